@@ -1,0 +1,241 @@
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::Aabb;
+
+/// What hangs below one side of a node of an [`AabbTree`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Child {
+    /// Another node, always with a greater index than its parent.
+    Node(u32),
+    /// `order()[start..end]`.
+    Leaf {
+        /// First position in the order.
+        start: u32,
+        /// One past the last.
+        end: u32,
+    },
+}
+
+/// A static binary tree of boxes over items, built by binned surface-area heuristic.
+///
+/// Deterministic: it depends on the boxes alone. Items of a leaf are contiguous in
+/// [`order`](Self::order), and so are those of any subtree.
+#[derive(Clone, Debug)]
+pub struct AabbTree {
+    order: Vec<u32>,
+    nodes: Vec<[(Aabb, Child); 2]>,
+    root: (Aabb, Child),
+}
+
+const BINS: usize = 16;
+/// Past this depth splits go to the median, so that no input makes a deep tree.
+const MEDIAN_DEPTH: usize = 40;
+
+impl AabbTree {
+    /// Largest depth of any tree: 40 levels by cost, then at most 29 halvings of 2^29 items.
+    pub const MAX_DEPTH: usize = MEDIAN_DEPTH + 30;
+
+    /// Builds the tree; leaves hold up to `leaf_size` items (at least 1).
+    pub fn build(boxes: &[Aabb], leaf_size: usize) -> Self {
+        let mut tree = Self {
+            order: (0..boxes.len() as u32).collect(),
+            nodes: Vec::with_capacity(2 * boxes.len() / leaf_size.max(1)),
+            root: (Aabb::EMPTY, Child::Leaf { start: 0, end: 0 }),
+        };
+        let mut order = std::mem::take(&mut tree.order);
+        let all = 0..order.len();
+        tree.root = tree.build_range(boxes, &mut order, all, leaf_size.max(1), 0);
+        tree.order = order;
+        tree
+    }
+
+    /// Items in leaf order.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Nodes, each with its two children and their boxes.
+    pub fn nodes(&self) -> &[[(Aabb, Child); 2]] {
+        &self.nodes
+    }
+
+    /// The whole tree as a child: its box, and node 0 or the only leaf.
+    pub fn root(&self) -> (Aabb, Child) {
+        self.root
+    }
+
+    /// Calls `leaf` with the items of each leaf whose box, and whose ancestors' boxes, `enter` accepts.
+    pub fn visit(&self, mut enter: impl FnMut(Aabb) -> bool, mut leaf: impl FnMut(&[u32])) {
+        let mut stack = vec![self.root];
+        while let Some((bounds, child)) = stack.pop() {
+            if !enter(bounds) {
+                continue;
+            }
+            match child {
+                Child::Node(n) => stack.extend(self.nodes[n as usize].iter().rev()),
+                Child::Leaf { start, end } => leaf(&self.order[start as usize..end as usize]),
+            }
+        }
+    }
+
+    /// The least `distance_squared(item)`, with its item; on ties the lowest item.
+    ///
+    /// `distance_squared` must be at least the squared distance from `p` to the item's box.
+    pub fn nearest(&self, p: DVec3, mut distance_squared: impl FnMut(u32) -> f64) -> Option<(f64, u32)> {
+        let mut best: Option<(f64, u32)> = None;
+        let mut stack = vec![(self.root.0.distance_squared(p), self.root.1)];
+        while let Some((bound, child)) = stack.pop() {
+            if best.is_some_and(|(d, _)| bound > d) {
+                continue;
+            }
+            match child {
+                Child::Node(n) => {
+                    let mut sides = self.nodes[n as usize].map(|(b, c)| (b.distance_squared(p), c));
+                    if sides[0].0 < sides[1].0 {
+                        sides.swap(0, 1);
+                    }
+                    stack.extend(sides);
+                }
+                Child::Leaf { start, end } => {
+                    for &item in &self.order[start as usize..end as usize] {
+                        let d = distance_squared(item);
+                        if best.is_none_or(|(b, i)| d < b || (d == b && item < i)) {
+                            best = Some((d, item));
+                        }
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    fn build_range(
+        &mut self,
+        boxes: &[Aabb],
+        order: &mut [u32],
+        range: Range<usize>,
+        leaf_size: usize,
+        depth: usize,
+    ) -> (Aabb, Child) {
+        let items = &mut order[range.clone()];
+        let bounds = items.iter().fold(Aabb::EMPTY, |b, &i| b.union(boxes[i as usize]));
+        if items.len() <= leaf_size {
+            items.sort_unstable();
+            return (bounds, Child::Leaf { start: range.start as u32, end: range.end as u32 });
+        }
+        let split = range.start + split(boxes, items, depth);
+        let node = self.nodes.len() as u32;
+        let empty = (Aabb::EMPTY, Child::Leaf { start: 0, end: 0 });
+        self.nodes.push([empty, empty]);
+        let left = self.build_range(boxes, order, range.start..split, leaf_size, depth + 1);
+        let right = self.build_range(boxes, order, split..range.end, leaf_size, depth + 1);
+        self.nodes[node as usize] = [left, right];
+        (bounds, Child::Node(node))
+    }
+}
+
+/// Reorders `items` and returns where the right side begins, in `1..items.len()`.
+fn split(boxes: &[Aabb], items: &mut [u32], depth: usize) -> usize {
+    let center = |i: u32| boxes[i as usize].center();
+    let spread = items.iter().fold(Aabb::EMPTY, |b, &i| b.union(Aabb::of(&[center(i)])));
+    let extent = spread.extent();
+    let by_cost = (depth < MEDIAN_DEPTH)
+        .then(|| (0..3).filter(|&a| extent[a] > 0.0).filter_map(|a| best_bin(boxes, items, spread, a)))
+        .and_then(|costs| costs.min_by(|a, b| a.0.total_cmp(&b.0)));
+    if let Some((_, axis, bin)) = by_cost {
+        // A stable partition keeps the result independent of everything but the boxes.
+        let (mut left, right): (Vec<u32>, Vec<u32>) =
+            items.iter().partition(|&&i| bin_of(center(i)[axis], spread, axis) <= bin);
+        let at = left.len();
+        left.extend(right);
+        items.copy_from_slice(&left);
+        return at;
+    }
+    let axis = if extent.x >= extent.y && extent.x >= extent.z {
+        0
+    } else if extent.y >= extent.z {
+        1
+    } else {
+        2
+    };
+    items.sort_by(|&a, &b| center(a)[axis].total_cmp(&center(b)[axis]).then(a.cmp(&b)));
+    items.len() / 2
+}
+
+fn bin_of(center: f64, spread: Aabb, axis: usize) -> usize {
+    let t = (center - spread.min[axis]) / (spread.max[axis] - spread.min[axis]);
+    ((t * BINS as f64) as usize).min(BINS - 1)
+}
+
+/// The cheapest split of one axis: (cost, axis, last bin of the left side).
+fn best_bin(boxes: &[Aabb], items: &[u32], spread: Aabb, axis: usize) -> Option<(f64, usize, usize)> {
+    let mut bins = [(Aabb::EMPTY, 0usize); BINS];
+    for &i in items {
+        let bin = &mut bins[bin_of(boxes[i as usize].center()[axis], spread, axis)];
+        *bin = (bin.0.union(boxes[i as usize]), bin.1 + 1);
+    }
+    let area = |b: Aabb| {
+        let e = b.extent().max(DVec3::ZERO);
+        e.x * e.y + e.y * e.z + e.z * e.x
+    };
+    let mut right = [(Aabb::EMPTY, 0usize); BINS];
+    for k in (0..BINS - 1).rev() {
+        right[k] = (right[k + 1].0.union(bins[k + 1].0), right[k + 1].1 + bins[k + 1].1);
+    }
+    let mut left = (Aabb::EMPTY, 0usize);
+    let mut best: Option<(f64, usize, usize)> = None;
+    for k in 0..BINS - 1 {
+        left = (left.0.union(bins[k].0), left.1 + bins[k].1);
+        if left.1 == 0 || right[k].1 == 0 {
+            continue;
+        }
+        let cost = area(left.0) * left.1 as f64 + area(right[k].0) * right[k].1 as f64;
+        if best.is_none_or(|(c, ..)| cost < c) {
+            best = Some((cost, axis, k));
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(n: usize) -> Vec<DVec3> {
+        let mut s = 7u64;
+        let mut next = || {
+            s = s.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (s >> 40) as f64 / (1u64 << 24) as f64
+        };
+        (0..n).map(|_| DVec3::new(next(), next(), next())).collect()
+    }
+
+    #[test]
+    fn nearest_equals_brute_force() {
+        let items = points(500);
+        let boxes: Vec<Aabb> = items.iter().map(|&p| Aabb::of(&[p])).collect();
+        let tree = AabbTree::build(&boxes, 3);
+        for q in points(200).iter().map(|p| *p * 2.0 - 0.5) {
+            let d = |i: u32| items[i as usize].distance_squared(q);
+            let brute = (0..500).map(|i| (d(i), i)).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+            assert_eq!(tree.nearest(q, d), Some(brute));
+        }
+    }
+
+    #[test]
+    fn identical_boxes_do_not_make_a_deep_tree() {
+        let tree = AabbTree::build(&vec![Aabb::of(&[DVec3::ONE]); 1000], 1);
+        let mut items = 0;
+        tree.visit(|_| true, |leaf| items += leaf.len());
+        assert_eq!(items, 1000);
+        assert_eq!(tree.nearest(DVec3::ZERO, |_| 3.0), Some((3.0, 0)));
+    }
+
+    #[test]
+    fn no_items() {
+        let tree = AabbTree::build(&[], 4);
+        assert_eq!(tree.nearest(DVec3::ZERO, |_| 0.0), None);
+    }
+}

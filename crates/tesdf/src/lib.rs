@@ -1,0 +1,7 @@
+//! Exact, memory-lean signed distances of arbitrary triangle meshes.
+#![warn(missing_docs)]
+
+pub mod geometry;
+pub mod mesh;
+
+pub use glam;
