@@ -1,0 +1,192 @@
+use glam::DVec3;
+
+/// Deepest cell. Three levels halve the edges: 66 levels reach `side / 2^22`.
+pub const MAX_DEPTH: u32 = 66;
+
+/// The axes of the unit cube in the order in which the six Kuhn tetrahedra walk them.
+///
+/// Root `r` has the corners `0, e_i, e_i + e_j, (1, 1, 1)` with `(i, j, k) = ROOTS[r]`: it holds the
+/// points with `x_i ≥ x_j ≥ x_k`.
+pub const ROOTS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+
+/// A tetrahedron of the bisection forest.
+///
+/// ```text
+///   k = 3: bisect edge 0–3      child 0: c0 c1 c2 m     child 1: c1 c2 c3 m
+///   k = 2: bisect edge 0–2      child 0: c0 c1 m  c3    child 1: c1 c2 m  c3
+///   k = 1: bisect edge 0–1      child 0: c0 m  c2 c3    child 1: c1 m  c2 c3
+/// ```
+///
+/// `k` cycles 3, 2, 1 (Maubach 1995, *Local bisection refinement for n-simplicial grids*). All cells
+/// of one depth are congruent up to three shapes, so no refinement makes slivers. Corners are exact:
+/// every coordinate is a dyadic fraction of the cube.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// Corners, in the order that the bisection needs.
+    pub corners: [DVec3; 4],
+    /// Number of bisections from the root.
+    pub depth: u32,
+}
+
+impl Cell {
+    /// The root tetrahedron `root` (0–5) of the cube `[origin, origin + side]³`.
+    pub fn root(origin: DVec3, side: f64, root: usize) -> Self {
+        let [i, j, _] = ROOTS[root];
+        let mut corners = [DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, DVec3::ONE];
+        corners[1][i] = 1.0;
+        corners[2][i] = 1.0;
+        corners[2][j] = 1.0;
+        Self { corners: corners.map(|c| origin + side * c), depth: 0 }
+    }
+
+    /// Which corner the refinement edge joins to corner 0.
+    fn k(&self) -> usize {
+        3 - (self.depth % 3) as usize
+    }
+
+    /// The midpoint of the refinement edge: the one new corner of both children.
+    pub fn midpoint(&self) -> DVec3 {
+        0.5 * (self.corners[0] + self.corners[self.k()])
+    }
+
+    /// Where each corner of child `side` (0 or 1) comes from: a corner of this cell, or its midpoint (4).
+    pub fn child_corners(&self, side: usize) -> [usize; 4] {
+        match (self.k(), side) {
+            (3, 0) => [0, 1, 2, 4],
+            (3, _) => [1, 2, 3, 4],
+            (2, 0) => [0, 1, 4, 3],
+            (2, _) => [1, 2, 4, 3],
+            (_, 0) => [0, 4, 2, 3],
+            _ => [1, 4, 2, 3],
+        }
+    }
+
+    /// Child 0 or 1.
+    pub fn child(&self, side: usize) -> Self {
+        let midpoint = self.midpoint();
+        let corner = |from: usize| if from == 4 { midpoint } else { self.corners[from] };
+        Self { corners: self.child_corners(side).map(corner), depth: self.depth + 1 }
+    }
+
+    /// Mean of the corners.
+    pub fn centroid(&self) -> DVec3 {
+        0.25 * (self.corners[0] + self.corners[1] + self.corners[2] + self.corners[3])
+    }
+
+    /// Volume.
+    pub fn volume(&self) -> f64 {
+        crate::geometry::tetrahedron_volume(&self.corners)
+    }
+}
+
+/// A point as fixed-point barycentric coordinates of the cell that holds it; exact from cell to child.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Barycentric {
+    lambda: [u64; 4],
+}
+
+impl Barycentric {
+    /// Fixed-point one: coordinates are whole multiples of `side / 2^52`.
+    pub const ONE: u64 = 1 << 52;
+
+    /// The root tetrahedron that holds a point of the unit cube, and the point's coordinates in it.
+    ///
+    /// `None` outside of the closed unit cube, and for NaN.
+    #[inline]
+    pub fn in_unit_cube(p: DVec3) -> Option<(usize, Self)> {
+        let inside = p.cmpge(DVec3::ZERO).all() && p.cmple(DVec3::ONE).all();
+        if !inside {
+            return None;
+        }
+        let u = p.to_array().map(|x| (x * Self::ONE as f64) as u64);
+        // Index of the permutation that sorts u in descending order, equal coordinates in axis order.
+        let (xy, xz, yz) = (u[0] >= u[1], u[0] >= u[2], u[1] >= u[2]);
+        let root = match (xy, xz, yz) {
+            (true, true, true) => 0,
+            (true, true, false) => 1,
+            (true, false, _) => 4,
+            (false, _, true) if xz => 2,
+            (false, _, true) => 3,
+            (false, _, false) => 5,
+        };
+        let [i, j, k] = ROOTS[root];
+        let lambda = [Self::ONE - u[i], u[i] - u[j], u[j] - u[k], u[k]];
+        Some((root, Self { lambda }))
+    }
+
+    /// Moves to the child that holds the point: its side, 0 or 1. On the shared face, side 0.
+    #[inline]
+    pub fn descend(&mut self, depth: u32) -> usize {
+        let l = self.lambda;
+        let k = 3 - (depth % 3) as usize;
+        let side = usize::from(l[0] < l[k]);
+        if side == 0 {
+            self.lambda[0] = l[0] - l[k];
+            self.lambda[k] = 2 * l[k];
+        } else {
+            self.lambda[..k].copy_from_slice(&l[1..=k]);
+            self.lambda[k - 1] = l[k] - l[0];
+            self.lambda[k] = 2 * l[0];
+        }
+        side
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn barycentric_of(cell: &Cell, p: DVec3) -> [f64; 4] {
+        let volume = |t: [DVec3; 4]| (t[1] - t[0]).cross(t[2] - t[0]).dot(t[3] - t[0]);
+        let whole = volume(cell.corners);
+        std::array::from_fn(|k| {
+            let mut t = cell.corners;
+            t[k] = p;
+            volume(t) / whole
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn descent_follows_the_geometry(x in 0.0..=1.0f64, y in 0.0..=1.0f64, z in 0.0..=1.0f64) {
+            let p = DVec3::new(x, y, z);
+            let (root, mut lambda) = Barycentric::in_unit_cube(p).unwrap();
+            let mut cell = Cell::root(DVec3::ZERO, 1.0, root);
+            for depth in 0..24 {
+                let exact = barycentric_of(&cell, p);
+                for k in 0..4 {
+                    let fixed = lambda.lambda[k] as f64 / Barycentric::ONE as f64;
+                    prop_assert!((fixed - exact[k]).abs() < 1e-8, "depth {} {:?}", depth, exact);
+                }
+                prop_assert_eq!(lambda.lambda.iter().sum::<u64>(), Barycentric::ONE);
+                let side = lambda.descend(depth);
+                cell = cell.child(side);
+            }
+        }
+    }
+
+    #[test]
+    fn children_halve_the_volume() {
+        let mut cell = Cell::root(DVec3::splat(-1.0), 2.0, 3);
+        for depth in 0..MAX_DEPTH {
+            let volume = cell.volume();
+            for side in 0..2 {
+                assert_eq!(cell.child(side).volume(), 0.5 * volume, "depth {depth}");
+            }
+            cell = cell.child((depth as usize * 7 / 3) % 2);
+        }
+    }
+
+    #[test]
+    fn ties_and_corners_have_a_root() {
+        for i in 0..27 {
+            let p = DVec3::new((i % 3) as f64, (i / 3 % 3) as f64, (i / 9) as f64) / 2.0;
+            let (root, _) = Barycentric::in_unit_cube(p).unwrap();
+            let [a, b, c] = ROOTS[root];
+            assert!(p[a] >= p[b] && p[b] >= p[c]);
+        }
+        assert_eq!(Barycentric::in_unit_cube(DVec3::new(0.5, f64::NAN, 0.5)), None);
+        assert_eq!(Barycentric::in_unit_cube(DVec3::new(0.5, 1.1, 0.5)), None);
+    }
+}

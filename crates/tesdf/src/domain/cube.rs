@@ -1,0 +1,66 @@
+use glam::DVec3;
+
+use super::{Barycentric, Cell};
+use crate::geometry::Aabb;
+
+/// The cube that the six roots fill, in the local frame.
+///
+/// Origin and side are multiples of 2^-20, so that all corners of all cells are exact in `f64`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DomainCube {
+    origin: DVec3,
+    side: f64,
+}
+
+const GRAIN: f64 = 1.0 / (1 << 20) as f64;
+
+impl DomainCube {
+    /// The least such cube around `bounds` (local frame), centred on it.
+    pub fn around(bounds: Aabb) -> Self {
+        let up = |x: f64, grain: f64| (x / grain).ceil() * grain;
+        let side = up(bounds.extent().max_element() + 4.0 * GRAIN, 1024.0 * GRAIN);
+        let origin = bounds.center() - 0.5 * side;
+        Self { origin: origin.map(|x| (x / GRAIN).floor() * GRAIN), side }
+    }
+
+    /// A cube with a given origin and side, as stored in an asset.
+    pub fn new(origin: DVec3, side: f64) -> Self {
+        Self { origin, side }
+    }
+
+    /// Least corner, in the local frame.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Edge length, in the local frame.
+    pub fn side(&self) -> f64 {
+        self.side
+    }
+
+    /// Root tetrahedron `root`, 0 to 5.
+    pub fn root(&self, root: usize) -> Cell {
+        Cell::root(self.origin, self.side, root)
+    }
+
+    /// The root that holds a point of the local frame, with the point's coordinates in it.
+    #[inline]
+    pub fn locate(&self, p: DVec3) -> Option<(usize, Barycentric)> {
+        Barycentric::in_unit_cube((p - self.origin) / self.side)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn holds_its_bounds() {
+        for size in [0.3, 0.57735, 1.0] {
+            let bounds = Aabb { min: DVec3::splat(-0.1), max: DVec3::new(0.1, size, 0.01) };
+            let cube = DomainCube::around(bounds);
+            assert!(bounds.min.cmpge(cube.origin()).all());
+            assert!(bounds.max.cmple(cube.origin() + cube.side()).all());
+        }
+    }
+}

@@ -1,0 +1,72 @@
+use glam::DVec3;
+
+use super::Aabb;
+
+/// The frame in which everything is computed: `local = (x − offset) · scale`, exact for every vertex.
+///
+/// A part of a few millimetres given in metres, a cube of edge 1e30 and a bracket 1000 km from the
+/// origin all become bodies of diagonal 0.5 to 1 near the origin, without rounding:
+/// - `scale` is a power of two;
+/// - an axis on which the body spans `[lo, hi]` with `0 < lo`, `hi ≤ 2 lo` (or mirrored) is offset by
+///   its middle, where subtraction is exact (Sterbenz); any other axis is not offset, as there the
+///   coordinates are at most twice the body's extent and lose nothing against it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LocalFrame {
+    /// Subtracted first, in the mesh's unit.
+    pub offset: DVec3,
+    /// Multiplied second; a power of two.
+    pub scale: f64,
+}
+
+impl LocalFrame {
+    /// The frame of a body with these bounds, in the mesh's unit.
+    pub fn of(bounds: Aabb) -> Self {
+        let axis = |lo: f64, hi: f64| {
+            let (near, far) = if lo > 0.0 { (lo, hi) } else { (-hi, -lo) };
+            if near > 0.0 && far <= 2.0 * near { lo + 0.5 * (hi - lo) } else { 0.0 }
+        };
+        let offset = DVec3::from_array(std::array::from_fn(|a| axis(bounds.min[a], bounds.max[a])));
+        let (_, exponent) = frexp(bounds.extent().length());
+        Self { offset, scale: 2f64.powi(-exponent) }
+    }
+
+    /// Mesh unit to local.
+    pub fn to_local(self, p: DVec3) -> DVec3 {
+        (p - self.offset) * self.scale
+    }
+
+    /// Local to mesh unit.
+    pub fn to_world(self, p: DVec3) -> DVec3 {
+        p / self.scale + self.offset
+    }
+}
+
+/// `x = m · 2^e` with `m` in [0.5, 1), for finite positive normal `x`.
+fn frexp(x: f64) -> (f64, i32) {
+    let e = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1022;
+    (x / 2f64.powi(e), e)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertices_map_exactly() {
+        for (center, size) in [(0.0, 0.02), (1e6, 0.02), (-1e6, 0.02), (0.0, 1e30), (0.0, 1e-30), (1.0, 1.5)] {
+            let corners: Vec<DVec3> = (0..8)
+                .map(|i| {
+                    DVec3::splat(center)
+                        + size * DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64)
+                })
+                .collect();
+            let bounds = Aabb::of(&corners);
+            let frame = LocalFrame::of(bounds);
+            for &c in &corners {
+                assert_eq!(frame.to_world(frame.to_local(c)), c);
+            }
+            let diagonal = bounds.extent().length() * frame.scale;
+            assert!((0.5..1.0).contains(&diagonal), "{diagonal}");
+        }
+    }
+}
