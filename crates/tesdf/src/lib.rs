@@ -2,6 +2,7 @@
 #![warn(missing_docs)]
 
 pub mod domain;
+pub mod encode;
 pub mod geometry;
 pub mod mesh;
 

@@ -1,0 +1,214 @@
+//! Over-refines the domain and prunes it while unwinding.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use super::filter::{Candidate, Scratch, filter, probe};
+use super::surface::{Requirement, Surface};
+use crate::domain::{Cell, DomainCube, MAX_DEPTH};
+use crate::geometry::Aabb;
+
+/// A refined tree of cells.
+#[derive(Debug)]
+pub enum Tree {
+    /// A cell.
+    Leaf(Leaf),
+    /// The two children of a bisection.
+    Split(Box<[Tree; 2]>),
+}
+
+/// What a leaf answers from.
+#[derive(Debug)]
+pub enum Leaf {
+    /// The faces that can be closest in the cell, in ascending order.
+    Listed {
+        /// Face ids, ascending.
+        faces: Vec<u32>,
+        /// Whether the surface passes through the cell.
+        crossing: bool,
+    },
+    /// Far from the surface with a long list: the face tree answers, the cell knows the sign.
+    Far,
+    /// Farther out than the band: not of the domain.
+    Outside,
+}
+
+/// What the pruning weighs: everything in the local frame.
+#[derive(Clone, Debug)]
+pub struct Weights {
+    /// Faces per query that one stored byte is worth.
+    pub byte: f64,
+    /// Divides volumes into the average over a layer of this half width around the surface.
+    pub near: f64,
+    /// Normalisation: 1 / (area · 2 near).
+    pub per_volume: f64,
+    /// Faces that a query by the face tree counts as.
+    pub far_faces: f64,
+    /// Lists shorter than this are never left to the face tree.
+    pub far_list: usize,
+    /// Nothing nearer to the surface than this is left to the face tree.
+    pub far_distance: f64,
+    /// List length that no refinement is expected to get below.
+    pub floor: f64,
+    /// Levels to bisect beyond where that could pay, for the tighter union.
+    pub extra_levels: u32,
+}
+
+/// Bytes of a leaf besides its entries: two words of the tree, its share of headers and palettes.
+const LEAF_BYTES: f64 = 14.0;
+/// Requirement sets longer than this are not merged: such a cell is never worth keeping.
+const MAX_UNION: usize = 256;
+
+/// All that the recursion reads.
+pub struct Refiner<'a> {
+    /// The surface.
+    pub surface: &'a Surface,
+    /// Weights of the pruning.
+    pub weights: Weights,
+    /// Outer band, local frame.
+    pub band: f64,
+    /// Boxes that belong to the domain besides the band, local frame.
+    pub regions: &'a [Aabb],
+    /// Winding number at a point, local frame.
+    pub inside: &'a (dyn Fn(glam::DVec3) -> bool + Sync),
+    /// Set to stop early.
+    pub cancel: &'a AtomicBool,
+    /// Volume done, in units of 2^-40 of the cube.
+    pub done: &'a AtomicU64,
+}
+
+struct Pruned {
+    tree: Tree,
+    cost: f64,
+    union: Option<Vec<Requirement>>,
+    crossing: bool,
+}
+
+impl Refiner<'_> {
+    /// Refines root `root` of the cube. `None` when cancelled.
+    pub fn root(&self, cube: &DomainCube, root: usize) -> Option<Tree> {
+        let cell = cube.root(root);
+        let candidates: Vec<Candidate> = (0..self.surface.faces.len() as u32)
+            .map(|face| Candidate { face, at: cell.corners.map(|c| probe(self.surface, face, c)) })
+            .collect();
+        self.refine(cell, candidates, 0, &mut Scratch::default()).map(|p| p.tree)
+    }
+
+    fn refine(&self, cell: Cell, candidates: Vec<Candidate>, beyond: u32, scratch: &mut Scratch) -> Option<Pruned> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return None;
+        }
+        let filtered = filter(self.surface, &cell, &candidates, scratch);
+        let centroid = cell.centroid();
+        let radius = cell.corners.iter().map(|c| c.distance(centroid)).fold(0.0, f64::max);
+        let nearest = filtered.distance - radius;
+        let n = filtered.survivors.len();
+
+        let mut own: Vec<Requirement> = filtered.survivors.iter().map(|s| s.requirement).collect();
+        own.sort_unstable();
+
+        let outside = nearest > self.band
+            && !self.regions.iter().any(|r| r.overlaps(Aabb::of(&cell.corners)))
+            && !(self.inside)(centroid);
+        if outside {
+            self.finish(&cell);
+            let union = (n <= MAX_UNION).then_some(own);
+            return Some(Pruned { tree: Tree::Leaf(Leaf::Outside), cost: 0.0, union, crossing: false });
+        }
+        let w = &self.weights;
+        let weight = cell.volume() * w.per_volume * w.near / (filtered.distance + w.near);
+        let could_pay = weight * (n as f64 - w.floor) > w.byte * (LEAF_BYTES + w.floor);
+        let beyond = if could_pay || n as f64 <= w.floor { 0 } else { beyond + 1 };
+        let split = cell.depth < MAX_DEPTH && (could_pay || (beyond > 0 && beyond <= w.extra_levels));
+        let far = n >= w.far_list && nearest > w.far_distance && !filtered.crossing;
+
+        if !split {
+            self.finish(&cell);
+            return Some(self.leaf(own, filtered.crossing, weight, far));
+        }
+        let midpoint = cell.midpoint();
+        let alive: Vec<(&Candidate, _)> = filtered
+            .survivors
+            .iter()
+            .map(|s| &candidates[s.index as usize])
+            .map(|g| (g, probe(self.surface, g.face, midpoint)))
+            .collect();
+        let below = |side: usize| -> Vec<Candidate> {
+            let from = cell.child_corners(side);
+            let take = |(g, m): &(&Candidate, _)| Candidate {
+                face: g.face,
+                at: from.map(|k| if k == 4 { *m } else { g.at[k] }),
+            };
+            alive.iter().map(take).collect()
+        };
+        let (first, second) = (below(0), below(1));
+        drop(alive);
+        drop(candidates);
+        let (left, right) = if cell.depth < 14 {
+            rayon::join(
+                || self.refine(cell.child(0), first, beyond, &mut Scratch::default()),
+                || self.refine(cell.child(1), second, beyond, &mut Scratch::default()),
+            )
+        } else {
+            let left = self.refine(cell.child(0), first, beyond, scratch);
+            (left, self.refine(cell.child(1), second, beyond, scratch))
+        };
+        let (left, right) = (left?, right?);
+        Some(self.prune(left, right, own, weight, far))
+    }
+
+    fn leaf(&self, mut own: Vec<Requirement>, crossing: bool, weight: f64, far: bool) -> Pruned {
+        let w = &self.weights;
+        let faces = self.surface.cover(&own);
+        let n = faces.len() as f64;
+        let listed = weight * n + w.byte * (n + LEAF_BYTES);
+        let by_tree = weight * w.far_faces + w.byte * LEAF_BYTES;
+        own.truncate(if own.len() > MAX_UNION { 0 } else { own.len() });
+        let union = (!own.is_empty()).then_some(own);
+        if far && by_tree < listed {
+            return Pruned { tree: Tree::Leaf(Leaf::Far), cost: by_tree, union, crossing };
+        }
+        Pruned { tree: Tree::Leaf(Leaf::Listed { faces, crossing }), cost: listed, union, crossing }
+    }
+
+    /// Keeps the split, or merges it when one cell costs less.
+    fn prune(&self, left: Pruned, right: Pruned, own: Vec<Requirement>, weight: f64, far: bool) -> Pruned {
+        let split = left.cost + right.cost;
+        let crossing = left.crossing || right.crossing;
+        let union = match (left.union, right.union) {
+            (Some(a), Some(b)) => Some(merged(a, b)).filter(|u| u.len() <= own.len().min(MAX_UNION)),
+            _ => None,
+        };
+        let tightest = union.or((own.len() <= MAX_UNION).then_some(own));
+        let both_outside =
+            matches!((&left.tree, &right.tree), (Tree::Leaf(Leaf::Outside), Tree::Leaf(Leaf::Outside)));
+        if both_outside {
+            return Pruned { tree: left.tree, cost: 0.0, union: tightest, crossing: false };
+        }
+        if let Some(all) = tightest {
+            let merged = self.leaf(all, crossing, weight, far);
+            if merged.cost <= split {
+                return merged;
+            }
+            let tree = Tree::Split(Box::new([left.tree, right.tree]));
+            return Pruned { tree, cost: split, ..merged };
+        }
+        if far {
+            let cost = weight * self.weights.far_faces + self.weights.byte * LEAF_BYTES;
+            if cost <= split {
+                return Pruned { tree: Tree::Leaf(Leaf::Far), cost, union: None, crossing };
+            }
+        }
+        Pruned { tree: Tree::Split(Box::new([left.tree, right.tree])), cost: split, union: None, crossing }
+    }
+
+    fn finish(&self, cell: &Cell) {
+        self.done.fetch_add((1 << 40) >> cell.depth.min(40), Ordering::Relaxed);
+    }
+}
+
+fn merged(mut a: Vec<Requirement>, b: Vec<Requirement>) -> Vec<Requirement> {
+    a.extend(b);
+    a.sort_unstable();
+    a.dedup();
+    a
+}

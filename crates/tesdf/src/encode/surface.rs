@@ -1,0 +1,145 @@
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use crate::geometry::{Feature, LocalFrame, Triangle};
+use crate::mesh::TriangleMesh;
+
+/// A part of the surface whose distance a cell needs: a face, an edge or a vertex.
+///
+/// Ordered: faces, then edges, then vertices, each by its id.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Requirement(u32);
+
+/// What a [`Requirement`] names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// A face.
+    Face(u32),
+    /// An edge of [`Surface`].
+    Edge(u32),
+    /// A vertex.
+    Vertex(u32),
+}
+
+/// The mesh in the local frame, with what the encoder looks up: normals, edges, incident faces.
+#[derive(Debug)]
+pub struct Surface {
+    /// Faces in the local frame.
+    pub triangles: Vec<Triangle>,
+    /// Vertex ids of each face.
+    pub faces: Vec<[u32; 3]>,
+    /// Edge ids of each face; edge `k` joins corners `k` and `k + 1`.
+    pub edges: Vec<[u32; 3]>,
+    edge_count: u32,
+    /// Faces of each edge.
+    edge_faces: Vec<Vec<u32>>,
+    /// Faces of each vertex.
+    vertex_faces: Vec<Vec<u32>>,
+    /// Total area, local frame.
+    pub area: f64,
+}
+
+impl Surface {
+    /// Takes a mesh into `frame`.
+    pub fn new(mesh: &TriangleMesh, frame: LocalFrame) -> Self {
+        let local: Vec<DVec3> = mesh.vertices().iter().map(|&v| frame.to_local(v)).collect();
+        let faces = mesh.faces().to_vec();
+        let triangles: Vec<Triangle> =
+            faces.iter().map(|f| Triangle::new(f.map(|v| local[v as usize]))).collect();
+        let mut ids = HashMap::with_capacity(faces.len() * 3 / 2);
+        let mut edge_faces: Vec<Vec<u32>> = Vec::new();
+        let mut edges = Vec::with_capacity(faces.len());
+        for (face, corners) in faces.iter().enumerate() {
+            edges.push(std::array::from_fn(|k| {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                let key = [a.min(b), a.max(b)];
+                let id = *ids.entry(key).or_insert_with(|| {
+                    edge_faces.push(Vec::with_capacity(2));
+                    edge_faces.len() as u32 - 1
+                });
+                edge_faces[id as usize].push(face as u32);
+                id
+            }));
+        }
+        let mut vertex_faces: Vec<Vec<u32>> = vec![Vec::new(); local.len()];
+        for (face, corners) in faces.iter().enumerate() {
+            for &v in corners {
+                vertex_faces[v as usize].push(face as u32);
+            }
+        }
+        let area = triangles
+            .iter()
+            .map(|t| 0.5 * (t.corners[1] - t.corners[0]).cross(t.corners[2] - t.corners[0]).length())
+            .sum();
+        Self { triangles, faces, edges, edge_count: edge_faces.len() as u32, edge_faces, vertex_faces, area }
+    }
+
+    /// The requirement of a face's feature.
+    pub fn requirement(&self, face: u32, feature: Feature) -> Requirement {
+        let (f, e) = (self.faces.len() as u32, self.edge_count);
+        Requirement(match feature {
+            Feature::Face => face,
+            Feature::Edge(k) => f + self.edges[face as usize][k as usize],
+            Feature::Vertex(k) => f + e + self.faces[face as usize][k as usize],
+        })
+    }
+
+    /// What a requirement names.
+    pub fn part(&self, requirement: Requirement) -> Part {
+        let (f, e) = (self.faces.len() as u32, self.edge_count);
+        match requirement.0 {
+            id if id < f => Part::Face(id),
+            id if id < f + e => Part::Edge(id - f),
+            id => Part::Vertex(id - f - e),
+        }
+    }
+
+    /// Whether a requirement is a whole face.
+    pub fn is_face(&self, requirement: Requirement) -> bool {
+        requirement.0 < self.faces.len() as u32
+    }
+
+    /// Whether `face` holds the feature that `requirement` names.
+    pub fn holds(&self, face: u32, requirement: Requirement) -> bool {
+        match self.part(requirement) {
+            Part::Face(f) => f == face,
+            Part::Edge(e) => self.edges[face as usize].contains(&e),
+            Part::Vertex(v) => self.faces[face as usize].contains(&v),
+        }
+    }
+
+    /// Whether `whole` is a face that holds the part that `requirement` names.
+    pub fn implies(&self, whole: Requirement, requirement: Requirement) -> bool {
+        matches!(self.part(whole), Part::Face(f) if self.holds(f, requirement))
+    }
+
+    /// The fewest faces, greedily, that hold all of `requirements` (sorted), in ascending order.
+    ///
+    /// Faces are taken as they are; then each edge that none of them has takes the one of its faces that
+    /// meets most of what is still open; then vertices likewise.
+    pub fn cover(&self, requirements: &[Requirement]) -> Vec<u32> {
+        let mut kept: Vec<u32> = Vec::with_capacity(requirements.len());
+        let mut open: Vec<Requirement> = Vec::new();
+        for &r in requirements {
+            match self.part(r) {
+                Part::Face(f) => kept.push(f),
+                _ => open.push(r),
+            }
+        }
+        open.retain(|&r| !kept.iter().any(|&f| self.holds(f, r)));
+        while let Some(&first) = open.first() {
+            let gain = |face: u32| open.iter().filter(|&&r| self.holds(face, r)).count();
+            let own: &[u32] = match self.part(first) {
+                Part::Face(_) => &[],
+                Part::Edge(e) => &self.edge_faces[e as usize],
+                Part::Vertex(v) => &self.vertex_faces[v as usize],
+            };
+            let Some(&best) = own.iter().max_by_key(|&&f| (gain(f), std::cmp::Reverse(f))) else { break };
+            kept.push(best);
+            open.retain(|&r| !self.holds(best, r));
+        }
+        kept.sort_unstable();
+        kept
+    }
+}
