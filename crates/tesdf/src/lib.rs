@@ -1,6 +1,7 @@
 //! Exact, memory-lean signed distances of arbitrary triangle meshes.
 #![warn(missing_docs)]
 
+pub mod asset;
 pub mod domain;
 pub mod encode;
 pub mod geometry;

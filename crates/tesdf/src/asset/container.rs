@@ -1,0 +1,327 @@
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::marker::PhantomData;
+use std::ops::{Deref, Range};
+use std::path::Path;
+use std::sync::Arc;
+
+use memmap2::Mmap;
+
+use super::header::{self, DIGITS, Line, SECTION_CHECKSUM, Shape};
+use super::{AssetError, Presence, Section, SectionSpec};
+
+#[cfg(target_endian = "big")]
+compile_error!("sections are read in place and are little-endian; this target is big-endian");
+
+/// Sections and metadata as the bytes of a `.tesdf` file; the same input gives the same bytes.
+///
+/// `metadata` are the caller's keys; `format`, `version`, `checksum` and `checksum.*` are added here.
+///
+/// # Errors
+/// A section that is given twice or is not whole rows, a metadata key that is reserved, more than 1 MiB of header.
+pub fn write_container(
+    sections: &[Section<'_>],
+    metadata: &BTreeMap<String, String>,
+) -> Result<Vec<u8>, AssetError> {
+    if let Some(key) = metadata.keys().find(|key| header::is_reserved(key)) {
+        return Err(AssetError::header(format!("the metadata key {key} is reserved; use another")));
+    }
+    // Widest first: safetensors forbids gaps, and this order alone keeps every section aligned.
+    let mut ordered: Vec<_> = sections.iter().collect();
+    ordered.sort_by_key(|s| std::cmp::Reverse(s.spec.element.size()));
+    let mut metadata = metadata.clone();
+    let mut lines = Vec::with_capacity(ordered.len());
+    let mut begin = 0;
+    for Section { spec, bytes } in &ordered {
+        let row = spec.row_size();
+        if row == 0 || !bytes.len().is_multiple_of(row) {
+            return Err(AssetError::section(
+                spec.name,
+                format!("{} bytes are not whole rows of {row} bytes", bytes.len()),
+            ));
+        }
+        let digest = blake3::hash(bytes).to_hex().to_string();
+        if metadata.insert(format!("{SECTION_CHECKSUM}{}", spec.name), digest).is_some() {
+            return Err(AssetError::section(spec.name, "given twice"));
+        }
+        let end = begin + bytes.len() as u64;
+        lines.push(Line {
+            name: spec.name,
+            dtype: spec.element.name(),
+            shape: shape_of(spec, (bytes.len() / row) as u64),
+            data_offsets: [begin, end],
+        });
+        begin = end;
+    }
+    let mut file = header::write_header(&metadata, &lines)?;
+    file.reserve_exact(ordered.iter().map(|s| s.bytes.len()).sum());
+    ordered.iter().for_each(|s| file.extend_from_slice(s.bytes));
+    Ok(file)
+}
+
+fn shape_of(spec: &SectionSpec, rows: u64) -> Shape {
+    Shape { rows, columns: (spec.columns != 1).then_some(spec.columns as u64) }
+}
+
+/// An open `.tesdf` file: the bytes, and where each section lies in them.
+///
+/// Opening checks the structure: magic, version, that every section of the table is there with its element type and
+/// columns, that sections are aligned and follow each other without gaps, and that the file ends where the last one ends.
+/// It reads only the header, so it costs the same for every size; [`verify_checksums`](Self::verify_checksums) reads the
+/// whole file. What the numbers in the sections mean is not checked here.
+///
+/// Cloning is cheap: clones share the bytes.
+#[derive(Clone, Debug)]
+pub struct Container {
+    storage: Arc<Storage>,
+    metadata: BTreeMap<String, String>,
+    sections: Vec<Placed>,
+    header_end: usize,
+    /// Position of the header checksum's digits.
+    digits: usize,
+}
+
+#[derive(Debug)]
+enum Storage {
+    Mapped(Mmap),
+    /// `u64` for the alignment; the last word may be partly unused.
+    Owned {
+        words: Vec<u64>,
+        length: usize,
+    },
+}
+
+impl Storage {
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Mapped(map) => map,
+            Self::Owned { words, length } => &bytemuck::cast_slice(words)[..*length],
+        }
+    }
+}
+
+#[derive(Clone, Debug)]
+struct Placed {
+    spec: SectionSpec,
+    range: Range<usize>,
+    checksum: String,
+}
+
+impl Container {
+    /// Maps the file at `path`, read-only, and checks its structure against `table`.
+    ///
+    /// The file must not be changed in place while it is open: a reader would see the change, and after a truncation the
+    /// operating system ends the process (SIGBUS). Replacing it by a rename, as [`save_atomic`](super::save_atomic) does,
+    /// is safe. For a file that others may write to, read it and use [`from_bytes`](Self::from_bytes).
+    ///
+    /// # Errors
+    /// [`AssetError`] names what was found, in which section, and what was expected.
+    pub fn open(path: &Path, table: &[SectionSpec]) -> Result<Self, AssetError> {
+        let io = |action| move |source| AssetError::Io { action, path: path.to_path_buf(), source };
+        let file = File::open(path).map_err(io("open"))?;
+        let kind = file.metadata().map_err(io("open"))?;
+        if kind.is_dir() {
+            return Err(io("open")(std::io::ErrorKind::IsADirectory.into()));
+        }
+        if kind.len() == 0 {
+            // An empty file cannot be mapped on every system.
+            return Self::from_bytes(&[], table);
+        }
+        // SAFETY: nothing in this process writes to the mapping; what other processes may do is documented above.
+        let map = unsafe { Mmap::map(&file) }.map_err(io("map"))?;
+        Self::new(Storage::Mapped(map), table)
+    }
+
+    /// Copies `bytes` into aligned memory and checks the structure against `table`.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn from_bytes(bytes: &[u8], table: &[SectionSpec]) -> Result<Self, AssetError> {
+        let mut words = vec![0_u64; bytes.len().div_ceil(size_of::<u64>())];
+        bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+        Self::new(Storage::Owned { words, length: bytes.len() }, table)
+    }
+
+    fn new(storage: Storage, table: &[SectionSpec]) -> Result<Self, AssetError> {
+        let bytes = storage.bytes();
+        let (digits, header_end) = header::read_prefix(bytes)?;
+        let header::Header { mut metadata, entries } =
+            header::parse(&bytes[header::LENGTH_FIELD..header_end])?;
+        let mut sections: Vec<Placed> = Vec::with_capacity(table.len());
+        let mut end = 0_u64;
+        for (name, entry) in entries {
+            let wrong = |reason: String| AssetError::section(&name, reason);
+            let spec = table
+                .iter()
+                .find(|spec| spec.name == name)
+                .ok_or_else(|| wrong("no section of this format version has this name".into()))?;
+            if sections.iter().any(|s| s.spec.name == name) {
+                return Err(wrong("it has two entries".into()));
+            }
+            if entry.dtype != spec.element.name() {
+                let found = super::error::shown(&entry.dtype);
+                return Err(wrong(format!("element type {found}; expected {}", spec.element.name())));
+            }
+            let expected = shape_of(spec, entry.shape.rows);
+            if entry.shape != expected {
+                return Err(wrong(format!("shape {}; expected {expected}", entry.shape)));
+            }
+            let [from, to] = entry.data_offsets;
+            let size = entry.shape.rows.checked_mul(spec.row_size() as u64);
+            if from != end || to.checked_sub(from) != size {
+                return Err(wrong(format!(
+                    "data_offsets [{from},{to}]; the section before ends at {end} and the shape {} needs {}",
+                    entry.shape,
+                    size.map_or("more than 2^64 bytes".to_string(), |s| format!("{s} bytes"))
+                )));
+            }
+            if !from.is_multiple_of(spec.element.size() as u64) {
+                return Err(wrong(format!(
+                    "data_offsets [{from},{to}] are not aligned to {} bytes",
+                    spec.element.size()
+                )));
+            }
+            let checksum = metadata
+                .remove(&format!("{SECTION_CHECKSUM}{name}"))
+                .ok_or_else(|| wrong(format!("the metadata has no {SECTION_CHECKSUM}{name}")))?;
+            let available = (bytes.len() - header_end) as u64;
+            if to > available {
+                return Err(wrong(format!(
+                    "it ends at byte {to} of the data, but the file has {available}; it was cut short, \
+                     copy or encode it again"
+                )));
+            }
+            // Both are within the file, so they fit a usize.
+            let range = header_end + from as usize..header_end + to as usize;
+            sections.push(Placed { spec: *spec, range, checksum });
+            end = to;
+        }
+        for spec in table {
+            if spec.presence == Presence::Required && !sections.iter().any(|s| s.spec.name == spec.name) {
+                return Err(AssetError::section(spec.name, "it is missing"));
+            }
+        }
+        let expected = header_end as u64 + end;
+        if bytes.len() as u64 != expected {
+            return Err(AssetError::TrailingBytes { expected, extra: bytes.len() as u64 - expected });
+        }
+        for key in ["format", "version", "checksum"] {
+            metadata.remove(key);
+        }
+        if let Some(key) = metadata.keys().find(|key| key.starts_with(SECTION_CHECKSUM)) {
+            return Err(AssetError::header(format!(
+                "{} belongs to no section of the file",
+                super::error::shown(key)
+            )));
+        }
+        Ok(Self { storage: Arc::new(storage), metadata, sections, header_end, digits })
+    }
+
+    /// The caller's metadata, as given to [`write_container`].
+    pub fn metadata(&self) -> &BTreeMap<String, String> {
+        &self.metadata
+    }
+
+    /// The whole file.
+    pub fn as_bytes(&self) -> &[u8] {
+        self.storage.bytes()
+    }
+
+    /// Bytes of length field and header, before the first section.
+    pub fn header_size(&self) -> usize {
+        self.header_end
+    }
+
+    /// The sections present, in the order of the file, with their bytes.
+    pub fn sections(&self) -> impl Iterator<Item = Section<'_>> {
+        self.sections.iter().map(|s| Section { spec: s.spec, bytes: &self.as_bytes()[s.range.clone()] })
+    }
+
+    /// Section `name` in place, one `T` per number or per row; `None` when the file lacks it.
+    ///
+    /// # Errors
+    /// [`AssetError::Section`] when `T` is neither as large as one number nor as one row, or is aligned to more than
+    /// the section is.
+    pub fn section<T: bytemuck::Pod>(&self, name: &str) -> Result<Option<&[T]>, AssetError> {
+        let Some(Placed { spec, range, .. }) = self.sections.iter().find(|s| s.spec.name == name) else {
+            return Ok(None);
+        };
+        if size_of::<T>() != spec.element.size() && size_of::<T>() != spec.row_size() {
+            return Err(AssetError::section(
+                name,
+                format!(
+                    "read as a type of {} bytes; a number has {} and a row {}",
+                    size_of::<T>(),
+                    spec.element.size(),
+                    spec.row_size()
+                ),
+            ));
+        }
+        bytemuck::try_cast_slice(&self.as_bytes()[range.clone()])
+            .map(Some)
+            .map_err(|e| AssetError::section(name, format!("cannot be read in place: {e}")))
+    }
+
+    /// As [`section`](Self::section), but owning a share of the bytes, for types that keep a section.
+    ///
+    /// # Errors
+    /// As [`section`](Self::section); a section that the file lacks is an error here.
+    pub fn shared_section<T: bytemuck::Pod>(&self, name: &str) -> Result<SharedSection<T>, AssetError> {
+        let slice: &[T] = self.section(name)?.ok_or_else(|| AssetError::section(name, "it is missing"))?;
+        let (start, length) = (slice.as_ptr(), slice.len());
+        Ok(SharedSection { storage: Arc::clone(&self.storage), start, length, element: PhantomData })
+    }
+
+    /// Reads every byte of the file and compares it with the checksums.
+    ///
+    /// # Errors
+    /// [`AssetError::Checksum`] names the header or the first damaged section.
+    pub fn verify_checksums(&self) -> Result<(), AssetError> {
+        let bytes = self.as_bytes();
+        let compare = |part: String, found: String, expected: &[u8]| {
+            if found.as_bytes() == expected {
+                return Ok(());
+            }
+            let expected = super::error::shown(&String::from_utf8_lossy(expected));
+            Err(AssetError::Checksum { part, found, expected })
+        };
+        let found = header::header_checksum(&bytes[..self.header_end], self.digits);
+        compare("header".into(), found, &bytes[self.digits..self.digits + DIGITS])?;
+        for Placed { spec, range, checksum } in &self.sections {
+            let found = blake3::hash(&bytes[range.clone()]).to_hex().to_string();
+            compare(format!("section {}", spec.name), found, checksum.as_bytes())?;
+        }
+        Ok(())
+    }
+}
+
+/// A section of a [`Container`] that keeps the container's bytes alive; derefs to a slice at no cost.
+#[derive(Clone)]
+pub struct SharedSection<T> {
+    storage: Arc<Storage>,
+    start: *const T,
+    length: usize,
+    element: PhantomData<T>,
+}
+
+// SAFETY: the bytes are immutable and owned by `storage`, itself `Send + Sync`; `start` is only read.
+unsafe impl<T: bytemuck::Pod + Send + Sync> Send for SharedSection<T> {}
+// SAFETY: as above.
+unsafe impl<T: bytemuck::Pod + Send + Sync> Sync for SharedSection<T> {}
+
+impl<T: bytemuck::Pod> Deref for SharedSection<T> {
+    type Target = [T];
+
+    #[inline]
+    fn deref(&self) -> &[T] {
+        // SAFETY: `start` and `length` are of a slice checked by bytemuck; its memory (a mapping, or the heap block of a
+        // vector that nobody can reach mutably) neither moves nor goes before `storage` does.
+        unsafe { std::slice::from_raw_parts(self.start, self.length) }
+    }
+}
+
+impl<T: bytemuck::Pod + std::fmt::Debug> std::fmt::Debug for SharedSection<T> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "SharedSection of {} of {} bytes", self.length, self.storage.bytes().len())
+    }
+}

@@ -1,0 +1,104 @@
+use std::io;
+use std::path::PathBuf;
+
+/// Why a `.tesdf` file cannot be written, opened or trusted.
+#[derive(Debug, thiserror::Error)]
+pub enum AssetError {
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was tried: `open`, `map`, `write`, …
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The operating system's answer.
+        source: io::Error,
+    },
+    /// The bytes are of another format.
+    #[error("this is {found}, not a .tesdf file; {next}")]
+    NotTesdf {
+        /// What the bytes look like, with its article.
+        found: &'static str,
+        /// What to do next.
+        next: &'static str,
+    },
+    /// The file is of a version that this build does not read.
+    #[error("file-format version {found}; this build reads version {}; {}", super::FORMAT_VERSION, next_for_version(.found))]
+    Version {
+        /// The version found, as written in the file.
+        found: String,
+    },
+    /// The file ends before its header does; one that ends later names the [`Section`](Self::Section).
+    #[error(
+        "the file has {found} bytes, but its header needs {expected}; it was cut short, copy or encode it again"
+    )]
+    Truncated {
+        /// Bytes found.
+        found: u64,
+        /// Bytes that must be there at least.
+        expected: u64,
+    },
+    /// Bytes follow the last section.
+    #[error(
+        "{extra} bytes follow the last section, which ends at byte {expected}; copy or encode the file again"
+    )]
+    TrailingBytes {
+        /// Length of the file by its header.
+        expected: u64,
+        /// Bytes after that.
+        extra: u64,
+    },
+    /// The header is not what the format says.
+    #[error("header: {reason}")]
+    Header {
+        /// What was found and what was expected.
+        reason: String,
+    },
+    /// A section's entry is not what the format says.
+    #[error("section {name}: {reason}")]
+    Section {
+        /// The section.
+        name: String,
+        /// What was found and what was expected.
+        reason: String,
+    },
+    /// A checksum does not match: the file was damaged or edited.
+    #[error(
+        "{part}: the checksum is {found}, the file says {expected}; the file was damaged, copy or encode it again"
+    )]
+    Checksum {
+        /// `header` or `section NAME`.
+        part: String,
+        /// Checksum of the bytes found, in hex.
+        found: String,
+        /// Checksum written in the file.
+        expected: String,
+    },
+}
+
+fn next_for_version(found: &str) -> &'static str {
+    match found.parse::<u32>() {
+        Ok(v) if v > super::FORMAT_VERSION => "a newer tesdf wrote it, update tesdf",
+        _ => "encode the mesh again",
+    }
+}
+
+impl AssetError {
+    pub(super) fn section(name: &str, reason: impl Into<String>) -> Self {
+        Self::Section { name: shown(name), reason: reason.into() }
+    }
+
+    pub(super) fn header(reason: impl Into<String>) -> Self {
+        Self::Header { reason: reason.into() }
+    }
+}
+
+/// Names come from the file: control characters are escaped and the length is bounded.
+pub(super) fn shown(name: &str) -> String {
+    const LONGEST: usize = 64;
+    let mut s: String = name.chars().take(LONGEST).flat_map(char::escape_debug).collect();
+    if name.chars().nth(LONGEST).is_some() {
+        s.push('…');
+    }
+    s
+}

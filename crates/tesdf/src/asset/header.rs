@@ -1,0 +1,297 @@
+//! The JSON header. It is written here, not by the `safetensors` crate: that keeps metadata in a `HashMap`, whose order
+//! differs from run to run, and the same mesh must give the same bytes. It is read here too, because the crate's errors
+//! do not name the section and it takes the last of two entries with one name.
+use std::collections::BTreeMap;
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+
+use super::error::shown;
+use super::{AssetError, FORMAT_VERSION};
+
+/// Bytes of the length field.
+pub(super) const LENGTH_FIELD: usize = 8;
+/// The header is metadata: a larger one is not ours. Bounds what a reader parses.
+pub(super) const MAX_HEADER: usize = 1 << 20;
+const MAX_ENTRIES: usize = 1 << 10;
+/// What every header starts with; the version follows.
+const MAGIC: &str = r#"{"__metadata__":{"format":"tesdf","version":""#;
+const BEFORE_CHECKSUM: &str = r#"","checksum":""#;
+pub(super) const DIGITS: usize = 2 * blake3::OUT_LEN;
+/// Metadata keys with this prefix hold the checksums of sections.
+pub(super) const SECTION_CHECKSUM: &str = "checksum.";
+
+/// Header as parsed, nothing but its syntax checked.
+pub(super) struct Header {
+    pub metadata: BTreeMap<String, String>,
+    pub entries: Vec<(String, Entry)>,
+}
+
+/// What the header says of one section.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Entry {
+    pub dtype: String,
+    pub shape: Shape,
+    pub data_offsets: [u64; 2],
+}
+
+/// One or two dimensions.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) struct Shape {
+    pub rows: u64,
+    pub columns: Option<u64>,
+}
+
+impl fmt::Display for Shape {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.columns {
+            None => write!(f, "[{}]", self.rows),
+            Some(columns) => write!(f, "[{},{columns}]", self.rows),
+        }
+    }
+}
+
+/// One section, ready to be written into a header.
+pub(super) struct Line<'a> {
+    pub name: &'a str,
+    pub dtype: &'a str,
+    pub shape: Shape,
+    pub data_offsets: [u64; 2],
+}
+
+/// Whether a caller may use `key` for its own metadata.
+pub(super) fn is_reserved(key: &str) -> bool {
+    matches!(key, "format" | "version" | "checksum") || key.starts_with(SECTION_CHECKSUM)
+}
+
+/// Length field, JSON and padding, with the header's checksum in place.
+pub(super) fn write_header(
+    metadata: &BTreeMap<String, String>,
+    lines: &[Line<'_>],
+) -> Result<Vec<u8>, AssetError> {
+    let quoted = |s: &str| serde_json::Value::from(s).to_string();
+    let mut json = format!("{MAGIC}{FORMAT_VERSION}{BEFORE_CHECKSUM}{}\"", "0".repeat(DIGITS));
+    for (key, value) in metadata {
+        json += &format!(",{}:{}", quoted(key), quoted(value));
+    }
+    json.push('}');
+    for Line { name, dtype, shape, data_offsets: [begin, end] } in lines {
+        json += &format!(
+            ",{}:{{\"dtype\":\"{dtype}\",\"shape\":{shape},\"data_offsets\":[{begin},{end}]}}",
+            quoted(name)
+        );
+    }
+    json.push('}');
+    while !json.len().is_multiple_of(LENGTH_FIELD) {
+        json.push(' ');
+    }
+    if json.len() > MAX_HEADER {
+        return Err(AssetError::header(format!(
+            "{} bytes of JSON are more than the {MAX_HEADER} allowed; shorten the metadata",
+            json.len()
+        )));
+    }
+    let mut bytes = (json.len() as u64).to_le_bytes().to_vec();
+    bytes.extend_from_slice(json.as_bytes());
+    let at = LENGTH_FIELD + MAGIC.len() + FORMAT_VERSION.to_string().len() + BEFORE_CHECKSUM.len();
+    let digest = header_checksum(&bytes, at);
+    bytes[at..at + DIGITS].copy_from_slice(digest.as_bytes());
+    Ok(bytes)
+}
+
+/// BLAKE3 of the header with the `DIGITS` bytes at `at` set to `0`, in hex.
+pub(super) fn header_checksum(header: &[u8], at: usize) -> String {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&header[..at]);
+    hasher.update("0".repeat(DIGITS).as_bytes());
+    hasher.update(&header[at + DIGITS..]);
+    hasher.finalize().to_hex().to_string()
+}
+
+/// Checks magic and version, and says where the checksum's digits are and where the header ends.
+pub(super) fn read_prefix(bytes: &[u8]) -> Result<(usize, usize), AssetError> {
+    let after = bytes.get(LENGTH_FIELD..).unwrap_or_default();
+    let seen = after.len().min(MAGIC.len());
+    if after[..seen] != MAGIC.as_bytes()[..seen] || bytes.is_empty() {
+        return Err(recognise(bytes));
+    }
+    let truncated =
+        |expected: usize| AssetError::Truncated { found: bytes.len() as u64, expected: expected as u64 };
+    let smallest = LENGTH_FIELD + MAGIC.len() + 1 + BEFORE_CHECKSUM.len() + DIGITS + "\"}}".len();
+    if seen < MAGIC.len() {
+        return Err(if bytes.len() < LENGTH_FIELD + 1 && !could_be_length(bytes) {
+            recognise(bytes)
+        } else {
+            truncated(smallest)
+        });
+    }
+    const LONGEST_VERSION: usize = 20;
+    let version = &after[MAGIC.len()..];
+    let end = version.iter().take(LONGEST_VERSION + 1).position(|&b| b == b'"');
+    let Some(version) = end.and_then(|end| std::str::from_utf8(&version[..end]).ok()) else {
+        return Err(if version.len() <= LONGEST_VERSION {
+            truncated(smallest)
+        } else {
+            AssetError::header("the version is not a number of at most 20 digits")
+        });
+    };
+    if version != FORMAT_VERSION.to_string() {
+        return Err(AssetError::Version { found: shown(version) });
+    }
+    let mut field = [0; LENGTH_FIELD];
+    field.copy_from_slice(&bytes[..LENGTH_FIELD]);
+    let length = u64::from_le_bytes(field);
+    if length > MAX_HEADER as u64 || length % LENGTH_FIELD as u64 != 0 {
+        return Err(AssetError::header(format!(
+            "its length field says {length} bytes; expected a multiple of {LENGTH_FIELD} of at most {MAX_HEADER}"
+        )));
+    }
+    let end = LENGTH_FIELD + length as usize;
+    if end > bytes.len() {
+        return Err(truncated(end));
+    }
+    let at = LENGTH_FIELD + MAGIC.len() + version.len();
+    let digits = at + BEFORE_CHECKSUM.len();
+    if end < digits + DIGITS || &bytes[at..digits] != BEFORE_CHECKSUM.as_bytes() {
+        return Err(AssetError::header(
+            "the checksum does not follow the version; another tool rewrote the file, encode the mesh again",
+        ));
+    }
+    Ok((digits, end))
+}
+
+fn could_be_length(bytes: &[u8]) -> bool {
+    // A header is shorter than 2^24 bytes: all but three bytes of its length are 0.
+    bytes.iter().skip(3).all(|&b| b == 0)
+}
+
+/// The error for bytes that do not start like a `.tesdf` file.
+fn recognise(bytes: &[u8]) -> AssetError {
+    const ENCODE: &str = "encode it first: tesdf encode MESH -o FILE.tesdf";
+    const OTHER: &str = "give a file that tesdf encode wrote";
+    let starts = |magic: &[u8]| bytes.starts_with(magic);
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let (found, next) = if bytes.is_empty() {
+        ("an empty file", "encode the mesh again")
+    } else if text.starts_with(b"solid") || is_binary_stl(bytes) {
+        ("an STL mesh", ENCODE)
+    } else if starts(b"ply\n") || starts(b"ply\r") {
+        ("a PLY mesh", ENCODE)
+    } else if starts(b"glTF") {
+        ("a GLB mesh", ENCODE)
+    } else if text.starts_with(b"OFF") {
+        ("an OFF mesh", ENCODE)
+    } else if [&b"v "[..], b"o ", b"g ", b"mtllib ", b"# "].iter().any(|m| text.starts_with(m)) {
+        ("text, perhaps an OBJ mesh", ENCODE)
+    } else if starts(b"PK\x03\x04") {
+        ("a ZIP archive", "unpack it first")
+    } else if starts(b"\x1f\x8b") {
+        ("a gzip file", "unpack it first")
+    } else if bytes.get(LENGTH_FIELD) == Some(&b'{') {
+        ("a safetensors file of another kind, or one that another tool rewrote", OTHER)
+    } else {
+        ("an unknown kind of file", OTHER)
+    };
+    AssetError::NotTesdf { found, next }
+}
+
+fn is_binary_stl(bytes: &[u8]) -> bool {
+    let Some(count) = bytes.get(80..84) else { return false };
+    let count = count.iter().rev().fold(0_u64, |n, &b| n << 8 | u64::from(b));
+    count > 0 && bytes.len() as u64 == 84 + 50 * count
+}
+
+/// Parses the JSON of a header, `bytes` without the length field.
+pub(super) fn parse(bytes: &[u8]) -> Result<Header, AssetError> {
+    serde_json::from_slice(bytes).map_err(|e| AssetError::header(format!("not the expected JSON: {e}")))
+}
+
+impl<'de> Deserialize<'de> for Header {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Fields;
+        impl<'de> Visitor<'de> for Fields {
+            type Value = Header;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object with __metadata__ and one entry per section")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Header, A::Error> {
+                let mut header = Header { metadata: BTreeMap::new(), entries: Vec::new() };
+                let mut metadata = None;
+                while let Some(name) = map.next_key::<String>()? {
+                    if name == "__metadata__" {
+                        if metadata.replace(map.next_value::<Metadata>()?).is_some() {
+                            return Err(Error::custom("two entries __metadata__"));
+                        }
+                    } else if header.entries.len() == MAX_ENTRIES {
+                        return Err(Error::custom(format!("more than {MAX_ENTRIES} sections")));
+                    } else {
+                        let entry = map
+                            .next_value()
+                            .map_err(|e| Error::custom(format!("section {}: {e}", shown(&name))))?;
+                        header.entries.push((name, entry));
+                    }
+                }
+                header.metadata = metadata.unwrap_or_default().0;
+                Ok(header)
+            }
+        }
+        deserializer.deserialize_map(Fields)
+    }
+}
+
+#[derive(Default)]
+struct Metadata(BTreeMap<String, String>);
+
+impl<'de> Deserialize<'de> for Metadata {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Pairs;
+        impl<'de> Visitor<'de> for Pairs {
+            type Value = Metadata;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("an object of strings")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Metadata, A::Error> {
+                let mut pairs = BTreeMap::new();
+                while let Some((key, value)) = map.next_entry::<String, String>()? {
+                    if pairs.len() == MAX_ENTRIES {
+                        return Err(Error::custom(format!("more than {MAX_ENTRIES} metadata keys")));
+                    }
+                    if pairs.contains_key(&key) {
+                        return Err(Error::custom(format!("two metadata keys {}", shown(&key))));
+                    }
+                    pairs.insert(key, value);
+                }
+                Ok(Metadata(pairs))
+            }
+        }
+        deserializer.deserialize_map(Pairs)
+    }
+}
+
+impl<'de> Deserialize<'de> for Shape {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Dimensions;
+        impl<'de> Visitor<'de> for Dimensions {
+            type Value = Shape;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("one or two sizes")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Shape, A::Error> {
+                let rows = seq.next_element()?.ok_or_else(|| Error::invalid_length(0, &self))?;
+                let columns = seq.next_element()?;
+                if seq.next_element::<u64>()?.is_some() {
+                    return Err(Error::invalid_length(3, &self));
+                }
+                Ok(Shape { rows, columns })
+            }
+        }
+        deserializer.deserialize_seq(Dimensions)
+    }
+}

@@ -1,0 +1,28 @@
+//! The `.tesdf` file: one open container, memory-mapped, checked before anything is read from it.
+//!
+//! In goes a list of named arrays ([`Section`]) and text metadata; out comes one byte string that is the same for the
+//! same input. It is a valid [safetensors](https://github.com/huggingface/safetensors) file, so that
+//! `safetensors.numpy.load_file` and every other reader of that format gives the arrays with no code of ours.
+//!
+//! ```text
+//! byte 0   length n of the header, u64 little-endian, a multiple of 8
+//!      8   {"__metadata__":{"format":"tesdf","version":"1","checksum":"<64 hex digits>",…},
+//!           "name":{"dtype":"F32","shape":[1000,3],"data_offsets":[0,12000]},…}      padded with spaces to n bytes
+//!  8 + n   the sections, back to back, widest element first, so that each is aligned to its element
+//! ```
+//!
+//! `checksum` is BLAKE3 of the first 8 + n bytes with its own 64 digits set to `0`; `checksum.NAME` is BLAKE3 of section
+//! NAME. Together they cover every byte of the file.
+mod container;
+mod error;
+mod header;
+mod save;
+mod section;
+
+pub use container::{Container, SharedSection, write_container};
+pub use error::AssetError;
+pub use save::save_atomic;
+pub use section::{Element, Presence, Section, SectionSpec};
+
+/// The version of the file format that this build writes, and the only one that it reads.
+pub const FORMAT_VERSION: u32 = 1;
