@@ -16,6 +16,7 @@
 mod container;
 mod error;
 mod header;
+pub mod layout;
 mod save;
 mod section;
 

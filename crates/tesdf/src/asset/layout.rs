@@ -1,0 +1,305 @@
+//! The sections of an asset and the words in them; the one place that knows the byte layout.
+
+use super::{Element, SectionSpec};
+
+/// `[V, 3]` vertex positions in the mesh's unit, in the order of the source.
+pub const VERTICES: SectionSpec = SectionSpec::required("mesh.vertices", Element::F64, 3);
+/// `[F, 3]` corner vertices of the faces, in the order of the face tree's leaves.
+pub const FACES: SectionSpec = SectionSpec::required("mesh.faces", Element::U32, 3);
+/// `[F]` id of each face in the source mesh.
+pub const FACE_IDS: SectionSpec = SectionSpec::required("mesh.face_ids", Element::U32, 1);
+/// `[F]` how each feature of a face tells the sign: see [`SignHints`].
+pub const SIGN_HINTS: SectionSpec = SectionSpec::required("mesh.sign_hints", Element::U16, 1);
+/// `[8]` local frame and cube: offset x y z, scale, cube origin x y z, cube side.
+pub const FRAME: SectionSpec = SectionSpec::required("domain.frame", Element::F64, 1);
+/// `[N]` the bisection forest: see [`Node`]. Words 0–5 are the roots; children are neighbours.
+pub const NODES: SectionSpec = SectionSpec::required("domain.nodes", Element::U32, 1);
+/// Encoded faces of the cells: see [`List`].
+pub const LISTS: SectionSpec = SectionSpec::required("lists.bytes", Element::U8, 1);
+/// `[P + 1]` where each palette begins among the palette faces.
+pub const PALETTE_STARTS: SectionSpec = SectionSpec::required("lists.palette_starts", Element::U32, 1);
+/// Low 16 bits of the palette faces (positions in [`FACES`]).
+pub const PALETTES: SectionSpec = SectionSpec::required("lists.palettes", Element::U16, 1);
+/// Bits 16–23 of the palette faces; only for meshes of more than 65,536 faces.
+pub const PALETTES_HIGH: SectionSpec = SectionSpec::optional("lists.palettes_high", Element::U8, 1);
+/// `[M, 12]` boxes of the two children of each node of the face tree, local frame: min x y z, max x y z, twice.
+pub const TREE_BOXES: SectionSpec = SectionSpec::required("tree.boxes", Element::F32, 12);
+/// `[M, 2]` children of each node of the face tree: see [`TreeChild`].
+pub const TREE_CHILDREN: SectionSpec = SectionSpec::required("tree.children", Element::U32, 2);
+
+/// All sections of a file.
+pub const SECTIONS: [SectionSpec; 12] = [
+    VERTICES,
+    FACES,
+    FACE_IDS,
+    SIGN_HINTS,
+    FRAME,
+    NODES,
+    LISTS,
+    PALETTE_STARTS,
+    PALETTES,
+    PALETTES_HIGH,
+    TREE_BOXES,
+    TREE_CHILDREN,
+];
+
+/// Most faces that an asset can hold: palette faces have 24 bits.
+pub const MAX_FACES: usize = 1 << 24;
+/// Most faces in a leaf of the face tree.
+pub const TREE_LEAF: usize = 8;
+
+/// Where a cell lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Label {
+    /// Winding number 0 in the whole cell.
+    Outside,
+    /// Winding number 1 or more in the whole cell.
+    Inside,
+    /// The surface comes within the padding of the cell; the winding number at its centroid.
+    Crossing(u32),
+}
+
+/// A word of the forest.
+///
+/// ```text
+///   0 c…c                      bisected; the children are words c and c + 1
+///   1 code(3) offset(28)       a cell
+///     0 outside  1 inside      list at byte `offset`
+///     2 3 4 crossing           the same; winding number 0, 1, 2 at the centroid
+///     5 crossing               the same; winding number in the four bytes before
+///     6 far                    no list; offset 1 inside, 0 outside
+///     7 not of the domain
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Node {
+    /// Children are this word and the next.
+    Split(u32),
+    /// A cell with a list at this byte of [`LISTS`].
+    Listed(Label, u32),
+    /// A cell far from the surface, answered by the face tree; whether it is inside.
+    Far(Side),
+    /// Farther out than the band.
+    NotOfDomain,
+}
+
+/// Which side of the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// Winding number 0.
+    Outside,
+    /// Winding number 1 or more.
+    Inside,
+}
+
+const LEAF: u32 = 1 << 31;
+const CODE: u32 = 28;
+/// Offsets of lists are below this.
+pub const MAX_LIST_OFFSET: u32 = 1 << CODE;
+/// Winding numbers from here on are written before their list.
+pub const LONG_WINDING: u32 = 3;
+
+impl Node {
+    /// Reads a word.
+    #[inline]
+    pub fn decode(word: u32, lists: &[u8]) -> Self {
+        if word & LEAF == 0 {
+            return Self::Split(word);
+        }
+        let offset = word & (MAX_LIST_OFFSET - 1);
+        match (word >> CODE) & 7 {
+            0 => Self::Listed(Label::Outside, offset),
+            1 => Self::Listed(Label::Inside, offset),
+            code @ 2..=4 => Self::Listed(Label::Crossing(code - 2), offset),
+            5 => {
+                let at = (offset as usize).checked_sub(4);
+                let bytes = at.and_then(|at| lists.get(at..)?.first_chunk::<4>());
+                Self::Listed(Label::Crossing(bytes.map_or(0, |b| u32::from_le_bytes(*b))), offset)
+            }
+            6 if offset == 1 => Self::Far(Side::Inside),
+            6 => Self::Far(Side::Outside),
+            _ => Self::NotOfDomain,
+        }
+    }
+
+    /// Writes a word.
+    pub fn encode(self) -> u32 {
+        match self {
+            Self::Split(children) => children,
+            Self::Listed(label, offset) => {
+                let code = match label {
+                    Label::Outside => 0,
+                    Label::Inside => 1,
+                    Label::Crossing(winding) => 2 + winding.min(LONG_WINDING),
+                };
+                LEAF | code << CODE | offset
+            }
+            Self::Far(side) => LEAF | 6 << CODE | u32::from(side == Side::Inside),
+            Self::NotOfDomain => LEAF | 7 << CODE,
+        }
+    }
+}
+
+/// Palette number that says "no palette": the list is a u32 count and u32 faces.
+pub const NO_PALETTE: u16 = u16::MAX;
+/// Most faces of a palette, so that a byte names each.
+pub const PALETTE_SIZE: usize = 256;
+
+/// The list of a cell: `palette u16, count u8, count × u8` slots of the palette, or
+/// `NO_PALETTE u16, count u32, count × u32` faces. Little-endian, unaligned.
+#[derive(Clone, Copy, Debug)]
+pub enum List<'a> {
+    /// Slots of a palette.
+    Slots(u16, &'a [u8]),
+    /// Faces, four bytes each.
+    Faces(&'a [u8]),
+}
+
+impl<'a> List<'a> {
+    /// Reads the list at `offset`; `None` when it does not lie in `bytes`.
+    #[inline]
+    pub fn decode(bytes: &'a [u8], offset: u32) -> Option<Self> {
+        let rest = bytes.get(offset as usize..)?;
+        let (&palette, rest) = rest.split_first_chunk::<2>()?;
+        let palette = u16::from_le_bytes(palette);
+        if palette == NO_PALETTE {
+            let (&count, rest) = rest.split_first_chunk::<4>()?;
+            let length = (u32::from_le_bytes(count) as usize).checked_mul(4)?;
+            return rest.get(..length).map(Self::Faces);
+        }
+        let (&count, rest) = rest.split_first()?;
+        rest.get(..count as usize).map(|slots| Self::Slots(palette, slots))
+    }
+
+    /// Appends the list to `bytes`.
+    pub fn encode(self, bytes: &mut Vec<u8>) {
+        match self {
+            Self::Slots(palette, slots) => {
+                bytes.extend(palette.to_le_bytes());
+                bytes.push(slots.len() as u8);
+                bytes.extend(slots);
+            }
+            Self::Faces(faces) => {
+                bytes.extend(NO_PALETTE.to_le_bytes());
+                bytes.extend(((faces.len() / 4) as u32).to_le_bytes());
+                bytes.extend(faces);
+            }
+        }
+    }
+
+    /// Number of faces.
+    pub fn len(self) -> usize {
+        match self {
+            Self::Slots(_, slots) => slots.len(),
+            Self::Faces(bytes) => bytes.len() / 4,
+        }
+    }
+
+    /// Whether there is no face.
+    pub fn is_empty(self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// A child of a node of the face tree: `0 node(31)`, or `1 start(28) count-1(3)`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TreeChild {
+    /// A node, of a greater index than its parent.
+    Node(u32),
+    /// Faces `start .. start + count`, `count` from 1 to [`TREE_LEAF`].
+    Leaf(u32, u32),
+}
+
+impl TreeChild {
+    /// Reads a word.
+    #[inline]
+    pub fn decode(word: u32) -> Self {
+        if word & LEAF == 0 { Self::Node(word) } else { Self::Leaf((word & !LEAF) >> 3, (word & 7) + 1) }
+    }
+
+    /// Writes a word.
+    pub fn encode(self) -> u32 {
+        match self {
+            Self::Node(node) => node,
+            Self::Leaf(start, count) => LEAF | start << 3 | (count - 1),
+        }
+    }
+}
+
+/// How the sign follows from a closest feature, two bits each: the face, edges 0–2, corners 0–2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct SignHints(pub u16);
+
+/// How a feature tells the sign of a point that it is closest to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u16)]
+pub enum SignHint {
+    /// Only the winding number does.
+    Winding = 0,
+    /// The side of the face's plane.
+    Plane = 1,
+    /// Such points are outside: the feature is convex.
+    Outside = 2,
+    /// Such points are inside: the feature is concave.
+    Inside = 3,
+}
+
+impl SignHints {
+    /// The hint of feature `k`: 0 the face, 1–3 edges, 4–6 corners.
+    #[inline]
+    pub fn get(self, k: usize) -> SignHint {
+        match (self.0 >> (2 * k)) & 3 {
+            0 => SignHint::Winding,
+            1 => SignHint::Plane,
+            2 => SignHint::Outside,
+            _ => SignHint::Inside,
+        }
+    }
+
+    /// Sets the hint of feature `k`.
+    pub fn set(&mut self, k: usize, hint: SignHint) {
+        self.0 = self.0 & !(3 << (2 * k)) | (hint as u16) << (2 * k);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_round_trip() {
+        let lists = 7u32.to_le_bytes();
+        for node in [
+            Node::Split(77),
+            Node::Listed(Label::Outside, 0),
+            Node::Listed(Label::Inside, 12345),
+            Node::Listed(Label::Crossing(0), MAX_LIST_OFFSET - 1),
+            Node::Listed(Label::Crossing(2), 9),
+            Node::Listed(Label::Crossing(7), 4),
+            Node::Far(Side::Inside),
+            Node::Far(Side::Outside),
+            Node::NotOfDomain,
+        ] {
+            assert_eq!(Node::decode(node.encode(), &lists), node);
+        }
+        for child in [TreeChild::Node(5), TreeChild::Leaf(0, 1), TreeChild::Leaf((1 << 24) - 1, 8)] {
+            assert_eq!(TreeChild::decode(child.encode()), child);
+        }
+        let mut hints = SignHints::default();
+        hints.set(3, SignHint::Inside);
+        hints.set(6, SignHint::Plane);
+        hints.set(3, SignHint::Outside);
+        assert_eq!((hints.get(3), hints.get(6), hints.get(0)), (SignHint::Outside, SignHint::Plane, SignHint::Winding));
+    }
+
+    #[test]
+    fn lists_round_trip_and_prefixes_are_refused() {
+        for list in [List::Slots(3, &[1, 2, 250]), List::Faces(&[0, 1, 0, 0, 5, 0, 0, 0])] {
+            let mut bytes = Vec::new();
+            list.encode(&mut bytes);
+            assert_eq!(List::decode(&bytes, 0).map(List::len), Some(list.len()));
+            for end in 0..bytes.len() {
+                assert!(List::decode(&bytes[..end], 0).is_none());
+            }
+        }
+    }
+}
