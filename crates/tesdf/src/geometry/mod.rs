@@ -1,12 +1,16 @@
-//! Closest points, bounds, predicates.
+//! Closest points, bounds, predicates, winding numbers.
 mod aabb;
 mod aabb_tree;
+mod crossing;
 mod frame;
 mod tetrahedron;
 mod triangle;
+mod winding;
 
 pub use aabb::Aabb;
 pub use aabb_tree::{AabbTree, Child};
+pub use crossing::{normal_signs, orientation, signed_crossing};
 pub use frame::LocalFrame;
 pub use tetrahedron::{tetrahedron_volume, triangle_meets_tetrahedron};
 pub use triangle::{Closest, Feature, Regions, Triangle};
+pub use winding::WindingNumber;
