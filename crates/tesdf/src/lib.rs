@@ -6,5 +6,7 @@ pub mod domain;
 pub mod encode;
 pub mod geometry;
 pub mod mesh;
+pub mod query;
 
+pub use asset::TeSdf;
 pub use glam;

@@ -13,17 +13,20 @@
 //!
 //! `checksum` is BLAKE3 of the first 8 + n bytes with its own 64 digits set to `0`; `checksum.NAME` is BLAKE3 of section
 //! NAME. Together they cover every byte of the file.
+pub mod about;
 mod container;
 mod error;
 mod header;
 pub mod layout;
 mod save;
 mod section;
+mod te_sdf;
 
 pub use container::{Container, SharedSection, write_container};
 pub use error::AssetError;
 pub use save::save_atomic;
 pub use section::{Element, Presence, Section, SectionSpec};
+pub use te_sdf::TeSdf;
 
 /// The version of the file format that this build writes, and the only one that it reads.
 pub const FORMAT_VERSION: u32 = 1;

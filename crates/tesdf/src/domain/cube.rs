@@ -38,6 +38,11 @@ impl DomainCube {
         self.side
     }
 
+    /// Centre, in the local frame.
+    pub fn middle(&self) -> DVec3 {
+        self.origin + 0.5 * self.side
+    }
+
     /// Root tetrahedron `root`, 0 to 5.
     pub fn root(&self, root: usize) -> Cell {
         Cell::root(self.origin, self.side, root)

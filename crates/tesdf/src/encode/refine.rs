@@ -1,7 +1,6 @@
 //! Over-refines the domain and prunes it while unwinding.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-
+use super::EncodeProgress;
 use super::filter::{Candidate, Scratch, filter, probe};
 use super::surface::{Requirement, Surface};
 use crate::domain::{Cell, DomainCube, MAX_DEPTH};
@@ -49,14 +48,15 @@ pub struct Weights {
     pub far_distance: f64,
     /// List length that no refinement is expected to get below.
     pub floor: f64,
-    /// Levels to bisect beyond where that could pay, for the tighter union.
-    pub extra_levels: u32,
 }
 
 /// Bytes of a leaf besides its entries: two words of the tree, its share of headers and palettes.
 const LEAF_BYTES: f64 = 14.0;
 /// Requirement sets longer than this are not merged: such a cell is never worth keeping.
 const MAX_UNION: usize = 256;
+
+/// Progress of a whole root.
+pub const ROOT_VOLUME: u64 = 1 << 40;
 
 /// All that the recursion reads.
 pub struct Refiner<'a> {
@@ -70,10 +70,8 @@ pub struct Refiner<'a> {
     pub regions: &'a [Aabb],
     /// Winding number at a point, local frame.
     pub inside: &'a (dyn Fn(glam::DVec3) -> bool + Sync),
-    /// Set to stop early.
-    pub cancel: &'a AtomicBool,
-    /// Volume done, in units of 2^-40 of the cube.
-    pub done: &'a AtomicU64,
+    /// Told of the volume done, in units of 2^-40 of a root; asked whether to stop.
+    pub progress: &'a EncodeProgress,
 }
 
 struct Pruned {
@@ -90,11 +88,11 @@ impl Refiner<'_> {
         let candidates: Vec<Candidate> = (0..self.surface.faces.len() as u32)
             .map(|face| Candidate { face, at: cell.corners.map(|c| probe(self.surface, face, c)) })
             .collect();
-        self.refine(cell, candidates, 0, &mut Scratch::default()).map(|p| p.tree)
+        self.refine(cell, candidates, &mut Scratch::default()).map(|p| p.tree)
     }
 
-    fn refine(&self, cell: Cell, candidates: Vec<Candidate>, beyond: u32, scratch: &mut Scratch) -> Option<Pruned> {
-        if self.cancel.load(Ordering::Relaxed) {
+    fn refine(&self, cell: Cell, candidates: Vec<Candidate>, scratch: &mut Scratch) -> Option<Pruned> {
+        if self.progress.is_cancelled() {
             return None;
         }
         let filtered = filter(self.surface, &cell, &candidates, scratch);
@@ -117,8 +115,7 @@ impl Refiner<'_> {
         let w = &self.weights;
         let weight = cell.volume() * w.per_volume * w.near / (filtered.distance + w.near);
         let could_pay = weight * (n as f64 - w.floor) > w.byte * (LEAF_BYTES + w.floor);
-        let beyond = if could_pay || n as f64 <= w.floor { 0 } else { beyond + 1 };
-        let split = cell.depth < MAX_DEPTH && (could_pay || (beyond > 0 && beyond <= w.extra_levels));
+        let split = cell.depth < MAX_DEPTH && could_pay;
         let far = n >= w.far_list && nearest > w.far_distance && !filtered.crossing;
 
         if !split {
@@ -145,12 +142,12 @@ impl Refiner<'_> {
         drop(candidates);
         let (left, right) = if cell.depth < 14 {
             rayon::join(
-                || self.refine(cell.child(0), first, beyond, &mut Scratch::default()),
-                || self.refine(cell.child(1), second, beyond, &mut Scratch::default()),
+                || self.refine(cell.child(0), first, &mut Scratch::default()),
+                || self.refine(cell.child(1), second, &mut Scratch::default()),
             )
         } else {
-            let left = self.refine(cell.child(0), first, beyond, scratch);
-            (left, self.refine(cell.child(1), second, beyond, scratch))
+            let left = self.refine(cell.child(0), first, scratch);
+            (left, self.refine(cell.child(1), second, scratch))
         };
         let (left, right) = (left?, right?);
         Some(self.prune(left, right, own, weight, far))
@@ -202,7 +199,7 @@ impl Refiner<'_> {
     }
 
     fn finish(&self, cell: &Cell) {
-        self.done.fetch_add((1 << 40) >> cell.depth.min(40), Ordering::Relaxed);
+        self.progress.advance(ROOT_VOLUME >> cell.depth.min(40));
     }
 }
 

@@ -1,8 +1,6 @@
 use std::collections::HashMap;
 
-use glam::DVec3;
-
-use crate::geometry::{Feature, LocalFrame, Triangle};
+use crate::geometry::{Feature, Triangle};
 use crate::mesh::TriangleMesh;
 
 /// A part of the surface whose distance a cell needs: a face, an edge or a vertex.
@@ -41,9 +39,9 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Takes a mesh into `frame`.
-    pub fn new(mesh: &TriangleMesh, frame: LocalFrame) -> Self {
-        let local: Vec<DVec3> = mesh.vertices().iter().map(|&v| frame.to_local(v)).collect();
+    /// Looks up what the encoder needs of a mesh that is in the local frame already.
+    pub fn new(mesh: &TriangleMesh) -> Self {
+        let local = mesh.vertices();
         let faces = mesh.faces().to_vec();
         let triangles: Vec<Triangle> =
             faces.iter().map(|f| Triangle::new(f.map(|v| local[v as usize]))).collect();
@@ -93,6 +91,16 @@ impl Surface {
             id if id < f + e => Part::Edge(id - f),
             id => Part::Vertex(id - f - e),
         }
+    }
+
+    /// The faces of an edge.
+    pub fn edge_faces(&self, edge: u32) -> &[u32] {
+        &self.edge_faces[edge as usize]
+    }
+
+    /// The faces around a vertex.
+    pub fn vertex_faces(&self, vertex: u32) -> &[u32] {
+        &self.vertex_faces[vertex as usize]
     }
 
     /// Whether a requirement is a whole face.

@@ -1,0 +1,323 @@
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::about::About;
+use super::layout::{self, List, Node, PALETTE_SIZE, TreeChild};
+use super::{AssetError, Container, SharedSection, save_atomic};
+use crate::domain::{DomainCube, MAX_DEPTH};
+use crate::geometry::{AabbTree, LocalFrame, Triangle};
+use crate::query::{FaceRecord, Isa};
+
+/// A Tetra-Encoded Signed Distance Field: an encoded mesh, immutable, shared by all that use it.
+///
+/// The space around a solid is cut into tetrahedra. Each tetrahedron `t` carries the list `E_t` of the
+/// faces that can be closest to a point of it, so a signed distance is the least of a few exact
+/// point–triangle distances, and its sign is that of the tetrahedron:
+///
+/// ```text
+///              ╱╲                 x lies in t              φ(x) = ± min  d(x, f)      Eq. (4)
+///       ______╱  ╲______          E_t = {f3, f4, f5}               f ∈ E_t
+///     f1 f2  f3   f4  f5 f6
+///             · x                 − inside, + outside; where the surface passes
+///         ___╱ ╲___ t             through t, the closest feature tells
+/// ```
+///
+/// The tetrahedra are the leaves of a bisection forest over a cube ([`Cell`](crate::domain::Cell)):
+/// their geometry follows from their path, so nothing is stored for a cell but its list. A list names
+/// its faces by one byte each, as slots of a palette of up to 256 faces that a subtree shares.
+///
+/// All lengths are in the mesh's own unit. The type is `Send + Sync` and cheap to share by `Arc`.
+#[derive(Debug)]
+pub struct TeSdf {
+    container: Container,
+    about: About,
+    pub(crate) frame: LocalFrame,
+    pub(crate) cube: DomainCube,
+    pub(crate) vertices: SharedSection<[f64; 3]>,
+    pub(crate) faces: SharedSection<[u32; 3]>,
+    pub(crate) face_ids: SharedSection<u32>,
+    pub(crate) sign_hints: SharedSection<u16>,
+    pub(crate) nodes: SharedSection<u32>,
+    pub(crate) lists: SharedSection<u8>,
+    pub(crate) palette_starts: SharedSection<u32>,
+    pub(crate) palettes: SharedSection<u16>,
+    pub(crate) palettes_high: Option<SharedSection<u8>>,
+    pub(crate) tree_boxes: SharedSection<[f32; 12]>,
+    pub(crate) tree_children: SharedSection<[u32; 2]>,
+    /// Faces in `f32`, made on opening.
+    pub(crate) records: Vec<FaceRecord>,
+    pub(crate) isa: Isa,
+}
+
+impl TeSdf {
+    /// Maps the file at `path` and checks all that a query relies on. Checksums are left to
+    /// [`verify_checksums`](Self::verify_checksums).
+    ///
+    /// The file must not be changed in place while it is open; see [`Container::open`].
+    ///
+    /// # Errors
+    /// [`AssetError`] names the section at fault.
+    pub fn open(path: &Path) -> Result<Self, AssetError> {
+        Self::new(Container::open(path, &layout::SECTIONS)?)
+    }
+
+    /// As [`open`](Self::open), from bytes, which are copied.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, AssetError> {
+        Self::new(Container::from_bytes(bytes, &layout::SECTIONS)?)
+    }
+
+    fn new(container: Container) -> Result<Self, AssetError> {
+        let about = About::from_metadata(container.metadata())?;
+        let placed: SharedSection<f64> = container.shared_section(layout::FRAME.name)?;
+        let (frame, cube) = frame_and_cube(&placed)?;
+        let palettes_high = container
+            .section::<u8>(layout::PALETTES_HIGH.name)?
+            .is_some()
+            .then(|| container.shared_section(layout::PALETTES_HIGH.name))
+            .transpose()?;
+        let mut asset = Self {
+            about,
+            frame,
+            cube,
+            vertices: container.shared_section(layout::VERTICES.name)?,
+            faces: container.shared_section(layout::FACES.name)?,
+            face_ids: container.shared_section(layout::FACE_IDS.name)?,
+            sign_hints: container.shared_section(layout::SIGN_HINTS.name)?,
+            nodes: container.shared_section(layout::NODES.name)?,
+            lists: container.shared_section(layout::LISTS.name)?,
+            palette_starts: container.shared_section(layout::PALETTE_STARTS.name)?,
+            palettes: container.shared_section(layout::PALETTES.name)?,
+            palettes_high,
+            tree_boxes: container.shared_section(layout::TREE_BOXES.name)?,
+            tree_children: container.shared_section(layout::TREE_CHILDREN.name)?,
+            container,
+            records: Vec::new(),
+            isa: Isa::detect(),
+        };
+        asset.check_mesh()?;
+        asset.check_lists()?;
+        asset.check_tree()?;
+        let middle = asset.cube.middle();
+        asset.records =
+            (0..asset.faces.len()).map(|f| FaceRecord::new(&asset.local_triangle(f), middle)).collect();
+        Ok(asset)
+    }
+
+    /// Where the asset came from, what was asked for, what was proved.
+    pub fn about(&self) -> &About {
+        &self.about
+    }
+
+    /// The whole file.
+    pub fn as_bytes(&self) -> &[u8] {
+        self.container.as_bytes()
+    }
+
+    /// The container, for its sections and their sizes.
+    pub fn container(&self) -> &Container {
+        &self.container
+    }
+
+    /// Writes the file, replacing one at `path` atomically.
+    ///
+    /// # Errors
+    /// What the operating system refused; no half file is left.
+    pub fn save(&self, path: &Path) -> Result<(), AssetError> {
+        save_atomic(path, self.as_bytes())
+    }
+
+    /// Compares every byte with the checksums.
+    ///
+    /// # Errors
+    /// Names the header or the first section that was damaged.
+    pub fn verify_checksums(&self) -> Result<(), AssetError> {
+        self.container.verify_checksums()
+    }
+
+    /// Number of faces.
+    pub fn face_count(&self) -> usize {
+        self.faces.len()
+    }
+
+    /// Corners of face `face` (its id in the source mesh, 0-based), in the mesh's unit.
+    pub fn face_corners(&self, position: usize) -> [DVec3; 3] {
+        self.faces[position].map(|v| DVec3::from_array(self.vertices[v as usize]))
+    }
+
+    /// The faces in `f32` that were made on opening, in bytes.
+    pub fn derived_bytes(&self) -> usize {
+        std::mem::size_of_val(self.records.as_slice())
+    }
+
+    /// The face at a position, in the local frame.
+    pub(crate) fn local_triangle(&self, position: usize) -> Triangle {
+        Triangle::new(self.face_corners(position).map(|p| self.frame.to_local(p)))
+    }
+
+    /// Position of slot `slot` of the palette that begins at `start`.
+    #[inline]
+    pub(crate) fn palette_face(&self, start: u32, slot: u8) -> u32 {
+        let at = start as usize + slot as usize;
+        let low = u32::from(self.palettes[at]);
+        match &self.palettes_high {
+            Some(high) => low | u32::from(high[at]) << 16,
+            None => low,
+        }
+    }
+
+    fn check_mesh(&self) -> Result<(), AssetError> {
+        let (f, v) = (self.faces.len(), self.vertices.len());
+        if f == 0 || f > layout::MAX_FACES {
+            return wrong(layout::FACES, format!("{f} faces; expected 1 to {}", layout::MAX_FACES));
+        }
+        let bad = |c: &[f64; 3]| c.iter().any(|x| !x.is_finite());
+        if let Some(i) = self.vertices.iter().position(bad) {
+            return wrong(layout::VERTICES, format!("vertex {i} is not finite"));
+        }
+        if let Some(i) = self.faces.iter().position(|c| c.iter().any(|&k| k as usize >= v)) {
+            return wrong(layout::FACES, format!("face {i} uses {:?} of {v} vertices", self.faces[i]));
+        }
+        if let Some(i) = self.face_ids.iter().position(|&id| id as usize >= f) {
+            return wrong(layout::FACE_IDS, format!("entry {i} is {} of {f} faces", self.face_ids[i]));
+        }
+        for (spec, n) in [(layout::FACE_IDS, self.face_ids.len()), (layout::SIGN_HINTS, self.sign_hints.len())] {
+            if n != f {
+                return wrong(spec, format!("{n} entries for {f} faces"));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_lists(&self) -> Result<(), AssetError> {
+        let f = self.faces.len() as u32;
+        if let Some(high) = &self.palettes_high
+            && high.len() != self.palettes.len()
+        {
+            return wrong(layout::PALETTES_HIGH, format!("{} entries for {}", high.len(), self.palettes.len()));
+        }
+        let starts = &self.palette_starts;
+        if starts.first() != Some(&0) || starts.last().map(|&s| s as usize) != Some(self.palettes.len()) {
+            return wrong(layout::PALETTE_STARTS, "does not begin at 0 and end at the number of palette faces".into());
+        }
+        if let Some(p) = starts.windows(2).position(|w| w[0] > w[1] || w[1] - w[0] > PALETTE_SIZE as u32) {
+            return wrong(layout::PALETTE_STARTS, format!("palette {p} has not 0 to {PALETTE_SIZE} faces"));
+        }
+        if let Some(i) = (0..self.palettes.len()).find(|&i| self.palette_face(i as u32, 0) >= f) {
+            return wrong(layout::PALETTES, format!("entry {i} names a face that does not exist ({f} faces)"));
+        }
+        // Children follow their parents, so depths are known when a word is reached.
+        let n = self.nodes.len();
+        if n < 6 {
+            return wrong(layout::NODES, format!("{n} words; expected the 6 roots at least"));
+        }
+        let mut depth = vec![u8::MAX; n];
+        depth[..6].fill(0);
+        for (i, &word) in self.nodes.iter().enumerate() {
+            let bad = |reason: String| wrong(layout::NODES, format!("word {i}: {reason}"));
+            if depth[i] == u8::MAX {
+                return bad("no word leads to it".into());
+            }
+            match Node::decode(word, &self.lists) {
+                Node::Split(c) => {
+                    let c = c as usize;
+                    if c <= i || c + 1 >= n || depth[c] != u8::MAX || depth[c + 1] != u8::MAX {
+                        return bad(format!("children at {c} of {n} words"));
+                    }
+                    if u32::from(depth[i]) >= MAX_DEPTH {
+                        return bad(format!("deeper than {MAX_DEPTH} bisections"));
+                    }
+                    let below = depth[i] + 1;
+                    depth[c..c + 2].fill(below);
+                }
+                Node::Listed(_, offset) => {
+                    if let Err(reason) = self.check_list(offset) {
+                        return bad(format!("list at byte {offset}: {reason}"));
+                    }
+                }
+                Node::Far(_) | Node::NotOfDomain => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn check_list(&self, offset: u32) -> Result<(), String> {
+        let list = List::decode(&self.lists, offset).ok_or("it runs out of the section")?;
+        if list.is_empty() {
+            return Err("it is empty".into());
+        }
+        match list {
+            List::Slots(palette, slots) => {
+                let palette = palette as usize;
+                let [start, end] = self.palette_starts.get(palette..palette + 2).unwrap_or(&[]) else {
+                    return Err(format!("palette {palette} does not exist"));
+                };
+                match slots.iter().find(|&&s| u32::from(s) >= end - start) {
+                    Some(s) => Err(format!("slot {s} of a palette of {}", end - start)),
+                    None => Ok(()),
+                }
+            }
+            List::Faces(bytes) => {
+                let faces = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+                match faces.into_iter().find(|&f| f as usize >= self.faces.len()) {
+                    Some(f) => Err(format!("face {f} of {}", self.faces.len())),
+                    None => Ok(()),
+                }
+            }
+        }
+    }
+
+    fn check_tree(&self) -> Result<(), AssetError> {
+        let (n, f) = (self.tree_children.len(), self.faces.len() as u32);
+        if n == 0 || self.tree_boxes.len() != n {
+            return wrong(layout::TREE_BOXES, format!("{} boxes for {n} nodes; at least 1 of each", self.tree_boxes.len()));
+        }
+        let mut depth = vec![0u8; n];
+        let mut covered = 0u64;
+        for (i, node) in self.tree_children.iter().enumerate() {
+            if usize::from(depth[i]) > AabbTree::MAX_DEPTH {
+                return wrong(layout::TREE_CHILDREN, format!("node {i} is deeper than {}", AabbTree::MAX_DEPTH));
+            }
+            for &word in node {
+                match TreeChild::decode(word) {
+                    TreeChild::Node(c) if c as usize <= i || c as usize >= n || depth[c as usize] != 0 => {
+                        return wrong(layout::TREE_CHILDREN, format!("node {i}: child {c} of {n} nodes"));
+                    }
+                    TreeChild::Node(c) => depth[c as usize] = depth[i] + 1,
+                    TreeChild::Leaf(start, count) => {
+                        if start + count > f {
+                            return wrong(layout::TREE_CHILDREN, format!("node {i}: faces {start} to {} of {f}", start + count));
+                        }
+                        covered += u64::from(count);
+                    }
+                }
+            }
+        }
+        if covered != u64::from(f) {
+            return wrong(layout::TREE_CHILDREN, format!("leaves hold {covered} of {f} faces"));
+        }
+        Ok(())
+    }
+}
+
+fn frame_and_cube(placed: &[f64]) -> Result<(LocalFrame, DomainCube), AssetError> {
+    let &[x, y, z, scale, u, v, w, side] = placed else {
+        return wrong(layout::FRAME, format!("{} numbers; expected 8", placed.len()));
+    };
+    let positive = |s: f64| s.is_normal() && s > 0.0;
+    if !placed.iter().all(|x| x.is_finite()) || !positive(scale) || !positive(side) {
+        return wrong(layout::FRAME, format!("{placed:?} is no frame: finite, scale and side positive"));
+    }
+    Ok((
+        LocalFrame { offset: DVec3::new(x, y, z), scale },
+        DomainCube::new(DVec3::new(u, v, w), side),
+    ))
+}
+
+fn wrong<T>(spec: super::SectionSpec, reason: String) -> Result<T, AssetError> {
+    Err(AssetError::section(spec.name, reason))
+}
+

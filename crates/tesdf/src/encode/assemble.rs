@@ -1,0 +1,200 @@
+//! Turns refined trees into the sections of an asset.
+
+use std::collections::HashMap;
+
+use super::EncodeError;
+use super::refine::{Leaf, Tree};
+use crate::asset::layout::{
+    LONG_WINDING, Label, List, MAX_LIST_OFFSET, NO_PALETTE, Node, PALETTE_SIZE, Side,
+};
+
+/// The forest and its lists, as they are stored.
+#[derive(Debug, Default)]
+pub struct Forest {
+    /// Words of the forest.
+    pub nodes: Vec<u32>,
+    /// Bytes of the lists.
+    pub lists: Vec<u8>,
+    /// Where each palette begins.
+    pub palette_starts: Vec<u32>,
+    /// Faces of the palettes.
+    pub palettes: Vec<u32>,
+}
+
+/// Lays out six roots. `labels` are of the leaves in depth-first order; `position` maps a face to its place in the asset; lists are sorted by it.
+///
+/// # Errors
+/// When the asset has more palettes or bytes of lists than its words can name.
+pub fn assemble(roots: &mut [Tree], labels: &[Label], position: &[u32]) -> Result<Forest, EncodeError> {
+    let mut leaves = Vec::new();
+    for root in roots {
+        collect(root, &mut |leaf| {
+            if let Leaf::Listed { faces, .. } = leaf {
+                faces.iter_mut().for_each(|f| *f = position[*f as usize]);
+                faces.sort_unstable();
+            }
+        });
+        leaves.push(root);
+    }
+    let mut forest = Forest { nodes: vec![0; 6], palette_starts: vec![0], ..Default::default() };
+    let mut palette_of = Vec::with_capacity(labels.len());
+    for root in &leaves {
+        let start = palette_of.len();
+        if let Union::Small(faces) = forest.find_palettes(root, &mut palette_of) {
+            forest.add_palette(&faces, &mut palette_of[start..]);
+        }
+    }
+    if forest.palette_starts.len() > usize::from(NO_PALETTE) {
+        return Err(EncodeError::TooLarge {
+            what: "palettes",
+            found: forest.palette_starts.len(),
+            limit: usize::from(NO_PALETTE),
+        });
+    }
+    let mut writer = Writer { forest, labels, palette_of: &palette_of, next: 0, seen: HashMap::new() };
+    for (word, root) in leaves.iter().enumerate() {
+        writer.write(root, word)?;
+    }
+    Ok(writer.forest)
+}
+
+/// Calls `visit` with each leaf in depth-first order.
+pub fn collect<'a>(tree: &'a mut Tree, visit: &mut impl FnMut(&'a mut Leaf)) {
+    match tree {
+        Tree::Leaf(leaf) => visit(leaf),
+        Tree::Split(children) => children.iter_mut().for_each(|c| collect(c, visit)),
+    }
+}
+
+/// The faces of a subtree, unless they are too many for one palette.
+enum Union {
+    Small(Vec<u32>),
+    Large,
+}
+
+impl Forest {
+    /// Gives each of the largest subtrees that name at most 256 faces a palette.
+    ///
+    /// `palette_of` grows by one entry per leaf of `tree`; those of a subtree that is still `Small` are open.
+    fn find_palettes(&mut self, tree: &Tree, palette_of: &mut Vec<Option<u16>>) -> Union {
+        match tree {
+            Tree::Leaf(Leaf::Listed { faces, .. }) => {
+                palette_of.push(None);
+                if faces.len() < PALETTE_SIZE { Union::Small(faces.clone()) } else { Union::Large }
+            }
+            Tree::Leaf(_) => {
+                palette_of.push(None);
+                Union::Small(Vec::new())
+            }
+            Tree::Split(children) => {
+                let start = palette_of.len();
+                let left = self.find_palettes(&children[0], palette_of);
+                let middle = palette_of.len();
+                let right = self.find_palettes(&children[1], palette_of);
+                let end = palette_of.len();
+                match (left, right) {
+                    (Union::Small(a), Union::Small(b)) => {
+                        let mut all = [a.as_slice(), &b].concat();
+                        all.sort_unstable();
+                        all.dedup();
+                        if all.len() <= PALETTE_SIZE {
+                            return Union::Small(all);
+                        }
+                        self.add_palette(&a, &mut palette_of[start..middle]);
+                        self.add_palette(&b, &mut palette_of[middle..end]);
+                    }
+                    (Union::Small(a), Union::Large) => self.add_palette(&a, &mut palette_of[start..middle]),
+                    (Union::Large, Union::Small(b)) => self.add_palette(&b, &mut palette_of[middle..end]),
+                    (Union::Large, Union::Large) => {}
+                }
+                Union::Large
+            }
+        }
+    }
+
+    fn add_palette(&mut self, faces: &[u32], leaves: &mut [Option<u16>]) {
+        if faces.is_empty() {
+            return;
+        }
+        // More palettes than u16 names are reported by the caller, which counts them.
+        leaves.fill(Some((self.palette_starts.len() - 1).min(usize::from(NO_PALETTE)) as u16));
+        self.palettes.extend(faces);
+        self.palette_starts.push(self.palettes.len() as u32);
+    }
+
+    fn palette(&self, palette: u16) -> &[u32] {
+        let start = self.palette_starts[palette as usize] as usize;
+        &self.palettes[start..self.palette_starts[palette as usize + 1] as usize]
+    }
+}
+
+struct Writer<'a> {
+    forest: Forest,
+    labels: &'a [Label],
+    palette_of: &'a [Option<u16>],
+    next: usize,
+    /// Where equal bytes are stored already.
+    seen: HashMap<Vec<u8>, u32>,
+}
+
+impl Writer<'_> {
+    fn write(&mut self, tree: &Tree, word: usize) -> Result<(), EncodeError> {
+        let node = match tree {
+            Tree::Split(children) => {
+                let at = self.forest.nodes.len();
+                self.forest.nodes.extend([0, 0]);
+                self.forest.nodes[word] = Node::Split(at as u32).encode();
+                self.write(&children[0], at)?;
+                return self.write(&children[1], at + 1);
+            }
+            Tree::Leaf(leaf) => {
+                let (label, palette) = (self.labels[self.next], self.palette_of[self.next]);
+                self.next += 1;
+                match leaf {
+                    Leaf::Listed { faces, .. } => Node::Listed(label, self.list(faces, label, palette)?),
+                    Leaf::Far => Node::Far(if label == Label::Outside { Side::Outside } else { Side::Inside }),
+                    Leaf::Outside => Node::NotOfDomain,
+                }
+            }
+        };
+        self.forest.nodes[word] = node.encode();
+        Ok(())
+    }
+
+    fn list(&mut self, faces: &[u32], label: Label, palette: Option<u16>) -> Result<u32, EncodeError> {
+        let mut bytes = Vec::with_capacity(faces.len() + 8);
+        let prefix = match label {
+            Label::Crossing(winding) if winding >= LONG_WINDING => {
+                bytes.extend(winding.to_le_bytes());
+                4
+            }
+            _ => 0,
+        };
+        let slots = palette.and_then(|p| {
+            let all = self.forest.palette(p);
+            let slot = |f: &u32| all.binary_search(f).ok().map(|s| s as u8);
+            Some((p, faces.iter().map(slot).collect::<Option<Vec<u8>>>()?))
+        });
+        match slots {
+            Some((palette, slots)) => List::Slots(palette, &slots).encode(&mut bytes),
+            None => {
+                let raw: Vec<u8> = faces.iter().flat_map(|f| f.to_le_bytes()).collect();
+                List::Faces(&raw).encode(&mut bytes);
+            }
+        }
+        if let Some(&offset) = self.seen.get(&bytes) {
+            return Ok(offset + prefix);
+        }
+        let offset = self.forest.lists.len();
+        if offset + bytes.len() > MAX_LIST_OFFSET as usize {
+            return Err(EncodeError::TooLarge {
+                what: "bytes of lists",
+                found: offset + bytes.len(),
+                limit: MAX_LIST_OFFSET as usize,
+            });
+        }
+        self.forest.lists.extend(&bytes);
+        self.seen.insert(bytes, offset as u32);
+        Ok(offset as u32 + prefix)
+    }
+}

@@ -1,0 +1,172 @@
+//! How the closest feature tells the sign, where it does so beyond doubt.
+
+use glam::DVec3;
+
+use super::surface::Surface;
+use crate::asset::layout::{SignHint, SignHints};
+use crate::geometry::{Aabb, AabbTree, Triangle};
+
+/// Whether the mesh meets itself or folds in ways that only the winding number sorts out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Simplicity {
+    /// No self-intersections; every edge and vertex is manifold; no duplicate or flat faces.
+    Simple,
+    /// Anything else.
+    Involved,
+}
+
+/// Sheets nearer to each other than this (local frame) are left to the winding number: `f32` storage
+/// could take one for the other. Twenty times its error.
+const THIN: f64 = 2e-6;
+/// Faces whose height is a smaller share of their length than this have no trustworthy normal in `f32`.
+const SLIVER: f64 = 1e-5;
+/// Cosine of the largest angle between normals across which the plane of either face tells the sign.
+///
+/// The direction from the feature to the point lies between the normals, so its angle to either is at
+/// most theirs, 60 degrees: the sine left over is far above any rounding.
+const FLAT: f64 = 0.5;
+/// Cosine beyond which two faces fold back onto each other.
+const FOLDED: f64 = -0.99;
+
+/// The hints of all faces. See `docs/math.md`, "The sign rule".
+pub fn sign_hints(surface: &Surface, tree: &AabbTree, simplicity: Simplicity) -> Vec<SignHints> {
+    use rayon::prelude::*;
+    if simplicity == Simplicity::Involved {
+        return vec![SignHints::default(); surface.faces.len()];
+    }
+    let folded: Vec<bool> =
+        (0..surface.faces.len()).into_par_iter().map(|f| is_delicate(surface, tree, f)).collect();
+    (0..surface.faces.len() as u32)
+        .into_par_iter()
+        .map(|face| {
+            let mut hints = SignHints::default();
+            if folded[face as usize] {
+                return hints;
+            }
+            hints.set(0, SignHint::Plane);
+            for k in 0..3 {
+                hints.set(1 + k, edge_hint(surface, face, k));
+                hints.set(4 + k, vertex_hint(surface, face, k, &folded));
+            }
+            hints
+        })
+        .collect()
+}
+
+/// A sliver, or so near to another sheet that rounding could confuse them.
+fn is_delicate(surface: &Surface, tree: &AabbTree, face: usize) -> bool {
+    let triangle = &surface.triangles[face];
+    let [a, b, c] = triangle.corners;
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let height = (b - a).cross(c - a).length() / longest;
+    if height < SLIVER * longest || height < THIN {
+        return true;
+    }
+    let corners = surface.faces[face];
+    let reach = Aabb::of(&triangle.corners).grown(THIN);
+    let mut delicate = false;
+    tree.visit(
+        |bounds| bounds.overlaps(reach),
+        |leaf| {
+            for &other in leaf {
+                if other as usize == face {
+                    continue;
+                }
+                let o = &surface.triangles[other as usize];
+                let shared = surface.faces[other as usize].iter().filter(|v| corners.contains(v)).count();
+                let cosine = triangle.normal.dot(o.normal);
+                delicate |= match shared {
+                    0 => Aabb::of(&o.corners).overlaps(reach) && within(triangle, o, THIN),
+                    1 => cosine < FLAT && narrow_fold(surface, face, other as usize),
+                    _ => cosine < FOLDED,
+                };
+            }
+        },
+    );
+    delicate
+}
+
+/// Whether two faces that share one vertex come within some three degrees of each other beside it.
+fn narrow_fold(surface: &Surface, face: usize, other: usize) -> bool {
+    let (f, o) = (surface.faces[face], surface.faces[other]);
+    let Some(v) = f.iter().find(|v| o.contains(v)) else { return false };
+    // The directions that a face takes up from the vertex, as a triangle with its corners on the unit sphere.
+    let sector = |which: usize, corners: [u32; 3]| {
+        let t = &surface.triangles[which];
+        let k = corners.iter().position(|c| c == v).unwrap_or(0);
+        let at = |i: usize| (t.corners[(k + i) % 3] - t.corners[k]).normalize_or_zero();
+        Triangle::new([at(1), at(2), (at(1) + at(2)).normalize_or_zero()])
+    };
+    within(&sector(face, f), &sector(other, o), 0.05)
+}
+
+/// Whether two triangles come within `distance`; may say yes without need.
+fn within(a: &Triangle, b: &Triangle, distance: f64) -> bool {
+    let edges = |t: &Triangle| {
+        [t.corners[1] - t.corners[0], t.corners[2] - t.corners[1], t.corners[0] - t.corners[2]]
+    };
+    let (ea, eb) = (edges(a), edges(b));
+    let separated = |axis: DVec3| {
+        let span = |t: &Triangle| {
+            t.corners.iter().map(|c| c.dot(axis)).fold((f64::INFINITY, f64::NEG_INFINITY), |s, x| (s.0.min(x), s.1.max(x)))
+        };
+        let (sa, sb) = (span(a), span(b));
+        (sa.0 - sb.1).max(sb.0 - sa.1) > distance * axis.length()
+    };
+    !(separated(a.normal)
+        || separated(b.normal)
+        || ea.iter().any(|&e| eb.iter().any(|&g| separated(e.cross(g))))
+        || ea.iter().any(|&e| separated(e.cross(a.normal)))
+        || eb.iter().any(|&e| separated(e.cross(b.normal))))
+}
+
+fn edge_hint(surface: &Surface, face: u32, k: usize) -> SignHint {
+    let [f, g] = surface.edge_faces(surface.edges[face as usize][k]) else { return SignHint::Winding };
+    let other = if *f == face { *g } else { *f };
+    let (t, o) = (&surface.triangles[face as usize], &surface.triangles[other as usize]);
+    let cosine = t.normal.dot(o.normal);
+    if cosine > FLAT {
+        return SignHint::Plane;
+    }
+    if cosine < FOLDED {
+        return SignHint::Winding;
+    }
+    // Convex when the other face's far corner lies behind this face.
+    let a = t.corners[k];
+    let apex = o.corners.iter().map(|&c| t.normal.dot(c - a)).fold(0.0, |m: f64, h| if h.abs() > m.abs() { h } else { m });
+    if apex < 0.0 { SignHint::Outside } else { SignHint::Inside }
+}
+
+/// Slack of "on or below" for the ring of a vertex, as a share of the ring edge's length.
+const RING: f64 = 1e-12;
+
+fn vertex_hint(surface: &Surface, face: u32, k: usize, delicate: &[bool]) -> SignHint {
+    let vertex = surface.faces[face as usize][k];
+    let around = surface.vertex_faces(vertex);
+    if around.iter().any(|&f| delicate[f as usize]) {
+        return SignHint::Winding;
+    }
+    let normal = surface.triangles[face as usize].normal;
+    if around.iter().all(|&f| surface.triangles[f as usize].normal.dot(normal) > FLAT) {
+        return SignHint::Plane;
+    }
+    let apex = surface.triangles[face as usize].corners[k];
+    // Heights of all ring vertices over all planes around the vertex.
+    let (mut below, mut above) = (true, true);
+    for &f in around {
+        let n = surface.triangles[f as usize].normal;
+        for &g in around {
+            for c in surface.triangles[g as usize].corners {
+                let height = n.dot(c - apex);
+                let slack = RING * (c - apex).length();
+                below &= height <= slack;
+                above &= height >= -slack;
+            }
+        }
+    }
+    match (below, above) {
+        (true, false) => SignHint::Outside,
+        (false, true) => SignHint::Inside,
+        _ => SignHint::Winding,
+    }
+}

@@ -1,0 +1,54 @@
+use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
+
+/// What the encoder is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Bisecting the domain.
+    Refine,
+    /// Shortening lists and labelling cells.
+    Tighten,
+    /// Laying out bytes.
+    Assemble,
+}
+
+/// Shared between the thread that encodes and one that watches: how far it is, and the wish to stop.
+#[derive(Debug, Default)]
+pub struct EncodeProgress {
+    pub(super) cancel: AtomicBool,
+    pub(super) done: AtomicU64,
+    total: AtomicU64,
+    stage: AtomicU8,
+}
+
+impl EncodeProgress {
+    /// Asks the encoder to stop; it answers [`EncodeError::Cancelled`](super::EncodeError::Cancelled).
+    pub fn cancel(&self) {
+        self.cancel.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether [`cancel`](Self::cancel) was called.
+    pub fn is_cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
+
+    /// The stage and the share of it that is done, 0 to 1.
+    pub fn state(&self) -> (Stage, f64) {
+        let stage = match self.stage.load(Ordering::Relaxed) {
+            0 => Stage::Refine,
+            1 => Stage::Tighten,
+            _ => Stage::Assemble,
+        };
+        let total = self.total.load(Ordering::Relaxed).max(1);
+        (stage, (self.done.load(Ordering::Relaxed) as f64 / total as f64).min(1.0))
+    }
+
+    pub(super) fn begin(&self, stage: Stage, total: u64) {
+        self.done.store(0, Ordering::Relaxed);
+        self.total.store(total, Ordering::Relaxed);
+        self.stage.store(stage as u8, Ordering::Relaxed);
+    }
+
+    pub(super) fn advance(&self, by: u64) {
+        self.done.fetch_add(by, Ordering::Relaxed);
+    }
+}

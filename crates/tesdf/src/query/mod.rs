@@ -1,0 +1,235 @@
+//! Signed distance, closest point, gradient, closest face; occupancy and rays.
+//!
+//! A point is taken to the local frame, its cell is found by descending the forest in fixed point, and the
+//! least distance to the faces of the cell's list is the answer. Points that no list serves (outside of the
+//! domain, or in a far cell) are answered from the tree over all faces, exactly too.
+mod kernel;
+mod locate;
+mod nearest;
+mod ray;
+mod sign;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+pub use kernel::{FaceRecord, Isa};
+use kernel::Ids;
+pub use nearest::Reads;
+pub use ray::RayHit;
+
+use crate::TeSdf;
+use crate::asset::layout::{Label, Side};
+use crate::geometry::{Closest, Feature};
+use locate::Place;
+
+/// What a query computes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// Faces rounded to `f32` in a local frame, several at a time: within 1e-6 × diagonal, the right sign
+    /// beyond that, gradients within 1e-3 rad from 1e-4 × diagonal on.
+    F32,
+    /// Faces as they are in the mesh: within 1e-12 × diagonal plus 4 ulp of the largest coordinate, signs by
+    /// exact predicates, gradients within 1e-3 rad from 1e-9 × diagonal on.
+    F64,
+}
+
+/// The answer to a query, in the mesh's unit and frame.
+///
+/// A point with a NaN or infinite coordinate has no answer: the numbers are NaN and the face is
+/// [`NO_FACE`](Self::NO_FACE).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// Distance to the nearest face, negative inside.
+    pub signed_distance: f64,
+    /// Unit gradient of the signed distance; it points outward.
+    pub gradient: DVec3,
+    /// The nearest point of the surface.
+    pub closest_point: DVec3,
+    /// The nearest face, by its id in the source mesh, 0-based. Of faces of the cell's list at equal
+    /// distance, the lowest.
+    pub face: u32,
+}
+
+impl Answer {
+    /// The face of a point that has no answer.
+    pub const NO_FACE: u32 = u32::MAX;
+
+    const NONE: Self = Self {
+        signed_distance: f64::NAN,
+        gradient: DVec3::NAN,
+        closest_point: DVec3::NAN,
+        face: Self::NO_FACE,
+    };
+}
+
+/// Below this distance (local frame) the gradient is the normal of the closest feature.
+const ON_SURFACE_F64: f64 = 1e-9;
+/// The same for `f32` storage, some ten times its rounding.
+const ON_SURFACE_F32: f64 = 1e-6;
+
+impl TeSdf {
+    /// Answers for any point; `point` is in the mesh's unit.
+    pub fn query(&self, point: DVec3, precision: Precision) -> Answer {
+        if !point.is_finite() {
+            return Answer::NONE;
+        }
+        let local = self.frame.to_local(point);
+        self.answer(point, local, self.place(local), precision)
+    }
+
+    /// As [`query`](Self::query), but `None` outside of the domain: more than the band from the solid, give or
+    /// take a cell.
+    pub fn query_in_domain(&self, point: DVec3, precision: Precision) -> Option<Answer> {
+        let local = self.frame.to_local(point);
+        match self.place(local) {
+            Place::NotOfDomain => None,
+            place => Some(self.answer(point, local, place, precision)),
+        }
+    }
+
+    /// Answers for many points, in order, on all threads of the current rayon pool.
+    pub fn query_batch(&self, points: &[DVec3], precision: Precision) -> Vec<Answer> {
+        points.par_iter().with_min_len(256).map(|&p| self.query(p, precision)).collect()
+    }
+
+    /// The signed distance alone; NaN for a point that is not finite.
+    pub fn signed_distance(&self, point: DVec3, precision: Precision) -> f64 {
+        self.query(point, precision).signed_distance
+    }
+
+    /// Whether the winding number at `point` is 1 or more, by exact predicates. Points on the surface may
+    /// go either way; points that are not finite are outside.
+    pub fn is_inside(&self, point: DVec3) -> bool {
+        let local = self.frame.to_local(point);
+        point.is_finite()
+            && match self.place(local) {
+                Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
+                Place::Listed { label: Label::Crossing(winding), offset } => {
+                    self.winding_in_cell(local, winding, offset) >= 1
+                }
+                _ => false,
+            }
+    }
+
+    /// How many faces and nodes a query at `point` reads, in `f32`.
+    pub fn reads(&self, point: DVec3) -> Reads {
+        let local = self.frame.to_local(point);
+        match self.place(local) {
+            Place::Listed { offset, .. } => Reads { list_entries: self.list(offset).len(), ..Reads::default() },
+            _ => {
+                let mut reads = Reads::default();
+                self.nearest_in_tree_f32((local - self.cube.middle()).as_vec3(), &mut reads);
+                reads
+            }
+        }
+    }
+
+    #[inline]
+    fn answer(&self, point: DVec3, local: DVec3, place: Place, precision: Precision) -> Answer {
+        match precision {
+            Precision::F32 => self.answer_f32(point, local, place),
+            Precision::F64 => self.answer_f64(point, local, place),
+        }
+    }
+
+    #[inline]
+    fn answer_f32(&self, point: DVec3, local: DVec3, place: Place) -> Answer {
+        let relative = local - self.cube.middle();
+        let found = match place {
+            Place::Listed { offset, .. } => self.nearest_in_list_f32(offset, relative.as_vec3()),
+            // Far from the cube, f32 is too coarse against the body.
+            _ if relative.abs().max_element() > 2.0 * self.cube.side() => {
+                return self.answer_f64(point, local, place);
+            }
+            _ => self.nearest_in_tree_f32(relative.as_vec3(), &mut Reads::default()),
+        };
+        let triangle = self.records[found.face as usize].triangle();
+        let closest = triangle.closest(relative);
+        let side = match place {
+            Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
+            Place::Listed { label: Label::Crossing(winding), offset } => {
+                let height = triangle.normal.dot(relative - triangle.corners[0]);
+                self.hinted_side(found.face, closest.feature, height)
+                    .unwrap_or_else(|| self.exact_side(local, winding, offset))
+            }
+            _ => Side::Outside,
+        };
+        let normal = triangle.normal;
+        let to_world = |p: DVec3| self.frame.to_world(p + self.cube.middle());
+        self.finish(relative, closest, side, found.face, to_world, |d| if d < ON_SURFACE_F32 { Some(normal) } else { None })
+    }
+
+    fn answer_f64(&self, _point: DVec3, local: DVec3, place: Place) -> Answer {
+        let (position, closest) = match place {
+            Place::Listed { offset, .. } => self.nearest_in_list_f64(offset, local),
+            _ => self.nearest_in_tree_f64(local),
+        };
+        let side = match place {
+            Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
+            Place::Listed { label: Label::Crossing(winding), offset } if closest.distance > 0.0 => {
+                self.exact_side(local, winding, offset)
+            }
+            _ => Side::Outside,
+        };
+        let on_surface = |d: f64| match place {
+            Place::Listed { offset, .. } if d < ON_SURFACE_F64 => {
+                Some(self.pseudonormal(offset, position, closest.feature))
+            }
+            _ => None,
+        };
+        self.finish(local, closest, side, position, |p| self.frame.to_world(p), on_surface)
+    }
+
+    /// From the local frame to the mesh's.
+    #[inline]
+    fn finish(
+        &self,
+        p: DVec3,
+        closest: Closest,
+        side: Side,
+        position: u32,
+        to_world: impl Fn(DVec3) -> DVec3,
+        on_surface: impl Fn(f64) -> Option<DVec3>,
+    ) -> Answer {
+        let sign = if side == Side::Inside { -1.0 } else { 1.0 };
+        let gradient = on_surface(closest.distance)
+            .unwrap_or_else(|| sign * (p - closest.point) / closest.distance);
+        Answer {
+            signed_distance: sign * closest.distance / self.frame.scale,
+            gradient,
+            closest_point: to_world(closest.point),
+            face: self.face_ids[position as usize],
+        }
+    }
+
+    /// The normal of a feature: of the face, the sum over an edge's faces, or the angle-weighted sum around a
+    /// vertex (Bærentzen and Aanæs 2005). The list names all of them when the feature is within the padding of the cell.
+    fn pseudonormal(&self, offset: u32, position: u32, feature: Feature) -> DVec3 {
+        let corners = self.faces[position as usize];
+        let own = self.local_triangle(position as usize).normal;
+        let held: &[u32] = match feature {
+            Feature::Face => return own,
+            Feature::Edge(k) => &[corners[k as usize], corners[(k as usize + 1) % 3]],
+            Feature::Vertex(k) => &corners[k as usize..=k as usize],
+        };
+        let mut sum = DVec3::ZERO;
+        for face in self.list_faces(offset) {
+            let ids = self.faces[face as usize];
+            if !held.iter().all(|v| ids.contains(v)) {
+                continue;
+            }
+            let triangle = self.local_triangle(face as usize);
+            let weight = match (held, ids.iter().position(|v| *v == held[0])) {
+                ([_], Some(k)) => {
+                    let at = |i: usize| triangle.corners[(k + i) % 3] - triangle.corners[k];
+                    at(1).angle_between(at(2))
+                }
+                _ => 1.0,
+            };
+            if weight.is_finite() {
+                sum += weight * triangle.normal;
+            }
+        }
+        sum.try_normalize().unwrap_or(own)
+    }
+}

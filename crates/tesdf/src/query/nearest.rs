@@ -1,0 +1,155 @@
+use glam::{DVec3, Vec3};
+
+use super::kernel::{self, Ids, Nearest};
+use crate::TeSdf;
+use crate::asset::layout::TreeChild;
+use crate::geometry::{AabbTree, Closest, Feature, Regions};
+
+/// What a query reads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reads {
+    /// Faces of the cell's list.
+    pub list_entries: usize,
+    /// Faces of leaves of the face tree.
+    pub tree_faces: usize,
+    /// Nodes of the face tree.
+    pub tree_nodes: usize,
+}
+
+impl Reads {
+    /// Faces and nodes together.
+    pub fn total(self) -> usize {
+        self.list_entries + self.tree_faces + self.tree_nodes
+    }
+}
+
+/// Faces that follow each other.
+#[derive(Clone, Copy)]
+struct Run(u32, u32);
+
+impl Ids for Run {
+    #[inline(always)]
+    fn len(self) -> usize {
+        self.1 as usize
+    }
+
+    #[inline(always)]
+    fn get(self, i: usize) -> u32 {
+        self.0 + i as u32
+    }
+}
+
+/// Entries of a stack that visits the farther child later: one per level.
+const STACK: usize = AabbTree::MAX_DEPTH + 2;
+
+impl TeSdf {
+    #[inline]
+    pub(super) fn nearest_in_list_f32(&self, offset: u32, p: Vec3) -> Nearest {
+        kernel::nearest(self.isa, &self.records, self.list(offset), p, Nearest::NONE)
+    }
+
+    /// The nearest of all faces; `p` relative to the middle of the cube.
+    pub(super) fn nearest_in_tree_f32(&self, p: Vec3, reads: &mut Reads) -> Nearest {
+        let mut best = Nearest::NONE;
+        let bound = |b: &[f32]| {
+            let d = (Vec3::from_slice(b) - p).max(p - Vec3::from_slice(&b[3..])).max(Vec3::ZERO);
+            d.length_squared()
+        };
+        let mut stack = [(0.0f32, TreeChild::Node(0)); STACK];
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (d, child) = stack[top];
+            if d >= best.distance_squared {
+                continue;
+            }
+            match child {
+                TreeChild::Leaf(start, count) => {
+                    reads.tree_faces += count as usize;
+                    best = kernel::nearest(self.isa, &self.records, Run(start, count), p, best);
+                }
+                TreeChild::Node(n) => {
+                    reads.tree_nodes += 1;
+                    let boxes = &self.tree_boxes[n as usize];
+                    let [left, right] = self.tree_children[n as usize].map(TreeChild::decode);
+                    let (a, b) = ((bound(&boxes[..6]), left), (bound(&boxes[6..]), right));
+                    let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+                    stack[top] = far;
+                    stack[top + 1] = near;
+                    top += 2;
+                }
+            }
+        }
+        best
+    }
+
+    /// The nearest face of a list, `p` in the local frame: its position, and where. Ties go to the lowest id.
+    pub(super) fn nearest_in_list_f64(&self, offset: u32, p: DVec3) -> (u32, Closest) {
+        let mut best = Best::NONE;
+        self.list_faces(offset).for_each(|face| best.try_face(self, face, p));
+        (best.position, best.closest)
+    }
+
+    /// The nearest of all faces, likewise.
+    pub(super) fn nearest_in_tree_f64(&self, p: DVec3) -> (u32, Closest) {
+        let mut best = Best::NONE;
+        let relative = p - self.cube.middle();
+        // Boxes hold their faces; the slack covers the rounding of the bound itself.
+        let bound = |b: &[f32]| {
+            let (low, high) = (Vec3::from_slice(b).as_dvec3(), Vec3::from_slice(&b[3..]).as_dvec3());
+            (low - relative).max(relative - high).max(DVec3::ZERO).length() * (1.0 - 1e-14)
+        };
+        let mut stack = [(0.0f64, TreeChild::Node(0)); STACK];
+        let mut top = 1;
+        while top > 0 {
+            top -= 1;
+            let (d, child) = stack[top];
+            if d > best.closest.distance {
+                continue;
+            }
+            match child {
+                TreeChild::Leaf(start, count) => {
+                    (start..start + count).for_each(|face| best.try_face(self, face, p));
+                }
+                TreeChild::Node(n) => {
+                    let boxes = &self.tree_boxes[n as usize];
+                    let [left, right] = self.tree_children[n as usize].map(TreeChild::decode);
+                    let (a, b) = ((bound(&boxes[..6]), left), (bound(&boxes[6..]), right));
+                    let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+                    stack[top] = far;
+                    stack[top + 1] = near;
+                    top += 2;
+                }
+            }
+        }
+        (best.position, best.closest)
+    }
+}
+
+struct Best {
+    position: u32,
+    id: u32,
+    closest: Closest,
+}
+
+impl Best {
+    const NONE: Self = Self {
+        position: 0,
+        id: u32::MAX,
+        closest: Closest {
+            distance: f64::INFINITY,
+            point: DVec3::NAN,
+            feature: Feature::Face,
+            regions: Regions::FACE,
+        },
+    };
+
+    fn try_face(&mut self, asset: &TeSdf, position: u32, p: DVec3) {
+        let closest = asset.local_triangle(position as usize).closest(p);
+        let id = asset.face_ids[position as usize];
+        let tie = closest.distance == self.closest.distance && id < self.id;
+        if closest.distance < self.closest.distance || tie {
+            *self = Self { position, id, closest };
+        }
+    }
+}

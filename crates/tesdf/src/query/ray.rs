@@ -1,0 +1,97 @@
+use glam::DVec3;
+
+use crate::TeSdf;
+use crate::asset::layout::TreeChild;
+use crate::geometry::orientation;
+
+/// Where a ray meets the surface first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// Distance along the ray, in lengths of its direction.
+    pub t: f64,
+    /// The point met, in the mesh's unit.
+    pub point: DVec3,
+    /// The face met, by its id in the source mesh; of several at the same `t`, the lowest.
+    pub face: u32,
+    /// Outward unit normal of the face.
+    pub normal: DVec3,
+}
+
+impl TeSdf {
+    /// The first face that `origin + t · direction` meets for `t` in `[0, limit]`, from either side; in the mesh's
+    /// unit. Rays through edges and corners hit: which side of an edge a ray passes is decided exactly.
+    ///
+    /// `None` when nothing is met, or when the ray is not finite or has no direction.
+    pub fn ray_cast(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
+        let valid = origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO && limit >= 0.0;
+        if !valid {
+            return None;
+        }
+        let from = self.frame.to_local(origin);
+        let along = direction * self.frame.scale;
+        let relative = from - self.cube.middle();
+        let mut best: Option<(f64, u32, u32)> = None;
+        let mut stack = vec![TreeChild::Node(0)];
+        while let Some(child) = stack.pop() {
+            match child {
+                TreeChild::Node(n) => {
+                    let boxes = &self.tree_boxes[n as usize];
+                    for (side, &word) in self.tree_children[n as usize].iter().enumerate() {
+                        let reach = best.map_or(limit, |b| b.0);
+                        if meets_box(relative, along, reach, &boxes[6 * side..6 * side + 6]) {
+                            stack.push(TreeChild::decode(word));
+                        }
+                    }
+                }
+                TreeChild::Leaf(start, count) => {
+                    for position in start..start + count {
+                        let corners = self.local_triangle(position as usize).corners;
+                        let Some(t) = meets_face(from, along, corners).filter(|&t| t <= limit) else { continue };
+                        let id = self.face_ids[position as usize];
+                        if best.is_none_or(|(b, i, _)| t < b || (t == b && id < i)) {
+                            best = Some((t, id, position));
+                        }
+                    }
+                }
+            }
+        }
+        best.map(|(t, face, position)| RayHit {
+            t,
+            point: origin + t * direction,
+            face,
+            normal: self.local_triangle(position as usize).normal,
+        })
+    }
+}
+
+/// Slab test, widened by more than its rounding.
+fn meets_box(from: DVec3, along: DVec3, limit: f64, b: &[f32]) -> bool {
+    let (mut enter, mut leave) = (0.0f64, limit);
+    for a in 0..3 {
+        let (low, high) = (f64::from(b[a]) - from[a], f64::from(b[a + 3]) - from[a]);
+        if along[a] == 0.0 {
+            if low > 0.0 || high < 0.0 {
+                return false;
+            }
+            continue;
+        }
+        let (s, t) = (low / along[a], high / along[a]);
+        enter = enter.max(s.min(t));
+        leave = leave.min(s.max(t));
+    }
+    enter * (1.0 - 1e-12) <= leave * (1.0 + 1e-12)
+}
+
+fn meets_face(from: DVec3, along: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+    let normal = (b - a).cross(c - a);
+    let slope = normal.dot(along);
+    let t = normal.dot(a - from) / slope;
+    if slope == 0.0 || t.is_nan() || t < 0.0 {
+        return None;
+    }
+    // Signs of the volumes that the ray's line spans with the edges, exact for the rounded second point.
+    let to = from + along;
+    let sides = [orientation(from, to, a, b), orientation(from, to, b, c), orientation(from, to, c, a)];
+    let one_side = sides.iter().all(|&s| s >= 0) || sides.iter().all(|&s| s <= 0);
+    one_side.then_some(t)
+}

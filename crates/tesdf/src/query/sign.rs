@@ -1,0 +1,39 @@
+use glam::DVec3;
+
+use crate::TeSdf;
+use crate::asset::layout::{SignHint, SignHints, Side};
+use crate::geometry::{Feature, signed_crossing};
+
+impl TeSdf {
+    /// The side that the closest feature tells, where it tells one. `height` is that of the point over the face.
+    #[inline]
+    pub(super) fn hinted_side(&self, position: u32, feature: Feature, height: f64) -> Option<Side> {
+        let hints = SignHints(self.sign_hints[position as usize]);
+        let k = match feature {
+            Feature::Face => 0,
+            Feature::Edge(k) => 1 + k,
+            Feature::Vertex(k) => 4 + k,
+        };
+        match hints.get(k as usize) {
+            SignHint::Winding => None,
+            SignHint::Plane => Some(if height < 0.0 { Side::Inside } else { Side::Outside }),
+            SignHint::Outside => Some(Side::Outside),
+            SignHint::Inside => Some(Side::Inside),
+        }
+    }
+
+    /// The side by winding number, exact; `winding` is that at the cell's centroid.
+    #[cold]
+    pub(super) fn exact_side(&self, local: DVec3, winding: u32, offset: u32) -> Side {
+        if self.winding_in_cell(local, winding, offset) >= 1 { Side::Inside } else { Side::Outside }
+    }
+
+    /// Winding number in a crossing cell: that at its centroid, plus the crossings on the way there. The list
+    /// names every face that meets the cell.
+    pub(super) fn winding_in_cell(&self, local: DVec3, winding: u32, offset: u32) -> i32 {
+        let Some(cell) = self.cell(local) else { return 0 };
+        let centroid = cell.centroid();
+        let corners = |f: u32| self.face_corners(f as usize).map(|p| self.frame.to_local(p));
+        winding as i32 + self.list_faces(offset).map(|f| signed_crossing(local, centroid, corners(f))).sum::<i32>()
+    }
+}
