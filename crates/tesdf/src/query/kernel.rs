@@ -5,6 +5,8 @@
 
 use glam::{DVec3, Vec3};
 
+use super::lanes::Lanes;
+
 use crate::geometry::Triangle;
 
 /// A face in `f32`, relative to the middle of the cube: corner a, b − a, c − a, unit normal.
@@ -54,27 +56,19 @@ impl Nearest {
 /// Instruction set that the kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Isa {
-    /// Whatever the build targets.
+    /// Whatever the build targets: four lanes.
     Baseline,
     /// AVX2: eight lanes.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// AVX-512: sixteen lanes.
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
 }
 
 impl Isa {
     /// The widest that this processor has.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
-        {
-            if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl") {
-                return Self::Avx512;
-            }
-            if std::arch::is_x86_feature_detected!("avx2") {
-                return Self::Avx2;
-            }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            return Self::Avx2;
         }
         Self::Baseline
     }
@@ -84,26 +78,17 @@ impl Isa {
 #[inline]
 pub fn nearest(isa: Isa, records: &[FaceRecord], ids: impl Ids, p: Vec3, best: Nearest) -> Nearest {
     match isa {
-        Isa::Baseline => nearest_lanes::<4>(records, ids, p, best),
-        // SAFETY: `detect` found the features.
+        Isa::Baseline => nearest_lanes::<[f32; 4], 4>(records, ids, p, best),
+        // SAFETY: `detect` found the feature.
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => unsafe { nearest_avx2(records, ids, p, best) },
-        // SAFETY: as above.
-        #[cfg(target_arch = "x86_64")]
-        Isa::Avx512 => unsafe { nearest_avx512(records, ids, p, best) },
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn nearest_avx2(records: &[FaceRecord], ids: impl Ids, p: Vec3, best: Nearest) -> Nearest {
-    nearest_lanes::<8>(records, ids, p, best)
-}
-
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512vl")]
-fn nearest_avx512(records: &[FaceRecord], ids: impl Ids, p: Vec3, best: Nearest) -> Nearest {
-    nearest_lanes::<16>(records, ids, p, best)
+    nearest_lanes::<std::arch::x86_64::__m256, 8>(records, ids, p, best)
 }
 
 /// Where the faces of a list are named.
@@ -115,76 +100,90 @@ pub trait Ids: Copy {
 }
 
 #[inline(always)]
-fn nearest_lanes<const N: usize>(records: &[FaceRecord], ids: impl Ids, p: Vec3, mut best: Nearest) -> Nearest {
+fn nearest_lanes<L: Lanes<N>, const N: usize>(
+    records: &[FaceRecord],
+    ids: impl Ids,
+    p: Vec3,
+    mut best: Nearest,
+) -> Nearest {
     let count = ids.len();
+    let p = V([L::splat(p.x), L::splat(p.y), L::splat(p.z)]);
     let mut first = 0;
     while first < count {
         // The last chunk is filled up with its last face: equal distances never replace an earlier one.
         let faces: [u32; N] = std::array::from_fn(|l| ids.get((first + l).min(count - 1)));
-        let d = distances_squared(records, &faces, p);
-        let least = d.iter().copied().fold(f32::INFINITY, f32::min);
-        if least < best.distance_squared {
-            let lane = d.iter().position(|&d| d == least).unwrap_or(0);
-            best = Nearest { distance_squared: least, face: faces[lane] };
+        let rows: [&[f32; 12]; N] = std::array::from_fn(|l| &records[faces[l] as usize].0);
+        let d = distance_squared(L::load(rows), p).to_array();
+        for l in 0..N {
+            let better = d[l] < best.distance_squared;
+            best.distance_squared = if better { d[l] } else { best.distance_squared };
+            best.face = if better { faces[l] } else { best.face };
         }
         first += N;
     }
     best
 }
 
-#[inline(always)]
-fn distances_squared<const N: usize>(records: &[FaceRecord], faces: &[u32; N], p: Vec3) -> [f32; N] {
-    let mut v = [[0.0f32; N]; 12];
-    for l in 0..N {
-        let record = &records[faces[l] as usize].0;
-        for (c, v) in v.iter_mut().enumerate() {
-            v[l] = record[c];
-        }
-    }
-    let mut d = [0.0f32; N];
-    for l in 0..N {
-        let at = |c: usize| [v[c][l], v[c + 1][l], v[c + 2][l]];
-        d[l] = distance_squared(at(0), at(3), at(6), at(9), p);
-    }
-    d
-}
+// No closures and no iterators over lanes below: the compiler builds those without the caller's instruction set, and
+// each operation becomes a call (measured: ten times slower).
 
-/// As [`Triangle::closest`], but branch-free and of the squared distance alone.
+/// As [`Triangle::closest`], but free of branches and of the squared distance alone.
 #[inline(always)]
-fn distance_squared(a: [f32; 3], ab: [f32; 3], ac: [f32; 3], n: [f32; 3], p: Vec3) -> f32 {
-    let [a, ab, ac, n] = [a, ab, ac, n].map(V);
-    let ap = V(p.to_array()).minus(a);
+fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 12], p: V<L>) -> L {
+    let (a, ab) = (V([v[0], v[1], v[2]]), V([v[3], v[4], v[5]]));
+    let (ac, n) = (V([v[6], v[7], v[8]]), V([v[9], v[10], v[11]]));
+    let zero = L::splat(0.0);
+    let ap = p.minus(a);
     let bp = ap.minus(ab);
     let bc = ac.minus(ab);
     let turned = ap.cross(n);
-    let inside = ab.dot(turned) >= 0.0 && ac.dot(turned) <= 0.0 && bc.dot(bp.cross(n)) >= 0.0;
+    let inside = ab.dot(turned).at_least(zero).and(zero.at_least(ac.dot(turned)));
+    let inside = inside.and(bc.dot(bp.cross(n)).at_least(zero));
     let height = n.dot(ap);
-    let edge = |from: V, along: V| {
-        let t = (along.dot(from) / along.dot(along).max(f32::MIN_POSITIVE)).max(0.0).min(1.0);
-        let to = V([from.0[0] - t * along.0[0], from.0[1] - t * along.0[1], from.0[2] - t * along.0[2]]);
-        to.dot(to)
-    };
-    let edges = edge(ap, ab).min(edge(ap, ac)).min(edge(bp, bc));
-    if inside { height * height } else { edges }
+    let edges = to_edge(ap, ab).min(to_edge(ap, ac)).min(to_edge(bp, bc));
+    inside.select(height.mul(height), edges)
+}
+
+/// Squared distance to the segment from the origin of `from` to `along`.
+#[inline(always)]
+fn to_edge<L: Lanes<N>, const N: usize>(from: V<L>, along: V<L>) -> L {
+    let t = along.dot(from).div(along.dot(along).max(L::splat(f32::MIN_POSITIVE)));
+    let t = t.max(L::splat(0.0)).min(L::splat(1.0));
+    let [x, y, z] = along.0;
+    let to = from.minus(V([x.mul(t), y.mul(t), z.mul(t)]));
+    to.dot(to)
 }
 
 #[derive(Clone, Copy)]
-struct V([f32; 3]);
+struct V<L>([L; 3]);
 
-impl V {
+impl<L> V<L> {
     #[inline(always)]
-    fn minus(self, o: Self) -> Self {
-        Self([self.0[0] - o.0[0], self.0[1] - o.0[1], self.0[2] - o.0[2]])
+    fn minus<const N: usize>(self, o: Self) -> Self
+    where
+        L: Lanes<N>,
+    {
+        Self([self.0[0].sub(o.0[0]), self.0[1].sub(o.0[1]), self.0[2].sub(o.0[2])])
     }
 
     #[inline(always)]
-    fn dot(self, o: Self) -> f32 {
-        self.0[0] * o.0[0] + self.0[1] * o.0[1] + self.0[2] * o.0[2]
+    fn dot<const N: usize>(self, o: Self) -> L
+    where
+        L: Lanes<N>,
+    {
+        self.0[0].mul(o.0[0]).add(self.0[1].mul(o.0[1])).add(self.0[2].mul(o.0[2]))
     }
 
     #[inline(always)]
-    fn cross(self, o: Self) -> Self {
+    fn cross<const N: usize>(self, o: Self) -> Self
+    where
+        L: Lanes<N>,
+    {
         let ([a, b, c], [x, y, z]) = (self.0, o.0);
-        Self([b * z - c * y, c * x - a * z, a * y - b * x])
+        Self([
+            b.mul(z).sub(c.mul(y)),
+            c.mul(x).sub(a.mul(z)),
+            a.mul(y).sub(b.mul(x)),
+        ])
     }
 }

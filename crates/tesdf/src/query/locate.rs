@@ -61,15 +61,22 @@ impl TeSdf {
     #[inline]
     pub(super) fn place(&self, local: DVec3) -> Place {
         let Some((mut word, mut lambda)) = self.cube.locate(local) else { return Place::NotOfDomain };
-        let mut depth = 0;
+        // Three bisections a turn, so that each knows its refinement edge.
         loop {
-            match Node::decode(self.nodes[word], &self.lists) {
-                Node::Split(children) => word = children as usize + lambda.descend(depth),
-                Node::Listed(label, offset) => return Place::Listed { label, offset },
-                Node::Far(side) => return Place::Far(side),
-                Node::NotOfDomain => return Place::NotOfDomain,
+            for k in [3, 2, 1] {
+                let children = match Node::decode(self.nodes[word], &self.lists) {
+                    Node::Split(children) => children as usize,
+                    Node::Listed(label, offset) => return Place::Listed { label, offset },
+                    Node::Far(side) => return Place::Far(side),
+                    Node::NotOfDomain => return Place::NotOfDomain,
+                };
+                word = children
+                    + match k {
+                        3 => lambda.descend_k::<3>(),
+                        2 => lambda.descend_k::<2>(),
+                        _ => lambda.descend_k::<1>(),
+                    };
             }
-            depth += 1;
         }
     }
 

@@ -1,0 +1,165 @@
+//! Several `f32` at once. Only what the distance kernel needs; every operation rounds as the scalar one does.
+
+/// `N` numbers.
+pub trait Lanes<const N: usize>: Copy {
+    /// The same number in all lanes.
+    fn splat(x: f32) -> Self;
+    /// Number `c` of each of `N` records as vector `c`.
+    fn load(records: [&[f32; 12]; N]) -> [Self; 12];
+    /// Sum.
+    fn add(self, o: Self) -> Self;
+    /// Difference.
+    fn sub(self, o: Self) -> Self;
+    /// Product.
+    fn mul(self, o: Self) -> Self;
+    /// Quotient.
+    fn div(self, o: Self) -> Self;
+    /// The lesser; `o` where either is NaN.
+    fn min(self, o: Self) -> Self;
+    /// The greater; `o` where either is NaN.
+    fn max(self, o: Self) -> Self;
+    /// A mask of the lanes in which `self ≥ o`; false where either is NaN.
+    fn at_least(self, o: Self) -> Self;
+    /// Lanes set in both masks.
+    fn and(self, o: Self) -> Self;
+    /// `yes` in the lanes that this mask sets, else `no`.
+    fn select(self, yes: Self, no: Self) -> Self;
+    /// The lanes as an array.
+    fn to_array(self) -> [f32; N];
+}
+
+impl Lanes<4> for [f32; 4] {
+    #[inline(always)]
+    fn splat(x: f32) -> Self {
+        [x; 4]
+    }
+    #[inline(always)]
+    fn load(records: [&[f32; 12]; 4]) -> [Self; 12] {
+        std::array::from_fn(|c| records.map(|r| r[c]))
+    }
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        std::array::from_fn(|l| self[l] + o[l])
+    }
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        std::array::from_fn(|l| self[l] - o[l])
+    }
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        std::array::from_fn(|l| self[l] * o[l])
+    }
+    #[inline(always)]
+    fn div(self, o: Self) -> Self {
+        std::array::from_fn(|l| self[l] / o[l])
+    }
+    #[inline(always)]
+    fn min(self, o: Self) -> Self {
+        std::array::from_fn(|l| if self[l] < o[l] { self[l] } else { o[l] })
+    }
+    #[inline(always)]
+    fn max(self, o: Self) -> Self {
+        std::array::from_fn(|l| if self[l] > o[l] { self[l] } else { o[l] })
+    }
+    #[inline(always)]
+    fn at_least(self, o: Self) -> Self {
+        std::array::from_fn(|l| f32::from_bits(if self[l] >= o[l] { u32::MAX } else { 0 }))
+    }
+    #[inline(always)]
+    fn and(self, o: Self) -> Self {
+        std::array::from_fn(|l| f32::from_bits(self[l].to_bits() & o[l].to_bits()))
+    }
+    #[inline(always)]
+    fn select(self, yes: Self, no: Self) -> Self {
+        std::array::from_fn(|l| if self[l].to_bits() != 0 { yes[l] } else { no[l] })
+    }
+    #[inline(always)]
+    fn to_array(self) -> [f32; 4] {
+        self
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    // SAFETY of all blocks: reached only from functions with the feature `avx2`.
+    use std::arch::x86_64::*;
+
+    /// Numbers `4k..4k + 4` of two records.
+    #[inline(always)]
+    fn pair(low: &[f32; 12], high: &[f32; 12], k: usize) -> __m256 {
+        let (low, high) = (&low[4 * k..4 * k + 4], &high[4 * k..4 * k + 4]);
+        unsafe {
+            let low = _mm256_castps128_ps256(_mm_loadu_ps(low.as_ptr()));
+            _mm256_insertf128_ps::<1>(low, _mm_loadu_ps(high.as_ptr()))
+        }
+    }
+
+    impl super::Lanes<8> for __m256 {
+        #[inline(always)]
+        fn splat(x: f32) -> Self {
+            unsafe { _mm256_set1_ps(x) }
+        }
+        #[inline(always)]
+        fn load(records: [&[f32; 12]; 8]) -> [Self; 12] {
+            let mut out = [Self::splat(0.0); 12];
+            for k in 0..3 {
+                // Rows l and l + 4 side by side, then two 4 × 4 transpositions at once.
+                let r0 = pair(records[0], records[4], k);
+                let r1 = pair(records[1], records[5], k);
+                let r2 = pair(records[2], records[6], k);
+                let r3 = pair(records[3], records[7], k);
+                unsafe {
+                    let (a, b) = (_mm256_unpacklo_ps(r0, r1), _mm256_unpackhi_ps(r0, r1));
+                    let (c, d) = (_mm256_unpacklo_ps(r2, r3), _mm256_unpackhi_ps(r2, r3));
+                    out[4 * k] = _mm256_shuffle_ps::<0b01_00_01_00>(a, c);
+                    out[4 * k + 1] = _mm256_shuffle_ps::<0b11_10_11_10>(a, c);
+                    out[4 * k + 2] = _mm256_shuffle_ps::<0b01_00_01_00>(b, d);
+                    out[4 * k + 3] = _mm256_shuffle_ps::<0b11_10_11_10>(b, d);
+                }
+            }
+            out
+        }
+        #[inline(always)]
+        fn add(self, o: Self) -> Self {
+            unsafe { _mm256_add_ps(self, o) }
+        }
+        #[inline(always)]
+        fn sub(self, o: Self) -> Self {
+            unsafe { _mm256_sub_ps(self, o) }
+        }
+        #[inline(always)]
+        fn mul(self, o: Self) -> Self {
+            unsafe { _mm256_mul_ps(self, o) }
+        }
+        #[inline(always)]
+        fn div(self, o: Self) -> Self {
+            unsafe { _mm256_div_ps(self, o) }
+        }
+        #[inline(always)]
+        fn min(self, o: Self) -> Self {
+            unsafe { _mm256_min_ps(self, o) }
+        }
+        #[inline(always)]
+        fn max(self, o: Self) -> Self {
+            unsafe { _mm256_max_ps(self, o) }
+        }
+        #[inline(always)]
+        fn at_least(self, o: Self) -> Self {
+            unsafe { _mm256_cmp_ps::<_CMP_GE_OQ>(self, o) }
+        }
+        #[inline(always)]
+        fn and(self, o: Self) -> Self {
+            unsafe { _mm256_and_ps(self, o) }
+        }
+        #[inline(always)]
+        fn select(self, yes: Self, no: Self) -> Self {
+            unsafe { _mm256_blendv_ps(no, yes, self) }
+        }
+        #[inline(always)]
+        fn to_array(self) -> [f32; 8] {
+            let mut out = [0.0; 8];
+            unsafe { _mm256_storeu_ps(out.as_mut_ptr(), self) };
+            out
+        }
+    }
+}
