@@ -27,11 +27,11 @@ fn main() {
     let solid = SolidMesh::new(mesh.clone()).unwrap();
     let t = Instant::now();
     let asset = encode(&solid, &Default::default(), &o, &Default::default()).unwrap();
-    println!("encode {:.2} s", t.elapsed().as_secs_f64());
+    asset.save(std::path::Path::new(&format!("/tmp/{}.tesdf", std::path::Path::new(&a[1]).file_stem().unwrap().to_str().unwrap()))).unwrap(); println!("encode {:.2} s", t.elapsed().as_secs_f64());
     println!("{:?}", asset.about().statistics);
     let sizes: Vec<(String, usize)> = asset.container().sections().map(|s| (s.spec.name.to_string(), s.bytes.len())).collect();
     let lt: usize = sizes.iter().filter(|s| s.0.starts_with("domain") || s.0.starts_with("lists")).map(|s| s.1).sum();
-    println!("{sizes:?}\nlists+tree {:.3} MB, file {:.3} MB = {:.1} B/face, derived {:.3}", lt as f64 / 1e6, asset.as_bytes().len() as f64 / 1e6, asset.as_bytes().len() as f64 / mesh.faces().len() as f64, asset.derived_bytes() as f64 / 1e6);
+    println!("{sizes:?}\nlists+tree {:.3} MB, file {:.3} MB = {:.1} B/face, derived {:?}", lt as f64 / 1e6, asset.as_bytes().len() as f64 / 1e6, asset.as_bytes().len() as f64 / mesh.faces().len() as f64, asset.derived_bytes());
     let mut seed = 1u64; let mut rnd = || { seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407); (seed >> 11) as f64 / (1u64 << 53) as f64 };
     let n = 100_000;
     let diag = mesh.diagonal();

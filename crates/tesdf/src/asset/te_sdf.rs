@@ -3,11 +3,11 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::about::About;
-use super::layout::{self, List, Node, PALETTE_SIZE, TreeChild};
+use super::layout::{self, SignHints, List, Node, PALETTE_SIZE, TreeChild};
 use super::{AssetError, Container, SharedSection, save_atomic};
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{AabbTree, LocalFrame, Triangle};
-use crate::query::{FaceRecord, Isa};
+use crate::query::{Entries, FaceRecord, Isa};
 
 /// A Tetra-Encoded Signed Distance Field: an encoded mesh, immutable, shared by all that use it.
 ///
@@ -47,6 +47,8 @@ pub struct TeSdf {
     pub(crate) tree_children: SharedSection<[u32; 2]>,
     /// Faces in `f32`, made on opening.
     pub(crate) records: Vec<FaceRecord>,
+    /// Where descents begin, made on opening.
+    pub(crate) entries: Entries,
     pub(crate) isa: Isa,
 }
 
@@ -96,14 +98,17 @@ impl TeSdf {
             tree_children: container.shared_section(layout::TREE_CHILDREN.name)?,
             container,
             records: Vec::new(),
+            entries: Entries::new(&[]),
             isa: Isa::detect(),
         };
         asset.check_mesh()?;
         asset.check_lists()?;
         asset.check_tree()?;
         let middle = asset.cube.middle();
-        asset.records =
-            (0..asset.faces.len()).map(|f| FaceRecord::new(&asset.local_triangle(f), middle)).collect();
+        asset.entries = Entries::new(&asset.nodes);
+        asset.records = (0..asset.faces.len())
+            .map(|f| FaceRecord::new(&asset.local_triangle(f), middle, SignHints(asset.sign_hints[f])))
+            .collect();
         Ok(asset)
     }
 
@@ -148,25 +153,14 @@ impl TeSdf {
         self.faces[position].map(|v| DVec3::from_array(self.vertices[v as usize]))
     }
 
-    /// The faces in `f32` that were made on opening, in bytes.
-    pub fn derived_bytes(&self) -> usize {
-        std::mem::size_of_val(self.records.as_slice())
+    /// What opening made besides the file, in bytes: the faces in `f32`, and where descents begin.
+    pub fn derived_bytes(&self) -> (usize, usize) {
+        (std::mem::size_of_val(self.records.as_slice()), self.entries.bytes())
     }
 
     /// The face at a position, in the local frame.
     pub(crate) fn local_triangle(&self, position: usize) -> Triangle {
         Triangle::new(self.face_corners(position).map(|p| self.frame.to_local(p)))
-    }
-
-    /// Position of slot `slot` of the palette that begins at `start`.
-    #[inline]
-    pub(crate) fn palette_face(&self, start: u32, slot: u8) -> u32 {
-        let at = start as usize + slot as usize;
-        let low = u32::from(self.palettes[at]);
-        match &self.palettes_high {
-            Some(high) => low | u32::from(high[at]) << 16,
-            None => low,
-        }
     }
 
     fn check_mesh(&self) -> Result<(), AssetError> {
@@ -206,7 +200,10 @@ impl TeSdf {
         if let Some(p) = starts.windows(2).position(|w| w[0] > w[1] || w[1] - w[0] > PALETTE_SIZE as u32) {
             return wrong(layout::PALETTE_STARTS, format!("palette {p} has not 0 to {PALETTE_SIZE} faces"));
         }
-        if let Some(i) = (0..self.palettes.len()).find(|&i| self.palette_face(i as u32, 0) >= f) {
+        if let Some(i) = (0..self.palettes.len()).find(|&i| {
+            let high = self.palettes_high.as_ref().map_or(0, |high| u32::from(high[i]));
+            u32::from(self.palettes[i]) | high << 16 >= f
+        }) {
             return wrong(layout::PALETTES, format!("entry {i} names a face that does not exist ({f} faces)"));
         }
         // Children follow their parents, so depths are known when a word is reached.

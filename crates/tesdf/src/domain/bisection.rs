@@ -9,6 +9,9 @@ pub const MAX_DEPTH: u32 = 66;
 /// points with `x_i ≥ x_j ≥ x_k`.
 pub const ROOTS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
+/// The root by whether `x ≥ y`, `x ≥ z`, `y ≥ z`, as bits 2, 1, 0; two of the eight cannot be.
+const ROOT_OF_ORDER: [usize; 8] = [5, 3, 5, 2, 4, 4, 1, 0];
+
 /// A tetrahedron of the bisection forest.
 ///
 /// ```text
@@ -94,24 +97,35 @@ impl Barycentric {
     /// `None` outside of the closed unit cube, and for NaN.
     #[inline]
     pub fn in_unit_cube(p: DVec3) -> Option<(usize, Self)> {
+        Self::in_grid(p, 0)
+    }
+
+    /// The cell of depth `3 · level` that holds a point of the unit cube, and the point's coordinates in it.
+    ///
+    /// Three uniform bisections of the Kuhn cube make eight half cubes, each cut like the whole, mirrored along the axes
+    /// on which its index is odd. So the cells of depth `3 · level` are those of a grid of `2^level` cubes a side, six to
+    /// a cube: cell `6 · (x + (y << level) + (z << 2 level)) + root`. `None` as in [`in_unit_cube`](Self::in_unit_cube).
+    #[inline]
+    pub fn in_grid(p: DVec3, level: u32) -> Option<(usize, Self)> {
         let inside = p.cmpge(DVec3::ZERO).all() && p.cmple(DVec3::ONE).all();
         if !inside {
             return None;
         }
-        let u = p.to_array().map(|x| (x * Self::ONE as f64) as u64);
+        let last = (1u64 << level) - 1;
+        let mut cube = 0;
+        let u: [u64; 3] = std::array::from_fn(|axis| {
+            let x = (p[axis] * Self::ONE as f64) as u64;
+            let index = (x >> (52 - level)).min(last);
+            cube |= (index as usize) << (axis as u32 * level);
+            let within = (x << level) - index * Self::ONE;
+            if index & 1 == 0 { within } else { Self::ONE - within }
+        });
         // Index of the permutation that sorts u in descending order, equal coordinates in axis order.
         let (xy, xz, yz) = (u[0] >= u[1], u[0] >= u[2], u[1] >= u[2]);
-        let root = match (xy, xz, yz) {
-            (true, true, true) => 0,
-            (true, true, false) => 1,
-            (true, false, _) => 4,
-            (false, _, true) if xz => 2,
-            (false, _, true) => 3,
-            (false, _, false) => 5,
-        };
+        let root = ROOT_OF_ORDER[usize::from(xy) << 2 | usize::from(xz) << 1 | usize::from(yz)];
         let [i, j, k] = ROOTS[root];
         let lambda = [Self::ONE - u[i], u[i] - u[j], u[j] - u[k], u[k]];
-        Some((root, Self { lambda }))
+        Some((6 * cube + root, Self { lambda }))
     }
 
     /// Moves to the child that holds the point: its side, 0 or 1. On the shared face, side 0.
@@ -176,6 +190,16 @@ mod tests {
                 let side = lambda.descend(depth);
                 cell = cell.child(side);
             }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_grid_is_a_shortcut(x in 0.0..=1.0f64, y in 0.0..=1.0f64, z in 0.0..=1.0f64, level in 0u32..6) {
+            let p = DVec3::new(x, y, z);
+            let (_, mut stepped) = Barycentric::in_unit_cube(p).unwrap();
+            (0..3 * level).for_each(|depth| { stepped.descend(depth); });
+            prop_assert_eq!(Barycentric::in_grid(p, level).unwrap().1, stepped);
         }
     }
 

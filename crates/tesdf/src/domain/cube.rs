@@ -48,10 +48,11 @@ impl DomainCube {
         Cell::root(self.origin, self.side, root)
     }
 
-    /// The root that holds a point of the local frame, with the point's coordinates in it.
+    /// The cell of depth `3 · level` that holds a point of the local frame, with the point's coordinates in it;
+    /// see [`Barycentric::in_grid`].
     #[inline]
-    pub fn locate(&self, p: DVec3) -> Option<(usize, Barycentric)> {
-        Barycentric::in_unit_cube((p - self.origin) / self.side)
+    pub fn locate(&self, p: DVec3, level: u32) -> Option<(usize, Barycentric)> {
+        Barycentric::in_grid((p - self.origin) / self.side, level)
     }
 }
 

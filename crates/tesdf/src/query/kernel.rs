@@ -7,23 +7,34 @@ use glam::{DVec3, Vec3};
 
 use super::lanes::Lanes;
 
+use crate::asset::layout::SignHints;
 use crate::geometry::Triangle;
 
-/// A face in `f32`, relative to the middle of the cube: corner a, b − a, c − a, unit normal.
+/// A face in `f32`, relative to the middle of the cube, in one cache line: corner a, b − a, c − a, unit normal,
+/// inverse squared lengths of b − a, c − a, c − b, and the bits of the sign hints.
 ///
-/// Without area the normal is NaN, which fails the test for the prism over the face: only edges count.
+/// Without area the normal is NaN, which fails the test for the prism over the face: only edges count. The inverse
+/// of a length of zero is 0, which makes the closest point of that edge its start.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(16))]
-pub struct FaceRecord([f32; 12]);
+#[repr(C, align(64))]
+pub struct FaceRecord(Record);
+
+type Record = [f32; 16];
+const HINTS: usize = 15;
 
 impl FaceRecord {
     /// Rounds a triangle of the local frame.
-    pub fn new(triangle: &Triangle, middle: DVec3) -> Self {
+    pub fn new(triangle: &Triangle, middle: DVec3, hints: SignHints) -> Self {
         let [a, b, c] = triangle.corners.map(|p| (p - middle).as_vec3());
         let n = triangle.normal.as_vec3();
         let n = if n == Vec3::ZERO { Vec3::NAN } else { n };
-        let mut record = [0.0; 12];
-        for (k, v) in [a, b - a, c - a, n].into_iter().enumerate() {
+        let inverse = |v: Vec3| {
+            let inverse = 1.0 / v.as_dvec3().length_squared();
+            if inverse < f64::from(f32::MAX) { inverse as f32 } else { 0.0 }
+        };
+        let inverses = Vec3::new(inverse(b - a), inverse(c - a), inverse(c - b));
+        let mut record = [f32::from_bits(hints.0.into()); 16];
+        for (k, v) in [a, b - a, c - a, n, inverses].into_iter().enumerate() {
             record[3 * k..3 * k + 3].copy_from_slice(&v.to_array());
         }
         Self(record)
@@ -36,6 +47,12 @@ impl FaceRecord {
         let normal = v(3);
         let normal = if normal.is_nan() { DVec3::ZERO } else { normal };
         Triangle { corners: [v(0), v(0) + v(1), v(0) + v(2)], normal }
+    }
+
+    /// How the sign follows from the closest feature.
+    #[inline]
+    pub fn hints(&self) -> SignHints {
+        SignHints(self.0[HINTS].to_bits() as u16)
     }
 }
 
@@ -104,22 +121,33 @@ fn nearest_lanes<L: Lanes<N>, const N: usize>(
     records: &[FaceRecord],
     ids: impl Ids,
     p: Vec3,
-    mut best: Nearest,
+    best: Nearest,
 ) -> Nearest {
     let count = ids.len();
     let p = V([L::splat(p.x), L::splat(p.y), L::splat(p.z)]);
+    let mut least = L::splat(best.distance_squared);
+    let mut nearest = L::from_bits([best.face; N]);
     let mut first = 0;
     while first < count {
         // The last chunk is filled up with its last face: equal distances never replace an earlier one.
-        let faces: [u32; N] = std::array::from_fn(|l| ids.get((first + l).min(count - 1)));
-        let rows: [&[f32; 12]; N] = std::array::from_fn(|l| &records[faces[l] as usize].0);
-        let d = distance_squared(L::load(rows), p).to_array();
+        let mut faces = [0u32; N];
+        let mut rows = [&records[0].0; N];
         for l in 0..N {
-            let better = d[l] < best.distance_squared;
-            best.distance_squared = if better { d[l] } else { best.distance_squared };
-            best.face = if better { faces[l] } else { best.face };
+            faces[l] = ids.get((first + l).min(count - 1));
+            rows[l] = &records[faces[l] as usize].0;
         }
+        let d = distance_squared(L::load(rows), p);
+        let closer = d.less(least);
+        least = closer.select(d, least);
+        nearest = closer.select(L::from_bits(faces), nearest);
         first += N;
+    }
+    let (least, nearest) = (least.to_array(), nearest.to_array());
+    let mut best = Nearest { distance_squared: least[0], face: nearest[0].to_bits() };
+    for l in 1..N {
+        if least[l] < best.distance_squared {
+            best = Nearest { distance_squared: least[l], face: nearest[l].to_bits() };
+        }
     }
     best
 }
@@ -129,7 +157,7 @@ fn nearest_lanes<L: Lanes<N>, const N: usize>(
 
 /// As [`Triangle::closest`], but free of branches and of the squared distance alone.
 #[inline(always)]
-fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 12], p: V<L>) -> L {
+fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
     let (a, ab) = (V([v[0], v[1], v[2]]), V([v[3], v[4], v[5]]));
     let (ac, n) = (V([v[6], v[7], v[8]]), V([v[9], v[10], v[11]]));
     let zero = L::splat(0.0);
@@ -140,15 +168,14 @@ fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 12], p: V<L>) -> L {
     let inside = ab.dot(turned).at_least(zero).and(zero.at_least(ac.dot(turned)));
     let inside = inside.and(bc.dot(bp.cross(n)).at_least(zero));
     let height = n.dot(ap);
-    let edges = to_edge(ap, ab).min(to_edge(ap, ac)).min(to_edge(bp, bc));
+    let edges = to_edge(ap, ab, v[12]).min(to_edge(ap, ac, v[13])).min(to_edge(bp, bc, v[14]));
     inside.select(height.mul(height), edges)
 }
 
 /// Squared distance to the segment from the origin of `from` to `along`.
 #[inline(always)]
-fn to_edge<L: Lanes<N>, const N: usize>(from: V<L>, along: V<L>) -> L {
-    let t = along.dot(from).div(along.dot(along).max(L::splat(f32::MIN_POSITIVE)));
-    let t = t.max(L::splat(0.0)).min(L::splat(1.0));
+fn to_edge<L: Lanes<N>, const N: usize>(from: V<L>, along: V<L>, inverse: L) -> L {
+    let t = along.dot(from).mul(inverse).max(L::splat(0.0)).min(L::splat(1.0));
     let [x, y, z] = along.0;
     let to = from.minus(V([x.mul(t), y.mul(t), z.mul(t)]));
     to.dot(to)

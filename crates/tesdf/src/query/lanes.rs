@@ -4,22 +4,24 @@
 pub trait Lanes<const N: usize>: Copy {
     /// The same number in all lanes.
     fn splat(x: f32) -> Self;
+    /// Numbers by their bits.
+    fn from_bits(bits: [u32; N]) -> Self;
     /// Number `c` of each of `N` records as vector `c`.
-    fn load(records: [&[f32; 12]; N]) -> [Self; 12];
+    fn load(records: [&[f32; 16]; N]) -> [Self; 16];
     /// Sum.
     fn add(self, o: Self) -> Self;
     /// Difference.
     fn sub(self, o: Self) -> Self;
     /// Product.
     fn mul(self, o: Self) -> Self;
-    /// Quotient.
-    fn div(self, o: Self) -> Self;
     /// The lesser; `o` where either is NaN.
     fn min(self, o: Self) -> Self;
     /// The greater; `o` where either is NaN.
     fn max(self, o: Self) -> Self;
     /// A mask of the lanes in which `self ≥ o`; false where either is NaN.
     fn at_least(self, o: Self) -> Self;
+    /// A mask of the lanes in which `self < o`; false where either is NaN.
+    fn less(self, o: Self) -> Self;
     /// Lanes set in both masks.
     fn and(self, o: Self) -> Self;
     /// `yes` in the lanes that this mask sets, else `no`.
@@ -34,7 +36,11 @@ impl Lanes<4> for [f32; 4] {
         [x; 4]
     }
     #[inline(always)]
-    fn load(records: [&[f32; 12]; 4]) -> [Self; 12] {
+    fn from_bits(bits: [u32; 4]) -> Self {
+        bits.map(f32::from_bits)
+    }
+    #[inline(always)]
+    fn load(records: [&[f32; 16]; 4]) -> [Self; 16] {
         std::array::from_fn(|c| records.map(|r| r[c]))
     }
     #[inline(always)]
@@ -50,10 +56,6 @@ impl Lanes<4> for [f32; 4] {
         std::array::from_fn(|l| self[l] * o[l])
     }
     #[inline(always)]
-    fn div(self, o: Self) -> Self {
-        std::array::from_fn(|l| self[l] / o[l])
-    }
-    #[inline(always)]
     fn min(self, o: Self) -> Self {
         std::array::from_fn(|l| if self[l] < o[l] { self[l] } else { o[l] })
     }
@@ -64,6 +66,10 @@ impl Lanes<4> for [f32; 4] {
     #[inline(always)]
     fn at_least(self, o: Self) -> Self {
         std::array::from_fn(|l| f32::from_bits(if self[l] >= o[l] { u32::MAX } else { 0 }))
+    }
+    #[inline(always)]
+    fn less(self, o: Self) -> Self {
+        std::array::from_fn(|l| f32::from_bits(if self[l] < o[l] { u32::MAX } else { 0 }))
     }
     #[inline(always)]
     fn and(self, o: Self) -> Self {
@@ -86,7 +92,7 @@ mod avx2 {
 
     /// Numbers `4k..4k + 4` of two records.
     #[inline(always)]
-    fn pair(low: &[f32; 12], high: &[f32; 12], k: usize) -> __m256 {
+    fn pair(low: &[f32; 16], high: &[f32; 16], k: usize) -> __m256 {
         let (low, high) = (&low[4 * k..4 * k + 4], &high[4 * k..4 * k + 4]);
         unsafe {
             let low = _mm256_castps128_ps256(_mm_loadu_ps(low.as_ptr()));
@@ -100,9 +106,13 @@ mod avx2 {
             unsafe { _mm256_set1_ps(x) }
         }
         #[inline(always)]
-        fn load(records: [&[f32; 12]; 8]) -> [Self; 12] {
-            let mut out = [Self::splat(0.0); 12];
-            for k in 0..3 {
+        fn from_bits(bits: [u32; 8]) -> Self {
+            unsafe { _mm256_loadu_ps(bits.as_ptr().cast()) }
+        }
+        #[inline(always)]
+        fn load(records: [&[f32; 16]; 8]) -> [Self; 16] {
+            let mut out = [Self::splat(0.0); 16];
+            for k in 0..4 {
                 // Rows l and l + 4 side by side, then two 4 × 4 transpositions at once.
                 let r0 = pair(records[0], records[4], k);
                 let r1 = pair(records[1], records[5], k);
@@ -132,10 +142,6 @@ mod avx2 {
             unsafe { _mm256_mul_ps(self, o) }
         }
         #[inline(always)]
-        fn div(self, o: Self) -> Self {
-            unsafe { _mm256_div_ps(self, o) }
-        }
-        #[inline(always)]
         fn min(self, o: Self) -> Self {
             unsafe { _mm256_min_ps(self, o) }
         }
@@ -146,6 +152,10 @@ mod avx2 {
         #[inline(always)]
         fn at_least(self, o: Self) -> Self {
             unsafe { _mm256_cmp_ps::<_CMP_GE_OQ>(self, o) }
+        }
+        #[inline(always)]
+        fn less(self, o: Self) -> Self {
+            unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(self, o) }
         }
         #[inline(always)]
         fn and(self, o: Self) -> Self {

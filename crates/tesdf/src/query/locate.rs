@@ -1,8 +1,8 @@
 use glam::DVec3;
 
 use crate::TeSdf;
-use crate::asset::layout::{Label, List, NO_PALETTE, Node, Side};
-use crate::domain::Cell;
+use crate::asset::layout::{Label, List, Node, Side};
+use crate::domain::{Barycentric, Cell};
 
 use super::kernel::Ids;
 
@@ -22,37 +22,100 @@ pub enum Place {
     NotOfDomain,
 }
 
+/// Where the descents of an asset begin: the words of all cells of one depth, made on opening.
+///
+/// The upper levels of the forest are nearly all bisected; a grid that holds them saves half of the way.
+#[derive(Debug)]
+pub struct Entries {
+    level: u32,
+    words: Vec<u32>,
+}
+
+/// Share of the forest's words that the entries may take.
+const ENTRY_SHARE: usize = 4;
+
+impl Entries {
+    /// The deepest grid that takes at most a quarter of the forest's own words.
+    pub fn new(nodes: &[u32]) -> Self {
+        if nodes.len() < 6 {
+            return Self { level: 0, words: Vec::new() };
+        }
+        let level = (0..10).take_while(|l| (6usize << (3 * l)) * ENTRY_SHARE <= nodes.len()).last().unwrap_or(0);
+        let mut words = vec![0; 6 << (3 * level)];
+        for root in 0..6 {
+            Self::fill(nodes, root, Cell::root(DVec3::ZERO, 1.0, root), level, &mut words);
+        }
+        Self { level, words }
+    }
+
+    fn fill(nodes: &[u32], word: usize, cell: Cell, level: u32, words: &mut [u32]) {
+        if cell.depth == 3 * level {
+            if let Some((at, _)) = Barycentric::in_grid(cell.centroid(), level) {
+                words[at] = word as u32;
+            }
+            return;
+        }
+        for side in 0..2 {
+            // A leaf above the grid stands for all of its part of the grid.
+            let below = match Node::decode(nodes[word], &[]) {
+                Node::Split(children) => children as usize + side,
+                _ => word,
+            };
+            Self::fill(nodes, below, cell.child(side), level, words);
+        }
+    }
+
+    /// Size in bytes.
+    pub fn bytes(&self) -> usize {
+        std::mem::size_of_val(self.words.as_slice())
+    }
+}
+
 /// The faces of a list, by position.
 #[derive(Clone, Copy)]
 pub enum ListIds<'a> {
     /// Slots of a palette.
-    Slots {
-        /// The asset.
-        asset: &'a TeSdf,
-        /// Where the palette begins.
-        start: u32,
-        /// One byte per face.
-        slots: &'a [u8],
-    },
+    Slots(Slots<'a>),
     /// Four bytes per face.
-    Faces(&'a [u8]),
+    Faces(Words<'a>),
 }
 
-impl Ids for ListIds<'_> {
+/// Slots of a palette.
+#[derive(Clone, Copy)]
+pub struct Slots<'a> {
+    slots: &'a [u8],
+    low: &'a [u16],
+    high: Option<&'a [u8]>,
+}
+
+impl Ids for Slots<'_> {
     #[inline(always)]
     fn len(self) -> usize {
-        match self {
-            Self::Slots { slots, .. } => slots.len(),
-            Self::Faces(bytes) => bytes.len() / 4,
-        }
+        self.slots.len()
     }
 
     #[inline(always)]
     fn get(self, i: usize) -> u32 {
-        match self {
-            Self::Slots { asset, start, slots } => asset.palette_face(start, slots[i]),
-            Self::Faces(b) => u32::from_le_bytes([b[4 * i], b[4 * i + 1], b[4 * i + 2], b[4 * i + 3]]),
-        }
+        let slot = self.slots[i] as usize;
+        let high = self.high.map_or(0, |high| u32::from(high[slot]));
+        u32::from(self.low[slot]) | high << 16
+    }
+}
+
+/// Four bytes per face.
+#[derive(Clone, Copy)]
+pub struct Words<'a>(&'a [u8]);
+
+impl Ids for Words<'_> {
+    #[inline(always)]
+    fn len(self) -> usize {
+        self.0.len() / 4
+    }
+
+    #[inline(always)]
+    fn get(self, i: usize) -> u32 {
+        let b = &self.0[4 * i..4 * i + 4];
+        u32::from_le_bytes([b[0], b[1], b[2], b[3]])
     }
 }
 
@@ -60,7 +123,9 @@ impl TeSdf {
     /// Finds what answers for a point of the local frame.
     #[inline]
     pub(super) fn place(&self, local: DVec3) -> Place {
-        let Some((mut word, mut lambda)) = self.cube.locate(local) else { return Place::NotOfDomain };
+        let entries = &self.entries;
+        let Some((entry, mut lambda)) = self.cube.locate(local, entries.level) else { return Place::NotOfDomain };
+        let mut word = entries.words[entry] as usize;
         // Three bisections a turn, so that each knows its refinement edge.
         loop {
             for k in [3, 2, 1] {
@@ -82,7 +147,7 @@ impl TeSdf {
 
     /// The cell that holds a point of the local frame.
     pub(super) fn cell(&self, local: DVec3) -> Option<Cell> {
-        let (mut word, mut lambda) = self.cube.locate(local)?;
+        let (mut word, mut lambda) = self.cube.locate(local, 0)?;
         let mut cell = self.cube.root(word);
         while let Node::Split(children) = Node::decode(self.nodes[word], &self.lists) {
             let side = lambda.descend(cell.depth);
@@ -95,18 +160,31 @@ impl TeSdf {
     /// The list at `offset`, which opening has checked.
     #[inline]
     pub(super) fn list(&self, offset: u32) -> ListIds<'_> {
-        match List::decode(&self.lists, offset).unwrap_or(List::Slots(NO_PALETTE, &[])) {
+        match List::decode(&self.lists, offset).unwrap_or(List::Faces(&[])) {
             List::Slots(palette, slots) => {
-                let start = self.palette_starts.get(palette as usize).copied().unwrap_or(0);
-                ListIds::Slots { asset: self, start, slots }
+                let palette = palette as usize;
+                let range = self.palette_starts[palette] as usize..self.palette_starts[palette + 1] as usize;
+                let high = self.palettes_high.as_ref().map(|high| &high[range.clone()]);
+                ListIds::Slots(Slots { slots, low: &self.palettes[range], high })
             }
-            List::Faces(bytes) => ListIds::Faces(bytes),
+            List::Faces(bytes) => ListIds::Faces(Words(bytes)),
+        }
+    }
+
+    /// Length of the list at `offset`.
+    pub(super) fn list_len(&self, offset: u32) -> usize {
+        match self.list(offset) {
+            ListIds::Slots(s) => s.len(),
+            ListIds::Faces(w) => w.len(),
         }
     }
 
     /// The faces of a list, by position.
     pub(super) fn list_faces(&self, offset: u32) -> impl Iterator<Item = u32> {
         let ids = self.list(offset);
-        (0..ids.len()).map(move |i| ids.get(i))
+        (0..self.list_len(offset)).map(move |i| match ids {
+            ListIds::Slots(s) => s.get(i),
+            ListIds::Faces(w) => w.get(i),
+        })
     }
 }

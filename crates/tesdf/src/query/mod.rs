@@ -14,7 +14,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 pub use kernel::{FaceRecord, Isa};
-use kernel::Ids;
+pub use locate::Entries;
 pub use nearest::Reads;
 pub use ray::RayHit;
 
@@ -22,6 +22,7 @@ use crate::TeSdf;
 use crate::asset::layout::{Label, Side};
 use crate::geometry::{Closest, Feature};
 use locate::Place;
+use sign::hinted_side;
 
 /// What a query computes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,7 +117,7 @@ impl TeSdf {
     pub fn reads(&self, point: DVec3) -> Reads {
         let local = self.frame.to_local(point);
         match self.place(local) {
-            Place::Listed { offset, .. } => Reads { list_entries: self.list(offset).len(), ..Reads::default() },
+            Place::Listed { offset, .. } => Reads { list_entries: self.list_len(offset), ..Reads::default() },
             _ => {
                 let mut reads = Reads::default();
                 self.nearest_in_tree_f32((local - self.cube.middle()).as_vec3(), &mut reads);
@@ -150,7 +151,7 @@ impl TeSdf {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
             Place::Listed { label: Label::Crossing(winding), offset } => {
                 let height = triangle.normal.dot(relative - triangle.corners[0]);
-                self.hinted_side(found.face, closest.feature, height)
+                hinted_side(self.records[found.face as usize].hints(), closest.feature, height)
                     .unwrap_or_else(|| self.exact_side(local, winding, offset))
             }
             _ => Side::Outside,
@@ -233,4 +234,10 @@ impl TeSdf {
         }
         sum.try_normalize().unwrap_or(own)
     }
+}
+impl TeSdf {
+    /// tmp
+    pub fn query_place(&self, p: DVec3) -> usize { match self.place(self.frame.to_local(p)) { Place::Listed { offset, .. } => offset as usize, _ => 0 } }
+    /// tmp
+    pub fn query_nearest(&self, p: DVec3) -> usize { let local = self.frame.to_local(p); match self.place(local) { Place::Listed { offset, .. } => self.nearest_in_list_f32(offset, (local - self.cube.middle()).as_vec3()).face as usize, _ => 0 } }
 }

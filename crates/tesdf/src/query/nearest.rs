@@ -1,6 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::kernel::{self, Ids, Nearest};
+use super::locate::ListIds;
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
 use crate::geometry::{AabbTree, Closest, Feature, Regions};
@@ -45,7 +46,10 @@ const STACK: usize = AabbTree::MAX_DEPTH + 2;
 impl TeSdf {
     #[inline]
     pub(super) fn nearest_in_list_f32(&self, offset: u32, p: Vec3) -> Nearest {
-        kernel::nearest(self.isa, &self.records, self.list(offset), p, Nearest::NONE)
+        match self.list(offset) {
+            ListIds::Slots(slots) => kernel::nearest(self.isa, &self.records, slots, p, Nearest::NONE),
+            ListIds::Faces(words) => kernel::nearest(self.isa, &self.records, words, p, Nearest::NONE),
+        }
     }
 
     /// The nearest of all faces; `p` relative to the middle of the cube.

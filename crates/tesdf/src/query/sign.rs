@@ -4,24 +4,23 @@ use crate::TeSdf;
 use crate::asset::layout::{SignHint, SignHints, Side};
 use crate::geometry::{Feature, signed_crossing};
 
-impl TeSdf {
-    /// The side that the closest feature tells, where it tells one. `height` is that of the point over the face.
-    #[inline]
-    pub(super) fn hinted_side(&self, position: u32, feature: Feature, height: f64) -> Option<Side> {
-        let hints = SignHints(self.sign_hints[position as usize]);
-        let k = match feature {
-            Feature::Face => 0,
-            Feature::Edge(k) => 1 + k,
-            Feature::Vertex(k) => 4 + k,
-        };
-        match hints.get(k as usize) {
-            SignHint::Winding => None,
-            SignHint::Plane => Some(if height < 0.0 { Side::Inside } else { Side::Outside }),
-            SignHint::Outside => Some(Side::Outside),
-            SignHint::Inside => Some(Side::Inside),
-        }
+/// The side that the closest feature tells, where it tells one. `height` is that of the point over the face.
+#[inline]
+pub fn hinted_side(hints: SignHints, feature: Feature, height: f64) -> Option<Side> {
+    let k = match feature {
+        Feature::Face => 0,
+        Feature::Edge(k) => 1 + k,
+        Feature::Vertex(k) => 4 + k,
+    };
+    match hints.get(k as usize) {
+        SignHint::Winding => None,
+        SignHint::Plane => Some(if height < 0.0 { Side::Inside } else { Side::Outside }),
+        SignHint::Outside => Some(Side::Outside),
+        SignHint::Inside => Some(Side::Inside),
     }
+}
 
+impl TeSdf {
     /// The side by winding number, exact; `winding` is that at the cell's centroid.
     #[cold]
     pub(super) fn exact_side(&self, local: DVec3, winding: u32, offset: u32) -> Side {
