@@ -2,9 +2,9 @@
 pub type Rgb = [u8; 3];
 
 /// The colours from the surface outwards: pale to deep blue, lightness falling evenly.
-const OUTSIDE: [Rgb; 5] = [[228, 239, 247], [176, 209, 231], [112, 168, 211], [56, 121, 180], [22, 73, 131]];
+const OUTSIDE: [Rgb; 5] = [[205, 225, 240], [164, 200, 226], [108, 164, 208], [56, 121, 180], [22, 73, 131]];
 /// From the surface inwards: pale sand to deep red, with the same lightness at the same depth.
-const INSIDE: [Rgb; 5] = [[253, 236, 214], [249, 201, 148], [238, 146, 84], [205, 89, 46], [142, 42, 32]];
+const INSIDE: [Rgb; 5] = [[252, 222, 184], [247, 189, 133], [236, 142, 82], [205, 89, 46], [142, 42, 32]];
 
 /// Colour of a signed distance when `outside` and `inside` are the distances that get the deepest colours.
 pub fn of(signed_distance: f64, outside: f64, inside: f64) -> Rgb {

@@ -222,9 +222,9 @@ fn paint_overlay(map: &mut Pixmap, frame: &Frame, overlay: &Overlay) -> Result<(
         }
     };
     for (label, colour) in [
-        (CellLabel::Outside, solid([255; 3], 0.62)),
-        (CellLabel::Inside, solid([255; 3], 0.62)),
-        (CellLabel::Crossing, solid([255; 3], 0.80)),
+        (CellLabel::Outside, solid([255; 3], 0.75)),
+        (CellLabel::Inside, solid([255; 3], 0.75)),
+        (CellLabel::Crossing, solid([255; 3], 0.9)),
     ] {
         let mut path = PathBuilder::new();
         for cell in overlay.cells.iter().filter(|cell| cell.label == label) {
