@@ -69,11 +69,12 @@ pub struct View {
 impl View {
     /// The plane at `offset` over the box from `min` to `max`, with a margin of 6 % of the picture's diagonal.
     ///
-    /// A long thin cut is widened to one to four, so that there is room for the picture.
+    /// A long thin cut is widened, a tall one to 1 : 2, a wide one to 4 : 1, so that there is room for what is written.
     pub fn of_box(axis: Axis, offset: f64, min: DVec3, max: DVec3) -> Self {
         let (min, max) = (axis.across(min), axis.across(max));
         let extent = max - min;
-        let extent = (extent + 0.12 * extent.length()).max(DVec2::splat(extent.max_element() / 4.0));
+        let extent = extent + 0.12 * extent.length();
+        let extent = extent.max(DVec2::new(extent.y / 2.0, extent.x / 4.0));
         let centre = 0.5 * (min + max);
         Self {
             axis,

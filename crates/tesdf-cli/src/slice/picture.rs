@@ -270,13 +270,13 @@ fn paint_surroundings(
     let title = lettering.fit(&view.title, 26.0 * k, room);
     lettering.draw(map, &title, 26.0 * k, [left, 44.0 * k], Anchor::Start, solid(INK, 1.0));
     let mut line_two = format!(
-        "signed distance at {} = {}{unit}, a contour every {}{unit}",
+        "signed distance · {} = {}{unit} · contours every {}{unit}",
         view.axis,
         ticks::short(view.offset),
         ticks::label(field.step, field.step)
     );
     if !overlay.cells.is_empty() {
-        line_two += &format!(", {} cells cut", overlay.cells.len());
+        line_two += &format!(" · {} cells", overlay.cells.len());
     }
     let line_two = lettering.fit(&line_two, 17.0 * k, room);
     lettering.draw(map, &line_two, 17.0 * k, [left, 72.0 * k], Anchor::Start, solid(QUIET, 1.0));

@@ -8,8 +8,9 @@ pub fn round_step(range: f64, count: f64) -> f64 {
 
 /// `value` with the decimals that a multiple of `step` needs, and a true minus sign.
 pub fn label(value: f64, step: f64) -> String {
-    let plain = (1e-3..1e5).contains(&step);
-    let text = if plain {
+    let text = if value == 0.0 {
+        "0".to_string()
+    } else if (0.99e-4..1e5).contains(&step) {
         let decimals = (-(step * (1.0 + 1e-9)).log10().floor()).max(0.0) as usize;
         format!("{value:.decimals$}")
     } else {
@@ -54,7 +55,7 @@ mod tests {
             assert!((found / step - 1.0).abs() < 1e-9, "{range}: {found}");
             assert_eq!(label(3.0 * found, found), text);
         }
-        assert_eq!(label(-0.5, 0.5), "−0.5");
+        assert_eq!([label(-0.5, 0.5), label(0.0, 1e-9), label(1e-3, 5e-4)], ["−0.5", "0", "0.0010"]);
         assert_eq!(
             [0.0, 12.3456, -3.0, 1234567.0, 2e-9].map(short),
             ["0", "12.35", "−3", "1.235e6", "2.000e−9"]
