@@ -9,12 +9,14 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub mod check;
 pub mod completions;
 pub mod encode;
 pub mod inspect;
 pub mod parse;
 pub mod progress;
 pub mod query;
+pub mod repair;
 pub mod report;
 pub mod slice;
 pub mod verify;
@@ -33,6 +35,10 @@ pub struct Cli {
 /// The commands.
 #[derive(Subcommand, Debug)]
 pub enum Command {
+    /// Say what is wrong with a mesh
+    Check(check::Args),
+    /// Mend what can be mended without guessing, and say what was changed
+    Repair(repair::Args),
     /// Encode a mesh into a .tesdf file
     Encode(encode::Args),
     /// Signed distance, gradient and closest point at the points of a CSV file
@@ -75,6 +81,8 @@ pub fn main() -> ExitCode {
 fn run(command: &Command) -> Result<Outcome, Failure> {
     let unwired = |name: &str| Err(Failure::new(format!("this build cannot {name}")));
     match command {
+        Command::Check(_) => unwired("check"),
+        Command::Repair(_) => unwired("repair"),
         Command::Encode(_) => unwired("encode"),
         Command::Query(_) => unwired("query"),
         Command::Inspect(_) => unwired("inspect"),

@@ -44,6 +44,12 @@ fn bad_usage_is_2_and_says_why_on_stderr() {
         (&["encode", "m.stl", "-o", "f", "--band", "-1"], "-1 is negative; expected a length"),
         (&["encode", "m.stl", "-o", "f", "--region", "0 0 0 1 1"], "5 numbers; expected six"),
         (&["encode", "m.stl", "-o", "f", "--threads", "0"], "--threads <N>"),
+        (&["repair", "m.stl"], "--output <FILE>"),
+        (
+            &["repair", "m", "-o", "f.ply", "--weld-tolerance", "-1e-3"],
+            "-0.001 is negative; expected a length",
+        ),
+        (&["check", "m.stl", "--quiet"], "error: unexpected argument '--quiet' found"),
         (&["query", "f.tesdf"], "--points <CSV>"),
         (&["verify", "f.tesdf", "--samples", "-1"], "error: "),
         (&["slice", "f", "-o", "p", "--at", "0.5", "--offset", "1"], "cannot be used with"),
