@@ -13,6 +13,7 @@ pub mod check;
 pub mod completions;
 pub mod encode;
 pub mod inspect;
+pub mod mesh_file;
 pub mod parse;
 pub mod progress;
 pub mod query;
@@ -81,7 +82,7 @@ pub fn main() -> ExitCode {
 fn run(command: &Command) -> Result<Outcome, Failure> {
     let unwired = |name: &str| Err(Failure::new(format!("this build cannot {name}")));
     match command {
-        Command::Check(_) => unwired("check"),
+        Command::Check(args) => check::run(args),
         Command::Repair(_) => unwired("repair"),
         Command::Encode(_) => unwired("encode"),
         Command::Query(_) => unwired("query"),
