@@ -83,7 +83,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
     let unwired = |name: &str| Err(Failure::new(format!("this build cannot {name}")));
     match command {
         Command::Check(args) => check::run(args),
-        Command::Repair(_) => unwired("repair"),
+        Command::Repair(args) => repair::run(args),
         Command::Encode(_) => unwired("encode"),
         Command::Query(_) => unwired("query"),
         Command::Inspect(_) => unwired("inspect"),

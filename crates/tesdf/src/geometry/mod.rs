@@ -1,6 +1,14 @@
-//! Closest points, bounds, predicates.
+//! Closest points, bounds, predicates, winding numbers.
 mod aabb;
 mod aabb_tree;
+mod crossing;
+mod meet;
+mod self_overlap;
+mod winding;
 
 pub use aabb::Aabb;
 pub use aabb_tree::{AabbTree, Child};
+pub use crossing::{normal_signs, orientation, perturbed_orientation, signed_crossing};
+pub use meet::{segment_meets_triangle, triangles_meet};
+pub use self_overlap::self_overlaps;
+pub use winding::WindingNumber;
