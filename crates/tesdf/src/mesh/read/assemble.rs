@@ -143,14 +143,11 @@ pub(super) fn assemble(
     }
     let non_finite =
         |i: usize| ['x', 'y', 'z'].into_iter().zip(positions[i].to_array()).find(|(_, v)| !v.is_finite());
-    for vertex in 0..positions.len() {
-        let Some((axis, value)) = non_finite(vertex) else { continue };
-        if used[vertex] {
-            let face = polygons().position(|p| p.contains(&(vertex as u64))).unwrap_or_default();
-            let place = places.vertex(vertex);
-            let vertex = vertex as u64 + base;
-            return Err(ReadError::NonFinite { format, place, vertex, base, face, axis, value });
-        }
+    let bad = (0..positions.len()).find_map(|i| used[i].then(|| non_finite(i)).flatten().map(|bad| (i, bad)));
+    if let Some((i, (axis, value))) = bad {
+        let face = polygons().position(|p| p.contains(&(i as u64))).unwrap_or_default();
+        let (place, vertex) = (places.vertex(i), i as u64 + base);
+        return Err(ReadError::NonFinite { format, place, vertex, base, face, axis, value });
     }
 
     let unused = used.iter().filter(|u| !**u).count();
