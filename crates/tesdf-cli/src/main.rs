@@ -1,1 +1,6 @@
-fn main() {}
+//! `tesdf`: check, repair and encode meshes; query, inspect, verify and draw the result.
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    tesdf_cli::main()
+}

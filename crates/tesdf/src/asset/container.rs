@@ -1,5 +1,6 @@
 use std::collections::BTreeMap;
 use std::fs::File;
+use std::io::Read;
 use std::marker::PhantomData;
 use std::ops::{Deref, Range};
 use std::path::Path;
@@ -112,20 +113,19 @@ impl Container {
     ///
     /// The file must not be changed in place while it is open: a reader would see the change, and after a truncation the
     /// operating system ends the process (SIGBUS). Replacing it by a rename, as [`save_atomic`](super::save_atomic) does,
-    /// is safe. For a file that others may write to, read it and use [`from_bytes`](Self::from_bytes).
+    /// is safe. A pipe is read into memory. For a file that others may write to, read it and use [`from_bytes`](Self::from_bytes).
     ///
     /// # Errors
     /// [`AssetError`] names what was found, in which section, and what was expected.
     pub fn open(path: &Path, table: &[SectionSpec]) -> Result<Self, AssetError> {
         let io = |action| move |source| AssetError::Io { action, path: path.to_path_buf(), source };
-        let file = File::open(path).map_err(io("open"))?;
+        let mut file = File::open(path).map_err(io("open"))?;
         let kind = file.metadata().map_err(io("open"))?;
-        if kind.is_dir() {
-            return Err(io("open")(std::io::ErrorKind::IsADirectory.into()));
-        }
-        if kind.len() == 0 {
-            // An empty file cannot be mapped on every system.
-            return Self::from_bytes(&[], table);
+        if !kind.is_file() || kind.len() == 0 {
+            // A pipe cannot be mapped, an empty file not on every system, and a folder cannot be read.
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).map_err(io("read"))?;
+            return Self::from_bytes(&bytes, table);
         }
         // SAFETY: nothing in this process writes to the mapping; what other processes may do is documented above.
         let map = unsafe { Mmap::map(&file) }.map_err(io("map"))?;

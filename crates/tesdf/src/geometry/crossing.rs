@@ -43,11 +43,7 @@ pub fn signed_crossing(x: DVec3, p: DVec3, triangle: [DVec3; 3]) -> i32 {
     if side == 0 {
         return 0;
     }
-    let side_of_p = match orientation(a, b, c, p) {
-        0 => -first_nonzero(normal_signs(a, b, c)),
-        sign => sign,
-    };
-    if side_of_p == side {
+    if perturbed_orientation(triangle, p) == side {
         return 0;
     }
     let turns = |a, b| match orientation(p, a, b, x) {
@@ -62,6 +58,15 @@ pub fn signed_crossing(x: DVec3, p: DVec3, triangle: [DVec3; 3]) -> i32 {
 pub fn orientation(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
     let coord = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
     sign(robust::orient3d(coord(a), coord(b), coord(c), coord(d)))
+}
+
+/// [`orientation`] of `p + (e, e^2, e^3)`, `e > 0` infinitesimal: 1 behind the triangle, -1 in front of it, 0
+/// only when the triangle has no area.
+pub fn perturbed_orientation([a, b, c]: [DVec3; 3], p: DVec3) -> i32 {
+    match orientation(a, b, c, p) {
+        0 => -first_nonzero(normal_signs(a, b, c)),
+        sign => sign,
+    }
 }
 
 /// Signs of the three components of `(b-a) x (c-a)`, exact; all 0 when the points are collinear.

@@ -45,17 +45,29 @@ impl WindingNumber {
     /// Winding number at `p + (e, e^2, e^3)` with `e > 0` infinitesimal: defined for every `p`, those on the
     /// surface included; 0 for NaN.
     pub fn at_perturbed(&self, p: DVec3) -> i32 {
-        if !self.bounds.contains(p) {
-            return 0;
-        }
-        -self.crossings(self.far_point(p), p)
+        let mut sum = 0;
+        self.for_each_crossing_to(p, |_, sign| sum += sign);
+        sum
     }
 
     /// `winding(x) - winding(p')` with `p' = p + (e, e^2, e^3)`: the sum of [`signed_crossing`] over the faces.
     /// `x` must not be on the surface.
     pub fn crossings(&self, x: DVec3, p: DVec3) -> i32 {
-        let segment = Segment::new(x, p);
         let mut sum = 0;
+        self.for_each_crossing(x, p, |_, sign| sum += sign);
+        sum
+    }
+
+    /// Calls `crossed` with each face that the segment from the far point to `p + (e, e^2, e^3)` crosses, and
+    /// the change of the winding number there: what [`at_perturbed`](Self::at_perturbed) adds up.
+    pub(crate) fn for_each_crossing_to(&self, p: DVec3, mut crossed: impl FnMut(u32, i32)) {
+        if self.bounds.contains(p) {
+            self.for_each_crossing(self.far_point(p), p, |face, sign| crossed(face, -sign));
+        }
+    }
+
+    fn for_each_crossing(&self, x: DVec3, p: DVec3, mut crossed: impl FnMut(u32, i32)) {
+        let segment = Segment::new(x, p);
         let mut stack = vec![self.tree.root()];
         while let Some((bounds, child)) = stack.pop() {
             if !segment.may_meet(bounds) {
@@ -64,13 +76,15 @@ impl WindingNumber {
             match child {
                 Child::Node(n) => stack.extend(self.tree.nodes()[n as usize]),
                 Child::Leaf { start, end } => {
-                    for &triangle in &self.triangles[start as usize..end as usize] {
-                        sum += signed_crossing(x, p, triangle);
+                    for i in start as usize..end as usize {
+                        match signed_crossing(x, p, self.triangles[i]) {
+                            0 => {}
+                            sign => crossed(self.tree.order()[i], sign),
+                        }
                     }
                 }
             }
         }
-        sum
     }
 
     /// The winding number at `x` from all faces, without a tree: slow, for comparison. `x` as in [`at`](Self::at).

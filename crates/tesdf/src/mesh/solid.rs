@@ -1,18 +1,100 @@
-use super::TriangleMesh;
-/// Placeholder.
-#[derive(Clone, Debug)]
-pub struct SolidMesh(TriangleMesh);
+use std::fmt;
+
+use super::{CheckReport, Defect, Severity, TriangleMesh, check};
+
+/// A mesh with a well-defined inside: what the encoder accepts, valid by construction.
+///
+/// - Every coordinate and the diagonal are in the accepted range.
+/// - Every directed edge is used as often as its reverse, so the winding number is an integer everywhere.
+/// - The winding number is not negative and somewhere 1 or more, as far as [`check`](super::check) tests it.
+///
+/// Inside is where the winding number is 1 or more. The surface may intersect itself, touch itself and have faces
+/// without area; [`warnings`](Self::warnings) then says so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolidMesh {
+    mesh: TriangleMesh,
+    warnings: Vec<Defect>,
+    simple: bool,
+}
+
 impl SolidMesh {
-    /// p
-    pub fn new(mesh: TriangleMesh) -> Result<Self, std::convert::Infallible> {
-        Ok(Self(mesh))
+    /// Checks the mesh as [`check`](super::check) does.
+    ///
+    /// # Errors
+    /// [`NotSolid`] has all errors, and says whether repair with default options would help.
+    pub fn new(mesh: TriangleMesh) -> Result<Self, NotSolid> {
+        let report = check(&mesh);
+        if !report.encodable {
+            let repairable = super::repair(&mesh, &super::RepairOptions::default())
+                .is_ok_and(|repaired| repaired.report.encodable);
+            return Err(NotSolid { report: Box::new(report), repairable });
+        }
+        let simple = report.is_simple();
+        let warnings = report.defects;
+        Ok(Self { mesh, warnings, simple })
     }
-    /// p
+
+    /// The mesh.
     pub fn mesh(&self) -> &TriangleMesh {
-        &self.0
+        &self.mesh
     }
-    /// p
+
+    /// What is worth a look, warnings and notes, although the inside is well defined.
+    pub fn warnings(&self) -> &[Defect] {
+        &self.warnings
+    }
+
+    /// Whether the surface is an embedded manifold with winding number 0 or 1 everywhere, see
+    /// [`CheckReport::is_simple`].
     pub fn is_simple(&self) -> bool {
-        true
+        self.simple
+    }
+
+    /// The mesh back.
+    pub fn into_mesh(self) -> TriangleMesh {
+        self.mesh
+    }
+}
+
+/// Why a mesh is not a [`SolidMesh`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct NotSolid {
+    report: Box<CheckReport>,
+    repairable: bool,
+}
+
+impl NotSolid {
+    /// All that was found.
+    pub fn report(&self) -> &CheckReport {
+        &self.report
+    }
+
+    /// Whether [`repair`](super::repair()) with default options makes it a solid.
+    pub fn is_repairable(&self) -> bool {
+        self.repairable
+    }
+}
+
+impl std::error::Error for NotSolid {}
+
+/// Errors that the message names.
+const NAMED: usize = 3;
+
+impl fmt::Display for NotSolid {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let errors: Vec<&Defect> = self.report.of_severity(Severity::Error).collect();
+        write!(f, "the mesh has no well-defined inside ({} errors; ids are 0-based): ", errors.len())?;
+        for (i, error) in errors.iter().take(NAMED).enumerate() {
+            write!(f, "{}{}", if i > 0 { "; " } else { "" }, error.message)?;
+        }
+        if errors.len() > NAMED {
+            write!(f, "; and {} more", errors.len() - NAMED)?;
+        }
+        f.write_str(if self.repairable {
+            ". Run `tesdf repair`, which makes it encodable, and encode the result"
+        } else {
+            ". `tesdf repair` with default options does not make it encodable: `tesdf check` lists all defects, and \
+             `tesdf repair --weld-tolerance` joins vertices that are a given length apart"
+        })
     }
 }

@@ -1,0 +1,94 @@
+//! The parts of the command-line tool `tesdf`: one module per command, and what they share.
+//!
+//! stdout carries only a command's result; notes, warnings, errors and progress go to stderr. The exit code is 0 when the
+//! command did its work, 1 when a mesh or file is not good (`check`, `repair`, `verify`), 2 for bad usage or input.
+#![warn(missing_docs)]
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+pub mod check;
+pub mod completions;
+pub mod encode;
+pub mod inspect;
+pub mod mesh_file;
+pub mod parse;
+pub mod progress;
+pub mod query;
+pub mod repair;
+pub mod report;
+pub mod slice;
+pub mod verify;
+
+use report::{Failure, Outcome};
+
+/// Exact signed distances of triangle meshes.
+#[derive(Parser, Debug)]
+#[command(name = "tesdf", version, about, arg_required_else_help = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Say what is wrong with a mesh
+    Check(check::Args),
+    /// Mend what can be mended without guessing, and say what was changed
+    Repair(repair::Args),
+    /// Encode a mesh into a .tesdf file
+    Encode(encode::Args),
+    /// Signed distance, gradient and closest point at the points of a CSV file
+    Query(query::Args),
+    /// Say what is in a .tesdf file
+    Inspect(inspect::Args),
+    /// Check a .tesdf file: its checksums, then its distances against brute force
+    Verify(verify::Args),
+    /// Draw the signed distance on a plane as a PNG picture
+    Slice(slice::Args),
+    /// Print a completion script for a shell
+    Completions(completions::Args),
+}
+
+/// Runs the command that the arguments of this process ask for.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            // Also --help and --version, which go to stdout and give 0.
+            let _ = e.print();
+            return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
+        }
+    };
+    // A panic is a bug of ours; the shell still gets a documented exit code.
+    let outcome = catch_unwind(AssertUnwindSafe(|| run(&cli.command))).unwrap_or_else(|_| {
+        Err(Failure::new("tesdf has a bug: the message above says where")
+            .hint("please report it with the command and, if you may share it, the file"))
+    });
+    match outcome {
+        Ok(Outcome::Good) => ExitCode::SUCCESS,
+        Ok(Outcome::NotGood) => ExitCode::from(1),
+        Err(failure) => {
+            report::error(&failure);
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(command: &Command) -> Result<Outcome, Failure> {
+    let unwired = |name: &str| Err(Failure::new(format!("this build cannot {name}")));
+    match command {
+        Command::Check(args) => check::run(args),
+        Command::Repair(args) => repair::run(args),
+        Command::Encode(_) => unwired("encode"),
+        Command::Query(_) => unwired("query"),
+        Command::Inspect(_) => unwired("inspect"),
+        Command::Verify(_) => unwired("verify"),
+        Command::Slice(_) => unwired("slice"),
+        Command::Completions(args) => completions::run(args),
+    }
+}

@@ -1,0 +1,28 @@
+//! Reading a mesh the way every command does.
+use std::path::Path;
+
+use tesdf::mesh::{LoadReport, LoadedMesh, ReadError};
+
+use crate::report::Failure;
+
+/// Reads a mesh; the message names the file.
+///
+/// # Errors
+/// As [`tesdf::mesh::read`].
+pub fn read(path: &Path) -> Result<LoadedMesh, Failure> {
+    tesdf::mesh::read(path).map_err(|e| match e {
+        ReadError::Open { .. } | ReadError::UnknownExtension { .. } => Failure::new(e),
+        e => Failure::new(format!("{}: {e}", path.display())),
+    })
+}
+
+/// What was read, as lines for a person.
+pub fn describe(path: &Path, load: &LoadReport) -> String {
+    let LoadReport { format, vertices_in_file, faces_in_file, .. } = load;
+    let mut text =
+        format!("{}: {format}, {faces_in_file} faces, {vertices_in_file} vertices\n", path.display());
+    for note in &load.notes {
+        text += &format!("note: {note}\n");
+    }
+    text
+}

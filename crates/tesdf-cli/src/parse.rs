@@ -1,0 +1,79 @@
+//! Values of options.
+use tesdf::geometry::Aabb;
+use tesdf::glam::DVec3;
+
+/// A finite number.
+///
+/// # Errors
+/// Says what was found.
+pub fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) => Err(format!("{value} is not a finite number")),
+        Err(_) => Err("not a number".into()),
+    }
+}
+
+/// A length: a finite number that is not negative.
+///
+/// # Errors
+/// Says what was found.
+pub fn length(text: &str) -> Result<f64, String> {
+    number(text).and_then(|value| match value >= 0.0 {
+        true => Ok(value),
+        false => Err(format!("{value} is negative; expected a length")),
+    })
+}
+
+/// A number from 0 to 1.
+///
+/// # Errors
+/// Says what was found.
+pub fn fraction(text: &str) -> Result<f64, String> {
+    number(text).and_then(|value| match (0.0..=1.0).contains(&value) {
+        true => Ok(value),
+        false => Err(format!("{value} is not between 0 and 1")),
+    })
+}
+
+/// A box as `x0 y0 z0 x1 y1 z1`, separated by spaces or commas; the first corner is the lower one.
+///
+/// # Errors
+/// Says which number is at fault.
+pub fn region(text: &str) -> Result<Aabb, String> {
+    let words: Vec<&str> =
+        text.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty()).collect();
+    let words: [&str; 6] = words
+        .try_into()
+        .map_err(|w: Vec<_>| format!("{} numbers; expected six, \"x0 y0 z0 x1 y1 z1\"", w.len()))?;
+    let mut values = [0.0; 6];
+    for (value, word) in values.iter_mut().zip(words) {
+        *value = number(word).map_err(|e| format!("{word}: {e}"))?;
+    }
+    let [min, max] = [0, 3].map(|i| DVec3::new(values[i], values[i + 1], values[i + 2]));
+    for (axis, (low, high)) in ["x", "y", "z"].into_iter().zip(min.to_array().into_iter().zip(max.to_array()))
+    {
+        if low >= high {
+            return Err(format!("{axis}0 = {low} is not below {axis}1 = {high}"));
+        }
+    }
+    Ok(Aabb { min, max })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_checked() {
+        assert_eq!(number(" -1e-3"), Ok(-1e-3));
+        assert_eq!(number("inf"), Err("inf is not a finite number".into()));
+        assert_eq!(length("-1"), Err("-1 is negative; expected a length".into()));
+        assert_eq!(fraction("1.5"), Err("1.5 is not between 0 and 1".into()));
+        let expected = Aabb { min: DVec3::new(-1., -2., -3.), max: DVec3::new(1., 2., 3.) };
+        assert_eq!(region("-1 -2,-3  1, 2 3"), Ok(expected));
+        assert_eq!(region("1 2 3"), Err("3 numbers; expected six, \"x0 y0 z0 x1 y1 z1\"".into()));
+        assert_eq!(region("0 0 a 1 1 1"), Err("a: not a number".into()));
+        assert_eq!(region("0 2 0 1 1 1"), Err("y0 = 2 is not below y1 = 1".into()));
+    }
+}

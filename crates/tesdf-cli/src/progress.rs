@@ -1,0 +1,57 @@
+//! Progress on stderr and Ctrl-C.
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::report::Failure;
+
+/// A bar on stderr, with an estimate of the time left; nothing is drawn when stderr is not a terminal.
+#[derive(Debug)]
+pub struct Progress {
+    bar: ProgressBar,
+}
+
+/// The bar's steps: finer than it can be drawn.
+const STEPS: u64 = 10_000;
+
+impl Progress {
+    /// A bar named after what is being done, such as `encoding`.
+    pub fn new(what: &'static str) -> Self {
+        let bar = ProgressBar::new(STEPS).with_message(what);
+        if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {percent:>3} %  {eta} left") {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self { bar }
+    }
+
+    /// Sets the share done, 0 to 1; may be called from any thread.
+    pub fn set(&self, share: f64) {
+        self.bar.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+/// A flag that the first Ctrl-C sets; the second ends the process at once.
+///
+/// # Errors
+/// When the system refuses the handler, or one is installed already.
+pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&flag);
+    ctrlc::set_handler(move || {
+        if seen.swap(true, Ordering::Relaxed) {
+            // Files are written aside and renamed, so nothing half-written is left under a final name.
+            std::process::exit(2);
+        }
+    })
+    .map_err(|e| Failure::new(format!("cannot handle Ctrl-C: {e}")))?;
+    Ok(flag)
+}

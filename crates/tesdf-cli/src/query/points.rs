@@ -1,0 +1,197 @@
+//! Points in, answers out, as CSV.
+use std::io::{self, Read, Write};
+
+use tesdf::glam::DVec3;
+
+use super::Answer;
+
+/// Why points cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PointsError {
+    /// There is not even a header.
+    #[error("the file is empty")]
+    Empty,
+    /// A column is missing or there twice.
+    #[error("line 1: the column {column} is there {count} times; expected once; the header is: {header}")]
+    Column {
+        /// `x`, `y` or `z`.
+        column: &'static str,
+        /// Number of columns with that name.
+        count: usize,
+        /// The header found.
+        header: String,
+    },
+    /// A row ends before the column.
+    #[error("line {line}: {fields} fields, so none for the column {column}; expected at least {expected}")]
+    Short {
+        /// Line, 1-based.
+        line: usize,
+        /// `x`, `y` or `z`.
+        column: &'static str,
+        /// Number of fields found.
+        fields: usize,
+        /// Number of fields needed.
+        expected: usize,
+    },
+    /// A field is not a number.
+    #[error("line {line}, column {column}: {found:?} is not a number")]
+    Number {
+        /// Line, 1-based.
+        line: usize,
+        /// `x`, `y` or `z`.
+        column: &'static str,
+        /// The field.
+        found: String,
+    },
+    /// The file cannot be read.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The file is not CSV.
+    #[error(transparent)]
+    Csv(#[from] csv::Error),
+}
+
+const COLUMNS: [&str; 3] = ["x", "y", "z"];
+/// A longer field in an error says nothing more.
+const SHOWN: usize = 80;
+
+/// The points of a CSV file, by the columns `x`, `y`, `z` of its header, in any order and case; other columns are ignored.
+///
+/// A byte-order mark, CRLF, quotes and blank lines are accepted. `nan` and `inf` are numbers here.
+///
+/// # Errors
+/// [`PointsError`] names line and column.
+pub fn read(mut input: impl Read) -> Result<Vec<DVec3>, PointsError> {
+    let mut bytes = Vec::new();
+    input.read_to_end(&mut bytes)?;
+    let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(&bytes[..]);
+    let header = reader.byte_headers()?.clone();
+    if header.is_empty() {
+        return Err(PointsError::Empty);
+    }
+    let mut places = [0; 3];
+    for (place, column) in places.iter_mut().zip(COLUMNS) {
+        let mut found =
+            header.iter().enumerate().filter(|(_, name)| name.eq_ignore_ascii_case(column.as_bytes()));
+        let (Some((at, _)), None) = (found.next(), found.next()) else {
+            let count = header.iter().filter(|name| name.eq_ignore_ascii_case(column.as_bytes())).count();
+            let header: Vec<_> = header.iter().map(String::from_utf8_lossy).collect();
+            let header = header.join(",").chars().take(SHOWN).collect();
+            return Err(PointsError::Column { column, count, header });
+        };
+        *place = at;
+    }
+    let mut points = Vec::new();
+    let mut row = csv::ByteRecord::new();
+    while reader.read_byte_record(&mut row)? {
+        let line = || line_of(&bytes, row.position().map_or(0, csv::Position::byte));
+        let mut p = DVec3::ZERO;
+        for (axis, (at, column)) in places.into_iter().zip(COLUMNS).enumerate() {
+            let field = row.get(at).ok_or_else(|| PointsError::Short {
+                line: line(),
+                column,
+                fields: row.len(),
+                expected: at + 1,
+            })?;
+            let number = std::str::from_utf8(field).ok().and_then(|text| text.parse().ok());
+            p[axis] = number.ok_or_else(|| PointsError::Number {
+                line: line(),
+                column,
+                found: String::from_utf8_lossy(field).chars().take(SHOWN).collect(),
+            })?;
+        }
+        points.push(p);
+    }
+    Ok(points)
+}
+
+/// The line, 1-based, of the row that `start` leads to. The crate's own line numbers leave out blank lines before a row.
+fn line_of(bytes: &[u8], start: u64) -> usize {
+    let start = usize::try_from(start).map_or(bytes.len(), |s| s.min(bytes.len()));
+    let blank = bytes[start..].iter().take_while(|b| matches!(b, b'\r' | b'\n')).count();
+    let before = &bytes[..start + blank];
+    let ends = |(i, &b): (usize, &u8)| b == b'\n' || b == b'\r' && before.get(i + 1) != Some(&b'\n');
+    1 + before.iter().enumerate().filter(|&at| ends(at)).count()
+}
+
+/// Writes one row per point. Numbers are the shortest that give the same f64 again; a point without an answer has `NaN`
+/// in every column but the first three, and an empty face.
+///
+/// # Errors
+/// When `out` cannot be written.
+pub fn write(mut out: impl Write, points: &[DVec3], answers: &[Option<Answer>]) -> io::Result<()> {
+    out.write_all(b"x,y,z,signed_distance,gx,gy,gz,cx,cy,cz,face\n")?;
+    for (p, answer) in points.iter().zip(answers) {
+        // {:?} is the shortest text that reads back equal, with an exponent where {} would print 300 digits.
+        write!(out, "{:?},{:?},{:?},", p.x, p.y, p.z)?;
+        match answer {
+            Some(Answer { signed_distance, gradient: g, closest: c, face }) => writeln!(
+                out,
+                "{signed_distance:?},{:?},{:?},{:?},{:?},{:?},{:?},{face}",
+                g.x, g.y, g.z, c.x, c.y, c.z
+            )?,
+            None => out.write_all(b"NaN,NaN,NaN,NaN,NaN,NaN,NaN,\n")?,
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(text: &[u8]) -> Result<Vec<[f64; 3]>, String> {
+        read(text).map(|p| p.iter().map(DVec3::to_array).collect()).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn csv_as_found_in_the_wild_is_read() {
+        let expected = Ok(vec![[1.0, 2.0, 3.0], [-4e-3, 5.0, 6e7]]);
+        for text in [
+            &b"x,y,z\n1,2,3\n-4e-3,5,6e7\n"[..],
+            b"\xef\xbb\xbfx,y,z\r\n1,2,3\r\n-4e-3,5,6e7",
+            b"name, Z ,\"X\",y\n\"a, b\",3,1,2\n\n\xff,6e7,-4e-3,+5,more\n",
+        ] {
+            assert_eq!(points(text), expected, "{:?}", String::from_utf8_lossy(text));
+        }
+        assert_eq!(points(b"x,y,z\n"), Ok(vec![]));
+        assert!(points(b"x,y,z\nnan,inf,-inf").unwrap()[0][0].is_nan());
+    }
+
+    #[test]
+    fn errors_name_line_and_column() {
+        for (text, expected) in [
+            (&b""[..], "the file is empty"),
+            (b"x;y;z\n1;2;3", "line 1: the column x is there 0 times; expected once; the header is: x;y;z"),
+            (b"x,y,Y,z\n", "line 1: the column y is there 2 times; expected once; the header is: x,y,Y,z"),
+            (b"x,y,z\n1,2,3\n\n1,2\n", "line 4: 2 fields, so none for the column z; expected at least 3"),
+            (b"x,y,z\r\n1,,3\r\n", "line 2, column y: \"\" is not a number"),
+            (b"i,x,y,z\n\"a\nb\",1,2,3\n4,5,six,7\n", "line 4, column y: \"six\" is not a number"),
+        ] {
+            assert_eq!(points(text).unwrap_err(), expected);
+        }
+    }
+
+    #[test]
+    fn numbers_round_trip() {
+        let values = [0.1 + 0.2, 1e300, f64::MIN_POSITIVE, -0.0, 5e-324, 1.0 / 3.0];
+        let p = DVec3::from_slice(&values[..3]);
+        let answer = Answer {
+            signed_distance: values[3],
+            gradient: DVec3::splat(values[4]),
+            closest: DVec3::splat(values[5]),
+            face: u32::MAX,
+        };
+        let mut out = Vec::new();
+        write(&mut out, &[p, DVec3::NAN], &[Some(answer), None]).unwrap();
+        let text = String::from_utf8(out).unwrap();
+        let lines: Vec<_> = text.lines().collect();
+        assert_eq!(lines[0], "x,y,z,signed_distance,gx,gy,gz,cx,cy,cz,face");
+        let found: Vec<f64> = lines[1].split(',').map(|s| s.parse().unwrap()).collect();
+        let [a, b] = [values[4], values[5]];
+        let expected = [p.x, p.y, p.z, values[3], a, a, a, b, b, b, f64::from(u32::MAX)];
+        assert_eq!(found.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), expected.map(f64::to_bits));
+        assert!(lines[1].len() < 150);
+        assert_eq!(lines[2], "NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,");
+    }
+}

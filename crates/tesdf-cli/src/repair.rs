@@ -1,0 +1,72 @@
+//! `tesdf repair MESH -o FILE`
+use std::path::PathBuf;
+
+use serde::Serialize;
+use tesdf::mesh::{LoadReport, RepairOptions, RepairReport, WriteFormat, check, repair, write};
+
+use crate::report::{self, Failure, Outcome};
+use crate::{mesh_file, parse};
+
+/// Arguments of `tesdf repair`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// Mesh: STL, OBJ, PLY, OFF, glTF or GLB
+    pub mesh: PathBuf,
+    /// The file to write, .ply (keeps every digit), .obj or .stl; an existing one is replaced
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Merge vertices closer than this and close cracks up to it, mesh unit [default: bitwise equal positions only]
+    #[arg(long, value_name = "T", value_parser = parse::length, allow_hyphen_values = true)]
+    pub weld_tolerance: Option<f64>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What `--json` prints; all ids are 0-based.
+#[derive(Serialize)]
+struct Report<'a> {
+    file: String,
+    output: String,
+    load: &'a LoadReport,
+    repair: &'a RepairReport,
+}
+
+/// Repairs a mesh, writes it, and prints what was changed and what is left.
+///
+/// # Errors
+/// The mesh cannot be read or has nothing to keep, or the result cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    // A wrong extension is found before the work.
+    let format = WriteFormat::of_path(&args.output).map_err(Failure::new)?;
+    let loaded = mesh_file::read(&args.mesh)?;
+    let options = RepairOptions { weld_tolerance: args.weld_tolerance, ..RepairOptions::DEFAULT };
+    let repaired =
+        repair(&loaded.mesh, &options).map_err(|e| Failure::new(format!("{}: {e}", args.mesh.display())))?;
+    write(&args.output, &repaired.mesh).map_err(Failure::new)?;
+    let [file, output] = [&args.mesh, &args.output].map(|path| path.display().to_string());
+    let found = &repaired.report;
+    if args.json {
+        report::json(&Report { file, output: output.clone(), load: &loaded.report, repair: found })?;
+    } else {
+        let text = mesh_file::describe(&args.mesh, &loaded.report);
+        report::result(format!("{text}{found}\nwritten to {output}\n").as_bytes())?;
+    }
+    if !found.encodable {
+        report::hint(match args.weld_tolerance {
+            None => "--weld-tolerance T merges vertices up to T apart and closes cracks up to T",
+            Some(_) => "mend the rest where the mesh was made, or try another --weld-tolerance",
+        });
+        return Ok(Outcome::NotGood);
+    }
+    if !format.is_exact() {
+        // Rounding may have closed or opened what the repaired mesh did not.
+        let rounded = mesh_file::read(&args.output)?;
+        if !check(&rounded.mesh).encodable {
+            report::warning(&format!("{output}: not encodable, as the format rounds coordinates to 32 bits"));
+            report::hint("write .ply, which keeps every digit");
+            return Ok(Outcome::NotGood);
+        }
+    }
+    Ok(Outcome::Good)
+}

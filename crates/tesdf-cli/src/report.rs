@@ -1,0 +1,98 @@
+//! What a person or a program sees: results on stdout, everything else on stderr.
+use std::fmt;
+use std::io::{self, Write};
+
+/// How a command that did its work ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Exit code 0.
+    Good,
+    /// Exit code 1: the mesh or file is not good.
+    NotGood,
+}
+
+/// Why a command could not do its work, and what to do next; exit code 2.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// What was found, where, and what was expected.
+    pub message: String,
+    /// What to do next.
+    pub hint: Option<String>,
+}
+
+impl Failure {
+    /// A failure without a hint.
+    pub fn new(message: impl fmt::Display) -> Self {
+        Self { message: message.to_string(), hint: None }
+    }
+
+    /// Adds what to do next.
+    pub fn hint(mut self, hint: impl fmt::Display) -> Self {
+        self.hint = Some(hint.to_string());
+        self
+    }
+}
+
+fn line(label: &str, colour: &str, text: &str) {
+    // Nothing is left to do when stderr is closed. The colour goes when stderr is not a terminal.
+    let _ = writeln!(anstream::stderr(), "\x1b[1;{colour}m{label}:\x1b[0m {text}");
+}
+
+/// Prints `error:` and `hint:` lines.
+pub fn error(failure: &Failure) {
+    line("error", "31", &failure.message);
+    if let Some(text) = &failure.hint {
+        hint(text);
+    }
+}
+
+/// Prints a `warning:` line.
+pub fn warning(text: &str) {
+    line("warning", "33", text);
+}
+
+/// Prints a `note:` line.
+pub fn note(text: &str) {
+    line("note", "34", text);
+}
+
+/// Prints a `hint:` line.
+pub fn hint(text: &str) {
+    line("hint", "36", text);
+}
+
+/// Writes a result to stdout.
+///
+/// # Errors
+/// When stdout cannot be written. A reader that has seen enough and closed the pipe (`| head`) is not an error.
+pub fn result(bytes: &[u8]) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(bytes).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::new(format!("cannot write to stdout: {e}")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Writes `value` to stdout as indented JSON.
+///
+/// # Errors
+/// As [`result`].
+pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    let mut bytes =
+        serde_json::to_vec_pretty(value).map_err(|e| Failure::new(format!("cannot write JSON: {e}")))?;
+    bytes.push(b'\n');
+    result(&bytes)
+}
+
+/// Writes names and values to stdout in two columns.
+///
+/// # Errors
+/// As [`result`].
+pub fn table<N: AsRef<str>, V: fmt::Display>(rows: &[(N, V)]) -> Result<(), Failure> {
+    let width = rows.iter().map(|(name, _)| name.as_ref().chars().count()).max().unwrap_or(0);
+    let text: String =
+        rows.iter().map(|(name, value)| format!("{:<width$}  {value}\n", name.as_ref())).collect();
+    result(text.as_bytes())
+}

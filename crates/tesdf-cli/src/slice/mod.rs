@@ -1,0 +1,120 @@
+//! `tesdf slice FILE -o out.png`: the signed distance on an axis-aligned plane, with contours, cells and the surface.
+//!
+//! In go a [`View`], a function that gives the signed distance and the [`Overlay`] of what the plane cuts; out comes a
+//! PNG. Nothing here knows what an asset is.
+mod colour;
+mod cut;
+mod picture;
+mod text;
+mod ticks;
+
+use std::path::PathBuf;
+
+use tesdf::asset::save_atomic;
+use tesdf::geometry::Aabb;
+use tesdf::glam::DVec3;
+
+pub use cut::{Axis, View, cut_tetrahedron, cut_triangle};
+pub use picture::{PictureError, draw};
+
+use crate::parse;
+use crate::report::{Failure, Outcome};
+
+/// Arguments of `tesdf slice`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// A .tesdf file
+    pub file: PathBuf,
+    /// The PNG file to write; an existing one is replaced
+    #[arg(short, long, value_name = "PNG")]
+    pub output: PathBuf,
+    /// The plane is perpendicular to this axis
+    #[arg(long, value_enum, default_value_t = Axis::Z)]
+    pub axis: Axis,
+    /// Where the plane is: 0 at the lower end of the mesh, 1 at the upper [default: 0.5]
+    #[arg(long, value_name = "FRACTION", value_parser = parse::fraction, conflicts_with = "offset", allow_hyphen_values = true)]
+    pub at: Option<f64>,
+    /// Coordinate of the plane along the axis, mesh unit
+    #[arg(long, value_name = "LENGTH", value_parser = parse::number, allow_hyphen_values = true)]
+    pub offset: Option<f64>,
+    /// Pixels of the picture's longer side
+    #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
+    pub size: u32,
+}
+
+impl Args {
+    /// The plane through a mesh with these bounds, titled with the file's name.
+    pub fn view(&self, bounds: Aabb, unit: &str) -> View {
+        let [low, high] = [bounds.min, bounds.max].map(|p| self.axis.along(p));
+        let offset = self.offset.unwrap_or_else(|| low + (high - low) * self.at.unwrap_or(0.5));
+        let mut view = View::of_box(self.axis, offset, bounds.min, bounds.max);
+        view.unit = unit.to_string();
+        view.title = self.file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        view
+    }
+}
+
+/// Draws the picture and saves it.
+///
+/// # Errors
+/// The size or the view cannot be drawn, or the file cannot be written.
+pub fn run(
+    args: &Args,
+    view: &View,
+    overlay: &Overlay,
+    signed_distance: impl Fn(DVec3) -> f64 + Sync,
+) -> Result<Outcome, Failure> {
+    let png = draw(view, overlay, args.size, signed_distance).map_err(Failure::new)?;
+    save_atomic(&args.output, &png).map_err(Failure::new)?;
+    Ok(Outcome::Good)
+}
+
+/// Where a cell lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CellLabel {
+    /// Inside the solid.
+    Inside,
+    /// Outside the solid.
+    Outside,
+    /// On both sides of the surface.
+    Crossing,
+}
+
+/// A tetrahedron cut by the plane.
+#[derive(Clone, Debug)]
+pub struct CellOutline {
+    /// Corners in the plane, three or four, in order around the polygon; mesh unit.
+    pub polygon: Vec<[f64; 2]>,
+    /// Where the cell lies.
+    pub label: CellLabel,
+}
+
+/// What is drawn over the colours.
+#[derive(Clone, Debug, Default)]
+pub struct Overlay {
+    /// Cells, as thin lines.
+    pub cells: Vec<CellOutline>,
+    /// The surface cut by the plane, as a strong line; mesh unit.
+    pub surface: Vec<[[f64; 2]; 2]>,
+}
+
+impl Overlay {
+    /// What the plane of `view` cuts of labelled tetrahedra and of the triangles of the surface.
+    pub fn of(
+        view: &View,
+        cells: impl IntoIterator<Item = ([DVec3; 4], CellLabel)>,
+        surface: impl IntoIterator<Item = [DVec3; 3]>,
+    ) -> Self {
+        let outline = |(corners, label)| {
+            let polygon = cut_tetrahedron(view.axis, view.offset, corners)?;
+            Some(CellOutline { polygon, label })
+        };
+        Self {
+            cells: cells.into_iter().filter_map(outline).collect(),
+            surface: surface
+                .into_iter()
+                .filter_map(|corners| cut_triangle(view.axis, view.offset, corners))
+                .collect(),
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! What a person and a script see of `tesdf check` and `tesdf repair`.
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const VERTICES: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n";
+const FACES: &str = "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).unwrap();
+    }
+
+    /// Exit code, stdout, stderr.
+    fn tesdf(&self, args: &[&str]) -> (Option<i32>, String, String) {
+        let out =
+            Command::new(env!("CARGO_BIN_EXE_tesdf")).args(args).current_dir(self.0.path()).output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (out.status.code(), text(out.stdout), text(out.stderr))
+    }
+}
+
+#[test]
+fn a_good_mesh_is_0() {
+    let folder = Folder::new();
+    folder.write("cube.obj", &format!("{VERTICES}{FACES}"));
+    let (code, out, err) = folder.tesdf(&["check", "cube.obj"]);
+    assert_eq!((code, err.as_str()), (Some(0), ""));
+    assert!(out.starts_with("cube.obj: OBJ, 6 faces, 8 vertices\n"), "{out}");
+    assert!(out.ends_with("ok: the inside is well defined\n"), "{out}");
+    let (code, out, _) = folder.tesdf(&["check", "cube.obj", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(code, Some(0));
+    assert_eq!(json["file"], "cube.obj");
+    assert_eq!(json["load"]["format"], "obj");
+    assert_eq!(json["check"]["faces"], 12);
+    assert_eq!(json["check"]["encodable"], true);
+}
+
+#[test]
+fn a_hole_is_1_and_names_its_edges() {
+    let folder = Folder::new();
+    folder.write("open.obj", &format!("{VERTICES}{}", &FACES[10..]));
+    let (code, out, err) = folder.tesdf(&["check", "open.obj"]);
+    assert_eq!(code, Some(1), "{err}");
+    assert!(out.contains("error: edge 0-1 is open: only face "), "{out}");
+    assert!(out.contains("boundary loop 0: 4 edges, length 8"), "{out}");
+    assert!(err.starts_with("hint: tesdf repair open.obj -o FILE.ply"), "{err}");
+    let (code, out, err) = folder.tesdf(&["repair", "open.obj", "-o", "r.ply"]);
+    assert_eq!(code, Some(1));
+    assert!(out.contains("not encodable: 4 errors left"), "{out}");
+    assert!(err.contains("hint: --weld-tolerance T"), "{err}");
+}
+
+#[test]
+fn what_is_repaired_is_named_and_checks_in_every_format() {
+    let folder = Folder::new();
+    // The last face is there twice, the first one is reversed.
+    let faces = FACES.replace("f 1 4 3 2", "f 1 2 3 4");
+    folder.write("bad.obj", &format!("{VERTICES}{faces}f 4 1 5 8\n"));
+    assert_eq!(folder.tesdf(&["check", "bad.obj"]).0, Some(1));
+    for name in ["r.ply", "r.obj", "r.stl"] {
+        let (code, out, err) = folder.tesdf(&["repair", "bad.obj", "-o", name]);
+        assert_eq!((code, err.as_str()), (Some(0), ""), "{out}");
+        assert!(out.contains("2 duplicate faces dropped (0-based): 12 repeats 10, 13 repeats 11\n"), "{out}");
+        assert!(out.contains("2 faces reversed (0-based): 0, 1\n"), "{out}");
+        assert!(out.ends_with(&format!("ok: encodable\nwritten to {name}\n")), "{out}");
+        assert_eq!(folder.tesdf(&["check", name]).0, Some(0));
+    }
+    let (_, out, _) = folder.tesdf(&["repair", "bad.obj", "-o", "r.ply", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["repair"]["reversed_faces"], serde_json::json!([0, 1]));
+    assert_eq!(json["output"], "r.ply");
+}
+
+#[test]
+fn a_weld_tolerance_joins_what_is_near() {
+    let folder = Folder::new();
+    // The roof has corners of its own, a millionth off.
+    let near = "v 0 0 2.000001\nv 2 0 2.000001\nv 2 2 2.000001\nv 0 2 2.000001\n";
+    let faces = FACES.replace("f 5 6 7 8", "f 9 10 11 12");
+    folder.write("crack.obj", &format!("{VERTICES}{near}{faces}"));
+    assert_eq!(folder.tesdf(&["repair", "crack.obj", "-o", "r.ply"]).0, Some(1));
+    let (code, out, _) = folder.tesdf(&["repair", "crack.obj", "-o", "r.ply", "--weld-tolerance", "1e-5"]);
+    assert_eq!(code, Some(0), "{out}");
+    assert!(out.contains("4 vertices merged (0-based): 8 into 4"), "{out}");
+    let (code, _, err) = folder.tesdf(&["repair", "crack.obj", "-o", "r.ply", "--weld-tolerance", "0"]);
+    assert_eq!(code, Some(2));
+    assert!(err.contains("the weld tolerance is 0; expected a finite number above 0"), "{err}");
+}
+
+#[test]
+fn what_cannot_be_read_or_written_is_2_and_named() {
+    let folder = Folder::new();
+    folder.write("cube.obj", &format!("{VERTICES}{FACES}"));
+    folder.write("bad.obj", "v 0 0 zero\n");
+    folder.write("empty.stl", "");
+    for (args, expected) in [
+        (&["check", "none.stl"][..], "error: cannot read none.stl: "),
+        (&["check", "cube.step"], "error: cube.step: the extension names no mesh format that can be read"),
+        (&["check", "bad.obj"], "error: bad.obj: OBJ, line 1: 'zero' is not a number"),
+        (&["check", "empty.stl"], "error: empty.stl: the file is empty"),
+        (
+            &["repair", "cube.obj", "-o", "r.step"],
+            "error: r.step: the extension names no mesh format that can be written",
+        ),
+        (&["repair", "cube.obj", "-o", "no/r.ply"], "error: cannot write no/r.ply: "),
+    ] {
+        let (code, out, err) = folder.tesdf(args);
+        assert_eq!((code, out.as_str()), (Some(2), ""), "{args:?}");
+        assert!(err.starts_with(expected), "{args:?}: {err}");
+    }
+    assert!(!Path::new(&folder.path("r.step")).exists());
+}

@@ -1,0 +1,131 @@
+//! What a person or a script sees of the binary: exit codes, streams, messages.
+use std::path::PathBuf;
+use std::process::{Command, Output, Stdio};
+
+use clap::{CommandFactory, Parser};
+use tesdf_cli::{Cli, Command as Parsed, encode, slice};
+
+fn tesdf(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tesdf")).args(args).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+fn parse(args: &[&str]) -> Result<Parsed, String> {
+    let args = std::iter::once("tesdf").chain(args.iter().copied());
+    Cli::try_parse_from(args).map(|cli| cli.command).map_err(|e| e.to_string())
+}
+
+#[test]
+fn the_declaration_is_consistent() {
+    Cli::command().debug_assert();
+}
+
+#[test]
+fn help_and_version_go_to_stdout() {
+    for args in [&["--help"][..], &["--version"], &["encode", "--help"], &["help", "slice"]] {
+        let out = tesdf(args);
+        assert_eq!(out.status.code(), Some(0), "{args:?}");
+        assert!(!out.stdout.is_empty() && out.stderr.is_empty(), "{args:?}");
+    }
+    assert_eq!(text(&tesdf(&["--version"]).stdout), format!("tesdf {}\n", env!("CARGO_PKG_VERSION")));
+}
+
+#[test]
+fn bad_usage_is_2_and_says_why_on_stderr() {
+    for (args, expected) in [
+        (&[][..], "Usage: tesdf <COMMAND>"),
+        (&["frobnicate"], "error: unrecognized subcommand 'frobnicate'"),
+        (&["encode", "m.stl"], "--output <FILE>"),
+        (&["encode", "m.stl", "-o", "f", "--quality", "9"], "error: unexpected argument '--quality' found"),
+        (&["encode", "m.stl", "-o", "f", "--preset", "huge"], "[possible values: default, fast, compact]"),
+        (&["encode", "m.stl", "-o", "f", "--band", "-1"], "-1 is negative; expected a length"),
+        (&["encode", "m.stl", "-o", "f", "--region", "0 0 0 1 1"], "5 numbers; expected six"),
+        (&["encode", "m.stl", "-o", "f", "--threads", "0"], "--threads <N>"),
+        (&["repair", "m.stl"], "--output <FILE>"),
+        (
+            &["repair", "m", "-o", "f.ply", "--weld-tolerance", "-1e-3"],
+            "-0.001 is negative; expected a length",
+        ),
+        (&["check", "m.stl", "--quiet"], "error: unexpected argument '--quiet' found"),
+        (&["query", "f.tesdf"], "--points <CSV>"),
+        (&["verify", "f.tesdf", "--samples", "-1"], "error: "),
+        (&["slice", "f", "-o", "p", "--at", "0.5", "--offset", "1"], "cannot be used with"),
+        (&["completions", "tcl"], "[possible values: bash, elvish, fish, powershell, zsh]"),
+    ] {
+        let out = tesdf(args);
+        assert_eq!(out.status.code(), Some(2), "{args:?}");
+        assert!(out.stdout.is_empty(), "{args:?}");
+        assert!(text(&out.stderr).contains(expected), "{args:?}: {}", text(&out.stderr));
+        assert!(!text(&out.stderr).contains('\x1b'), "colours only on a terminal");
+    }
+}
+
+#[test]
+fn negative_values_are_values() {
+    let Parsed::Encode(args) = parse(&[
+        "encode",
+        "m.stl",
+        "-o",
+        "f.tesdf",
+        "--region",
+        "-1 -2 -3 1 2 3",
+        "--region",
+        "0,0,0,1,1,1",
+        "--band",
+        "0",
+        "--preset",
+        "compact",
+        "--unit",
+        "mm",
+        "--threads",
+        "2",
+        "--json",
+    ])
+    .unwrap() else {
+        panic!()
+    };
+    assert_eq!(args.regions.len(), 2);
+    assert_eq!(args.regions[0].min.to_array(), [-1.0, -2.0, -3.0]);
+    assert_eq!((args.band, args.preset), (Some(0.0), encode::Preset::Compact));
+    let Parsed::Slice(args) =
+        parse(&["slice", "a/b.tesdf", "-o", "p.png", "--axis", "x", "--offset", "-2.5e-1"]).unwrap()
+    else {
+        panic!()
+    };
+    assert_eq!((args.axis, args.offset, args.size), (slice::Axis::X, Some(-0.25), 1200));
+    let bounds = tesdf::geometry::Aabb { min: tesdf::glam::DVec3::ZERO, max: tesdf::glam::DVec3::ONE };
+    let view = args.view(bounds, "mm");
+    assert_eq!((view.offset, view.title.as_str()), (-0.25, "b.tesdf"));
+}
+
+#[test]
+fn defaults_are_the_documented_ones() {
+    let Parsed::Verify(args) = parse(&["verify", "f.tesdf"]).unwrap() else { panic!() };
+    assert_eq!((args.file, args.samples, args.json), (PathBuf::from("f.tesdf"), 10_000, false));
+    let Parsed::Encode(args) = parse(&["encode", "m", "-o", "f"]).unwrap() else { panic!() };
+    assert_eq!(
+        (args.domain, args.encoder, args.preset),
+        (encode::Domain::Bisection, encode::Encoder::Certified, encode::Preset::Default)
+    );
+}
+
+#[test]
+fn completions_are_printed_and_a_closed_pipe_is_no_error() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let out = tesdf(&["completions", shell]);
+        assert_eq!(out.status.code(), Some(0));
+        assert!(text(&out.stdout).contains("tesdf") && out.stderr.is_empty());
+    }
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tesdf"))
+        .args(["completions", "bash"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let out = child.wait_with_output().unwrap();
+    assert_eq!((out.status.code(), text(&out.stderr)), (Some(0), ""));
+}

@@ -1,0 +1,105 @@
+use glam::DVec3;
+
+use super::{normal_signs, orientation};
+
+/// Whether two closed triangles of positive area share a point; exact.
+pub fn triangles_meet(t: [DVec3; 3], u: [DVec3; 3]) -> bool {
+    if one_sided(t, u) || one_sided(u, t) {
+        return false;
+    }
+    // Where they meet at all, the end of what they share is on the border of one of them.
+    let edges = |t: [DVec3; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
+    edges(u).into_iter().any(|(p, q)| segment_meets_triangle(p, q, t))
+        || edges(t).into_iter().any(|(p, q)| segment_meets_triangle(p, q, u))
+}
+
+/// Whether a closed segment and a closed triangle of positive area share a point; exact.
+pub fn segment_meets_triangle(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+    match (orientation(a, b, c, p), orientation(a, b, c, q)) {
+        (0, 0) => segment_meets_coplanar(p, q, [a, b, c]),
+        (s, r) if s * r > 0 => false,
+        _ => {
+            let turns = [orientation(p, q, a, b), orientation(p, q, b, c), orientation(p, q, c, a)];
+            turns.iter().all(|&s| s >= 0) || turns.iter().all(|&s| s <= 0)
+        }
+    }
+}
+
+/// Whether the corners of `u` are strictly on one side of the plane of `t`.
+fn one_sided([a, b, c]: [DVec3; 3], u: [DVec3; 3]) -> bool {
+    let first = orientation(a, b, c, u[0]);
+    first != 0 && orientation(a, b, c, u[1]) == first && orientation(a, b, c, u[2]) == first
+}
+
+fn segment_meets_coplanar(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
+    let normal = normal_signs(a, b, c);
+    let Some(axis) = (0..3).find(|&k| normal[k] != 0) else { return false };
+    // Positive where the turn is that of the triangle, seen along the axis.
+    let turn = |u, v, w| normal[axis] * normal_signs(u, v, w)[axis];
+    let edges = [(a, b), (b, c), (c, a)];
+    let holds = |x| edges.iter().all(|&(u, v)| turn(u, v, x) >= 0);
+    if holds(p) || holds(q) {
+        return true;
+    }
+    edges.iter().any(|&(u, v)| {
+        let ends = (turn(p, q, u), turn(p, q, v));
+        // An edge in line with the segment is left to the other two.
+        ends != (0, 0) && ends.0 * ends.1 <= 0 && turn(u, v, p) * turn(u, v, q) <= 0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn point(c: [i32; 3]) -> DVec3 {
+        DVec3::new(c[0].into(), c[1].into(), c[2].into())
+    }
+
+    /// Least distance of two triangles on a dense grid of both, refined around its minimum.
+    fn distance(t: [DVec3; 3], u: [DVec3; 3]) -> f64 {
+        // Alternating projections onto two convex sets go to their distance.
+        let mut x = (t[0] + t[1] + t[2]) / 3.0;
+        let mut last = f64::INFINITY;
+        for _ in 0..20_000 {
+            let y = closest(u, x);
+            x = closest(t, y);
+            last = x.distance(y);
+        }
+        last
+    }
+
+    fn closest([a, b, c]: [DVec3; 3], x: DVec3) -> DVec3 {
+        let n = (b - a).cross(c - a);
+        let on_edge = |a: DVec3, b: DVec3| {
+            a + ((x - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0) * (b - a)
+        };
+        if [(a, b), (b, c), (c, a)].iter().all(|&(a, b)| (b - a).cross(x - a).dot(n) >= 0.0) {
+            return x - (x - a).dot(n) / n.length_squared() * n;
+        }
+        [on_edge(a, b), on_edge(b, c), on_edge(c, a)]
+            .into_iter()
+            .min_by(|p, q| p.distance(x).total_cmp(&q.distance(x)))
+            .unwrap_or(a)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(600))]
+        #[test]
+        fn agrees_with_the_distance(
+            t in prop::array::uniform3(prop::array::uniform3(0i32..4)),
+            u in prop::array::uniform3(prop::array::uniform3(0i32..4)),
+            flat in 0u8..3,
+        ) {
+            // A third of the pairs are coplanar.
+            let project = |mut c: [i32; 3]| { if flat == 0 { c[1] = 1; } point(c) };
+            let (t, u) = (t.map(project), u.map(project));
+            prop_assume!(normal_signs(t[0], t[1], t[2]) != [0; 3] && normal_signs(u[0], u[1], u[2]) != [0; 3]);
+            // On this lattice, triangles that do not meet are farther apart than the iteration's error.
+            prop_assert_eq!(triangles_meet(t, u), distance(t, u) < 5e-3);
+            prop_assert_eq!(triangles_meet(u, t), triangles_meet(t, u));
+        }
+    }
+}

@@ -1,0 +1,83 @@
+use std::collections::HashSet;
+
+use super::edges::centroid;
+use crate::{
+    geometry::{
+        Aabb, AabbTree, normal_signs, orientation, segment_meets_triangle, self_overlaps, triangles_meet,
+    },
+    mesh::{Defect, DefectKind, Severity, TriangleMesh},
+};
+
+/// Faces of a leaf of the tree.
+const LEAF_SIZE: usize = 4;
+
+/// Pairs of faces, lower first and ascending, that meet in more than the corners or the edge that they share.
+///
+/// Exact. Left out are faces without area (`without_area`, ascending), pairs with the same three corners, and the
+/// pairs of `touching`, which meet in a T-junction or along a collinear face.
+pub(crate) fn self_intersections(
+    mesh: &TriangleMesh,
+    without_area: &[u32],
+    touching: &HashSet<(u32, u32)>,
+) -> Vec<[u32; 2]> {
+    let faces: Vec<u32> =
+        (0..mesh.faces().len() as u32).filter(|f| without_area.binary_search(f).is_err()).collect();
+    let boxes: Vec<Aabb> = faces.iter().map(|&f| Aabb::of(&mesh.triangle(f as usize))).collect();
+    let mut pairs = Vec::new();
+    self_overlaps(&AabbTree::build(&boxes, LEAF_SIZE), &boxes, |i, j| {
+        let (f, g) = (faces[i as usize], faces[j as usize]);
+        if meet_beyond_shared(mesh, f, g) && !touching.contains(&(f, g)) && !touching.contains(&(g, f)) {
+            pairs.push([f, g]);
+        }
+    });
+    pairs.sort_unstable();
+    pairs
+}
+
+/// Whether two faces with area meet in more than the corners or the edge that they share by index.
+fn meet_beyond_shared(mesh: &TriangleMesh, f: u32, g: u32) -> bool {
+    let (corners, others) = (mesh.faces()[f as usize], mesh.faces()[g as usize]);
+    let (t, u) = (mesh.triangle(f as usize), mesh.triangle(g as usize));
+    let in_g = corners.map(|v| others.contains(&v));
+    let in_f = others.map(|v| corners.contains(&v));
+    match in_g.iter().filter(|&&shared| shared).count() {
+        0 => triangles_meet(t, u),
+        1 => {
+            // What they share besides the corner would reach the edge of one of them that is opposite to it.
+            let opposite = |t: [glam::DVec3; 3], shared: [bool; 3]| {
+                let k = shared.iter().position(|&s| s).unwrap_or(0);
+                (t[(k + 1) % 3], t[(k + 2) % 3])
+            };
+            let (p, q) = opposite(u, in_f);
+            let (r, s) = opposite(t, in_g);
+            segment_meets_triangle(p, q, t) || segment_meets_triangle(r, s, u)
+        }
+        2 => {
+            // Only when folded flat onto each other.
+            let apex =
+                |t: [glam::DVec3; 3], shared: [bool; 3]| t[shared.iter().position(|&s| !s).unwrap_or(0)];
+            let (c, d) = (apex(t, in_g), apex(u, in_f));
+            if orientation(t[0], t[1], t[2], d) != 0 {
+                return false;
+            }
+            let k = in_g.iter().position(|&s| !s).unwrap_or(0);
+            let (a, b) = (t[(k + 1) % 3], t[(k + 2) % 3]);
+            let (here, there) = (normal_signs(a, b, c), normal_signs(a, b, d));
+            (0..3).any(|axis| here[axis] * there[axis] > 0)
+        }
+        _ => false,
+    }
+}
+
+pub(super) fn defects(mesh: &TriangleMesh, pairs: &[[u32; 2]], lenient: Severity) -> Vec<Defect> {
+    pairs
+        .iter()
+        .map(|&[f, g]| {
+            let (t, u) = (Aabb::of(&mesh.triangle(f as usize)), Aabb::of(&mesh.triangle(g as usize)));
+            let common = Aabb { min: t.min.max(u.min), max: t.max.min(u.max) };
+            let place = if common.min.cmple(common.max).all() { common.center() } else { centroid(mesh, f) };
+            let message = format!("faces {f} and {g} intersect");
+            Defect::new(DefectKind::SelfIntersection, lenient, place, message).faces([f, g])
+        })
+        .collect()
+}

@@ -1,0 +1,131 @@
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use super::{Draft, RepairReport};
+use crate::{
+    geometry::{WindingNumber, perturbed_orientation},
+    mesh::{
+        Topology, TriangleMesh,
+        check::{TJunctions, face_flaws, height, self_intersections},
+        topology::DisjointSets,
+    },
+};
+
+/// Makes neighbouring faces agree, then turns closed shells outward or inward by the parity of those around.
+pub(super) fn orient(draft: &mut Draft, report: &mut RepairReport) {
+    let (mut reversed, _) = Topology::new(&draft.faces).consistent_orientation();
+    for (face, _) in draft.faces.iter_mut().zip(&reversed).filter(|(_, r)| **r) {
+        face.swap(1, 2);
+    }
+    orient_shells(draft, &mut reversed, report);
+    let origins = reversed.iter().zip(&draft.origin).filter(|(r, _)| **r).map(|(_, &o)| o);
+    report.reversed_faces = origins.collect::<BTreeSet<_>>().into_iter().collect();
+}
+
+fn orient_shells(draft: &mut Draft, reversed: &mut [bool], report: &mut RepairReport) {
+    let topology = Topology::new(&draft.faces);
+    let (shell, count) = shells(&topology);
+    let closed = closed_shells(&topology, &shell, count);
+    // The faces of closed shells as a mesh of their own.
+    let kept: Vec<u32> =
+        (0..draft.faces.len() as u32).filter(|&f| closed[shell[f as usize] as usize]).collect();
+    let faces = kept.iter().map(|&f| draft.faces[f as usize]).collect();
+    let Ok(mesh) = TriangleMesh::new(draft.vertices.clone(), faces) else {
+        return; // no shell is closed
+    };
+    let shell_of = |face: u32| shell[kept[face as usize] as usize];
+    let crossing = crossing_shells(&mesh, shell_of);
+    let origin = |face: u32| draft.origin[kept[face as usize] as usize];
+    report.crossing_shells = crossing.values().map(|&[f, g]| [origin(f), origin(g)]).collect();
+
+    let mut tallest: BTreeMap<u32, (f64, u32)> = BTreeMap::new();
+    for f in 0..mesh.faces().len() as u32 {
+        let height = height(mesh.triangle(f as usize));
+        let best = tallest.entry(shell_of(f)).or_insert((height, f));
+        if height > best.0 {
+            *best = (height, f);
+        }
+    }
+    tallest.retain(|s, _| !crossing.keys().flatten().any(|c| c == s));
+    let winding = WindingNumber::new(&mesh);
+    let mut inside_out = vec![false; count];
+    for (&number, &(_, face)) in &tallest {
+        let triangle = mesh.triangle(face as usize);
+        let center = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
+        let mut windings: BTreeMap<u32, i32> = BTreeMap::new();
+        winding.for_each_crossing_to(center, |f, sign| *windings.entry(shell_of(f)).or_default() += sign);
+        let own = windings.remove(&number).unwrap_or(0);
+        let depth = windings.values().filter(|w| *w % 2 != 0).count();
+        let behind = if perturbed_orientation(triangle, center) > 0 { own } else { own + 1 };
+        let outward = match behind {
+            1 => true,  // 0 in front, 1 behind
+            0 => false, // -1 in front, 0 behind
+            _ => volume(&mesh, |f| shell_of(f) == number) > 0.0,
+        };
+        inside_out[number as usize] = outward != (depth % 2 == 0);
+    }
+    for (f, face) in draft.faces.iter_mut().enumerate() {
+        if inside_out[shell[f] as usize] {
+            face.swap(1, 2);
+            reversed[f] = !reversed[f];
+        }
+    }
+}
+
+/// Shell of each face and their number: patches that are connected over edges with two faces, and joined where
+/// they only balance together at an edge with more.
+fn shells(topology: &Topology) -> (Vec<u32>, usize) {
+    let (patch, count) = topology.components(|edge| edge.face_count() == 2);
+    let mut sets = DisjointSets::new(count);
+    for edge in topology.edges().iter().filter(|e| e.face_count() > 2) {
+        let balance = balance(topology.uses(edge).iter().map(|u| (patch[u.face as usize], u.forward)));
+        let unbalanced: Vec<u32> = balance.into_iter().filter(|(_, n)| *n != 0).map(|(p, _)| p).collect();
+        unbalanced.windows(2).for_each(|w| sets.join(w[0], w[1]));
+    }
+    (patch.into_iter().map(|p| sets.find(p)).collect(), count)
+}
+
+fn closed_shells(topology: &Topology, shell: &[u32], count: usize) -> Vec<bool> {
+    let mut closed = vec![true; count];
+    for edge in topology.edges().iter().filter(|e| !e.is_manifold()) {
+        for (s, n) in balance(topology.uses(edge).iter().map(|u| (shell[u.face as usize], u.forward))) {
+            closed[s as usize] &= n == 0;
+        }
+    }
+    closed
+}
+
+/// Uses forward minus uses backward, for each owner.
+fn balance(uses: impl Iterator<Item = (u32, bool)>) -> BTreeMap<u32, i32> {
+    let mut balance = BTreeMap::new();
+    uses.for_each(|(owner, forward)| *balance.entry(owner).or_default() += if forward { 1 } else { -1 });
+    balance
+}
+
+/// Pairs of shells that meet, each with a face of either.
+fn crossing_shells(mesh: &TriangleMesh, shell_of: impl Fn(u32) -> u32) -> BTreeMap<[u32; 2], [u32; 2]> {
+    let topology = Topology::new(mesh.faces());
+    let flaws = face_flaws(mesh);
+    // Closed shells have no open edges to lie on.
+    let touching = TJunctions::default().with_collinear(mesh, &flaws.zero_area).touching(mesh, &topology);
+    let pairs = self_intersections(mesh, &flaws.without_area(), &touching);
+    let mut crossing = BTreeMap::new();
+    for &[f, g] in pairs.iter().chain(&flaws.duplicates).chain(&flaws.reversed_duplicates) {
+        let (s, t) = (shell_of(f), shell_of(g));
+        if s != t {
+            crossing.entry([s.min(t), s.max(t)]).or_insert(if s < t { [f, g] } else { [g, f] });
+        }
+    }
+    crossing
+}
+
+/// Signed volume of some faces, relative to the middle of the mesh.
+fn volume(mesh: &TriangleMesh, of: impl Fn(u32) -> bool) -> f64 {
+    let middle = mesh.bounds().center();
+    let term = |f: u32| {
+        let [a, b, c] = mesh.triangle(f as usize).map(|p: DVec3| p - middle);
+        a.dot(b.cross(c))
+    };
+    (0..mesh.faces().len() as u32).filter(|&f| of(f)).map(term).sum()
+}

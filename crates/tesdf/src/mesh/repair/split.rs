@@ -1,0 +1,95 @@
+use std::collections::{BTreeSet, HashMap};
+
+use super::{Draft, RepairReport, SplitEdge};
+use crate::mesh::{
+    Topology,
+    check::{TJunctions, t_junctions},
+    topology::has_repeated_corner,
+};
+
+/// Splitting an edge can bring another vertex within reach of one of its parts, but each round makes edges
+/// shorter; CAD parts need one or two.
+const MAX_ROUNDS: usize = 32;
+
+/// Splits faces at the vertices that lie within `tolerance` of their open edges.
+///
+/// An edge is split in all of its faces at once. Its directed uses then become those of its parts, as often as
+/// before, and new edges inside a face are used once in each direction: balanced edges stay balanced. A face
+/// whose third corner is on the edge leaves only parts with two equal corners; it vanishes.
+pub(super) fn split(draft: &mut Draft, tolerance: f64, report: &mut RepairReport) {
+    let mut vanished = BTreeSet::new();
+    for _ in 0..MAX_ROUNDS {
+        let topology = Topology::new(&draft.faces);
+        let junctions = t_junctions(&draft.vertices, &topology, tolerance);
+        if junctions.edges.is_empty() {
+            break;
+        }
+        record(draft, &topology, &junctions, report);
+        let before: BTreeSet<u32> = draft.origin.iter().copied().collect();
+        let chains: HashMap<[u32; 2], &[u32]> = junctions
+            .edges
+            .iter()
+            .map(|(e, on_edge)| (topology.edges()[*e].vertices, on_edge.as_slice()))
+            .collect();
+        let (mut faces, mut origin) = (Vec::with_capacity(draft.faces.len()), Vec::new());
+        for (&face, &from) in draft.faces.iter().zip(&draft.origin) {
+            let first = faces.len();
+            split_face(face, &chains, &mut faces);
+            origin.resize(origin.len() + faces.len() - first, from);
+        }
+        (draft.faces, draft.origin) = (faces, origin);
+        let after: BTreeSet<u32> = draft.origin.iter().copied().collect();
+        vanished.extend(before.difference(&after));
+    }
+    report.vanished_faces = vanished.into_iter().collect();
+}
+
+fn record(draft: &Draft, topology: &Topology, junctions: &TJunctions, report: &mut RepairReport) {
+    for (e, at) in &junctions.edges {
+        let edge = &topology.edges()[*e];
+        let [a, b] = edge.vertices.map(|v| draft.vertices[v as usize]);
+        let off = |v: &u32| {
+            let p = draft.vertices[*v as usize];
+            p.distance(a + (p - a).dot(b - a) / (b - a).length_squared() * (b - a))
+        };
+        let mut faces: Vec<u32> = topology.uses(edge).iter().map(|u| draft.origin[u.face as usize]).collect();
+        faces.dedup();
+        report.split_edges.push(SplitEdge {
+            edge: edge.vertices,
+            at: at.clone(),
+            faces,
+            distance: at.iter().map(off).fold(0.0, f64::max),
+        });
+    }
+}
+
+/// The parts of one face, with those that have two equal corners left out.
+fn split_face(face: [u32; 3], chains: &HashMap<[u32; 2], &[u32]>, parts: &mut Vec<[u32; 3]>) {
+    // Each part, and which of its edges (from corner k to k + 1) are whole edges of the face, still to be split.
+    let mut todo = vec![(face, [true; 3])];
+    while let Some((corners, whole)) = todo.pop() {
+        let found = (0..3).filter(|&k| whole[k]).find_map(|k| {
+            let (a, b) = (corners[k], corners[(k + 1) % 3]);
+            Some((k, a, b, *chains.get(&[a.min(b), a.max(b)])?))
+        });
+        let Some((k, a, b, chain)) = found else {
+            if !has_repeated_corner(corners) {
+                parts.push(corners);
+            }
+            continue;
+        };
+        let opposite = corners[(k + 2) % 3];
+        let mut along = vec![a];
+        along.extend(chain);
+        along.push(b);
+        if a > b {
+            let inner = along.len() - 1;
+            along[1..inner].reverse();
+        }
+        let last = along.len() - 2;
+        for (i, ends) in along.windows(2).enumerate().rev() {
+            let inherits = [false, i == last && whole[(k + 1) % 3], i == 0 && whole[(k + 2) % 3]];
+            todo.push(([ends[0], ends[1], opposite], inherits));
+        }
+    }
+}
