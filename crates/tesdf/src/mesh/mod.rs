@@ -1,14 +1,20 @@
 //! From a mesh file to a solid that can be encoded.
 mod check;
 mod defect;
+mod polygon;
+mod read;
 mod repair;
 mod solid;
 mod topology;
 mod triangle_mesh;
+mod weld;
+mod write;
 
 pub use check::{BoundaryLoop, CheckReport, check};
 pub use defect::{Defect, DefectKind, Severity};
+pub use read::{LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, read, read_bytes};
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, repair};
 pub use solid::{NotSolid, SolidMesh};
 pub use topology::{Edge, EdgeUse, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};
+pub use write::{WriteError, WriteFormat, write};

@@ -59,10 +59,15 @@ fn orient_shells(draft: &mut Draft, reversed: &mut [bool], report: &mut RepairRe
         let depth = windings.values().filter(|w| *w % 2 != 0).count();
         let behind = if perturbed_orientation(triangle, center) > 0 { own } else { own + 1 };
         // Of an embedded shell, one side of each face has the winding number 0. Where a shell meets itself, such
-        // as flaps of a careless triangulation, one place does not tell; its volume does.
-        let outward = match crossing_themselves.contains(&number) {
-            false => behind == 1,
-            true => volume(&mesh, |f| shell_of(f) == number) > 0.0,
+        // as flaps of a careless triangulation, one place does not tell; its volume does, if it has any.
+        let outward = if crossing_themselves.contains(&number) {
+            let volume = volume(&mesh, |f| shell_of(f) == number);
+            if volume == 0.0 {
+                continue;
+            }
+            volume > 0.0
+        } else {
+            behind == 1
         };
         inside_out[number as usize] = outward != (depth % 2 == 0);
     }

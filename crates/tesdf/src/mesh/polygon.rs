@@ -1,0 +1,305 @@
+//! Triangulation of one polygon of a mesh file.
+//!
+//! In: the corner positions of a polygon in 3-D, in order. Out: triangles by corner number, all
+//! oriented as the polygon. Every corner is a corner of some triangle, flat ones (on the line
+//! between their neighbours) too: a neighbour face uses them, and leaving them out would open a
+//! T-junction. That is why no earcut crate is used here: `earcut` and `earcutr` filter flat
+//! corners out before they clip (`filter_points`), and state that they do not guarantee a right
+//! result.
+use glam::{DVec2, DVec3};
+use robust::{Coord, orient2d};
+
+/// What a polygon proved to be, seen along its normal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Shape {
+    /// Convex: a fan from its first corner.
+    Convex,
+    /// Simple, not convex: ear clipping; the triangles do not overlap.
+    Concave,
+    /// No area, or its outline crosses itself: no triangulation without a flat or flipped
+    /// triangle was found.
+    Irregular,
+}
+
+/// Splits a polygon of three or more corners and appends its `corners.len() - 2` triangles.
+///
+/// Orientation is decided exactly (`robust`) on the coordinate plane most nearly parallel to the
+/// polygon's Newell plane: to drop a coordinate rounds nothing.
+pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> Shape {
+    let n = corners.len();
+    if n < 3 {
+        return Shape::Irregular;
+    }
+    if n == 3 {
+        triangles.push([0, 1, 2]);
+        return Shape::Convex;
+    }
+    let flat = project(corners);
+    let turn = |a: usize, b: usize, c: usize| orient(flat[a], flat[b], flat[c]);
+    // The third condition keeps a locally convex outline that goes round more than once out.
+    let fan = (1..n - 1).all(|i| turn(0, i, i + 1) > 0.0)
+        && (0..n).all(|i| turn(i, (i + 1) % n, (i + 2) % n) >= 0.0)
+        && (2..n).all(|i| turn(0, 1, i) >= 0.0);
+    if fan {
+        triangles.extend((1..n as u32 - 1).map(|i| [0, i, i + 1]));
+        return Shape::Convex;
+    }
+    let convex = (0..n).all(|i| turn(i, (i + 1) % n, (i + 2) % n) >= 0.0);
+    let first = triangles.len();
+    EarClipper::new(&flat).clip(triangles);
+    let positive = triangles[first..].iter().all(|t| {
+        let [a, b, c] = t.map(|v| v as usize);
+        turn(a, b, c) > 0.0
+    });
+    // The triangles' oriented outlines add up to the polygon's outline. So when all are positive,
+    // each point inside a simple polygon is covered once.
+    match (positive, convex) {
+        (false, _) => Shape::Irregular,
+        (true, true) => Shape::Convex,
+        (true, false) => Shape::Concave,
+    }
+}
+
+/// Drops the coordinate in which the Newell normal is largest, keeping counter-clockwise order.
+fn project(corners: &[DVec3]) -> Vec<DVec2> {
+    let origin = corners[0];
+    let mut normal = DVec3::ZERO;
+    for (i, &p) in corners.iter().enumerate() {
+        let q = corners[(i + 1) % corners.len()];
+        normal += (p - origin).cross(q - origin);
+    }
+    let size = normal.abs();
+    let (axis, sign) = if size.x >= size.y && size.x >= size.z {
+        (0, normal.x)
+    } else if size.y >= size.z {
+        (1, normal.y)
+    } else {
+        (2, normal.z)
+    };
+    let pick = |p: &DVec3| match axis {
+        0 => DVec2::new(p.y, p.z),
+        1 => DVec2::new(p.z, p.x),
+        _ => DVec2::new(p.x, p.y),
+    };
+    let turned = |p: &DVec3| {
+        let q = pick(p);
+        DVec2::new(q.y, q.x)
+    };
+    if sign < 0.0 { corners.iter().map(turned).collect() } else { corners.iter().map(pick).collect() }
+}
+
+fn orient(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+    let coord = |p: DVec2| Coord { x: p.x, y: p.y };
+    orient2d(coord(a), coord(b), coord(c))
+}
+
+/// The part of the outline that is not clipped yet, as a ring.
+struct EarClipper<'a> {
+    points: &'a [DVec2],
+    next: Vec<u32>,
+    previous: Vec<u32>,
+    /// Corners that were not strictly convex when last looked at; only these can block an ear.
+    blockers: Vec<u32>,
+    blocks: Vec<bool>,
+}
+
+impl<'a> EarClipper<'a> {
+    fn new(points: &'a [DVec2]) -> Self {
+        let n = points.len() as u32;
+        let mut ring = Self {
+            points,
+            next: (0..n).map(|i| (i + 1) % n).collect(),
+            previous: (0..n).map(|i| (i + n - 1) % n).collect(),
+            blockers: Vec::new(),
+            blocks: vec![false; points.len()],
+        };
+        for i in 0..n {
+            if ring.turn(i) <= 0.0 {
+                ring.blocks[i as usize] = true;
+                ring.blockers.push(i);
+            }
+        }
+        ring
+    }
+
+    fn turn(&self, i: u32) -> f64 {
+        let [a, b, c] = self.ear(i).map(|v| self.points[v as usize]);
+        orient(a, b, c)
+    }
+
+    fn ear(&self, i: u32) -> [u32; 3] {
+        [self.previous[i as usize], i, self.next[i as usize]]
+    }
+
+    /// Whether no other corner lies in or on the ear at `i`. Corners at the position of one of
+    /// the ear's own do not count: the two sides of a bridge to a hole coincide.
+    fn is_free(&self, i: u32) -> bool {
+        let ear = self.ear(i);
+        let [a, b, c] = ear.map(|v| self.points[v as usize]);
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        self.blockers.iter().all(|&v| {
+            let p = self.points[v as usize];
+            !self.blocks[v as usize]
+                || ear.contains(&v)
+                || p.cmplt(low).any()
+                || p.cmpgt(high).any()
+                || p == a
+                || p == b
+                || p == c
+                || orient(a, b, p) < 0.0
+                || orient(b, c, p) < 0.0
+                || orient(c, a, p) < 0.0
+        })
+    }
+
+    fn clip(mut self, triangles: &mut Vec<[u32; 3]>) {
+        let mut left = self.points.len();
+        let mut at = 0;
+        let mut tried = 0;
+        while left > 3 {
+            // An outline that crosses itself can have no free ear: then any strictly convex
+            // corner is taken, and when there is none either, any corner.
+            let take = if tried < left {
+                self.turn(at) > 0.0 && self.is_free(at)
+            } else {
+                tried >= 2 * left || self.turn(at) > 0.0
+            };
+            if !take {
+                tried += 1;
+                at = self.next[at as usize];
+                continue;
+            }
+            triangles.push(self.ear(at));
+            let [before, _, after] = self.ear(at);
+            self.next[before as usize] = after;
+            self.previous[after as usize] = before;
+            self.blocks[at as usize] = false;
+            left -= 1;
+            tried = 0;
+            for v in [before, after] {
+                if self.blocks[v as usize] && self.turn(v) > 0.0 {
+                    self.blocks[v as usize] = false;
+                } else if !self.blocks[v as usize] && self.turn(v) <= 0.0 {
+                    self.blocks[v as usize] = true;
+                    if !self.blockers.contains(&v) {
+                        self.blockers.push(v);
+                    }
+                }
+            }
+            // Going on two corners further gives rounder triangles than a fan around `before`.
+            at = self.next[after as usize];
+            if left.is_multiple_of(64) {
+                self.blockers.retain(|&v| self.blocks[v as usize]);
+            }
+        }
+        triangles.push(self.ear(at));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn lift(points: &[(f64, f64)]) -> Vec<DVec3> {
+        points.iter().map(|&(x, y)| DVec3::new(x, 2.0 * x - y, y)).collect()
+    }
+
+    /// Triangles, their shape, and their summed area over the polygon's own.
+    fn split(corners: &[DVec3]) -> (Vec<[u32; 3]>, Shape, f64) {
+        let mut triangles = Vec::new();
+        let shape = triangulate(corners, &mut triangles);
+        let cross = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - a);
+        let sum: f64 = triangles
+            .iter()
+            .map(|t| t.map(|v| corners[v as usize]))
+            .map(|[a, b, c]| cross(a, b, c).length())
+            .sum();
+        let whole: DVec3 =
+            (1..corners.len() - 1).map(|i| cross(corners[0], corners[i], corners[i + 1])).sum();
+        (triangles, shape, sum / whole.length())
+    }
+
+    #[test]
+    fn convex_polygons_become_fans() {
+        let (triangles, shape, _) = split(&lift(&[(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)]));
+        assert_eq!((triangles, shape), (vec![[0, 1, 2], [0, 2, 3]], Shape::Convex));
+    }
+
+    #[test]
+    fn flat_corners_are_kept_and_no_triangle_is_flat() {
+        // Corners 1 and 2 lie on the first edge, 4 on the second.
+        let corners = lift(&[(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (4.0, 0.0), (2.0, 2.0), (0.0, 4.0)]);
+        for start in 0..corners.len() {
+            let mut turned = corners.clone();
+            turned.rotate_left(start);
+            let (triangles, shape, area) = split(&turned);
+            assert_eq!(shape, Shape::Convex);
+            assert_eq!(triangles.len(), 4);
+            assert!((area - 1.0).abs() < 1e-12);
+            for v in 0..6 {
+                assert!(triangles.iter().flatten().any(|&c| c == v), "corner {v} is gone");
+            }
+        }
+    }
+
+    #[test]
+    fn concave_polygons_keep_their_area_from_each_corner_and_in_both_directions() {
+        let l = lift(&[(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)]);
+        let dart = lift(&[(0.0, 0.0), (2.0, -1.0), (0.5, 0.0), (2.0, 1.0)]);
+        let star: Vec<_> = (0..40)
+            .map(|i| {
+                let (radius, angle) = ([1.0, 0.2][i % 2], i as f64 * std::f64::consts::TAU / 40.0);
+                (radius * angle.cos(), radius * angle.sin())
+            })
+            .collect();
+        for corners in [l, dart, lift(&star)] {
+            for start in 0..corners.len() {
+                for reversed in [false, true] {
+                    let mut turned = corners.clone();
+                    turned.rotate_left(start);
+                    if reversed {
+                        turned.reverse();
+                    }
+                    let (triangles, shape, area) = split(&turned);
+                    assert_eq!(shape, Shape::Concave);
+                    assert_eq!(triangles.len(), corners.len() - 2);
+                    assert!((area - 1.0).abs() < 1e-12, "area {area}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_hole_reached_by_a_bridge_is_left_out() {
+        let corners = lift(&[
+            (0.0, 0.0),
+            (4.0, 0.0),
+            (4.0, 4.0),
+            (0.0, 4.0),
+            (0.0, 0.0),
+            (1.0, 1.0),
+            (1.0, 3.0),
+            (3.0, 3.0),
+            (3.0, 1.0),
+            (1.0, 1.0),
+        ]);
+        let (triangles, shape, area) = split(&corners);
+        assert_eq!((triangles.len(), shape), (8, Shape::Concave));
+        assert!((area - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn outlines_without_a_triangulation_are_named_irregular() {
+        let bow = lift(&[(0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]);
+        let line = lift(&[(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 0.0), (1.5, 0.0)]);
+        let pentagram: Vec<_> = (0..5)
+            .map(|i| (2.0 * std::f64::consts::TAU * i as f64 / 5.0).sin_cos())
+            .map(|(y, x)| (x, y))
+            .collect();
+        for corners in [bow, line, lift(&pentagram), vec![DVec3::MAX; 5], vec![DVec3::ZERO; 4]] {
+            let mut triangles = Vec::new();
+            assert_eq!(triangulate(&corners, &mut triangles), Shape::Irregular);
+            assert_eq!(triangles.len(), corners.len() - 2);
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Mesh files to [`TriangleMesh`]: STL, OBJ, PLY, OFF, glTF and GLB.
+//!
+//! Each format has a parser that turns bytes into polygons with a place (line, byte, accessor)
+//! for each vertex and face; everything after that is common: index check, finiteness, welding,
+//! triangulation. Nothing is allocated by a count in a header, only by bytes that are there.
+//!
+//! The STL, OBJ, PLY and OFF parsers are our own because an error must name the line or element
+//! at fault: `tobj`'s `LoadError` carries neither line nor index, `stl_io` and `ply-rs-bw` return
+//! an `io::Error` or text without the face. glTF's JSON is parsed and validated by the `gltf`
+//! crate, which names the path (`meshes[0].primitives[0].indices`).
+mod assemble;
+mod error;
+mod gltf;
+mod obj;
+mod off;
+mod ply;
+mod sniff;
+mod stl;
+mod text;
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::TriangleMesh;
+use assemble::{Places, RawMesh, assemble};
+pub use error::{Place, ReadError};
+
+/// A mesh file format that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MeshFormat {
+    /// Stereolithography, binary or ASCII (told apart by content).
+    Stl,
+    /// Wavefront OBJ.
+    Obj,
+    /// Polygon file format, ASCII or binary of either byte order.
+    Ply,
+    /// Object file format of Geomview, ASCII.
+    Off,
+    /// glTF 2.0 as JSON.
+    Gltf,
+    /// glTF 2.0 as one binary file.
+    Glb,
+}
+
+impl MeshFormat {
+    /// All formats, in the order in which messages list them.
+    pub const ALL: [Self; 6] = [Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Gltf, Self::Glb];
+
+    /// The format that a file's extension names, in upper or lower case.
+    ///
+    /// # Errors
+    /// [`ReadError::UnknownExtension`] lists the extensions there are.
+    pub fn of_path(path: &Path) -> Result<Self, ReadError> {
+        let extension = path.extension().unwrap_or_default().to_string_lossy();
+        Self::ALL
+            .into_iter()
+            .find(|f| f.extension().eq_ignore_ascii_case(&extension))
+            .ok_or_else(|| ReadError::UnknownExtension { path: path.to_owned() })
+    }
+
+    /// The file extension, without the dot.
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Stl => "stl",
+            Self::Obj => "obj",
+            Self::Ply => "ply",
+            Self::Off => "off",
+            Self::Gltf => "gltf",
+            Self::Glb => "glb",
+        }
+    }
+}
+
+impl std::fmt::Display for MeshFormat {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Stl => "STL",
+            Self::Obj => "OBJ",
+            Self::Ply => "PLY",
+            Self::Off => "OFF",
+            Self::Gltf => "glTF",
+            Self::Glb => "GLB",
+        })
+    }
+}
+
+/// A mesh that was read, and what reading did to it.
+#[derive(Clone, Debug)]
+pub struct LoadedMesh {
+    /// The mesh. Faces are in file order, polygons expanded in place.
+    pub mesh: TriangleMesh,
+    /// What was found and changed.
+    pub report: LoadReport,
+    /// Where the mesh's vertices and faces come from.
+    pub origin: Origin,
+}
+
+/// Where the vertices and faces of a [`LoadedMesh`] come from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// For each vertex of the mesh the first vertex of the file at its position, 0-based.
+    pub vertices: Vec<u32>,
+    /// For each face of the mesh the polygon of the file that it is a part of, 0-based.
+    pub faces: Vec<u32>,
+}
+
+/// What reading found and changed. `vertices_in_file` is the mesh's number of vertices plus
+/// `welded_vertices` plus `unused_vertices`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LoadReport {
+    /// The file's format.
+    pub format: MeshFormat,
+    /// Vertices in the file; an STL file has three for each facet.
+    pub vertices_in_file: usize,
+    /// Polygons in the file.
+    pub faces_in_file: usize,
+    /// Polygons of more than three corners, which were split into triangles.
+    pub triangulated_polygons: usize,
+    /// Those of them that are not convex.
+    pub concave_polygons: usize,
+    /// Used vertices that were merged into an earlier one with bitwise the same position.
+    pub welded_vertices: usize,
+    /// Vertices that were dropped because no face uses them.
+    pub unused_vertices: usize,
+    /// What a person should know, one sentence each.
+    pub notes: Vec<String>,
+    /// BLAKE3 of the file's bytes (and of external glTF buffers, in order), in hexadecimal.
+    pub source_blake3: String,
+}
+
+/// Reads the mesh file at `path`; its extension names the format.
+///
+/// # Errors
+/// [`ReadError`] names what is at fault, the line, byte or element, and what to do.
+pub fn read(path: &Path) -> Result<LoadedMesh, ReadError> {
+    let format = MeshFormat::of_path(path)?;
+    let bytes = std::fs::read(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    parse(&bytes, format, Some(folder))
+}
+
+/// Reads a mesh from bytes that are in memory. glTF buffers must be in the bytes too.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes(bytes: &[u8], format: MeshFormat) -> Result<LoadedMesh, ReadError> {
+    parse(bytes, format, None)
+}
+
+fn parse(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<LoadedMesh, ReadError> {
+    if bytes.is_empty() {
+        return Err(ReadError::Empty { format });
+    }
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(bytes);
+    let raw = match format {
+        MeshFormat::Stl => stl::parse(bytes),
+        MeshFormat::Obj => obj::parse(bytes),
+        MeshFormat::Ply => ply::parse(bytes),
+        MeshFormat::Off => off::parse(bytes),
+        MeshFormat::Gltf | MeshFormat::Glb => gltf::parse(bytes, format, folder, &mut hasher),
+    }?;
+    assemble(raw, format, hasher.finalize().to_hex().to_string())
+}

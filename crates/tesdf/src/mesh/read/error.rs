@@ -1,0 +1,131 @@
+use std::fmt;
+use std::path::PathBuf;
+
+use super::MeshFormat;
+use crate::mesh::MeshError;
+
+/// A place in a mesh file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A line of a text file, 1-based.
+    Line(u64),
+    /// An offset into a binary file, 0-based.
+    Byte(u64),
+    /// An element of a glTF file, such as `meshes[0].primitives[1]`.
+    Element(String),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Byte(byte) => write!(f, "byte {byte}"),
+            Self::Element(element) => f.write_str(element),
+        }
+    }
+}
+
+/// Why a file does not give a mesh.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// The file cannot be read from disk.
+    #[error("cannot read {}: {source}", path.display())]
+    Open {
+        /// The path asked for.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The extension names no mesh format.
+    #[error(
+        "{}: the extension names no mesh format that can be read; expected one of {}",
+        path.display(),
+        MeshFormat::ALL.map(|f| format!(".{}", f.extension())).join(", ")
+    )]
+    UnknownExtension {
+        /// The path asked for.
+        path: PathBuf,
+    },
+    /// There are no bytes.
+    #[error("the file is empty (0 bytes); expected {format} data: export or copy it again")]
+    Empty {
+        /// The format asked for.
+        format: MeshFormat,
+    },
+    /// The content is of another kind than the extension says.
+    #[error("the content is not {format}: it {looks}; {help}")]
+    WrongContent {
+        /// The format asked for.
+        format: MeshFormat,
+        /// What it looks like, as `is a PNG picture`.
+        looks: String,
+        /// What to do.
+        help: &'static str,
+    },
+    /// The bytes break the format's rules.
+    #[error("{format}, {place}: {found}; {help}")]
+    Malformed {
+        /// The format.
+        format: MeshFormat,
+        /// Where.
+        place: Place,
+        /// What was found there.
+        found: String,
+        /// What is expected, or what to do.
+        help: String,
+    },
+    /// A face uses a vertex that the file does not have.
+    #[error(
+        "{format}, {place}: face {face} (0-based) uses vertex {index}, but the file has {vertices} \
+         vertices ({base} to {last}); is the file cut short, or joined from several?",
+        last = (vertices + base).saturating_sub(1)
+    )]
+    IndexOutOfRange {
+        /// The format.
+        format: MeshFormat,
+        /// Where the face is.
+        place: Place,
+        /// Polygon of the file, 0-based.
+        face: usize,
+        /// The index as the file writes it.
+        index: u64,
+        /// Number of vertices in the file.
+        vertices: u64,
+        /// What the format counts from: 1 for OBJ, otherwise 0.
+        base: u64,
+    },
+    /// A vertex that a face uses has a coordinate that is NaN or infinite.
+    #[error(
+        "{format}, {place}: vertex {vertex} ({base}-based) has {axis} = {value} and face {face} (0-based) \
+         uses it; coordinates must be finite: mend the vertex or export again"
+    )]
+    NonFinite {
+        /// The format.
+        format: MeshFormat,
+        /// Where the vertex is.
+        place: Place,
+        /// Vertex of the file, counted from `base`.
+        vertex: u64,
+        /// What the format counts from: 1 for OBJ, otherwise 0.
+        base: u64,
+        /// The first polygon that uses the vertex, 0-based.
+        face: usize,
+        /// `x`, `y` or `z`.
+        axis: char,
+        /// The value found.
+        value: f64,
+    },
+    /// The file has no face.
+    #[error(
+        "{format}: the file has {vertices} vertices and no face; expected a surface mesh: export it with faces"
+    )]
+    NoFaces {
+        /// The format.
+        format: MeshFormat,
+        /// Number of vertices found.
+        vertices: usize,
+    },
+    /// The mesh is larger than ids can name.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+}

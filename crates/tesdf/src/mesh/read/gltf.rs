@@ -1,0 +1,232 @@
+//! glTF 2.0, as JSON and as GLB.
+//!
+//! The `gltf` crate parses the JSON and validates it, and names the path at fault. The container
+//! and the accessors are read here: `gltf` 1.4.1 subtracts 12 from the GLB header's length
+//! unchecked, and its accessor iterators do not say which bytes are missing.
+//!
+//! Read: the triangles, strips and fans of the default scene (else the first scene, else all root
+//! nodes, else all meshes), with the nodes' transforms; buffers in the file, as `data:` URIs, or
+//! in files next to it. Nodes that mirror flip their faces, so outward stays outward. Skins and
+//! morph targets are not applied.
+mod buffers;
+mod scene;
+
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+use gltf::json;
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+
+use super::{MeshFormat, Place, Places, RawMesh, ReadError, sniff};
+use crate::mesh::{MeshError, TriangleMesh};
+use buffers::Data;
+
+const EXPORT_AGAIN: &str = "export the file again, or as another format";
+
+pub(super) fn parse(
+    bytes: &[u8],
+    format: MeshFormat,
+    folder: Option<&Path>,
+    hasher: &mut blake3::Hasher,
+) -> Result<RawMesh, ReadError> {
+    let (json, binary) = if bytes.starts_with(b"glTF") {
+        split_glb(bytes, format)?
+    } else {
+        sniff::refuse_other_kinds(bytes, format)?;
+        sniff::refuse_binary(bytes, format)?;
+        (super::text::without_bom(bytes), None)
+    };
+    let root: json::Root = json::deserialize::from_slice(json).map_err(|error| ReadError::Malformed {
+        format,
+        place: Place::Line(error.line() as u64),
+        found: format!("the JSON is not glTF 2.0: {error}"),
+        help: EXPORT_AGAIN.into(),
+    })?;
+    let root = match gltf::Document::from_json(root) {
+        Ok(document) => document.into_json(),
+        Err(gltf::Error::Validation(errors)) => {
+            let (path, what) =
+                errors.first().map(|(p, e)| (p.to_string(), e.to_string())).unwrap_or_default();
+            let found = format!("{what} ({} defects of the JSON in all)", errors.len());
+            return Err(fault(format, path, found, "this needs a valid file without required extensions"));
+        }
+        Err(error) => return Err(fault(format, "JSON", error.to_string(), EXPORT_AGAIN)),
+    };
+    let buffers = buffers::load(&root, binary, format, folder, hasher)?;
+    let data = Data { root: &root, buffers: &buffers, format };
+    let mut reader =
+        Reader { data, raw: RawMesh::new(Places::Elements(Vec::new()), 0), skipped: 0, deformable: false };
+    scene::instances(&root, format)?.into_iter().try_for_each(|(mesh, pose)| reader.mesh(mesh, &pose))?;
+    if reader.skipped > 0 {
+        reader.raw.notes.push(format!("{} primitives of points or lines skipped", reader.skipped));
+    }
+    if reader.deformable || root.nodes.iter().any(|n| n.skin.is_some()) {
+        reader.raw.notes.push("skins and morph targets are not applied: the base shape is read".into());
+    }
+    Ok(reader.raw)
+}
+
+fn fault(
+    format: MeshFormat,
+    element: impl Into<String>,
+    found: impl Into<String>,
+    help: impl Into<String>,
+) -> ReadError {
+    ReadError::Malformed {
+        format,
+        place: Place::Element(element.into()),
+        found: found.into(),
+        help: help.into(),
+    }
+}
+
+/// The JSON chunk and the binary chunk.
+fn split_glb(bytes: &[u8], format: MeshFormat) -> Result<(&[u8], Option<&[u8]>), ReadError> {
+    let error = |at: usize, found: String, help: &str| ReadError::Malformed {
+        format,
+        place: Place::Byte(at as u64),
+        found,
+        help: help.into(),
+    };
+    let word = |at: usize| {
+        let word = bytes.get(at..at + 4).and_then(|w| w.try_into().ok()).map(u32::from_le_bytes);
+        word.ok_or_else(|| error(at, format!("the file ends at byte {}", bytes.len()), "is it cut short?"))
+    };
+    let version = word(4)?;
+    if version != 2 {
+        return Err(error(4, format!("version {version}"), "expected 2: convert the file to glTF 2.0"));
+    }
+    let length = word(8)?;
+    if u64::from(length) != bytes.len() as u64 {
+        let found = format!("the header says {length} bytes, but the file has {}", bytes.len());
+        return Err(error(8, found, "is it cut short?"));
+    }
+    let mut chunks = Vec::new();
+    let mut at = 12;
+    while at < bytes.len() {
+        let size = word(at)?;
+        let kind = word(at + 4)?.to_le_bytes();
+        let start = at + 8;
+        let Some(chunk) = bytes[start..].get(..size as usize) else {
+            let found = format!("a chunk of {size} bytes, {} left in the file", bytes.len() - start);
+            return Err(error(at, found, "is it cut short?"));
+        };
+        chunks.push((kind, chunk));
+        at = start + size as usize;
+    }
+    match chunks[..] {
+        [(kind, json), ..] if &kind == b"JSON" => {
+            let binary = chunks.get(1).filter(|(kind, _)| kind == b"BIN\0").map(|(_, chunk)| *chunk);
+            Ok((json, binary))
+        }
+        _ => Err(error(12, "no JSON chunk".into(), "expected it first")),
+    }
+}
+
+struct Reader<'a> {
+    data: Data<'a>,
+    raw: RawMesh,
+    skipped: usize,
+    deformable: bool,
+}
+
+impl Reader<'_> {
+    fn mesh(&mut self, mesh: usize, pose: &DAffine3) -> Result<(), ReadError> {
+        let root = self.data.root;
+        for (i, primitive) in root.meshes[mesh].primitives.iter().enumerate() {
+            self.primitive(primitive, pose, format!("meshes[{mesh}].primitives[{i}]"))?;
+        }
+        Ok(())
+    }
+
+    fn primitive(
+        &mut self,
+        primitive: &Primitive,
+        pose: &DAffine3,
+        element: String,
+    ) -> Result<(), ReadError> {
+        let format = self.data.format;
+        let mode = match primitive.mode {
+            Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
+            _ => {
+                self.skipped += 1;
+                return Ok(());
+            }
+        };
+        self.deformable |= primitive.targets.is_some();
+        let Some(positions) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) else {
+            return Err(fault(
+                format,
+                element,
+                "no POSITION attribute",
+                "compressed geometry is not read: export it plain",
+            ));
+        };
+        let positions = self.data.positions(positions.value())?;
+        let base = self.raw.positions.len();
+        if base + positions.len() > 3 * TriangleMesh::MAX_ELEMENTS {
+            let limit = 3 * TriangleMesh::MAX_ELEMENTS;
+            return Err(MeshError::TooLarge { what: "vertices", found: base + positions.len(), limit }.into());
+        }
+        let indices = match primitive.indices {
+            Some(accessor) => self.data.indices(accessor.value())?,
+            None => (0..positions.len() as u64).collect(),
+        };
+        if let Some((i, index)) =
+            indices.iter().enumerate().find(|(_, index)| **index >= positions.len() as u64)
+        {
+            let found =
+                format!("index {i} (0-based) is {index}, but the primitive has {} vertices", positions.len());
+            return Err(fault(format, element, found, "expected a smaller index: export the file again"));
+        }
+        if mode == Mode::Triangles && !indices.len().is_multiple_of(3) {
+            let found = format!("{} corners are not whole triangles", indices.len());
+            return Err(fault(format, element, found, "expected a multiple of 3"));
+        }
+        let first_face = self.raw.ends.len();
+        if let Places::Elements(parts) = &mut self.raw.places {
+            parts.push((base, first_face, element));
+        }
+        self.raw.positions.extend(positions.iter().map(|p| pose.transform_point3(*p)));
+        let mirrored = pose.matrix3.determinant() < 0.0;
+        let first_corner = self.raw.corners.len();
+        let corners = indices.into_iter().map(|i| i + base as u64);
+        match mode {
+            Mode::TriangleStrip => {
+                let strip: Vec<_> = corners.collect();
+                self.raw.push_strip(&strip, 0);
+            }
+            Mode::TriangleFan => {
+                let fan: Vec<_> = corners.collect();
+                for pair in fan.get(1..).unwrap_or_default().windows(2) {
+                    self.raw.corners.extend([fan[0], pair[0], pair[1]]);
+                    self.raw.end_face(0);
+                }
+            }
+            _ => {
+                for (i, corner) in corners.enumerate() {
+                    self.raw.corners.push(corner);
+                    if i % 3 == 2 {
+                        self.raw.end_face(0);
+                    }
+                }
+            }
+        }
+        if mirrored {
+            self.raw.corners[first_corner..].chunks_exact_mut(3).for_each(|t| t.swap(1, 2));
+        }
+        Ok(())
+    }
+}
+
+/// An f32 of the JSON as the decimal number that was most likely written: a scale of 0.001 is to
+/// be 0.001 and not 0.0010000000474974513. The shortest decimal that rounds to the f32 is it
+/// whenever up to six digits were written.
+fn decimal(value: f32) -> f64 {
+    value.to_string().parse().unwrap_or(f64::from(value))
+}
+
+fn decimals(v: [f32; 3]) -> DVec3 {
+    DVec3::from_array(v.map(decimal))
+}

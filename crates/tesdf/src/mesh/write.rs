@@ -1,0 +1,155 @@
+//! [`TriangleMesh`] to a file: PLY and OBJ keep every bit, STL rounds to f32.
+use std::fmt::Write as _;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use super::TriangleMesh;
+
+/// A mesh file format that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WriteFormat {
+    /// Binary little-endian PLY with `double` coordinates: keeps every bit.
+    Ply,
+    /// OBJ with the shortest decimals that give the same f64 again: keeps every bit.
+    Obj,
+    /// Binary STL: coordinates are rounded to f32 and vertices are no longer shared.
+    Stl,
+}
+
+impl WriteFormat {
+    /// The format that a file's extension names, in upper or lower case.
+    ///
+    /// # Errors
+    /// [`WriteError::UnknownExtension`] lists the extensions there are.
+    pub fn of_path(path: &Path) -> Result<Self, WriteError> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        match extension.to_str() {
+            Some("ply") => Ok(Self::Ply),
+            Some("obj") => Ok(Self::Obj),
+            Some("stl") => Ok(Self::Stl),
+            _ => Err(WriteError::UnknownExtension { path: path.to_owned() }),
+        }
+    }
+
+    /// Whether reading the file gives the same coordinates again, bit for bit. STL does not:
+    /// rounding to f32 moves vertices by up to 6e-8 of their coordinates.
+    pub fn is_exact(self) -> bool {
+        self != Self::Stl
+    }
+}
+
+/// Why a mesh was not written. The file at the path is then as it was.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The extension names no format that can be written.
+    #[error("{}: the extension names no mesh format that can be written; expected one of .ply, .obj, .stl", path.display())]
+    UnknownExtension {
+        /// The path asked for.
+        path: PathBuf,
+    },
+    /// A coordinate is beyond f32, so STL cannot hold it.
+    #[error(
+        "vertex {vertex} (0-based) has the coordinate {value}, beyond the 3.4e38 of STL's f32; write .ply or .obj"
+    )]
+    BeyondF32 {
+        /// Vertex, 0-based.
+        vertex: usize,
+        /// The coordinate.
+        value: f64,
+    },
+    /// The disk does not take the file.
+    #[error("cannot write {}: {source}", path.display())]
+    Io {
+        /// The path asked for.
+        path: PathBuf,
+        /// What the operating system says.
+        source: io::Error,
+    },
+}
+
+/// Writes `mesh` to `path`; the extension names the format (`.ply`, `.obj`, `.stl`).
+///
+/// The bytes go to a temporary file in the same folder, which then replaces `path`: a reader
+/// never sees half a file.
+///
+/// # Errors
+/// [`WriteError`]; the file at `path` is then as it was.
+pub fn write(path: &Path, mesh: &TriangleMesh) -> Result<WriteFormat, WriteError> {
+    let format = WriteFormat::of_path(path)?;
+    let bytes = match format {
+        WriteFormat::Ply => ply(mesh),
+        WriteFormat::Obj => obj(mesh),
+        WriteFormat::Stl => stl(mesh)?,
+    };
+    replace(path, &bytes).map_err(|source| WriteError::Io { path: path.to_owned(), source })?;
+    Ok(format)
+}
+
+fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut builder = tempfile::Builder::new();
+    // A temporary file is private by default; this one becomes an ordinary file.
+    #[cfg(unix)]
+    let builder = {
+        use std::os::unix::fs::PermissionsExt;
+        let mode = std::fs::metadata(path).map_or(0o666, |m| m.permissions().mode());
+        builder.permissions(std::fs::Permissions::from_mode(mode))
+    };
+    let mut file = builder.prefix(".tesdf-").tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.as_file().sync_all()?;
+    file.persist(path)?;
+    Ok(())
+}
+
+fn ply(mesh: &TriangleMesh) -> Vec<u8> {
+    let mut out = format!(
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\n\
+         property double z\nelement face {}\nproperty list uchar uint vertex_indices\nend_header\n",
+        mesh.vertices().len(),
+        mesh.faces().len()
+    )
+    .into_bytes();
+    for value in mesh.vertices().iter().flat_map(|p| p.to_array()) {
+        out.extend(value.to_le_bytes());
+    }
+    for face in mesh.faces() {
+        out.push(3);
+        face.iter().for_each(|v| out.extend(v.to_le_bytes()));
+    }
+    out
+}
+
+fn obj(mesh: &TriangleMesh) -> Vec<u8> {
+    let mut out = String::new();
+    for p in mesh.vertices() {
+        // Debug gives the shortest decimal that reads back as the same f64, and exponents where
+        // Display would print hundreds of zeros. Writing to a String cannot fail.
+        let _ = writeln!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z);
+    }
+    for [a, b, c] in mesh.faces() {
+        let _ = writeln!(out, "f {} {} {}", a + 1, b + 1, c + 1);
+    }
+    out.into_bytes()
+}
+
+fn stl(mesh: &TriangleMesh) -> Result<Vec<u8>, WriteError> {
+    for (vertex, p) in mesh.vertices().iter().enumerate() {
+        if let Some(value) = p.to_array().into_iter().find(|v| !(*v as f32).is_finite()) {
+            return Err(WriteError::BeyondF32 { vertex, value });
+        }
+    }
+    let mut out = vec![0; 80];
+    // It must not begin with `solid`, which is how ASCII files begin.
+    out[..20].copy_from_slice(b"binary STL by tesdf ");
+    out.extend((mesh.faces().len() as u32).to_le_bytes());
+    for face in 0..mesh.faces().len() {
+        let [a, b, c] = mesh.triangle(face);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        for value in [normal, a, b, c].iter().flat_map(|p| p.to_array()) {
+            out.extend((value as f32).to_le_bytes());
+        }
+        out.extend([0, 0]);
+    }
+    Ok(out)
+}
