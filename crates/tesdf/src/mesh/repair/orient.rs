@@ -35,7 +35,7 @@ fn orient_shells(draft: &mut Draft, reversed: &mut [bool], report: &mut RepairRe
         return; // no shell is closed
     };
     let shell_of = |face: u32| shell[kept[face as usize] as usize];
-    let crossing = crossing_shells(&mesh, shell_of);
+    let (crossing, crossing_themselves) = crossing_shells(&mesh, shell_of);
     let origin = |face: u32| draft.origin[kept[face as usize] as usize];
     report.crossing_shells = crossing.values().map(|&[f, g]| [origin(f), origin(g)]).collect();
 
@@ -58,10 +58,16 @@ fn orient_shells(draft: &mut Draft, reversed: &mut [bool], report: &mut RepairRe
         let own = windings.remove(&number).unwrap_or(0);
         let depth = windings.values().filter(|w| *w % 2 != 0).count();
         let behind = if perturbed_orientation(triangle, center) > 0 { own } else { own + 1 };
-        let outward = match behind {
-            1 => true,  // 0 in front, 1 behind
-            0 => false, // -1 in front, 0 behind
-            _ => volume(&mesh, |f| shell_of(f) == number) > 0.0,
+        // Of an embedded shell, one side of each face has the winding number 0. Where a shell meets itself, such
+        // as flaps of a careless triangulation, one place does not tell; its volume does, if it has any.
+        let outward = if crossing_themselves.contains(&number) {
+            let volume = volume(&mesh, |f| shell_of(f) == number);
+            if volume == 0.0 {
+                continue;
+            }
+            volume > 0.0
+        } else {
+            behind == 1
         };
         inside_out[number as usize] = outward != (depth % 2 == 0);
     }
@@ -103,21 +109,26 @@ fn balance(uses: impl Iterator<Item = (u32, bool)>) -> BTreeMap<u32, i32> {
     balance
 }
 
-/// Pairs of shells that meet, each with a face of either.
-fn crossing_shells(mesh: &TriangleMesh, shell_of: impl Fn(u32) -> u32) -> BTreeMap<[u32; 2], [u32; 2]> {
+/// Pairs of shells that meet, each with a face of either; and the shells that meet themselves.
+fn crossing_shells(
+    mesh: &TriangleMesh,
+    shell_of: impl Fn(u32) -> u32,
+) -> (BTreeMap<[u32; 2], [u32; 2]>, BTreeSet<u32>) {
     let topology = Topology::new(mesh.faces());
     let flaws = face_flaws(mesh);
     // Closed shells have no open edges to lie on.
     let touching = TJunctions::default().with_collinear(mesh, &flaws.zero_area).touching(mesh, &topology);
     let pairs = self_intersections(mesh, &flaws.without_area(), &touching);
-    let mut crossing = BTreeMap::new();
+    let (mut crossing, mut themselves) = (BTreeMap::new(), BTreeSet::new());
     for &[f, g] in pairs.iter().chain(&flaws.duplicates).chain(&flaws.reversed_duplicates) {
         let (s, t) = (shell_of(f), shell_of(g));
-        if s != t {
+        if s == t {
+            themselves.insert(s);
+        } else {
             crossing.entry([s.min(t), s.max(t)]).or_insert(if s < t { [f, g] } else { [g, f] });
         }
     }
-    crossing
+    (crossing, themselves)
 }
 
 /// Signed volume of some faces, relative to the middle of the mesh.
