@@ -6,21 +6,9 @@ use tesdf::mesh::*;
 use tesdf::query::*;
 use parry3d::query::PointQuery;
 
-fn read(path: &str) -> TriangleMesh {
-    let text = std::fs::read_to_string(path).unwrap();
-    let (mut v, mut f) = (vec![], vec![]);
-    for l in text.lines() {
-        let t: Vec<&str> = l.split_whitespace().collect();
-        if t.is_empty() { continue; }
-        if t[0] == "v" { v.push(DVec3::new(t[1].parse().unwrap(), t[2].parse().unwrap(), t[3].parse().unwrap())); }
-        if t[0] == "f" { let i: Vec<u32> = t[1..].iter().map(|x| x.split('/').next().unwrap().parse::<u32>().unwrap() - 1).collect();
-            for k in 1..i.len()-1 { f.push([i[0], i[k], i[k+1]]); } }
-    }
-    TriangleMesh::new(v, f).unwrap()
-}
 fn main() {
     let a: Vec<String> = std::env::args().collect();
-    let mesh = read(&a[1]);
+    let mesh = tesdf::mesh::read(a[1].as_ref()).unwrap().mesh;
     let mut o = EncodeOptions::default();
     o.byte_worth = a[2].parse().unwrap();
     o.tighten_levels = a[3].parse().unwrap();

@@ -6,8 +6,8 @@
 //!
 //! The STL, OBJ, PLY and OFF parsers are our own because an error must name the line or element
 //! at fault: `tobj`'s `LoadError` carries neither line nor index, `stl_io` and `ply-rs-bw` return
-//! an `io::Error` or text without the face. glTF's JSON is parsed and validated by the `gltf`
-//! crate, which names the path (`meshes[0].primitives[0].indices`).
+//! an `io::Error` or text without the face. glTF's JSON is parsed and validated by
+//! `gltf-json`, which names the path (`meshes[0].primitives[0].indices`).
 mod assemble;
 mod error;
 mod gltf;
