@@ -14,10 +14,7 @@ fn main() {
     let t = Instant::now();
     for _ in 0..reps { for p in &near { s += asset.query(*p, Precision::F32).signed_distance; } }
     println!("query {:.1} ns {s}", t.elapsed().as_secs_f64() / (reps * n) as f64 * 1e9);
-    let t = Instant::now(); let mut c = 0;
-    for _ in 0..reps { for p in &near { c += asset.query_place(*p); } }
-    println!("place {:.1} ns {c}", t.elapsed().as_secs_f64() / (reps * n) as f64 * 1e9);
-    let t = Instant::now(); let mut c = 0;
-    for _ in 0..reps { for p in &near { c += asset.query_nearest(*p); } }
-    println!("place+kernel {:.1} ns {c}", t.elapsed().as_secs_f64() / (reps * n) as f64 * 1e9);
+    let t = Instant::now();
+    for _ in 0..reps { s += asset.query_batch(&near, Precision::F32)[5].signed_distance; }
+    println!("batch {:.1} ns {s}", t.elapsed().as_secs_f64() / (reps * n) as f64 * 1e9);
 }

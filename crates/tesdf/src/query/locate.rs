@@ -32,10 +32,10 @@ pub struct Entries {
 }
 
 /// Share of the forest's words that the entries may take.
-const ENTRY_SHARE: usize = 4;
+const ENTRY_SHARE: usize = 2;
 
 impl Entries {
-    /// The deepest grid that takes at most a quarter of the forest's own words.
+    /// The deepest grid that takes at most half of the forest's own words.
     pub fn new(nodes: &[u32]) -> Self {
         if nodes.len() < 6 {
             return Self { level: 0, words: Vec::new() };

@@ -3,6 +3,7 @@
 //! A point is taken to the local frame, its cell is found by descending the forest in fixed point, and the
 //! least distance to the faces of the cell's list is the answer. Points that no list serves (outside of the
 //! domain, or in a far cell) are answered from the tree over all faces, exactly too.
+mod batch;
 mod kernel;
 mod lanes;
 mod locate;
@@ -11,7 +12,6 @@ mod ray;
 mod sign;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 pub use kernel::{FaceRecord, Isa};
 pub use locate::Entries;
@@ -76,7 +76,7 @@ impl TeSdf {
             return Answer::NONE;
         }
         let local = self.frame.to_local(point);
-        self.answer(point, local, self.place(local), precision)
+        self.answer(local, self.place(local), precision)
     }
 
     /// As [`query`](Self::query), but `None` outside of the domain: more than the band from the solid, give or
@@ -85,13 +85,8 @@ impl TeSdf {
         let local = self.frame.to_local(point);
         match self.place(local) {
             Place::NotOfDomain => None,
-            place => Some(self.answer(point, local, place, precision)),
+            place => Some(self.answer(local, place, precision)),
         }
-    }
-
-    /// Answers for many points, in order, on all threads of the current rayon pool.
-    pub fn query_batch(&self, points: &[DVec3], precision: Precision) -> Vec<Answer> {
-        points.par_iter().with_min_len(256).map(|&p| self.query(p, precision)).collect()
     }
 
     /// The signed distance alone; NaN for a point that is not finite.
@@ -127,21 +122,21 @@ impl TeSdf {
     }
 
     #[inline]
-    fn answer(&self, point: DVec3, local: DVec3, place: Place, precision: Precision) -> Answer {
+    fn answer(&self, local: DVec3, place: Place, precision: Precision) -> Answer {
         match precision {
-            Precision::F32 => self.answer_f32(point, local, place),
-            Precision::F64 => self.answer_f64(point, local, place),
+            Precision::F32 => self.answer_f32(local, place),
+            Precision::F64 => self.answer_f64(local, place),
         }
     }
 
     #[inline]
-    fn answer_f32(&self, point: DVec3, local: DVec3, place: Place) -> Answer {
+    fn answer_f32(&self, local: DVec3, place: Place) -> Answer {
         let relative = local - self.cube.middle();
         let found = match place {
             Place::Listed { offset, .. } => self.nearest_in_list_f32(offset, relative.as_vec3()),
             // Far from the cube, f32 is too coarse against the body.
             _ if relative.abs().max_element() > 2.0 * self.cube.side() => {
-                return self.answer_f64(point, local, place);
+                return self.answer_f64(local, place);
             }
             _ => self.nearest_in_tree_f32(relative.as_vec3(), &mut Reads::default()),
         };
@@ -161,7 +156,7 @@ impl TeSdf {
         self.finish(relative, closest, side, found.face, to_world, |d| if d < ON_SURFACE_F32 { Some(normal) } else { None })
     }
 
-    fn answer_f64(&self, _point: DVec3, local: DVec3, place: Place) -> Answer {
+    fn answer_f64(&self, local: DVec3, place: Place) -> Answer {
         let (position, closest) = match place {
             Place::Listed { offset, .. } => self.nearest_in_list_f64(offset, local),
             _ => self.nearest_in_tree_f64(local),
@@ -195,9 +190,9 @@ impl TeSdf {
     ) -> Answer {
         let sign = if side == Side::Inside { -1.0 } else { 1.0 };
         let gradient = on_surface(closest.distance)
-            .unwrap_or_else(|| sign * (p - closest.point) / closest.distance);
+            .unwrap_or_else(|| (p - closest.point) * (sign / closest.distance));
         Answer {
-            signed_distance: sign * closest.distance / self.frame.scale,
+            signed_distance: sign * closest.distance * self.frame.inverse_scale(),
             gradient,
             closest_point: to_world(closest.point),
             face: self.face_ids[position as usize],
@@ -234,10 +229,4 @@ impl TeSdf {
         }
         sum.try_normalize().unwrap_or(own)
     }
-}
-impl TeSdf {
-    /// tmp
-    pub fn query_place(&self, p: DVec3) -> usize { match self.place(self.frame.to_local(p)) { Place::Listed { offset, .. } => offset as usize, _ => 0 } }
-    /// tmp
-    pub fn query_nearest(&self, p: DVec3) -> usize { let local = self.frame.to_local(p); match self.place(local) { Place::Listed { offset, .. } => self.nearest_in_list_f32(offset, (local - self.cube.middle()).as_vec3()).face as usize, _ => 0 } }
 }

@@ -4,7 +4,7 @@ use super::kernel::{self, Ids, Nearest};
 use super::locate::ListIds;
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
-use crate::geometry::{AabbTree, Closest, Feature, Regions};
+use crate::geometry::{AabbTree, Closest, Feature};
 
 /// What a query reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -144,7 +144,6 @@ impl Best {
             distance: f64::INFINITY,
             point: DVec3::NAN,
             feature: Feature::Face,
-            regions: Regions::FACE,
         },
     };
 
