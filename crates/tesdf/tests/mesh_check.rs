@@ -2,6 +2,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use tesdf::glam::DVec3;
 use tesdf::mesh::{CheckReport, Defect, DefectKind, Severity, SolidMesh, TriangleMesh, check, read};
 
 use DefectKind::*;
@@ -206,7 +207,7 @@ fn a_moebius_strip_is_non_orientable() {
             let angle = std::f64::consts::TAU * f64::from(i) / 10.0;
             let (side, tilt) = (if i % 2 == 0 { 1.0 } else { -1.0 }, angle / 2.0);
             let radius = 3.0 + side * tilt.cos();
-            tesdf::glam::DVec3::new(radius * angle.cos(), radius * angle.sin(), side * tilt.sin())
+            DVec3::new(radius * angle.cos(), radius * angle.sin(), side * tilt.sin())
         })
         .collect();
     // Vertex 10 would be vertex 0 with the sides exchanged: vertex 1 takes its place.
@@ -218,4 +219,31 @@ fn a_moebius_strip_is_non_orientable() {
     assert_eq!(of_kind(&report, NonOrientable).len(), 1, "{report}");
     let refusal = SolidMesh::new(mesh).unwrap_err();
     assert!(!refusal.is_repairable());
+}
+
+#[test]
+fn thin_folds_are_accepted_with_a_warning() {
+    // A unit cube whose lid is a fan around a vertex that lies beyond one side of it, above or below the lid.
+    let folded = |height: f64| {
+        let corner = |x: i32, y: i32, z: i32| DVec3::new(x.into(), y.into(), z.into());
+        let mut vertices: Vec<DVec3> = [0, 1]
+            .iter()
+            .flat_map(|&z| [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| corner(x, y, z)))
+            .collect();
+        vertices.push(DVec3::new(1.5, 0.5, 1.0 + height));
+        let mut faces = vec![[0, 2, 1], [0, 3, 2]];
+        for i in 0..4 {
+            let j = (i + 1) % 4;
+            faces.extend([[i, j, j + 4], [i, j + 4, i + 4], [i + 4, j + 4, 8]]);
+        }
+        check(&TriangleMesh::new(vertices, faces).unwrap())
+    };
+    for height in [1e-8, 0.2] {
+        assert!(folded(height).is_simple(), "{}", folded(height));
+    }
+    let thin = folded(-1e-8);
+    assert_eq!((thin.winding, thin.encodable), (Some([-1, 1]), true), "{thin}");
+    assert!(of_kind(&thin, NegativeWinding).iter().all(|d| d.severity == Severity::Warning), "{thin}");
+    let thick = folded(-0.2);
+    assert_eq!((thick.winding, thick.encodable), (Some([-1, 1]), false), "{thick}");
 }
