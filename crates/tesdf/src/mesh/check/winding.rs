@@ -3,10 +3,7 @@ use glam::DVec3;
 use super::{edges::centroid, faces::FaceFlaws};
 use crate::{
     geometry::{WindingNumber, perturbed_orientation},
-    mesh::{
-        Defect, DefectKind, Severity, Topology, TriangleMesh,
-        topology::{Edge, NO_COMPONENT},
-    },
+    mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, topology::Edge},
 };
 
 /// How far from a face that meets others its sides are sampled, relative to the diagonal.
@@ -64,7 +61,9 @@ pub(super) fn winding_defects(
     // The tallest face of each patch stands for it: rounding moves its centre least, relative to its size.
     let mut tallest: Vec<Option<(f64, u32)>> = vec![None; patches];
     let mut sizes = vec![0usize; patches];
-    for f in (0..mesh.faces().len() as u32).filter(|&f| !excluded(f) && patch[f as usize] != NO_COMPONENT) {
+    for f in (0..mesh.faces().len() as u32)
+        .filter(|&f| !excluded(f) && patch[f as usize] != Topology::NO_COMPONENT)
+    {
         let number = patch[f as usize] as usize;
         sizes[number] += 1;
         let height = height(mesh.triangle(f as usize));
