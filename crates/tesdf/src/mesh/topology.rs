@@ -104,14 +104,14 @@ impl Topology {
                 sets.join(pair[0].face, pair[1].face);
             }
         }
-        let mut number = vec![NO_COMPONENT; self.faces.len()];
+        let mut number = vec![Self::NO_COMPONENT; self.faces.len()];
         let mut count = 0;
         let component = |f: usize| {
             if has_repeated_corner(self.faces[f]) {
-                return Topology::NO_COMPONENT;
+                return Self::NO_COMPONENT;
             }
             let root = sets.find(f as u32) as usize;
-            if number[root] == Topology::NO_COMPONENT {
+            if number[root] == Self::NO_COMPONENT {
                 number[root] = count;
                 count += 1;
             }
@@ -264,7 +264,7 @@ mod tests {
         let t = Topology::new(&faces);
         assert!(t.is_closed());
         assert_eq!(t.edges().len(), 6);
-        assert_eq!(t.components(Edge::is_manifold).0[4..], [NO_COMPONENT; 2]);
+        assert_eq!(t.components(Edge::is_manifold).0[4..], [Topology::NO_COMPONENT; 2]);
     }
 
     #[test]
