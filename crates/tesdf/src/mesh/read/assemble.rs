@@ -174,7 +174,7 @@ pub(super) fn assemble(
     }
 
     if unused > 0 {
-        notes.push(format!("{unused} vertices that no face uses were dropped"));
+        notes.push(format!("vertices dropped because no face uses them: {unused}"));
     }
     if let Some(i) = unused_non_finite {
         let place = places.vertex(i);
