@@ -3,9 +3,9 @@
 //! In: the corner positions of a polygon in 3-D, in order. Out: triangles by corner number, all
 //! oriented as the polygon. Every corner is a corner of some triangle, flat ones (on the line
 //! between their neighbours) too: a neighbour face uses them, and leaving them out would open a
-//! T-junction. That is why no earcut crate is used here: `earcut` and `earcutr` filter flat
-//! corners out before they clip (`filter_points`), and state that they do not guarantee a right
-//! result.
+//! T-junction. That is why no earcut crate is used here: `earcut` 0.4.8 and `earcutr` 0.5.0 filter
+//! flat corners out before they clip (`filter_points`), and leave it to the caller to check the
+//! result (`deviation`).
 use glam::{DVec2, DVec3};
 use robust::{Coord, orient2d};
 
