@@ -1,8 +1,8 @@
 //! glTF 2.0, as JSON and as GLB.
 //!
-//! The `gltf` crate parses the JSON and validates it, and names the path at fault. The container
-//! and the accessors are read here: `gltf` 1.4.1 subtracts 12 from the GLB header's length
-//! unchecked, and its accessor iterators do not say which bytes are missing.
+//! `gltf-json` (of the `gltf` crate) parses the JSON and validates it, and names the path at fault.
+//! The container and the accessors are read here: `gltf` 1.4.1 subtracts 12 from the length in
+//! the GLB header unchecked, and its accessor iterators do not say which bytes are missing.
 //!
 //! Read: the triangles, strips and fans of the default scene (else the first scene, else all root
 //! nodes, else all meshes), with the nodes' transforms; buffers in the file, as `data:` URIs, or
@@ -14,9 +14,9 @@ mod scene;
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
-use gltf::json;
-use gltf::json::mesh::{Mode, Primitive, Semantic};
-use gltf::json::validation::Checked;
+use gltf_json as json;
+use json::mesh::{Mode, Primitive, Semantic};
+use json::validation::{Checked, Error as Defect, Validate};
 
 use super::{MeshFormat, Place, Places, RawMesh, ReadError, sniff};
 use crate::mesh::{MeshError, TriangleMesh};
@@ -43,16 +43,7 @@ pub(super) fn parse(
         found: format!("the JSON is not glTF 2.0: {error}"),
         help: EXPORT_AGAIN.into(),
     })?;
-    let root = match gltf::Document::from_json(root) {
-        Ok(document) => document.into_json(),
-        Err(gltf::Error::Validation(errors)) => {
-            let (path, what) =
-                errors.first().map(|(p, e)| (p.to_string(), e.to_string())).unwrap_or_default();
-            let found = format!("{what} ({} defects of the JSON in all)", errors.len());
-            return Err(fault(format, path, found, "this needs a valid file without required extensions"));
-        }
-        Err(error) => return Err(fault(format, "JSON", error.to_string(), EXPORT_AGAIN)),
-    };
+    validate(&root, format)?;
     let buffers = buffers::load(&root, binary, format, folder, hasher)?;
     let data = Data { root: &root, buffers: &buffers, format };
     let mut reader =
@@ -65,6 +56,48 @@ pub(super) fn parse(
         reader.raw.notes.push("skins and morph targets are not applied: the base shape is read".into());
     }
     Ok(reader.raw)
+}
+
+/// What geometry depends on. Other parts (materials, animations) may be as they are.
+const GEOMETRY: [&str; 8] =
+    ["asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "buffers"];
+
+/// Required extensions that change how a mesh looks, not its shape.
+const LOOKS: [&str; 4] = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"];
+
+fn validate(root: &json::Root, format: MeshFormat) -> Result<(), ReadError> {
+    let unknown = |name: &&String| !LOOKS.iter().any(|prefix| name.starts_with(prefix));
+    if let Some(name) = root.extensions_required.iter().find(unknown) {
+        let help = "export the file without it, uncompressed";
+        return Err(fault(format, "extensionsRequired", format!("the extension '{name}' is not read"), help));
+    }
+    // `gltf-json` 1.4.1 looks this accessor up before it checks the index.
+    for (m, mesh) in root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            let accessor = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+            if let Some(index) = accessor.map(|a| a.value()).filter(|&a| a >= root.accessors.len()) {
+                let element = format!("meshes[{m}].primitives[{p}].attributes.POSITION");
+                let found = format!("accessor {index} of {}", root.accessors.len());
+                return Err(fault(format, element, found, "expected an accessor that exists"));
+            }
+        }
+    }
+    let mut first = None;
+    root.validate(root, json::Path::new, &mut |path, defect| {
+        let path = path().to_string();
+        let part = path.split(['[', '.', ' ']).next().unwrap_or_default();
+        // Many exporters leave the required bounds out; values without bytes are refused where
+        // they are needed.
+        let is_bound = path.ends_with(".min") || path.ends_with(".max");
+        let is_view = defect == Defect::Missing && path.ends_with("].bufferView");
+        if first.is_none() && GEOMETRY.contains(&part) && !is_bound && !is_view {
+            first = Some((path, defect));
+        }
+    });
+    match first {
+        None => Ok(()),
+        Some((path, defect)) => Err(fault(format, path, defect.to_string(), EXPORT_AGAIN)),
+    }
 }
 
 fn fault(
@@ -188,7 +221,9 @@ impl Reader<'_> {
         if let Places::Elements(parts) = &mut self.raw.places {
             parts.push((base, first_face, element));
         }
-        self.raw.positions.extend(positions.iter().map(|p| pose.transform_point3(*p)));
+        // A NaN in one coordinate is to be reported in that one, and would spread.
+        let placed = |p: &DVec3| if p.is_finite() { pose.transform_point3(*p) } else { *p };
+        self.raw.positions.extend(positions.iter().map(placed));
         let mirrored = pose.matrix3.determinant() < 0.0;
         let first_corner = self.raw.corners.len();
         let corners = indices.into_iter().map(|i| i + base as u64);

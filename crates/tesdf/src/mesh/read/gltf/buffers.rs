@@ -5,9 +5,9 @@ use std::path::{Component, Path, PathBuf};
 use base64::Engine;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use glam::DVec3;
-use gltf::json;
-use gltf::json::accessor::{ComponentType, GenericComponentType, Type};
-use gltf::json::validation::Checked;
+use gltf_json as json;
+use json::accessor::{ComponentType, GenericComponentType, Type};
+use json::validation::Checked;
 
 use super::{MeshFormat, ReadError, fault};
 

@@ -1,6 +1,6 @@
 //! Which meshes a glTF file shows, and where.
 use glam::{DAffine3, DMat4, DQuat, DVec3};
-use gltf::json;
+use gltf_json as json;
 
 use super::{MeshFormat, ReadError, decimal, decimals, fault};
 
