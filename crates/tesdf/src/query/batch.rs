@@ -1,15 +1,12 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::locate::Place;
+use super::locate::{FLIGHT, Faces, Place};
 use super::{Answer, Precision};
 use crate::TeSdf;
 
 /// Points that one task takes.
 const TASK: usize = 1 << 12;
-/// Points in flight: enough to hide the way to memory, few enough that what was fetched is still in cache.
-const FLIGHT: usize = 16;
-
 impl TeSdf {
     /// Answers for many points, in order, on all threads of the current rayon pool.
     ///
@@ -18,30 +15,38 @@ impl TeSdf {
     pub fn query_batch(&self, points: &[DVec3], precision: Precision) -> Vec<Answer> {
         let mut answers = vec![Answer::NONE; points.len()];
         answers.par_chunks_mut(TASK).zip(points.par_chunks(TASK)).for_each(|(answers, points)| {
+            let mut faces: [Faces; FLIGHT] = std::array::from_fn(|_| Faces::default());
             for (answers, points) in answers.chunks_mut(FLIGHT).zip(points.chunks(FLIGHT)) {
-                self.query_flight(points, precision, answers);
+                self.query_flight(points, precision, &mut faces, answers);
             }
         });
         answers
     }
 
-    fn query_flight(&self, points: &[DVec3], precision: Precision, answers: &mut [Answer]) {
+    fn query_flight(
+        &self,
+        points: &[DVec3],
+        precision: Precision,
+        faces: &mut [Faces; FLIGHT],
+        answers: &mut [Answer],
+    ) {
+        let mut locals = [DVec3::NAN; FLIGHT];
+        locals.iter_mut().zip(points).for_each(|(local, &p)| *local = self.frame.to_local(p));
         let mut places = [Place::NotOfDomain; FLIGHT];
-        for (place, &point) in places.iter_mut().zip(points) {
-            *place = self.place(self.frame.to_local(point));
+        self.places(&locals, &mut places);
+        for place in &places {
             if let Place::Listed { offset, .. } = *place {
                 fetch(&self.lists[offset as usize..]);
             }
         }
-        for place in &places[..points.len()] {
+        for (place, faces) in places.iter().zip(faces.iter_mut()) {
             if let Place::Listed { offset, .. } = *place {
-                self.list_faces(offset).for_each(|face| fetch(&self.records[face as usize..]));
+                self.read_list(offset, faces);
+                faces.ids().iter().for_each(|&face| fetch(&self.records[face as usize..]));
             }
         }
-        for ((answer, &point), &place) in answers.iter_mut().zip(points).zip(&places) {
-            if point.is_finite() {
-                *answer = self.answer(self.frame.to_local(point), place, precision);
-            }
+        for (i, answer) in answers.iter_mut().enumerate() {
+            *answer = self.answer(locals[i], places[i], &faces[i], precision);
         }
     }
 }
