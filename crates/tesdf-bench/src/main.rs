@@ -38,7 +38,7 @@ fn main() {
     for (name, points) in [("near", &near), ("box", &boxed)] {
         let (mut tp, mut to, mut t64, mut tb) = (f64::MAX, f64::MAX, f64::MAX, f64::MAX); let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let mut sink = 0.0;
-        for _ in 0..3 {
+        for _ in 0..3 { 
             let t = Instant::now();
             for p in points { let q = p.as_vec3(); let r = tm.project_local_point(q.to_array().into(), false); let d = parry3d::math::Vector::from(q.to_array()) - r.point; sink += d.length() as f64 + r.is_inside as u8 as f64; }
             tp = tp.min(t.elapsed().as_secs_f64());

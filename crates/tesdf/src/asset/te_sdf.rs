@@ -305,11 +305,12 @@ fn frame_and_cube(placed: &[f64]) -> Result<(LocalFrame, DomainCube), AssetError
         return wrong(layout::FRAME, format!("{} numbers; expected 8", placed.len()));
     };
     let positive = |s: f64| s.is_normal() && s > 0.0;
-    if !placed.iter().all(|x| x.is_finite()) || !positive(scale) || !positive(side) {
+    let sound = |s: f64| positive(s) && (1.0 / s).is_normal();
+    if !placed.iter().all(|x| x.is_finite()) || !sound(scale) || !sound(side) {
         return wrong(layout::FRAME, format!("{placed:?} is no frame: finite, scale and side positive"));
     }
     Ok((
-        LocalFrame { offset: DVec3::new(x, y, z), scale },
+        LocalFrame::new(DVec3::new(x, y, z), scale),
         DomainCube::new(DVec3::new(u, v, w), side),
     ))
 }

@@ -76,28 +76,34 @@ impl Triangle {
     pub fn closest(&self, p: DVec3) -> Closest {
         let relative = Relative::new(self, p);
         if relative.over_face(self) {
-            let height = self.normal.dot(relative.from[0]);
-            let point = p - height * self.normal;
-            return Closest { distance: height.abs(), point, feature: Feature::Face };
+            return self.closest_in_plane(p);
         }
-        let mut best = (f64::INFINITY, self.corners[0], Feature::Vertex(0));
-        for k in 0..3 {
-            let next = (k + 1) % 3;
-            let (start, end) = (relative.start(k), relative.end(k));
-            let (point, feature) = if start <= 0.0 {
-                (self.corners[k], Feature::Vertex(k as u8))
-            } else if end >= 0.0 {
-                (self.corners[next], Feature::Vertex(next as u8))
-            } else {
-                let t = start / (start - end);
-                (self.corners[k] + t * relative.along[k], Feature::Edge(k as u8))
-            };
-            let d = p.distance_squared(point);
-            if d < best.0 {
-                best = (d, point, feature);
-            }
-        }
-        Closest { distance: best.0.sqrt(), point: best.1, feature: best.2 }
+        let [a, b, c] = [0, 1, 2].map(|k| self.closest_on_edge(k, p));
+        let nearer = |x: Closest, y: Closest| if y.distance < x.distance { y } else { x };
+        nearer(nearer(a, b), c)
+    }
+
+    /// The closest point to `p` of the plane.
+    #[inline]
+    pub fn closest_in_plane(&self, p: DVec3) -> Closest {
+        let height = self.normal.dot(p - self.corners[0]);
+        Closest { distance: height.abs(), point: p - height * self.normal, feature: Feature::Face }
+    }
+
+    /// The closest point to `p` of edge `k`.
+    #[inline]
+    pub fn closest_on_edge(&self, k: usize, p: DVec3) -> Closest {
+        let next = (k + 1) % 3;
+        let along = self.corners[next] - self.corners[k];
+        let (start, end) = (along.dot(p - self.corners[k]), along.dot(p - self.corners[next]));
+        let (point, feature) = if start <= 0.0 {
+            (self.corners[k], Feature::Vertex(k as u8))
+        } else if end >= 0.0 {
+            (self.corners[next], Feature::Vertex(next as u8))
+        } else {
+            (self.corners[k] + start / (start - end) * along, Feature::Edge(k as u8))
+        };
+        Closest { distance: p.distance(point), point, feature }
     }
 
     /// The features whose closed region holds `p`.

@@ -145,7 +145,7 @@ impl TeSdf {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn answer_f32(&self, local: DVec3, place: Place, faces: &Faces) -> Answer {
         let relative = local - self.cube.middle();
         let found = match place {
@@ -158,7 +158,11 @@ impl TeSdf {
         };
         let record = &self.records[found.face as usize];
         let triangle = record.triangle();
-        let closest = triangle.closest(relative);
+        // The kernel has found the part; in f64 the point on it is as good as the f32 corners allow.
+        let closest = match found.part() {
+            0 => triangle.closest_in_plane(relative),
+            edge => triangle.closest_on_edge(edge as usize - 1, relative),
+        };
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
             Place::Listed { label: Label::Crossing(winding), .. } => {
