@@ -145,16 +145,25 @@ impl TeSdf {
         }
     }
 
-    /// The cell that holds a point of the local frame.
-    pub(super) fn cell(&self, local: DVec3) -> Option<Cell> {
+    /// The cell that holds a point of the local frame, with its label and list if it has them.
+    ///
+    /// On a border this may be another of the cells that share it than [`place`](Self::place) finds: the grid rounds
+    /// up, the descent to side 0.
+    pub(super) fn cell(&self, local: DVec3) -> Option<(Cell, Label, u32)> {
         let (mut word, mut lambda) = self.cube.locate(local, 0)?;
         let mut cell = self.cube.root(word);
-        while let Node::Split(children) = Node::decode(self.nodes[word], &self.lists) {
-            let side = lambda.descend(cell.depth);
-            cell = cell.child(side);
-            word = children as usize + side;
+        loop {
+            match Node::decode(self.nodes[word], &self.lists) {
+                Node::Split(children) => {
+                    let side = lambda.descend(cell.depth);
+                    cell = cell.child(side);
+                    word = children as usize + side;
+                }
+                Node::Listed(label, offset) => return Some((cell, label, offset)),
+                Node::Far(Side::Inside) => return Some((cell, Label::Inside, 0)),
+                Node::Far(Side::Outside) | Node::NotOfDomain => return Some((cell, Label::Outside, 0)),
+            }
         }
-        Some(cell)
     }
 
     /// The list at `offset`, which opening has checked.

@@ -106,9 +106,7 @@ impl TeSdf {
         point.is_finite()
             && match self.place(local) {
                 Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
-                Place::Listed { label: Label::Crossing(winding), offset } => {
-                    self.winding_in_cell(local, winding, offset) >= 1
-                }
+                Place::Listed { label: Label::Crossing(_), .. } => self.winding_in_cell(local) >= 1,
                 _ => false,
             }
     }
@@ -149,10 +147,10 @@ impl TeSdf {
         let closest = triangle.closest(relative);
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
-            Place::Listed { label: Label::Crossing(winding), offset } => {
+            Place::Listed { label: Label::Crossing(_), .. } => {
                 let height = triangle.normal.dot(relative - triangle.corners[0]);
                 hinted_side(self.records[found.face as usize].hints(), closest.feature, height)
-                    .unwrap_or_else(|| self.exact_side(local, winding, offset))
+                    .unwrap_or_else(|| self.exact_side(local))
             }
             _ => Side::Outside,
         };
@@ -168,8 +166,8 @@ impl TeSdf {
         };
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
-            Place::Listed { label: Label::Crossing(winding), offset } if closest.distance > 0.0 => {
-                self.exact_side(local, winding, offset)
+            Place::Listed { label: Label::Crossing(_), .. } if closest.distance > 0.0 => {
+                self.exact_side(local)
             }
             _ => Side::Outside,
         };

@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use crate::TeSdf;
-use crate::asset::layout::{SignHint, SignHints, Side};
+use crate::asset::layout::{Label, SignHint, SignHints, Side};
 use crate::geometry::{Feature, signed_crossing};
 
 /// The side that the closest feature tells, where it tells one. `height` is that of the point over the face.
@@ -21,17 +21,20 @@ pub fn hinted_side(hints: SignHints, feature: Feature, height: f64) -> Option<Si
 }
 
 impl TeSdf {
-    /// The side by winding number, exact; `winding` is that at the cell's centroid.
+    /// The side by winding number, exact.
     #[cold]
-    pub(super) fn exact_side(&self, local: DVec3, winding: u32, offset: u32) -> Side {
-        if self.winding_in_cell(local, winding, offset) >= 1 { Side::Inside } else { Side::Outside }
+    pub(super) fn exact_side(&self, local: DVec3) -> Side {
+        if self.winding_in_cell(local) >= 1 { Side::Inside } else { Side::Outside }
     }
 
     /// Winding number in a crossing cell: that at its centroid, plus the crossings on the way there. The list
     /// names every face that meets the cell.
-    pub(super) fn winding_in_cell(&self, local: DVec3, winding: u32, offset: u32) -> i32 {
-        let Some(cell) = self.cell(local) else { return 0 };
-        let centroid = cell.centroid();
+    pub(super) fn winding_in_cell(&self, local: DVec3) -> i32 {
+        let (centroid, winding, offset) = match self.cell(local) {
+            Some((cell, Label::Crossing(winding), offset)) => (cell.centroid(), winding, offset),
+            Some((_, Label::Inside, _)) => return 1,
+            Some((_, Label::Outside, _)) | None => return 0,
+        };
         let corners = |f: u32| self.face_corners(f as usize).map(|p| self.frame.to_local(p));
         winding as i32 + self.list_faces(offset).map(|f| signed_crossing(local, centroid, corners(f))).sum::<i32>()
     }
