@@ -65,7 +65,9 @@ impl Answer {
 }
 
 /// Below this distance (local frame) the gradient is the normal of the closest feature.
-const ON_SURFACE_F64: f64 = 1e-9;
+///
+/// At most 1e-9 × diagonal, as the diagonal is 0.5 to 1 here: from there on the gradient is that of the point.
+const ON_SURFACE_F64: f64 = 5e-10;
 /// The same for `f32` storage, some ten times its rounding.
 const ON_SURFACE_F32: f64 = 1e-6;
 
@@ -156,7 +158,14 @@ impl TeSdf {
         };
         let normal = triangle.normal;
         let to_world = |p: DVec3| self.frame.to_world(p + self.cube.middle());
-        self.finish(relative, closest, side, found.face, to_world, |d| if d < ON_SURFACE_F32 { Some(normal) } else { None })
+        let on_surface = |d: f64| match place {
+            _ if d >= ON_SURFACE_F32 => None,
+            Place::Listed { offset, .. } if normal == DVec3::ZERO => {
+                Some(self.pseudonormal(offset, found.face, closest.feature))
+            }
+            _ => Some(normal),
+        };
+        self.finish(relative, closest, side, found.face, to_world, on_surface)
     }
 
     fn answer_f64(&self, _point: DVec3, local: DVec3, place: Place) -> Answer {
