@@ -289,7 +289,7 @@ fn pseudonormal(r: &Reference, face: u32, feature: Feature) -> DVec3 {
         Feature::Face => 0,
     }];
     let mut sum = DVec3::ZERO;
-    for (other, _) in r.within_local(at, 0.0) {
+    for (other, _) in r.within_local(at, 1e-12) {
         let ids = r.faces[other as usize];
         if !held.iter().all(|v| ids.contains(v)) {
             continue;
