@@ -57,8 +57,10 @@ impl Sample {
         if row.faces > LARGE {
             options = EncodeOptions { byte_worth: 2.0, tighten_levels: 0, ..options };
         }
+        let t0 = std::time::Instant::now();
         let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default())
             .map_err(|e| named(e.to_string()))?;
+        eprintln!("ENC {} {} {:?}", row.name, row.faces, t0.elapsed());
         let (reference, cells) = (Reference::new(solid.mesh()), Cells::of(&asset));
         Ok(Self { row, solid, asset, reference, cells })
     }

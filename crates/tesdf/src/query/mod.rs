@@ -145,13 +145,17 @@ impl TeSdf {
             }
             _ => self.nearest_in_tree_f32(relative.as_vec3(), &mut Reads::default()),
         };
-        let triangle = self.records[found.face as usize].triangle();
+        // Nothing is near in f32 when a file's coordinates overflow it.
+        let Some(record) = self.records.get(found.face as usize) else {
+            return self.answer_f64(point, local, place);
+        };
+        let triangle = record.triangle();
         let closest = triangle.closest(relative);
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
             Place::Listed { label: Label::Crossing(_), .. } => {
                 let height = triangle.normal.dot(relative - triangle.corners[0]);
-                hinted_side(self.records[found.face as usize].hints(), closest.feature, height)
+                hinted_side(record.hints(), closest.feature, height)
                     .unwrap_or_else(|| self.exact_side(local))
             }
             _ => Side::Outside,
