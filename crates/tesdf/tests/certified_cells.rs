@@ -25,7 +25,8 @@ fn options(preset: Preset, band: f64) -> EncodeOptions {
 /// Encodes a member of a family, looks into its cells, and asks it for distances.
 fn check_member(family: Family, seed: u64, options: &EncodeOptions) -> Result<(), String> {
     let solid = family.member(seed);
-    let asset = encode(&solid, &Source::default(), options, &EncodeProgress::default()).map_err(|e| e.to_string())?;
+    let asset =
+        encode(&solid, &Source::default(), options, &EncodeProgress::default()).map_err(|e| e.to_string())?;
     let (reference, cells) = (Reference::new(solid.mesh()), Cells::of(&asset));
     let band = options.band.resolve(reference.local_diagonal());
     WellFormed { reference: &reference, cells: &cells, band, lattice: 3, most_cells: 1500 }.check()?;
@@ -40,7 +41,11 @@ fn check_member(family: Family, seed: u64, options: &EncodeOptions) -> Result<()
             let wrong_sign = (found < 0.0) != (exact < 0.0) && exact.abs() > tolerance;
             if !((found.abs() - exact.abs()).abs() <= tolerance) || wrong_sign {
                 let d = reference.diagonal;
-                return Err(format!("{kind:?} {precision:?} {p:?}: {:e} is not {:e} diagonals", found / d, exact / d));
+                return Err(format!(
+                    "{kind:?} {precision:?} {p:?}: {:e} is not {:e} diagonals",
+                    found / d,
+                    exact / d
+                ));
             }
         }
     }

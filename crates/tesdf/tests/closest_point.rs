@@ -49,9 +49,14 @@ fn certify(t: &Triangle, p: DVec3) -> Result<(), String> {
     if !((to.length() - found.distance).abs() <= 1e-14) {
         return Err(format!("{} is not the distance of {}, {}", found.distance, found.point, to.length()));
     }
-    let edges = (0..3).map(|k| to_edge(p, t.corners[k], t.corners[(k + 1) % 3])).fold(f64::INFINITY, f64::min);
+    let edges =
+        (0..3).map(|k| to_edge(p, t.corners[k], t.corners[(k + 1) % 3])).fold(f64::INFINITY, f64::min);
     if found.distance > edges + SLACK || found.distance < edges - width(&t.corners) - SLACK {
-        return Err(format!("{} at {p}, {edges} from the edges, width {}: {t:?}", found.distance, width(&t.corners)));
+        return Err(format!(
+            "{} at {p}, {edges} from the edges, width {}: {t:?}",
+            found.distance,
+            width(&t.corners)
+        ));
     }
     Ok(())
 }

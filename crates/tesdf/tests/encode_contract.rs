@@ -16,7 +16,8 @@ use tesdf::query::Precision;
 
 fn encode_on(threads: usize, solid: &SolidMesh, options: &EncodeOptions) -> TeSdf {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    pool.install(|| encode(solid, &Source::default(), options, &EncodeProgress::default())).expect("valid options")
+    pool.install(|| encode(solid, &Source::default(), options, &EncodeProgress::default()))
+        .expect("valid options")
 }
 
 fn ball() -> SolidMesh {
@@ -25,7 +26,8 @@ fn ball() -> SolidMesh {
 
 #[test]
 fn same_bytes_from_1_2_and_8_threads() {
-    let meshes = ["procedural/menger_2.obj", "public/mpl_palm.stl", "procedural/iso_m16_nut_c100.obj"].map(named);
+    let meshes =
+        ["procedural/menger_2.obj", "public/mpl_palm.stl", "procedural/iso_m16_nut_c100.obj"].map(named);
     let fast = EncodeOptions::preset(Preset::Fast);
     let compact = EncodeOptions::preset(Preset::Compact);
     let families = FAMILIES.map(|family| family.member(3));
@@ -128,10 +130,13 @@ fn odd_regions() {
     let solid = ball();
     for (at, size) in [(DVec3::new(1.7, 0.0, 0.3), 0.0), (DVec3::new(-40.0, 3.0, 8.0), 1.0)] {
         let (a, b) = (at, at + size);
-        let options = EncodeOptions { regions: vec![[a.x, a.y, a.z, b.x, b.y, b.z]], ..EncodeOptions::default() };
+        let options =
+            EncodeOptions { regions: vec![[a.x, a.y, a.z, b.x, b.y, b.z]], ..EncodeOptions::default() };
         let asset = encode_on(2, &solid, &options);
         for p in [a, b, 0.5 * (a + b)] {
-            let answer = asset.query_in_domain(p, Precision::F64).unwrap_or_else(|| panic!("{p} is not in the domain"));
+            let answer = asset
+                .query_in_domain(p, Precision::F64)
+                .unwrap_or_else(|| panic!("{p} is not in the domain"));
             let tree = encode_on(1, &solid, &EncodeOptions::default()).query(p, Precision::F64);
             assert!((answer.signed_distance - tree.signed_distance).abs() < 1e-12 * p.length());
         }

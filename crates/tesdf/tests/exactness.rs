@@ -1,7 +1,7 @@
 //! Every mesh of `data/`, encoded, against brute force and against the reference distances.
 //!
-//! `TESDF_TEST_POINTS=100000 cargo test --release -p tesdf --test exactness -- --nocapture` is the long run, with a table of
-//! the largest errors.
+//! `TESDF_TEST_POINTS=100000 TESDF_TEST_PRESET=default cargo test --release -p tesdf --test exactness -- --nocapture` is the
+//! long run, with a table of the largest errors.
 mod support;
 
 use std::fmt::Write as _;
@@ -24,10 +24,8 @@ use tesdf::query::{Answer, Precision};
 const POINTS: usize = 2700;
 /// Of those, the ones that are compared with all faces without a tree.
 const BRUTE: usize = 54;
-/// Meshes that are encoded with the default preset; the rest with `fast`, which takes a quarter of the time.
-const DEFAULT_PRESET: [&str; 5] = ["iso_m16_bolt_6k", "iso_m16_nut_c50", "lobed_hole_c100", "cup_thin", "spot"];
-/// Meshes of more faces get cells so coarse that encoding them takes seconds.
-const LARGE: usize = 50_000;
+/// Meshes that are encoded with the default preset in any case.
+const DEFAULT_PRESET: [&str; 3] = ["iso_m16_bolt_6k", "iso_m16_nut_c50", "lobed_hole_c100"];
 
 struct Sample {
     row: Row,
@@ -41,32 +39,38 @@ struct Sample {
 static SAMPLES: LazyLock<Vec<Result<Sample, String>>> = LazyLock::new(|| {
     let mut rows = meshes::manifest();
     rows.retain(|r| !meshes::CRACKED.contains(&r.name.as_str()));
-    // The largest first, so that no thread is left with it at the end.
-    rows.sort_by_key(|r| std::cmp::Reverse(r.faces));
-    rows.into_par_iter().with_max_len(1).map(Sample::new).collect()
+    rows.into_iter().map(Sample::new).collect()
 });
 
 impl Sample {
     fn new(row: Row) -> Result<Self, String> {
         let named = |e: String| format!("{}: {e}", row.name);
         let solid = row.solid().map_err(named)?;
-        let mut options = EncodeOptions::preset(match DEFAULT_PRESET.contains(&row.name.as_str()) {
-            true => Preset::Default,
-            false => Preset::Fast,
-        });
-        if row.faces > LARGE {
-            options = EncodeOptions { byte_worth: 2.0, tighten_levels: 0, ..options };
-        }
-        let t0 = std::time::Instant::now();
+        let options = options(&row);
         let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default())
             .map_err(|e| named(e.to_string()))?;
-        eprintln!("ENC {} {} {:?}", row.name, row.faces, t0.elapsed());
         let (reference, cells) = (Reference::new(solid.mesh()), Cells::of(&asset));
         Ok(Self { row, solid, asset, reference, cells })
     }
 
     fn points(&self) -> Vec<(Kind, DVec3)> {
         points::sample(self.solid.mesh(), &self.cells, points::count(POINTS))
+    }
+}
+
+/// `TESDF_TEST_PRESET` of all meshes; without it a mixture that takes minutes: a few with the default preset, large ones with
+/// coarser cells than any preset makes.
+fn options(row: &Row) -> EncodeOptions {
+    let fast = EncodeOptions::preset(Preset::Fast);
+    match std::env::var("TESDF_TEST_PRESET").as_deref() {
+        Ok("default") => EncodeOptions::default(),
+        Ok("fast") => fast,
+        Ok("compact") => EncodeOptions::preset(Preset::Compact),
+        Ok(other) => panic!("TESDF_TEST_PRESET is {other}; expected default, fast or compact"),
+        Err(_) if DEFAULT_PRESET.contains(&row.name.as_str()) => EncodeOptions::default(),
+        Err(_) if row.faces > 50_000 => EncodeOptions { byte_worth: 10.0, tighten_levels: 0, ..fast },
+        Err(_) if row.faces > 2_500 => EncodeOptions { byte_worth: 1.0, ..fast },
+        Err(_) => fast,
     }
 }
 
@@ -103,7 +107,11 @@ impl Mistakes {
     }
 
     fn result(self, of: usize) -> Result<(), String> {
-        if self.count == 0 { Ok(()) } else { Err(format!("{} mistakes at {of} points:{}", self.count, self.first)) }
+        if self.count == 0 {
+            Ok(())
+        } else {
+            Err(format!("{} mistakes at {of} points:{}", self.count, self.first))
+        }
     }
 }
 
@@ -205,8 +213,12 @@ fn answers_are_consistent() {
                     mistakes.add(|| format!("{precision:?} {:?}: {e}: {answer:?}", p.to_array()));
                 }
                 match s.asset.query_in_domain(p, precision) {
-                    Some(inside) if inside != answer => mistakes.add(|| format!("{p}: {inside:?} in the domain")),
-                    None if exact <= 0.05 * s.reference.diagonal => mistakes.add(|| format!("{p} is not in the domain")),
+                    Some(inside) if inside != answer => {
+                        mistakes.add(|| format!("{p}: {inside:?} in the domain"))
+                    }
+                    None if exact <= 0.05 * s.reference.diagonal => {
+                        mistakes.add(|| format!("{p} is not in the domain"))
+                    }
                     None => asides += 1,
                     Some(_) => {}
                 }
@@ -329,13 +341,15 @@ fn regions_belong_to_the_domain() {
         regions: vec![[a[0], a[1], a[2], b[0], b[1], b[2]]],
         ..EncodeOptions::default()
     };
-    let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("valid options");
+    let asset =
+        encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("valid options");
     let reference = Reference::new(solid.mesh());
     let mut random = support::random::Random(5);
     for i in 0..2000 {
         let t = (0.5 * random.in_cube() + 0.5).map(|x| if i % 3 == 0 { x.round() } else { x });
         let p = region[0] + t * (region[1] - region[0]);
-        let answer = asset.query_in_domain(p, Precision::F64).unwrap_or_else(|| panic!("{p} is not in the domain"));
+        let answer =
+            asset.query_in_domain(p, Precision::F64).unwrap_or_else(|| panic!("{p} is not in the domain"));
         let exact = reference.signed_distance(p);
         assert!((answer.signed_distance - exact).abs() <= reference.tolerance_f64(p), "{p}");
     }

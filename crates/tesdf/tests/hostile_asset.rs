@@ -23,7 +23,8 @@ fn ball() -> SolidMesh {
 
 /// A small asset with every kind of cell: outside, inside, crossing, far, not of the domain.
 fn small() -> TeSdf {
-    let options = EncodeOptions { byte_worth: 0.5, band: Length::OfDiagonal(0.3), ..EncodeOptions::default() };
+    let options =
+        EncodeOptions { byte_worth: 0.5, band: Length::OfDiagonal(0.3), ..EncodeOptions::default() };
     let source = Source { name: "ball.obj".into(), blake3: "0".repeat(64) };
     encode(&ball(), &source, &options, &EncodeProgress::default()).expect("valid options")
 }
@@ -44,7 +45,9 @@ fn the_golden_asset_answers() {
     let solid = ball();
     let (reference, cells) = (Reference::new(solid.mesh()), Cells::of(&asset));
     let band = 0.3 * reference.local_diagonal();
-    WellFormed { reference: &reference, cells: &cells, band, lattice: 2, most_cells: usize::MAX }.check().expect("cells");
+    WellFormed { reference: &reference, cells: &cells, band, lattice: 2, most_cells: usize::MAX }
+        .check()
+        .expect("cells");
     for (kind, p) in support::points::sample(solid.mesh(), &cells, 900) {
         let error = asset.signed_distance(p, Precision::F64) - reference.signed_distance(p);
         assert!(error.abs() <= reference.tolerance_f64(p), "{kind:?} {p}: {error:e}");
@@ -115,7 +118,10 @@ fn survives(bytes: &[u8], random: &mut Random) -> bool {
         }
         Err(e) => {
             let text = e.to_string();
-            assert!(text.contains("section") || text.contains("header") || text.contains("metadata"), "{text}");
+            assert!(
+                text.contains("section") || text.contains("header") || text.contains("metadata"),
+                "{text}"
+            );
             false
         }
     }
@@ -123,7 +129,17 @@ fn survives(bytes: &[u8], random: &mut Random) -> bool {
 
 /// A number that an index, a count, an offset or a coordinate least expects.
 fn hostile_bytes(random: &mut Random, width: usize, size: usize) -> [u8; 8] {
-    let word = [0, 1, u64::MAX, 1 << 31, (1 << 31) - 1, (7 << 28) | 1 << 31, size as u64, random.bits(), random.bits() % 64];
+    let word = [
+        0,
+        1,
+        u64::MAX,
+        1 << 31,
+        (1 << 31) - 1,
+        (7 << 28) | 1 << 31,
+        size as u64,
+        random.bits(),
+        random.bits() % 64,
+    ];
     let floats = [f64::NAN, f64::INFINITY, -1e300, 1e-300, f64::MIN_POSITIVE, 0.0, -0.0, 1e20, f64::MAX];
     let which = random.index(word.len());
     match (width, random.index(2)) {

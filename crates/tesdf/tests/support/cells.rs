@@ -65,7 +65,10 @@ impl Cells {
         let positions = match node {
             Node::Split(children) => {
                 let halves = [cell.child(0), cell.child(1)];
-                assert!(halves.iter().all(|h| h.volume() == 0.5 * cell.volume()), "children do not halve {cell:?}");
+                assert!(
+                    halves.iter().all(|h| h.volume() == 0.5 * cell.volume()),
+                    "children do not halve {cell:?}"
+                );
                 for (side, half) in halves.into_iter().enumerate() {
                     self.read(children as usize + side, half, lists, reached);
                 }
@@ -161,4 +164,3 @@ pub fn lattice(corners: &[DVec3; 4], n: usize) -> Vec<DVec3> {
     }
     points
 }
-

@@ -43,7 +43,11 @@ pub fn manifest() -> Vec<Row> {
                 path: folder.join(row[file]),
                 faces: row[faces].parse().expect("a count"),
                 repair: row[expect] == "repair",
-                references: row[references].split(' ').filter(|r| *r != "-").map(|r| data().join(r)).collect(),
+                references: row[references]
+                    .split(' ')
+                    .filter(|r| *r != "-")
+                    .map(|r| data().join(r))
+                    .collect(),
             }
         })
         .collect()

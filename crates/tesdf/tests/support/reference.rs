@@ -70,7 +70,9 @@ impl Reference {
         self.tree.visit(
             |b| b.overlaps(reach),
             |leaf| {
-                found.extend(leaf.iter().filter(|&&f| Aabb::of(&self.triangles[f as usize].corners).overlaps(reach)))
+                found.extend(
+                    leaf.iter().filter(|&&f| Aabb::of(&self.triangles[f as usize].corners).overlaps(reach)),
+                )
             },
         );
         found

@@ -167,9 +167,11 @@ impl Family {
             }
             Self::ThinWalls => {
                 let gap = 10f64.powf(random.between(-9.0, -5.0));
-                shape
-                    .add_box(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.5), 2)
-                    .add_box(DVec3::new(0.0, 0.0, 0.5 + gap), DVec3::new(1.0, 1.0, 0.5 + 2.0 * gap), 2)
+                shape.add_box(DVec3::ZERO, DVec3::new(1.0, 1.0, 0.5), 2).add_box(
+                    DVec3::new(0.0, 0.0, 0.5 + gap),
+                    DVec3::new(1.0, 1.0, 0.5 + 2.0 * gap),
+                    2,
+                )
             }
             Self::Slivers => {
                 let width = 10f64.powf(random.between(-8.0, -5.0));

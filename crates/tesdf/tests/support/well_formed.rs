@@ -73,7 +73,10 @@ impl WellFormed<'_> {
         let excess = (listed - exact.distance) / self.reference.local_diagonal();
         if excess > DELTA {
             let weights = barycentric(&leaf.cell.corners, p);
-            return Err(format!("face {face} at {:e} is nearer by {excess:e} diagonals at {weights:?}", exact.distance));
+            return Err(format!(
+                "face {face} at {:e} is nearer by {excess:e} diagonals at {weights:?}",
+                exact.distance
+            ));
         }
         Ok(())
     }
@@ -151,7 +154,11 @@ fn triangles_gap(a: &Triangle, b: &Triangle) -> f64 {
             for _ in 0..80 {
                 let (s, u) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
                 let at = |x: f64| o.closest(p + x * (q - p)).distance;
-                if at(s) < at(u) { high = u } else { low = s }
+                if at(s) < at(u) {
+                    high = u
+                } else {
+                    low = s
+                }
                 least = least.min(at(s));
             }
         }
