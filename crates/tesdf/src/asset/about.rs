@@ -91,7 +91,13 @@ pub struct Statistics {
 
 impl Statistics {
     /// Counts the leaves of six roots with their labels.
-    pub fn of(roots: &[Tree], labels: &[Label], cube: &DomainCube, mesh: &TriangleMesh, frame: LocalFrame) -> Self {
+    pub fn of(
+        roots: &[Tree],
+        labels: &[Label],
+        cube: &DomainCube,
+        mesh: &TriangleMesh,
+        frame: LocalFrame,
+    ) -> Self {
         let mut s = Self {
             faces: mesh.faces().len(),
             vertices: mesh.vertices().len(),

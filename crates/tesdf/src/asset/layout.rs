@@ -294,7 +294,10 @@ mod tests {
         hints.set(3, SignHint::Inside);
         hints.set(6, SignHint::Plane);
         hints.set(3, SignHint::Outside);
-        assert_eq!((hints.get(3), hints.get(6), hints.get(0)), (SignHint::Outside, SignHint::Plane, SignHint::Winding));
+        assert_eq!(
+            (hints.get(3), hints.get(6), hints.get(0)),
+            (SignHint::Outside, SignHint::Plane, SignHint::Winding)
+        );
     }
 
     #[test]

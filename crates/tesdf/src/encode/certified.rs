@@ -126,8 +126,7 @@ pub fn encode(
     let hints: Vec<u16> = tree.order().iter().map(|f| hints[in_order(f)].0).collect();
     let vertices: Vec<[f64; 3]> = mesh.vertices().iter().map(|v| v.to_array()).collect();
     let (offset, origin) = (frame.offset, cube.origin());
-    let placed =
-        [offset.x, offset.y, offset.z, frame.scale, origin.x, origin.y, origin.z, cube.side()];
+    let placed = [offset.x, offset.y, offset.z, frame.scale, origin.x, origin.y, origin.z, cube.side()];
     let low: Vec<u16> = forest.palettes.iter().map(|&f| f as u16).collect();
     let high: Vec<u8> = forest.palettes.iter().map(|&f| (f >> 16) as u8).collect();
     let (tree_boxes, tree_children) = face_tree(&tree, &cube);
@@ -182,7 +181,11 @@ fn validated(options: &EncodeOptions, diagonal: f64) -> Result<f64, EncodeError>
     }
     for r in options.region_boxes() {
         if !(r.min.is_finite() && r.max.is_finite() && r.min.cmple(r.max).all()) {
-            return wrong("region", format!("{} to {}", r.min, r.max), "min x y z and a max that is not less");
+            return wrong(
+                "region",
+                format!("{} to {}", r.min, r.max),
+                "min x y z and a max that is not less",
+            );
         }
     }
     Ok(band)
@@ -265,10 +268,7 @@ fn face_tree(tree: &AabbTree, cube: &DomainCube) -> (Vec<[f32; 12]>, Vec<[u32; 2
     if let (bounds, Child::Leaf { start, end }) = tree.root() {
         // A tree of one leaf is written as a node with two: a closed mesh has at least two faces.
         let half = start + (end - start) / 2;
-        nodes.push([
-            (bounds, Child::Leaf { start, end: half }),
-            (bounds, Child::Leaf { start: half, end }),
-        ]);
+        nodes.push([(bounds, Child::Leaf { start, end: half }), (bounds, Child::Leaf { start: half, end })]);
     }
     let boxes = nodes.iter().map(|node| {
         let mut out = [0.0; 12];

@@ -108,7 +108,10 @@ fn within(a: &Triangle, b: &Triangle, distance: f64) -> bool {
     let (ea, eb) = (edges(a), edges(b));
     let separated = |axis: DVec3| {
         let span = |t: &Triangle| {
-            t.corners.iter().map(|c| c.dot(axis)).fold((f64::INFINITY, f64::NEG_INFINITY), |s, x| (s.0.min(x), s.1.max(x)))
+            t.corners
+                .iter()
+                .map(|c| c.dot(axis))
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |s, x| (s.0.min(x), s.1.max(x)))
         };
         let (sa, sb) = (span(a), span(b));
         (sa.0 - sb.1).max(sb.0 - sa.1) > distance * axis.length()
@@ -133,7 +136,11 @@ fn edge_hint(surface: &Surface, face: u32, k: usize) -> SignHint {
     }
     // Convex when the other face's far corner lies behind this face.
     let a = t.corners[k];
-    let apex = o.corners.iter().map(|&c| t.normal.dot(c - a)).fold(0.0, |m: f64, h| if h.abs() > m.abs() { h } else { m });
+    let apex = o
+        .corners
+        .iter()
+        .map(|&c| t.normal.dot(c - a))
+        .fold(0.0, |m: f64, h| if h.abs() > m.abs() { h } else { m });
     if apex < 0.0 { SignHint::Outside } else { SignHint::Inside }
 }
 

@@ -65,7 +65,8 @@ mod tests {
 
     #[test]
     fn vertices_map_exactly() {
-        for (center, size) in [(0.0, 0.02), (1e6, 0.02), (-1e6, 0.02), (0.0, 1e30), (0.0, 1e-30), (1.0, 1.5)] {
+        for (center, size) in [(0.0, 0.02), (1e6, 0.02), (-1e6, 0.02), (0.0, 1e30), (0.0, 1e-30), (1.0, 1.5)]
+        {
             let corners: Vec<DVec3> = (0..8)
                 .map(|i| {
                     DVec3::splat(center)

@@ -13,7 +13,7 @@ use crate::geometry::Triangle;
 /// A face in `f32`, relative to the middle of the cube, in one cache line: corner a, b − a, c − a, unit normal,
 /// inverse squared lengths of b − a, c − a, c − b, and the bits of the sign hints.
 ///
-/// Without area the normal is NaN, which fails the test for the prism over the face: only edges count. The inverse
+/// Without area, or nearly so, the normal is NaN, which fails the test for the prism over the face: only edges count. The inverse
 /// of a length of zero is 0, which makes the closest point of that edge its start.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
@@ -22,12 +22,18 @@ pub struct FaceRecord(Record);
 type Record = [f32; 16];
 const HINTS: usize = 15;
 
+/// Faces of less height than this (local frame) are no more than their edges: rounding may have turned them over, and
+/// then no prism stands on them. Half of it is within what `f32` promises, 1e-6 × diagonal.
+const FLAT: f64 = 7e-7;
+
 impl FaceRecord {
     /// Rounds a triangle of the local frame.
     pub fn new(triangle: &Triangle, middle: DVec3, hints: SignHints) -> Self {
         let [a, b, c] = triangle.corners.map(|p| (p - middle).as_vec3());
-        let n = triangle.normal.as_vec3();
-        let n = if n == Vec3::ZERO { Vec3::NAN } else { n };
+        let (u, v) = ((b - a).as_dvec3(), (c - a).as_dvec3());
+        let longest = u.length().max(v.length()).max((u - v).length());
+        let flat = u.cross(v).dot(triangle.normal) < FLAT * longest;
+        let n = if flat { Vec3::NAN } else { triangle.normal.as_vec3() };
         let inverse = |v: Vec3| {
             let inverse = 1.0 / v.as_dvec3().length_squared();
             if inverse < f64::from(f32::MAX) { inverse as f32 } else { 0.0 }
@@ -222,10 +228,6 @@ impl<L> V<L> {
         L: Lanes<N>,
     {
         let ([a, b, c], [x, y, z]) = (self.0, o.0);
-        Self([
-            c.neg_mul_add(y, b.mul(z)),
-            a.neg_mul_add(z, c.mul(x)),
-            b.neg_mul_add(x, a.mul(y)),
-        ])
+        Self([c.neg_mul_add(y, b.mul(z)), a.neg_mul_add(z, c.mul(x)), b.neg_mul_add(x, a.mul(y))])
     }
 }
