@@ -1,5 +1,6 @@
 use std::fmt;
 
+use super::count::count;
 use super::{CheckReport, Defect, Severity, TriangleMesh, check};
 
 /// A mesh with a well-defined inside: what the encoder accepts, valid by construction.
@@ -83,7 +84,11 @@ const NAMED: usize = 3;
 impl fmt::Display for NotSolid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let errors: Vec<&Defect> = self.report.of_severity(Severity::Error).collect();
-        write!(f, "the mesh has no well-defined inside ({} errors; ids are 0-based): ", errors.len())?;
+        write!(
+            f,
+            "the mesh has no well-defined inside ({}; ids are 0-based): ",
+            count(errors.len(), "error", "errors")
+        )?;
         for (i, error) in errors.iter().take(NAMED).enumerate() {
             write!(f, "{}{}", if i > 0 { "; " } else { "" }, error.message)?;
         }
