@@ -130,6 +130,7 @@ fn precision_text(p: &PrecisionReport) -> String {
     if p.gradient_mistakes > 0 {
         text += &place(p.worst_gradient.as_ref());
     }
+    text += "    points                       largest error\n";
     let classes = p.classes.iter().filter(|c| c.points > 0);
     classes.for_each(|c| {
         text += &format!(

@@ -2,7 +2,6 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::PointClass;
-use crate::geometry::Triangle;
 use crate::mesh::TriangleMesh;
 use crate::query::{Answer, Precision};
 
@@ -153,14 +152,14 @@ impl Comparison {
         &self.promise
     }
 
-    /// Compares one answer; `face` is the triangle that it names.
+    /// Compares one answer; `offset` is from the closest point of the face that it names to `p`.
     pub(super) fn add(
         &mut self,
         class: PointClass,
         p: DVec3,
         expected: f64,
         answer: &Answer,
-        face: Option<&Triangle>,
+        offset: Option<DVec3>,
     ) {
         let found = answer.signed_distance;
         let at = || Worst { point: p.to_array(), class, expected, found, face: answer.face };
@@ -177,7 +176,7 @@ impl Comparison {
             self.sign_mistakes += 1;
             self.sign.add(expected.abs(), at);
         }
-        match gradient_error(p, expected, answer, face, &self.promise) {
+        match gradient_error(p, expected, answer, offset, &self.promise) {
             Some(angle) => {
                 self.gradient_mistakes += usize::from(!(angle <= self.promise.gradient));
                 self.gradient.add(angle, at);
@@ -243,18 +242,17 @@ fn gradient_error(
     p: DVec3,
     expected: f64,
     answer: &Answer,
-    face: Option<&Triangle>,
+    offset: Option<DVec3>,
     promise: &Promise,
 ) -> Option<f64> {
     let bound = promise.distance(p);
     if expected.abs() < (promise.gradient_from * promise.diagonal).max(10.0 * bound) {
         return None;
     }
-    let closest = face?.closest(p);
-    if closest.distance > expected.abs() + 2.0 * bound {
+    let Some(offset) = offset.filter(|o| o.length() <= expected.abs() + 2.0 * bound) else {
         return Some(f64::INFINITY);
-    }
-    let direction = expected.signum() * (p - closest.point) / closest.distance;
+    };
+    let direction = expected.signum() * offset.normalize();
     // The chord, which sees a wrong length too.
     Some((answer.gradient - direction).length())
 }

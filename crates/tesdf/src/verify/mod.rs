@@ -3,6 +3,7 @@
 //! Comes in: an opened asset. Goes out: for each [`Precision`] the largest error, wrong signs and wrong gradients, each with
 //! the point where it is. Nothing of the lists, the forest or the face tree is used for the comparison, only the mesh that
 //! the asset holds.
+mod brute_force;
 mod compare;
 mod samples;
 
@@ -13,9 +14,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::TeSdf;
-use crate::geometry::{Triangle, WindingNumber};
+use crate::geometry::WindingNumber;
 use crate::mesh::{MeshError, Topology, TriangleMesh};
 use crate::query::Precision;
+use brute_force::BruteForce;
 use compare::Comparison;
 pub use compare::{ClassErrors, PrecisionReport, Promise, Worst};
 pub use samples::PointClass;
@@ -98,7 +100,9 @@ pub fn verify(
     }
     let winding = WindingNumber::new(&mesh);
     let sampler = Sampler::new(asset, &mesh, &winding, options.seed);
-    let truth = Truth { triangles: triangles_of(&mesh), ids, winding: &winding, mesh: &mesh };
+    let mut place = vec![None; ids.len()];
+    ids.iter().enumerate().for_each(|(at, &id)| place[id as usize] = Some(at));
+    let truth = Truth { faces: BruteForce::new(&mesh, diagonal), place, winding: &winding, mesh: &mesh };
     let samples = options.samples as u64;
     let done = AtomicUsize::new(0);
     let found = (0..samples.div_ceil(CHUNK))
@@ -132,27 +136,13 @@ fn mesh_of(asset: &TeSdf) -> Result<(TriangleMesh, Vec<u32>), MeshError> {
     Ok((TriangleMesh::new(vertices, asset.faces.to_vec())?, asset.face_ids.to_vec()))
 }
 
-fn triangles_of(mesh: &TriangleMesh) -> Vec<Triangle> {
-    (0..mesh.faces().len()).map(|f| Triangle::new(mesh.triangle(f))).collect()
-}
-
-/// The mesh, without anything that finds its parts fast.
+/// What the answers are compared with.
 struct Truth<'a> {
-    triangles: Vec<Triangle>,
-    ids: Vec<u32>,
+    faces: BruteForce,
+    /// Place in `faces` of each face of the source.
+    place: Vec<Option<usize>>,
     winding: &'a WindingNumber,
     mesh: &'a TriangleMesh,
-}
-
-impl Truth<'_> {
-    fn distance(&self, p: DVec3) -> f64 {
-        self.triangles.iter().map(|t| t.closest(p).distance).fold(f64::INFINITY, f64::min)
-    }
-
-    /// The face with this id in the source.
-    fn face(&self, id: u32) -> Option<&Triangle> {
-        self.ids.iter().position(|&i| i == id).map(|at| &self.triangles[at])
-    }
 }
 
 struct Found {
@@ -173,7 +163,7 @@ impl Found {
 
     fn add(&mut self, asset: &TeSdf, truth: &Truth, index: u64, p: DVec3) {
         let class = PointClass::of_index(index);
-        let distance = truth.distance(p);
+        let distance = truth.faces.distance(p);
         let winding = truth.winding.at_perturbed(p);
         // Where rounding could put the point on the surface, either answer of the other way is right.
         if index.is_multiple_of(BRUTE_FORCE_EVERY) && distance > self.comparisons[1].promise().distance(p) {
@@ -183,7 +173,10 @@ impl Found {
         let expected = if winding >= 1 { -distance } else { distance };
         for comparison in &mut self.comparisons {
             let answer = asset.query(p, comparison.precision());
-            comparison.add(class, p, expected, &answer, truth.face(answer.face));
+            // From the closest point of the face that the answer names.
+            let place = truth.place.get(answer.face as usize).copied().flatten();
+            let offset = place.map(|at| truth.faces.offset(at, p));
+            comparison.add(class, p, expected, &answer, offset);
         }
     }
 
