@@ -135,7 +135,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let LoadedMesh { mesh, report: load, .. } = mesh_file::read(&args.mesh)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.mesh.display()));
     let solid = pool.install(|| SolidMesh::new(mesh)).map_err(|e| at(&e))?;
-    load.notes.iter().for_each(|note| report::note(note));
+    load.notes.iter().for_each(|note| report::warning(note));
     warn(solid.warnings());
 
     let name = args.mesh.file_name().unwrap_or_default().to_string_lossy().into_owned();
