@@ -1,11 +1,22 @@
 //! `tesdf encode MESH -o FILE`
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
+use rayon::ThreadPoolBuilder;
+use serde::Serialize;
+use tesdf::TeSdf;
+use tesdf::asset::about::{Certificate, Source, Statistics};
+use tesdf::encode::{EncodeError, EncodeOptions, EncodeProgress, Length, Stage, encode};
 use tesdf::geometry::Aabb;
+use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 
-use crate::parse;
+use crate::progress::{Progress, interrupt_flag};
+use crate::report::{self, Failure, Outcome};
+use crate::{mesh_file, parse};
 
 /// Arguments of `tesdf encode`.
 #[derive(clap::Args, Debug)]
@@ -64,4 +75,194 @@ pub enum Preset {
     Fast,
     /// Smallest
     Compact,
+}
+
+impl From<Preset> for tesdf::encode::Preset {
+    fn from(preset: Preset) -> Self {
+        match preset {
+            Preset::Default => Self::Default,
+            Preset::Fast => Self::Fast,
+            Preset::Compact => Self::Compact,
+        }
+    }
+}
+
+impl Args {
+    /// What the library is asked for.
+    pub fn options(&self) -> EncodeOptions {
+        // The library has one of each so far; a second one makes these patterns an error.
+        let (Domain::Bisection, Encoder::Certified) = (self.domain, self.encoder);
+        let mut options = EncodeOptions::preset(self.preset.into());
+        if let Some(band) = self.band {
+            options.band = Length::Absolute(band);
+        }
+        let numbers = |r: &Aabb| [r.min.x, r.min.y, r.min.z, r.max.x, r.max.y, r.max.z];
+        options.regions = self.regions.iter().map(numbers).collect();
+        options.unit.clone_from(&self.unit);
+        options
+    }
+}
+
+/// What `--json` prints; all ids are 0-based.
+#[derive(Serialize)]
+struct Report<'a> {
+    file: String,
+    output: String,
+    load: &'a LoadReport,
+    warnings: &'a [Defect],
+    bytes: usize,
+    bytes_per_face: f64,
+    seconds: f64,
+    options: &'a EncodeOptions,
+    source: &'a Source,
+    statistics: &'a Statistics,
+    certificate: &'a Certificate,
+}
+
+/// Reads, checks and encodes a mesh, and saves the result in one step at the end.
+///
+/// # Errors
+/// The mesh cannot be read or has no well-defined inside, an option has no meaning for it, the file cannot be written, or
+/// Ctrl-C was pressed. The output file is then as it was.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let mut pool = ThreadPoolBuilder::new();
+    if let Some(threads) = args.threads {
+        pool = pool.num_threads(threads.get());
+    }
+    let pool = pool.build().map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;
+    check_output(&args.mesh, &args.output)?;
+    let start = Instant::now();
+    let LoadedMesh { mesh, report: load, .. } = mesh_file::read(&args.mesh)?;
+    let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.mesh.display()));
+    let solid = pool.install(|| SolidMesh::new(mesh)).map_err(|e| at(&e))?;
+    load.notes.iter().for_each(|note| report::warning(note));
+    warn(solid.warnings());
+
+    let name = args.mesh.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let source = Source { name, blake3: load.source_blake3.clone() };
+    let interrupted = interrupt_flag()?;
+    let progress = EncodeProgress::default();
+    let options = args.options();
+    let encoded =
+        watched(&progress, &interrupted, || pool.install(|| encode(&solid, &source, &options, &progress)));
+    let asset: TeSdf = match encoded {
+        Ok(asset) if !interrupted.load(Ordering::Relaxed) => asset,
+        Ok(_) | Err(EncodeError::Cancelled) => {
+            return Err(Failure::new(format!("interrupted; {} is as it was", args.output.display())));
+        }
+        Err(e) => return Err(at(&e)),
+    };
+    asset.save(&args.output).map_err(Failure::new)?;
+    let seconds = start.elapsed().as_secs_f64();
+    print(args, &load, solid.warnings(), &asset, seconds)?;
+    Ok(Outcome::Good)
+}
+
+/// What would be noticed only after the work.
+fn check_output(mesh: &Path, output: &Path) -> Result<(), Failure> {
+    let folder = match output.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    if !folder.is_dir() {
+        return Err(Failure::new(format!(
+            "cannot write {}: there is no folder {}",
+            output.display(),
+            folder.display()
+        )));
+    }
+    let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
+    if same(mesh, output) {
+        return Err(Failure::new(format!(
+            "{} is the mesh itself; give another file to -o",
+            output.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Defects of each kind that are printed; `tesdf check` prints more.
+const SHOWN: usize = 3;
+
+fn warn(defects: &[Defect]) {
+    for (i, defect) in defects.iter().enumerate() {
+        let alike = |d: &&Defect| d.kind == defect.kind && d.severity == defect.severity;
+        let print = if defect.severity == Severity::Note { report::note } else { report::warning };
+        match defects[..i].iter().filter(alike).count() {
+            before if before < SHOWN => print(&defect.message),
+            SHOWN => print(&format!(
+                "... {} {} in all; `tesdf check` lists them",
+                defects.iter().filter(alike).count(),
+                defect.kind
+            )),
+            _ => {}
+        }
+    }
+}
+
+/// Runs `work` while another thread draws its progress and hands Ctrl-C on.
+fn watched<T>(progress: &EncodeProgress, interrupted: &AtomicBool, work: impl FnOnce() -> T) -> T {
+    let done = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let watcher = scope.spawn(|| {
+            let bar = Progress::new("encoding");
+            while !done.load(Ordering::Acquire) {
+                if interrupted.load(Ordering::Relaxed) {
+                    progress.cancel();
+                }
+                let (stage, share) = progress.state();
+                bar.stage(match stage {
+                    Stage::Refine => "1/3 cutting space into cells",
+                    Stage::Tighten => "2/3 shortening lists",
+                    Stage::Assemble => "3/3 laying out the file",
+                });
+                bar.set(share);
+                thread::park_timeout(Duration::from_millis(100));
+            }
+        });
+        // Also when `work` panics, or the scope would wait for the watcher for ever.
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
+        done.store(true, Ordering::Release);
+        watcher.thread().unpark();
+        result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+fn print(
+    args: &Args,
+    load: &LoadReport,
+    warnings: &[Defect],
+    asset: &TeSdf,
+    seconds: f64,
+) -> Result<(), Failure> {
+    let about = asset.about();
+    let statistics = &about.statistics;
+    let bytes = asset.as_bytes().len();
+    let bytes_per_face = bytes as f64 / statistics.faces as f64;
+    let [file, output] = [&args.mesh, &args.output].map(|path| path.display().to_string());
+    if args.json {
+        return report::json(&Report {
+            file,
+            output,
+            load,
+            warnings,
+            bytes,
+            bytes_per_face,
+            seconds,
+            options: &about.options,
+            source: &about.source,
+            statistics,
+            certificate: &about.certificate,
+        });
+    }
+    let cells = statistics.listed_cells + statistics.far_cells;
+    let mean = statistics.entries as f64 / statistics.listed_cells.max(1) as f64;
+    report::table(&[
+        ("mesh", format!("{file}, {}", report::count(statistics.faces, "face"))),
+        ("file", format!("{output}, {}, {bytes_per_face:.0} per face", report::size(bytes))),
+        ("cells", format!("{cells}, of which {} with a list", statistics.listed_cells)),
+        ("lists", format!("{mean:.1} faces on average, at most {}", statistics.longest_list)),
+        ("exact", format!("to {:.1e} of the diagonal, proven", about.certificate.delta_of_diagonal)),
+        ("time", format!("{seconds:.1} s")),
+    ])
 }

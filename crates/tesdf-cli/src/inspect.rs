@@ -1,6 +1,15 @@
 //! `tesdf inspect FILE`
 use std::path::PathBuf;
 
+use serde::Serialize;
+use tesdf::asset::FORMAT_VERSION;
+use tesdf::asset::about::{Certificate, Source, Statistics};
+use tesdf::encode::{EncodeOptions, Length};
+use tesdf::inspect::{InspectOptions, Inspection, inspect};
+
+use crate::asset_file;
+use crate::report::{self, Failure, Outcome, count, size};
+
 /// Arguments of `tesdf inspect`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
@@ -9,4 +18,127 @@ pub struct Args {
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    file: String,
+    format_version: u32,
+    unit: Option<&'a str>,
+    #[serde(flatten)]
+    found: &'a Inspection,
+    source: &'a Source,
+    options: &'a EncodeOptions,
+    certificate: &'a Certificate,
+    statistics: &'a Statistics,
+}
+
+/// Opens an asset, which checks its structure, and prints what is in it.
+///
+/// # Errors
+/// The asset cannot be opened, or stdout cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let asset = asset_file::open(&args.file)?;
+    let found = inspect(&asset, &InspectOptions::default());
+    let about = asset.about();
+    let report = Report {
+        file: args.file.display().to_string(),
+        format_version: FORMAT_VERSION,
+        unit: about.options.unit.as_deref(),
+        found: &found,
+        source: &about.source,
+        options: &about.options,
+        certificate: &about.certificate,
+        statistics: &about.statistics,
+    };
+    if args.json {
+        report::json(&report)?;
+    } else {
+        report::table(&rows(&report))?;
+    }
+    Ok(Outcome::Good)
+}
+
+fn rows(report: &Report) -> Vec<(String, String)> {
+    let Report { source, options, certificate, statistics, .. } = report;
+    let Inspection { counts, lists, reads, memory } = report.found;
+    let unit = report.unit.map_or(String::new(), |unit| format!(" {unit}"));
+    let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+    let yes_no = |b: bool| if b { "yes" } else { "no" };
+    let band = match options.band {
+        Length::OfDiagonal(share) => format!("{} of the diagonal", percent(share)),
+        Length::Absolute(length) => format!("{length}{unit}"),
+    };
+    let list_sizes = format!(
+        "half up to {}, 9 of 10 up to {}, 99 of 100 up to {}, longest {}",
+        lists.p50, lists.p90, lists.p99, lists.longest
+    );
+    let mut rows: Vec<(&str, String)> = vec![
+        ("file", format!("{}, format version {}", report.file, report.format_version)),
+        ("source", if source.name.is_empty() { "made in memory".into() } else { source.name.clone() }),
+        ("source BLAKE3", if source.blake3.is_empty() { "-".into() } else { source.blake3.clone() }),
+        ("unit", report.unit.unwrap_or("not given").into()),
+        ("", String::new()),
+        ("mesh", format!("{}, {}", count(counts.faces, "face"), count(counts.vertices, "vertex"))),
+        ("diagonal", format!("{}{unit}", statistics.diagonal)),
+        (
+            "cells with a list",
+            format!("{}, {} of them at the surface", counts.listed_cells, counts.crossing_cells),
+        ),
+        ("cells without", format!("{}, answered by the face tree", counts.far_cells)),
+        ("deepest cell", count(counts.depth as usize, "bisection")),
+        ("list entries", format!("{}, {:.2} per cell", counts.entries, lists.mean)),
+        ("list lengths", list_sizes),
+        ("", String::new()),
+        ("reads per query", format!("{:.2} within 2 % of the diagonal from the surface", reads.near_surface)),
+        ("", format!("{:.2} by volume, the face tree's reads included", reads.volume_weighted)),
+        (
+            "face tree",
+            format!(
+                "answers {} of the volume with {:.1} reads, {} near the surface",
+                percent(reads.fallback_volume),
+                reads.fallback,
+                percent(reads.near_surface_fallback)
+            ),
+        ),
+        ("", String::new()),
+    ];
+    let mut bytes: Vec<(&str, String)> =
+        memory.parts.iter().map(|(name, bytes)| (name.as_str(), format!("{bytes:>12} B"))).collect();
+    bytes.push(("file in all", format!("{:>12} B  {}", memory.file, size(memory.file))));
+    bytes.push((
+        "resident in all",
+        format!("{:>12} B  {}, {:.1} per face", memory.whole, size(memory.whole), memory.whole_per_face),
+    ));
+    bytes.push(("lists and tree", format!("{:>12} B  domain.*, lists.* and entries", memory.lists_and_tree)));
+    bytes.push((
+        "as in the paper",
+        format!(
+            "{:>12} B  {:.3} MiB: 4 per list entry, 16 per tetrahedron with a list",
+            memory.paper, memory.paper_mib
+        ),
+    ));
+    rows.append(&mut bytes);
+    let exact = match certificate.exactness_distance {
+        None => "in the whole domain".into(),
+        Some(distance) => format!("up to {distance}{unit} from the surface"),
+    };
+    rows.extend([
+        ("", String::new()),
+        ("encoder", format!("{}, domain {}", certificate.encoder, certificate.domain)),
+        (
+            "exact",
+            format!(
+                "{exact}, to {:.1e}{unit} ({:.1e} of the diagonal)",
+                certificate.delta, certificate.delta_of_diagonal
+            ),
+        ),
+        ("lists cut", yes_no(certificate.truncated).into()),
+        ("band", band),
+        ("regions", options.regions.len().to_string()),
+        ("byte worth", options.byte_worth.to_string()),
+        ("tighten levels", options.tighten_levels.to_string()),
+    ]);
+    rows.into_iter().map(|(name, value)| (name.to_string(), value)).collect()
 }

@@ -9,6 +9,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub mod asset_file;
 pub mod check;
 pub mod completions;
 pub mod encode;
@@ -80,15 +81,14 @@ pub fn main() -> ExitCode {
 }
 
 fn run(command: &Command) -> Result<Outcome, Failure> {
-    let unwired = |name: &str| Err(Failure::new(format!("this build cannot {name}")));
     match command {
         Command::Check(args) => check::run(args),
         Command::Repair(args) => repair::run(args),
-        Command::Encode(_) => unwired("encode"),
-        Command::Query(_) => unwired("query"),
-        Command::Inspect(_) => unwired("inspect"),
-        Command::Verify(_) => unwired("verify"),
-        Command::Slice(_) => unwired("slice"),
+        Command::Encode(args) => encode::run(args),
+        Command::Query(args) => query::run(args),
+        Command::Inspect(args) => inspect::run(args),
+        Command::Verify(args) => verify::run(args),
+        Command::Slice(args) => slice::run(args),
         Command::Completions(args) => completions::run(args),
     }
 }

@@ -3,7 +3,7 @@ use std::path::Path;
 
 use tesdf::mesh::{LoadReport, LoadedMesh, ReadError};
 
-use crate::report::Failure;
+use crate::report::{Failure, count};
 
 /// Reads a mesh; the message names the file.
 ///
@@ -19,8 +19,8 @@ pub fn read(path: &Path) -> Result<LoadedMesh, Failure> {
 /// What was read, as lines for a person.
 pub fn describe(path: &Path, load: &LoadReport) -> String {
     let LoadReport { format, vertices_in_file, faces_in_file, .. } = load;
-    let mut text =
-        format!("{}: {format}, {faces_in_file} faces, {vertices_in_file} vertices\n", path.display());
+    let (faces, vertices) = (count(*faces_in_file, "face"), count(*vertices_in_file, "vertex"));
+    let mut text = format!("{}: {format}, {faces}, {vertices}\n", path.display());
     for note in &load.notes {
         text += &format!("note: {note}\n");
     }

@@ -27,6 +27,15 @@ impl Progress {
         Self { bar }
     }
 
+    /// Names what is being done now; the estimate begins anew when that changes.
+    pub fn stage(&self, what: &'static str) {
+        if self.bar.message() != what {
+            self.bar.set_message(what);
+            self.bar.set_position(0);
+            self.bar.reset_eta();
+        }
+    }
+
     /// Sets the share done, 0 to 1; may be called from any thread.
     pub fn set(&self, share: f64) {
         self.bar.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);

@@ -93,6 +93,39 @@ pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
 pub fn table<N: AsRef<str>, V: fmt::Display>(rows: &[(N, V)]) -> Result<(), Failure> {
     let width = rows.iter().map(|(name, _)| name.as_ref().chars().count()).max().unwrap_or(0);
     let text: String =
-        rows.iter().map(|(name, value)| format!("{:<width$}  {value}\n", name.as_ref())).collect();
+        rows.iter().map(|(name, value)| format!("{:<width$}  {value}", name.as_ref()).trim_end().to_string() + "\n").collect();
     result(text.as_bytes())
+}
+
+/// A number with the word for it: `1 face`, `2 faces`.
+pub fn count(number: usize, word: &str) -> String {
+    let plural = match word.strip_suffix("ex") {
+        Some(stem) => format!("{stem}ices"),
+        None => format!("{word}s"),
+    };
+    format!("{number} {}", if number == 1 { word } else { &plural })
+}
+
+/// A number of bytes for people, in powers of 1000.
+pub fn size(bytes: usize) -> String {
+    match bytes as f64 {
+        b if b < 1e3 => count(bytes, "byte"),
+        b if b < 1e6 => format!("{:.2} kB", b / 1e3),
+        b if b < 1e9 => format!("{:.3} MB", b / 1e6),
+        b => format!("{:.3} GB", b / 1e9),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_their_words() {
+        assert_eq!(
+            [count(1, "vertex"), count(2, "vertex"), count(0, "face")],
+            ["1 vertex", "2 vertices", "0 faces"]
+        );
+        assert_eq!([size(1), size(1500), size(2_345_678)], ["1 byte", "1.50 kB", "2.346 MB"]);
+    }
 }

@@ -5,8 +5,11 @@ pub mod asset;
 pub mod domain;
 pub mod encode;
 pub mod geometry;
+pub mod inspect;
 pub mod mesh;
 pub mod query;
+mod sampling;
+pub mod verify;
 
 pub use asset::TeSdf;
 pub use glam;

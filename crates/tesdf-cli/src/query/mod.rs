@@ -2,13 +2,15 @@
 mod points;
 
 use std::fs::File;
+use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
-use rayon::prelude::*;
-use tesdf::glam::DVec3;
+use tesdf::query::Precision;
 
-pub use points::{PointsError, read, write};
+pub use points::{HEADER, PointsError, read, write};
 
+use crate::asset_file;
+use crate::progress::Progress;
 use crate::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf query`.
@@ -21,31 +23,32 @@ pub struct Args {
     pub points: PathBuf,
 }
 
-/// What the surface closest to a point is like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Answer {
-    /// Signed distance, negative inside; mesh unit.
-    pub signed_distance: f64,
-    /// Unit gradient, outwards.
-    pub gradient: DVec3,
-    /// Closest point on the surface, mesh unit.
-    pub closest: DVec3,
-    /// Face of the closest point, 0-based.
-    pub face: u32,
-}
+/// Points that are answered before their rows are written: enough work for all threads, some MB of text.
+const CHUNK: usize = 1 << 15;
 
-/// Reads the points, asks `answer` for each that is finite, from several threads, and prints the rows in order.
+/// Reads the points, answers them on the f64 path, and prints the rows in order. A point that is not finite has a row
+/// without an answer.
 ///
 /// # Errors
-/// The points cannot be read, naming line and column, or stdout cannot be written.
-pub fn run(args: &Args, answer: impl Fn(DVec3) -> Option<Answer> + Sync) -> Result<Outcome, Failure> {
+/// The asset or the points cannot be read, naming line and column, or stdout cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let asset = asset_file::open(&args.file)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.points.display()));
     let file = File::open(&args.points).map_err(|e| at(&e))?;
     let points =
         read(file).map_err(|e| at(&e).hint("expected a CSV file whose header has the columns x, y, z"))?;
-    let answers: Vec<_> = points.par_iter().map(|&p| if p.is_finite() { answer(p) } else { None }).collect();
-    let mut table = Vec::new();
-    write(&mut table, &points, &answers).map_err(|e| Failure::new(format!("cannot write the rows: {e}")))?;
-    report::result(&table)?;
+    // Rows that run over the terminal show the progress themselves.
+    let bar = (!io::stdout().is_terminal()).then(|| Progress::new("querying"));
+    report::result(HEADER.as_bytes())?;
+    let mut rows = Vec::new();
+    for (i, chunk) in points.chunks(CHUNK).enumerate() {
+        rows.clear();
+        write(&mut rows, chunk, &asset.query_batch(chunk, Precision::F64))
+            .map_err(|e| Failure::new(format!("cannot write the rows: {e}")))?;
+        report::result(&rows)?;
+        if let Some(bar) = &bar {
+            bar.set((i * CHUNK + chunk.len()) as f64 / points.len() as f64);
+        }
+    }
     Ok(Outcome::Good)
 }

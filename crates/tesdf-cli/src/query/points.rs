@@ -2,8 +2,7 @@
 use std::io::{self, Read, Write};
 
 use tesdf::glam::DVec3;
-
-use super::Answer;
+use tesdf::query::Answer;
 
 /// Why points cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -114,23 +113,23 @@ fn line_of(bytes: &[u8], start: u64) -> usize {
     1 + before.iter().enumerate().filter(|&at| ends(at)).count()
 }
 
-/// Writes one row per point. Numbers are the shortest that give the same f64 again; a point without an answer has `NaN`
-/// in every column but the first three, and an empty face.
+/// The header of the answers.
+pub const HEADER: &str = "x,y,z,signed_distance,gx,gy,gz,cx,cy,cz,face\n";
+
+/// Writes one row per point. Numbers are the shortest that give the same f64 again; a point without an answer (one that
+/// is not finite) has `NaN` in every column but the first three, and an empty face.
 ///
 /// # Errors
 /// When `out` cannot be written.
-pub fn write(mut out: impl Write, points: &[DVec3], answers: &[Option<Answer>]) -> io::Result<()> {
-    out.write_all(b"x,y,z,signed_distance,gx,gy,gz,cx,cy,cz,face\n")?;
+pub fn write(mut out: impl Write, points: &[DVec3], answers: &[Answer]) -> io::Result<()> {
     for (p, answer) in points.iter().zip(answers) {
+        let Answer { signed_distance, gradient: g, closest_point: c, face } = answer;
         // {:?} is the shortest text that reads back equal, with an exponent where {} would print 300 digits.
-        write!(out, "{:?},{:?},{:?},", p.x, p.y, p.z)?;
-        match answer {
-            Some(Answer { signed_distance, gradient: g, closest: c, face }) => writeln!(
-                out,
-                "{signed_distance:?},{:?},{:?},{:?},{:?},{:?},{:?},{face}",
-                g.x, g.y, g.z, c.x, c.y, c.z
-            )?,
-            None => out.write_all(b"NaN,NaN,NaN,NaN,NaN,NaN,NaN,\n")?,
+        write!(out, "{:?},{:?},{:?},{signed_distance:?},", p.x, p.y, p.z)?;
+        write!(out, "{:?},{:?},{:?},{:?},{:?},{:?},", g.x, g.y, g.z, c.x, c.y, c.z)?;
+        match *face {
+            Answer::NO_FACE => writeln!(out)?,
+            face => writeln!(out, "{face}")?,
         }
     }
     Ok(())
@@ -179,19 +178,24 @@ mod tests {
         let answer = Answer {
             signed_distance: values[3],
             gradient: DVec3::splat(values[4]),
-            closest: DVec3::splat(values[5]),
-            face: u32::MAX,
+            closest_point: DVec3::splat(values[5]),
+            face: 16_777_215,
+        };
+        let none = Answer {
+            signed_distance: f64::NAN,
+            gradient: DVec3::NAN,
+            closest_point: DVec3::NAN,
+            face: Answer::NO_FACE,
         };
         let mut out = Vec::new();
-        write(&mut out, &[p, DVec3::NAN], &[Some(answer), None]).unwrap();
+        write(&mut out, &[p, DVec3::NAN], &[answer, none]).unwrap();
         let text = String::from_utf8(out).unwrap();
         let lines: Vec<_> = text.lines().collect();
-        assert_eq!(lines[0], "x,y,z,signed_distance,gx,gy,gz,cx,cy,cz,face");
-        let found: Vec<f64> = lines[1].split(',').map(|s| s.parse().unwrap()).collect();
+        let found: Vec<f64> = lines[0].split(',').map(|s| s.parse().unwrap()).collect();
         let [a, b] = [values[4], values[5]];
-        let expected = [p.x, p.y, p.z, values[3], a, a, a, b, b, b, f64::from(u32::MAX)];
+        let expected = [p.x, p.y, p.z, values[3], a, a, a, b, b, b, 16_777_215.0];
         assert_eq!(found.iter().map(|v| v.to_bits()).collect::<Vec<_>>(), expected.map(f64::to_bits));
-        assert!(lines[1].len() < 150);
-        assert_eq!(lines[2], "NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,");
+        assert!(lines[0].len() < 150);
+        assert_eq!(lines[1], "NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,");
     }
 }

@@ -10,15 +10,16 @@ mod ticks;
 
 use std::path::PathBuf;
 
-use tesdf::asset::save_atomic;
+use tesdf::asset::{CellKind, save_atomic};
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
+use tesdf::query::Precision;
 
 pub use cut::{Axis, View, cut_tetrahedron, cut_triangle};
 pub use picture::{PictureError, draw};
 
-use crate::parse;
 use crate::report::{Failure, Outcome};
+use crate::{asset_file, parse};
 
 /// Arguments of `tesdf slice`.
 #[derive(clap::Args, Debug)]
@@ -57,14 +58,27 @@ impl Args {
 /// Draws the picture and saves it.
 ///
 /// # Errors
-/// The size or the view cannot be drawn, or the file cannot be written.
-pub fn run(
-    args: &Args,
-    view: &View,
-    overlay: &Overlay,
-    signed_distance: impl Fn(DVec3) -> f64 + Sync,
-) -> Result<Outcome, Failure> {
-    let png = draw(view, overlay, args.size, signed_distance).map_err(Failure::new)?;
+/// The asset cannot be opened, the size or the view cannot be drawn, or the file cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let asset = asset_file::open(&args.file)?;
+    let about = asset.about();
+    let view = args.view(asset_file::bounds(&asset), about.options.unit.as_deref().unwrap_or(""));
+    let faces = (0..asset.face_count()).map(|face| asset.face_corners(face));
+    let mut overlay = Overlay::of(&view, [], faces);
+    asset.visit_cells(|cell| {
+        let label = match cell.kind {
+            CellKind::Inside => CellLabel::Inside,
+            CellKind::Outside => CellLabel::Outside,
+            CellKind::Crossing => CellLabel::Crossing,
+            CellKind::FarInside | CellKind::FarOutside => CellLabel::Far,
+            CellKind::NotOfDomain => return,
+        };
+        if let Some(polygon) = cut_tetrahedron(view.axis, view.offset, cell.corners) {
+            overlay.cells.push(CellOutline { polygon, label });
+        }
+    });
+    let png = draw(&view, &overlay, args.size, |p| asset.signed_distance(p, Precision::F32))
+        .map_err(Failure::new)?;
     save_atomic(&args.output, &png).map_err(Failure::new)?;
     Ok(Outcome::Good)
 }
@@ -78,6 +92,8 @@ pub enum CellLabel {
     Outside,
     /// On both sides of the surface.
     Crossing,
+    /// Far from the surface, without a list.
+    Far,
 }
 
 /// A tetrahedron cut by the plane.

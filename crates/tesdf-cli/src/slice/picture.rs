@@ -222,6 +222,7 @@ fn paint_overlay(map: &mut Pixmap, frame: &Frame, overlay: &Overlay) -> Result<(
         }
     };
     for (label, colour) in [
+        (CellLabel::Far, solid([255; 3], 0.75)),
         (CellLabel::Outside, solid([255; 3], 0.75)),
         (CellLabel::Inside, solid([255; 3], 0.75)),
         (CellLabel::Crossing, solid([255; 3], 0.9)),

@@ -14,6 +14,7 @@
 //! `checksum` is BLAKE3 of the first 8 + n bytes with its own 64 digits set to `0`; `checksum.NAME` is BLAKE3 of section
 //! NAME. Together they cover every byte of the file.
 pub mod about;
+mod cells;
 mod container;
 mod error;
 mod header;
@@ -22,6 +23,7 @@ mod save;
 mod section;
 mod te_sdf;
 
+pub use cells::{CellKind, CellView};
 pub use container::{Container, SharedSection, write_container};
 pub use error::AssetError;
 pub use save::save_atomic;

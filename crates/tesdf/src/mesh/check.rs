@@ -2,6 +2,7 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
+use super::count::count;
 use super::{Defect, DefectKind, Severity, Topology, TriangleMesh};
 
 mod edges;
@@ -143,8 +144,11 @@ impl fmt::Display for CheckReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{} faces, {} vertices, {} shells, diagonal {:.6e} (ids are 0-based)",
-            self.faces, self.vertices, self.shells, self.diagonal
+            "{}, {}, {}, diagonal {:.6e} (ids are 0-based)",
+            count(self.faces, "face", "faces"),
+            count(self.vertices, "vertex", "vertices"),
+            count(self.shells, "shell", "shells"),
+            self.diagonal
         )?;
         write_defects(f, &self.defects)?;
         for (i, chain) in self.boundary_loops.iter().enumerate().take(SHOWN) {
@@ -153,17 +157,19 @@ impl fmt::Display for CheckReport {
             let ids: Vec<_> = chain.vertices.iter().take(6).map(u32::to_string).collect();
             let more = if chain.vertices.len() > 6 { ", ..." } else { "" };
             let ids = ids.join(", ");
-            writeln!(f, "boundary {what} {i}: {n} edges, length {:.6e}, vertices {ids}{more}", chain.length)?;
+            let edges = count(n, "edge", "edges");
+            writeln!(f, "boundary {what} {i}: {edges}, length {:.6e}, vertices {ids}{more}", chain.length)?;
         }
         if self.boundary_loops.len() > SHOWN {
             writeln!(f, "... {} boundary loops in all", self.boundary_loops.len())?;
         }
-        let count = |s| self.of_severity(s).count();
-        let (errors, warnings) = (count(Severity::Error), count(Severity::Warning));
-        match (self.encodable, warnings) {
+        let of = |s, one, many| count(self.of_severity(s).count(), one, many);
+        let errors = of(Severity::Error, "error", "errors");
+        let warnings = of(Severity::Warning, "warning", "warnings");
+        match (self.encodable, self.of_severity(Severity::Warning).count()) {
             (true, 0) => write!(f, "ok: the inside is well defined"),
-            (true, n) => write!(f, "ok: the inside is well defined ({n} warnings)"),
-            (false, n) => write!(f, "not encodable: {errors} errors, {n} warnings"),
+            (true, _) => write!(f, "ok: the inside is well defined ({warnings})"),
+            (false, _) => write!(f, "not encodable: {errors}, {warnings}"),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! From a mesh file to a solid that can be encoded.
 mod check;
+mod count;
 mod defect;
 mod polygon;
 mod read;

@@ -3,6 +3,7 @@ use std::fmt;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::count::count;
 use super::{
     Defect, MeshError, Severity, TriangleMesh, check,
     check::{T_JUNCTION_TOLERANCE, out_of_range, write_defects},
@@ -244,47 +245,78 @@ const SHOWN: usize = 8;
 
 impl fmt::Display for RepairReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let list =
-            |f: &mut fmt::Formatter<'_>, what: &str, ids: &mut dyn ExactSizeIterator<Item = String>| {
-                let n = ids.len();
-                if n == 0 {
-                    return Ok(());
-                }
-                let named = ids.take(SHOWN).collect::<Vec<_>>().join(", ");
-                writeln!(f, "{n} {what}: {named}{}", if n > SHOWN { ", ..." } else { "" })
-            };
+        let list = |f: &mut fmt::Formatter<'_>,
+                    [one, many]: [&str; 2],
+                    ids: &mut dyn ExactSizeIterator<Item = String>| {
+            let n = ids.len();
+            if n == 0 {
+                return Ok(());
+            }
+            let named = ids.take(SHOWN).collect::<Vec<_>>().join(", ");
+            writeln!(f, "{}: {named}{}", count(n, one, many), if n > SHOWN { ", ..." } else { "" })
+        };
         if self.is_unchanged() {
             writeln!(f, "nothing to repair")?;
         }
         let pairs = |pairs: &[[u32; 2]], word: &'static str| {
             pairs.iter().map(move |[a, b]| format!("{a} {word} {b}")).collect::<Vec<_>>().into_iter()
         };
-        list(f, "vertices merged (0-based)", &mut pairs(&self.welded_vertices, "into"))?;
         list(
             f,
-            "faces with two equal corners dropped (0-based)",
+            ["vertex merged (0-based)", "vertices merged (0-based)"],
+            &mut pairs(&self.welded_vertices, "into"),
+        )?;
+        list(
+            f,
+            [
+                "face with two equal corners dropped (0-based)",
+                "faces with two equal corners dropped (0-based)",
+            ],
             &mut self.collapsed_faces.iter().map(u32::to_string),
         )?;
-        list(f, "duplicate faces dropped (0-based)", &mut pairs(&self.duplicate_faces, "repeats"))?;
+        list(
+            f,
+            ["duplicate face dropped (0-based)", "duplicate faces dropped (0-based)"],
+            &mut pairs(&self.duplicate_faces, "repeats"),
+        )?;
         let split = |s: &SplitEdge| {
             let [a, b] = s.edge;
             let at = s.at.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
             let faces = s.faces.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
             format!("{a}-{b} at {at} (face {faces}, {:.1e} off)", s.distance)
         };
-        list(f, "edges split at T-junctions (0-based)", &mut self.split_edges.iter().map(split))?;
-        list(f, "collinear faces dropped (0-based)", &mut self.vanished_faces.iter().map(u32::to_string))?;
-        list(f, "faces reversed (0-based)", &mut self.reversed_faces.iter().map(u32::to_string))?;
+        list(
+            f,
+            ["edge split at T-junctions (0-based)", "edges split at T-junctions (0-based)"],
+            &mut self.split_edges.iter().map(split),
+        )?;
+        list(
+            f,
+            ["collinear face dropped (0-based)", "collinear faces dropped (0-based)"],
+            &mut self.vanished_faces.iter().map(u32::to_string),
+        )?;
+        list(
+            f,
+            ["face reversed (0-based)", "faces reversed (0-based)"],
+            &mut self.reversed_faces.iter().map(u32::to_string),
+        )?;
         let crossing = pairs(&self.crossing_shells, "meets");
-        list(f, "pairs of shells meet and keep their orientation, by faces (0-based)", &mut { crossing })?;
+        list(
+            f,
+            [
+                "pair of shells meets and keeps its orientation, by faces (0-based)",
+                "pairs of shells meet and keep their orientation, by faces (0-based)",
+            ],
+            &mut { crossing },
+        )?;
         if self.unused_vertices > 0 {
-            writeln!(f, "{} unused vertices dropped", self.unused_vertices)?;
+            writeln!(f, "{} dropped", count(self.unused_vertices, "unused vertex", "unused vertices"))?;
         }
         write_defects(f, &self.warnings)?;
         write_defects(f, &self.remaining)?;
         match self.remaining.len() {
             0 => write!(f, "ok: encodable"),
-            n => write!(f, "not encodable: {n} errors left"),
+            n => write!(f, "not encodable: {} left", count(n, "error", "errors")),
         }
     }
 }

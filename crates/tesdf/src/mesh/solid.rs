@@ -1,5 +1,6 @@
 use std::{collections::BTreeMap, fmt};
 
+use super::count::count;
 use super::{CheckReport, Defect, DefectKind, Severity, TriangleMesh, check};
 
 /// A mesh with a well-defined inside: what the encoder accepts, valid by construction.
@@ -88,7 +89,8 @@ impl fmt::Display for NotSolid {
             kinds.entry(error.kind).or_default().push(&error.message);
         }
         let total: usize = kinds.values().map(Vec::len).sum();
-        write!(f, "the mesh has no well-defined inside ({total} errors; ids are 0-based): ")?;
+        let errors = count(total, "error", "errors");
+        write!(f, "the mesh has no well-defined inside ({errors}; ids are 0-based): ")?;
         for (i, (kind, messages)) in kinds.iter().take(NAMED[0]).enumerate() {
             let named = messages[..messages.len().min(NAMED[1])].join("; ");
             let separator = if i > 0 { "; " } else { "" };

@@ -1,0 +1,77 @@
+use glam::DVec3;
+use serde::Serialize;
+
+use super::TeSdf;
+use super::layout::{Label, List, Node, Side};
+use crate::domain::Cell;
+
+/// A tetrahedron of the domain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CellView {
+    /// Corners, in the mesh's unit.
+    pub corners: [DVec3; 4],
+    /// Number of bisections from a sixth of the cube.
+    pub depth: u32,
+    /// Where it lies, and what answers for its points.
+    pub kind: CellKind,
+    /// Faces of its list; 0 when it has none.
+    pub list_length: usize,
+}
+
+/// Where a cell lies, and what answers for its points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CellKind {
+    /// Outside of the solid, with a list.
+    Outside,
+    /// Inside, with a list.
+    Inside,
+    /// The surface comes into the cell or close to it; with a list.
+    Crossing,
+    /// Outside, far from the surface: the face tree answers.
+    FarOutside,
+    /// Inside, far from the surface: the face tree answers.
+    FarInside,
+    /// Farther out than the band.
+    NotOfDomain,
+}
+
+impl CellKind {
+    /// Whether the cell has a list.
+    pub fn is_listed(self) -> bool {
+        matches!(self, Self::Outside | Self::Inside | Self::Crossing)
+    }
+}
+
+impl TeSdf {
+    /// Shows every cell, depth first: always in the same order.
+    ///
+    /// The cells fill a cube around the solid; together, without those of [`CellKind::NotOfDomain`], they are the domain.
+    pub fn visit_cells(&self, mut visit: impl FnMut(&CellView)) {
+        // Opening has checked that children follow their parents, so this ends.
+        let mut stack: Vec<(u32, Cell)> =
+            (0..6).rev().map(|root| (root as u32, self.cube.root(root))).collect();
+        while let Some((word, cell)) = stack.pop() {
+            let (kind, offset) = match Node::decode(self.nodes[word as usize], &self.lists) {
+                Node::Split(children) => {
+                    stack.push((children + 1, cell.child(1)));
+                    stack.push((children, cell.child(0)));
+                    continue;
+                }
+                Node::Listed(Label::Outside, offset) => (CellKind::Outside, Some(offset)),
+                Node::Listed(Label::Inside, offset) => (CellKind::Inside, Some(offset)),
+                Node::Listed(Label::Crossing(_), offset) => (CellKind::Crossing, Some(offset)),
+                Node::Far(Side::Outside) => (CellKind::FarOutside, None),
+                Node::Far(Side::Inside) => (CellKind::FarInside, None),
+                Node::NotOfDomain => (CellKind::NotOfDomain, None),
+            };
+            let list = offset.and_then(|offset| List::decode(&self.lists, offset));
+            visit(&CellView {
+                corners: cell.corners.map(|p| self.frame.to_world(p)),
+                depth: cell.depth,
+                kind,
+                list_length: list.map_or(0, List::len),
+            });
+        }
+    }
+}

@@ -1,0 +1,144 @@
+use glam::DVec3;
+
+use crate::mesh::TriangleMesh;
+
+/// All faces of a mesh, without anything that finds the near ones fast.
+///
+/// Written apart from [`Triangle`](crate::geometry::Triangle), which queries use, so that an error in one shows against
+/// the other. Lengths are scaled by a power of two, so that no product leaves the range of `f64`.
+pub(super) struct BruteForce {
+    facets: Vec<Facet>,
+    scale: f64,
+}
+
+/// A face in scaled lengths.
+struct Facet {
+    corners: [DVec3; 3],
+    /// From each corner to the next.
+    along: [DVec3; 3],
+    /// Inverse squared lengths of those; 0 for a length of 0.
+    inverse: [f64; 3],
+    /// Unit normal; `None` without area.
+    normal: Option<DVec3>,
+}
+
+impl BruteForce {
+    /// `diagonal` is that of the mesh: finite and positive.
+    pub(super) fn new(mesh: &TriangleMesh, diagonal: f64) -> Self {
+        let scale = (-diagonal.log2().floor()).clamp(-1000.0, 1000.0).exp2();
+        let facets = (0..mesh.faces().len()).map(|f| Facet::new(mesh.triangle(f).map(|p| p * scale)));
+        Self { facets: facets.collect(), scale }
+    }
+
+    /// Distance from `p` to the nearest of all faces, mesh unit.
+    pub(super) fn distance(&self, p: DVec3) -> f64 {
+        let p = p * self.scale;
+        let least = self.facets.iter().map(|f| f.offset(p).length_squared()).fold(f64::INFINITY, f64::min);
+        least.sqrt() / self.scale
+    }
+
+    /// From the closest point of one face to `p`, mesh unit.
+    pub(super) fn offset(&self, face: usize, p: DVec3) -> DVec3 {
+        self.facets[face].offset(p * self.scale) / self.scale
+    }
+}
+
+impl Facet {
+    fn new(corners: [DVec3; 3]) -> Self {
+        let [a, b, c] = corners;
+        let along = [b - a, c - b, a - c];
+        let inverse = along.map(|e| if e == DVec3::ZERO { 0.0 } else { 1.0 / e.length_squared() });
+        Self { corners, along, inverse, normal: accurate_cross(along[0], along[1]).try_normalize() }
+    }
+
+    fn offset(&self, p: DVec3) -> DVec3 {
+        if let Some(n) = self.normal {
+            let from = self.corners.map(|c| p - c);
+            // Beside a wrong "over the face" the foot is a rounding error away from the edge.
+            let over = (0..3).all(|k| n.cross(self.along[k]).dot(from[k]) >= 0.0);
+            if over {
+                return n.dot(from[0]) * n;
+            }
+        }
+        let mut best = DVec3::INFINITY;
+        let mut least = f64::INFINITY;
+        for k in 0..3 {
+            let from = p - self.corners[k];
+            let t = (from.dot(self.along[k]) * self.inverse[k]).clamp(0.0, 1.0);
+            // From the nearer end, so that rounding is small against what is left.
+            let offset = if t <= 0.5 {
+                from - t * self.along[k]
+            } else {
+                let next = p - self.corners[(k + 1) % 3];
+                let back = (next.dot(-self.along[k]) * self.inverse[k]).clamp(0.0, 1.0);
+                next + back * self.along[k]
+            };
+            if offset.length_squared() < least {
+                (best, least) = (offset, offset.length_squared());
+            }
+        }
+        best
+    }
+}
+
+/// The cross product with each component right to some ulp of itself.
+///
+/// A plain cross product of the edges of a needle of aspect 1e7 has a normal that is off by 1e-9, and distances to its far end
+/// by 1e-9 of its length.
+fn accurate_cross(u: DVec3, v: DVec3) -> DVec3 {
+    // Kahan's difference of products; see Jeannerod, Louvet, Muller 2013.
+    let difference = |a: f64, b: f64, c: f64, d: f64| {
+        let cd = c * d;
+        let lost = c.mul_add(-d, cd);
+        a.mul_add(b, -cd) + lost
+    };
+    DVec3::new(difference(u.y, v.z, u.z, v.y), difference(u.z, v.x, u.x, v.z), difference(u.x, v.y, u.y, v.x))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-3i32..4).prop_map(|[x, y, z]| DVec3::new(x.into(), y.into(), z.into()))
+    }
+
+    proptest! {
+        #[test]
+        fn no_sample_of_the_triangle_is_closer(a in point(), b in point(), c in point(), p in point()) {
+            let offset = Facet::new([a, b, c]).offset(p);
+            let (mut least, mut near) = (f64::INFINITY, f64::INFINITY);
+            for i in 0..=60 {
+                for j in 0..=60 - i {
+                    let (u, v) = (f64::from(i) / 60.0, f64::from(j) / 60.0);
+                    let q = a + u * (b - a) + v * (c - a);
+                    least = least.min(p.distance(q));
+                    near = near.min((p - offset).distance(q));
+                }
+            }
+            prop_assert!(offset.length() <= least + 1e-12, "{} {}", offset, least);
+            prop_assert!(near <= 0.2, "the closest point is {} off the triangle", near);
+        }
+    }
+
+    #[test]
+    fn needles_keep_their_plane() {
+        // Height 1e-7 of the length, in no special position: points over the far end.
+        let (u, v) = (DVec3::new(0.3, 0.5, 0.7).normalize(), DVec3::new(0.1, -0.9, 0.2));
+        let n = accurate_cross(u, v).normalize();
+        let w = n.cross(u);
+        let corners = [DVec3::ZERO, u, 0.9 * u + 1e-7 * w];
+        let facet = Facet::new(corners);
+        let middle = 0.5 * corners[1] + 0.5 * corners[2];
+        for height in [-1e-3, 1e-3, 0.5] {
+            let offset = facet.offset(middle + height * n);
+            assert!(
+                (offset.length() - f64::abs(height)).abs() < 4e-16,
+                "{}",
+                offset.length() - f64::abs(height)
+            );
+        }
+    }
+}

@@ -1,0 +1,258 @@
+use glam::DVec3;
+use serde::Serialize;
+
+use super::PointClass;
+use crate::mesh::TriangleMesh;
+use crate::query::{Answer, Precision};
+
+/// What a [`Precision`] promises.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Promise {
+    /// Largest error of a distance, as a share of the diagonal.
+    pub of_diagonal: f64,
+    /// Added to it: this many units in the last place of the largest coordinate of the mesh and the point.
+    pub ulps: f64,
+    /// Largest error of a gradient, radians.
+    pub gradient: f64,
+    /// Gradients closer to the surface than this share of the diagonal are only promised to be unit vectors.
+    pub gradient_from: f64,
+    diagonal: f64,
+    largest_coordinate: f64,
+}
+
+impl Promise {
+    fn new(precision: Precision, mesh: &TriangleMesh) -> Self {
+        let bounds = mesh.bounds();
+        let largest_coordinate = bounds.min.abs().max(bounds.max.abs()).max_element();
+        let (of_diagonal, ulps, gradient_from) = match precision {
+            Precision::F32 => (1e-6, 0.0, 1e-4),
+            Precision::F64 => (1e-12, 4.0, 1e-9),
+        };
+        let diagonal = mesh.diagonal();
+        Self { of_diagonal, ulps, gradient: 1e-3, gradient_from, diagonal, largest_coordinate }
+    }
+
+    /// Largest error of the distance at `p`, in the mesh's unit; also the distance up to which the sign is free.
+    pub fn distance(&self, p: DVec3) -> f64 {
+        let largest = self.largest_coordinate.max(p.abs().max_element());
+        self.of_diagonal * self.diagonal + self.ulps * (largest.next_up() - largest)
+    }
+}
+
+/// A point where an answer was off, in the mesh's unit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Worst {
+    /// The point.
+    pub point: [f64; 3],
+    /// Where it lies.
+    pub class: PointClass,
+    /// Signed distance by brute force.
+    pub expected: f64,
+    /// The answer.
+    pub found: f64,
+    /// Face of the answer, 0-based.
+    pub face: u32,
+}
+
+/// Points of one class.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ClassErrors {
+    /// Where they lie.
+    pub class: PointClass,
+    /// How many.
+    pub points: usize,
+    /// Largest error of a distance, in the mesh's unit.
+    pub largest_error: f64,
+}
+
+/// How one precision compares with brute force.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PrecisionReport {
+    /// `f32` or `f64`.
+    pub precision: &'static str,
+    /// Whether everything is as promised.
+    pub passed: bool,
+    /// What is promised.
+    pub promise: Promise,
+    /// Largest error of a signed distance, in the mesh's unit.
+    pub largest_error: f64,
+    /// The same as a share of the diagonal.
+    pub largest_error_of_diagonal: f64,
+    /// The error that takes most of what is promised at its point, as a share of that; up to 1 is as promised.
+    pub largest_error_of_promise: f64,
+    /// Where that is.
+    pub worst: Option<Worst>,
+    /// Points farther from the surface than the promised error, on the wrong side.
+    pub sign_mistakes: usize,
+    /// The one farthest from the surface.
+    pub worst_sign: Option<Worst>,
+    /// Gradients farther off than promised, not of length 1, or of a face that is not closest.
+    pub gradient_mistakes: usize,
+    /// Largest angle between a gradient and the direction from the closest point of the answer's face, radians.
+    pub largest_gradient_error: f64,
+    /// Where that is.
+    pub worst_gradient: Option<Worst>,
+    /// By where the points lie.
+    pub classes: Vec<ClassErrors>,
+}
+
+/// A largest value and where it is; of equal ones the first.
+#[derive(Clone, Debug, Default)]
+struct Largest {
+    value: f64,
+    at: Option<Worst>,
+}
+
+impl Largest {
+    fn add(&mut self, value: f64, at: impl FnOnce() -> Worst) {
+        // What is not a number is worse than any number.
+        let value = if value.is_nan() { f64::INFINITY } else { value };
+        if self.at.is_none() || value > self.value {
+            *self = Self { value, at: Some(at()) };
+        }
+    }
+
+    fn join(self, other: Self) -> Self {
+        let other_wins = other.at.is_some() && (self.at.is_none() || other.value > self.value);
+        if other_wins { other } else { self }
+    }
+}
+
+/// Errors of one precision so far.
+pub(super) struct Comparison {
+    precision: Precision,
+    promise: Promise,
+    classes: [(usize, f64); PointClass::ALL.len()],
+    error: Largest,
+    sign_mistakes: usize,
+    sign: Largest,
+    gradient_mistakes: usize,
+    gradient: Largest,
+}
+
+impl Comparison {
+    pub(super) fn new(precision: Precision, mesh: &TriangleMesh) -> Self {
+        Self {
+            precision,
+            promise: Promise::new(precision, mesh),
+            classes: Default::default(),
+            error: Largest::default(),
+            sign_mistakes: 0,
+            sign: Largest::default(),
+            gradient_mistakes: 0,
+            gradient: Largest::default(),
+        }
+    }
+
+    pub(super) fn precision(&self) -> Precision {
+        self.precision
+    }
+
+    pub(super) fn promise(&self) -> &Promise {
+        &self.promise
+    }
+
+    /// Compares one answer; `offset` is from the closest point of the face that it names to `p`.
+    pub(super) fn add(
+        &mut self,
+        class: PointClass,
+        p: DVec3,
+        expected: f64,
+        answer: &Answer,
+        offset: Option<DVec3>,
+    ) {
+        let found = answer.signed_distance;
+        let at = || Worst { point: p.to_array(), class, expected, found, face: answer.face };
+        let bound = self.promise.distance(p);
+        // Nearer than the bound the side is free, but not the distance.
+        let clear = expected.abs() > bound;
+        let error = if clear { (found - expected).abs() } else { (found.abs() - expected.abs()).abs() };
+        let error = if error.is_nan() { f64::INFINITY } else { error };
+        let slot = &mut self.classes[class as usize];
+        *slot = (slot.0 + 1, slot.1.max(error));
+        self.error.add(error / bound, at);
+        // Zero is on neither side.
+        if clear && found * expected.signum() <= 0.0 {
+            self.sign_mistakes += 1;
+            self.sign.add(expected.abs(), at);
+        }
+        match gradient_error(p, expected, answer, offset, &self.promise) {
+            Some(angle) => {
+                self.gradient_mistakes += usize::from(!(angle <= self.promise.gradient));
+                self.gradient.add(angle, at);
+            }
+            None => {
+                let unit = (answer.gradient.length() - 1.0).abs() <= self.promise.gradient;
+                if !unit {
+                    self.gradient_mistakes += 1;
+                    self.gradient.add(f64::INFINITY, at);
+                }
+            }
+        }
+    }
+
+    pub(super) fn join(mut self, other: Self) -> Self {
+        for (a, b) in self.classes.iter_mut().zip(other.classes) {
+            *a = (a.0 + b.0, a.1.max(b.1));
+        }
+        Self {
+            precision: self.precision,
+            promise: self.promise,
+            classes: self.classes,
+            error: self.error.join(other.error),
+            sign_mistakes: self.sign_mistakes + other.sign_mistakes,
+            sign: self.sign.join(other.sign),
+            gradient_mistakes: self.gradient_mistakes + other.gradient_mistakes,
+            gradient: self.gradient.join(other.gradient),
+        }
+    }
+
+    pub(super) fn report(self) -> PrecisionReport {
+        let largest_error = self.classes.iter().map(|c| c.1).fold(0.0, f64::max);
+        let classes = PointClass::ALL.into_iter().zip(self.classes);
+        PrecisionReport {
+            precision: match self.precision {
+                Precision::F32 => "f32",
+                Precision::F64 => "f64",
+            },
+            passed: self.error.value <= 1.0 && self.sign_mistakes == 0 && self.gradient_mistakes == 0,
+            promise: self.promise,
+            largest_error,
+            largest_error_of_diagonal: largest_error / self.promise.diagonal,
+            largest_error_of_promise: self.error.value,
+            worst: self.error.at,
+            sign_mistakes: self.sign_mistakes,
+            worst_sign: self.sign.at,
+            gradient_mistakes: self.gradient_mistakes,
+            largest_gradient_error: self.gradient.value,
+            worst_gradient: self.gradient.at,
+            classes: classes
+                .map(|(class, (points, largest_error))| ClassErrors { class, points, largest_error })
+                .collect(),
+        }
+    }
+}
+
+/// The angle between the gradient and the direction from the closest point of the face that the answer names, which must
+/// be a closest face; `None` so near to the surface that no direction is promised.
+///
+/// Where several faces are closest the gradient of any of them is right. One face has one closest point, so this is as
+/// strict as a comparison with the nearest face, without its jumps.
+fn gradient_error(
+    p: DVec3,
+    expected: f64,
+    answer: &Answer,
+    offset: Option<DVec3>,
+    promise: &Promise,
+) -> Option<f64> {
+    let bound = promise.distance(p);
+    if expected.abs() < (promise.gradient_from * promise.diagonal).max(10.0 * bound) {
+        return None;
+    }
+    let Some(offset) = offset.filter(|o| o.length() <= expected.abs() + 2.0 * bound) else {
+        return Some(f64::INFINITY);
+    };
+    let direction = expected.signum() * offset.normalize();
+    // The chord, which sees a wrong length too.
+    Some((answer.gradient - direction).length())
+}

@@ -1,0 +1,208 @@
+use glam::DVec3;
+use serde::Serialize;
+
+use crate::TeSdf;
+use crate::asset::CellKind;
+use crate::geometry::{Aabb, Triangle, WindingNumber};
+use crate::mesh::TriangleMesh;
+use crate::query::Precision;
+use crate::sampling::{Random, Weighted};
+
+/// Where a point that is compared with brute force lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PointClass {
+    /// Uniform in the mesh's bounds, 1.2 times as large.
+    Box,
+    /// 1e-9 to 1e-2 diagonals from a face, on either side, uniform in the logarithm.
+    NearSurface,
+    /// On a face, up to rounding.
+    OnFace,
+    /// On an edge, up to rounding.
+    OnEdge,
+    /// At a vertex.
+    AtVertex,
+    /// On a face, edge or corner of a cell, up to rounding.
+    CellBorder,
+    /// Inside of the solid, the deepest of several.
+    Deep,
+    /// 0.2 to 1000 diagonals outside of the bounds.
+    FarOutside,
+}
+
+impl PointClass {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Box,
+        Self::NearSurface,
+        Self::OnFace,
+        Self::OnEdge,
+        Self::AtVertex,
+        Self::CellBorder,
+        Self::Deep,
+        Self::FarOutside,
+    ];
+
+    /// Name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Box => "in the box",
+            Self::NearSurface => "near the surface",
+            Self::OnFace => "on faces",
+            Self::OnEdge => "on edges",
+            Self::AtVertex => "at vertices",
+            Self::CellBorder => "on borders of cells",
+            Self::Deep => "deep inside",
+            Self::FarOutside => "far outside",
+        }
+    }
+
+    /// The class of sample `index`: in any 20 consecutive samples all are there, the likely trouble most often.
+    pub fn of_index(index: u64) -> Self {
+        use PointClass::*;
+        const TURN: [PointClass; 20] = [
+            Box,
+            NearSurface,
+            OnFace,
+            OnEdge,
+            AtVertex,
+            CellBorder,
+            Deep,
+            FarOutside,
+            Box,
+            NearSurface,
+            OnEdge,
+            CellBorder,
+            NearSurface,
+            OnFace,
+            Box,
+            NearSurface,
+            AtVertex,
+            CellBorder,
+            Deep,
+            NearSurface,
+        ];
+        TURN[(index % 20) as usize]
+    }
+}
+
+/// Makes the points: the same for the same asset and seed.
+pub(super) struct Sampler<'a> {
+    asset: &'a TeSdf,
+    mesh: &'a TriangleMesh,
+    winding: &'a WindingNumber,
+    seed: u64,
+    bounds: Aabb,
+    diagonal: f64,
+    areas: Weighted,
+    /// Corners of the cells of the domain.
+    cells: Vec<[DVec3; 4]>,
+}
+
+/// Points tried for one that is inside.
+const TRIES: usize = 64;
+/// Points inside of which the deepest is taken.
+const DEEPEST_OF: usize = 4;
+
+impl<'a> Sampler<'a> {
+    pub(super) fn new(
+        asset: &'a TeSdf,
+        mesh: &'a TriangleMesh,
+        winding: &'a WindingNumber,
+        seed: u64,
+    ) -> Self {
+        let diagonal = mesh.diagonal();
+        // Relative to the diagonal, so that no area underflows.
+        let areas = Weighted::new((0..mesh.faces().len()).map(|f| {
+            let [a, b, c] = mesh.triangle(f);
+            ((b - a) / diagonal).cross((c - a) / diagonal).length()
+        }));
+        let mut cells = Vec::new();
+        asset.visit_cells(|cell| {
+            if cell.kind != CellKind::NotOfDomain {
+                cells.push(cell.corners);
+            }
+        });
+        Self { asset, mesh, winding, seed, bounds: mesh.bounds(), diagonal, areas, cells }
+    }
+
+    pub(super) fn point(&self, index: u64) -> DVec3 {
+        let random = &mut Random::new(self.seed, index);
+        match PointClass::of_index(index) {
+            PointClass::Box => self.in_box(random),
+            PointClass::NearSurface => {
+                let corners = self.face(random);
+                let normal = Triangle::new(corners.map(|p| (p - corners[0]) / self.diagonal)).normal;
+                let offset = random.sign() * random.log_between(1e-9, 1e-2) * self.diagonal;
+                random.in_simplex(&corners) + offset * normal
+            }
+            PointClass::OnFace => {
+                let corners = self.face(random);
+                random.in_simplex(&corners)
+            }
+            PointClass::OnEdge => {
+                let [a, b, _] = self.any_face(random);
+                a.lerp(b, random.unit())
+            }
+            PointClass::AtVertex => self.any_face(random)[0],
+            PointClass::CellBorder => self.cell_border(random),
+            PointClass::Deep => self.deep(random),
+            PointClass::FarOutside => {
+                let distance = random.log_between(0.2, 1e3) * self.diagonal;
+                let from = self.bounds.center();
+                from + (0.5 * self.diagonal + distance) * random.direction()
+            }
+        }
+    }
+
+    fn in_box(&self, random: &mut Random) -> DVec3 {
+        let (center, half) = (self.bounds.center(), 0.6 * self.bounds.extent());
+        random.in_box(Aabb { min: center - half, max: center + half })
+    }
+
+    /// Corners of a face, by area.
+    fn face(&self, random: &mut Random) -> [DVec3; 3] {
+        let face = self.areas.pick(random).unwrap_or(0);
+        self.mesh.triangle(face)
+    }
+
+    /// Corners of a face, small ones as often as large ones, in any rotation.
+    fn any_face(&self, random: &mut Random) -> [DVec3; 3] {
+        let mut corners = self.mesh.triangle(random.below(self.mesh.faces().len()));
+        corners.rotate_left(random.below(3));
+        corners
+    }
+
+    fn cell_border(&self, random: &mut Random) -> DVec3 {
+        let Some(mut corners) = self.cells.get(random.below(self.cells.len().max(1))).copied() else {
+            return self.in_box(random);
+        };
+        corners.rotate_left(random.below(4));
+        let [a, b, c, _] = corners;
+        match random.below(4) {
+            0 => a,
+            1 => 0.5 * (a + b),
+            2 => random.in_simplex(&[a, b]),
+            _ => random.in_simplex(&[a, b, c]),
+        }
+    }
+
+    fn deep(&self, random: &mut Random) -> DVec3 {
+        let mut found = 0;
+        let mut best = (0.0, None);
+        for _ in 0..TRIES {
+            let p = random.in_box(self.bounds);
+            if self.winding.at_perturbed(p) >= 1 {
+                let depth = self.asset.signed_distance(p, Precision::F32).abs();
+                if depth > best.0 {
+                    best = (depth, Some(p));
+                }
+                found += 1;
+                if found == DEEPEST_OF {
+                    break;
+                }
+            }
+        }
+        best.1.unwrap_or_else(|| random.in_box(self.bounds))
+    }
+}
