@@ -96,7 +96,7 @@ impl Topology {
     }
 
     /// Component of each face and their number, where faces are connected over the edges that `across` accepts.
-    /// Components are numbered by their lowest face; faces with a repeated corner have [`NO_COMPONENT`].
+    /// Components are numbered by their lowest face; faces with a repeated corner have `NO_COMPONENT`.
     pub fn components(&self, across: impl Fn(&Edge) -> bool) -> (Vec<u32>, usize) {
         let mut sets = DisjointSets::new(self.faces.len());
         for edge in self.edges.iter().filter(|e| across(e)) {
