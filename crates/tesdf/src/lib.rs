@@ -6,7 +6,8 @@
 //! ```
 //!
 //! ```
-//! use tesdf::encode::{EncodeOptions, EncodeProgress, Source, encode};
+//! use tesdf::asset::about::Source;
+//! use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
 //! use tesdf::glam::DVec3;
 //! use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
 //! use tesdf::query::Precision;
