@@ -36,7 +36,7 @@ fn main() {
     let tree = AabbTree::build(&boxes, 4);
     let winding = WindingNumber::new(&mesh);
     for (name, points) in [("near", &near), ("box", &boxed)] {
-        let (mut tp, mut to, mut t64) = (f64::MAX, f64::MAX, f64::MAX);
+        let (mut tp, mut to, mut t64, mut tb) = (f64::MAX, f64::MAX, f64::MAX, f64::MAX); let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let mut sink = 0.0;
         for _ in 0..3 {
             let t = Instant::now();
@@ -45,6 +45,9 @@ fn main() {
             let t = Instant::now();
             for p in points { let r = asset.query(*p, Precision::F32); sink += r.signed_distance + r.gradient.x; }
             to = to.min(t.elapsed().as_secs_f64());
+            let t = Instant::now();
+            let r = one.install(|| asset.query_batch(points, Precision::F32)); sink += r[7].signed_distance;
+            tb = tb.min(t.elapsed().as_secs_f64());
             let t = Instant::now();
             for p in points { let r = asset.query(*p, Precision::F64); sink += r.signed_distance + r.gradient.x; }
             t64 = t64.min(t.elapsed().as_secs_f64());
@@ -59,6 +62,6 @@ fn main() {
             if x.signum() != e.signum() && d > 1e-6 * diag { s32 += 1 }
             if y.signum() != e.signum() && d > 1e-12 * diag { s64 += 1 }
         }
-        println!("{name}: parry {:.0} ns, ours {:.0} ns ({:.2} x), f64 {:.0} ns | reads {:.2} | err {:.1e} {:.1e} signs {s32} {s64} ({sink:.3})", tp/n as f64*1e9, to/n as f64*1e9, tp/to, t64/n as f64*1e9, reads as f64 / n as f64, e32/diag, e64/diag);
+        println!("{name}: parry {:.0} ns, ours {:.0} ns ({:.2} x), batch {:.0} ns ({:.2} x), f64 {:.0} ns | reads {:.2} | err {:.1e} {:.1e} signs {s32} {s64} ({sink:.3})", tp/n as f64*1e9, to/n as f64*1e9, tp/to, tb/n as f64*1e9, tp/tb, t64/n as f64*1e9, reads as f64 / n as f64, e32/diag, e64/diag);
     }
 }

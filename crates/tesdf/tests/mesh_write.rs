@@ -1,6 +1,7 @@
 //! Writing: what comes back when a written file is read.
 use std::path::Path;
 
+use proptest::prelude::*;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{TriangleMesh, WriteError, WriteFormat, read, write};
 
@@ -56,4 +57,29 @@ fn files_are_replaced_whole_or_not_at_all() {
     assert!(unknown.contains(".ply, .obj, .stl"), "{unknown}");
     let missing = write(Path::new("no/such/folder/a.ply"), &mesh()).unwrap_err().to_string();
     assert!(missing.contains("no/such/folder/a.ply"), "{missing}");
+}
+
+proptest! {
+    /// Any finite bit pattern survives; only equal positions, which welding merges, are avoided
+    /// by numbering z.
+    #[test]
+    fn any_finite_coordinates_survive_ply_and_obj(
+        points in prop::collection::vec((any::<f64>(), any::<f64>()), 3..40),
+        corners in prop::collection::vec(0..1000usize, 3),
+    ) {
+        let finite = |v: f64| if v.is_finite() { v + 0.0 } else { 1.0 };
+        let vertices: Vec<_> = points.iter().enumerate()
+            .map(|(i, p)| DVec3::new(finite(p.0), finite(p.1), i as f64)).collect();
+        let n = vertices.len() as u32;
+        // Every vertex is used, since unused ones are dropped on reading.
+        let mut faces: Vec<_> = (0..n).map(|i| [i, (i + 1) % n, (i + 2) % n]).collect();
+        faces.push([0, 1, 2].map(|i: usize| corners[i] as u32 % n));
+        let mesh = TriangleMesh::new(vertices, faces).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.ply", "a.obj"] {
+            let path = folder.path().join(name);
+            write(&path, &mesh).unwrap();
+            prop_assert_eq!(&read(&path).unwrap().mesh, &mesh);
+        }
+    }
 }

@@ -99,6 +99,12 @@ pub const MAX_LIST_OFFSET: u32 = 1 << CODE;
 pub const LONG_WINDING: u32 = 3;
 
 impl Node {
+    /// Whether a word is of a bisected cell; its value is then where the children are.
+    #[inline]
+    pub fn is_split(word: u32) -> bool {
+        word & LEAF == 0
+    }
+
     /// Reads a word.
     #[inline]
     pub fn decode(word: u32, lists: &[u8]) -> Self {

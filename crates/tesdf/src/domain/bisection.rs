@@ -83,7 +83,7 @@ impl Cell {
 }
 
 /// A point as fixed-point barycentric coordinates of the cell that holds it; exact from cell to child.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Barycentric {
     lambda: [u64; 4],
 }

@@ -97,6 +97,7 @@ pub fn encode(
             floor: FLOOR,
         },
         band,
+        bounds: local.bounds(),
         regions: &regions,
         inside: &|p| winding.at(p) >= 1,
         progress,

@@ -72,8 +72,9 @@ const MAX_RIVALS: usize = 96;
 
 /// Distance of `face` at `p`.
 pub fn probe(surface: &Surface, face: u32, p: DVec3) -> Probe {
-    let c = surface.triangles[face as usize].closest(p);
-    Probe { distance: c.distance, point: c.point, regions: c.regions }
+    let triangle = &surface.triangles[face as usize];
+    let closest = triangle.closest(p);
+    Probe { distance: closest.distance, point: closest.point, regions: triangle.regions(p) }
 }
 
 /// Applies rules A (point), B (plane) and C (shared feature) to the candidates of a cell.

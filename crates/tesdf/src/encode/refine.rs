@@ -66,6 +66,8 @@ pub struct Refiner<'a> {
     pub weights: Weights,
     /// Outer band, local frame.
     pub band: f64,
+    /// Bounds of the mesh, local frame: beyond the band, cells in here are listed where that pays.
+    pub bounds: Aabb,
     /// Boxes that belong to the domain besides the band, local frame.
     pub regions: &'a [Aabb],
     /// Winding number at a point, local frame.
@@ -104,10 +106,11 @@ impl Refiner<'_> {
         let mut own: Vec<Requirement> = filtered.survivors.iter().map(|s| s.requirement).collect();
         own.sort_unstable();
 
-        let outside = nearest > self.band
-            && !self.regions.iter().any(|r| r.overlaps(Aabb::of(&cell.corners)))
+        let reach = Aabb::of(&cell.corners);
+        let beyond = nearest > self.band
+            && !self.regions.iter().any(|r| r.overlaps(reach))
             && !(self.inside)(centroid);
-        if outside {
+        if beyond && !reach.overlaps(self.bounds) {
             self.finish(&cell);
             let union = (n <= MAX_UNION).then_some(own);
             return Some(Pruned { tree: Tree::Leaf(Leaf::Outside), cost: 0.0, union, crossing: false });
@@ -117,10 +120,15 @@ impl Refiner<'_> {
         let could_pay = weight * (n as f64 - w.floor) > w.byte * (LEAF_BYTES + w.floor);
         let split = cell.depth < MAX_DEPTH && could_pay;
         let far = n >= w.far_list && nearest > w.far_distance && !filtered.crossing;
+        let unlisted = match (beyond, far) {
+            (true, _) => Some(Leaf::Outside),
+            (false, true) => Some(Leaf::Far),
+            _ => None,
+        };
 
         if !split {
             self.finish(&cell);
-            return Some(self.leaf(own, filtered.crossing, weight, far));
+            return Some(self.leaf(own, filtered.crossing, weight, unlisted));
         }
         let midpoint = cell.midpoint();
         let alive: Vec<(&Candidate, _)> = filtered
@@ -150,10 +158,10 @@ impl Refiner<'_> {
             (left, self.refine(cell.child(1), second, scratch))
         };
         let (left, right) = (left?, right?);
-        Some(self.prune(left, right, own, weight, far))
+        Some(self.prune(left, right, own, weight, unlisted))
     }
 
-    fn leaf(&self, mut own: Vec<Requirement>, crossing: bool, weight: f64, far: bool) -> Pruned {
+    fn leaf(&self, mut own: Vec<Requirement>, crossing: bool, weight: f64, unlisted: Option<Leaf>) -> Pruned {
         let w = &self.weights;
         let faces = self.surface.cover(&own);
         let n = faces.len() as f64;
@@ -161,14 +169,23 @@ impl Refiner<'_> {
         let by_tree = weight * w.far_faces + w.byte * LEAF_BYTES;
         own.truncate(if own.len() > MAX_UNION { 0 } else { own.len() });
         let union = (!own.is_empty()).then_some(own);
-        if far && by_tree < listed {
-            return Pruned { tree: Tree::Leaf(Leaf::Far), cost: by_tree, union, crossing };
+        if let Some(leaf) = unlisted
+            && by_tree < listed
+        {
+            return Pruned { tree: Tree::Leaf(leaf), cost: by_tree, union, crossing };
         }
         Pruned { tree: Tree::Leaf(Leaf::Listed { faces, crossing }), cost: listed, union, crossing }
     }
 
     /// Keeps the split, or merges it when one cell costs less.
-    fn prune(&self, left: Pruned, right: Pruned, own: Vec<Requirement>, weight: f64, far: bool) -> Pruned {
+    fn prune(
+        &self,
+        left: Pruned,
+        right: Pruned,
+        own: Vec<Requirement>,
+        weight: f64,
+        unlisted: Option<Leaf>,
+    ) -> Pruned {
         let split = left.cost + right.cost;
         let crossing = left.crossing || right.crossing;
         let union = match (left.union, right.union) {
@@ -179,20 +196,20 @@ impl Refiner<'_> {
         let both_outside =
             matches!((&left.tree, &right.tree), (Tree::Leaf(Leaf::Outside), Tree::Leaf(Leaf::Outside)));
         if both_outside {
-            return Pruned { tree: left.tree, cost: 0.0, union: tightest, crossing: false };
+            return Pruned { tree: left.tree, cost: split, union: tightest, crossing: false };
         }
         if let Some(all) = tightest {
-            let merged = self.leaf(all, crossing, weight, far);
+            let merged = self.leaf(all, crossing, weight, unlisted);
             if merged.cost <= split {
                 return merged;
             }
             let tree = Tree::Split(Box::new([left.tree, right.tree]));
             return Pruned { tree, cost: split, ..merged };
         }
-        if far {
+        if let Some(leaf) = unlisted {
             let cost = weight * self.weights.far_faces + self.weights.byte * LEAF_BYTES;
             if cost <= split {
-                return Pruned { tree: Tree::Leaf(Leaf::Far), cost, union: None, crossing };
+                return Pruned { tree: Tree::Leaf(leaf), cost, union: None, crossing };
             }
         }
         Pruned { tree: Tree::Split(Box::new([left.tree, right.tree])), cost: split, union: None, crossing }

@@ -37,7 +37,12 @@ impl LocalFrame {
 
     /// Local to mesh unit.
     pub fn to_world(self, p: DVec3) -> DVec3 {
-        p / self.scale + self.offset
+        p * self.inverse_scale() + self.offset
+    }
+
+    /// Mesh units per local unit: exact, as the scale is a power of two.
+    pub fn inverse_scale(self) -> f64 {
+        1.0 / self.scale
     }
 }
 

@@ -46,8 +46,6 @@ pub struct Closest {
     pub point: DVec3,
     /// The feature that the closest point lies on.
     pub feature: Feature,
-    /// All features whose closed region holds the query point.
-    pub regions: Regions,
 }
 
 /// A triangle with its unit normal, ready for distance queries.
@@ -63,7 +61,6 @@ impl Triangle {
     /// Computes the normal.
     pub fn new(corners: [DVec3; 3]) -> Self {
         let [a, b, c] = corners;
-        // Of the three equal cross products, the one at the longest edge's opposite corner cancels least.
         let normal = (b - a).cross(c - a);
         let length = normal.length();
         let normal = if length > 0.0 { normal / length } else { DVec3::ZERO };
@@ -75,51 +72,89 @@ impl Triangle {
     /// Inside of the prism over the face the distance is that to the plane, elsewhere the least of the
     /// three edges. Both are accurate to a few ulp for slivers too, as the prism is told by distances
     /// to its sides, never by a quotient of areas (a needle of aspect 1e7 loses seven digits there).
+    #[inline]
     pub fn closest(&self, p: DVec3) -> Closest {
-        let [a, b, c] = self.corners;
-        let from = [p - a, p - b, p - c];
-        let along = [b - a, c - b, a - c];
-        let turned = from[0].cross(self.normal);
-        let turned_b = from[1].cross(self.normal);
-        let side = [along[0].dot(turned), along[1].dot(turned_b), along[2].dot(turned)];
-        let start: [f64; 3] = std::array::from_fn(|k| along[k].dot(from[k]));
-        let end: [f64; 3] = std::array::from_fn(|k| along[k].dot(from[(k + 1) % 3]));
-        let flat = self.normal == DVec3::ZERO;
-
-        let mut regions = 0u8;
-        for k in 0..3 {
-            let previous = (k + 2) % 3;
-            regions |= u8::from(side[k] <= 0.0 && start[k] >= 0.0 && end[k] <= 0.0) << (1 + k);
-            regions |= u8::from(start[k] <= 0.0 && end[previous] >= 0.0) << (4 + k);
+        let relative = Relative::new(self, p);
+        if relative.over_face(self) {
+            let height = self.normal.dot(relative.from[0]);
+            let point = p - height * self.normal;
+            return Closest { distance: height.abs(), point, feature: Feature::Face };
         }
-        let inside = !flat && side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0;
-        let regions = if flat { Regions::FACE } else { Regions(regions | u8::from(inside)) };
-        if inside {
-            let height = self.normal.dot(from[0]);
-            return Closest {
-                distance: height.abs(),
-                point: p - height * self.normal,
-                feature: Feature::Face,
-                regions,
-            };
-        }
-        let mut best = (f64::INFINITY, a, Feature::Vertex(0));
+        let mut best = (f64::INFINITY, self.corners[0], Feature::Vertex(0));
         for k in 0..3 {
             let next = (k + 1) % 3;
-            let (point, feature) = if start[k] <= 0.0 {
+            let (start, end) = (relative.start(k), relative.end(k));
+            let (point, feature) = if start <= 0.0 {
                 (self.corners[k], Feature::Vertex(k as u8))
-            } else if end[k] >= 0.0 {
+            } else if end >= 0.0 {
                 (self.corners[next], Feature::Vertex(next as u8))
             } else {
-                let t = start[k] / (start[k] - end[k]);
-                (self.corners[k] + t * along[k], Feature::Edge(k as u8))
+                let t = start / (start - end);
+                (self.corners[k] + t * relative.along[k], Feature::Edge(k as u8))
             };
             let d = p.distance_squared(point);
             if d < best.0 {
                 best = (d, point, feature);
             }
         }
-        Closest { distance: best.0.sqrt(), point: best.1, feature: best.2, regions }
+        Closest { distance: best.0.sqrt(), point: best.1, feature: best.2 }
+    }
+
+    /// The features whose closed region holds `p`.
+    #[inline]
+    pub fn regions(&self, p: DVec3) -> Regions {
+        if self.normal == DVec3::ZERO {
+            return Regions::FACE;
+        }
+        let relative = Relative::new(self, p);
+        let mut regions = u8::from(relative.over_face(self));
+        for k in 0..3 {
+            let (start, end) = (relative.start(k), relative.end(k));
+            regions |= u8::from(relative.side[k] <= 0.0 && start >= 0.0 && end <= 0.0) << (1 + k);
+            regions |= u8::from(start <= 0.0 && relative.end((k + 2) % 3) >= 0.0) << (4 + k);
+        }
+        Regions(regions)
+    }
+}
+
+/// A point as seen from a triangle.
+struct Relative {
+    /// From each corner to the point.
+    from: [DVec3; 3],
+    /// From each corner to the next.
+    along: [DVec3; 3],
+    /// Height over each edge within the plane, times the edge's length; positive on the face's side.
+    side: [f64; 3],
+}
+
+impl Relative {
+    #[inline]
+    fn new(triangle: &Triangle, p: DVec3) -> Self {
+        let [a, b, c] = triangle.corners;
+        let from = [p - a, p - b, p - c];
+        let along = [b - a, c - b, a - c];
+        let turned = from[0].cross(triangle.normal);
+        let turned_b = from[1].cross(triangle.normal);
+        let side = [along[0].dot(turned), along[1].dot(turned_b), along[2].dot(turned)];
+        Self { from, along, side }
+    }
+
+    /// Where edge `k` starts, seen along it: negative before its start.
+    #[inline]
+    fn start(&self, k: usize) -> f64 {
+        self.along[k].dot(self.from[k])
+    }
+
+    /// Where edge `k` ends: positive beyond its end.
+    #[inline]
+    fn end(&self, k: usize) -> f64 {
+        self.along[k].dot(self.from[(k + 1) % 3])
+    }
+
+    #[inline]
+    fn over_face(&self, triangle: &Triangle) -> bool {
+        let [a, b, c] = self.side;
+        a >= 0.0 && b >= 0.0 && c >= 0.0 && triangle.normal != DVec3::ZERO
     }
 }
 
@@ -148,7 +183,7 @@ mod tests {
             prop_assert!(found.distance <= least + 1e-12);
             prop_assert!((found.point.distance(p) - found.distance).abs() <= 1e-12);
             prop_assert!(least <= found.distance + 0.1);
-            prop_assert!(found.regions.0 != 0);
+            prop_assert!(triangle.regions(p).0 != 0);
         }
     }
 }

@@ -65,7 +65,8 @@ pub(crate) const T_JUNCTION_TOLERANCE: f64 = 1e-9;
 /// edges balance; where they do not, the solid angle of what is left changes continuously with the point.) That
 /// is a matter of counting: no tolerance. When the edges balance, self-intersections, non-manifold edges and
 /// vertices, duplicate faces and faces without area are warnings, as they leave the inside (winding number
-/// 1 or more) well defined; otherwise they are errors, like open edges. A negative winding number is an error too.
+/// 1 or more) well defined; otherwise they are errors, like open edges. A negative winding number is an error too,
+/// except in folds thinner than 1e-6 of the diagonal, which rounding to 32-bit floats makes.
 ///
 /// # How far the winding number is tested
 /// The winding number is constant on each side of a patch of faces that are connected over manifold edges and

@@ -32,12 +32,16 @@ pub enum Severity {
     Note,
 }
 
-/// Kinds of defects, in the order in which reports list them.
+/// Kinds of defects, in the order in which reports list them: causes before consequences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DefectKind {
     /// A coordinate or the size of the mesh is outside of the range in which computations are exact.
     OutOfRange,
+    /// A face with the corners of another, in the same orientation.
+    DuplicateFace,
+    /// A face with the corners of another, in the opposite orientation.
+    ReversedDuplicateFace,
     /// A vertex lies on an open edge of a face that does not use it.
     TJunction,
     /// An edge with a single face.
@@ -50,10 +54,6 @@ pub enum DefectKind {
     NonManifoldEdge,
     /// A vertex where surfaces touch that share no edge there.
     NonManifoldVertex,
-    /// A face with the corners of another, in the same orientation.
-    DuplicateFace,
-    /// A face with the corners of another, in the opposite orientation.
-    ReversedDuplicateFace,
     /// A face with two equal corners.
     RepeatedCorner,
     /// A face whose three different corners are on one line, exactly.

@@ -5,9 +5,11 @@
 //! triangulation. Nothing is allocated by a count in a header, only by bytes that are there.
 //!
 //! The STL, OBJ, PLY and OFF parsers are our own because an error must name the line or element
-//! at fault: `tobj`'s `LoadError` carries neither line nor index, `stl_io` and `ply-rs-bw` return
-//! an `io::Error` or text without the face. glTF's JSON is parsed and validated by
-//! `gltf-json`, which names the path (`meshes[0].primitives[0].indices`).
+//! at fault. `tobj` 4.0.5 has neither in its `LoadError`; `stl_io` 0.11.0 gives an `io::Error`
+//! without the line; `ply-rs-bw` 4.0.1 names the line that does not parse, but its rows do not say
+//! where they stand, so an index out of range has no place, and data after the last row go
+//! unnoticed. glTF's JSON is parsed and validated by `gltf-json`, which names the path
+//! (`meshes[0].primitives[0].indices`).
 mod assemble;
 mod error;
 mod gltf;

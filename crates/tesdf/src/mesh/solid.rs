@@ -1,12 +1,13 @@
-use std::fmt;
+use std::{collections::BTreeMap, fmt};
 
-use super::{CheckReport, Defect, Severity, TriangleMesh, check};
+use super::{CheckReport, Defect, DefectKind, Severity, TriangleMesh, check};
 
 /// A mesh with a well-defined inside: what the encoder accepts, valid by construction.
 ///
 /// - Every coordinate and the diagonal are in the accepted range.
 /// - Every directed edge is used as often as its reverse, so the winding number is an integer everywhere.
-/// - The winding number is not negative and somewhere 1 or more, as far as [`check`](super::check) tests it.
+/// - The winding number is somewhere 1 or more, and not negative but for thin folds, as far as
+///   [`check`](super::check) tests it.
 ///
 /// Inside is where the winding number is 1 or more. The surface may intersect itself, touch itself and have faces
 /// without area; [`warnings`](Self::warnings) then says so.
@@ -77,18 +78,27 @@ impl NotSolid {
 
 impl std::error::Error for NotSolid {}
 
-/// Errors that the message names.
-const NAMED: usize = 3;
+/// Kinds of errors that the message names, and errors of each.
+const NAMED: [usize; 2] = [3, 2];
 
 impl fmt::Display for NotSolid {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let errors: Vec<&Defect> = self.report.of_severity(Severity::Error).collect();
-        write!(f, "the mesh has no well-defined inside ({} errors; ids are 0-based): ", errors.len())?;
-        for (i, error) in errors.iter().take(NAMED).enumerate() {
-            write!(f, "{}{}", if i > 0 { "; " } else { "" }, error.message)?;
+        let mut kinds: BTreeMap<DefectKind, Vec<&str>> = BTreeMap::new();
+        for error in self.report.of_severity(Severity::Error) {
+            kinds.entry(error.kind).or_default().push(&error.message);
         }
-        if errors.len() > NAMED {
-            write!(f, "; and {} more", errors.len() - NAMED)?;
+        let total: usize = kinds.values().map(Vec::len).sum();
+        write!(f, "the mesh has no well-defined inside ({total} errors; ids are 0-based): ")?;
+        for (i, (kind, messages)) in kinds.iter().take(NAMED[0]).enumerate() {
+            let named = messages[..messages.len().min(NAMED[1])].join("; ");
+            let separator = if i > 0 { "; " } else { "" };
+            match messages.len() {
+                n if n > NAMED[1] => write!(f, "{separator}{n} {kind}: {named}; ...")?,
+                _ => write!(f, "{separator}{named}")?,
+            }
+        }
+        if kinds.len() > NAMED[0] {
+            f.write_str("; and other defects")?;
         }
         f.write_str(if self.repairable {
             ". Run `tesdf repair`, which makes it encodable, and encode the result"

@@ -50,10 +50,10 @@ impl Edge {
     }
 }
 
-/// Component of a face with two equal corners.
-pub const NO_COMPONENT: u32 = u32::MAX;
-
 impl Topology {
+    /// Component of a face with two equal corners.
+    pub const NO_COMPONENT: u32 = u32::MAX;
+
     /// Finds the edges of `faces`, ordered by their vertices.
     pub fn new(faces: &[[u32; 3]]) -> Self {
         let mut half_edges = Vec::with_capacity(3 * faces.len());
@@ -96,7 +96,7 @@ impl Topology {
     }
 
     /// Component of each face and their number, where faces are connected over the edges that `across` accepts.
-    /// Components are numbered by their lowest face; faces with a repeated corner have `NO_COMPONENT`.
+    /// Components are numbered by their lowest face; faces with a repeated corner have [`NO_COMPONENT`](Self::NO_COMPONENT).
     pub fn components(&self, across: impl Fn(&Edge) -> bool) -> (Vec<u32>, usize) {
         let mut sets = DisjointSets::new(self.faces.len());
         for edge in self.edges.iter().filter(|e| across(e)) {
@@ -104,14 +104,14 @@ impl Topology {
                 sets.join(pair[0].face, pair[1].face);
             }
         }
-        let mut number = vec![NO_COMPONENT; self.faces.len()];
+        let mut number = vec![Self::NO_COMPONENT; self.faces.len()];
         let mut count = 0;
         let component = |f: usize| {
             if has_repeated_corner(self.faces[f]) {
-                return NO_COMPONENT;
+                return Self::NO_COMPONENT;
             }
             let root = sets.find(f as u32) as usize;
-            if number[root] == NO_COMPONENT {
+            if number[root] == Self::NO_COMPONENT {
                 number[root] = count;
                 count += 1;
             }
@@ -264,7 +264,7 @@ mod tests {
         let t = Topology::new(&faces);
         assert!(t.is_closed());
         assert_eq!(t.edges().len(), 6);
-        assert_eq!(t.components(Edge::is_manifold).0[4..], [NO_COMPONENT; 2]);
+        assert_eq!(t.components(Edge::is_manifold).0[4..], [Topology::NO_COMPONENT; 2]);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Squared distances from one point to the faces of a list, several faces at once.
 //!
-//! One source, compiled per instruction set and chosen when an asset is opened. No fused multiply-add
-//! anywhere, so that every machine gives the same bits.
+//! One source, compiled per instruction set and chosen when an asset is opened. With fused multiply-add the last
+//! bits differ from those without; only which of two equally near faces wins can follow from that.
 
 use glam::{DVec3, Vec3};
 
@@ -73,9 +73,9 @@ impl Nearest {
 /// Instruction set that the kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Isa {
-    /// Whatever the build targets: four lanes.
+    /// Whatever the build targets.
     Baseline,
-    /// AVX2: eight lanes.
+    /// AVX2 and FMA: eight lanes.
     #[cfg(target_arch = "x86_64")]
     Avx2,
 }
@@ -84,63 +84,52 @@ impl Isa {
     /// The widest that this processor has.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
             return Self::Avx2;
         }
         Self::Baseline
     }
 }
 
-/// Improves `best` by the faces `ids`; of equally near ones the first wins.
+/// Lanes of the widest kernel: lists of faces are filled up to a multiple of it by repeating their last face.
+pub const LANES: usize = 8;
+
+/// Improves `best` by `faces`, at least one and a multiple of [`LANES`]; of equally near ones the first of a lane wins.
 #[inline]
-pub fn nearest(isa: Isa, records: &[FaceRecord], ids: impl Ids, p: Vec3, best: Nearest) -> Nearest {
+pub fn nearest(isa: Isa, records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best: Nearest) -> Nearest {
     match isa {
-        Isa::Baseline => nearest_lanes::<[f32; 4], 4>(records, ids, p, best),
-        // SAFETY: `detect` found the feature.
+        Isa::Baseline => nearest_lanes::<[f32; LANES], LANES>(records, faces, p, best),
+        // SAFETY: `detect` found the features.
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx2 => unsafe { nearest_avx2(records, ids, p, best) },
+        Isa::Avx2 => unsafe { nearest_avx2(records, faces, p, best) },
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-fn nearest_avx2(records: &[FaceRecord], ids: impl Ids, p: Vec3, best: Nearest) -> Nearest {
-    nearest_lanes::<std::arch::x86_64::__m256, 8>(records, ids, p, best)
-}
-
-/// Where the faces of a list are named.
-pub trait Ids: Copy {
-    /// Number of faces.
-    fn len(self) -> usize;
-    /// Position of face `i`, for `i < len`.
-    fn get(self, i: usize) -> u32;
+#[target_feature(enable = "avx2,fma")]
+fn nearest_avx2(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best: Nearest) -> Nearest {
+    nearest_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, best)
 }
 
 #[inline(always)]
 fn nearest_lanes<L: Lanes<N>, const N: usize>(
     records: &[FaceRecord],
-    ids: impl Ids,
+    faces: &[[u32; N]],
     p: Vec3,
     best: Nearest,
 ) -> Nearest {
-    let count = ids.len();
     let p = V([L::splat(p.x), L::splat(p.y), L::splat(p.z)]);
     let mut least = L::splat(best.distance_squared);
     let mut nearest = L::from_bits([best.face; N]);
-    let mut first = 0;
-    while first < count {
-        // The last chunk is filled up with its last face: equal distances never replace an earlier one.
-        let mut faces = [0u32; N];
+    for faces in faces {
         let mut rows = [&records[0].0; N];
         for l in 0..N {
-            faces[l] = ids.get((first + l).min(count - 1));
             rows[l] = &records[faces[l] as usize].0;
         }
         let d = distance_squared(L::load(rows), p);
         let closer = d.less(least);
         least = closer.select(d, least);
-        nearest = closer.select(L::from_bits(faces), nearest);
-        first += N;
+        nearest = closer.select(L::from_bits(*faces), nearest);
     }
     let (least, nearest) = (least.to_array(), nearest.to_array());
     let mut best = Nearest { distance_squared: least[0], face: nearest[0].to_bits() };
@@ -176,8 +165,8 @@ fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
 #[inline(always)]
 fn to_edge<L: Lanes<N>, const N: usize>(from: V<L>, along: V<L>, inverse: L) -> L {
     let t = along.dot(from).mul(inverse).max(L::splat(0.0)).min(L::splat(1.0));
-    let [x, y, z] = along.0;
-    let to = from.minus(V([x.mul(t), y.mul(t), z.mul(t)]));
+    let ([x, y, z], [u, v, w]) = (along.0, from.0);
+    let to = V([x.neg_mul_add(t, u), y.neg_mul_add(t, v), z.neg_mul_add(t, w)]);
     to.dot(to)
 }
 
@@ -198,7 +187,7 @@ impl<L> V<L> {
     where
         L: Lanes<N>,
     {
-        self.0[0].mul(o.0[0]).add(self.0[1].mul(o.0[1])).add(self.0[2].mul(o.0[2]))
+        self.0[2].mul_add(o.0[2], self.0[1].mul_add(o.0[1], self.0[0].mul(o.0[0])))
     }
 
     #[inline(always)]
@@ -208,9 +197,9 @@ impl<L> V<L> {
     {
         let ([a, b, c], [x, y, z]) = (self.0, o.0);
         Self([
-            b.mul(z).sub(c.mul(y)),
-            c.mul(x).sub(a.mul(z)),
-            a.mul(y).sub(b.mul(x)),
+            c.neg_mul_add(y, b.mul(z)),
+            a.neg_mul_add(z, c.mul(x)),
+            b.neg_mul_add(x, a.mul(y)),
         ])
     }
 }

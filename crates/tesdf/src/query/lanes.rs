@@ -1,4 +1,4 @@
-//! Several `f32` at once. Only what the distance kernel needs; every operation rounds as the scalar one does.
+//! Several `f32` at once. Only what the distance kernel needs.
 
 /// `N` numbers.
 pub trait Lanes<const N: usize>: Copy {
@@ -8,12 +8,14 @@ pub trait Lanes<const N: usize>: Copy {
     fn from_bits(bits: [u32; N]) -> Self;
     /// Number `c` of each of `N` records as vector `c`.
     fn load(records: [&[f32; 16]; N]) -> [Self; 16];
-    /// Sum.
-    fn add(self, o: Self) -> Self;
     /// Difference.
     fn sub(self, o: Self) -> Self;
     /// Product.
     fn mul(self, o: Self) -> Self;
+    /// `self · o + plus`, rounded once where the instruction set can.
+    fn mul_add(self, o: Self, plus: Self) -> Self;
+    /// `plus − self · o`, likewise.
+    fn neg_mul_add(self, o: Self, plus: Self) -> Self;
     /// The lesser; `o` where either is NaN.
     fn min(self, o: Self) -> Self;
     /// The greater; `o` where either is NaN.
@@ -30,22 +32,18 @@ pub trait Lanes<const N: usize>: Copy {
     fn to_array(self) -> [f32; N];
 }
 
-impl Lanes<4> for [f32; 4] {
+impl Lanes<8> for [f32; 8] {
     #[inline(always)]
     fn splat(x: f32) -> Self {
-        [x; 4]
+        [x; 8]
     }
     #[inline(always)]
-    fn from_bits(bits: [u32; 4]) -> Self {
+    fn from_bits(bits: [u32; 8]) -> Self {
         bits.map(f32::from_bits)
     }
     #[inline(always)]
-    fn load(records: [&[f32; 16]; 4]) -> [Self; 16] {
+    fn load(records: [&[f32; 16]; 8]) -> [Self; 16] {
         std::array::from_fn(|c| records.map(|r| r[c]))
-    }
-    #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        std::array::from_fn(|l| self[l] + o[l])
     }
     #[inline(always)]
     fn sub(self, o: Self) -> Self {
@@ -54,6 +52,14 @@ impl Lanes<4> for [f32; 4] {
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
         std::array::from_fn(|l| self[l] * o[l])
+    }
+    #[inline(always)]
+    fn mul_add(self, o: Self, plus: Self) -> Self {
+        std::array::from_fn(|l| self[l] * o[l] + plus[l])
+    }
+    #[inline(always)]
+    fn neg_mul_add(self, o: Self, plus: Self) -> Self {
+        std::array::from_fn(|l| plus[l] - self[l] * o[l])
     }
     #[inline(always)]
     fn min(self, o: Self) -> Self {
@@ -80,14 +86,14 @@ impl Lanes<4> for [f32; 4] {
         std::array::from_fn(|l| if self[l].to_bits() != 0 { yes[l] } else { no[l] })
     }
     #[inline(always)]
-    fn to_array(self) -> [f32; 4] {
+    fn to_array(self) -> [f32; 8] {
         self
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    // SAFETY of all blocks: reached only from functions with the feature `avx2`.
+    // SAFETY of all blocks: reached only from functions with the features `avx2` and `fma`.
     use std::arch::x86_64::*;
 
     /// Numbers `4k..4k + 4` of two records.
@@ -130,16 +136,20 @@ mod avx2 {
             out
         }
         #[inline(always)]
-        fn add(self, o: Self) -> Self {
-            unsafe { _mm256_add_ps(self, o) }
-        }
-        #[inline(always)]
         fn sub(self, o: Self) -> Self {
             unsafe { _mm256_sub_ps(self, o) }
         }
         #[inline(always)]
         fn mul(self, o: Self) -> Self {
             unsafe { _mm256_mul_ps(self, o) }
+        }
+        #[inline(always)]
+        fn mul_add(self, o: Self, plus: Self) -> Self {
+            unsafe { _mm256_fmadd_ps(self, o, plus) }
+        }
+        #[inline(always)]
+        fn neg_mul_add(self, o: Self, plus: Self) -> Self {
+            unsafe { _mm256_fnmadd_ps(self, o, plus) }
         }
         #[inline(always)]
         fn min(self, o: Self) -> Self {

@@ -3,6 +3,7 @@
 //! A point is taken to the local frame, its cell is found by descending the forest in fixed point, and the
 //! least distance to the faces of the cell's list is the answer. Points that no list serves (outside of the
 //! domain, or in a far cell) are answered from the tree over all faces, exactly too.
+mod batch;
 mod kernel;
 mod lanes;
 mod locate;
@@ -10,8 +11,9 @@ mod nearest;
 mod ray;
 mod sign;
 
+use std::cell::RefCell;
+
 use glam::DVec3;
-use rayon::prelude::*;
 
 pub use kernel::{FaceRecord, Isa};
 pub use locate::Entries;
@@ -21,7 +23,7 @@ pub use ray::RayHit;
 use crate::TeSdf;
 use crate::asset::layout::{Label, Side};
 use crate::geometry::{Closest, Feature};
-use locate::Place;
+use locate::{Faces, Place};
 use sign::hinted_side;
 
 /// What a query computes with.
@@ -72,26 +74,18 @@ const ON_SURFACE_F32: f64 = 1e-6;
 impl TeSdf {
     /// Answers for any point; `point` is in the mesh's unit.
     pub fn query(&self, point: DVec3, precision: Precision) -> Answer {
-        if !point.is_finite() {
-            return Answer::NONE;
-        }
         let local = self.frame.to_local(point);
-        self.answer(point, local, self.place(local), precision)
+        self.answer_alone(local, self.place(local), precision)
     }
 
     /// As [`query`](Self::query), but `None` outside of the domain: more than the band from the solid, give or
-    /// take a cell.
+    /// take a cell, and where no list was worth its bytes.
     pub fn query_in_domain(&self, point: DVec3, precision: Precision) -> Option<Answer> {
         let local = self.frame.to_local(point);
         match self.place(local) {
             Place::NotOfDomain => None,
-            place => Some(self.answer(point, local, place, precision)),
+            place => Some(self.answer_alone(local, place, precision)),
         }
-    }
-
-    /// Answers for many points, in order, on all threads of the current rayon pool.
-    pub fn query_batch(&self, points: &[DVec3], precision: Precision) -> Vec<Answer> {
-        points.par_iter().with_min_len(256).map(|&p| self.query(p, precision)).collect()
     }
 
     /// The signed distance alone; NaN for a point that is not finite.
@@ -103,86 +97,103 @@ impl TeSdf {
     /// go either way; points that are not finite are outside.
     pub fn is_inside(&self, point: DVec3) -> bool {
         let local = self.frame.to_local(point);
-        point.is_finite()
-            && match self.place(local) {
-                Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
-                Place::Listed { label: Label::Crossing(winding), offset } => {
-                    self.winding_in_cell(local, winding, offset) >= 1
-                }
-                _ => false,
+        match self.place(local) {
+            Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
+            Place::Listed { label: Label::Crossing(winding), offset } => {
+                let mut faces = Faces::default();
+                self.read_list(offset, &mut faces);
+                self.winding_in_cell(local, winding, &faces) >= 1
             }
+            _ => false,
+        }
     }
 
     /// How many faces and nodes a query at `point` reads, in `f32`.
     pub fn reads(&self, point: DVec3) -> Reads {
         let local = self.frame.to_local(point);
-        match self.place(local) {
-            Place::Listed { offset, .. } => Reads { list_entries: self.list_len(offset), ..Reads::default() },
-            _ => {
-                let mut reads = Reads::default();
-                self.nearest_in_tree_f32((local - self.cube.middle()).as_vec3(), &mut reads);
-                reads
+        let mut reads = Reads::default();
+        if let Place::Listed { offset, .. } = self.place(local) {
+            let mut faces = Faces::default();
+            self.read_list(offset, &mut faces);
+            reads.list_entries = faces.ids().len();
+        } else {
+            self.nearest_in_tree_f32((local - self.cube.middle()).as_vec3(), &mut reads);
+        }
+        reads
+    }
+
+    #[inline]
+    fn answer_alone(&self, local: DVec3, place: Place, precision: Precision) -> Answer {
+        thread_local! {
+            static FACES: RefCell<Faces> = RefCell::default();
+        }
+        FACES.with_borrow_mut(|faces| {
+            if let Place::Listed { offset, .. } = place {
+                self.read_list(offset, faces);
             }
-        }
+            self.answer(local, place, faces, precision)
+        })
     }
 
+    /// `faces` are those of the place's list, if it has one.
     #[inline]
-    fn answer(&self, point: DVec3, local: DVec3, place: Place, precision: Precision) -> Answer {
+    fn answer(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Answer {
         match precision {
-            Precision::F32 => self.answer_f32(point, local, place),
-            Precision::F64 => self.answer_f64(point, local, place),
+            _ if !local.is_finite() => Answer::NONE,
+            Precision::F32 => self.answer_f32(local, place, faces),
+            Precision::F64 => self.answer_f64(local, place, faces),
         }
     }
 
     #[inline]
-    fn answer_f32(&self, point: DVec3, local: DVec3, place: Place) -> Answer {
+    fn answer_f32(&self, local: DVec3, place: Place, faces: &Faces) -> Answer {
         let relative = local - self.cube.middle();
         let found = match place {
-            Place::Listed { offset, .. } => self.nearest_in_list_f32(offset, relative.as_vec3()),
+            Place::Listed { .. } => self.nearest_in_list_f32(faces, relative.as_vec3()),
             // Far from the cube, f32 is too coarse against the body.
             _ if relative.abs().max_element() > 2.0 * self.cube.side() => {
-                return self.answer_f64(point, local, place);
+                return self.answer_f64(local, place, faces);
             }
             _ => self.nearest_in_tree_f32(relative.as_vec3(), &mut Reads::default()),
         };
-        let triangle = self.records[found.face as usize].triangle();
+        let record = &self.records[found.face as usize];
+        let triangle = record.triangle();
         let closest = triangle.closest(relative);
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
-            Place::Listed { label: Label::Crossing(winding), offset } => {
+            Place::Listed { label: Label::Crossing(winding), .. } => {
                 let height = triangle.normal.dot(relative - triangle.corners[0]);
-                hinted_side(self.records[found.face as usize].hints(), closest.feature, height)
-                    .unwrap_or_else(|| self.exact_side(local, winding, offset))
+                hinted_side(record.hints(), closest.feature, height)
+                    .unwrap_or_else(|| self.exact_side(local, winding, faces))
             }
             _ => Side::Outside,
         };
-        let normal = triangle.normal;
-        let to_world = |p: DVec3| self.frame.to_world(p + self.cube.middle());
-        self.finish(relative, closest, side, found.face, to_world, |d| if d < ON_SURFACE_F32 { Some(normal) } else { None })
+        let on_surface = |d: f64| (d < ON_SURFACE_F32).then_some(triangle.normal);
+        self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
     }
 
-    fn answer_f64(&self, _point: DVec3, local: DVec3, place: Place) -> Answer {
+    fn answer_f64(&self, local: DVec3, place: Place, faces: &Faces) -> Answer {
         let (position, closest) = match place {
-            Place::Listed { offset, .. } => self.nearest_in_list_f64(offset, local),
+            Place::Listed { .. } => self.nearest_in_list_f64(faces, local),
             _ => self.nearest_in_tree_f64(local),
         };
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
-            Place::Listed { label: Label::Crossing(winding), offset } if closest.distance > 0.0 => {
-                self.exact_side(local, winding, offset)
+            Place::Listed { label: Label::Crossing(winding), .. } if closest.distance > 0.0 => {
+                self.exact_side(local, winding, faces)
             }
             _ => Side::Outside,
         };
         let on_surface = |d: f64| match place {
-            Place::Listed { offset, .. } if d < ON_SURFACE_F64 => {
-                Some(self.pseudonormal(offset, position, closest.feature))
+            Place::Listed { .. } if d < ON_SURFACE_F64 => {
+                Some(self.pseudonormal(faces, position, closest.feature))
             }
             _ => None,
         };
-        self.finish(local, closest, side, position, |p| self.frame.to_world(p), on_surface)
+        self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
     }
 
-    /// From the local frame to the mesh's.
+    /// From the local frame, shifted by `origin`, to the mesh's.
     #[inline]
     fn finish(
         &self,
@@ -190,23 +201,23 @@ impl TeSdf {
         closest: Closest,
         side: Side,
         position: u32,
-        to_world: impl Fn(DVec3) -> DVec3,
+        origin: DVec3,
         on_surface: impl Fn(f64) -> Option<DVec3>,
     ) -> Answer {
         let sign = if side == Side::Inside { -1.0 } else { 1.0 };
         let gradient = on_surface(closest.distance)
-            .unwrap_or_else(|| sign * (p - closest.point) / closest.distance);
+            .unwrap_or_else(|| (p - closest.point) * (sign / closest.distance));
         Answer {
-            signed_distance: sign * closest.distance / self.frame.scale,
+            signed_distance: sign * closest.distance * self.frame.inverse_scale(),
             gradient,
-            closest_point: to_world(closest.point),
+            closest_point: self.frame.to_world(closest.point + origin),
             face: self.face_ids[position as usize],
         }
     }
 
     /// The normal of a feature: of the face, the sum over an edge's faces, or the angle-weighted sum around a
     /// vertex (Bærentzen and Aanæs 2005). The list names all of them when the feature is within the padding of the cell.
-    fn pseudonormal(&self, offset: u32, position: u32, feature: Feature) -> DVec3 {
+    fn pseudonormal(&self, faces: &Faces, position: u32, feature: Feature) -> DVec3 {
         let corners = self.faces[position as usize];
         let own = self.local_triangle(position as usize).normal;
         let held: &[u32] = match feature {
@@ -215,7 +226,7 @@ impl TeSdf {
             Feature::Vertex(k) => &corners[k as usize..=k as usize],
         };
         let mut sum = DVec3::ZERO;
-        for face in self.list_faces(offset) {
+        for &face in faces.ids() {
             let ids = self.faces[face as usize];
             if !held.iter().all(|v| ids.contains(v)) {
                 continue;
@@ -234,10 +245,4 @@ impl TeSdf {
         }
         sum.try_normalize().unwrap_or(own)
     }
-}
-impl TeSdf {
-    /// tmp
-    pub fn query_place(&self, p: DVec3) -> usize { match self.place(self.frame.to_local(p)) { Place::Listed { offset, .. } => offset as usize, _ => 0 } }
-    /// tmp
-    pub fn query_nearest(&self, p: DVec3) -> usize { let local = self.frame.to_local(p); match self.place(local) { Place::Listed { offset, .. } => self.nearest_in_list_f32(offset, (local - self.cube.middle()).as_vec3()).face as usize, _ => 0 } }
 }

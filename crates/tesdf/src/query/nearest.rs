@@ -1,10 +1,10 @@
 use glam::{DVec3, Vec3};
 
-use super::kernel::{self, Ids, Nearest};
-use super::locate::ListIds;
+use super::kernel::{self, Nearest};
+use super::locate::Faces;
 use crate::TeSdf;
-use crate::asset::layout::TreeChild;
-use crate::geometry::{AabbTree, Closest, Feature, Regions};
+use crate::asset::layout::{TREE_LEAF, TreeChild};
+use crate::geometry::{AabbTree, Closest, Feature};
 
 /// What a query reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -24,32 +24,16 @@ impl Reads {
     }
 }
 
-/// Faces that follow each other.
-#[derive(Clone, Copy)]
-struct Run(u32, u32);
-
-impl Ids for Run {
-    #[inline(always)]
-    fn len(self) -> usize {
-        self.1 as usize
-    }
-
-    #[inline(always)]
-    fn get(self, i: usize) -> u32 {
-        self.0 + i as u32
-    }
-}
+// A leaf of the face tree is one step of the kernel.
+const _: () = assert!(TREE_LEAF == kernel::LANES);
 
 /// Entries of a stack that visits the farther child later: one per level.
 const STACK: usize = AabbTree::MAX_DEPTH + 2;
 
 impl TeSdf {
     #[inline]
-    pub(super) fn nearest_in_list_f32(&self, offset: u32, p: Vec3) -> Nearest {
-        match self.list(offset) {
-            ListIds::Slots(slots) => kernel::nearest(self.isa, &self.records, slots, p, Nearest::NONE),
-            ListIds::Faces(words) => kernel::nearest(self.isa, &self.records, words, p, Nearest::NONE),
-        }
+    pub(super) fn nearest_in_list_f32(&self, faces: &Faces, p: Vec3) -> Nearest {
+        kernel::nearest(self.isa, &self.records, faces.chunks(), p, Nearest::NONE)
     }
 
     /// The nearest of all faces; `p` relative to the middle of the cube.
@@ -70,7 +54,8 @@ impl TeSdf {
             match child {
                 TreeChild::Leaf(start, count) => {
                     reads.tree_faces += count as usize;
-                    best = kernel::nearest(self.isa, &self.records, Run(start, count), p, best);
+                    let faces = std::array::from_fn(|l| start + (l as u32).min(count - 1));
+                    best = kernel::nearest(self.isa, &self.records, &[faces], p, best);
                 }
                 TreeChild::Node(n) => {
                     reads.tree_nodes += 1;
@@ -88,9 +73,9 @@ impl TeSdf {
     }
 
     /// The nearest face of a list, `p` in the local frame: its position, and where. Ties go to the lowest id.
-    pub(super) fn nearest_in_list_f64(&self, offset: u32, p: DVec3) -> (u32, Closest) {
+    pub(super) fn nearest_in_list_f64(&self, faces: &Faces, p: DVec3) -> (u32, Closest) {
         let mut best = Best::NONE;
-        self.list_faces(offset).for_each(|face| best.try_face(self, face, p));
+        faces.ids().iter().for_each(|&face| best.try_face(self, face, p));
         (best.position, best.closest)
     }
 
@@ -144,7 +129,6 @@ impl Best {
             distance: f64::INFINITY,
             point: DVec3::NAN,
             feature: Feature::Face,
-            regions: Regions::FACE,
         },
     };
 

@@ -1,5 +1,6 @@
 use glam::DVec3;
 
+use super::locate::Faces;
 use crate::TeSdf;
 use crate::asset::layout::{SignHint, SignHints, Side};
 use crate::geometry::{Feature, signed_crossing};
@@ -23,16 +24,16 @@ pub fn hinted_side(hints: SignHints, feature: Feature, height: f64) -> Option<Si
 impl TeSdf {
     /// The side by winding number, exact; `winding` is that at the cell's centroid.
     #[cold]
-    pub(super) fn exact_side(&self, local: DVec3, winding: u32, offset: u32) -> Side {
-        if self.winding_in_cell(local, winding, offset) >= 1 { Side::Inside } else { Side::Outside }
+    pub(super) fn exact_side(&self, local: DVec3, winding: u32, faces: &Faces) -> Side {
+        if self.winding_in_cell(local, winding, faces) >= 1 { Side::Inside } else { Side::Outside }
     }
 
     /// Winding number in a crossing cell: that at its centroid, plus the crossings on the way there. The list
     /// names every face that meets the cell.
-    pub(super) fn winding_in_cell(&self, local: DVec3, winding: u32, offset: u32) -> i32 {
+    pub(super) fn winding_in_cell(&self, local: DVec3, winding: u32, faces: &Faces) -> i32 {
         let Some(cell) = self.cell(local) else { return 0 };
         let centroid = cell.centroid();
         let corners = |f: u32| self.face_corners(f as usize).map(|p| self.frame.to_local(p));
-        winding as i32 + self.list_faces(offset).map(|f| signed_crossing(local, centroid, corners(f))).sum::<i32>()
+        winding as i32 + faces.ids().iter().map(|&f| signed_crossing(local, centroid, corners(f))).sum::<i32>()
     }
 }

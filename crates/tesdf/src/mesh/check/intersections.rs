@@ -81,3 +81,61 @@ pub(super) fn defects(mesh: &TriangleMesh, pairs: &[[u32; 2]], lenient: Severity
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A triangle without a thin strip at the corners `shared`, as triangles; the coordinates stay exact.
+    fn trimmed(t: [DVec3; 3], shared: [bool; 3]) -> Vec<[DVec3; 3]> {
+        let off = |from: DVec3, to: DVec3| from + (to - from) / 1024.0;
+        match shared.iter().filter(|&&s| s).count() {
+            0 => vec![t],
+            1 => {
+                let k = shared.iter().position(|&s| s).unwrap();
+                let [a, b, c] = [0, 1, 2].map(|i| t[(k + i) % 3]);
+                vec![[off(a, b), b, c], [off(a, b), c, off(a, c)]]
+            }
+            _ => {
+                let k = shared.iter().position(|&s| !s).unwrap();
+                let [c, a, b] = [0, 1, 2].map(|i| t[(k + i) % 3]);
+                vec![[c, off(a, c), off(b, c)]]
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+        /// Two faces meet beyond what they share exactly when they meet without thin strips along that.
+        #[test]
+        fn equals_all_pairs_trimmed(faces in prop::collection::vec(prop::array::uniform3(0u32..27), 2..16)) {
+            let vertices = (0..27).map(|v| DVec3::new((v % 3).into(), (v / 3 % 3).into(), (v / 9).into())).collect();
+            let mesh = TriangleMesh::new(vertices, faces).unwrap();
+            let n = mesh.faces().len() as u32;
+            let flat = |f: u32| {
+                let [a, b, c] = mesh.triangle(f as usize);
+                normal_signs(a, b, c) == [0; 3]
+            };
+            let without_area: Vec<u32> = (0..n).filter(|&f| flat(f)).collect();
+            let mut expected = Vec::new();
+            for f in 0..n {
+                for g in f + 1..n {
+                    let (corners, others) = (mesh.faces()[f as usize], mesh.faces()[g as usize]);
+                    let (in_g, in_f) = (corners.map(|v| others.contains(&v)), others.map(|v| corners.contains(&v)));
+                    if flat(f) || flat(g) || in_g == [true; 3] {
+                        continue;
+                    }
+                    let us = trimmed(mesh.triangle(g as usize), in_f);
+                    let ts = trimmed(mesh.triangle(f as usize), in_g);
+                    if ts.iter().any(|&t| us.iter().any(|&u| triangles_meet(t, u))) {
+                        expected.push([f, g]);
+                    }
+                }
+            }
+            prop_assert_eq!(self_intersections(&mesh, &without_area, &HashSet::new()), expected);
+        }
+    }
+}

@@ -3,14 +3,15 @@ use glam::DVec3;
 use super::{edges::centroid, faces::FaceFlaws};
 use crate::{
     geometry::{WindingNumber, perturbed_orientation},
-    mesh::{
-        Defect, DefectKind, Severity, Topology, TriangleMesh,
-        topology::{Edge, NO_COMPONENT},
-    },
+    mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, topology::Edge},
 };
 
 /// How far from a face that meets others its sides are sampled, relative to the diagonal.
 const SAMPLE_DISTANCE: f64 = 1e-12;
+
+/// A negative winding number no farther from the face than this, relative to the diagonal, is that of a fold as
+/// rounding to 32-bit floats makes: a warning.
+const FOLD_THICKNESS: f64 = 1e-6;
 
 /// The least and greatest winding number of a closed mesh, and where it is negative or above 1.
 pub(super) fn winding_defects(
@@ -28,6 +29,11 @@ pub(super) fn winding_defects(
 
     let winding = WindingNumber::new(mesh);
     let diagonal = mesh.diagonal();
+    let both_sides = |face: u32, distance: f64| {
+        let [a, b, c] = mesh.triangle(face as usize);
+        let (center, step) = (centroid(mesh, face), distance * (b - a).cross(c - a).normalize_or_zero());
+        [center + step, center - step].map(|x| winding.at_perturbed(x))
+    };
     let mut range = [0, 0];
     let mut defects = Vec::new();
     let mut above_one: Vec<(u32, i32)> = Vec::new();
@@ -36,11 +42,13 @@ pub(super) fn winding_defects(
         range = [range[0].min(low), range[1].max(high)];
         if low < 0 {
             let side = if sides[0] == low { "in front of" } else { "behind" };
-            let message = format!(
-                "the winding number is {low} {side} face {face}{extent}: the surface is inside out there"
-            );
-            let defect =
-                Defect::new(DefectKind::NegativeWinding, Severity::Error, centroid(mesh, face), message);
+            let is_fold = both_sides(face, FOLD_THICKNESS * diagonal).iter().all(|&w| w >= 0);
+            let (severity, what) = match is_fold {
+                true => (Severity::Warning, "a thin fold, inside is where it is 1 or more"),
+                false => (Severity::Error, "the surface is inside out there"),
+            };
+            let message = format!("the winding number is {low} {side} face {face}{extent}: {what}");
+            let defect = Defect::new(DefectKind::NegativeWinding, severity, centroid(mesh, face), message);
             defects.push(defect.faces([face]));
         }
         if high > 1 {
@@ -53,7 +61,9 @@ pub(super) fn winding_defects(
     // The tallest face of each patch stands for it: rounding moves its centre least, relative to its size.
     let mut tallest: Vec<Option<(f64, u32)>> = vec![None; patches];
     let mut sizes = vec![0usize; patches];
-    for f in (0..mesh.faces().len() as u32).filter(|&f| !excluded(f) && patch[f as usize] != NO_COMPONENT) {
+    for f in (0..mesh.faces().len() as u32)
+        .filter(|&f| !excluded(f) && patch[f as usize] != Topology::NO_COMPONENT)
+    {
         let number = patch[f as usize] as usize;
         sizes[number] += 1;
         let height = height(mesh.triangle(f as usize));
@@ -75,10 +85,7 @@ pub(super) fn winding_defects(
     for face in
         (0..mesh.faces().len() as u32).filter(|&f| meets_others[f as usize] && !without_area[f as usize])
     {
-        let [a, b, c] = mesh.triangle(face as usize);
-        let step = SAMPLE_DISTANCE * diagonal * (b - a).cross(c - a).normalize_or_zero();
-        let center = centroid(mesh, face);
-        record(face, [center + step, center - step].map(|x| winding.at_perturbed(x)), "");
+        record(face, both_sides(face, SAMPLE_DISTANCE * diagonal), "");
     }
 
     if let Some(&(face, value)) = above_one.iter().max_by_key(|&&(f, w)| (w, std::cmp::Reverse(f))) {

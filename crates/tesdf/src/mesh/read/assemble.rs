@@ -174,7 +174,7 @@ pub(super) fn assemble(
     }
 
     if unused > 0 {
-        notes.push(format!("{unused} vertices that no face uses were dropped"));
+        notes.push(format!("vertices dropped because no face uses them: {unused}"));
     }
     if let Some(i) = unused_non_finite {
         let place = places.vertex(i);
@@ -243,7 +243,7 @@ impl PolygonCounts {
         }
         if self.irregular > 0 {
             notes.push(format!(
-                "{} polygons have no area or cross themselves (the first is polygon {}, 0-based, {}); \
+                "{} polygons have no area, cross themselves, or are too intricate to split well (the first is polygon {}, 0-based, {}); \
                  their triangles may be flat or overlap: check the mesh",
                 self.irregular,
                 self.first_irregular,

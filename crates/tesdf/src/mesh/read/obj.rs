@@ -161,6 +161,7 @@ impl Skipped {
                 let what = match keyword.as_slice() {
                     b"l" => "line elements",
                     b"p" => "point elements",
+                    b"<<<<<<<" => "mark of an unfinished Git merge: two versions may be mixed",
                     _ => "statements that are no vertex or face",
                 };
                 format!("line {line}: {} ({what}) skipped; {count} in the file", shown(keyword))

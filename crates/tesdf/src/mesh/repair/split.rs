@@ -1,5 +1,7 @@
 use std::collections::{BTreeSet, HashMap};
 
+use glam::DVec3;
+
 use super::{Draft, RepairReport, SplitEdge};
 use crate::mesh::{
     Topology,
@@ -7,41 +9,74 @@ use crate::mesh::{
     topology::has_repeated_corner,
 };
 
-/// Splitting an edge can bring another vertex within reach of one of its parts, but each round makes edges
-/// shorter; CAD parts need one or two.
-const MAX_ROUNDS: usize = 32;
+/// Splitting an edge can bring another vertex within reach of one of its parts.
+const MAX_ROUNDS: usize = 4;
 
 /// Splits faces at the vertices that lie within `tolerance` of their open edges.
 ///
 /// An edge is split in all of its faces at once. Its directed uses then become those of its parts, as often as
 /// before, and new edges inside a face are used once in each direction: balanced edges stay balanced. A face
 /// whose third corner is on the edge leaves only parts with two equal corners; it vanishes.
+///
+/// Splits are kept only when they make the open edges shorter in total, and are not tried when vertices lie on more
+/// than two open edges each: then the tolerance is wider than the details of the mesh, and splitting would not end.
 pub(super) fn split(draft: &mut Draft, tolerance: f64, report: &mut RepairReport) {
     let mut vanished = BTreeSet::new();
+    let mut topology = Topology::new(&draft.faces);
     for _ in 0..MAX_ROUNDS {
-        let topology = Topology::new(&draft.faces);
         let junctions = t_junctions(&draft.vertices, &topology, tolerance);
-        if junctions.edges.is_empty() {
+        let open = topology.edges().iter().filter(|e| !e.is_balanced()).count();
+        let parts: usize = junctions
+            .edges
+            .iter()
+            .map(|(e, on_edge)| on_edge.len() * topology.edges()[*e].face_count() as usize)
+            .sum();
+        if junctions.edges.is_empty() || parts > 2 * open {
+            break;
+        }
+        let (faces, origin) = split_all(draft, &topology, &junctions);
+        let split = Topology::new(&faces);
+        let (before, after) =
+            (open_lengths(&draft.vertices, &topology), open_lengths(&draft.vertices, &split));
+        // Parts of an edge are as long as the whole: less than that much shorter is rounding.
+        let shorter = |k: usize| after[k] < before[k] * (1.0 - 1e-9);
+        let longer = |k: usize| after[k] > before[k] * (1.0 + 1e-9);
+        if !shorter(0) && (longer(0) || !shorter(1)) {
             break;
         }
         record(draft, &topology, &junctions, report);
-        let before: BTreeSet<u32> = draft.origin.iter().copied().collect();
-        let chains: HashMap<[u32; 2], &[u32]> = junctions
-            .edges
-            .iter()
-            .map(|(e, on_edge)| (topology.edges()[*e].vertices, on_edge.as_slice()))
-            .collect();
-        let (mut faces, mut origin) = (Vec::with_capacity(draft.faces.len()), Vec::new());
-        for (&face, &from) in draft.faces.iter().zip(&draft.origin) {
-            let first = faces.len();
-            split_face(face, &chains, &mut faces);
-            origin.resize(origin.len() + faces.len() - first, from);
-        }
+        let kept: BTreeSet<u32> = origin.iter().copied().collect();
+        vanished.extend(draft.origin.iter().filter(|o| !kept.contains(o)));
         (draft.faces, draft.origin) = (faces, origin);
-        let after: BTreeSet<u32> = draft.origin.iter().copied().collect();
-        vanished.extend(before.difference(&after));
+        topology = split;
     }
     report.vanished_faces = vanished.into_iter().collect();
+}
+
+/// Total length of the edges with an odd number of faces, which no orientation of the faces could balance, and that
+/// of all unbalanced edges, each as often as it is out of balance.
+fn open_lengths(vertices: &[DVec3], topology: &Topology) -> [f64; 2] {
+    topology.edges().iter().filter(|e| !e.is_balanced()).fold([0.0, 0.0], |sum, edge| {
+        let [a, b] = edge.vertices.map(|v| vertices[v as usize]);
+        let times = [edge.face_count() % 2, edge.forward.abs_diff(edge.backward)].map(f64::from);
+        [0, 1].map(|k| sum[k] + times[k] * a.distance(b))
+    })
+}
+
+/// The faces after splitting, and the face given that each comes from.
+fn split_all(draft: &Draft, topology: &Topology, junctions: &TJunctions) -> (Vec<[u32; 3]>, Vec<u32>) {
+    let chains: HashMap<[u32; 2], &[u32]> = junctions
+        .edges
+        .iter()
+        .map(|(e, on_edge)| (topology.edges()[*e].vertices, on_edge.as_slice()))
+        .collect();
+    let (mut faces, mut origin) = (Vec::with_capacity(draft.faces.len()), Vec::new());
+    for (&face, &from) in draft.faces.iter().zip(&draft.origin) {
+        let first = faces.len();
+        split_face(face, &chains, &mut faces);
+        origin.resize(origin.len() + faces.len() - first, from);
+    }
+    (faces, origin)
 }
 
 fn record(draft: &Draft, topology: &Topology, junctions: &TJunctions, report: &mut RepairReport) {
