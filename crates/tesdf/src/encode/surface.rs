@@ -1,3 +1,5 @@
+//! The mesh as the encoder sees it: triangles, edges, incident faces, and the parts that a cell can need.
+
 use std::collections::HashMap;
 
 use crate::geometry::{Feature, Triangle};
