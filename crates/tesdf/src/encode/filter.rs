@@ -68,6 +68,9 @@ pub struct Scratch {
     alive: Vec<u32>,
 }
 
+/// Rule C compares all pairs; cells with more survivors than this are bisected anyway, and compared below.
+const MAX_SHARING: usize = 256;
+
 /// At most this many faces stand against each candidate in the plane rule; the nearest ones.
 const MAX_RIVALS: usize = 96;
 
@@ -207,6 +210,9 @@ fn keep_rivals(chord: &mut [Vec<f64>; 4]) {
 
 /// Rule C: of the faces that are one and the same edge or vertex to the whole cell, one is enough.
 fn share_features(surface: &Surface, candidates: &[Candidate], survivors: &mut Vec<Survivor>) {
+    if survivors.len() > MAX_SHARING {
+        return;
+    }
     let mut i = 0;
     while i < survivors.len() {
         let g = survivors[i];
