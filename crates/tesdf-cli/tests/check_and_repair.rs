@@ -1,33 +1,12 @@
 //! What a person and a script see of `tesdf check` and `tesdf repair`.
-use std::path::{Path, PathBuf};
-use std::process::Command;
+mod folder;
+
+use std::path::Path;
+
+use folder::Folder;
 
 const VERTICES: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n";
 const FACES: &str = "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
-
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path(name), text).unwrap();
-    }
-
-    /// Exit code, stdout, stderr.
-    fn tesdf(&self, args: &[&str]) -> (Option<i32>, String, String) {
-        let out =
-            Command::new(env!("CARGO_BIN_EXE_tesdf")).args(args).current_dir(self.0.path()).output().unwrap();
-        let text = |bytes| String::from_utf8(bytes).unwrap();
-        (out.status.code(), text(out.stdout), text(out.stderr))
-    }
-}
 
 #[test]
 fn a_good_mesh_is_0() {
