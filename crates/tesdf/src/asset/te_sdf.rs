@@ -3,7 +3,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::about::About;
-use super::layout::{self, SignHints, List, Node, PALETTE_SIZE, TreeChild};
+use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
 use super::{AssetError, Container, SharedSection, save_atomic};
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{AabbTree, LocalFrame, Triangle};
@@ -178,7 +178,9 @@ impl TeSdf {
         if let Some(i) = self.face_ids.iter().position(|&id| id as usize >= f) {
             return wrong(layout::FACE_IDS, format!("entry {i} is {} of {f} faces", self.face_ids[i]));
         }
-        for (spec, n) in [(layout::FACE_IDS, self.face_ids.len()), (layout::SIGN_HINTS, self.sign_hints.len())] {
+        for (spec, n) in
+            [(layout::FACE_IDS, self.face_ids.len()), (layout::SIGN_HINTS, self.sign_hints.len())]
+        {
             if n != f {
                 return wrong(spec, format!("{n} entries for {f} faces"));
             }
@@ -191,11 +193,17 @@ impl TeSdf {
         if let Some(high) = &self.palettes_high
             && high.len() != self.palettes.len()
         {
-            return wrong(layout::PALETTES_HIGH, format!("{} entries for {}", high.len(), self.palettes.len()));
+            return wrong(
+                layout::PALETTES_HIGH,
+                format!("{} entries for {}", high.len(), self.palettes.len()),
+            );
         }
         let starts = &self.palette_starts;
         if starts.first() != Some(&0) || starts.last().map(|&s| s as usize) != Some(self.palettes.len()) {
-            return wrong(layout::PALETTE_STARTS, "does not begin at 0 and end at the number of palette faces".into());
+            return wrong(
+                layout::PALETTE_STARTS,
+                "does not begin at 0 and end at the number of palette faces".into(),
+            );
         }
         if let Some(p) = starts.windows(2).position(|w| w[0] > w[1] || w[1] - w[0] > PALETTE_SIZE as u32) {
             return wrong(layout::PALETTE_STARTS, format!("palette {p} has not 0 to {PALETTE_SIZE} faces"));
@@ -204,7 +212,10 @@ impl TeSdf {
             let high = self.palettes_high.as_ref().map_or(0, |high| u32::from(high[i]));
             u32::from(self.palettes[i]) | high << 16 >= f
         }) {
-            return wrong(layout::PALETTES, format!("entry {i} names a face that does not exist ({f} faces)"));
+            return wrong(
+                layout::PALETTES,
+                format!("entry {i} names a face that does not exist ({f} faces)"),
+            );
         }
         // Children follow their parents, so depths are known when a word is reached.
         let n = self.nodes.len();
@@ -270,13 +281,19 @@ impl TeSdf {
     fn check_tree(&self) -> Result<(), AssetError> {
         let (n, f) = (self.tree_children.len(), self.faces.len() as u32);
         if n == 0 || self.tree_boxes.len() != n {
-            return wrong(layout::TREE_BOXES, format!("{} boxes for {n} nodes; at least 1 of each", self.tree_boxes.len()));
+            return wrong(
+                layout::TREE_BOXES,
+                format!("{} boxes for {n} nodes; at least 1 of each", self.tree_boxes.len()),
+            );
         }
         let mut depth = vec![0u8; n];
         let mut covered = 0u64;
         for (i, node) in self.tree_children.iter().enumerate() {
             if usize::from(depth[i]) > AabbTree::MAX_DEPTH {
-                return wrong(layout::TREE_CHILDREN, format!("node {i} is deeper than {}", AabbTree::MAX_DEPTH));
+                return wrong(
+                    layout::TREE_CHILDREN,
+                    format!("node {i} is deeper than {}", AabbTree::MAX_DEPTH),
+                );
             }
             for &word in node {
                 match TreeChild::decode(word) {
@@ -286,7 +303,10 @@ impl TeSdf {
                     TreeChild::Node(c) => depth[c as usize] = depth[i] + 1,
                     TreeChild::Leaf(start, count) => {
                         if start + count > f {
-                            return wrong(layout::TREE_CHILDREN, format!("node {i}: faces {start} to {} of {f}", start + count));
+                            return wrong(
+                                layout::TREE_CHILDREN,
+                                format!("node {i}: faces {start} to {} of {f}", start + count),
+                            );
                         }
                         covered += u64::from(count);
                     }
@@ -305,16 +325,13 @@ fn frame_and_cube(placed: &[f64]) -> Result<(LocalFrame, DomainCube), AssetError
         return wrong(layout::FRAME, format!("{} numbers; expected 8", placed.len()));
     };
     let positive = |s: f64| s.is_normal() && s > 0.0;
-    if !placed.iter().all(|x| x.is_finite()) || !positive(scale) || !positive(side) {
+    let sound = |s: f64| positive(s) && (1.0 / s).is_normal();
+    if !placed.iter().all(|x| x.is_finite()) || !sound(scale) || !sound(side) {
         return wrong(layout::FRAME, format!("{placed:?} is no frame: finite, scale and side positive"));
     }
-    Ok((
-        LocalFrame { offset: DVec3::new(x, y, z), scale },
-        DomainCube::new(DVec3::new(u, v, w), side),
-    ))
+    Ok((LocalFrame::new(DVec3::new(x, y, z), scale), DomainCube::new(DVec3::new(u, v, w), side)))
 }
 
 fn wrong<T>(spec: super::SectionSpec, reason: String) -> Result<T, AssetError> {
     Err(AssetError::section(spec.name, reason))
 }
-

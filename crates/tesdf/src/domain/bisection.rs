@@ -114,7 +114,8 @@ impl Barycentric {
         let last = (1u64 << level) - 1;
         let mut cube = 0;
         let u: [u64; 3] = std::array::from_fn(|axis| {
-            let x = (p[axis] * Self::ONE as f64) as u64;
+            // In [1, 2] the bits of a double are fixed point: no conversion, rounded to nearest.
+            let x = (p[axis] + 1.0).to_bits() - 1f64.to_bits();
             let index = (x >> (52 - level)).min(last);
             cube |= (index as usize) << (axis as u32 * level);
             let within = (x << level) - index * Self::ONE;

@@ -10,6 +10,8 @@ use crate::geometry::Aabb;
 pub struct DomainCube {
     origin: DVec3,
     side: f64,
+    /// 1 / `side`.
+    inverse: f64,
 }
 
 const GRAIN: f64 = 1.0 / (1 << 20) as f64;
@@ -20,12 +22,12 @@ impl DomainCube {
         let up = |x: f64, grain: f64| (x / grain).ceil() * grain;
         let side = up(bounds.extent().max_element() + 4.0 * GRAIN, 1024.0 * GRAIN);
         let origin = bounds.center() - 0.5 * side;
-        Self { origin: origin.map(|x| (x / GRAIN).floor() * GRAIN), side }
+        Self::new(origin.map(|x| (x / GRAIN).floor() * GRAIN), side)
     }
 
     /// A cube with a given origin and side, as stored in an asset.
     pub fn new(origin: DVec3, side: f64) -> Self {
-        Self { origin, side }
+        Self { origin, side, inverse: 1.0 / side }
     }
 
     /// Least corner, in the local frame.
@@ -49,10 +51,10 @@ impl DomainCube {
     }
 
     /// The cell of depth `3 · level` that holds a point of the local frame, with the point's coordinates in it;
-    /// see [`Barycentric::in_grid`].
+    /// see [`Barycentric::in_grid`]. Off by at most 2^-51 of the side, which the padding of the cells covers.
     #[inline]
     pub fn locate(&self, p: DVec3, level: u32) -> Option<(usize, Barycentric)> {
-        Barycentric::in_grid((p - self.origin) / self.side, level)
+        Barycentric::in_grid((p - self.origin) * self.inverse, level)
     }
 }
 

@@ -152,7 +152,9 @@ impl Writer<'_> {
                 self.next += 1;
                 match leaf {
                     Leaf::Listed { faces, .. } => Node::Listed(label, self.list(faces, label, palette)?),
-                    Leaf::Far => Node::Far(if label == Label::Outside { Side::Outside } else { Side::Inside }),
+                    Leaf::Far => {
+                        Node::Far(if label == Label::Outside { Side::Outside } else { Side::Inside })
+                    }
                     Leaf::Outside => Node::NotOfDomain,
                 }
             }

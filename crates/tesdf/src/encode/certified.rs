@@ -73,7 +73,6 @@ pub fn encode(
         });
     }
     let local = local_mesh(mesh, frame)?;
-    let surface = Surface::new(&local);
     let winding = WindingNumber::new(&local);
     let regions: Vec<Aabb> = options
         .region_boxes()
@@ -82,6 +81,15 @@ pub fn encode(
     let bounds = regions.iter().fold(local.bounds().grown(band), |b, &r| b.union(r));
     let cube = DomainCube::around(bounds);
     let diagonal_local = diagonal * frame.scale;
+    let size = cube.side() / diagonal_local;
+    if size > MAX_SIZE {
+        return Err(EncodeError::Option {
+            option: "band or region",
+            found: format!("a domain {size:.1} times as wide as the mesh's diagonal"),
+            expected: "at most 8 times; points beyond the domain are answered exactly without",
+        });
+    }
+    let surface = Surface::new(&local, cube.side());
     let near = NEAR * diagonal_local;
 
     progress.begin(Stage::Refine, 6 * ROOT_VOLUME);
@@ -126,8 +134,7 @@ pub fn encode(
     let hints: Vec<u16> = tree.order().iter().map(|f| hints[in_order(f)].0).collect();
     let vertices: Vec<[f64; 3]> = mesh.vertices().iter().map(|v| v.to_array()).collect();
     let (offset, origin) = (frame.offset, cube.origin());
-    let placed =
-        [offset.x, offset.y, offset.z, frame.scale, origin.x, origin.y, origin.z, cube.side()];
+    let placed = [offset.x, offset.y, offset.z, frame.scale, origin.x, origin.y, origin.z, cube.side()];
     let low: Vec<u16> = forest.palettes.iter().map(|&f| f as u16).collect();
     let high: Vec<u8> = forest.palettes.iter().map(|&f| (f >> 16) as u8).collect();
     let (tree_boxes, tree_children) = face_tree(&tree, &cube);
@@ -150,7 +157,7 @@ pub fn encode(
     let about = about::About {
         source: source.clone(),
         options: options.clone(),
-        certificate: about::Certificate::exact(diagonal),
+        certificate: about::Certificate::exact(diagonal, cube.side()),
         statistics: about::Statistics::of(&roots, &labels, &cube, mesh, frame),
     };
     let bytes = write_container(&sections, &about.to_metadata())?;
@@ -171,8 +178,8 @@ const FLOOR: f64 = 6.0;
 fn validated(options: &EncodeOptions, diagonal: f64) -> Result<f64, EncodeError> {
     let band = options.band.resolve(diagonal);
     let wrong = |option, found: String, expected| Err(EncodeError::Option { option, found, expected });
-    if !(0.0..=MAX_BAND * diagonal).contains(&band) {
-        return wrong("band", format!("{band}"), "a length from 0 to 100 times the diagonal of the mesh");
+    if !(0.0..=MAX_SIZE * diagonal).contains(&band) {
+        return wrong("band", format!("{band}"), "a length from 0 to 8 times the diagonal of the mesh");
     }
     if !(options.byte_worth > 0.0 && options.byte_worth.is_finite()) {
         return wrong("byte_worth", format!("{}", options.byte_worth), "a positive number");
@@ -182,13 +189,18 @@ fn validated(options: &EncodeOptions, diagonal: f64) -> Result<f64, EncodeError>
     }
     for r in options.region_boxes() {
         if !(r.min.is_finite() && r.max.is_finite() && r.min.cmple(r.max).all()) {
-            return wrong("region", format!("{} to {}", r.min, r.max), "min x y z and a max that is not less");
+            return wrong(
+                "region",
+                format!("{} to {}", r.min, r.max),
+                "min x y z and a max that is not less",
+            );
         }
     }
     Ok(band)
 }
 
-const MAX_BAND: f64 = 100.0;
+/// Widest domain, in diagonals of the mesh: rounding, and with it the certificate's delta, grows with it.
+const MAX_SIZE: f64 = 8.0;
 const MAX_TIGHTEN: u32 = 30;
 
 fn local_mesh(mesh: &TriangleMesh, frame: LocalFrame) -> Result<TriangleMesh, MeshError> {
@@ -224,8 +236,8 @@ fn finish(
             }
             let at_centroid = winding.at_perturbed(cell.centroid());
             let label = |crossing: bool| match (crossing, at_centroid) {
-                // Solids have no negative winding numbers.
-                (true, w) => Label::Crossing(w.max(0) as u32),
+                // Read back as i32: folds thinner than the check sees may be negative.
+                (true, w) => Label::Crossing(w as u32),
                 (false, w) if w >= 1 => Label::Inside,
                 _ => Label::Outside,
             };
@@ -265,10 +277,7 @@ fn face_tree(tree: &AabbTree, cube: &DomainCube) -> (Vec<[f32; 12]>, Vec<[u32; 2
     if let (bounds, Child::Leaf { start, end }) = tree.root() {
         // A tree of one leaf is written as a node with two: a closed mesh has at least two faces.
         let half = start + (end - start) / 2;
-        nodes.push([
-            (bounds, Child::Leaf { start, end: half }),
-            (bounds, Child::Leaf { start: half, end }),
-        ]);
+        nodes.push([(bounds, Child::Leaf { start, end: half }), (bounds, Child::Leaf { start: half, end })]);
     }
     let boxes = nodes.iter().map(|node| {
         let mut out = [0.0; 12];

@@ -10,8 +10,10 @@ use crate::domain::Cell;
 /// settled once some probed point has it closest; bisection goes on only where a survivor is not
 /// settled yet, so that nearly all of the work goes to the faces in doubt.
 pub fn tighten(surface: &Surface, cell: &Cell, list: &[u32], levels: u32, scratch: &mut Scratch) -> Vec<u32> {
-    let candidates =
-        list.iter().map(|&face| Candidate { face, at: cell.corners.map(|c| probe(surface, face, c)) }).collect();
+    let candidates = list
+        .iter()
+        .map(|&face| Candidate { face, at: cell.corners.map(|c| probe(surface, face, c)) })
+        .collect();
     let mut needed = Needed { surface, settled: Vec::with_capacity(list.len()) };
     needed.descend(*cell, candidates, levels, scratch);
     needed.settled.sort_unstable();

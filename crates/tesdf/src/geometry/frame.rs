@@ -16,6 +16,8 @@ pub struct LocalFrame {
     pub offset: DVec3,
     /// Multiplied second; a power of two.
     pub scale: f64,
+    /// 1 / `scale`, exact.
+    inverse: f64,
 }
 
 impl LocalFrame {
@@ -27,7 +29,12 @@ impl LocalFrame {
         };
         let offset = DVec3::from_array(std::array::from_fn(|a| axis(bounds.min[a], bounds.max[a])));
         let (_, exponent) = frexp(bounds.extent().length());
-        Self { offset, scale: 2f64.powi(-exponent) }
+        Self::new(offset, 2f64.powi(-exponent))
+    }
+
+    /// A frame with a given offset and scale, as stored in an asset.
+    pub fn new(offset: DVec3, scale: f64) -> Self {
+        Self { offset, scale, inverse: 1.0 / scale }
     }
 
     /// Mesh unit to local.
@@ -37,12 +44,12 @@ impl LocalFrame {
 
     /// Local to mesh unit.
     pub fn to_world(self, p: DVec3) -> DVec3 {
-        p * self.inverse_scale() + self.offset
+        p * self.inverse + self.offset
     }
 
     /// Mesh units per local unit: exact, as the scale is a power of two.
     pub fn inverse_scale(self) -> f64 {
-        1.0 / self.scale
+        self.inverse
     }
 }
 
@@ -58,7 +65,8 @@ mod tests {
 
     #[test]
     fn vertices_map_exactly() {
-        for (center, size) in [(0.0, 0.02), (1e6, 0.02), (-1e6, 0.02), (0.0, 1e30), (0.0, 1e-30), (1.0, 1.5)] {
+        for (center, size) in [(0.0, 0.02), (1e6, 0.02), (-1e6, 0.02), (0.0, 1e30), (0.0, 1e-30), (1.0, 1.5)]
+        {
             let corners: Vec<DVec3> = (0..8)
                 .map(|i| {
                     DVec3::splat(center)

@@ -53,18 +53,64 @@ pub struct Closest {
 pub struct Triangle {
     /// Corners.
     pub corners: [DVec3; 3],
-    /// Unit normal by the right-hand rule; zero when the triangle has no area.
+    /// Unit normal by the right-hand rule; zero when the triangle has no area, or no more than rounding gives it.
     pub normal: DVec3,
+}
+
+/// Sine of the angle at the first corner below which the normal is computed with twice the digits; heights
+/// above that are off by at most 1e-16 / 1e-3 of the triangle's size.
+const NEEDLE: f64 = 1e-3;
+
+/// Height, as a share of the longest edge, up to which a triangle is no more than its edges: which side of them a point
+/// is on is rounding then.
+const FLAT: f64 = 16.0 * f64::EPSILON;
+
+/// `(b - a) × (c - a)` by products and differences without rounding errors, but for the last sums.
+fn cross_of_differences(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
+    let (u, v) = ([0, 1, 2].map(|k| difference(b[k], a[k])), [0, 1, 2].map(|k| difference(c[k], a[k])));
+    DVec3::from_array([(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
+        let (first, second) = (product(u[i].0, v[j].0), product(u[j].0, v[i].0));
+        let small = u[i].0 * v[j].1 + u[i].1 * v[j].0 - (u[j].0 * v[i].1 + u[j].1 * v[i].0);
+        let leading = difference(first.0, second.0);
+        leading.0 + (leading.1 + (first.1 - second.1) + small)
+    }))
+}
+
+/// `x - y` as a rounded difference and its error (Knuth).
+fn difference(x: f64, y: f64) -> (f64, f64) {
+    let d = x - y;
+    let t = d - x;
+    (d, (x - (d - t)) - (y + t))
+}
+
+/// `x y` as a rounded product and its error.
+fn product(x: f64, y: f64) -> (f64, f64) {
+    let p = x * y;
+    (p, x.mul_add(y, -p))
 }
 
 impl Triangle {
     /// Computes the normal.
     pub fn new(corners: [DVec3; 3]) -> Self {
         let [a, b, c] = corners;
-        let normal = (b - a).cross(c - a);
-        let length = normal.length();
-        let normal = if length > 0.0 { normal / length } else { DVec3::ZERO };
-        Self { corners, normal: if normal.is_finite() { normal } else { DVec3::ZERO } }
+        let (u, v) = (b - a, c - a);
+        let mut normal = u.cross(v);
+        // The cross product is off by some ulps of |u| |v|, in any direction. The normal of a needle would be noise, not
+        // even at right angles to it, and heights over its plane as wrong as the needle is long.
+        if normal.length_squared() < NEEDLE * NEEDLE * u.length_squared() * v.length_squared() {
+            normal = cross_of_differences(a, b, c);
+        }
+        let longest = [v, v - u]
+            .into_iter()
+            .fold(u, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
+        let longest_squared = longest.length_squared();
+        // What is left of rounding along the longest edge would count with that edge's length in heights over the plane.
+        normal -= longest * (normal.dot(longest) / longest_squared.max(f64::MIN_POSITIVE));
+        let flat = normal.length() <= FLAT * longest_squared;
+        Self {
+            corners,
+            normal: if flat { DVec3::ZERO } else { normal.try_normalize().unwrap_or(DVec3::ZERO) },
+        }
     }
 
     /// The closest point to `p`.
@@ -76,28 +122,34 @@ impl Triangle {
     pub fn closest(&self, p: DVec3) -> Closest {
         let relative = Relative::new(self, p);
         if relative.over_face(self) {
-            let height = self.normal.dot(relative.from[0]);
-            let point = p - height * self.normal;
-            return Closest { distance: height.abs(), point, feature: Feature::Face };
+            return self.closest_in_plane(p);
         }
-        let mut best = (f64::INFINITY, self.corners[0], Feature::Vertex(0));
-        for k in 0..3 {
-            let next = (k + 1) % 3;
-            let (start, end) = (relative.start(k), relative.end(k));
-            let (point, feature) = if start <= 0.0 {
-                (self.corners[k], Feature::Vertex(k as u8))
-            } else if end >= 0.0 {
-                (self.corners[next], Feature::Vertex(next as u8))
-            } else {
-                let t = start / (start - end);
-                (self.corners[k] + t * relative.along[k], Feature::Edge(k as u8))
-            };
-            let d = p.distance_squared(point);
-            if d < best.0 {
-                best = (d, point, feature);
-            }
-        }
-        Closest { distance: best.0.sqrt(), point: best.1, feature: best.2 }
+        let [a, b, c] = [0, 1, 2].map(|k| self.closest_on_edge(k, p));
+        let nearer = |x: Closest, y: Closest| if y.distance < x.distance { y } else { x };
+        nearer(nearer(a, b), c)
+    }
+
+    /// The closest point to `p` of the plane.
+    #[inline]
+    pub fn closest_in_plane(&self, p: DVec3) -> Closest {
+        let height = self.normal.dot(p - self.corners[0]);
+        Closest { distance: height.abs(), point: p - height * self.normal, feature: Feature::Face }
+    }
+
+    /// The closest point to `p` of edge `k`.
+    #[inline]
+    pub fn closest_on_edge(&self, k: usize, p: DVec3) -> Closest {
+        let next = (k + 1) % 3;
+        let along = self.corners[next] - self.corners[k];
+        let (start, end) = (along.dot(p - self.corners[k]), along.dot(p - self.corners[next]));
+        let (point, feature) = if start <= 0.0 {
+            (self.corners[k], Feature::Vertex(k as u8))
+        } else if end >= 0.0 {
+            (self.corners[next], Feature::Vertex(next as u8))
+        } else {
+            (self.corners[k] + start / (start - end) * along, Feature::Edge(k as u8))
+        };
+        Closest { distance: p.distance(point), point, feature }
     }
 
     /// The features whose closed region holds `p`.
@@ -154,7 +206,16 @@ impl Relative {
     #[inline]
     fn over_face(&self, triangle: &Triangle) -> bool {
         let [a, b, c] = self.side;
-        a >= 0.0 && b >= 0.0 && c >= 0.0 && triangle.normal != DVec3::ZERO
+        if !(a >= 0.0 && b >= 0.0 && c >= 0.0) || triangle.normal == DVec3::ZERO {
+            return false;
+        }
+        // Beyond the tip of a needle the sides are rounding when seen from its other end.
+        let [from, along] = [&self.from, &self.along];
+        (0..3).all(|k| {
+            let next = (k + 1) % 3;
+            let nearer = if from[k].length_squared() <= from[next].length_squared() { k } else { next };
+            along[k].dot(from[nearer].cross(triangle.normal)) >= 0.0
+        })
     }
 }
 

@@ -13,7 +13,7 @@ use crate::geometry::Triangle;
 /// A face in `f32`, relative to the middle of the cube, in one cache line: corner a, b − a, c − a, unit normal,
 /// inverse squared lengths of b − a, c − a, c − b, and the bits of the sign hints.
 ///
-/// Without area the normal is NaN, which fails the test for the prism over the face: only edges count. The inverse
+/// Without area, or nearly so, the normal is NaN, which fails the test for the prism over the face: only edges count. The inverse
 /// of a length of zero is 0, which makes the closest point of that edge its start.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
@@ -22,12 +22,18 @@ pub struct FaceRecord(Record);
 type Record = [f32; 16];
 const HINTS: usize = 15;
 
+/// Faces of less height than this (local frame) are no more than their edges: rounding may have turned them over, and
+/// then no prism stands on them. Half of it is within what `f32` promises, 1e-6 × diagonal.
+const FLAT: f64 = 7e-7;
+
 impl FaceRecord {
     /// Rounds a triangle of the local frame.
     pub fn new(triangle: &Triangle, middle: DVec3, hints: SignHints) -> Self {
         let [a, b, c] = triangle.corners.map(|p| (p - middle).as_vec3());
-        let n = triangle.normal.as_vec3();
-        let n = if n == Vec3::ZERO { Vec3::NAN } else { n };
+        let (u, v) = ((b - a).as_dvec3(), (c - a).as_dvec3());
+        let longest = u.length().max(v.length()).max((u - v).length());
+        let flat = u.cross(v).dot(triangle.normal) < FLAT * longest;
+        let n = if flat { Vec3::NAN } else { triangle.normal.as_vec3() };
         let inverse = |v: Vec3| {
             let inverse = 1.0 / v.as_dvec3().length_squared();
             if inverse < f64::from(f32::MAX) { inverse as f32 } else { 0.0 }
@@ -56,10 +62,14 @@ impl FaceRecord {
     }
 }
 
+/// The low bits of a squared distance say which part of the face it is to: they are worth 2^-22 of it, half of that of
+/// the distance, and cost no register.
+const PART: u32 = 3;
+
 /// The nearest face so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
-    /// Squared distance.
+    /// Squared distance, with the part in its low bits.
     pub distance_squared: f32,
     /// Position of the face among the records.
     pub face: u32,
@@ -68,6 +78,12 @@ pub struct Nearest {
 impl Nearest {
     /// Nothing yet.
     pub const NONE: Self = Self { distance_squared: f32::INFINITY, face: u32::MAX };
+
+    /// What of the face: 0 its plane, 1 the edge a–b, 2 the edge b–c, 3 the edge c–a.
+    #[inline]
+    pub fn part(self) -> u32 {
+        self.distance_squared.to_bits() & PART
+    }
 }
 
 /// Instruction set that the kernels are compiled for.
@@ -78,14 +94,20 @@ pub enum Isa {
     /// AVX2 and FMA: eight lanes.
     #[cfg(target_arch = "x86_64")]
     Avx2,
+    /// The same eight lanes with the 32 registers of AVX-512, which the kernel needs not to spill.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
 }
 
 impl Isa {
     /// The widest that this processor has.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-            return Self::Avx2;
+        {
+            use std::arch::is_x86_feature_detected as has;
+            if has!("avx2") && has!("fma") {
+                return if has!("avx512f") && has!("avx512vl") { Self::Avx512 } else { Self::Avx2 };
+            }
         }
         Self::Baseline
     }
@@ -102,12 +124,21 @@ pub fn nearest(isa: Isa, records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3
         // SAFETY: `detect` found the features.
         #[cfg(target_arch = "x86_64")]
         Isa::Avx2 => unsafe { nearest_avx2(records, faces, p, best) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx512 => unsafe { nearest_avx512(records, faces, p, best) },
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn nearest_avx2(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best: Nearest) -> Nearest {
+    nearest_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, best)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+fn nearest_avx512(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best: Nearest) -> Nearest {
     nearest_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, best)
 }
 
@@ -131,20 +162,18 @@ fn nearest_lanes<L: Lanes<N>, const N: usize>(
         least = closer.select(d, least);
         nearest = closer.select(L::from_bits(*faces), nearest);
     }
-    let (least, nearest) = (least.to_array(), nearest.to_array());
-    let mut best = Nearest { distance_squared: least[0], face: nearest[0].to_bits() };
+    let least = least.to_array();
+    let mut lane = 0;
     for l in 1..N {
-        if least[l] < best.distance_squared {
-            best = Nearest { distance_squared: least[l], face: nearest[l].to_bits() };
-        }
+        lane = if least[l] < least[lane] { l } else { lane };
     }
-    best
+    Nearest { distance_squared: least[lane], face: nearest.to_array()[lane].to_bits() }
 }
 
 // No closures and no iterators over lanes below: the compiler builds those without the caller's instruction set, and
 // each operation becomes a call (measured: ten times slower).
 
-/// As [`Triangle::closest`], but free of branches and of the squared distance alone.
+/// As [`Triangle::closest`], but free of branches: the squared distance, with the part of the face in its low bits.
 #[inline(always)]
 fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
     let (a, ab) = (V([v[0], v[1], v[2]]), V([v[3], v[4], v[5]]));
@@ -157,8 +186,11 @@ fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
     let inside = ab.dot(turned).at_least(zero).and(zero.at_least(ac.dot(turned)));
     let inside = inside.and(bc.dot(bp.cross(n)).at_least(zero));
     let height = n.dot(ap);
-    let edges = to_edge(ap, ab, v[12]).min(to_edge(ap, ac, v[13])).min(to_edge(bp, bc, v[14]));
-    inside.select(height.mul(height), edges)
+    let keep = L::from_bits([!PART; N]);
+    let to_ab = to_edge(ap, ab, v[12]).and(keep).or(L::from_bits([1; N]));
+    let to_bc = to_edge(bp, bc, v[14]).and(keep).or(L::from_bits([2; N]));
+    let to_ca = to_edge(ap, ac, v[13]).and(keep).or(L::from_bits([3; N]));
+    inside.select(height.mul(height).and(keep), to_ab.min(to_bc).min(to_ca))
 }
 
 /// Squared distance to the segment from the origin of `from` to `along`.
@@ -196,10 +228,6 @@ impl<L> V<L> {
         L: Lanes<N>,
     {
         let ([a, b, c], [x, y, z]) = (self.0, o.0);
-        Self([
-            c.neg_mul_add(y, b.mul(z)),
-            a.neg_mul_add(z, c.mul(x)),
-            b.neg_mul_add(x, a.mul(y)),
-        ])
+        Self([c.neg_mul_add(y, b.mul(z)), a.neg_mul_add(z, c.mul(x)), b.neg_mul_add(x, a.mul(y))])
     }
 }

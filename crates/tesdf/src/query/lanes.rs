@@ -24,8 +24,10 @@ pub trait Lanes<const N: usize>: Copy {
     fn at_least(self, o: Self) -> Self;
     /// A mask of the lanes in which `self < o`; false where either is NaN.
     fn less(self, o: Self) -> Self;
-    /// Lanes set in both masks.
+    /// Bits set in both.
     fn and(self, o: Self) -> Self;
+    /// Bits set in either.
+    fn or(self, o: Self) -> Self;
     /// `yes` in the lanes that this mask sets, else `no`.
     fn select(self, yes: Self, no: Self) -> Self;
     /// The lanes as an array.
@@ -80,6 +82,10 @@ impl Lanes<8> for [f32; 8] {
     #[inline(always)]
     fn and(self, o: Self) -> Self {
         std::array::from_fn(|l| f32::from_bits(self[l].to_bits() & o[l].to_bits()))
+    }
+    #[inline(always)]
+    fn or(self, o: Self) -> Self {
+        std::array::from_fn(|l| f32::from_bits(self[l].to_bits() | o[l].to_bits()))
     }
     #[inline(always)]
     fn select(self, yes: Self, no: Self) -> Self {
@@ -170,6 +176,10 @@ mod avx2 {
         #[inline(always)]
         fn and(self, o: Self) -> Self {
             unsafe { _mm256_and_ps(self, o) }
+        }
+        #[inline(always)]
+        fn or(self, o: Self) -> Self {
+            unsafe { _mm256_or_ps(self, o) }
         }
         #[inline(always)]
         fn select(self, yes: Self, no: Self) -> Self {

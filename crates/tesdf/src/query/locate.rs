@@ -45,7 +45,8 @@ impl Entries {
         if nodes.len() < 6 {
             return Self { level: 0, words: Vec::new() };
         }
-        let level = (0..10).take_while(|l| (6usize << (3 * l)) * ENTRY_SHARE <= nodes.len()).last().unwrap_or(0);
+        let level =
+            (0..10).take_while(|l| (6usize << (3 * l)) * ENTRY_SHARE <= nodes.len()).last().unwrap_or(0);
         let mut words = vec![0; 6 << (3 * level)];
         for root in 0..6 {
             Self::fill(nodes, root, Cell::root(DVec3::ZERO, 1.0, root), level, &mut words);
@@ -118,7 +119,9 @@ impl TeSdf {
     #[inline]
     pub(super) fn place(&self, local: DVec3) -> Place {
         let entries = &self.entries;
-        let Some((entry, mut lambda)) = self.cube.locate(local, entries.level) else { return Place::NotOfDomain };
+        let Some((entry, mut lambda)) = self.cube.locate(local, entries.level) else {
+            return Place::NotOfDomain;
+        };
         let mut word = entries.words[entry] as usize;
         // Three bisections a turn, so that each knows its refinement edge.
         loop {
@@ -139,16 +142,25 @@ impl TeSdf {
         }
     }
 
-    /// The cell that holds a point of the local frame.
-    pub(super) fn cell(&self, local: DVec3) -> Option<Cell> {
+    /// The cell that holds a point of the local frame, with its label and list if it has them.
+    ///
+    /// On a border this may be another of the cells that share it than [`place`](Self::place) finds: the grid rounds
+    /// up, the descent to side 0.
+    pub(super) fn cell(&self, local: DVec3) -> Option<(Cell, Label, u32)> {
         let (mut word, mut lambda) = self.cube.locate(local, 0)?;
         let mut cell = self.cube.root(word);
-        while let Node::Split(children) = Node::decode(self.nodes[word], &self.lists) {
-            let side = lambda.descend(cell.depth);
-            cell = cell.child(side);
-            word = children as usize + side;
+        loop {
+            match Node::decode(self.nodes[word], &self.lists) {
+                Node::Split(children) => {
+                    let side = lambda.descend(cell.depth);
+                    cell = cell.child(side);
+                    word = children as usize + side;
+                }
+                Node::Listed(label, offset) => return Some((cell, label, offset)),
+                Node::Far(Side::Inside) => return Some((cell, Label::Inside, 0)),
+                Node::Far(Side::Outside) | Node::NotOfDomain => return Some((cell, Label::Outside, 0)),
+            }
         }
-        Some(cell)
     }
 
     /// Reads the list at `offset`, which opening has checked.

@@ -67,7 +67,9 @@ impl Answer {
 }
 
 /// Below this distance (local frame) the gradient is the normal of the closest feature.
-const ON_SURFACE_F64: f64 = 1e-9;
+///
+/// At most 1e-9 × diagonal, as the diagonal is 0.5 to 1 here: from there on the gradient is that of the point.
+const ON_SURFACE_F64: f64 = 5e-10;
 /// The same for `f32` storage, some ten times its rounding.
 const ON_SURFACE_F32: f64 = 1e-6;
 
@@ -99,11 +101,7 @@ impl TeSdf {
         let local = self.frame.to_local(point);
         match self.place(local) {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
-            Place::Listed { label: Label::Crossing(winding), offset } => {
-                let mut faces = Faces::default();
-                self.read_list(offset, &mut faces);
-                self.winding_in_cell(local, winding, &faces) >= 1
-            }
+            Place::Listed { label: Label::Crossing(_), .. } => self.winding_in_cell(local) >= 1,
             _ => false,
         }
     }
@@ -145,7 +143,7 @@ impl TeSdf {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn answer_f32(&self, local: DVec3, place: Place, faces: &Faces) -> Answer {
         let relative = local - self.cube.middle();
         let found = match place {
@@ -156,19 +154,31 @@ impl TeSdf {
             }
             _ => self.nearest_in_tree_f32(relative.as_vec3(), &mut Reads::default()),
         };
-        let record = &self.records[found.face as usize];
+        // Nothing is near in f32 when a file's coordinates overflow it.
+        let Some(record) = self.records.get(found.face as usize) else {
+            return self.answer_f64(local, place, faces);
+        };
         let triangle = record.triangle();
-        let closest = triangle.closest(relative);
+        // The kernel has found the part; in f64 the point on it is as good as the f32 corners allow.
+        let closest = match found.part() {
+            0 => triangle.closest_in_plane(relative),
+            edge => triangle.closest_on_edge(edge as usize - 1, relative),
+        };
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
-            Place::Listed { label: Label::Crossing(winding), .. } => {
+            Place::Listed { label: Label::Crossing(_), .. } => {
                 let height = triangle.normal.dot(relative - triangle.corners[0]);
-                hinted_side(record.hints(), closest.feature, height)
-                    .unwrap_or_else(|| self.exact_side(local, winding, faces))
+                hinted_side(record.hints(), closest.feature, height).unwrap_or_else(|| self.exact_side(local))
             }
             _ => Side::Outside,
         };
-        let on_surface = |d: f64| (d < ON_SURFACE_F32).then_some(triangle.normal);
+        let on_surface = |d: f64| match place {
+            _ if d >= ON_SURFACE_F32 => None,
+            Place::Listed { .. } if triangle.normal == DVec3::ZERO => {
+                Some(self.pseudonormal(faces, found.face, closest.feature))
+            }
+            _ => Some(triangle.normal),
+        };
         self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
     }
 
@@ -179,8 +189,8 @@ impl TeSdf {
         };
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
-            Place::Listed { label: Label::Crossing(winding), .. } if closest.distance > 0.0 => {
-                self.exact_side(local, winding, faces)
+            Place::Listed { label: Label::Crossing(_), .. } if closest.distance > 0.0 => {
+                self.exact_side(local)
             }
             _ => Side::Outside,
         };
@@ -205,8 +215,8 @@ impl TeSdf {
         on_surface: impl Fn(f64) -> Option<DVec3>,
     ) -> Answer {
         let sign = if side == Side::Inside { -1.0 } else { 1.0 };
-        let gradient = on_surface(closest.distance)
-            .unwrap_or_else(|| (p - closest.point) * (sign / closest.distance));
+        let gradient =
+            on_surface(closest.distance).unwrap_or_else(|| (p - closest.point) * (sign / closest.distance));
         Answer {
             signed_distance: sign * closest.distance * self.frame.inverse_scale(),
             gradient,

@@ -125,11 +125,7 @@ impl Best {
     const NONE: Self = Self {
         position: 0,
         id: u32::MAX,
-        closest: Closest {
-            distance: f64::INFINITY,
-            point: DVec3::NAN,
-            feature: Feature::Face,
-        },
+        closest: Closest { distance: f64::INFINITY, point: DVec3::NAN, feature: Feature::Face },
     };
 
     fn try_face(&mut self, asset: &TeSdf, position: u32, p: DVec3) {

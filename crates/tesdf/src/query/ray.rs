@@ -46,7 +46,9 @@ impl TeSdf {
                 TreeChild::Leaf(start, count) => {
                     for position in start..start + count {
                         let corners = self.local_triangle(position as usize).corners;
-                        let Some(t) = meets_face(from, along, corners).filter(|&t| t <= limit) else { continue };
+                        let Some(t) = meets_face(from, along, corners).filter(|&t| t <= limit) else {
+                            continue;
+                        };
                         let id = self.face_ids[position as usize];
                         if best.is_none_or(|(b, i, _)| t < b || (t == b && id < i)) {
                             best = Some((t, id, position));

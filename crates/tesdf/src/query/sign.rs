@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::locate::Faces;
 use crate::TeSdf;
-use crate::asset::layout::{SignHint, SignHints, Side};
+use crate::asset::layout::{Label, Side, SignHint, SignHints};
 use crate::geometry::{Feature, signed_crossing};
 
 /// The side that the closest feature tells, where it tells one. `height` is that of the point over the face.
@@ -22,18 +22,24 @@ pub fn hinted_side(hints: SignHints, feature: Feature, height: f64) -> Option<Si
 }
 
 impl TeSdf {
-    /// The side by winding number, exact; `winding` is that at the cell's centroid.
+    /// The side by winding number, exact.
     #[cold]
-    pub(super) fn exact_side(&self, local: DVec3, winding: u32, faces: &Faces) -> Side {
-        if self.winding_in_cell(local, winding, faces) >= 1 { Side::Inside } else { Side::Outside }
+    pub(super) fn exact_side(&self, local: DVec3) -> Side {
+        if self.winding_in_cell(local) >= 1 { Side::Inside } else { Side::Outside }
     }
 
     /// Winding number in a crossing cell: that at its centroid, plus the crossings on the way there. The list
     /// names every face that meets the cell.
-    pub(super) fn winding_in_cell(&self, local: DVec3, winding: u32, faces: &Faces) -> i32 {
-        let Some(cell) = self.cell(local) else { return 0 };
-        let centroid = cell.centroid();
+    pub(super) fn winding_in_cell(&self, local: DVec3) -> i32 {
+        let (centroid, winding, offset) = match self.cell(local) {
+            Some((cell, Label::Crossing(winding), offset)) => (cell.centroid(), winding, offset),
+            Some((_, Label::Inside, _)) => return 1,
+            Some((_, Label::Outside, _)) | None => return 0,
+        };
         let corners = |f: u32| self.face_corners(f as usize).map(|p| self.frame.to_local(p));
-        winding as i32 + faces.ids().iter().map(|&f| signed_crossing(local, centroid, corners(f))).sum::<i32>()
+        let mut faces = Faces::default();
+        self.read_list(offset, &mut faces);
+        winding as i32
+            + faces.ids().iter().map(|&f| signed_crossing(local, centroid, corners(f))).sum::<i32>()
     }
 }

@@ -1,0 +1,144 @@
+//! What `encode` promises besides distances: the same bytes on any number of threads, a prompt end when cancelled, options
+//! that are checked and used.
+mod support;
+
+use std::time::{Duration, Instant};
+
+use rayon::ThreadPoolBuilder;
+use support::meshes::named;
+use support::shapes::{FAMILIES, Shape};
+use tesdf::TeSdf;
+use tesdf::asset::about::Source;
+use tesdf::encode::{EncodeError, EncodeOptions, EncodeProgress, Length, Preset, Stage, encode};
+use tesdf::glam::DVec3;
+use tesdf::mesh::SolidMesh;
+use tesdf::query::Precision;
+
+fn encode_on(threads: usize, solid: &SolidMesh, options: &EncodeOptions) -> TeSdf {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+    pool.install(|| encode(solid, &Source::default(), options, &EncodeProgress::default()))
+        .expect("valid options")
+}
+
+fn ball() -> SolidMesh {
+    Shape::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid()
+}
+
+#[test]
+fn same_bytes_from_1_2_and_8_threads() {
+    let meshes =
+        ["procedural/menger_2.obj", "public/mpl_palm.stl", "procedural/iso_m16_nut_c100.obj"].map(named);
+    let fast = EncodeOptions::preset(Preset::Fast);
+    let compact = EncodeOptions::preset(Preset::Compact);
+    let families = FAMILIES.map(|family| family.member(3));
+    let small = families.iter().map(|solid| (solid, &compact));
+    for (solid, options) in meshes.iter().map(|solid| (solid, &fast)).chain(small) {
+        let [one, two, eight, again] = [1, 2, 8, 8].map(|threads| encode_on(threads, solid, options));
+        assert!(one.as_bytes() == two.as_bytes(), "1 and 2 threads differ");
+        assert!(one.as_bytes() == eight.as_bytes(), "1 and 8 threads differ");
+        assert!(eight.as_bytes() == again.as_bytes(), "two runs differ");
+        one.verify_checksums().expect("just written");
+    }
+}
+
+#[test]
+fn a_cancelled_encode_stops_soon() {
+    let solid = named("procedural/iso_m16_bolt_24k.obj");
+    let options = EncodeOptions { byte_worth: 1e-3, ..EncodeOptions::default() };
+    let progress = EncodeProgress::default();
+    let (result, late) = std::thread::scope(|scope| {
+        let encoder = scope.spawn(|| encode(&solid, &Source::default(), &options, &progress));
+        std::thread::sleep(Duration::from_millis(1500));
+        let (asked, cancelled) = (Instant::now(), !encoder.is_finished());
+        progress.cancel();
+        assert!(cancelled, "it was over before it could be cancelled");
+        (encoder.join().expect("no panic"), asked.elapsed())
+    });
+    assert!(matches!(result, Err(EncodeError::Cancelled)), "{result:?}");
+    // A cell takes microseconds; the bound allows for a machine that does much else.
+    assert!(late < Duration::from_secs(2), "{late:?} after it was asked");
+
+    let before = EncodeProgress::default();
+    before.cancel();
+    let result = encode(&ball(), &Source::default(), &EncodeOptions::default(), &before);
+    assert!(matches!(result, Err(EncodeError::Cancelled)), "{result:?}");
+}
+
+#[test]
+fn progress_ends_at_the_end() {
+    let progress = EncodeProgress::default();
+    assert_eq!(progress.state(), (Stage::Refine, 0.0));
+    encode(&ball(), &Source::default(), &EncodeOptions::default(), &progress).expect("valid options");
+    assert_eq!(progress.state().0, Stage::Assemble);
+    assert!(!progress.is_cancelled());
+}
+
+#[test]
+fn options_without_meaning_are_refused_by_name() {
+    let d = EncodeOptions::default;
+    let (nan, inf) = (f64::NAN, f64::INFINITY);
+    let cases: Vec<(&str, EncodeOptions)> = vec![
+        ("band", EncodeOptions { band: Length::OfDiagonal(-0.01), ..d() }),
+        ("band", EncodeOptions { band: Length::Absolute(-1e-300), ..d() }),
+        ("band", EncodeOptions { band: Length::OfDiagonal(nan), ..d() }),
+        ("band", EncodeOptions { band: Length::Absolute(inf), ..d() }),
+        ("band", EncodeOptions { band: Length::OfDiagonal(101.0), ..d() }),
+        ("byte_worth", EncodeOptions { byte_worth: 0.0, ..d() }),
+        ("byte_worth", EncodeOptions { byte_worth: -1.0, ..d() }),
+        ("byte_worth", EncodeOptions { byte_worth: nan, ..d() }),
+        ("byte_worth", EncodeOptions { byte_worth: inf, ..d() }),
+        ("tighten_levels", EncodeOptions { tighten_levels: 31, ..d() }),
+        ("region", EncodeOptions { regions: vec![[0.0, 0.0, 0.0, 1.0, 1.0, -1.0]], ..d() }),
+        ("region", EncodeOptions { regions: vec![[0.0, nan, 0.0, 1.0, 1.0, 1.0]], ..d() }),
+        ("region", EncodeOptions { regions: vec![[0.0, 0.0, 0.0, inf, 1.0, 1.0]], ..d() }),
+    ];
+    for (name, options) in cases {
+        match encode(&ball(), &Source::default(), &options, &EncodeProgress::default()) {
+            Err(EncodeError::Option { option, .. }) => assert_eq!(option, name, "{options:?}"),
+            other => panic!("{options:?} gives {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn every_option_is_used() {
+    let solid = named("procedural/tetra.obj");
+    let bytes = |options: &EncodeOptions| encode_on(1, &solid, options).as_bytes().to_vec();
+    let cells = |options: &EncodeOptions| encode_on(1, &solid, options).about().statistics.clone();
+    let base = EncodeOptions::default();
+    let d = solid.mesh().diagonal();
+    let wide = EncodeOptions { band: Length::Absolute(0.5 * d), ..base.clone() };
+    assert!(cells(&wide).domain_volume > 2.0 * cells(&base).domain_volume);
+    let far = solid.mesh().bounds().max + d;
+    let region = [far.x, far.y, far.z, far.x + d, far.y + d, far.z + d];
+    let region = EncodeOptions { regions: vec![region], ..base.clone() };
+    assert!(cells(&region).domain_volume > cells(&base).domain_volume + 0.9 * d.powi(3));
+    let solid_ball = ball();
+    let entries = |options: &EncodeOptions| encode_on(1, &solid_ball, options).about().statistics.clone();
+    let coarse = EncodeOptions { byte_worth: 1.0, ..base.clone() };
+    assert!(entries(&coarse).listed_cells < entries(&base).listed_cells);
+    let loose = EncodeOptions { tighten_levels: 0, ..base.clone() };
+    assert!(entries(&loose).entries > entries(&base).entries);
+    let named = EncodeOptions { unit: Some("mm".into()), ..base.clone() };
+    assert_ne!(bytes(&named), bytes(&base));
+    assert_eq!(encode_on(1, &solid, &named).about().options, named);
+}
+
+/// A region of no extent, and one far away, are domain too.
+#[test]
+fn odd_regions() {
+    let solid = ball();
+    for (at, size) in [(DVec3::new(1.7, 0.0, 0.3), 0.0), (DVec3::new(-40.0, 3.0, 8.0), 1.0)] {
+        let (a, b) = (at, at + size);
+        let options =
+            EncodeOptions { regions: vec![[a.x, a.y, a.z, b.x, b.y, b.z]], ..EncodeOptions::default() };
+        let asset = encode_on(2, &solid, &options);
+        for p in [a, b, 0.5 * (a + b)] {
+            let answer = asset
+                .query_in_domain(p, Precision::F64)
+                .unwrap_or_else(|| panic!("{p} is not in the domain"));
+            let tree = encode_on(1, &solid, &EncodeOptions::default()).query(p, Precision::F64);
+            assert!((answer.signed_distance - tree.signed_distance).abs() < 1e-12 * p.length());
+        }
+    }
+}

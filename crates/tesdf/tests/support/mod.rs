@@ -1,0 +1,11 @@
+//! What the tests of encoding and queries share: the meshes of `data/`, an exact reference by brute force, seeded points,
+//! closed shapes, and the cells of an asset read from its bytes alone.
+#![allow(dead_code, reason = "each test program uses its own part")]
+
+pub mod cells;
+pub mod meshes;
+pub mod points;
+pub mod random;
+pub mod reference;
+pub mod shapes;
+pub mod well_formed;
