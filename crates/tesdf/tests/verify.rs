@@ -81,7 +81,7 @@ fn a_wrong_label_is_a_sign_mistake() {
     for precision in &report.precisions {
         assert!(precision.sign_mistakes > 50, "{precision:#?}");
         let worst = precision.worst_sign.as_ref().expect("a place");
-        assert!(worst.expected < 0.0 && worst.found == worst.expected.abs(), "{worst:?}");
+        assert!(worst.expected < 0.0 && worst.found + worst.expected < 1e-6, "{worst:?}");
     }
 }
 
