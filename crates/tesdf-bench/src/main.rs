@@ -103,6 +103,7 @@ fn main() {
             }
             t64 = t64.min(t.elapsed().as_secs_f64());
         }
+        let fall = points.iter().filter(|p| asset.reads(**p).tree_nodes > 0).count(); let fr: usize = points.iter().map(|p| { let r = asset.reads(*p); r.tree_nodes + r.tree_faces }).sum(); println!("fallback share {:.4} reads each {:.1}", fall as f64 / n as f64, fr as f64 / fall.max(1) as f64);
         let reads: usize = points.iter().map(|p| asset.reads(*p).total()).sum();
         let (mut e32, mut e64, mut s32, mut s64) = (0f64, 0f64, 0, 0);
         for p in &points[..20000] {

@@ -152,7 +152,7 @@ proptest! {
     #[test]
     fn random_tetrahedra(kind in prop::sample::select(SOUPS.to_vec()), seed in any::<u64>(), levels in 0u32..9) {
         let mut random = Random(seed);
-        let surface = Surface::new(&soup(kind, &mut random));
+        let surface = Surface::new(&soup(kind, &mut random), 1.0);
         let cell = tetrahedron(&mut random);
         let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
         let candidates: Vec<Candidate> = all

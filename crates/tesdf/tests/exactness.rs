@@ -22,7 +22,7 @@ use tesdf::mesh::SolidMesh;
 use tesdf::query::{Answer, Precision};
 
 /// Points per mesh, unless `TESDF_TEST_POINTS` says otherwise.
-const POINTS: usize = 2700;
+const POINTS: usize = 1800;
 /// Of those, the ones that are compared with all faces without a tree.
 const BRUTE: usize = 54;
 /// Meshes that are encoded with the default preset in any case.

@@ -119,6 +119,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
     let least: [f64; 4] =
         std::array::from_fn(|k| scratch.chord[k].iter().copied().fold(f64::INFINITY, f64::min));
 
+    let width = cell.width();
     let mut filtered = Filtered { survivors: Vec::new(), crossing: false, distance, closest };
     let mut kept_whole = |index: u32| {
         let meets = triangle_meets_tetrahedron(
@@ -134,7 +135,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
     let mut next_alive = scratch.alive.iter().copied().peekable();
     for index in 0..candidates.len() as u32 {
         let g = &candidates[index as usize];
-        let tangents = tangents(g, &scratch.centroid[index as usize], cell, margin);
+        let tangents = tangents(g, &scratch.centroid[index as usize], cell, width, margin);
         let low = tangents
             .iter()
             .map(|t| t.iter().copied().fold(f64::INFINITY, f64::min))
@@ -161,10 +162,8 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
 /// d(·, g) is convex, so it lies above its tangent at the centroid and at each corner. The slope is off by the rounding
 /// of the closest point over the distance, so the bound is lowered by as much times the width of the cell, and once more
 /// by the margin that rule B asks for.
-fn tangents(g: &Candidate, centroid: &Probe, cell: &Cell, margin: f64) -> [[f64; 4]; 5] {
+fn tangents(g: &Candidate, centroid: &Probe, cell: &Cell, width: f64, margin: f64) -> [[f64; 4]; 5] {
     let c = &cell.corners;
-    let width = [c[0].distance(c[3]), c[0].distance(c[2]), c[0].distance(c[1]), c[1].distance(c[3])];
-    let width = width.into_iter().fold(0.0, f64::max);
     let tangent = |at: DVec3, p: &Probe| {
         if p.distance <= margin {
             return [-margin; 4];
