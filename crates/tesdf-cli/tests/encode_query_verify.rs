@@ -219,7 +219,7 @@ fn what_is_no_asset_is_2_and_named() {
         ("cube.obj", "not a .tesdf file"),
         ("half.tesdf", "cut short"),
         ("short.tesdf", "cut short"),
-        ("long.tesdf", "1 bytes follow the last section"),
+        ("long.tesdf", "1 byte follows the last section"),
         ("none.tesdf", "cannot open none.tesdf"),
     ] {
         for args in
