@@ -92,8 +92,10 @@ pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
 /// As [`result`].
 pub fn table<N: AsRef<str>, V: fmt::Display>(rows: &[(N, V)]) -> Result<(), Failure> {
     let width = rows.iter().map(|(name, _)| name.as_ref().chars().count()).max().unwrap_or(0);
-    let text: String =
-        rows.iter().map(|(name, value)| format!("{:<width$}  {value}", name.as_ref()).trim_end().to_string() + "\n").collect();
+    let text: String = rows
+        .iter()
+        .map(|(name, value)| format!("{:<width$}  {value}", name.as_ref()).trim_end().to_string() + "\n")
+        .collect();
     result(text.as_bytes())
 }
 
