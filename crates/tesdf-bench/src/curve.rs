@@ -18,7 +18,7 @@ pub struct Args {
     /// A mesh of any format; one without an inside is repaired
     mesh: PathBuf,
     /// Values of the option that trades memory for speed
-    #[arg(long, value_delimiter = ',', default_value = "0.03,0.05,0.075,0.1,0.15,0.25,0.5", value_parser = positive)]
+    #[arg(long, value_delimiter = ',', default_value = "0.03,0.05,0.075,0.1,0.15,0.25,0.5", value_parser = positive, allow_negative_numbers = true)]
     byte_worth: Vec<f64>,
     /// Levels of bisection below each cell that shorten lists
     #[arg(long, value_delimiter = ',', default_value = "0,3,6,12")]
@@ -45,8 +45,8 @@ const COLUMNS: [&str; 10] = [
 ];
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    heading::print()?;
     let input = Input::read(&args.mesh)?;
+    heading::print()?;
     let mesh = input.solid.mesh();
     output::line(&format!(
         "{}, {} faces. *Read* and times are at {} points near the surface (±{} % of the diagonal), f32, one thread, the best of \

@@ -41,16 +41,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         pool = pool.num_threads(threads.get());
     }
     let pool = pool.build()?;
+    let start = Instant::now();
+    // A `Failure` does not go from thread to thread; a text does.
+    let input = pool.install(|| Input::read(&args.mesh).map_err(|e| e.to_string()))?;
+    let read = start.elapsed().as_secs_f64();
     heading::print()?;
     output::line(
         "One process, one encode. *Peak resident*: the most memory that the process had at any time (VmHWM), reading and \
          checking the mesh included. Equal hashes are equal files.\n",
     )?;
     output::head(&COLUMNS, 2)?;
-    let start = Instant::now();
-    // A `Failure` does not go from thread to thread; a text does.
-    let input = pool.install(|| Input::read(&args.mesh).map_err(|e| e.to_string()))?;
-    let read = start.elapsed().as_secs_f64();
     let (asset, seconds) =
         pool.install(|| input.encode(&args.preset.options()).map_err(|e| e.to_string()))?;
     let peak = peak_resident_kib()?;

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
-use tesdf::mesh::{RepairOptions, SolidMesh, repair};
+use tesdf::mesh::{ReadError, RepairOptions, SolidMesh, repair};
 
 use crate::Failure;
 
@@ -55,7 +55,11 @@ impl Input {
     /// what was changed.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let at = |e: &dyn std::fmt::Display| Failure::from(format!("{}: {e}", path.display()));
-        let loaded = tesdf::mesh::read(path).map_err(|e| at(&e))?;
+        let loaded = tesdf::mesh::read(path).map_err(|e| match e {
+            // These name the file themselves.
+            ReadError::Open { .. } | ReadError::UnknownExtension { .. } => e.into(),
+            e => at(&e),
+        })?;
         let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let source = Source { name: file, blake3: loaded.report.source_blake3 };

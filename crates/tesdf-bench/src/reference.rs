@@ -3,7 +3,8 @@ use tesdf::geometry::{Aabb, AabbTree, Triangle, WindingNumber};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 
-/// Signed distances in `f64` that share nothing with an asset: a tree over the faces as read, and winding numbers.
+/// Signed distances in `f64` that share nothing with an asset but the closest point of one triangle: a tree over the faces as
+/// read, and winding numbers.
 pub struct Reference {
     triangles: Vec<Triangle>,
     tree: AabbTree,
