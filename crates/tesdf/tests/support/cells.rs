@@ -38,7 +38,7 @@ impl Cells {
         let v = |k: usize| DVec3::from_slice(&placed[k..]);
         let nodes: Vec<u32> = section(asset, layout::NODES);
         let mut cells = Self {
-            frame: LocalFrame { offset: v(0), scale: placed[3] },
+            frame: LocalFrame::new(v(0), placed[3]),
             cube: DomainCube::new(v(4), placed[7]),
             leaves: Vec::new(),
             leaf_of: vec![None; nodes.len()],
