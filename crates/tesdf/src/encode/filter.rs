@@ -71,14 +71,16 @@ pub struct Scratch {
 /// Rule C compares all pairs; cells with more survivors than this are bisected anyway, and compared below.
 const MAX_SHARING: usize = 256;
 
+/// More candidates than this are only thinned out by [`by_balls`].
+const MANY: usize = 1 << 15;
+
 /// At most this many faces stand against each candidate in the plane rule; the nearest ones.
 const MAX_RIVALS: usize = 96;
 
 /// Distance of `face` at `p`.
 pub fn probe(surface: &Surface, face: u32, p: DVec3) -> Probe {
-    let triangle = &surface.triangles[face as usize];
-    let closest = triangle.closest(p);
-    Probe { distance: closest.distance, point: closest.point, regions: triangle.regions(p) }
+    let (closest, regions) = surface.triangles[face as usize].closest_and_regions(p);
+    Probe { distance: closest.distance, point: closest.point, regions }
 }
 
 /// Applies rules A (point), B (plane) and C (shared feature) to the candidates of a cell.
@@ -108,6 +110,9 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
         distance = d;
     }
 
+    if candidates.len() > MANY {
+        return by_balls(surface, candidates, scratch, distance, radius(cell), closest);
+    }
     scratch.alive.clear();
     scratch.alive.extend((0..candidates.len() as u32).filter(|&i| {
         let g = &candidates[i as usize];
@@ -123,6 +128,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
         std::array::from_fn(|k| scratch.chord[k].iter().copied().fold(f64::INFINITY, f64::min));
 
     let width = cell.width();
+    let radius = radius(cell);
     let mut filtered = Filtered { survivors: Vec::new(), crossing: false, distance, closest };
     let mut kept_whole = |index: u32| {
         let meets = triangle_meets_tetrahedron(
@@ -138,13 +144,16 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
     let mut next_alive = scratch.alive.iter().copied().peekable();
     for index in 0..candidates.len() as u32 {
         let g = &candidates[index as usize];
+        let alive = next_alive.next_if_eq(&index).is_some();
+        if !alive && scratch.centroid[index as usize].distance > radius + PAD {
+            continue;
+        }
         let tangents = tangents(g, &scratch.centroid[index as usize], cell, width, margin);
         let low = tangents
             .iter()
             .map(|t| t.iter().copied().fold(f64::INFINITY, f64::min))
             .fold(f64::NEG_INFINITY, f64::max);
         let meets = low <= PAD && kept_whole(index);
-        let alive = next_alive.next_if_eq(&index).is_some();
         if alive && !beaten(&tangents, &scratch.chord, &least) {
             let regions = g.at.iter().fold(Regions(0x7f), |r, p| r.and(p.regions));
             let feature = if meets { Feature::Face } else { regions.least() };
@@ -158,6 +167,34 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
     survivors.extend(dropped_but_meeting);
     filtered.survivors = survivors;
     filtered
+}
+
+/// Radius of the least ball around the centroid that holds the cell.
+pub fn radius(cell: &Cell) -> f64 {
+    let m = cell.centroid();
+    cell.corners.iter().map(|c| c.distance(m)).fold(0.0, f64::max)
+}
+
+/// Eq. (6), Lemma 1: a face that is farther from the centroid than the nearest one by twice the radius is nowhere closest.
+///
+/// For the shallow cells, which are always bisected: the rules compare pairs, and would find little more here.
+fn by_balls(
+    surface: &Surface,
+    candidates: &[Candidate],
+    scratch: &Scratch,
+    distance: f64,
+    radius: f64,
+    closest: [(u32, Feature); 5],
+) -> Filtered {
+    let reach = distance + 2.0 * radius + surface.margin;
+    let survivors = (0..candidates.len() as u32)
+        .filter(|&i| scratch.centroid[i as usize].distance <= reach.max(radius + PAD))
+        .map(|index| {
+            let requirement = surface.requirement(candidates[index as usize].face, Feature::Face);
+            Survivor { index, requirement, meets: true }
+        })
+        .collect();
+    Filtered { survivors, crossing: distance <= radius + PAD, distance, closest }
 }
 
 /// Linear lower bounds of d(·, g) over the cell, each by its values at the corners.

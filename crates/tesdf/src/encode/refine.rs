@@ -1,7 +1,7 @@
 //! Over-refines the domain and prunes it while unwinding.
 
 use super::EncodeProgress;
-use super::filter::{Candidate, Scratch, filter, probe};
+use super::filter::{Candidate, Scratch, filter, probe, radius};
 use super::surface::{Requirement, Surface};
 use crate::domain::{Cell, DomainCube, MAX_DEPTH};
 use crate::geometry::Aabb;
@@ -99,7 +99,7 @@ impl Refiner<'_> {
         }
         let filtered = filter(self.surface, &cell, &candidates, scratch);
         let centroid = cell.centroid();
-        let radius = cell.corners.iter().map(|c| c.distance(centroid)).fold(0.0, f64::max);
+        let radius = radius(&cell);
         let nearest = filtered.distance - radius;
         let n = filtered.survivors.len();
 

@@ -55,11 +55,16 @@ pub struct Triangle {
     pub corners: [DVec3; 3],
     /// Unit normal by the right-hand rule; zero when the triangle has no area, or no more than rounding gives it.
     pub normal: DVec3,
+    /// So much longer than wide that which side of it a point is on takes care; true when that is not known.
+    is_needle: bool,
 }
 
 /// Sine of the angle at the first corner below which the normal is computed with twice the digits; heights
 /// above that are off by at most 1e-16 / 1e-3 of the triangle's size.
 const NEEDLE: f64 = 1e-3;
+
+/// Height, as a share of the longest edge, up to which the sides are looked at again from their nearer ends.
+const TIP: f64 = 1e-2;
 
 /// Height, as a share of the longest edge, up to which a triangle is no more than its edges: which side of them a point
 /// is on is rounding then.
@@ -107,10 +112,15 @@ impl Triangle {
         // What is left of rounding along the longest edge would count with that edge's length in heights over the plane.
         normal -= longest * (normal.dot(longest) / longest_squared.max(f64::MIN_POSITIVE));
         let flat = normal.length() <= FLAT * longest_squared;
-        Self {
-            corners,
-            normal: if flat { DVec3::ZERO } else { normal.try_normalize().unwrap_or(DVec3::ZERO) },
-        }
+        let is_needle = normal.length() <= TIP * longest_squared;
+        let normal = if flat { DVec3::ZERO } else { normal.try_normalize().unwrap_or(DVec3::ZERO) };
+        Self { corners, normal, is_needle }
+    }
+
+    /// A triangle whose normal is known already.
+    #[inline]
+    pub fn with_normal(corners: [DVec3; 3], normal: DVec3) -> Self {
+        Self { corners, normal, is_needle: true }
     }
 
     /// The closest point to `p`.
@@ -120,8 +130,19 @@ impl Triangle {
     /// to its sides, never by a quotient of areas (a needle of aspect 1e7 loses seven digits there).
     #[inline]
     pub fn closest(&self, p: DVec3) -> Closest {
+        self.closest_seen(p, &Relative::new(self, p))
+    }
+
+    /// [`closest`](Self::closest) and [`regions`](Self::regions) of the same point.
+    #[inline]
+    pub fn closest_and_regions(&self, p: DVec3) -> (Closest, Regions) {
         let relative = Relative::new(self, p);
-        if relative.over_face(self) {
+        (self.closest_seen(p, &relative), self.regions_seen(&relative))
+    }
+
+    #[inline]
+    fn closest_seen(&self, p: DVec3, relative: &Relative) -> Closest {
+        if relative.over_face {
             return self.closest_in_plane(p);
         }
         let [a, b, c] = [0, 1, 2].map(|k| self.closest_on_edge(k, p));
@@ -155,15 +176,19 @@ impl Triangle {
     /// The features whose closed region holds `p`.
     #[inline]
     pub fn regions(&self, p: DVec3) -> Regions {
+        self.regions_seen(&Relative::new(self, p))
+    }
+
+    #[inline]
+    fn regions_seen(&self, relative: &Relative) -> Regions {
         if self.normal == DVec3::ZERO {
             return Regions::FACE;
         }
-        let relative = Relative::new(self, p);
-        let mut regions = u8::from(relative.over_face(self));
+        let (start, end) = ([0, 1, 2].map(|k| relative.start(k)), [0, 1, 2].map(|k| relative.end(k)));
+        let mut regions = u8::from(relative.over_face);
         for k in 0..3 {
-            let (start, end) = (relative.start(k), relative.end(k));
-            regions |= u8::from(relative.side[k] <= 0.0 && start >= 0.0 && end <= 0.0) << (1 + k);
-            regions |= u8::from(start <= 0.0 && relative.end((k + 2) % 3) >= 0.0) << (4 + k);
+            regions |= u8::from(relative.side[k] <= 0.0 && start[k] >= 0.0 && end[k] <= 0.0) << (1 + k);
+            regions |= u8::from(start[k] <= 0.0 && end[(k + 2) % 3] >= 0.0) << (4 + k);
         }
         Regions(regions)
     }
@@ -177,6 +202,8 @@ struct Relative {
     along: [DVec3; 3],
     /// Height over each edge within the plane, times the edge's length; positive on the face's side.
     side: [f64; 3],
+    /// Whether the point is over the face itself.
+    over_face: bool,
 }
 
 impl Relative {
@@ -188,7 +215,9 @@ impl Relative {
         let turned = from[0].cross(triangle.normal);
         let turned_b = from[1].cross(triangle.normal);
         let side = [along[0].dot(turned), along[1].dot(turned_b), along[2].dot(turned)];
-        Self { from, along, side }
+        let inside = side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0 && triangle.normal != DVec3::ZERO;
+        let over_face = inside && (!triangle.is_needle || seen_from_nearer_ends(&from, &along, triangle.normal));
+        Self { from, along, side, over_face }
     }
 
     /// Where edge `k` starts, seen along it: negative before its start.
@@ -202,21 +231,16 @@ impl Relative {
     fn end(&self, k: usize) -> f64 {
         self.along[k].dot(self.from[(k + 1) % 3])
     }
+}
 
-    #[inline]
-    fn over_face(&self, triangle: &Triangle) -> bool {
-        let [a, b, c] = self.side;
-        if !(a >= 0.0 && b >= 0.0 && c >= 0.0) || triangle.normal == DVec3::ZERO {
-            return false;
-        }
-        // Beyond the tip of a needle the sides are rounding when seen from its other end.
-        let [from, along] = [&self.from, &self.along];
-        (0..3).all(|k| {
-            let next = (k + 1) % 3;
-            let nearer = if from[k].length_squared() <= from[next].length_squared() { k } else { next };
-            along[k].dot(from[nearer].cross(triangle.normal)) >= 0.0
-        })
-    }
+/// Beyond the tip of a needle the sides are rounding when seen from its other end.
+#[cold]
+fn seen_from_nearer_ends(from: &[DVec3; 3], along: &[DVec3; 3], normal: DVec3) -> bool {
+    (0..3).all(|k| {
+        let next = (k + 1) % 3;
+        let nearer = if from[k].length_squared() <= from[next].length_squared() { k } else { next };
+        along[k].dot(from[nearer].cross(normal)) >= 0.0
+    })
 }
 
 #[cfg(test)]

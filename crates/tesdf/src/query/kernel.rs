@@ -52,7 +52,7 @@ impl FaceRecord {
         let v = |k: usize| Vec3::from_slice(&self.0[3 * k..]).as_dvec3();
         let normal = v(3);
         let normal = if normal.is_nan() { DVec3::ZERO } else { normal };
-        Triangle { corners: [v(0), v(0) + v(1), v(0) + v(2)], normal }
+        Triangle::with_normal([v(0), v(0) + v(1), v(0) + v(2)], normal)
     }
 
     /// How the sign follows from the closest feature.

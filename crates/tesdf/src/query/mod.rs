@@ -4,6 +4,7 @@
 //! least distance to the faces of the cell's list is the answer. Points that no list serves (outside of the
 //! domain, or in a far cell) are answered from the tree over all faces, exactly too.
 mod batch;
+mod by_tree;
 mod kernel;
 mod lanes;
 mod locate;

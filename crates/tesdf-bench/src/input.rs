@@ -1,0 +1,96 @@
+//! Meshes and presets as the benchmarks take them.
+use std::path::Path;
+use std::time::Instant;
+
+use clap::ValueEnum;
+use tesdf::TeSdf;
+use tesdf::asset::about::Source;
+use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
+use tesdf::mesh::{ReadError, RepairOptions, SolidMesh, repair};
+
+use crate::Failure;
+
+/// The encoder's presets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Preset {
+    /// Few faces per query
+    Default,
+    /// Quickest to encode
+    Fast,
+    /// Smallest
+    Compact,
+}
+
+impl Preset {
+    /// As on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::Fast => "fast",
+            Self::Compact => "compact",
+        }
+    }
+
+    /// What the encoder is asked for.
+    pub fn options(self) -> EncodeOptions {
+        EncodeOptions::preset(match self {
+            Self::Default => tesdf::encode::Preset::Default,
+            Self::Fast => tesdf::encode::Preset::Fast,
+            Self::Compact => tesdf::encode::Preset::Compact,
+        })
+    }
+}
+
+/// A mesh that can be encoded.
+pub struct Input {
+    /// File name without extension; repaired meshes are marked.
+    pub name: String,
+    /// The mesh, repaired if need be.
+    pub solid: SolidMesh,
+    source: Source,
+}
+
+impl Input {
+    /// Reads a mesh of any format. One that has no inside is repaired with default options; its name then says so, and stderr
+    /// what was changed.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let at = |e: &dyn std::fmt::Display| Failure::from(format!("{}: {e}", path.display()));
+        let loaded = tesdf::mesh::read(path).map_err(|e| match e {
+            // These name the file themselves.
+            ReadError::Open { .. } | ReadError::UnknownExtension { .. } => e.into(),
+            e => at(&e),
+        })?;
+        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let source = Source { name: file, blake3: loaded.report.source_blake3 };
+        let solid = match SolidMesh::new(loaded.mesh.clone()) {
+            Ok(solid) => solid,
+            Err(e) if e.is_repairable() => {
+                let repaired = repair(&loaded.mesh, &RepairOptions::default()).map_err(|e| at(&e))?;
+                let r = &repaired.report;
+                eprintln!(
+                    "note: {}: repaired with default options: {} faces with two equal corners and {} duplicates dropped, \
+                     {} edges split, {} faces vanished, {} reversed",
+                    path.display(),
+                    r.collapsed_faces.len(),
+                    r.duplicate_faces.len(),
+                    r.split_edges.len(),
+                    r.vanished_faces.len(),
+                    r.reversed_faces.len()
+                );
+                name += " (repaired)";
+                SolidMesh::new(repaired.mesh).map_err(|e| at(&e))?
+            }
+            Err(e) => return Err(at(&e)),
+        };
+        Ok(Self { name, solid, source })
+    }
+
+    /// Encodes the mesh; the asset and the seconds it took, on all threads of the current rayon pool.
+    pub fn encode(&self, options: &EncodeOptions) -> Result<(TeSdf, f64), Failure> {
+        let start = Instant::now();
+        let asset = encode(&self.solid, &self.source, options, &EncodeProgress::default())
+            .map_err(|e| format!("{}: {e}", self.source.name))?;
+        Ok((asset, start.elapsed().as_secs_f64()))
+    }
+}

@@ -1,0 +1,181 @@
+//! `tesdf-bench query`
+use std::hint::black_box;
+use std::path::PathBuf;
+
+use parry3d::math::Vector;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use tesdf::TeSdf;
+use tesdf::glam::DVec3;
+use tesdf::query::Precision;
+
+use crate::input::{Input, Preset};
+use crate::parry::Peer;
+use crate::reference::Reference;
+use crate::timing::{PASSES, best_pass};
+use crate::{Failure, heading, output, parry, points};
+
+/// Arguments of `tesdf-bench query`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Meshes of any format; those without an inside are repaired
+    #[arg(required = true)]
+    meshes: Vec<PathBuf>,
+    /// What is encoded
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    preset: Preset,
+    /// Points of each kind
+    #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    points: u32,
+    /// The same seed gives the same points
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+}
+
+const COLUMNS: [&str; 9] = [
+    "mesh",
+    "points",
+    "contender",
+    "ns per query",
+    "parry3d / this",
+    "tree / this",
+    "read per query",
+    "largest error / diagonal",
+    "sign mistakes",
+];
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    heading::print()?;
+    output::line(&format!(
+        "One thread, preset `{}`, {} points of each kind, seed {}; the best of {PASSES} passes after one to warm up. All give \
+         signed distance, closest point and gradient; ours the face, too, and the place of the point is part of its time. \
+         *Near*: uniform on the surface, moved by up to ±{} % of the diagonal along the normal. *Box*: uniform in the mesh's \
+         bounds. *Face tree*: the tree over all faces of our own asset in f32, eight faces a leaf, SIMD over faces, sides \
+         from the closest feature, without the lists. *Read*: list entries, or faces and nodes of the tree. Errors are \
+         against an f64 tree over the mesh as read, signs against winding numbers, counted from 1e-6 (f64: 1e-12) of \
+         the diagonal on.\n",
+        args.preset.name(),
+        args.points,
+        args.seed,
+        points::NEAR * 100.0
+    ))?;
+    output::head(&COLUMNS, 3)?;
+    let one = ThreadPoolBuilder::new().num_threads(1).build()?;
+    for path in &args.meshes {
+        let input = Input::read(path)?;
+        let mesh = input.solid.mesh();
+        let peer = Peer::new(mesh).map_err(|e| format!("{}: {e}", path.display()))?;
+        let (asset, _) = input.encode(&args.preset.options())?;
+        let reference = Reference::new(mesh);
+        let count = args.points as usize;
+        for (kind, points) in [
+            ("near", points::near_surface(mesh, count, args.seed)),
+            ("box", points::in_box(mesh.bounds(), count, args.seed)),
+        ] {
+            let truth = reference.signed_distances(&points);
+            let rows = contest(&asset, &peer, &one, &points);
+            let (parry, tree) = (rows[0].seconds, rows[1].seconds);
+            for row in &rows {
+                let (error, mistakes) = row.compare(&truth, mesh.diagonal());
+                output::row(&[
+                    input.name.clone(),
+                    kind.into(),
+                    row.name.into(),
+                    format!("{:.0}", row.seconds / count as f64 * 1e9),
+                    format!("{:.2}", parry / row.seconds),
+                    format!("{:.2}", tree / row.seconds),
+                    row.reads.map_or("".into(), |r| format!("{r:.2}")),
+                    format!("{error:.1e}"),
+                    mistakes.to_string(),
+                ])?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// One contender at one kind of points.
+struct Row {
+    name: &'static str,
+    seconds: f64,
+    /// Mean of faces and nodes.
+    reads: Option<f64>,
+    /// Signed distances found.
+    found: Vec<f64>,
+    /// Nearer to the surface than this share of the diagonal the sign is free.
+    sign_from: f64,
+}
+
+/// The peer first, the tree second.
+fn contest(asset: &TeSdf, peer: &Peer, one: &ThreadPool, points: &[DVec3]) -> [Row; 5] {
+    // Rounded outside of what is timed.
+    let rounded: Vec<Vector> = points.iter().map(|&p| parry::point(p)).collect();
+    let mean = |reads: &dyn Fn(DVec3) -> usize| {
+        Some(points.iter().map(|&p| reads(p)).sum::<usize>() as f64 / points.len() as f64)
+    };
+    let list_reads = mean(&|p| asset.reads(p).total());
+    let tree_reads = mean(&|p| asset.reads_by_tree(p).total());
+    let single = |name, precision, reads, sign_from| Row {
+        name,
+        seconds: best_pass(|| {
+            for &p in points {
+                black_box(asset.query(black_box(p), precision));
+            }
+        }),
+        reads,
+        found: points.iter().map(|&p| asset.signed_distance(p, precision)).collect(),
+        sign_from,
+    };
+    [
+        Row {
+            name: parry::NAME,
+            seconds: best_pass(|| {
+                for &p in &rounded {
+                    let answer = peer.query(black_box(p));
+                    black_box((answer.signed_distance, answer.gradient, answer.closest_point));
+                }
+            }),
+            reads: None,
+            found: rounded.iter().map(|&p| f64::from(peer.query(p).signed_distance)).collect(),
+            sign_from: 1e-6,
+        },
+        Row {
+            name: "tesdf, face tree alone, f32",
+            seconds: best_pass(|| {
+                for &p in points {
+                    black_box(asset.query_by_tree(black_box(p), Precision::F32));
+                }
+            }),
+            reads: tree_reads,
+            found: points.iter().map(|&p| asset.query_by_tree(p, Precision::F32).signed_distance).collect(),
+            sign_from: 1e-6,
+        },
+        single("tesdf, one by one, f32", Precision::F32, list_reads, 1e-6),
+        Row {
+            name: "tesdf, batch, f32",
+            seconds: one.install(|| {
+                best_pass(|| {
+                    black_box(asset.query_batch(black_box(points), Precision::F32));
+                })
+            }),
+            reads: list_reads,
+            found: asset.query_batch(points, Precision::F32).iter().map(|a| a.signed_distance).collect(),
+            sign_from: 1e-6,
+        },
+        single("tesdf, one by one, f64", Precision::F64, None, 1e-12),
+    ]
+}
+
+impl Row {
+    /// Largest error of an absolute distance as a share of the diagonal, and the number of wrong signs.
+    fn compare(&self, truth: &[f64], diagonal: f64) -> (f64, usize) {
+        let (mut largest, mut mistakes) = (0.0f64, 0);
+        for (&found, &expected) in self.found.iter().zip(truth) {
+            let error = (found.abs() - expected.abs()).abs() / diagonal;
+            // NaN is worse than any number.
+            largest = largest.max(if error.is_nan() { f64::INFINITY } else { error });
+            let wrong = found.is_sign_negative() != expected.is_sign_negative();
+            mistakes += usize::from(wrong && expected.abs() > self.sign_from * diagonal);
+        }
+        (largest, mistakes)
+    }
+}

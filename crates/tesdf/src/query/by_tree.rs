@@ -1,0 +1,64 @@
+use glam::DVec3;
+
+use super::sign::hinted_side;
+use super::{Answer, ON_SURFACE_F32, ON_SURFACE_F64, Precision, Reads};
+use crate::TeSdf;
+use crate::asset::layout::Side;
+
+impl TeSdf {
+    /// As [`query`](Self::query), from the tree over all faces instead of the lists: what a good bounding volume hierarchy
+    /// alone does, for comparison.
+    ///
+    /// The same exact distance; of equally near faces another may be named. The side is told by the closest feature where it
+    /// can tell ([`Precision::F32`]), else by [`is_inside`](Self::is_inside). On the surface itself the gradient is that
+    /// of [`query`](Self::query).
+    pub fn query_by_tree(&self, point: DVec3, precision: Precision) -> Answer {
+        let local = self.frame.to_local(point);
+        match precision {
+            _ if !local.is_finite() => Answer::NONE,
+            Precision::F32 => self.by_tree_f32(point, local),
+            Precision::F64 => self.by_tree_f64(point, local),
+        }
+    }
+
+    /// How many faces and nodes [`query_by_tree`](Self::query_by_tree) reads at `point`, in `f32`.
+    pub fn reads_by_tree(&self, point: DVec3) -> Reads {
+        let mut reads = Reads::default();
+        let relative = self.frame.to_local(point) - self.cube.middle();
+        self.nearest_in_tree_f32(relative.as_vec3(), &mut reads);
+        reads
+    }
+
+    fn by_tree_f32(&self, point: DVec3, local: DVec3) -> Answer {
+        let relative = local - self.cube.middle();
+        // Far from the cube, f32 is too coarse against the body.
+        if relative.abs().max_element() > 2.0 * self.cube.side() {
+            return self.by_tree_f64(point, local);
+        }
+        let found = self.nearest_in_tree_f32(relative.as_vec3(), &mut Reads::default());
+        let Some(record) = self.records.get(found.face as usize) else {
+            return self.by_tree_f64(point, local);
+        };
+        let triangle = record.triangle();
+        let closest = match found.part() {
+            0 => triangle.closest_in_plane(relative),
+            edge => triangle.closest_on_edge(edge as usize - 1, relative),
+        };
+        let height = triangle.normal.dot(relative - triangle.corners[0]);
+        let side =
+            hinted_side(record.hints(), closest.feature, height).unwrap_or_else(|| self.side_of(point));
+        let on_surface = |d| (d < ON_SURFACE_F32).then(|| self.query(point, Precision::F32).gradient);
+        self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
+    }
+
+    fn by_tree_f64(&self, point: DVec3, local: DVec3) -> Answer {
+        let (position, closest) = self.nearest_in_tree_f64(local);
+        let side = if closest.distance > 0.0 { self.side_of(point) } else { Side::Outside };
+        let on_surface = |d| (d < ON_SURFACE_F64).then(|| self.query(point, Precision::F64).gradient);
+        self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
+    }
+
+    fn side_of(&self, point: DVec3) -> Side {
+        if self.is_inside(point) { Side::Inside } else { Side::Outside }
+    }
+}
