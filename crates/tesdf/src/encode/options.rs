@@ -54,8 +54,8 @@ impl EncodeOptions {
     /// The options of a preset.
     pub fn preset(preset: Preset) -> Self {
         let (byte_worth, tighten_levels) = match preset {
-            Preset::Default => (0.075, 12),
-            Preset::Fast => (0.12, 3),
+            Preset::Default => (0.075, 11),
+            Preset::Fast => (0.12, 2),
             Preset::Compact => (0.15, 12),
         };
         Self { band: Length::OfDiagonal(0.05), regions: Vec::new(), byte_worth, tighten_levels, unit: None }

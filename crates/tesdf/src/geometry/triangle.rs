@@ -216,7 +216,8 @@ impl Relative {
         let turned_b = from[1].cross(triangle.normal);
         let side = [along[0].dot(turned), along[1].dot(turned_b), along[2].dot(turned)];
         let inside = side[0] >= 0.0 && side[1] >= 0.0 && side[2] >= 0.0 && triangle.normal != DVec3::ZERO;
-        let over_face = inside && (!triangle.is_needle || seen_from_nearer_ends(&from, &along, triangle.normal));
+        let over_face =
+            inside && (!triangle.is_needle || seen_from_nearer_ends(&from, &along, triangle.normal));
         Self { from, along, side, over_face }
     }
 
