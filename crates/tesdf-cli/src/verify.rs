@@ -117,7 +117,7 @@ fn precision_text(p: &PrecisionReport) -> String {
         p.largest_error,
         p.largest_error_of_diagonal,
     );
-    text += &place(p.worst.as_ref());
+    text += &place(p.worst.as_ref().filter(|_| p.largest_error > 0.0));
     text += &format!("  sign mistakes   {}\n", p.sign_mistakes);
     text += &place(p.worst_sign.as_ref());
     text += &format!(

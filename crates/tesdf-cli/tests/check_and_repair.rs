@@ -1,38 +1,17 @@
 //! What a person and a script see of `tesdf check` and `tesdf repair`.
-use std::path::{Path, PathBuf};
-use std::process::Command;
+mod folder;
+
+use std::path::Path;
+
+use folder::Folder;
 
 const VERTICES: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n";
 const FACES: &str = "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        Self(tempfile::tempdir().unwrap())
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    fn write(&self, name: &str, text: &str) {
-        std::fs::write(self.path(name), text).unwrap();
-    }
-
-    /// Exit code, stdout, stderr.
-    fn tesdf(&self, args: &[&str]) -> (Option<i32>, String, String) {
-        let out =
-            Command::new(env!("CARGO_BIN_EXE_tesdf")).args(args).current_dir(self.0.path()).output().unwrap();
-        let text = |bytes| String::from_utf8(bytes).unwrap();
-        (out.status.code(), text(out.stdout), text(out.stderr))
-    }
-}
-
 #[test]
 fn a_good_mesh_is_0() {
     let folder = Folder::new();
-    folder.write("cube.obj", &format!("{VERTICES}{FACES}"));
+    folder.write("cube.obj", format!("{VERTICES}{FACES}"));
     let (code, out, err) = folder.tesdf(&["check", "cube.obj"]);
     assert_eq!((code, err.as_str()), (Some(0), ""));
     assert!(out.starts_with("cube.obj: OBJ, 6 faces, 8 vertices\n"), "{out}");
@@ -49,7 +28,7 @@ fn a_good_mesh_is_0() {
 #[test]
 fn a_hole_is_1_and_names_its_edges() {
     let folder = Folder::new();
-    folder.write("open.obj", &format!("{VERTICES}{}", &FACES[10..]));
+    folder.write("open.obj", format!("{VERTICES}{}", &FACES[10..]));
     let (code, out, err) = folder.tesdf(&["check", "open.obj"]);
     assert_eq!(code, Some(1), "{err}");
     assert!(out.contains("error: edge 0-1 is open: only face "), "{out}");
@@ -66,7 +45,7 @@ fn what_is_repaired_is_named_and_checks_in_every_format() {
     let folder = Folder::new();
     // The last face is there twice, the first one is reversed.
     let faces = FACES.replace("f 1 4 3 2", "f 1 2 3 4");
-    folder.write("bad.obj", &format!("{VERTICES}{faces}f 4 1 5 8\n"));
+    folder.write("bad.obj", format!("{VERTICES}{faces}f 4 1 5 8\n"));
     assert_eq!(folder.tesdf(&["check", "bad.obj"]).0, Some(1));
     for name in ["r.ply", "r.obj", "r.stl"] {
         let (code, out, err) = folder.tesdf(&["repair", "bad.obj", "-o", name]);
@@ -88,7 +67,7 @@ fn a_weld_tolerance_joins_what_is_near() {
     // The roof has corners of its own, a millionth off.
     let near = "v 0 0 2.000001\nv 2 0 2.000001\nv 2 2 2.000001\nv 0 2 2.000001\n";
     let faces = FACES.replace("f 5 6 7 8", "f 9 10 11 12");
-    folder.write("crack.obj", &format!("{VERTICES}{near}{faces}"));
+    folder.write("crack.obj", format!("{VERTICES}{near}{faces}"));
     assert_eq!(folder.tesdf(&["repair", "crack.obj", "-o", "r.ply"]).0, Some(1));
     let (code, out, _) = folder.tesdf(&["repair", "crack.obj", "-o", "r.ply", "--weld-tolerance", "1e-5"]);
     assert_eq!(code, Some(0), "{out}");
@@ -101,7 +80,7 @@ fn a_weld_tolerance_joins_what_is_near() {
 #[test]
 fn what_cannot_be_read_or_written_is_2_and_named() {
     let folder = Folder::new();
-    folder.write("cube.obj", &format!("{VERTICES}{FACES}"));
+    folder.write("cube.obj", format!("{VERTICES}{FACES}"));
     folder.write("bad.obj", "v 0 0 zero\n");
     folder.write("empty.stl", "");
     for (args, expected) in [

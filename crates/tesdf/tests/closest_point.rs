@@ -6,6 +6,7 @@ mod support;
 
 use proptest::prelude::*;
 use support::random::Random;
+use support::reference::exceeds;
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
@@ -46,7 +47,7 @@ const SLACK: f64 = 2e-13;
 fn certify(t: &Triangle, p: DVec3) -> Result<(), String> {
     let found = t.closest(p);
     let to = p - found.point;
-    if !((to.length() - found.distance).abs() <= 1e-14) {
+    if exceeds((to.length() - found.distance).abs(), 1e-14) {
         return Err(format!("{} is not the distance of {}, {}", found.distance, found.point, to.length()));
     }
     let edges =

@@ -103,7 +103,8 @@ fn ask(asset: &TeSdf, random: &mut Random) {
             asset.query_in_domain(p, precision);
         }
         asset.query_batch(&[p, -p], Precision::F32);
-        (asset.is_inside(p), asset.reads(p));
+        asset.is_inside(p);
+        asset.reads(p);
         asset.ray_cast(p, random.in_cube(), f64::INFINITY);
         asset.ray_cast(p, DVec3::X * 1e300, 1e300);
     }

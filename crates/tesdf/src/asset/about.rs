@@ -43,17 +43,18 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// Share of the diagonal that rounding is granted: 100 dominations of 1e-15 each, where a
+    /// Share of the diagonal that rounding is granted, in a domain of a local side up to 1: 100 dominations of 1e-15 each, where a
     /// face is dropped only for one that is closer by more than the rounding of both.
     pub const DELTA: f64 = 1e-13;
 
-    /// The certificate of the certified encoder: nothing truncated.
-    pub fn exact(diagonal: f64) -> Self {
+    /// The certificate of the certified encoder: nothing truncated. `side` is the domain's, in the local frame.
+    pub fn exact(diagonal: f64, side: f64) -> Self {
+        let delta = Self::DELTA * side.max(1.0);
         Self {
             encoder: "certified".into(),
             domain: "bisection".into(),
-            delta: Self::DELTA * diagonal,
-            delta_of_diagonal: Self::DELTA,
+            delta: delta * diagonal,
+            delta_of_diagonal: delta,
             truncated: false,
             exactness_distance: None,
         }

@@ -40,7 +40,8 @@ pub enum AssetError {
     },
     /// Bytes follow the last section.
     #[error(
-        "{extra} bytes follow the last section, which ends at byte {expected}; copy or encode the file again"
+        "{} the last section, which ends at byte {expected}; copy or encode the file again",
+        bytes_follow(.extra)
     )]
     TrailingBytes {
         /// Length of the file by its header.
@@ -74,6 +75,10 @@ pub enum AssetError {
         /// Checksum written in the file.
         expected: String,
     },
+}
+
+fn bytes_follow(extra: &u64) -> String {
+    if *extra == 1 { "1 byte follows".into() } else { format!("{extra} bytes follow") }
 }
 
 fn next_for_version(found: &str) -> &'static str {

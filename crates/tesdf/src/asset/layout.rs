@@ -22,7 +22,7 @@ pub const PALETTE_STARTS: SectionSpec = SectionSpec::required("lists.palette_sta
 pub const PALETTES: SectionSpec = SectionSpec::required("lists.palettes", Element::U16, 1);
 /// Bits 16–23 of the palette faces; only for meshes of more than 65,536 faces.
 pub const PALETTES_HIGH: SectionSpec = SectionSpec::optional("lists.palettes_high", Element::U8, 1);
-/// `[M, 12]` boxes of the two children of each node of the face tree, local frame: min x y z, max x y z, twice.
+/// `[M, 12]` boxes of the two children of each node of the face tree, relative to the middle of the cube, local frame: min x y z, max x y z, twice.
 pub const TREE_BOXES: SectionSpec = SectionSpec::required("tree.boxes", Element::F32, 12);
 /// `[M, 2]` children of each node of the face tree: see [`TreeChild`].
 pub const TREE_CHILDREN: SectionSpec = SectionSpec::required("tree.children", Element::U32, 2);

@@ -76,6 +76,13 @@ impl Cell {
         0.25 * (self.corners[0] + self.corners[1] + self.corners[2] + self.corners[3])
     }
 
+    /// Length of the longest edge.
+    pub fn width(&self) -> f64 {
+        let c = &self.corners;
+        let edges = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+        edges.into_iter().map(|(i, j)| c[i].distance(c[j])).fold(0.0, f64::max)
+    }
+
     /// Volume.
     pub fn volume(&self) -> f64 {
         crate::geometry::tetrahedron_volume(&self.corners)

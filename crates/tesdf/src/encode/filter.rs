@@ -8,8 +8,9 @@ use crate::geometry::{Feature, Regions, triangle_meets_tetrahedron};
 
 /// Rounding margin of the rules, in the local frame, where the body's diagonal is 0.5 to 1.
 ///
-/// A computed distance is off by a few 2^-53. A face is dropped only when another one is closer by
-/// more than this, so that rounding cannot make two faces drop each other.
+/// A computed distance is off by a few 2^-53 of the coordinates' size, which is the cube's side. A face is dropped only
+/// when another one is closer by more than this times the side (at least 1), so that rounding cannot make two
+/// faces drop each other.
 pub const MARGIN: f64 = 4e-15;
 
 /// How near to a cell a face counts as meeting it, in the local frame.
@@ -67,6 +68,9 @@ pub struct Scratch {
     alive: Vec<u32>,
 }
 
+/// Rule C compares all pairs; cells with more survivors than this are bisected anyway, and compared below.
+const MAX_SHARING: usize = 256;
+
 /// At most this many faces stand against each candidate in the plane rule; the nearest ones.
 const MAX_RIVALS: usize = 96;
 
@@ -85,6 +89,7 @@ pub fn probe(surface: &Surface, face: u32, p: DVec3) -> Probe {
 pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch: &mut Scratch) -> Filtered {
     let m = cell.centroid();
     let c = &cell.corners;
+    let margin = surface.margin;
     scratch.centroid.clear();
     scratch.centroid.extend(candidates.iter().map(|g| probe(surface, g.face, m)));
 
@@ -99,7 +104,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
         let at = |i: usize| if k < 4 { &candidates[i].at[k] } else { &scratch.centroid[i] };
         let (d, i) = nearest(&|i| at(i).distance);
         closest[k] = (i as u32, at(i).regions.least());
-        reach[k] = c.map(|c| c.distance(at(i).point) + MARGIN);
+        reach[k] = c.map(|c| c.distance(at(i).point) + margin);
         distance = d;
     }
 
@@ -117,6 +122,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
     let least: [f64; 4] =
         std::array::from_fn(|k| scratch.chord[k].iter().copied().fold(f64::INFINITY, f64::min));
 
+    let width = cell.width();
     let mut filtered = Filtered { survivors: Vec::new(), crossing: false, distance, closest };
     let mut kept_whole = |index: u32| {
         let meets = triangle_meets_tetrahedron(
@@ -132,7 +138,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
     let mut next_alive = scratch.alive.iter().copied().peekable();
     for index in 0..candidates.len() as u32 {
         let g = &candidates[index as usize];
-        let tangents = tangents(g, &scratch.centroid[index as usize], c, m);
+        let tangents = tangents(g, &scratch.centroid[index as usize], cell, width, margin);
         let low = tangents
             .iter()
             .map(|t| t.iter().copied().fold(f64::INFINITY, f64::min))
@@ -156,17 +162,21 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
 
 /// Linear lower bounds of d(·, g) over the cell, each by its values at the corners.
 ///
-/// d(·, g) is convex, so it lies above its tangent at the centroid and at each corner.
-fn tangents(g: &Candidate, centroid: &Probe, c: &[DVec3; 4], m: DVec3) -> [[f64; 4]; 5] {
+/// d(·, g) is convex, so it lies above its tangent at the centroid and at each corner. The slope is off by the rounding
+/// of the closest point over the distance, so the bound is lowered by as much times the width of the cell, and once more
+/// by the margin that rule B asks for.
+fn tangents(g: &Candidate, centroid: &Probe, cell: &Cell, width: f64, margin: f64) -> [[f64; 4]; 5] {
+    let c = &cell.corners;
     let tangent = |at: DVec3, p: &Probe| {
-        if p.distance <= MARGIN {
-            return [0.0; 4];
+        if p.distance <= margin {
+            return [-margin; 4];
         }
         let slope = (at - p.point) / p.distance;
-        c.map(|c| p.distance + slope.dot(c - at))
+        let lowered = p.distance - margin - margin * width / p.distance;
+        c.map(|c| lowered + slope.dot(c - at))
     };
     [
-        tangent(m, centroid),
+        tangent(cell.centroid(), centroid),
         tangent(c[0], &g.at[0]),
         tangent(c[1], &g.at[1]),
         tangent(c[2], &g.at[2]),
@@ -176,10 +186,7 @@ fn tangents(g: &Candidate, centroid: &Probe, c: &[DVec3; 4], m: DVec3) -> [[f64;
 
 /// Rule B: some rival's chord lies below one of the tangents at all four corners.
 fn beaten(tangents: &[[f64; 4]; 5], chord: &[Vec<f64>; 4], least: &[f64; 4]) -> bool {
-    tangents.iter().any(|t| {
-        let t = t.map(|v| v - MARGIN);
-        (0..4).all(|k| t[k] >= least[k]) && any_below(&t, chord)
-    })
+    tangents.iter().any(|t| (0..4).all(|k| t[k] >= least[k]) && any_below(t, chord))
 }
 
 fn any_below(t: &[f64; 4], chord: &[Vec<f64>; 4]) -> bool {
@@ -203,6 +210,9 @@ fn keep_rivals(chord: &mut [Vec<f64>; 4]) {
 
 /// Rule C: of the faces that are one and the same edge or vertex to the whole cell, one is enough.
 fn share_features(surface: &Surface, candidates: &[Candidate], survivors: &mut Vec<Survivor>) {
+    if survivors.len() > MAX_SHARING {
+        return;
+    }
     let mut i = 0;
     while i < survivors.len() {
         let g = survivors[i];

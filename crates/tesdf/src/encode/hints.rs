@@ -25,8 +25,11 @@ const SLIVER: f64 = 1e-5;
 /// The direction from the feature to the point lies between the normals, so its angle to either is at
 /// most theirs, 60 degrees: the sine left over is far above any rounding.
 const FLAT: f64 = 0.5;
-/// Cosine beyond which two faces fold back onto each other.
-const FOLDED: f64 = -0.99;
+/// Two faces at one vertex that come this near to each other on the unit sphere around it are as good as folded.
+const NARROW: f64 = 0.3;
+/// Cosine beyond which two faces fold back onto each other: blades of under 37 degrees. (Of 9 degrees, `f32` storage
+/// took one side for the other up to 4e-6 × diagonal away; from 20 degrees on never beyond 1e-6.)
+const FOLDED: f64 = -0.8;
 
 /// The hints of all faces. See `docs/math.md`, "The sign rule".
 pub fn sign_hints(surface: &Surface, tree: &AabbTree, simplicity: Simplicity) -> Vec<SignHints> {
@@ -86,7 +89,7 @@ fn is_delicate(surface: &Surface, tree: &AabbTree, face: usize) -> bool {
     delicate
 }
 
-/// Whether two faces that share one vertex come within some three degrees of each other beside it.
+/// Whether two faces that share one vertex come within some 17 degrees of each other beside it.
 fn narrow_fold(surface: &Surface, face: usize, other: usize) -> bool {
     let (f, o) = (surface.faces[face], surface.faces[other]);
     let Some(v) = f.iter().find(|v| o.contains(v)) else { return false };
@@ -97,7 +100,7 @@ fn narrow_fold(surface: &Surface, face: usize, other: usize) -> bool {
         let at = |i: usize| (t.corners[(k + i) % 3] - t.corners[k]).normalize_or_zero();
         Triangle::new([at(1), at(2), (at(1) + at(2)).normalize_or_zero()])
     };
-    within(&sector(face, f), &sector(other, o), 0.05)
+    within(&sector(face, f), &sector(other, o), NARROW)
 }
 
 /// Whether two triangles come within `distance`; may say yes without need.

@@ -15,6 +15,6 @@ pub mod refine;
 pub mod surface;
 pub mod tighten;
 
-pub use certified::{EncodeError, encode};
+pub use certified::{EncodeError, Source, encode};
 pub use options::{EncodeOptions, Length, Preset};
 pub use progress::{EncodeProgress, Stage};

@@ -38,7 +38,7 @@ pub struct Weights {
     pub byte: f64,
     /// Divides volumes into the average over a layer of this half width around the surface.
     pub near: f64,
-    /// Normalisation: 1 / (area · 2 near).
+    /// Normalisation: 1 / (area · 4 near).
     pub per_volume: f64,
     /// Faces that a query by the face tree counts as.
     pub far_faces: f64,

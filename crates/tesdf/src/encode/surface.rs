@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use super::filter::MARGIN;
 use crate::geometry::{Feature, Triangle};
 use crate::mesh::TriangleMesh;
 
@@ -38,11 +39,13 @@ pub struct Surface {
     vertex_faces: Vec<Vec<u32>>,
     /// Total area, local frame.
     pub area: f64,
+    /// What a distance must be less by to count as less: [`MARGIN`](super::filter::MARGIN) times the size of the domain.
+    pub margin: f64,
 }
 
 impl Surface {
-    /// Looks up what the encoder needs of a mesh that is in the local frame already.
-    pub fn new(mesh: &TriangleMesh) -> Self {
+    /// Looks up what the encoder needs of a mesh that is in the local frame already, for a domain of this `side`.
+    pub fn new(mesh: &TriangleMesh, side: f64) -> Self {
         let local = mesh.vertices();
         let faces = mesh.faces().to_vec();
         let triangles: Vec<Triangle> =
@@ -72,7 +75,16 @@ impl Surface {
             .iter()
             .map(|t| 0.5 * (t.corners[1] - t.corners[0]).cross(t.corners[2] - t.corners[0]).length())
             .sum();
-        Self { triangles, faces, edges, edge_count: edge_faces.len() as u32, edge_faces, vertex_faces, area }
+        Self {
+            triangles,
+            faces,
+            edges,
+            edge_count: edge_faces.len() as u32,
+            edge_faces,
+            vertex_faces,
+            area,
+            margin: MARGIN * side.max(1.0),
+        }
     }
 
     /// The requirement of a face's feature.

@@ -100,7 +100,12 @@ impl Triangle {
         if normal.length_squared() < NEEDLE * NEEDLE * u.length_squared() * v.length_squared() {
             normal = cross_of_differences(a, b, c);
         }
-        let longest_squared = u.length_squared().max(v.length_squared()).max((v - u).length_squared());
+        let longest = [v, v - u]
+            .into_iter()
+            .fold(u, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
+        let longest_squared = longest.length_squared();
+        // What is left of rounding along the longest edge would count with that edge's length in heights over the plane.
+        normal -= longest * (normal.dot(longest) / longest_squared.max(f64::MIN_POSITIVE));
         let flat = normal.length() <= FLAT * longest_squared;
         Self {
             corners,

@@ -178,7 +178,8 @@ impl Comparison {
         }
         match gradient_error(p, expected, answer, offset, &self.promise) {
             Some(angle) => {
-                self.gradient_mistakes += usize::from(!(angle <= self.promise.gradient));
+                let right = angle <= self.promise.gradient;
+                self.gradient_mistakes += usize::from(!right);
                 self.gradient.add(angle, at);
             }
             None => {

@@ -116,3 +116,8 @@ impl Reference {
         1e-6 * self.diagonal + self.tolerance_f64(p)
     }
 }
+
+/// Whether an error is more than allowed; NaN is.
+pub fn exceeds(error: f64, tolerance: f64) -> bool {
+    error > tolerance || error.is_nan()
+}

@@ -1,0 +1,59 @@
+//! A folder of its own for each test, and the binary run in it.
+// Each test file is a crate of its own and uses a part of this.
+#![allow(dead_code)]
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+pub struct Folder(tempfile::TempDir);
+
+impl Folder {
+    pub fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    pub fn write(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        std::fs::write(self.path(name), bytes).unwrap();
+    }
+
+    /// Names of all files, sorted.
+    pub fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.0.path()).unwrap();
+        let mut names: Vec<_> =
+            entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    pub fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tesdf"));
+        command.args(args).current_dir(self.0.path());
+        command
+    }
+
+    /// Exit code, stdout, stderr.
+    pub fn tesdf(&self, args: &[&str]) -> (Option<i32>, String, String) {
+        texts(self.command(args).output().unwrap())
+    }
+
+    /// As [`tesdf`](Self::tesdf), for a run that must be 0; stdout.
+    pub fn good(&self, args: &[&str]) -> String {
+        let (code, out, err) = self.tesdf(args);
+        assert_eq!(code, Some(0), "{args:?}: {out}{err}");
+        out
+    }
+}
+
+/// Exit code, stdout, stderr.
+pub fn texts(out: Output) -> (Option<i32>, String, String) {
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (out.status.code(), text(out.stdout), text(out.stderr))
+}
+
+/// The library's test data.
+pub fn data(name: &str) -> String {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tesdf/tests/data").join(name).display().to_string()
+}
