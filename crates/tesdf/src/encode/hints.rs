@@ -80,7 +80,7 @@ fn is_delicate(surface: &Surface, tree: &AabbTree, face: usize) -> bool {
                 let cosine = triangle.normal.dot(o.normal);
                 delicate |= match shared {
                     0 => Aabb::of(&o.corners).overlaps(reach) && within(triangle, o, THIN),
-                    1 => cosine < FLAT && narrow_fold(surface, face, other as usize),
+                    1 => cosine < FOLDED && narrow_fold(surface, face, other as usize),
                     _ => cosine < FOLDED,
                 };
             }
