@@ -54,7 +54,7 @@ impl EncodeOptions {
     /// The options of a preset.
     pub fn preset(preset: Preset) -> Self {
         let (byte_worth, tighten_levels) = match preset {
-            Preset::Default => (0.075, 11),
+            Preset::Default => (0.067, 12),
             Preset::Fast => (0.12, 2),
             Preset::Compact => (0.22, 11),
         };
