@@ -39,7 +39,7 @@ pub struct Surface {
     vertex_faces: Vec<Vec<u32>>,
     /// Total area, local frame.
     pub area: f64,
-    /// What a distance must be less by to count as less: [`MARGIN`](super::filter::MARGIN) times the size of the domain.
+    /// What a distance must be less by to count as less: [`MARGIN`] times the size of the domain.
     pub margin: f64,
 }
 
