@@ -128,7 +128,7 @@ fn every_option_is_used() {
 #[test]
 fn odd_regions() {
     let solid = ball();
-    for (at, size) in [(DVec3::new(1.7, 0.0, 0.3), 0.0), (DVec3::new(-40.0, 3.0, 8.0), 1.0)] {
+    for (at, size) in [(DVec3::new(1.7, 0.0, 0.3), 0.0), (DVec3::new(-20.0, 3.0, 8.0), 1.0)] {
         let (a, b) = (at, at + size);
         let options =
             EncodeOptions { regions: vec![[a.x, a.y, a.z, b.x, b.y, b.z]], ..EncodeOptions::default() };
@@ -141,4 +141,8 @@ fn odd_regions() {
             assert!((answer.signed_distance - tree.signed_distance).abs() < 1e-12 * p.length());
         }
     }
+    let too_far =
+        EncodeOptions { regions: vec![[-40.0, 3.0, 8.0, -39.0, 4.0, 9.0]], ..EncodeOptions::default() };
+    let refused = encode(&solid, &Source::default(), &too_far, &EncodeProgress::default());
+    assert!(matches!(refused, Err(EncodeError::Option { option: "band or region", .. })));
 }
