@@ -56,7 +56,7 @@ impl EncodeOptions {
         let (byte_worth, tighten_levels) = match preset {
             Preset::Default => (0.067, 12),
             Preset::Fast => (0.12, 2),
-            Preset::Compact => (0.22, 11),
+            Preset::Compact => (0.24, 11),
         };
         Self { band: Length::OfDiagonal(0.05), regions: Vec::new(), byte_worth, tighten_levels, unit: None }
     }
