@@ -71,8 +71,8 @@ pub struct Scratch {
 /// Rule C compares all pairs; cells with more survivors than this are bisected anyway, and compared below.
 const MAX_SHARING: usize = 256;
 
-/// More candidates than this are only thinned out by [`by_balls`].
-const MANY: usize = 1 << 15;
+/// More candidates than this are only thinned out by [`by_points`].
+const MANY: usize = 1 << 12;
 
 /// At most this many faces stand against each candidate in the plane rule; the nearest ones.
 const MAX_RIVALS: usize = 96;
@@ -110,15 +110,15 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &[Candidate], scratch:
         distance = d;
     }
 
-    if candidates.len() > MANY {
-        return by_balls(surface, candidates, scratch, distance, radius(cell), closest);
-    }
     scratch.alive.clear();
     scratch.alive.extend((0..candidates.len() as u32).filter(|&i| {
         let g = &candidates[i as usize];
         !reach.iter().any(|r| (0..4).all(|k| g.at[k].distance >= r[k]))
     }));
 
+    if candidates.len() > MANY {
+        return by_points(surface, candidates, scratch, distance, radius(cell), closest);
+    }
     for (k, chord) in scratch.chord.iter_mut().enumerate() {
         chord.clear();
         chord.extend(scratch.alive.iter().map(|&i| candidates[i as usize].at[k].distance));
@@ -175,10 +175,10 @@ pub fn radius(cell: &Cell) -> f64 {
     cell.corners.iter().map(|c| c.distance(m)).fold(0.0, f64::max)
 }
 
-/// Eq. (6), Lemma 1: a face that is farther from the centroid than the nearest one by twice the radius is nowhere closest.
+/// Rule A alone, for the shallow cells: they are bisected anyway, and rules B and C compare pairs.
 ///
-/// For the shallow cells, which are always bisected: the rules compare pairs, and would find little more here.
-fn by_balls(
+/// Whatever may come within the padding of the cell stays.
+fn by_points(
     surface: &Surface,
     candidates: &[Candidate],
     scratch: &Scratch,
@@ -186,9 +186,9 @@ fn by_balls(
     radius: f64,
     closest: [(u32, Feature); 5],
 ) -> Filtered {
-    let reach = distance + 2.0 * radius + surface.margin;
+    let mut alive = scratch.alive.iter().copied().peekable();
     let survivors = (0..candidates.len() as u32)
-        .filter(|&i| scratch.centroid[i as usize].distance <= reach.max(radius + PAD))
+        .filter(|i| alive.next_if_eq(i).is_some() | (scratch.centroid[*i as usize].distance <= radius + PAD))
         .map(|index| {
             let requirement = surface.requirement(candidates[index as usize].face, Feature::Face);
             Survivor { index, requirement, meets: true }
