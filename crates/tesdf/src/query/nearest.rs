@@ -43,22 +43,41 @@ impl TeSdf {
             let d = (Vec3::from_slice(b) - p).max(p - Vec3::from_slice(&b[3..])).max(Vec3::ZERO);
             d.length_squared()
         };
-        let mut stack = [(0.0f32, TreeChild::Node(0)); STACK];
+        let beyond = |d: f32, limit: f32| d >= limit;
+        reads.tree_nodes += self.walk_tree(bound, beyond, f32::INFINITY, |start, count| {
+            reads.tree_faces += count as usize;
+            let faces = std::array::from_fn(|l| start + (l as u32).min(count - 1));
+            best = kernel::nearest(self.isa, &self.records, &[faces], p, best);
+            best.distance_squared
+        });
+        best
+    }
+
+    /// Visits the leaves of the face tree, the nearer child first, but for those whose `bound` is `beyond` the limit.
+    ///
+    /// `leaf` takes the first face and the number of faces, and answers with the limit from then on. Returns the number
+    /// of nodes read.
+    #[inline]
+    fn walk_tree<D: Copy + PartialOrd + Default>(
+        &self,
+        bound: impl Fn(&[f32]) -> D,
+        beyond: impl Fn(D, D) -> bool,
+        mut limit: D,
+        mut leaf: impl FnMut(u32, u32) -> D,
+    ) -> usize {
+        let mut nodes = 0;
+        let mut stack = [(D::default(), TreeChild::Node(0)); STACK];
         let mut top = 1;
         while top > 0 {
             top -= 1;
             let (d, child) = stack[top];
-            if d >= best.distance_squared {
+            if beyond(d, limit) {
                 continue;
             }
             match child {
-                TreeChild::Leaf(start, count) => {
-                    reads.tree_faces += count as usize;
-                    let faces = std::array::from_fn(|l| start + (l as u32).min(count - 1));
-                    best = kernel::nearest(self.isa, &self.records, &[faces], p, best);
-                }
+                TreeChild::Leaf(start, count) => limit = leaf(start, count),
                 TreeChild::Node(n) => {
-                    reads.tree_nodes += 1;
+                    nodes += 1;
                     let boxes = &self.tree_boxes[n as usize];
                     let [left, right] = self.tree_children[n as usize].map(TreeChild::decode);
                     let (a, b) = ((bound(&boxes[..6]), left), (bound(&boxes[6..]), right));
@@ -69,7 +88,7 @@ impl TeSdf {
                 }
             }
         }
-        best
+        nodes
     }
 
     /// The nearest face of a list, `p` in the local frame: its position, and where. Ties go to the lowest id.
@@ -88,29 +107,16 @@ impl TeSdf {
             let (low, high) = (Vec3::from_slice(b).as_dvec3(), Vec3::from_slice(&b[3..]).as_dvec3());
             (low - relative).max(relative - high).max(DVec3::ZERO).length() * (1.0 - 1e-14)
         };
-        let mut stack = [(0.0f64, TreeChild::Node(0)); STACK];
-        let mut top = 1;
-        while top > 0 {
-            top -= 1;
-            let (d, child) = stack[top];
-            if d > best.closest.distance {
-                continue;
-            }
-            match child {
-                TreeChild::Leaf(start, count) => {
-                    (start..start + count).for_each(|face| best.try_face(self, face, p));
-                }
-                TreeChild::Node(n) => {
-                    let boxes = &self.tree_boxes[n as usize];
-                    let [left, right] = self.tree_children[n as usize].map(TreeChild::decode);
-                    let (a, b) = ((bound(&boxes[..6]), left), (bound(&boxes[6..]), right));
-                    let (near, far) = if a.0 <= b.0 { (a, b) } else { (b, a) };
-                    stack[top] = far;
-                    stack[top + 1] = near;
-                    top += 2;
-                }
-            }
-        }
+        // Faces at the same distance are looked at too: the lowest id wins.
+        self.walk_tree(
+            bound,
+            |d: f64, limit: f64| d > limit,
+            f64::INFINITY,
+            |start, count| {
+                (start..start + count).for_each(|face| best.try_face(self, face, p));
+                best.closest.distance
+            },
+        );
         (best.position, best.closest)
     }
 }
