@@ -32,6 +32,7 @@
 #![warn(missing_docs)]
 
 pub mod asset;
+pub mod collide;
 pub mod domain;
 pub mod encode;
 pub mod geometry;

@@ -6,7 +6,7 @@ use super::about::About;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
 use super::{AssetError, Container, SharedSection, save_atomic};
 use crate::domain::{DomainCube, MAX_DEPTH};
-use crate::geometry::{AabbTree, LocalFrame, Triangle};
+use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
 use crate::query::{Entries, FaceRecord, Isa};
 
 /// A Tetra-Encoded Signed Distance Field: an encoded mesh, immutable, shared by all that use it.
@@ -50,6 +50,8 @@ pub struct TeSdf {
     /// Where descents begin, made on opening.
     pub(crate) entries: Entries,
     pub(crate) isa: Isa,
+    /// Of the faces' corners, in the mesh's unit; made on opening.
+    bounds: Aabb,
 }
 
 impl TeSdf {
@@ -100,11 +102,14 @@ impl TeSdf {
             records: Vec::new(),
             entries: Entries::new(&[]),
             isa: Isa::detect(),
+            bounds: Aabb::EMPTY,
         };
         asset.check_mesh()?;
         asset.check_lists()?;
         asset.check_tree()?;
         let middle = asset.cube.middle();
+        asset.bounds =
+            (0..asset.faces.len()).map(|f| Aabb::of(&asset.face_corners(f))).fold(Aabb::EMPTY, Aabb::union);
         asset.entries = Entries::new(&asset.nodes);
         asset.records = (0..asset.faces.len())
             .map(|f| FaceRecord::new(&asset.local_triangle(f), middle, SignHints(asset.sign_hints[f])))
@@ -146,6 +151,11 @@ impl TeSdf {
     /// Number of faces.
     pub fn face_count(&self) -> usize {
         self.faces.len()
+    }
+
+    /// Bounds of the mesh, in its unit.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
     }
 
     /// Corners of face `face` (its id in the source mesh, 0-based), in the mesh's unit.

@@ -1,0 +1,84 @@
+use glam::DVec3;
+use serde::Serialize;
+
+use super::InstanceId;
+
+/// A place where body *a* touches body *b*, in the world's unit and frame.
+///
+/// *a* is the body whose face or node it is, *b* the one whose signed distance field `φ_b` it is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Contact {
+    /// The witness on `face_a`.
+    pub point_a: DVec3,
+    /// The point of b's surface that is closest to `point_a`.
+    pub point_b: DVec3,
+    /// ∇φ_b at `point_a`: unit, from b to a.
+    pub normal: DVec3,
+    /// φ_b at `point_a`: negative where the bodies penetrate.
+    pub distance: f64,
+    /// The face of a, 0-based in the encoded mesh; for a node the lowest face that has it.
+    pub face_a: u32,
+    /// The face of b that is closest to `point_a`.
+    pub face_b: u32,
+    /// The cell of b's domain, as the number of its word in `domain.nodes`; `None` where the face tree or a formula answered.
+    pub tet_b: Option<u32>,
+    /// The body whose face it is.
+    pub instance_a: InstanceId,
+    /// The body whose field it is.
+    pub instance_b: InstanceId,
+    /// The same from step to step while the same parts touch.
+    pub feature: FeatureId,
+    /// Whether the minimum over the face is within the tolerance; false when its search was cut short.
+    pub converged: bool,
+}
+
+/// Names the parts of two bodies that touch, whatever cells they touch in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+pub struct FeatureId {
+    /// Face of a; a node in node mode.
+    pub a: u32,
+    /// The closest feature of b.
+    pub b: FeatureB,
+}
+
+/// The feature of a mesh that is closest to a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FeatureB {
+    /// A vertex, by its id in the encoded mesh.
+    Vertex(u32),
+    /// An edge, by its vertices, the lower id first.
+    Edge(u32, u32),
+    /// A face, by its id in the encoded mesh.
+    Face(u32),
+}
+
+/// What a detection did. Bytes are of the products between stages, at their greatest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Statistics {
+    /// Ordered pairs of instances whose bounds meet.
+    pub instance_pairs: usize,
+    /// Faces or nodes of a that the broad phase left, over all pairs.
+    pub candidates: usize,
+    /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell.
+    pub polygons: usize,
+    /// Contacts within the contact distance.
+    pub touching: usize,
+    /// Contacts that the cosine filter dropped.
+    pub filtered: usize,
+    /// Contacts that the reduction dropped.
+    pub reduced: usize,
+    /// Contacts whose minimum is not within the tolerance.
+    pub unconverged: usize,
+    /// Bytes of all contacts and intermediate products.
+    pub bytes: usize,
+}
+
+/// The contacts of a scene, sorted by world, instances, face and cell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Contacts {
+    /// The contacts.
+    pub contacts: Vec<Contact>,
+    /// What was done to find them.
+    pub statistics: Statistics,
+}

@@ -1,0 +1,28 @@
+//! Contacts between instances of encoded meshes and simple shapes.
+//!
+//! ```text
+//! Scene ──instance_pairs──▶ pairs ──broad──▶ Candidates ──middle──▶ ClippedPolygons ──narrow──▶ contacts ──filter, reduce──▶ Contacts
+//! ```
+//!
+//! - [`Scene`]: shapes (an encoded mesh, a plane, a box, a sphere, a capsule), and instances of them: a pose, a
+//!   velocity, a scale, a world. An instance costs its state only.
+//! - `detect`: all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
+//! - `clearance`: the signed distance between two instances, with witnesses.
+//! - `time_of_impact`: when two moving instances first touch, never too late.
+//! - `why`: why a contact is, or is not, there.
+//!
+//! In each contact *a* is the body whose face (or node) it is and *b* the body whose signed distance field it is; both
+//! directions of a pair are evaluated.
+mod contact;
+mod error;
+mod options;
+mod pose;
+mod scene;
+mod shape;
+
+pub use contact::{Contact, Contacts, FeatureB, FeatureId, Statistics};
+pub use error::CollideError;
+pub use options::{CollideOptions, FaceMethod, Mode, Reduction};
+pub use pose::{Placement, Pose};
+pub use scene::{Groups, Instance, InstanceId, Scene, ShapeId, Velocity};
+pub use shape::Shape;

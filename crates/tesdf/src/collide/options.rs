@@ -1,0 +1,122 @@
+use serde::{Deserialize, Serialize};
+
+use super::CollideError;
+use crate::encode::Length;
+use crate::query::Precision;
+
+/// What is tested of body *a* against the field of body *b*.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// Node-TES: the vertices.
+    Node,
+    /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9).
+    Face(FaceMethod),
+}
+
+impl Mode {
+    /// Face-TES with the paper's 16 iterations.
+    pub const FACE: Self = Self::Face(FaceMethod::FrankWolfe { iterations: 16 });
+    /// The exact minimum, to 1e-7 of the diagonal.
+    pub const EXACT: Self = Self::Face(FaceMethod::Exact { tolerance: Length::OfDiagonal(1e-7) });
+}
+
+/// How the least signed distance over a polygon is found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FaceMethod {
+    /// A fixed number of Frank–Wolfe iterations: an upper bound of the minimum.
+    FrankWolfe {
+        /// Iterations; each is one evaluation of the field.
+        iterations: u32,
+    },
+    /// Closed form outside, branch and bound inside.
+    Exact {
+        /// Bound on the error; a share of the diagonal of the field's body, or in the world's unit.
+        tolerance: Length,
+    },
+}
+
+/// How many contacts of a pair are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reduction {
+    /// All.
+    None,
+    /// At most so many per pair of instances: the deepest, the extremes, then those that matter most to the wrench.
+    PerPair(u32),
+}
+
+/// What to detect. Every field is used.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CollideOptions {
+    /// Nodes, or faces and how.
+    pub mode: Mode,
+    /// Contacts are reported up to this signed distance, in the world's unit. Wider than the band of an asset is no
+    /// error: what lies outside of its domain is answered from its face tree, exactly.
+    pub contact_distance: f64,
+    /// Adds to the contact distance of a pair what its velocities can close in this time; 0 adds nothing.
+    pub speculative_time: f64,
+    /// Eq. (10): a contact of a face is dropped when ∇φ · n > −cos θ; `None` keeps all. Not for nodes.
+    pub cos_theta: Option<f64>,
+    /// How many contacts of a pair are kept.
+    pub reduction: Reduction,
+    /// What the reported distances, normals and witness points are computed with.
+    #[serde(skip, default = "exact")]
+    pub precision: Precision,
+}
+
+fn exact() -> Precision {
+    Precision::F64
+}
+
+impl CollideOptions {
+    /// The defaults with another mode.
+    pub fn with_mode(mode: Mode) -> Self {
+        Self { mode, ..Self::default() }
+    }
+
+    /// Checks that every value makes sense.
+    ///
+    /// # Errors
+    /// Names the option.
+    pub fn validate(&self) -> Result<(), CollideError> {
+        let refuse = |option, found: String, expected| Err(CollideError::Option { option, found, expected });
+        for (name, value) in
+            [("contact_distance", self.contact_distance), ("speculative_time", self.speculative_time)]
+        {
+            if !(value >= 0.0 && value.is_finite()) {
+                return refuse(name, value.to_string(), "a finite number, 0 or greater");
+            }
+        }
+        if let Some(cos) = self.cos_theta
+            && !(-1.0..=1.0).contains(&cos)
+        {
+            return refuse("cos_theta", cos.to_string(), "-1 to 1");
+        }
+        if let Mode::Face(FaceMethod::Exact { tolerance }) = self.mode {
+            let (Length::OfDiagonal(value) | Length::Absolute(value)) = tolerance;
+            if !(value > 0.0 && value.is_finite()) {
+                return refuse("tolerance", value.to_string(), "a finite number greater than 0");
+            }
+        }
+        if self.reduction == Reduction::PerPair(0) {
+            return refuse("reduction", "0 contacts per pair".into(), "at least 1, or none");
+        }
+        Ok(())
+    }
+}
+
+impl Default for CollideOptions {
+    /// Exact, everything that touches, nothing filtered or reduced.
+    fn default() -> Self {
+        Self {
+            mode: Mode::EXACT,
+            contact_distance: 0.0,
+            speculative_time: 0.0,
+            cos_theta: None,
+            reduction: Reduction::None,
+            precision: Precision::F64,
+        }
+    }
+}

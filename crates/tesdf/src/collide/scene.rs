@@ -1,0 +1,279 @@
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+use glam::DVec3;
+use serde::Serialize;
+
+use super::{CollideError, Placement, Pose, Shape};
+use crate::geometry::Aabb;
+
+/// Names a shape of a scene; never used again after the shape is removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+pub struct ShapeId(pub u32);
+
+/// Names an instance of a scene: 0, 1, 2, … in the order of adding; never used again after the instance is removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+pub struct InstanceId(pub u32);
+
+impl fmt::Display for InstanceId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// Which instances meet which: two do when each one's `memberships` share a bit with the other's `filter`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Groups {
+    /// The groups that the instance is in.
+    pub memberships: u32,
+    /// The groups that it meets.
+    pub filter: u32,
+}
+
+impl Groups {
+    /// In all groups, meeting all.
+    pub const ALL: Self = Self { memberships: u32::MAX, filter: u32::MAX };
+
+    /// Whether instances of these groups meet.
+    pub fn meet(self, other: Self) -> bool {
+        self.memberships & other.filter != 0 && other.memberships & self.filter != 0
+    }
+}
+
+/// Velocity of a body in the world, per unit of time; the angular part about the body's origin, in radians.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Velocity {
+    /// Of the body's origin.
+    pub linear: DVec3,
+    /// About the body's origin.
+    pub angular: DVec3,
+}
+
+/// A shape, placed in a world. Its state is all that it costs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instance {
+    /// The shape.
+    pub shape: ShapeId,
+    /// Where it is.
+    pub pose: Pose,
+    /// How it moves; only for contacts ahead of time.
+    pub velocity: Velocity,
+    /// World units per unit of the shape; positive.
+    pub scale: f64,
+    /// Instances of different worlds never meet.
+    pub world: u32,
+    /// Which instances it meets.
+    pub groups: Groups,
+}
+
+impl Instance {
+    /// A resting instance of scale 1 in world 0 that meets all others.
+    pub fn new(shape: ShapeId, pose: Pose) -> Self {
+        Self { shape, pose, velocity: Velocity::default(), scale: 1.0, world: 0, groups: Groups::ALL }
+    }
+
+    /// Pose and scale.
+    pub fn placement(&self) -> Placement {
+        Placement { pose: self.pose, scale: self.scale }
+    }
+}
+
+/// Shapes and their instances.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    shapes: BTreeMap<ShapeId, Shape>,
+    /// Sorted by id, as ids only grow.
+    ids: Vec<InstanceId>,
+    instances: Vec<Instance>,
+    excluded: BTreeSet<(InstanceId, InstanceId)>,
+    next_shape: u32,
+    next_instance: u32,
+}
+
+impl Scene {
+    /// A scene of nothing.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a shape: an encoded mesh (shared, by `Arc`) or a simple one.
+    ///
+    /// # Errors
+    /// [`CollideError::Shape`] for sizes that are not positive.
+    pub fn add_shape(&mut self, shape: impl Into<Shape>) -> Result<ShapeId, CollideError> {
+        let shape = shape.into();
+        shape.validate()?;
+        let id = ShapeId(self.next_shape);
+        self.next_shape += 1;
+        self.shapes.insert(id, shape);
+        Ok(id)
+    }
+
+    /// Removes a shape that no instance uses.
+    ///
+    /// # Errors
+    /// [`CollideError::ShapeInUse`] names an instance.
+    pub fn remove_shape(&mut self, shape: ShapeId) -> Result<Shape, CollideError> {
+        if let Some(at) = self.instances.iter().position(|i| i.shape == shape) {
+            return Err(CollideError::ShapeInUse { shape, instance: self.ids[at] });
+        }
+        self.shapes.remove(&shape).ok_or(CollideError::NoShape(shape))
+    }
+
+    /// Adds an instance.
+    ///
+    /// # Errors
+    /// As [`add_many`](Self::add_many).
+    pub fn add(&mut self, instance: Instance) -> Result<InstanceId, CollideError> {
+        self.add_many(&[instance]).map(|ids| ids.start)
+    }
+
+    /// Adds instances; their ids follow each other. All are added, or none.
+    ///
+    /// # Errors
+    /// Names the instance by its place in `instances`.
+    pub fn add_many(&mut self, instances: &[Instance]) -> Result<std::ops::Range<InstanceId>, CollideError> {
+        let first = self.next_instance;
+        let end =
+            u32::try_from(instances.len()).ok().and_then(|n| first.checked_add(n)).ok_or_else(|| {
+                CollideError::Instance {
+                    instance: first,
+                    reason: format!("{} more instances; ids end at 2^32", instances.len()),
+                }
+            })?;
+        let checked = |(k, instance)| {
+            self.checked(instance).map_err(|reason| CollideError::Instance { instance: k as u32, reason })
+        };
+        let instances = instances.iter().enumerate().map(checked).collect::<Result<Vec<_>, _>>()?;
+        self.ids.extend((first..end).map(InstanceId));
+        self.instances.extend(instances);
+        self.next_instance = end;
+        Ok(InstanceId(first)..InstanceId(end))
+    }
+
+    /// Removes instances. All are removed, or none.
+    ///
+    /// # Errors
+    /// [`CollideError::NoInstance`] names one that is not there.
+    pub fn remove(&mut self, ids: &[InstanceId]) -> Result<(), CollideError> {
+        ids.iter().try_for_each(|&id| self.at(id).map(|_| ()))?;
+        let gone: BTreeSet<InstanceId> = ids.iter().copied().collect();
+        let mut kept = self.ids.iter().map(|id| !gone.contains(id));
+        self.instances.retain(|_| kept.next() == Some(true));
+        self.ids.retain(|id| !gone.contains(id));
+        self.excluded.retain(|(a, b)| !gone.contains(a) && !gone.contains(b));
+        Ok(())
+    }
+
+    /// Replaces the states of instances. All are replaced, or none.
+    ///
+    /// # Errors
+    /// Names the first instance that is not there or whose state cannot be.
+    pub fn update(&mut self, updates: &[(InstanceId, Instance)]) -> Result<(), CollideError> {
+        let checked = |&(id, instance): &(InstanceId, Instance)| {
+            let instance = self
+                .checked(&instance)
+                .map_err(|reason| CollideError::Instance { instance: id.0, reason })?;
+            Ok((self.at(id)?, instance))
+        };
+        for (at, instance) in updates.iter().map(checked).collect::<Result<Vec<_>, CollideError>>()? {
+            self.instances[at] = instance;
+        }
+        Ok(())
+    }
+
+    /// Moves instances. All are moved, or none.
+    ///
+    /// # Errors
+    /// As [`update`](Self::update).
+    pub fn set_poses(&mut self, poses: &[(InstanceId, Pose)]) -> Result<(), CollideError> {
+        let updates = poses
+            .iter()
+            .map(|&(id, pose)| Ok((id, Instance { pose, ..*self.instance(id)? })))
+            .collect::<Result<Vec<_>, CollideError>>()?;
+        self.update(&updates)
+    }
+
+    /// Two instances never meet from now on.
+    ///
+    /// # Errors
+    /// [`CollideError::NoInstance`].
+    pub fn exclude(&mut self, a: InstanceId, b: InstanceId) -> Result<(), CollideError> {
+        self.at(a)?;
+        self.at(b)?;
+        self.excluded.insert((a.min(b), a.max(b)));
+        Ok(())
+    }
+
+    /// Two excluded instances meet again.
+    pub fn include(&mut self, a: InstanceId, b: InstanceId) {
+        self.excluded.remove(&(a.min(b), a.max(b)));
+    }
+
+    /// An instance's state.
+    ///
+    /// # Errors
+    /// [`CollideError::NoInstance`].
+    pub fn instance(&self, id: InstanceId) -> Result<&Instance, CollideError> {
+        self.at(id).map(|at| &self.instances[at])
+    }
+
+    /// A shape.
+    ///
+    /// # Errors
+    /// [`CollideError::NoShape`].
+    pub fn shape(&self, id: ShapeId) -> Result<&Shape, CollideError> {
+        self.shapes.get(&id).ok_or(CollideError::NoShape(id))
+    }
+
+    /// All instances, by id.
+    pub fn instances(&self) -> impl ExactSizeIterator<Item = (InstanceId, &Instance)> {
+        self.ids.iter().copied().zip(&self.instances)
+    }
+
+    /// Whether two instances may meet: of one world, of groups that meet, not excluded, not the same.
+    pub fn may_meet(&self, a: (InstanceId, &Instance), b: (InstanceId, &Instance)) -> bool {
+        a.0 != b.0
+            && a.1.world == b.1.world
+            && a.1.groups.meet(b.1.groups)
+            && (self.excluded.is_empty() || !self.excluded.contains(&(a.0.min(b.0), a.0.max(b.0))))
+    }
+
+    /// Bounds of an instance in the world.
+    ///
+    /// # Errors
+    /// [`CollideError::NoInstance`].
+    pub fn bounds(&self, id: InstanceId) -> Result<Aabb, CollideError> {
+        let instance = self.instance(id)?;
+        let shape = self.shape(instance.shape)?;
+        Ok(match shape {
+            // A rotated half space has no useful box.
+            Shape::Plane => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
+            _ => instance.placement().bounds(shape.bounds()),
+        })
+    }
+
+    /// Bytes that the instances take, shapes not counted.
+    pub fn instance_bytes(&self) -> usize {
+        self.instances.len() * (size_of::<Instance>() + size_of::<InstanceId>())
+            + self.excluded.len() * size_of::<(InstanceId, InstanceId)>()
+    }
+
+    fn at(&self, id: InstanceId) -> Result<usize, CollideError> {
+        self.ids.binary_search(&id).map_err(|_| CollideError::NoInstance(id))
+    }
+
+    /// The instance with its rotation normalised.
+    fn checked(&self, instance: &Instance) -> Result<Instance, String> {
+        self.shape(instance.shape).map_err(|e| e.to_string())?;
+        let Instance { pose, velocity, scale, .. } = instance;
+        let pose = Pose::new(pose.translation, pose.rotation).map_err(|e| e.to_string())?;
+        if !velocity.linear.is_finite() || !velocity.angular.is_finite() {
+            return Err(format!("velocity {velocity:?}; expected finite numbers"));
+        }
+        if !(*scale > 0.0 && scale.is_finite()) {
+            return Err(format!("scale {scale}; expected a finite number greater than 0"));
+        }
+        Ok(Instance { pose, ..*instance })
+    }
+}

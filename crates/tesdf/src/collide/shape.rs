@@ -1,0 +1,92 @@
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::CollideError;
+use crate::TeSdf;
+use crate::geometry::Aabb;
+
+/// A body's geometry, in its own frame; shared by all instances.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// An encoded mesh.
+    Mesh(Arc<TeSdf>),
+    /// The half space z ≤ 0; its surface is the plane z = 0.
+    Plane,
+    /// A box centred on the origin.
+    Box {
+        /// Half of its edge lengths; positive.
+        half_extents: DVec3,
+    },
+    /// A sphere around the origin.
+    Sphere {
+        /// Radius; positive.
+        radius: f64,
+    },
+    /// All points within `radius` of the segment from `-half_height` to `half_height` on the z axis.
+    Capsule {
+        /// Half of the segment's length; positive.
+        half_height: f64,
+        /// Radius; positive.
+        radius: f64,
+    },
+}
+
+impl Shape {
+    /// Checks the sizes.
+    ///
+    /// # Errors
+    /// [`CollideError::Shape`] names the shape and the size.
+    pub fn validate(&self) -> Result<(), CollideError> {
+        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let (shape, found, good) = match *self {
+            Self::Mesh(_) | Self::Plane => return Ok(()),
+            Self::Box { half_extents: h } => {
+                ("box", format!("half extents {h}"), h.to_array().into_iter().all(positive))
+            }
+            Self::Sphere { radius } => ("sphere", format!("radius {radius}"), positive(radius)),
+            Self::Capsule { half_height, radius } => (
+                "capsule",
+                format!("half height {half_height}, radius {radius}"),
+                positive(half_height) && positive(radius),
+            ),
+        };
+        if good {
+            return Ok(());
+        }
+        Err(CollideError::Shape { shape, found, expected: "finite numbers greater than 0" })
+    }
+
+    /// Bounds in the shape's frame; those of a plane are infinite.
+    pub fn bounds(&self) -> Aabb {
+        let symmetric = |half: DVec3| Aabb { min: -half, max: half };
+        match self {
+            Self::Mesh(asset) => asset.bounds(),
+            Self::Plane => {
+                Aabb { min: DVec3::NEG_INFINITY, max: DVec3::new(f64::INFINITY, f64::INFINITY, 0.0) }
+            }
+            Self::Box { half_extents } => symmetric(*half_extents),
+            Self::Sphere { radius } => symmetric(DVec3::splat(*radius)),
+            Self::Capsule { half_height, radius } => {
+                symmetric(DVec3::new(*radius, *radius, half_height + radius))
+            }
+        }
+    }
+
+    /// Diagonal of the bounds, in the shape's unit; that of a plane is infinite.
+    pub fn diagonal(&self) -> f64 {
+        self.bounds().extent().length()
+    }
+}
+
+impl From<Arc<TeSdf>> for Shape {
+    fn from(asset: Arc<TeSdf>) -> Self {
+        Self::Mesh(asset)
+    }
+}
+
+impl From<TeSdf> for Shape {
+    fn from(asset: TeSdf) -> Self {
+        Self::Mesh(Arc::new(asset))
+    }
+}
