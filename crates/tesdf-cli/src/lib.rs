@@ -11,6 +11,7 @@ use clap::{Parser, Subcommand};
 
 pub mod asset_file;
 pub mod check;
+pub mod collide;
 pub mod completions;
 pub mod encode;
 pub mod inspect;
@@ -49,6 +50,8 @@ pub enum Command {
     Inspect(inspect::Args),
     /// Check a .tesdf file: its checksums, then its distances against brute force
     Verify(verify::Args),
+    /// Contacts between two bodies
+    Collide(collide::Args),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
     /// Print a completion script for a shell
@@ -88,6 +91,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Query(args) => query::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Verify(args) => verify::run(args),
+        Command::Collide(args) => collide::run(args),
         Command::Slice(args) => slice::run(args),
         Command::Completions(args) => completions::run(args),
     }

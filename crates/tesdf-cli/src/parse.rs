@@ -1,6 +1,7 @@
 //! Values of options.
+use tesdf::collide::Pose;
 use tesdf::geometry::Aabb;
-use tesdf::glam::DVec3;
+use tesdf::glam::{DQuat, DVec3};
 
 /// A finite number.
 ///
@@ -41,15 +42,7 @@ pub fn fraction(text: &str) -> Result<f64, String> {
 /// # Errors
 /// Says which number is at fault.
 pub fn region(text: &str) -> Result<Aabb, String> {
-    let words: Vec<&str> =
-        text.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty()).collect();
-    let words: [&str; 6] = words
-        .try_into()
-        .map_err(|w: Vec<_>| format!("{} numbers; expected six, \"x0 y0 z0 x1 y1 z1\"", w.len()))?;
-    let mut values = [0.0; 6];
-    for (value, word) in values.iter_mut().zip(words) {
-        *value = number(word).map_err(|e| format!("{word}: {e}"))?;
-    }
+    let values: [f64; 6] = numbers(text, "six, \"x0 y0 z0 x1 y1 z1\"")?;
     let [min, max] = [0, 3].map(|i| DVec3::new(values[i], values[i + 1], values[i + 2]));
     for (axis, (low, high)) in ["x", "y", "z"].into_iter().zip(min.to_array().into_iter().zip(max.to_array()))
     {
@@ -58,6 +51,28 @@ pub fn region(text: &str) -> Result<Aabb, String> {
         }
     }
     Ok(Aabb { min, max })
+}
+
+/// A pose as `tx ty tz qx qy qz qw`, separated by spaces or commas.
+///
+/// # Errors
+/// Says which number is at fault, or that the quaternion is not of unit length.
+pub fn pose(text: &str) -> Result<Pose, String> {
+    let [x, y, z, i, j, k, w] = numbers(text, "seven, \"tx ty tz qx qy qz qw\"")?;
+    Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| e.to_string())
+}
+
+/// `N` numbers, separated by spaces or commas.
+fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
+    let words: Vec<&str> =
+        text.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty()).collect();
+    let words: [&str; N] =
+        words.try_into().map_err(|w: Vec<_>| format!("{} numbers; expected {expected}", w.len()))?;
+    let mut values = [0.0; N];
+    for (value, word) in values.iter_mut().zip(words) {
+        *value = number(word).map_err(|e| format!("{word}: {e}"))?;
+    }
+    Ok(values)
 }
 
 #[cfg(test)]

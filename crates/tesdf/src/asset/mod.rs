@@ -14,6 +14,7 @@
 //! `checksum` is BLAKE3 of the first 8 + n bytes with its own 64 digits set to `0`; `checksum.NAME` is BLAKE3 of section
 //! NAME. Together they cover every byte of the file.
 pub mod about;
+mod cell_bounds;
 mod cells;
 mod container;
 mod error;

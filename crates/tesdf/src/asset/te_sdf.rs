@@ -1,8 +1,10 @@
 use std::path::Path;
+use std::sync::OnceLock;
 
 use glam::DVec3;
 
 use super::about::About;
+use super::cell_bounds::CellBounds;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
 use super::{AssetError, Container, SharedSection, save_atomic};
 use crate::domain::{DomainCube, MAX_DEPTH};
@@ -52,6 +54,8 @@ pub struct TeSdf {
     pub(crate) isa: Isa,
     /// Of the faces' corners, in the mesh's unit; made on opening.
     bounds: Aabb,
+    cell_bounds: OnceLock<CellBounds>,
+    lowest_faces: OnceLock<Vec<u32>>,
 }
 
 impl TeSdf {
@@ -103,6 +107,8 @@ impl TeSdf {
             entries: Entries::new(&[]),
             isa: Isa::detect(),
             bounds: Aabb::EMPTY,
+            cell_bounds: OnceLock::new(),
+            lowest_faces: OnceLock::new(),
         };
         asset.check_mesh()?;
         asset.check_lists()?;
@@ -156,6 +162,33 @@ impl TeSdf {
     /// Bounds of the mesh, in its unit.
     pub fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    /// Bounds of the mesh, in the local frame.
+    pub(crate) fn local_bounds(&self) -> Aabb {
+        Aabb { min: self.frame.to_local(self.bounds.min), max: self.frame.to_local(self.bounds.max) }
+    }
+
+    /// For each vertex the lowest id of a face that has it; made on first use. [`u32::MAX`] for one that no face has.
+    pub(crate) fn lowest_faces(&self) -> &[u32] {
+        self.lowest_faces.get_or_init(|| {
+            let mut lowest = vec![u32::MAX; self.vertices.len()];
+            for (corners, &id) in self.faces.iter().zip(self.face_ids.iter()) {
+                corners.iter().for_each(|&v| lowest[v as usize] = lowest[v as usize].min(id));
+            }
+            lowest
+        })
+    }
+
+    /// Width of the outer band (local frame).
+    pub(crate) fn band(&self) -> f64 {
+        let diagonal = self.bounds.extent().length();
+        self.about.options.band.resolve(diagonal) * self.frame.scale
+    }
+
+    /// The least signed distances of the cells; made on first use.
+    pub(crate) fn cell_bounds(&self) -> &CellBounds {
+        self.cell_bounds.get_or_init(|| CellBounds::new(self))
     }
 
     /// Corners of face `face` (its id in the source mesh, 0-based), in the mesh's unit.

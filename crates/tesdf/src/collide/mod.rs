@@ -6,7 +6,7 @@
 //!
 //! - [`Scene`]: shapes (an encoded mesh, a plane, a box, a sphere, a capsule), and instances of them: a pose, a
 //!   velocity, a scale, a world. An instance costs its state only.
-//! - `detect`: all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
+//! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
 //! - `clearance`: the signed distance between two instances, with witnesses.
 //! - `time_of_impact`: when two moving instances first touch, never too late.
 //! - `why`: why a contact is, or is not, there.
@@ -14,14 +14,24 @@
 //! In each contact *a* is the body whose face (or node) it is and *b* the body whose signed distance field it is; both
 //! directions of a pair are evaluated.
 mod contact;
+mod detect;
 mod error;
+mod field;
+mod instance_pairs;
+mod middle;
+mod narrow;
 mod options;
+mod polygon;
 mod pose;
 mod scene;
 mod shape;
+mod simple;
+mod surface;
 
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, Statistics};
+pub use detect::detect;
 pub use error::CollideError;
+pub use instance_pairs::{InstancePair, instance_pairs};
 pub use options::{CollideOptions, FaceMethod, Mode, Reduction};
 pub use pose::{Placement, Pose};
 pub use scene::{Groups, Instance, InstanceId, Scene, ShapeId, Velocity};

@@ -71,6 +71,22 @@ impl Cell {
         Self { corners: self.child_corners(side).map(corner), depth: self.depth + 1 }
     }
 
+    /// Barycentric coordinates in child `side` of a point with coordinates `lambda` in a cell whose refinement edge ends at
+    /// corner `k`; see [`Barycentric::descend`], of which this is the form in floating point.
+    #[inline(always)]
+    pub fn lambda_of_child(lambda: [f64; 4], k: usize, side: usize) -> [f64; 4] {
+        let [a, l1, l2, l3] = lambda;
+        let b = lambda[k];
+        let (kept, middle) = if side == 0 { (a - b, 2.0 * b) } else { (b - a, 2.0 * a) };
+        match (k, side) {
+            (3, 0) => [kept, l1, l2, middle],
+            (3, _) => [l1, l2, kept, middle],
+            (2, 0) => [kept, l1, middle, l3],
+            (2, _) => [l1, kept, middle, l3],
+            _ => [kept, middle, l2, l3],
+        }
+    }
+
     /// Mean of the corners.
     pub fn centroid(&self) -> DVec3 {
         0.25 * (self.corners[0] + self.corners[1] + self.corners[2] + self.corners[3])

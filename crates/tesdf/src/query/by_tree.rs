@@ -48,14 +48,14 @@ impl TeSdf {
         let side =
             hinted_side(record.hints(), closest.feature, height).unwrap_or_else(|| self.side_of(point));
         let on_surface = |d| (d < ON_SURFACE_F32).then(|| self.query(point, Precision::F32).gradient);
-        self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
+        self.to_answer(self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface))
     }
 
     fn by_tree_f64(&self, point: DVec3, local: DVec3) -> Answer {
         let (position, closest) = self.nearest_in_tree_f64(local);
         let side = if closest.distance > 0.0 { self.side_of(point) } else { Side::Outside };
         let on_surface = |d| (d < ON_SURFACE_F64).then(|| self.query(point, Precision::F64).gradient);
-        self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
+        self.to_answer(self.finish(local, closest, side, position, DVec3::ZERO, on_surface))
     }
 
     fn side_of(&self, point: DVec3) -> Side {

@@ -142,6 +142,62 @@ fn nearest_avx512(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best:
     nearest_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, best)
 }
 
+/// Adds to `near` those of `faces` whose squared distance is `limit` at most, without the repeated last one.
+#[inline]
+pub fn within(
+    isa: Isa,
+    records: &[FaceRecord],
+    faces: &[[u32; LANES]],
+    p: Vec3,
+    limit: f32,
+    near: &mut Vec<u32>,
+) {
+    match isa {
+        Isa::Baseline => within_lanes::<[f32; LANES], LANES>(records, faces, p, limit, near),
+        // SAFETY: `detect` found the features.
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx2 => unsafe { within_avx2(records, faces, p, limit, near) },
+        // SAFETY: as above.
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx512 => unsafe { within_avx512(records, faces, p, limit, near) },
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn within_avx2(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, limit: f32, near: &mut Vec<u32>) {
+    within_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, limit, near);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
+fn within_avx512(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, limit: f32, near: &mut Vec<u32>) {
+    within_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, limit, near);
+}
+
+#[inline(always)]
+fn within_lanes<L: Lanes<N>, const N: usize>(
+    records: &[FaceRecord],
+    faces: &[[u32; N]],
+    p: Vec3,
+    limit: f32,
+    near: &mut Vec<u32>,
+) {
+    let p = V([L::splat(p.x), L::splat(p.y), L::splat(p.z)]);
+    for faces in faces {
+        let mut rows = [&records[0].0; N];
+        for l in 0..N {
+            rows[l] = &records[faces[l] as usize].0;
+        }
+        let d = distance_squared(L::load(rows), p).to_array();
+        for l in 0..N {
+            if d[l] <= limit && near.last() != Some(&faces[l]) {
+                near.push(faces[l]);
+            }
+        }
+    }
+}
+
 #[inline(always)]
 fn nearest_lanes<L: Lanes<N>, const N: usize>(
     records: &[FaceRecord],

@@ -117,7 +117,7 @@ impl Faces {
 impl TeSdf {
     /// Finds what answers for a point of the local frame.
     #[inline]
-    pub(super) fn place(&self, local: DVec3) -> Place {
+    pub(crate) fn place(&self, local: DVec3) -> Place {
         let entries = &self.entries;
         let Some((entry, mut lambda)) = self.cube.locate(local, entries.level) else {
             return Place::NotOfDomain;

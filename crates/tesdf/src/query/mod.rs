@@ -18,13 +18,13 @@ use glam::DVec3;
 
 pub use kernel::{FaceRecord, Isa};
 pub use locate::Entries;
+pub(crate) use locate::{Faces, Place};
 pub use nearest::Reads;
 pub use ray::RayHit;
 
 use crate::TeSdf;
 use crate::asset::layout::{Label, Side};
 use crate::geometry::{Closest, Feature};
-use locate::{Faces, Place};
 use sign::hinted_side;
 
 /// What a query computes with.
@@ -65,6 +65,21 @@ impl Answer {
         closest_point: DVec3::NAN,
         face: Self::NO_FACE,
     };
+}
+
+/// An answer in the local frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found {
+    /// Distance to the nearest face, negative inside.
+    pub signed_distance: f64,
+    /// Unit gradient.
+    pub gradient: DVec3,
+    /// The nearest point of the surface.
+    pub closest_point: DVec3,
+    /// The nearest face, by its position among the asset's faces.
+    pub position: u32,
+    /// Which feature of it the nearest point is on.
+    pub feature: Feature,
 }
 
 /// Below this distance (local frame) the gradient is the normal of the closest feature.
@@ -134,18 +149,61 @@ impl TeSdf {
         })
     }
 
+    /// The faces of the list at `offset`, read once for many points.
+    pub(crate) fn with_list<R>(&self, offset: u32, f: impl FnOnce(&Faces) -> R) -> R {
+        thread_local! {
+            static FACES: RefCell<Vec<Faces>> = const { RefCell::new(Vec::new()) };
+        }
+        // Taken out, as `f` may read another list.
+        let mut faces = FACES.with_borrow_mut(Vec::pop).unwrap_or_default();
+        self.read_list(offset, &mut faces);
+        let result = f(&faces);
+        FACES.with_borrow_mut(|free| free.push(faces));
+        result
+    }
+
+    /// The answer at a point of the local frame whose place is known, in `f32`; the point is finite.
+    pub(crate) fn found_at(&self, local: DVec3, place: Place) -> Found {
+        match place {
+            Place::Listed { offset, .. } => {
+                self.with_list(offset, |faces| self.find(local, place, faces, Precision::F32))
+            }
+            _ => self.find(local, place, &Faces::default(), Precision::F32),
+        }
+    }
+
     /// `faces` are those of the place's list, if it has one.
     #[inline]
     fn answer(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Answer {
+        if local.is_finite() {
+            self.to_answer(self.find(local, place, faces, precision))
+        } else {
+            Answer::NONE
+        }
+    }
+
+    /// As [`answer`](Self::answer), in the local frame; `local` is finite.
+    #[inline]
+    pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
         match precision {
-            _ if !local.is_finite() => Answer::NONE,
             Precision::F32 => self.answer_f32(local, place, faces),
             Precision::F64 => self.answer_f64(local, place, faces),
         }
     }
 
+    /// From the local frame to the mesh's.
+    #[inline]
+    fn to_answer(&self, found: Found) -> Answer {
+        Answer {
+            signed_distance: found.signed_distance * self.frame.inverse_scale(),
+            gradient: found.gradient,
+            closest_point: self.frame.to_world(found.closest_point),
+            face: self.face_ids[found.position as usize],
+        }
+    }
+
     #[inline(always)]
-    fn answer_f32(&self, local: DVec3, place: Place, faces: &Faces) -> Answer {
+    fn answer_f32(&self, local: DVec3, place: Place, faces: &Faces) -> Found {
         let relative = local - self.cube.middle();
         let found = match place {
             Place::Listed { .. } => self.nearest_in_list_f32(faces, relative.as_vec3()),
@@ -183,7 +241,7 @@ impl TeSdf {
         self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
     }
 
-    fn answer_f64(&self, local: DVec3, place: Place, faces: &Faces) -> Answer {
+    fn answer_f64(&self, local: DVec3, place: Place, faces: &Faces) -> Found {
         let (position, closest) = match place {
             Place::Listed { .. } => self.nearest_in_list_f64(faces, local),
             _ => self.nearest_in_tree_f64(local),
@@ -191,7 +249,7 @@ impl TeSdf {
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
             Place::Listed { label: Label::Crossing(_), .. } if closest.distance > 0.0 => {
-                self.exact_side(local)
+                self.side_in_cell(local, position, &closest)
             }
             _ => Side::Outside,
         };
@@ -204,7 +262,7 @@ impl TeSdf {
         self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
     }
 
-    /// From the local frame, shifted by `origin`, to the mesh's.
+    /// Signed, and with the gradient; `origin` is that of the frame that `p` and `closest` are given in.
     #[inline]
     fn finish(
         &self,
@@ -214,15 +272,16 @@ impl TeSdf {
         position: u32,
         origin: DVec3,
         on_surface: impl Fn(f64) -> Option<DVec3>,
-    ) -> Answer {
+    ) -> Found {
         let sign = if side == Side::Inside { -1.0 } else { 1.0 };
         let gradient =
             on_surface(closest.distance).unwrap_or_else(|| (p - closest.point) * (sign / closest.distance));
-        Answer {
-            signed_distance: sign * closest.distance * self.frame.inverse_scale(),
+        Found {
+            signed_distance: sign * closest.distance,
             gradient,
-            closest_point: self.frame.to_world(closest.point + origin),
-            face: self.face_ids[position as usize],
+            closest_point: closest.point + origin,
+            position,
+            feature: closest.feature,
         }
     }
 

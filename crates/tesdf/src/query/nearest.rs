@@ -1,3 +1,5 @@
+use std::cell::RefCell;
+
 use glam::{DVec3, Vec3};
 
 use super::kernel::{self, Nearest};
@@ -23,6 +25,14 @@ impl Reads {
         self.list_entries + self.tree_faces + self.tree_nodes
     }
 }
+
+/// Twice what a distance of the `f32` kernel is off by, relative and absolute (local frame).
+///
+/// Coordinates of points up to 4 from the middle are off by 2^-22 at most, those of faces, within 1, by 2^-25; a face taken for its edges
+/// costs 3.5e-7 ([`FaceRecord`](super::FaceRecord)); a squared distance of some twenty operations 2^-20 of it, with the low bits that
+/// say the part.
+const F32_RELATIVE: f32 = 4e-6;
+const F32_ABSOLUTE: f32 = 4e-6;
 
 // A leaf of the face tree is one step of the kernel.
 const _: () = assert!(TREE_LEAF == kernel::LANES);
@@ -92,24 +102,77 @@ impl TeSdf {
     }
 
     /// The nearest face of a list, `p` in the local frame: its position, and where. Ties go to the lowest id.
+    ///
+    /// The `f32` kernel says which faces can be the nearest: those within its rounding of the least distance.
     pub(super) fn nearest_in_list_f64(&self, faces: &Faces, p: DVec3) -> (u32, Closest) {
+        thread_local! {
+            static NEAR: RefCell<Vec<u32>> = const { RefCell::new(Vec::new()) };
+        }
+        let relative = (p - self.cube.middle()).as_vec3();
+        let least = self.nearest_in_list_f32(faces, relative).distance_squared;
+        let limit = (least.sqrt() * (1.0 + F32_RELATIVE) + F32_ABSOLUTE).powi(2);
         let mut best = Best::NONE;
-        faces.ids().iter().for_each(|&face| best.try_face(self, face, p));
+        NEAR.with_borrow_mut(|near| {
+            near.clear();
+            if limit.is_finite() {
+                kernel::within(self.isa, &self.records, faces.chunks(), relative, limit, near);
+            }
+            let candidates = if near.is_empty() { faces.ids() } else { near };
+            candidates.iter().for_each(|&face| best.try_face(self, face, p));
+        });
         (best.position, best.closest)
+    }
+
+    /// Offers those faces of a list that can be nearest to a set of points within `radius` of `center`, one of them (local frame).
+    pub(crate) fn near_in_list(
+        &self,
+        faces: &Faces,
+        center: DVec3,
+        radius: f64,
+        offer: &mut impl FnMut(u32) -> f64,
+    ) {
+        let relative = (center - self.cube.middle()).as_vec3();
+        let least = self.nearest_in_list_f32(faces, relative).distance_squared.sqrt();
+        // The least distance over the ball is at most that at its centre.
+        let limit = ((least + radius as f32) * (1.0 + F32_RELATIVE) + F32_ABSOLUTE).powi(2);
+        if limit.is_finite() {
+            let mut near = Vec::with_capacity(faces.ids().len());
+            kernel::within(self.isa, &self.records, faces.chunks(), relative, limit, &mut near);
+            near.iter().for_each(|&face| {
+                offer(face);
+            });
+        } else {
+            faces.ids().iter().for_each(|&face| {
+                offer(face);
+            });
+        }
+    }
+
+    /// The same of all faces, from the face tree; `offer` answers with the least distance so far, over the ball.
+    pub(crate) fn near_in_tree(&self, center: DVec3, radius: f64, offer: &mut impl FnMut(u32) -> f64) {
+        self.walk_tree(
+            self.box_bound(center),
+            |d: f64, limit: f64| d > limit,
+            f64::INFINITY,
+            |start, count| (start..start + count).map(&mut *offer).fold(f64::INFINITY, f64::min) + radius,
+        );
+    }
+
+    /// Boxes hold their faces; the slack covers the rounding of the bound itself.
+    fn box_bound(&self, p: DVec3) -> impl Fn(&[f32]) -> f64 {
+        let relative = p - self.cube.middle();
+        move |b: &[f32]| {
+            let (low, high) = (Vec3::from_slice(b).as_dvec3(), Vec3::from_slice(&b[3..]).as_dvec3());
+            (low - relative).max(relative - high).max(DVec3::ZERO).length() * (1.0 - 1e-14)
+        }
     }
 
     /// The nearest of all faces, likewise.
     pub(super) fn nearest_in_tree_f64(&self, p: DVec3) -> (u32, Closest) {
         let mut best = Best::NONE;
-        let relative = p - self.cube.middle();
-        // Boxes hold their faces; the slack covers the rounding of the bound itself.
-        let bound = |b: &[f32]| {
-            let (low, high) = (Vec3::from_slice(b).as_dvec3(), Vec3::from_slice(&b[3..]).as_dvec3());
-            (low - relative).max(relative - high).max(DVec3::ZERO).length() * (1.0 - 1e-14)
-        };
         // Faces at the same distance are looked at too: the lowest id wins.
         self.walk_tree(
-            bound,
+            self.box_bound(p),
             |d: f64, limit: f64| d > limit,
             f64::INFINITY,
             |start, count| {

@@ -1,9 +1,10 @@
 use glam::DVec3;
 
+use super::ON_SURFACE_F32;
 use super::locate::Faces;
 use crate::TeSdf;
 use crate::asset::layout::{Label, Side, SignHint, SignHints};
-use crate::geometry::{Feature, signed_crossing};
+use crate::geometry::{Closest, Feature, signed_crossing};
 
 /// The side that the closest feature tells, where it tells one. `height` is that of the point over the face.
 #[inline]
@@ -22,6 +23,19 @@ pub fn hinted_side(hints: SignHints, feature: Feature, height: f64) -> Option<Si
 }
 
 impl TeSdf {
+    /// The side of a point of a crossing cell, whose nearest face is known in `f64`: by the hint where the distance is more
+    /// than rounding can be about which feature is the nearest, else by winding number.
+    #[inline]
+    pub(super) fn side_in_cell(&self, local: DVec3, position: u32, closest: &Closest) -> Side {
+        if closest.distance < ON_SURFACE_F32 {
+            return self.exact_side(local);
+        }
+        let triangle = self.local_triangle(position as usize);
+        let height = triangle.normal.dot(local - triangle.corners[0]);
+        hinted_side(self.records[position as usize].hints(), closest.feature, height)
+            .unwrap_or_else(|| self.exact_side(local))
+    }
+
     /// The side by winding number, exact.
     #[cold]
     pub(super) fn exact_side(&self, local: DVec3) -> Side {

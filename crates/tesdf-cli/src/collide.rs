@@ -1,0 +1,185 @@
+//! `tesdf collide A.tesdf B.tesdf`
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use tesdf::collide::{
+    CollideOptions, Contact, Contacts, FaceMethod, Instance, InstanceId, Mode, Pose, Reduction, Scene, detect,
+};
+use tesdf::encode::Length;
+
+use crate::report::{self, Failure, Outcome, count};
+use crate::{asset_file, parse};
+
+/// Two placed bodies: arguments that several commands share.
+#[derive(clap::Args, Debug)]
+pub struct Bodies {
+    /// The .tesdf file of instance 0
+    pub a: PathBuf,
+    /// The .tesdf file of instance 1
+    pub b: PathBuf,
+    /// Where A is, body to world: translation, then the unit quaternion x y z w
+    #[arg(long, value_name = "\"tx ty tz qx qy qz qw\"", value_parser = parse::pose, allow_hyphen_values = true, default_value = "0 0 0 0 0 0 1", hide_default_value = true)]
+    pub pose_a: Pose,
+    /// Where B is
+    #[arg(long, value_name = "\"tx ty tz qx qy qz qw\"", value_parser = parse::pose, allow_hyphen_values = true, default_value = "0 0 0 0 0 0 1", hide_default_value = true)]
+    pub pose_b: Pose,
+}
+
+impl Bodies {
+    /// A scene of the two, and their ids.
+    ///
+    /// # Errors
+    /// A file that cannot be opened.
+    pub fn scene(&self) -> Result<(Scene, [InstanceId; 2]), Failure> {
+        let mut scene = Scene::new();
+        let mut add = |file: &Path, pose: Pose| {
+            let shape = scene.add_shape(asset_file::open(file)?).map_err(Failure::new)?;
+            scene.add(Instance::new(shape, pose)).map_err(Failure::new)
+        };
+        let ids = [add(&self.a, self.pose_a)?, add(&self.b, self.pose_b)?];
+        Ok((scene, ids))
+    }
+}
+
+/// What is tested against the other body's field.
+#[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModeName {
+    /// The vertices
+    Node,
+    /// The faces, by Frank-Wolfe iterations
+    Face,
+    /// The faces, the exact minimum
+    Exact,
+}
+
+/// Arguments of `tesdf collide`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// The bodies.
+    #[command(flatten)]
+    pub bodies: Bodies,
+    /// What is tested against the other body's field
+    #[arg(long, value_enum, default_value_t = ModeName::Exact)]
+    pub mode: ModeName,
+    /// Contacts are reported up to this signed distance, in the meshes' unit
+    #[arg(long, value_name = "D", value_parser = parse::length, default_value_t = 0.0, allow_hyphen_values = true)]
+    pub contact_distance: f64,
+    /// Drop contacts of faces whose normal meets the field's gradient at less than this, or `off`
+    #[arg(long, value_name = "C|off", value_parser = cosine, default_value = "off", allow_hyphen_values = true)]
+    pub cos_theta: Cosine,
+    /// Frank-Wolfe iterations of the mode `face`
+    #[arg(long, value_name = "K", default_value_t = 16)]
+    pub iterations: u32,
+    /// Bound on the error of the mode `exact`, in the meshes' unit [default: 1e-7 of the diagonal of the field's body]
+    #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true)]
+    pub tolerance: Option<f64>,
+    /// Most contacts to keep of the pair, or `none` to keep all
+    #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
+    pub reduce: Reduction,
+    /// Print the contacts as a JSON array
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The cosine filter's threshold, if it is on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cosine(pub Option<f64>);
+
+fn cosine(text: &str) -> Result<Cosine, String> {
+    match text {
+        "off" => Ok(Cosine(None)),
+        _ => parse::number(text)
+            .map(|c| Cosine(Some(c)))
+            .map_err(|e| format!("{e}; expected a cosine, or off")),
+    }
+}
+
+fn reduction(text: &str) -> Result<Reduction, String> {
+    match text {
+        "none" => Ok(Reduction::None),
+        _ => text
+            .parse()
+            .map(Reduction::PerPair)
+            .map_err(|_| format!("{text}: expected a number of contacts, or none")),
+    }
+}
+
+impl Args {
+    fn options(&self) -> CollideOptions {
+        let tolerance = self.tolerance.map_or(Length::OfDiagonal(1e-7), Length::Absolute);
+        let mode = match self.mode {
+            ModeName::Node => Mode::Node,
+            ModeName::Face => Mode::Face(FaceMethod::FrankWolfe { iterations: self.iterations }),
+            ModeName::Exact => Mode::Face(FaceMethod::Exact { tolerance }),
+        };
+        CollideOptions {
+            mode,
+            contact_distance: self.contact_distance,
+            cos_theta: self.cos_theta.0,
+            reduction: self.reduce,
+            ..CollideOptions::default()
+        }
+    }
+}
+
+/// Prints the contacts of two bodies.
+///
+/// # Errors
+/// A file that cannot be opened, an option out of range, or stdout cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let options = args.options();
+    options.validate().map_err(Failure::new)?;
+    let (scene, _) = args.bodies.scene()?;
+    let found = detect(&scene, &options).map_err(Failure::new)?;
+    if args.json {
+        report::json(&found.contacts)?;
+    } else {
+        report::result(text(&found).as_bytes())?;
+    }
+    Ok(Outcome::Good)
+}
+
+/// Contacts that are shown to people.
+const SHOWN: usize = 10;
+
+fn text(found: &Contacts) -> String {
+    let s = &found.statistics;
+    let mut text = format!(
+        "{} of {} against {}\n",
+        count(found.contacts.len(), "contact"),
+        count(s.candidates, "candidate"),
+        count(s.polygons, "cell")
+    );
+    if s.filtered + s.reduced > 0 {
+        let _ = writeln!(text, "{} dropped by the cosine filter, {} by the reduction", s.filtered, s.reduced);
+    }
+    if s.unconverged > 0 {
+        let _ = writeln!(text, "{} not within the tolerance", count(s.unconverged, "contact"));
+    }
+    let mut deepest: Vec<&Contact> = found.contacts.iter().collect();
+    deepest.sort_by(|x, y| x.distance.total_cmp(&y.distance));
+    if !deepest.is_empty() {
+        text += "deepest first: distance, face of a, face of b, point on a, normal from b to a\n";
+    }
+    for c in deepest.iter().take(SHOWN) {
+        let point = |p: tesdf::glam::DVec3| format!("{:.6e} {:.6e} {:.6e}", p.x, p.y, p.z);
+        let _ = writeln!(
+            text,
+            "{:>13.6e}  {}:{:<7} {}:{:<7} ({})  ({:.4} {:.4} {:.4})",
+            c.distance,
+            c.instance_a,
+            c.face_a,
+            c.instance_b,
+            c.face_b,
+            point(c.point_a),
+            c.normal.x,
+            c.normal.y,
+            c.normal.z
+        );
+    }
+    if deepest.len() > SHOWN {
+        let _ = writeln!(text, "and {} more; --json prints all", deepest.len() - SHOWN);
+    }
+    text
+}

@@ -1,0 +1,131 @@
+//! Narrow phase: the least signed distance over a node or a clipped polygon, and where.
+mod exact;
+mod frank_wolfe;
+
+use glam::DVec3;
+
+use super::field::{CellField, Field, FieldBody, FieldValue, ROUNDING};
+use super::middle::{self, ClippedPolygon};
+use super::polygon::Polygon;
+use super::surface::Part;
+use super::{CollideOptions, FaceMethod, Mode};
+use crate::query::{Faces, Place, Precision};
+
+/// The least signed distance of a part in one cell, in the field's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Minimum {
+    /// Where it is: a point of the part.
+    pub point: DVec3,
+    /// The field there.
+    pub value: FieldValue,
+    /// The cell's word; `None` where the face tree or a formula answered.
+    pub cell: Option<u32>,
+    /// Whether it is within the tolerance.
+    pub converged: bool,
+}
+
+/// What a search over one polygon gives: a point of it, and whether no other is lower by more than the tolerance.
+struct Lowest {
+    point: DVec3,
+    converged: bool,
+}
+
+/// How a detection looks for minima of one field; lengths in its frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    mode: Mode,
+    /// Signed distances above this are not looked for.
+    pub reach: f64,
+    tolerance: f64,
+    precision: Precision,
+}
+
+/// Tolerances from this on are searched in `f32`, whose rounding is then small against them.
+const COARSE: f64 = 20.0 * ROUNDING;
+
+impl Search {
+    /// `reach` is the contact distance, in the world's unit.
+    pub fn new(options: &CollideOptions, reach: f64, field: &FieldBody, diagonal: f64) -> Self {
+        let unit = field.unit();
+        let tolerance = match options.mode {
+            Mode::Face(FaceMethod::Exact { tolerance }) => tolerance.resolve(diagonal) / unit,
+            _ => 0.0,
+        };
+        Self { mode: options.mode, reach: reach / unit, tolerance, precision: options.precision }
+    }
+
+    /// The same search up to another signed distance (field's frame).
+    pub fn within(self, reach: f64) -> Self {
+        Self { reach, ..self }
+    }
+
+    /// The minima of a part, cell by cell, that are within reach; also tells every polygon.
+    pub fn minima(
+        &self,
+        field: &FieldBody,
+        part: &Part,
+        polygon: &mut impl FnMut(&ClippedPolygon),
+        found: &mut impl FnMut(&ClippedPolygon, Minimum),
+    ) {
+        let reach = self.reach + part.radius;
+        match field.field {
+            Field::Mesh(asset) => {
+                middle::clip(asset, &Polygon::new(part.points()), reach, &mut |clipped| {
+                    polygon(clipped);
+                    let mut look = |faces: &Faces| {
+                        let cell = CellField::Mesh { asset, place: clipped.place, faces };
+                        if let Some(minimum) = self.in_cell(&cell, clipped, part, reach) {
+                            found(clipped, minimum);
+                        }
+                    };
+                    match clipped.place {
+                        Place::Listed { offset, .. } => asset.with_list(offset, |faces| look(faces)),
+                        _ => look(&Faces::default()),
+                    }
+                });
+            }
+            Field::Simple(simple) => {
+                let whole = ClippedPolygon {
+                    polygon: Polygon::new(part.points()),
+                    place: Place::NotOfDomain,
+                    cell: None,
+                };
+                polygon(&whole);
+                if let Some(minimum) = self.in_cell(&CellField::Simple(simple), &whole, part, reach) {
+                    found(&whole, minimum);
+                }
+            }
+        }
+    }
+
+    fn in_cell(
+        &self,
+        cell: &CellField,
+        clipped: &ClippedPolygon,
+        part: &Part,
+        reach: f64,
+    ) -> Option<Minimum> {
+        let polygon = &clipped.polygon;
+        let lowest = match self.mode {
+            _ if polygon.vertices().len() == 1 => {
+                Some(Lowest { point: polygon.vertices()[0].point, converged: true })
+            }
+            Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true }),
+            Mode::Face(FaceMethod::FrankWolfe { iterations }) => {
+                frank_wolfe::lowest(cell, polygon, iterations, reach)
+            }
+            Mode::Face(FaceMethod::Exact { .. }) => {
+                let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
+                exact::lowest(cell, polygon, part.normal, self.tolerance, reach, precision)
+            }
+        }?;
+        let value = cell.value(lowest.point, self.precision);
+        let listed = matches!(clipped.place, Place::Listed { .. });
+        (value.distance <= reach).then_some(Minimum {
+            point: lowest.point,
+            value,
+            cell: clipped.cell.filter(|_| listed),
+            converged: lowest.converged,
+        })
+    }
+}

@@ -1,0 +1,174 @@
+//! Planes, boxes, spheres and capsules: their fields by formula, and what is tested of them as surfaces.
+use glam::DVec3;
+
+use super::Shape;
+use super::field::FieldValue;
+use crate::geometry::Feature;
+
+/// A convex shape whose signed distance is a formula. All of the fields are convex functions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Simple {
+    /// z ≤ 0.
+    Plane,
+    /// Half extents.
+    Box(DVec3),
+    /// All within the radius of the segment between ± the half height on the z axis; a sphere when that is 0.
+    Round {
+        /// Half of the segment's length.
+        half_height: f64,
+        /// Radius.
+        radius: f64,
+    },
+}
+
+impl Simple {
+    /// Of any shape but a mesh, which has no formula and is taken for a point.
+    pub fn new(shape: &Shape) -> Self {
+        match *shape {
+            Shape::Plane => Self::Plane,
+            Shape::Box { half_extents } => Self::Box(half_extents),
+            Shape::Sphere { radius } => Self::Round { half_height: 0.0, radius },
+            Shape::Capsule { half_height, radius } => Self::Round { half_height, radius },
+            Shape::Mesh(_) => Self::Round { half_height: 0.0, radius: 0.0 },
+        }
+    }
+
+    /// Signed distance, gradient, nearest point; a box numbers its sides −x +x −y +y −z +z.
+    pub fn value(&self, p: DVec3) -> FieldValue {
+        let (distance, gradient, closest_point, position) = match *self {
+            Self::Plane => (p.z, DVec3::Z, p.with_z(0.0), 0),
+            Self::Box(half) => box_value(p, half),
+            Self::Round { half_height, radius } => {
+                let core = DVec3::new(0.0, 0.0, p.z.clamp(-half_height, half_height));
+                let from_core = p - core;
+                let length = from_core.length();
+                // On the core itself every direction across it is as good.
+                let gradient = if length > 0.0 { from_core / length } else { DVec3::X };
+                (length - radius, gradient, core + radius * gradient, 0)
+            }
+        };
+        FieldValue { distance, gradient, closest_point, position, feature: Feature::Face }
+    }
+
+    /// What is tested of the shape as a surface: parts, each within `radius` of a convex polygon of up to three points.
+    ///
+    /// A box has twelve triangles, two to a side in the order of [`value`](Self::value), a sphere its centre, a capsule its
+    /// segment. A plane has no corners; see [`plane_square`].
+    pub fn parts(&self) -> (Vec<Vec<DVec3>>, f64) {
+        match *self {
+            Self::Plane => (Vec::new(), 0.0),
+            Self::Box(half) => (box_triangles(half), 0.0),
+            Self::Round { half_height, radius } if half_height == 0.0 => (vec![vec![DVec3::ZERO]], radius),
+            Self::Round { half_height, radius } => {
+                (vec![vec![DVec3::new(0.0, 0.0, -half_height), DVec3::new(0.0, 0.0, half_height)]], radius)
+            }
+        }
+    }
+
+    /// The nodes among the parts' points, each with the lowest part that has it.
+    pub fn nodes(&self) -> (Vec<(DVec3, u32)>, f64) {
+        let (parts, radius) = self.parts();
+        let mut nodes: Vec<(DVec3, u32)> = Vec::new();
+        for (part, points) in parts.iter().enumerate() {
+            for &p in points {
+                if nodes.iter().all(|(q, _)| *q != p) {
+                    nodes.push((p, part as u32));
+                }
+            }
+        }
+        (nodes, radius)
+    }
+}
+
+fn box_value(p: DVec3, half: DVec3) -> (f64, DVec3, DVec3, u32) {
+    let clamped = p.clamp(-half, half);
+    let sign = DVec3::from_array(p.to_array().map(|x| if x < 0.0 { -1.0 } else { 1.0 }));
+    // The side that is the nearest, or that the point is most outside of.
+    let depth = half - p.abs();
+    let axis = (0..3).min_by(|&i, &j| depth[i].total_cmp(&depth[j])).unwrap_or(0);
+    let side = 2 * axis as u32 + u32::from(sign[axis] > 0.0);
+    let outward = p - clamped;
+    if outward != DVec3::ZERO {
+        let length = outward.length();
+        return (length, outward / length, clamped, side);
+    }
+    let mut gradient = DVec3::ZERO;
+    gradient[axis] = sign[axis];
+    let mut closest = p;
+    closest[axis] = sign[axis] * half[axis];
+    (-depth[axis], gradient, closest, side)
+}
+
+fn box_triangles(half: DVec3) -> Vec<Vec<DVec3>> {
+    let mut triangles = Vec::with_capacity(12);
+    for axis in 0..3 {
+        for sign in [-1.0, 1.0] {
+            let corner = |u: f64, v: f64| {
+                let mut p = DVec3::ZERO;
+                p[axis] = sign * half[axis];
+                p[(axis + 1) % 3] = u * half[(axis + 1) % 3];
+                p[(axis + 2) % 3] = sign * v * half[(axis + 2) % 3];
+                p
+            };
+            let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+            triangles.push(vec![a, b, c]);
+            triangles.push(vec![a, c, d]);
+        }
+    }
+    triangles
+}
+
+/// The square of the plane z = 0 that holds all of its points within `radius` of `center`, as two triangles.
+pub fn plane_square(center: DVec3, radius: f64) -> [[DVec3; 3]; 2] {
+    let corner = |u: f64, v: f64| DVec3::new(center.x + u * radius, center.y + v * radius, 0.0);
+    let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    [[a, b, c], [a, c, d]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Triangle;
+
+    #[test]
+    fn a_box_is_its_triangles() {
+        let half = DVec3::new(1.0, 2.0, 3.0);
+        let simple = Simple::Box(half);
+        let triangles: Vec<Triangle> =
+            simple.parts().0.iter().map(|t| Triangle::new([t[0], t[1], t[2]])).collect();
+        for (side, t) in triangles.iter().enumerate() {
+            let axis = side / 4;
+            let outward = if side % 4 < 2 { -1.0 } else { 1.0 };
+            assert_eq!(t.normal[axis], outward, "triangle {side} faces outward");
+        }
+        for i in 0..1000u32 {
+            let p = DVec3::new((i % 10) as f64, (i / 10 % 10) as f64, (i / 100) as f64) - 4.6;
+            let value = simple.value(p);
+            let least = triangles.iter().map(|t| t.closest(p).distance).fold(f64::INFINITY, f64::min);
+            assert!((value.distance.abs() - least).abs() < 1e-12);
+            assert_eq!(value.distance < 0.0, p.abs().cmplt(half).all());
+            let side = value.position as usize;
+            let on_side = triangles[2 * side..2 * side + 2]
+                .iter()
+                .any(|t| t.closest(value.closest_point).distance < 1e-12);
+            assert!(on_side, "{p} {value:?}");
+            let step = 1e-6;
+            let ahead = simple.value(p + step * value.gradient).distance;
+            assert!((ahead - value.distance - step).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_capsule_without_height_is_a_sphere() {
+        let (sphere, capsule) = (
+            Simple::Round { half_height: 0.0, radius: 2.0 },
+            Simple::Round { half_height: 1.0, radius: 2.0 },
+        );
+        let p = DVec3::new(3.0, 0.0, 0.5);
+        assert_eq!(capsule.value(p).distance, 1.0);
+        assert!((sphere.value(p).distance - (9.25f64.sqrt() - 2.0)).abs() < 1e-15);
+        assert_eq!(sphere.value(DVec3::ZERO).distance, -2.0);
+        assert_eq!(capsule.nodes().0.len(), 2);
+        assert_eq!(Simple::Box(DVec3::ONE).nodes().0.len(), 8);
+    }
+}

@@ -1,0 +1,207 @@
+//! The body whose surface is tested, and the broad phase: which of its faces or nodes can touch a field.
+use glam::{DMat3, DVec3, Vec3};
+
+use super::field::{Field, FieldBody};
+use super::simple::{Simple, plane_square};
+use super::{Placement, Shape};
+use crate::TeSdf;
+use crate::asset::layout::TreeChild;
+use crate::geometry::Aabb;
+
+/// A surface placed in the world, seen from the frame of a field.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceBody<'a> {
+    shape: &'a Shape,
+    /// Field = `linear` · p + `shift`, of points p of the shape's frame.
+    linear: DMat3,
+    shift: DVec3,
+    /// Field units per unit of the shape.
+    scale: f64,
+    placement: Placement,
+}
+
+/// What the broad phase left of a surface: faces or nodes that can touch, in order.
+pub type Candidates = Vec<u32>;
+
+/// A face, or the core of a rounded shape, in the field's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Part {
+    points: [DVec3; 3],
+    count: usize,
+    /// The surface is all within this of the part.
+    pub radius: f64,
+    /// Unit normal; zero for what is rounded or has no area.
+    pub normal: DVec3,
+}
+
+impl Part {
+    fn new(points: &[DVec3], radius: f64) -> Self {
+        let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal: DVec3::ZERO };
+        part.points[..points.len()].copy_from_slice(points);
+        if let [a, b, c] = *points {
+            part.normal = (b - a).cross(c - a).normalize_or_zero();
+        }
+        part
+    }
+
+    /// One to three points.
+    pub fn points(&self) -> &[DVec3] {
+        &self.points[..self.count]
+    }
+
+    /// A ball around the part's core: the middle of its box, and the reach from there.
+    pub fn ball(&self) -> (DVec3, f64) {
+        let center = Aabb::of(self.points()).center();
+        (center, self.points().iter().map(|p| p.distance(center)).fold(0.0, f64::max))
+    }
+}
+
+impl<'a> SurfaceBody<'a> {
+    /// A shape at `placement`, as the field's frame sees it.
+    pub fn new(shape: &'a Shape, placement: Placement, field: &FieldBody) -> Self {
+        // The images of the origin and the axes: the map is affine.
+        let shift = field.to_field(placement.to_world(DVec3::ZERO));
+        let unit = placement.scale / field.unit();
+        let turn = |axis: DVec3| field.turn_back(placement.pose.rotation * axis) * unit;
+        let linear = DMat3::from_cols(turn(DVec3::X), turn(DVec3::Y), turn(DVec3::Z));
+        Self { shape, linear, shift, scale: unit, placement }
+    }
+
+    /// From the shape's frame to the field's.
+    #[inline]
+    pub fn to_field(&self, p: DVec3) -> DVec3 {
+        self.linear * p + self.shift
+    }
+
+    /// Faces that can come within `reach` (field's frame) of the solid; all numbers of a simple shape's parts.
+    pub fn faces(&self, field: &FieldBody, reach: f64) -> Candidates {
+        let mut faces = Vec::new();
+        match self.shape {
+            Shape::Mesh(asset) => {
+                self.visit_leaves(asset, field, reach, |start, count| faces.extend(start..start + count));
+            }
+            Shape::Plane => faces.extend(0..2),
+            simple => faces.extend(0..Simple::new(simple).parts().0.len() as u32),
+        }
+        faces.retain(|&face| {
+            let part = self.face(face, field, reach);
+            let (center, ball) = part.ball();
+            !field.is_beyond(center, ball, reach + part.radius)
+        });
+        faces
+    }
+
+    /// Nodes that can, by vertex number: those of the faces that can.
+    pub fn nodes(&self, field: &FieldBody, reach: f64) -> Candidates {
+        let Shape::Mesh(asset) = self.shape else {
+            return (0..Simple::new(self.shape).nodes().0.len() as u32).collect();
+        };
+        let mut nodes = Vec::new();
+        self.visit_leaves(asset, field, reach, |start, count| {
+            nodes.extend(asset.faces[start as usize..(start + count) as usize].as_flattened());
+        });
+        nodes.sort_unstable();
+        nodes.dedup();
+        nodes
+    }
+
+    /// A candidate face.
+    pub fn face(&self, face: u32, field: &FieldBody, reach: f64) -> Part {
+        match self.shape {
+            Shape::Mesh(asset) => {
+                Part::new(&asset.face_corners(face as usize).map(|p| self.to_field(p)), 0.0)
+            }
+            Shape::Plane => {
+                // Only what is over or under the field's body matters.
+                let (center, radius) = field.ball();
+                let center = self.linear.transpose() * (center - self.shift) / (self.scale * self.scale);
+                let square = plane_square(center, (radius + reach) / self.scale);
+                Part::new(&square[face as usize % 2].map(|p| self.to_field(p)), 0.0)
+            }
+            simple => {
+                let (parts, radius) = Simple::new(simple).parts();
+                let points: Vec<DVec3> = parts[face as usize].iter().map(|&p| self.to_field(p)).collect();
+                Part::new(&points, radius * self.scale)
+            }
+        }
+    }
+
+    /// A candidate node as a part of one point.
+    pub fn node(&self, node: u32) -> Part {
+        match self.shape {
+            Shape::Mesh(asset) => {
+                Part::new(&[self.to_field(DVec3::from_array(asset.vertices[node as usize]))], 0.0)
+            }
+            simple => {
+                let (nodes, radius) = Simple::new(simple).nodes();
+                Part::new(&[self.to_field(nodes[node as usize].0)], radius * self.scale)
+            }
+        }
+    }
+
+    /// The user's number of a face.
+    pub fn face_id(&self, face: u32) -> u32 {
+        match self.shape {
+            Shape::Mesh(asset) => asset.face_ids[face as usize],
+            Shape::Plane => 0,
+            _ => face,
+        }
+    }
+
+    /// The user's number of the lowest face that has a node.
+    pub fn face_of_node(&self, node: u32) -> u32 {
+        match self.shape {
+            Shape::Mesh(asset) => asset.lowest_faces()[node as usize],
+            simple => Simple::new(simple).nodes().0[node as usize].1,
+        }
+    }
+
+    /// Where it is in the world.
+    pub fn placement(&self) -> Placement {
+        self.placement
+    }
+
+    /// The leaves of the face tree that can come within `reach` of the solid: a node is left out when the ball around its box
+    /// is out of the field's reach (the field is 1-Lipschitz).
+    fn visit_leaves(&self, asset: &TeSdf, field: &FieldBody, reach: f64, mut leaf: impl FnMut(u32, u32)) {
+        let unit = asset.frame.inverse_scale();
+        let middle = asset.cube.middle();
+        let mut stack = vec![TreeChild::Node(0)];
+        while let Some(child) = stack.pop() {
+            let node = match child {
+                TreeChild::Leaf(start, count) => {
+                    leaf(start, count);
+                    continue;
+                }
+                TreeChild::Node(node) => node as usize,
+            };
+            let children = asset.tree_children[node].map(TreeChild::decode);
+            let (boxes, _) = asset.tree_boxes[node].as_chunks::<6>();
+            // The first child comes out first.
+            for side in [1, 0] {
+                let low = Vec3::from_slice(&boxes[side]).as_dvec3();
+                let high = Vec3::from_slice(&boxes[side][3..]).as_dvec3();
+                let center = self.to_field(asset.frame.to_world(0.5 * (low + high) + middle));
+                let radius = 0.5 * (high - low).length() * unit * self.scale;
+                if !field.is_beyond(center, radius, reach) {
+                    stack.push(children[side]);
+                }
+            }
+        }
+    }
+}
+
+impl FieldBody<'_> {
+    /// A ball around the body, in the field's frame; endless for a plane.
+    fn ball(&self) -> (DVec3, f64) {
+        let bounds = match self.field {
+            Field::Mesh(asset) => asset.local_bounds(),
+            Field::Simple(Simple::Box(half)) => Aabb { min: -half, max: half },
+            Field::Simple(Simple::Round { half_height, radius }) => {
+                return (DVec3::ZERO, half_height + radius);
+            }
+            Field::Simple(Simple::Plane) => return (DVec3::ZERO, f64::INFINITY),
+        };
+        (bounds.center(), 0.5 * bounds.extent().length())
+    }
+}

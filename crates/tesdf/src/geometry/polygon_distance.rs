@@ -1,0 +1,157 @@
+use glam::DVec3;
+
+use super::Triangle;
+
+/// The least distance between a convex plane polygon and a triangle, and where on the polygon.
+///
+/// `points` go around the polygon; one or two are a point or a segment. `normal` is the polygon's unit normal, or zero when it
+/// has no area. Candidates are pairs of real points, so the distance is never too small by more than rounding; they are all that
+/// can be nearest: a corner and a face, two edges, an edge through a face.
+///
+/// ```
+/// use tesdf::geometry::{Triangle, polygon_to_triangle};
+/// use tesdf::glam::DVec3;
+///
+/// let t = Triangle::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
+/// let square = [(0., 0.), (1., 0.), (1., 1.), (0., 1.)].map(|(x, y)| DVec3::new(x, y, 2.0 + x));
+/// let normal = DVec3::new(-1.0, 0.0, 1.0).normalize();
+/// let (distance, at) = polygon_to_triangle(&square, normal, &t);
+/// assert_eq!((distance, at.x), (2.0, 0.0));
+/// ```
+pub fn polygon_to_triangle(points: &[DVec3], normal: DVec3, triangle: &Triangle) -> (f64, DVec3) {
+    let mut best = Least { squared: f64::INFINITY, at: DVec3::NAN };
+    let corners = &triangle.corners;
+    let edges = || {
+        let n = points.len();
+        (0..if n < 3 { n - 1 } else { n })
+            .map(move |i| (points[i], points[if i + 1 == n { 0 } else { i + 1 }]))
+    };
+    for &p in points {
+        best.offer(p, triangle.closest(p).point);
+    }
+    for (p, q) in edges() {
+        for k in 0..3 {
+            let (on_edge, on_triangle) = between_segments(p, q, corners[k], corners[(k + 1) % 3]);
+            best.offer(on_edge, on_triangle);
+        }
+        if let Some(x) = crossing(p, q, corners[0], triangle.normal) {
+            best.offer(x, triangle.closest(x).point);
+        }
+    }
+    if points.len() > 2 && normal != DVec3::ZERO {
+        for &c in corners {
+            let x = c - normal * normal.dot(c - points[0]);
+            if holds(points, normal, x) {
+                best.offer(x, c);
+            }
+        }
+        for k in 0..3 {
+            if let Some(x) = crossing(corners[k], corners[(k + 1) % 3], points[0], normal)
+                && holds(points, normal, x)
+            {
+                best.offer(x, x);
+            }
+        }
+    }
+    (best.squared.sqrt(), best.at)
+}
+
+struct Least {
+    squared: f64,
+    at: DVec3,
+}
+
+impl Least {
+    #[inline]
+    fn offer(&mut self, on_polygon: DVec3, on_triangle: DVec3) {
+        let squared = on_polygon.distance_squared(on_triangle);
+        if squared < self.squared {
+            *self = Self { squared, at: on_polygon };
+        }
+    }
+}
+
+/// Where the segment goes through the plane, if its ends lie on different sides of it.
+#[inline]
+fn crossing(p: DVec3, q: DVec3, on_plane: DVec3, normal: DVec3) -> Option<DVec3> {
+    let (h, k) = (normal.dot(p - on_plane), normal.dot(q - on_plane));
+    (h * k < 0.0).then(|| p + (h / (h - k)) * (q - p))
+}
+
+/// Whether a point of the polygon's plane lies in it.
+#[inline]
+fn holds(points: &[DVec3], normal: DVec3, x: DVec3) -> bool {
+    let n = points.len();
+    let side = |i: usize| {
+        let (p, q) = (points[i], points[if i + 1 == n { 0 } else { i + 1 }]);
+        (q - p).cross(x - p).dot(normal)
+    };
+    // Either way around: a clipped face keeps its sense, a polygon of the user may have the other.
+    (0..n).all(|i| side(i) >= 0.0) || (0..n).all(|i| side(i) <= 0.0)
+}
+
+/// The nearest points of two segments (Ericson 2005, *Real-Time Collision Detection*, 5.1.9).
+#[inline]
+fn between_segments(p: DVec3, q: DVec3, r: DVec3, s: DVec3) -> (DVec3, DVec3) {
+    let (u, v, w) = (q - p, s - r, p - r);
+    let (a, e, f) = (u.length_squared(), v.length_squared(), v.dot(w));
+    let share = |x: f64, of: f64| if of > 0.0 { (x / of).clamp(0.0, 1.0) } else { 0.0 };
+    let (b, c) = (u.dot(v), u.dot(w));
+    let denominator = a * e - b * b;
+    // Parallel segments: any start will do, as the end is fitted to it and it to the end.
+    let start = if denominator > 0.0 { share(b * f - c * e, denominator) } else { 0.0 };
+    let t = share(b * start + f, e);
+    let start = share(b * t - c, a);
+    (p + start * u, r + t * v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sampled(points: &[DVec3], triangle: &Triangle) -> f64 {
+        let n = 60;
+        let mut least = f64::INFINITY;
+        for k in 1..points.len() - 1 {
+            for i in 0..=n {
+                for j in 0..=n - i {
+                    let (s, t) = (i as f64 / n as f64, j as f64 / n as f64);
+                    let p = points[0] + s * (points[k] - points[0]) + t * (points[k + 1] - points[0]);
+                    least = least.min(triangle.closest(p).distance);
+                }
+            }
+        }
+        least
+    }
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        (-1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+    }
+
+    proptest! {
+        #[test]
+        fn no_sample_is_nearer(t in [point(), point(), point()], o in point(), u in point(), v in point()) {
+            let triangle = Triangle::new(t);
+            // A parallelogram.
+            let points = [o, o + 0.5 * u, o + 0.5 * (u + v), o + 0.5 * v];
+            let normal = u.cross(v).normalize_or_zero();
+            let (distance, at) = polygon_to_triangle(&points, normal, &triangle);
+            let sampled = sampled(&points, &triangle);
+            prop_assert!(distance <= sampled + 1e-12, "{distance} {sampled}");
+            prop_assert!(sampled <= distance + 0.04, "{distance} {sampled}");
+            prop_assert!((triangle.closest(at).distance - distance).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn crossing_polygons_touch() {
+        let triangle = Triangle::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
+        let points = [DVec3::new(0.2, 0.2, -1.0), DVec3::new(0.2, 0.2, 1.0), DVec3::new(0.3, 0.2, 1.0)];
+        let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize();
+        assert!(polygon_to_triangle(&points, normal, &triangle).0 < 1e-16);
+        let segment = &points[..2];
+        assert!(polygon_to_triangle(segment, DVec3::ZERO, &triangle).0 < 1e-16);
+        assert_eq!(polygon_to_triangle(&points[..1], DVec3::ZERO, &triangle).0, 1.0);
+    }
+}
