@@ -52,11 +52,6 @@ impl CellBounds {
         let step = f64::from(self.bytes[word as usize]);
         step * step * self.unit
     }
-
-    /// Size in bytes.
-    pub fn bytes(&self) -> usize {
-        self.bytes.len()
-    }
 }
 
 /// What rounding may have added to a bound: that of `f32`, and its conversion.

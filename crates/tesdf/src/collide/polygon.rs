@@ -1,3 +1,4 @@
+use arrayvec::ArrayVec;
 use glam::DVec3;
 
 /// Most vertices of a polygon: a triangle clipped by a tetrahedron has seven; the rest is room for those that rounding
@@ -23,43 +24,43 @@ impl Vertex {
 }
 
 /// A convex polygon: a face, a segment or a point, clipped by a cell.
-#[derive(Clone, Copy, Debug)]
-pub struct Polygon {
-    vertices: [Vertex; MOST_VERTICES],
-    count: usize,
+#[derive(Clone, Debug, Default)]
+pub struct Polygon(ArrayVec<Vertex, MOST_VERTICES>);
+
+/// Where a polygon lies, seen from a plane.
+pub enum Parts {
+    /// Above, or in the plane.
+    Above,
+    /// Below; a part of it may be in the plane.
+    Below,
+    /// On both sides: the part above and the part below.
+    Across(Polygon, Polygon),
 }
 
 impl Polygon {
     /// From one to [`MOST_VERTICES`] vertices.
     pub fn new(points: &[DVec3]) -> Self {
-        let mut polygon = Self { vertices: [Vertex::default(); MOST_VERTICES], count: 0 };
-        points.iter().for_each(|&point| polygon.push(Vertex { point, lambda: [0.0; 4] }));
-        polygon
+        Self(points.iter().map(|&point| Vertex { point, lambda: [0.0; 4] }).collect())
     }
 
     /// The vertices, in order around.
     pub fn vertices(&self) -> &[Vertex] {
-        &self.vertices[..self.count]
+        &self.0
     }
 
     /// The same, to change them.
     pub fn vertices_mut(&mut self) -> &mut [Vertex] {
-        &mut self.vertices[..self.count]
+        &mut self.0
     }
 
     /// Where the vertices are.
     pub fn points(&self) -> impl ExactSizeIterator<Item = DVec3> + Clone {
-        self.vertices().iter().map(|v| v.point)
-    }
-
-    /// Whether nothing is left.
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
+        self.0.iter().map(|v| v.point)
     }
 
     /// Mean of the vertices: a point of the polygon.
     pub fn center(&self) -> DVec3 {
-        self.points().sum::<DVec3>() / self.count as f64
+        self.points().sum::<DVec3>() / self.0.len() as f64
     }
 
     /// Greatest distance from `p` to a point of the polygon: to a vertex, as the polygon is convex.
@@ -67,27 +68,29 @@ impl Polygon {
         self.points().map(|v| v.distance_squared(p)).fold(0.0, f64::max).sqrt()
     }
 
-    /// The parts where `height` is not negative, and where it is not positive; a part of no more than points on the line
-    /// between is empty, unless there is no other: then it is the first.
-    pub fn cut(&self, height: impl Fn(&Vertex) -> f64) -> (Self, Self) {
+    /// Cuts where `height` is 0. The parts are closed; what only touches the plane is not cut.
+    #[inline]
+    pub fn cut(&self, height: impl Fn(&Vertex) -> f64) -> Parts {
         let mut heights = [0.0; MOST_VERTICES];
         let (mut above, mut below) = (false, false);
-        for (h, v) in heights.iter_mut().zip(self.vertices()) {
+        for (h, v) in heights.iter_mut().zip(&self.0) {
             *h = height(v);
             above |= *h > 0.0;
             below |= *h < 0.0;
         }
-        let nothing = Self { vertices: self.vertices, count: 0 };
-        if !below {
-            return (*self, nothing);
+        match (above, below) {
+            (_, false) => Parts::Above,
+            (false, true) => Parts::Below,
+            (true, true) => self.across(&heights),
         }
-        if !above {
-            return (nothing, *self);
-        }
-        let (mut first, mut second) = (nothing, nothing);
-        for i in 0..self.count {
-            let j = if i + 1 == self.count { 0 } else { i + 1 };
-            let (v, h, h_next) = (self.vertices[i], heights[i], heights[j]);
+    }
+
+    fn across(&self, heights: &[f64; MOST_VERTICES]) -> Parts {
+        let (mut first, mut second) = (Self::default(), Self::default());
+        let n = self.0.len();
+        for i in 0..n {
+            let j = if i + 1 == n { 0 } else { i + 1 };
+            let (v, h, h_next) = (self.0[i], heights[i], heights[j]);
             if h >= 0.0 {
                 first.push(v);
             }
@@ -97,41 +100,47 @@ impl Polygon {
             if (h > 0.0 && h_next < 0.0) || (h < 0.0 && h_next > 0.0) {
                 // From the same end on both sides of an edge that two polygons share.
                 let v = if h > 0.0 {
-                    Vertex::between(&v, &self.vertices[j], h / (h - h_next))
+                    Vertex::between(&v, &self.0[j], h / (h - h_next))
                 } else {
-                    Vertex::between(&self.vertices[j], &v, h_next / (h_next - h))
+                    Vertex::between(&self.0[j], &v, h_next / (h_next - h))
                 };
                 first.push(v);
                 second.push(v);
             }
         }
-        (first, second)
+        Parts::Across(first, second)
     }
 
     /// Adds a vertex; one that is where the last one is adds nothing. Of too many the one that adds least area goes:
     /// more than seven are there only by rounding.
     fn push(&mut self, v: Vertex) {
-        if self.count > 0 && self.vertices[self.count - 1].point == v.point {
+        if self.0.last().is_some_and(|last| last.point == v.point) {
             return;
         }
-        if self.count == MOST_VERTICES {
+        if self.0.is_full() {
+            let n = self.0.len();
             let area = |i: usize| {
-                let at = |k: usize| self.vertices[(i + k) % MOST_VERTICES].point;
-                (at(1) - at(0)).cross(at(2) - at(0)).length_squared()
+                let at = |k: usize| self.0[(i + k) % n].point;
+                (at(n - 1) - at(0)).cross(at(1) - at(0)).length_squared()
             };
-            let least = (0..MOST_VERTICES).min_by(|&i, &j| area(i).total_cmp(&area(j))).unwrap_or(0);
-            let gone = (least + 1) % MOST_VERTICES;
-            self.vertices.copy_within(gone + 1.., gone);
-            self.count -= 1;
+            let least = (0..n).min_by(|&i, &j| area(i).total_cmp(&area(j))).unwrap_or(0);
+            self.0.remove(least);
         }
-        self.vertices[self.count] = v;
-        self.count += 1;
+        self.0.push(v);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn parts(polygon: &Polygon, height: impl Fn(&Vertex) -> f64) -> (Polygon, Polygon) {
+        match polygon.cut(height) {
+            Parts::Above => (polygon.clone(), Polygon::default()),
+            Parts::Below => (Polygon::default(), polygon.clone()),
+            Parts::Across(above, below) => (above, below),
+        }
+    }
 
     #[test]
     fn parts_cover_the_whole() {
@@ -143,7 +152,7 @@ mod tests {
                 .sum::<f64>()
         };
         for (n, d) in [(DVec3::new(1.0, 0.3, 0.0), 0.4), (DVec3::new(1.0, 1.0, 0.0), 1.0), (DVec3::X, 0.0)] {
-            let (first, second) = square.cut(|v| v.point.dot(n) - d);
+            let (first, second) = parts(&square, |v| v.point.dot(n) - d);
             assert!((area(&first) + area(&second) - 1.0).abs() < 1e-14);
             assert!(first.points().all(|p| p.dot(n) - d >= -1e-15));
             assert!(second.points().all(|p| p.dot(n) - d <= 1e-15));
@@ -151,11 +160,11 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_on_the_line_is_of_the_first_part() {
+    fn what_only_touches_the_line_is_not_cut() {
         let segment = Polygon::new(&[DVec3::ZERO, DVec3::X]);
-        let (first, second) = segment.cut(|v| v.point.y);
-        assert_eq!((first.vertices().len(), second.is_empty()), (2, true));
-        let (first, second) = segment.cut(|v| v.point.x - 0.25);
+        assert!(matches!(segment.cut(|v| v.point.y), Parts::Above));
+        assert!(matches!(segment.cut(|v| -v.point.x), Parts::Below));
+        let (first, second) = parts(&segment, |v| v.point.x - 0.25);
         assert_eq!(first.points().collect::<Vec<_>>(), [DVec3::new(0.25, 0.0, 0.0), DVec3::X]);
         assert!(second.points().all(|p| p.x <= 0.25));
         assert!(first.points().all(|p| p.x >= 0.25));

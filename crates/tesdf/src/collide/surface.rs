@@ -17,7 +17,6 @@ pub struct SurfaceBody<'a> {
     shift: DVec3,
     /// Field units per unit of the shape.
     scale: f64,
-    placement: Placement,
 }
 
 /// What the broad phase left of a surface: faces or nodes that can touch, in order.
@@ -64,7 +63,7 @@ impl<'a> SurfaceBody<'a> {
         let unit = placement.scale / field.unit();
         let turn = |axis: DVec3| field.turn_back(placement.pose.rotation * axis) * unit;
         let linear = DMat3::from_cols(turn(DVec3::X), turn(DVec3::Y), turn(DVec3::Z));
-        Self { shape, linear, shift, scale: unit, placement }
+        Self { shape, linear, shift, scale: unit }
     }
 
     /// From the shape's frame to the field's.
@@ -154,11 +153,6 @@ impl<'a> SurfaceBody<'a> {
             Shape::Mesh(asset) => asset.lowest_faces()[node as usize],
             simple => Simple::new(simple).nodes().0[node as usize].1,
         }
-    }
-
-    /// Where it is in the world.
-    pub fn placement(&self) -> Placement {
-        self.placement
     }
 
     /// The leaves of the face tree that can come within `reach` of the solid: a node is left out when the ball around its box

@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::Triangle;
 
-/// The least distance between a convex plane polygon and a triangle, and where on the polygon.
+/// The least distance between a convex plane polygon and a triangle, and where on the polygon; `None` when it is `limit` or more.
 ///
 /// `points` go around the polygon; one or two are a point or a segment. `normal` is the polygon's unit normal, or zero when it
 /// has no area. Candidates are pairs of real points, so the distance is never too small by more than rounding; they are all that
@@ -15,36 +15,63 @@ use super::Triangle;
 /// let t = Triangle::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
 /// let square = [(0., 0.), (1., 0.), (1., 1.), (0., 1.)].map(|(x, y)| DVec3::new(x, y, 2.0 + x));
 /// let normal = DVec3::new(-1.0, 0.0, 1.0).normalize();
-/// let (distance, at) = polygon_to_triangle(&square, normal, &t);
-/// assert_eq!((distance, at.x), (2.0, 0.0));
+/// let nearest = polygon_to_triangle(&square, normal, &t, f64::INFINITY);
+/// assert_eq!(nearest.map(|(distance, at)| (distance, at.x)), Some((2.0, 0.0)));
+/// assert_eq!(polygon_to_triangle(&square, normal, &t, 1.5), None);
 /// ```
-pub fn polygon_to_triangle(points: &[DVec3], normal: DVec3, triangle: &Triangle) -> (f64, DVec3) {
-    let mut best = Least { squared: f64::INFINITY, at: DVec3::NAN };
+pub fn polygon_to_triangle(
+    points: &[DVec3],
+    normal: DVec3,
+    triangle: &Triangle,
+    limit: f64,
+) -> Option<(f64, DVec3)> {
     let corners = &triangle.corners;
-    let edges = || {
-        let n = points.len();
-        (0..if n < 3 { n - 1 } else { n })
-            .map(move |i| (points[i], points[if i + 1 == n { 0 } else { i + 1 }]))
-    };
-    for &p in points {
-        best.offer(p, triangle.closest(p).point);
+    let mut best = Least { distance: limit, at: None };
+    // The plane of the triangle is not farther than the triangle.
+    let to_points = Heights::new(points, corners[0], triangle.normal);
+    if to_points.least >= limit {
+        return None;
     }
-    for (p, q) in edges() {
+    for (i, &p) in points.iter().enumerate() {
+        if to_points.of(i) < best.distance {
+            best.offer(p, triangle.closest(p).point);
+        }
+    }
+    let has_plane = points.len() > 2 && normal != DVec3::ZERO;
+    let plane = if has_plane { normal } else { DVec3::ZERO };
+    let to_corners = Heights::new(corners, points[0], plane);
+    if to_points.least.max(to_corners.least) >= best.distance {
+        return best.found();
+    }
+    if has_plane {
+        for (k, &c) in corners.iter().enumerate() {
+            if to_corners.of(k) < best.distance {
+                let x = c - normal * normal.dot(c - points[0]);
+                if holds(points, normal, x) {
+                    best.offer(x, c);
+                }
+            }
+        }
+    }
+    let n = points.len();
+    for i in 0..if n < 3 { n - 1 } else { n } {
+        let j = if i + 1 == n { 0 } else { i + 1 };
+        if to_points.of_edge(i, j) >= best.distance {
+            continue;
+        }
+        let (p, q) = (points[i], points[j]);
         for k in 0..3 {
-            let (on_edge, on_triangle) = between_segments(p, q, corners[k], corners[(k + 1) % 3]);
-            best.offer(on_edge, on_triangle);
+            let l = (k + 1) % 3;
+            if to_corners.of_edge(k, l) < best.distance {
+                let (on_edge, on_triangle) = between_segments(p, q, corners[k], corners[l]);
+                best.offer(on_edge, on_triangle);
+            }
         }
         if let Some(x) = crossing(p, q, corners[0], triangle.normal) {
             best.offer(x, triangle.closest(x).point);
         }
     }
-    if points.len() > 2 && normal != DVec3::ZERO {
-        for &c in corners {
-            let x = c - normal * normal.dot(c - points[0]);
-            if holds(points, normal, x) {
-                best.offer(x, c);
-            }
-        }
+    if has_plane {
         for k in 0..3 {
             if let Some(x) = crossing(corners[k], corners[(k + 1) % 3], points[0], normal)
                 && holds(points, normal, x)
@@ -53,21 +80,62 @@ pub fn polygon_to_triangle(points: &[DVec3], normal: DVec3, triangle: &Triangle)
             }
         }
     }
-    (best.squared.sqrt(), best.at)
+    best.found()
 }
 
 struct Least {
-    squared: f64,
-    at: DVec3,
+    distance: f64,
+    at: Option<DVec3>,
 }
 
 impl Least {
     #[inline]
     fn offer(&mut self, on_polygon: DVec3, on_triangle: DVec3) {
-        let squared = on_polygon.distance_squared(on_triangle);
-        if squared < self.squared {
-            *self = Self { squared, at: on_polygon };
+        let distance = on_polygon.distance(on_triangle);
+        if distance < self.distance {
+            *self = Self { distance, at: Some(on_polygon) };
         }
+    }
+
+    fn found(&self) -> Option<(f64, DVec3)> {
+        self.at.map(|at| (self.distance, at))
+    }
+}
+
+/// Most points of a polygon whose heights are kept; those of others count as 0, which leaves nothing out.
+const MOST: usize = 12;
+
+/// Heights of points over a plane.
+struct Heights {
+    heights: [f64; MOST],
+    /// Nothing between the points is nearer to the plane.
+    least: f64,
+}
+
+impl Heights {
+    #[inline]
+    fn new(points: &[DVec3], on_plane: DVec3, normal: DVec3) -> Self {
+        let mut heights = [0.0; MOST];
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        if points.len() > MOST || normal == DVec3::ZERO {
+            return Self { heights, least: 0.0 };
+        }
+        for (height, p) in heights.iter_mut().zip(points) {
+            *height = normal.dot(*p - on_plane);
+            (low, high) = (low.min(*height), high.max(*height));
+        }
+        Self { heights, least: low.max(-high).max(0.0) }
+    }
+
+    #[inline]
+    fn of(&self, i: usize) -> f64 {
+        self.heights.get(i).map_or(0.0, |h| h.abs())
+    }
+
+    #[inline]
+    fn of_edge(&self, i: usize, j: usize) -> f64 {
+        let (h, k) = (self.heights.get(i).unwrap_or(&0.0), self.heights.get(j).unwrap_or(&0.0));
+        if h * k > 0.0 { h.abs().min(k.abs()) } else { 0.0 }
     }
 }
 
@@ -136,7 +204,8 @@ mod tests {
             // A parallelogram.
             let points = [o, o + 0.5 * u, o + 0.5 * (u + v), o + 0.5 * v];
             let normal = u.cross(v).normalize_or_zero();
-            let (distance, at) = polygon_to_triangle(&points, normal, &triangle);
+            let (distance, at) = polygon_to_triangle(&points, normal, &triangle, f64::INFINITY).unwrap();
+            prop_assert!(polygon_to_triangle(&points, normal, &triangle, distance).is_none());
             let sampled = sampled(&points, &triangle);
             prop_assert!(distance <= sampled + 1e-12, "{distance} {sampled}");
             prop_assert!(sampled <= distance + 0.04, "{distance} {sampled}");
@@ -149,9 +218,10 @@ mod tests {
         let triangle = Triangle::new([DVec3::ZERO, DVec3::X, DVec3::Y]);
         let points = [DVec3::new(0.2, 0.2, -1.0), DVec3::new(0.2, 0.2, 1.0), DVec3::new(0.3, 0.2, 1.0)];
         let normal = (points[1] - points[0]).cross(points[2] - points[0]).normalize();
-        assert!(polygon_to_triangle(&points, normal, &triangle).0 < 1e-16);
-        let segment = &points[..2];
-        assert!(polygon_to_triangle(segment, DVec3::ZERO, &triangle).0 < 1e-16);
-        assert_eq!(polygon_to_triangle(&points[..1], DVec3::ZERO, &triangle).0, 1.0);
+        let distance =
+            |points: &[DVec3], normal| polygon_to_triangle(points, normal, &triangle, 9.0).unwrap().0;
+        assert!(distance(&points, normal) < 1e-16);
+        assert!(distance(&points[..2], DVec3::ZERO) < 1e-16);
+        assert_eq!(distance(&points[..1], DVec3::ZERO), 1.0);
     }
 }

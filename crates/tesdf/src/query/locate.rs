@@ -118,9 +118,15 @@ impl TeSdf {
     /// Finds what answers for a point of the local frame.
     #[inline]
     pub(crate) fn place(&self, local: DVec3) -> Place {
+        self.place_and_word(local).0
+    }
+
+    /// The same, with the word of the cell; [`NOWHERE`] outside of the cube.
+    #[inline]
+    pub(crate) fn place_and_word(&self, local: DVec3) -> (Place, usize) {
         let entries = &self.entries;
         let Some((entry, mut lambda)) = self.cube.locate(local, entries.level) else {
-            return Place::NotOfDomain;
+            return (Place::NotOfDomain, NOWHERE);
         };
         let mut word = entries.words[entry] as usize;
         // Three bisections a turn, so that each knows its refinement edge.
@@ -128,9 +134,9 @@ impl TeSdf {
             for k in [3, 2, 1] {
                 let children = match Node::decode(self.nodes[word], &self.lists) {
                     Node::Split(children) => children as usize,
-                    Node::Listed(label, offset) => return Place::Listed { label, offset },
-                    Node::Far(side) => return Place::Far(side),
-                    Node::NotOfDomain => return Place::NotOfDomain,
+                    Node::Listed(label, offset) => return (Place::Listed { label, offset }, word),
+                    Node::Far(side) => return (Place::Far(side), word),
+                    Node::NotOfDomain => return (Place::NotOfDomain, word),
                 };
                 word = children
                     + match k {

@@ -14,6 +14,9 @@ use crate::query::{Faces, Place, Precision};
 /// Evaluations after which a search gives up: the hardest of 10^5 polygons on real parts took a tenth.
 const MOST_EVALUATIONS: usize = 20_000;
 
+/// A polygon that comes as near to a face may go through it (local frame, of extent about 1): some ten roundings.
+const TOUCHING: f64 = 1e-14;
+
 /// The least signed distance over a polygon to `tolerance`, both in the field's frame; `None` when it is above `reach`.
 ///
 /// Outside of the solid it is the least distance between the polygon and a face, in closed form. Inside it is the greatest of a
@@ -46,45 +49,54 @@ pub fn lowest(
     if inside {
         return Some(branch_and_bound(cell, polygon, tolerance, precision));
     }
-    let (distance, point) = nearest_to_faces(asset, place, faces, polygon, normal, center, radius);
+    let query = Query { asset, place, faces, polygon, normal, center, radius, tolerance };
+    let (distance, point) = query.nearest_to_faces(first.position);
     // Clear of the surface, the polygon is all on one side of it.
-    let all_outside = !crossing || (distance > 0.0 && cell.value(point, Precision::F64).distance > 0.0);
+    let all_outside = !crossing || (distance > TOUCHING && cell.value(point, Precision::F64).distance > 0.0);
     if !all_outside {
         return Some(branch_and_bound(cell, polygon, tolerance, precision));
     }
     (distance <= reach).then_some(Lowest { point, converged: true })
 }
 
-/// The least distance between the polygon and the faces that can be nearest to a point of it.
-fn nearest_to_faces(
-    asset: &TeSdf,
+/// A polygon and the faces that can be nearest to its points.
+struct Query<'a> {
+    asset: &'a TeSdf,
     place: Place,
-    faces: &Faces,
-    polygon: &Polygon,
+    faces: &'a Faces,
+    polygon: &'a Polygon,
     normal: DVec3,
     center: DVec3,
     radius: f64,
-) -> (f64, DVec3) {
-    let mut points = [DVec3::ZERO; MOST_VERTICES];
-    let count = polygon.vertices().len();
-    points.iter_mut().zip(polygon.points()).for_each(|(to, p)| *to = p);
-    let points = &points[..count];
-    let mut best = (f64::INFINITY, center);
-    let mut offer = |face: u32| {
-        let triangle = asset.local_triangle(face as usize);
-        if triangle.closest(center).distance - radius <= best.0 {
-            let found = polygon_to_triangle(points, normal, &triangle);
-            if found.0 < best.0 {
+    tolerance: f64,
+}
+
+impl Query<'_> {
+    /// The least distance between the polygon and a face, up to the tolerance, and where on the polygon; `likely` is looked at
+    /// first.
+    fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3) {
+        let mut points = [DVec3::ZERO; MOST_VERTICES];
+        points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
+        let points = &points[..self.polygon.vertices().len()];
+        let mut best = (f64::INFINITY, self.center);
+        let mut offer = |face: u32| {
+            let triangle = self.asset.local_triangle(face as usize);
+            // What is nearer by less than the tolerance does not count, unless the polygon may go through it.
+            let limit = if best.0 > 2.0 * self.tolerance { best.0 - self.tolerance } else { best.0 };
+            if let Some(found) = polygon_to_triangle(points, self.normal, &triangle, limit) {
                 best = found;
             }
+            best.0
+        };
+        offer(likely);
+        match self.place {
+            Place::Listed { .. } => {
+                self.asset.near_in_list(self.faces, self.center, self.radius, &mut offer);
+            }
+            _ => self.asset.near_in_tree(self.center, self.radius, &mut offer),
         }
-        best.0
-    };
-    match place {
-        Place::Listed { .. } => asset.near_in_list(faces, center, radius, &mut offer),
-        _ => asset.near_in_tree(center, radius, &mut offer),
+        best
     }
-    best
 }
 
 /// A part of the polygon that is still open.

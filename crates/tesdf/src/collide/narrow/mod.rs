@@ -70,7 +70,7 @@ impl Search {
         let reach = self.reach + part.radius;
         match field.field {
             Field::Mesh(asset) => {
-                middle::clip(asset, &Polygon::new(part.points()), reach, &mut |clipped| {
+                let mut visit = |clipped: &ClippedPolygon| {
                     polygon(clipped);
                     let mut look = |faces: &Faces| {
                         let cell = CellField::Mesh { asset, place: clipped.place, faces };
@@ -82,7 +82,11 @@ impl Search {
                         Place::Listed { offset, .. } => asset.with_list(offset, |faces| look(faces)),
                         _ => look(&Faces::default()),
                     }
-                });
+                };
+                match *part.points() {
+                    [point] => middle::locate(asset, point, reach, &mut visit),
+                    _ => middle::clip(asset, Polygon::new(part.points()), reach, &mut visit),
+                }
             }
             Field::Simple(simple) => {
                 let whole = ClippedPolygon {
