@@ -119,7 +119,7 @@ fn extremes(n: usize, radius: f64, at: impl Fn(usize) -> DVec3) -> Vec<usize> {
     while axes.len() < 3 {
         let off = |p: DVec3| axes.iter().fold(p, |p, &axis| p - p.dot(axis) * axis);
         let reach = off(at(first_most(n, |i| off(at(i)).length_squared())));
-        if !(reach.length() > FLAT * radius) {
+        if reach.length() <= FLAT * radius {
             break;
         }
         let axis = reach.normalize();
