@@ -6,6 +6,7 @@ use super::narrow::{Minimum, Search};
 use super::surface::{Candidates, Part, SurfaceBody};
 use super::{
     CollideError, CollideOptions, Contact, Contacts, FeatureId, InstanceId, Mode, Scene, Statistics,
+    reduce_pairs,
 };
 
 /// Faces or nodes that one task takes.
@@ -54,7 +55,10 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
     contacts
         .chunk_by_mut(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b))
         .for_each(|run| run.sort_unstable_by(|x, y| order(x).cmp(&order(y))));
-    Ok(Contacts { contacts, statistics })
+    let all = contacts.len();
+    let (contacts, reductions) = reduce_pairs(contacts, options.reduction);
+    statistics.reduced = all - contacts.len();
+    Ok(Contacts { contacts, statistics, reductions })
 }
 
 /// Within one ordered pair of instances. A point in no cell may be one of several pieces outside of the cube.

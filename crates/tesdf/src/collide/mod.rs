@@ -7,6 +7,7 @@
 //! - [`Scene`]: shapes (an encoded mesh, a plane, a box, a sphere, a capsule), and instances of them: a pose, a
 //!   velocity, a scale, a world. An instance costs its state only.
 //! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
+//! - [`reduce_pairs`]: fewer contacts per pair, with a bound on what is lost.
 //! - `clearance`: the signed distance between two instances, with witnesses.
 //! - `time_of_impact`: when two moving instances first touch, never too late.
 //! - `why`: why a contact is, or is not, there.
@@ -17,22 +18,25 @@ mod contact;
 mod detect;
 mod error;
 mod field;
+mod hull;
 mod instance_pairs;
 mod middle;
 mod narrow;
 mod options;
 mod polygon;
 mod pose;
+mod reduce;
 mod scene;
 mod shape;
 mod simple;
 mod surface;
 
-pub use contact::{Contact, Contacts, FeatureB, FeatureId, Statistics};
+pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};
 pub use detect::detect;
 pub use error::CollideError;
 pub use instance_pairs::{InstancePair, instance_pairs};
 pub use options::{CollideOptions, FaceMethod, Mode, Reduction};
 pub use pose::{Placement, Pose};
+pub use reduce::reduce_pairs;
 pub use scene::{Groups, Instance, InstanceId, Scene, ShapeId, Velocity};
 pub use shape::Shape;

@@ -1,0 +1,276 @@
+//! What a reduction keeps, and what it says is lost, against distances computed one by one.
+mod support;
+
+use proptest::prelude::*;
+use support::random::Random;
+use tesdf::collide::{Contact, FeatureB, FeatureId, InstanceId, PairReduction, Reduction, reduce_pairs};
+use tesdf::glam::{DQuat, DVec3};
+
+type Wrench = [f64; 6];
+
+/// Rounding of sums of wrenches.
+const ROUNDING: f64 = 1e-9;
+/// How far from the least error the test's own solver stops.
+const SOLVER: f64 = 1e-3;
+
+fn contact(instances: [u32; 2], point: DVec3, normal: DVec3, distance: f64, face: u32) -> Contact {
+    Contact {
+        point_a: point,
+        point_b: point - distance * normal,
+        normal,
+        distance,
+        face_a: face,
+        face_b: 0,
+        tet_b: Some(0),
+        instance_a: InstanceId(instances[0]),
+        instance_b: InstanceId(instances[1]),
+        feature: FeatureId { a: face, b: FeatureB::Face(0) },
+        converged: true,
+    }
+}
+
+/// Contacts between instances 2 and 5, as many in each direction as it comes.
+fn patch(count: usize, seed: u64, mut place: impl FnMut(&mut Random) -> (DVec3, DVec3)) -> Vec<Contact> {
+    let mut random = Random(seed);
+    let mut contacts: Vec<Contact> = (0..count)
+        .map(|face| {
+            let (point, normal) = place(&mut random);
+            let (instances, normal) =
+                if random.bits() & 1 == 0 { ([2, 5], normal) } else { ([5, 2], -normal) };
+            contact(instances, point, normal, -random.unit(), face as u32)
+        })
+        .collect();
+    contacts.sort_by_key(|c| (c.instance_a, c.face_a));
+    contacts
+}
+
+/// Patches of the kinds that occur: flat, around a shaft, in a corner of a box, anything, few places with many contacts.
+fn any_patch() -> impl Strategy<Value = Vec<Contact>> {
+    (1..250usize, 0..5, any::<u64>()).prop_map(|(count, kind, seed)| {
+        let turn = DQuat::from_rotation_arc(DVec3::Z, Random(seed).direction());
+        let origin = 10.0 * Random(!seed).in_cube();
+        patch(count, seed, |random| {
+            let p = random.in_cube();
+            let (point, normal) = match kind {
+                0 => (DVec3::new(p.x, 0.3 * p.y, 0.0), DVec3::Z),
+                1 => {
+                    let (sin, cos) = (4.0 * p.x).sin_cos();
+                    (DVec3::new(cos, sin, p.y), DVec3::new(cos, sin, 0.4).normalize())
+                }
+                2 => {
+                    let axis = random.index(3);
+                    let mut at = p;
+                    at[axis] = -1.0;
+                    (at, DVec3::AXES[axis])
+                }
+                3 => (p, random.direction()),
+                _ => {
+                    ((2.0 * p).round(), (3.0 * random.in_cube()).round().try_normalize().unwrap_or(DVec3::X))
+                }
+            };
+            (origin + turn * point, turn * normal)
+        })
+    })
+}
+
+fn reduce(contacts: &[Contact], n: u32) -> (Vec<Contact>, PairReduction) {
+    let (kept, reports) = reduce_pairs(contacts.to_vec(), Reduction::PerPair(n));
+    assert_eq!(reports.len(), 1);
+    (kept, reports[0])
+}
+
+/// Of a unit force, on instance 2.
+fn wrench(c: &Contact, report: &PairReduction) -> Wrench {
+    let force = if c.instance_a == InstanceId(2) { c.normal } else { -c.normal };
+    let torque = (c.point_a - report.center).cross(force) / report.length.max(f64::MIN_POSITIVE);
+    [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+}
+
+fn sum(wrenches: &[Wrench], forces: &[f64]) -> Wrench {
+    std::array::from_fn(|k| wrenches.iter().zip(forces).map(|(w, f)| w[k] * f).sum())
+}
+
+fn minus(a: &Wrench, b: &Wrench) -> Wrench {
+    std::array::from_fn(|k| a[k] - b[k])
+}
+
+fn dot(a: &Wrench, b: &Wrench) -> f64 {
+    (0..6).map(|k| a[k] * b[k]).sum()
+}
+
+/// Forces on the kept contacts in place of forces of sum 1 on all.
+struct Replacement {
+    forces: Vec<f64>,
+    /// What is left of the wrench: an upper bound of the least error.
+    error: f64,
+    /// A lower bound of the least error: how far the goal is beyond the kept wrenches in some direction.
+    least: f64,
+}
+
+/// By pairwise Frank–Wolfe steps, which are slow where the hull is thin.
+fn replacement(kept: &[Wrench], goal: &Wrench) -> Replacement {
+    let mut forces = vec![0.0; kept.len()];
+    forces[0] = 1.0;
+    let mut least = 0.0f64;
+    loop {
+        let off = minus(&sum(kept, &forces), goal);
+        let error = dot(&off, &off).sqrt();
+        let slope = |j: &usize| dot(&kept[*j], &off);
+        let to = (0..kept.len()).min_by(|a, b| slope(a).total_cmp(&slope(b))).unwrap();
+        let from = (0..kept.len()).filter(|&j| forces[j] > 0.0);
+        let from = from.max_by(|a, b| slope(a).total_cmp(&slope(b))).unwrap();
+        least = least.max((slope(&to) - dot(goal, &off)) / error.max(f64::MIN_POSITIVE));
+        if error - least < SOLVER {
+            return Replacement { forces, error, least };
+        }
+        let way = minus(&kept[from], &kept[to]);
+        let step = (dot(&off, &way) / dot(&way, &way)).min(forces[from]);
+        forces[from] -= step;
+        forces[to] += step;
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(128))]
+
+    #[test]
+    fn any_forces_can_be_replaced(contacts in any_patch(), n in 1..24u32, seed in any::<u64>()) {
+        let (kept, report) = reduce(&contacts, n);
+        prop_assert!(kept.len() <= n as usize && (kept.len(), contacts.len()) == (report.kept, report.contacts));
+        let wrenches = |contacts: &[Contact]| contacts.iter().map(|c| wrench(c, &report)).collect::<Vec<_>>();
+        let (all, kept) = (wrenches(&contacts), wrenches(&kept));
+        let mut random = Random(seed);
+        for sparse in [1, 2, 5, 100] {
+            let forces: Vec<f64> =
+                all.iter().map(|_| if random.index(sparse) == 0 { 5.0 * random.unit() } else { 0.0 }).collect();
+            let total: f64 = forces.iter().sum();
+            let goal = sum(&all, &forces).map(|x| x / total.max(f64::MIN_POSITIVE));
+            if total > 0.0 {
+                let replaced = replacement(&kept, &goal);
+                prop_assert!(replaced.forces.iter().all(|&f| f >= 0.0));
+                prop_assert!((replaced.forces.iter().sum::<f64>() - 1.0).abs() < ROUNDING);
+                prop_assert!(replaced.error <= report.wrench_error + SOLVER);
+                prop_assert!(replaced.least <= report.wrench_error + ROUNDING);
+            }
+        }
+        // The forces that lose most are those of one contact, and they lose what the report says: it is no loose bound.
+        let single = all.iter().map(|w| replacement(&kept, w));
+        let (least, most) = single.fold((0.0, 0.0), |(l, m), r| (r.least.max(l), r.error.max(m)));
+        prop_assert!(least <= report.wrench_error + ROUNDING, "{least} {report:?}");
+        prop_assert!(most >= 0.99 * report.wrench_error - ROUNDING, "{most} {report:?}");
+        prop_assert!(most - least <= SOLVER + ROUNDING, "{most} {least}");
+    }
+
+    #[test]
+    fn the_deepest_and_the_extremes_stay(contacts in any_patch(), n in 1..24u32) {
+        let (kept, report) = reduce(&contacts, n);
+        let deepest = |contacts: &[Contact]| contacts.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
+        prop_assert_eq!(deepest(&kept), deepest(&contacts));
+        let mut axes: Vec<DVec3> = Vec::new();
+        while n >= 7 && axes.len() < 3 {
+            let off = |c: &Contact| axes.iter().fold(c.point_a - report.center, |p, a| p - p.dot(*a) * a);
+            let longest = contacts.iter().map(off).max_by(|a, b| a.length().total_cmp(&b.length())).unwrap();
+            let Some(axis) = longest.try_normalize() else { break };
+            for axis in [axis, -axis] {
+                let reach = |c: &[Contact]| c.iter().map(|c| c.point_a.dot(axis)).fold(f64::NEG_INFINITY, f64::max);
+                prop_assert!(reach(&kept) >= reach(&contacts) - 1.001e-3 * report.length);
+            }
+            axes.push(axis);
+        }
+    }
+
+    #[test]
+    fn more_contacts_lose_less(contacts in any_patch()) {
+        let mut last = f64::INFINITY;
+        for n in 1..=contacts.len().min(40) as u32 {
+            let error = reduce(&contacts, n).1.wrench_error;
+            prop_assert!(error <= last * (1.0 + 1e-6) + 1e-12, "{n}: {last} {error}");
+            last = error;
+        }
+        let (kept, report) = reduce(&contacts, contacts.len() as u32);
+        prop_assert_eq!(&kept, &contacts);
+        prop_assert_eq!(report.wrench_error, 0.0);
+        prop_assert_eq!(reduce_pairs(contacts.clone(), Reduction::None), (contacts, Vec::new()));
+    }
+
+    /// The contacts of a pair, in their order, whatever else touches and on any number of threads.
+    #[test]
+    fn pairs_are_reduced_on_their_own(patches in prop::collection::vec(any_patch(), 1..6), n in 1..12u32) {
+        let alone: Vec<_> = patches.iter().map(|contacts| reduce(contacts, n)).collect();
+        // Pair k is (k, 100 - k): in the scene's order the two directions of a pair are far from each other.
+        let renamed = |contacts: &[Contact], k: usize| -> Vec<Contact> {
+            let rename = |id: InstanceId| InstanceId(if id.0 == 2 { k as u32 } else { 100 - k as u32 });
+            contacts
+                .iter()
+                .map(|c| Contact { instance_a: rename(c.instance_a), instance_b: rename(c.instance_b), ..*c })
+                .collect()
+        };
+        let scene = |contacts: Vec<Vec<Contact>>| {
+            let mut all = contacts.concat();
+            all.sort_by_key(|c| (c.instance_a, c.face_a));
+            all
+        };
+        let all = scene(patches.iter().enumerate().map(|(k, p)| renamed(p, k)).collect());
+        let expected = scene(alone.iter().enumerate().map(|(k, (kept, _))| renamed(kept, k)).collect());
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let (kept, reports) = pool.install(|| reduce_pairs(all.clone(), Reduction::PerPair(n)));
+            prop_assert_eq!(&kept, &expected);
+            for (k, (report, (_, alone))) in reports.iter().zip(&alone).enumerate() {
+                let (a, b) = (InstanceId(k as u32), InstanceId(100 - k as u32));
+                prop_assert_eq!(*report, PairReduction { instance_a: a, instance_b: b, ..*alone });
+            }
+            prop_assert_eq!(reports.len(), alone.len());
+        }
+    }
+}
+
+/// 100 × 100 contacts on a plane, the deepest one somewhere inside: eight keep the corners, and so the whole support polygon.
+#[test]
+fn a_flat_patch_keeps_its_corners() {
+    let turn = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0);
+    for deepest in [0, 4711] {
+        let at = |i: u32| turn * DVec3::new(f64::from(i % 100), 0.5 * f64::from(i / 100), 3.0);
+        let contacts: Vec<Contact> = (0..10_000)
+            .map(|i| contact([2, 5], at(i), turn * DVec3::Z, if i == deepest { -0.2 } else { -0.1 }, i))
+            .collect();
+        let (kept, report) = reduce(&contacts, 8);
+        let faces: Vec<u32> = kept.iter().map(|c| c.face_a).collect();
+        for face in [0, 99, deepest, 9900, 9999] {
+            assert!(faces.contains(&face), "{faces:?}");
+        }
+        assert!(report.wrench_error < 1e-9, "{report:?}");
+        assert!((report.length - 0.5 * DVec3::new(99.0, 49.5, 0.0).length()).abs() < 1e-9, "{report:?}");
+    }
+}
+
+/// Contacts that say the same, from one body or from the other, are one.
+#[test]
+fn equal_contacts_are_one() {
+    let (point, normal) = (DVec3::new(3.0, -2.0, 1.0), DVec3::Y);
+    let both =
+        |face| [contact([2, 5], point, normal, -0.1, face), contact([5, 2], point, -normal, -0.1, face)];
+    let mut contacts: Vec<Contact> = (0..500).flat_map(both).collect();
+    contacts.sort_by_key(|c| (c.instance_a, c.face_a));
+    let (kept, report) = reduce(&contacts, 4);
+    assert_eq!(kept, contacts[..1]);
+    assert_eq!((report.wrench_error, report.length), (0.0, 0.0));
+    assert_eq!(reduce(&contacts[..1], 1).1.wrench_error, 0.0);
+    assert_eq!(reduce_pairs(Vec::new(), Reduction::PerPair(4)), (Vec::new(), Vec::new()));
+}
+
+/// A ring of contacts that push outwards, as around a shaft: what is lost falls with the square of the number that is kept.
+#[test]
+fn a_ring_is_lost_by_the_square() {
+    let contacts = patch(5000, 1, |random| {
+        let (sin, cos) = (std::f64::consts::TAU * random.unit()).sin_cos();
+        (DVec3::new(cos, sin, 0.0), DVec3::new(cos, sin, 0.0))
+    });
+    // The hull is that of a circle, and a chord over 1/n of it is 1 − cos(π/n) from its arc. Arcs are halved, so the longest are up to
+    // twice the shortest.
+    for n in [8u32, 16, 32, 64] {
+        let error = reduce(&contacts, n).1.wrench_error;
+        let chord = |n: f64| 1.0 - (std::f64::consts::PI / n).cos();
+        assert!((0.9 * chord(f64::from(n))..=chord(0.4 * f64::from(n))).contains(&error), "{n}: {error}");
+    }
+}
