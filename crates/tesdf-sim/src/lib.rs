@@ -6,7 +6,7 @@
 //!
 //! - [`MassProperties`]: mass, centre and inertia of a closed mesh or a simple shape, in `f64`.
 //! - [`System`]: bodies, their states, gravity.
-//! - [`Dynamics`]: what every engine does: a step of time.
+//! - [`Dynamics`]: what every engine does: a step of time. [`newton`] is the embedded one.
 //!
 //! Units are those of the SI: metres, kilograms, seconds, radians. Everything is deterministic: the same input gives the
 //! same bits on any number of threads.
@@ -14,6 +14,7 @@
 
 mod dynamics;
 mod mass;
+pub mod newton;
 mod system;
 
 pub use dynamics::{Dynamics, DynamicsError, StepReport};
