@@ -116,8 +116,7 @@ fn load(args: &Args) -> Result<LoadedScene, Failure> {
     }
     for (name, file) in &args.geometries {
         // Paths of a scene are relative to its folder, those of a command to where it runs.
-        let file = std::path::absolute(file)
-            .map_err(|e| Failure::new(format!("{}: {e}", file.display())))?;
+        let file = std::path::absolute(file).map_err(|e| Failure::new(format!("{}: {e}", file.display())))?;
         let body = scene.bodies.iter_mut().map(|body| body.get_mut()).find(|body| &body.name == name);
         let Some(body) = body else {
             return Err(Failure::new(format!("{}: there is no body {name}", args.scene.display())));
