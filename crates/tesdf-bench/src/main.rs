@@ -16,6 +16,7 @@ mod parry;
 mod points;
 mod query;
 mod reference;
+mod screw;
 mod timing;
 
 /// Why a benchmark could not run: what was found, where, and what to do.
@@ -41,6 +42,8 @@ enum Command {
     Curve(curve::Args),
     /// Largest errors and sign mistakes against brute force
     Exactness(exactness::Args),
+    /// A nut on a bolt: travel, energy, penetration and time by clearance, time step and detector
+    Screw(screw::Args),
 }
 
 fn main() -> ExitCode {
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
         Command::Encode(args) => encode::run(args),
         Command::Curve(args) => curve::run(args),
         Command::Exactness(args) => exactness::run(args),
+        Command::Screw(args) => screw::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,20 +1,19 @@
 //! `tesdf encode MESH -o FILE`
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::sync::atomic::Ordering;
+use std::time::Instant;
 
 use clap::ValueEnum;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::asset::about::{Certificate, Source, Statistics};
-use tesdf::encode::{EncodeError, EncodeOptions, EncodeProgress, Length, Stage, encode};
+use tesdf::encode::{EncodeError, EncodeOptions, EncodeProgress, Length, encode};
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 
-use crate::progress::{Progress, interrupt_flag};
+use crate::progress::{interrupt_flag, watched};
 use crate::report::{self, Failure, Outcome};
 use crate::{mesh_file, parse};
 
@@ -158,8 +157,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Good)
 }
 
-/// What would be noticed only after the work.
-fn check_output(mesh: &Path, output: &Path) -> Result<(), Failure> {
+/// What would be noticed only after the work: an output in no folder, or on top of the input.
+///
+/// # Errors
+/// Says which.
+pub(crate) fn check_output(mesh: &Path, output: &Path) -> Result<(), Failure> {
     let folder = match output.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -174,7 +176,7 @@ fn check_output(mesh: &Path, output: &Path) -> Result<(), Failure> {
     let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
     if same(mesh, output) {
         return Err(Failure::new(format!(
-            "{} is the mesh itself; give another file to -o",
+            "{} is the input itself; give another file to -o",
             output.display()
         )));
     }
@@ -198,34 +200,6 @@ fn warn(defects: &[Defect]) {
             _ => {}
         }
     }
-}
-
-/// Runs `work` while another thread draws its progress and hands Ctrl-C on.
-fn watched<T>(progress: &EncodeProgress, interrupted: &AtomicBool, work: impl FnOnce() -> T) -> T {
-    let done = AtomicBool::new(false);
-    thread::scope(|scope| {
-        let watcher = scope.spawn(|| {
-            let bar = Progress::new("encoding");
-            while !done.load(Ordering::Acquire) {
-                if interrupted.load(Ordering::Relaxed) {
-                    progress.cancel();
-                }
-                let (stage, share) = progress.state();
-                bar.stage(match stage {
-                    Stage::Refine => "1/3 cutting space into cells",
-                    Stage::Tighten => "2/3 shortening lists",
-                    Stage::Assemble => "3/3 laying out the file",
-                });
-                bar.set(share);
-                thread::park_timeout(Duration::from_millis(100));
-            }
-        });
-        // Also when `work` panics, or the scope would wait for the watcher for ever.
-        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
-        done.store(true, Ordering::Release);
-        watcher.thread().unpark();
-        result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-    })
 }
 
 fn print(

@@ -21,6 +21,7 @@ pub mod progress;
 pub mod query;
 pub mod repair;
 pub mod report;
+pub mod simulate;
 pub mod slice;
 pub mod verify;
 
@@ -54,6 +55,8 @@ pub enum Command {
     Collide(collide::Args),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
+    /// Move the bodies of a scene and write the run
+    Simulate(simulate::Args),
     /// Print a completion script for a shell
     Completions(completions::Args),
 }
@@ -93,6 +96,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Verify(args) => verify::run(args),
         Command::Collide(args) => collide::run(args),
         Command::Slice(args) => slice::run(args),
+        Command::Simulate(args) => simulate::run(args),
         Command::Completions(args) => completions::run(args),
     }
 }

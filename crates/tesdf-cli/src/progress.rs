@@ -1,9 +1,11 @@
 //! Progress on stderr and Ctrl-C.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use tesdf::encode::{EncodeProgress, Stage};
 
 use crate::report::Failure;
 
@@ -63,4 +65,32 @@ pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
     })
     .map_err(|e| Failure::new(format!("cannot handle Ctrl-C: {e}")))?;
     Ok(flag)
+}
+
+/// Runs `work` while another thread draws its progress and hands Ctrl-C on.
+pub fn watched<T>(progress: &EncodeProgress, interrupted: &AtomicBool, work: impl FnOnce() -> T) -> T {
+    let done = AtomicBool::new(false);
+    thread::scope(|scope| {
+        let watcher = scope.spawn(|| {
+            let bar = Progress::new("encoding");
+            while !done.load(Ordering::Acquire) {
+                if interrupted.load(Ordering::Relaxed) {
+                    progress.cancel();
+                }
+                let (stage, share) = progress.state();
+                bar.stage(match stage {
+                    Stage::Refine => "1/3 cutting space into cells",
+                    Stage::Tighten => "2/3 shortening lists",
+                    Stage::Assemble => "3/3 laying out the file",
+                });
+                bar.set(share);
+                thread::park_timeout(Duration::from_millis(100));
+            }
+        });
+        // Also when `work` panics, or the scope would wait for the watcher for ever.
+        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
+        done.store(true, Ordering::Release);
+        watcher.thread().unpark();
+        result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
 }

@@ -1,0 +1,209 @@
+//! `tesdf-bench screw`
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use tesdf::TeSdf;
+use tesdf::collide::{Pose, Shape};
+use tesdf::encode::EncodeProgress;
+use tesdf::glam::DVec3;
+use tesdf::query::Precision;
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
+use tesdf_sim::{Moment, Summary, System, simulate};
+
+use crate::{Failure, heading, output};
+
+/// Arguments of `tesdf-bench screw`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// A scene with the criterion `screw`
+    scene: PathBuf,
+    /// Geometries of the turning body, one after the other: meshes or .tesdf files [default: that of the scene]
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    geometries: Vec<PathBuf>,
+    /// Time steps, ms
+    #[arg(long, value_name = "MS", value_delimiter = ',', default_value = "1,3,5")]
+    time_steps: Vec<f64>,
+    /// Detector modes
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "node,face,exact")]
+    modes: Vec<Mode>,
+    /// How often contacts are detected again
+    #[arg(long, value_name = "N", value_delimiter = ',', default_value = "0,1,2")]
+    redetections: Vec<u32>,
+    /// Instead of the scene's duration, s
+    #[arg(long, value_name = "SECONDS")]
+    duration: Option<f64>,
+    /// How often in a run the penetration is measured
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    measurements: u64,
+}
+
+/// As in a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Mode {
+    Node,
+    Face,
+    Exact,
+    Off,
+}
+
+const COLUMNS: [&str; 15] = [
+    "body",
+    "step, ms",
+    "mode",
+    "re-detections",
+    "contacts",
+    "penetration, µm",
+    "as detected, µm",
+    "travel, mm",
+    "turns",
+    "from pitch, µm",
+    "of ideal travel",
+    "of ideal acceleration",
+    "energy kept",
+    "detection + solution, ms per step",
+    "criterion",
+];
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    heading::print()?;
+    output::line(
+        "*Penetration*: deepest of the vertices and of 15 points of each face, of both bodies in the other's field, in f64, \
+         at times spread over the run; not by the detector under test. *From pitch*: largest difference of travel and \
+         turns × pitch. *Ideal*: the frictionless screw without play.\n",
+    )?;
+    output::head(&COLUMNS, 1)?;
+    let mut loaded = LoadedScene::read(&args.scene)?;
+    loaded.scene.duration = args.duration.unwrap_or(loaded.scene.duration);
+    loaded.scene.record.contacts_every = 0;
+    let screw = loaded.scene.criterion.screw.clone();
+    let screw = screw.ok_or_else(|| format!("{}: it has no criterion.screw", args.scene.display()))?;
+    let scenes = match args.geometries.is_empty() {
+        true => vec![(screw.body.clone(), loaded.clone())],
+        false => args
+            .geometries
+            .iter()
+            .map(|file| with_geometry(&loaded, &screw.body, file.clone()))
+            .collect::<Result<_, _>>()?,
+    };
+    for (name, mut loaded) in scenes {
+        let system = loaded.system(&EncodeProgress::default())?;
+        for &mode in &args.modes {
+            loaded.scene.detector.mode = match mode {
+                Mode::Node => DetectorMode::Node,
+                Mode::Face => DetectorMode::Face,
+                Mode::Exact => DetectorMode::Exact,
+                Mode::Off => DetectorMode::Off,
+            };
+            for (&step, &redetections) in
+                args.time_steps.iter().flat_map(|step| args.redetections.iter().map(move |n| (step, n)))
+            {
+                loaded.scene.time_step = step * 1e-3;
+                loaded.scene.solver.redetections = redetections;
+                let start = [name.clone(), step.to_string(), format!("{mode:?}").to_lowercase()];
+                let (summary, depth) = one(&loaded, system.clone(), args.measurements)?;
+                print(start.into_iter().chain([redetections.to_string()]), &summary, depth)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn with_geometry(loaded: &LoadedScene, body: &str, file: PathBuf) -> Result<(String, LoadedScene), Failure> {
+    let mut loaded = loaded.clone();
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let file = std::path::absolute(file)?;
+    for section in loaded.scene.bodies.iter_mut().map(|b| b.get_mut()).filter(|b| b.name == body) {
+        (section.asset, section.mesh) = match file.extension().is_some_and(|e| e == "tesdf") {
+            true => (Some(file.clone()), None),
+            false => (None, Some(file.clone())),
+        };
+    }
+    Ok((name, loaded))
+}
+
+/// A run, and the greatest penetration at its measurements, m.
+fn one(loaded: &LoadedScene, system: System, measurements: u64) -> Result<(Summary, f64), Failure> {
+    let mut engine = loaded.newton(system)?;
+    let mut depth = 0.0_f64;
+    let (_, summary) = simulate(&loaded.scene, &mut engine, |moment: &Moment<'_>| {
+        let part = |step: u64| step * measurements / moment.steps;
+        if part(moment.step) != part(moment.step - 1) {
+            depth = depth.max(penetration(moment.system));
+        }
+        ControlFlow::Continue(())
+    })?;
+    Ok((summary, depth))
+}
+
+fn print(start: impl Iterator<Item = String>, summary: &Summary, depth: f64) -> Result<(), Failure> {
+    let Some(screw) = &summary.screw else { return Err("the run has no screw".into()) };
+    let rest = [
+        format!("{:.0}", summary.mean_contacts),
+        format!("{:.2}", depth * 1e6),
+        format!("{:.2}", summary.deepest_penetration * 1e6),
+        format!("{:.4}", screw.travel * 1e3),
+        format!("{:.4}", screw.turns),
+        format!("{:.1}", screw.largest_pitch_error * 1e6),
+        format!("{:.3}", screw.travel_of_analytic),
+        format!("{:.3}", screw.acceleration / screw.analytic_acceleration),
+        format!("{:.3}", screw.energy),
+        format!("{:.2} + {:.2}", summary.detection_ms, summary.solution_ms),
+        if screw.failures.is_empty() { "met".into() } else { screw.failures.join("; ") },
+    ];
+    output::row(&start.chain(rest).collect::<Vec<_>>())
+}
+
+/// Barycentric coordinates of the samples of a face are multiples of 1 / this.
+const LATTICE: u32 = 4;
+/// Samples that `f32` says are farther out than this share of the diagonal are not penetrating; its error is 1e-6.
+const NEAR: f64 = 1e-5;
+
+/// How deep sampled points of any body are in another, m; 0 when none is.
+fn penetration(system: &System) -> f64 {
+    let meshes: Vec<(&TeSdf, Pose)> = system
+        .bodies()
+        .iter()
+        .zip(system.states())
+        .filter_map(|(body, state)| {
+            let instance = system.scene().instance(body.instance).ok()?;
+            match system.scene().shape(instance.shape).ok()? {
+                Shape::Mesh(asset) => Some((asset.as_ref(), state.pose)),
+                _ => None,
+            }
+        })
+        .collect();
+    let mut depth = 0.0_f64;
+    for (i, a) in meshes.iter().enumerate() {
+        for (_, b) in meshes.iter().enumerate().filter(|&(j, _)| j != i) {
+            depth = depth.max(sampled_depth(a, b));
+        }
+    }
+    depth
+}
+
+fn sampled_depth((a, pose_a): &(&TeSdf, Pose), (b, pose_b): &(&TeSdf, Pose)) -> f64 {
+    use rayon::prelude::*;
+    let near = NEAR * b.bounds().extent().length();
+    let bounds = b.bounds();
+    let of_face = |face: usize| {
+        let corners = a.face_corners(face).map(|p| pose_b.to_body(pose_a.to_world(p)));
+        if !tesdf::geometry::Aabb::of(&corners).overlaps(bounds) {
+            return 0.0;
+        }
+        let depth = |p: DVec3| match b.signed_distance(p, Precision::F32) < near {
+            true => -b.signed_distance(p, Precision::F64),
+            false => 0.0,
+        };
+        lattice()
+            .map(|w| depth(corners[0] * w[0] + corners[1] * w[1] + corners[2] * w[2]))
+            .fold(0.0, f64::max)
+    };
+    (0..a.face_count()).into_par_iter().map(of_face).reduce(|| 0.0, f64::max)
+}
+
+fn lattice() -> impl Iterator<Item = [f64; 3]> {
+    let n = f64::from(LATTICE);
+    (0..=LATTICE)
+        .flat_map(move |i| (0..=LATTICE - i).map(move |j| [i, j, LATTICE - i - j].map(|k| f64::from(k) / n)))
+}

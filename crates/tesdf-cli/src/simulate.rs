@@ -1,0 +1,239 @@
+//! `tesdf simulate SCENE -o RUN`
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use tesdf::encode::EncodeProgress;
+use tesdf_sim::criterion::ScrewReport;
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
+use tesdf_sim::{Moment, SimulateError, Summary, simulate};
+
+use crate::parse;
+use crate::progress::{interrupt_flag, watched};
+use crate::report::{self, Failure, Outcome};
+
+/// Arguments of `tesdf simulate`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// A scene: TOML
+    pub scene: PathBuf,
+    /// The file to write, safetensors; an existing one is replaced
+    #[arg(short, long, value_name = "RUN")]
+    pub output: PathBuf,
+    /// Instead of the scene's time step, s
+    #[arg(long, value_name = "SECONDS", value_parser = parse::length)]
+    pub time_step: Option<f64>,
+    /// Instead of the scene's duration, s
+    #[arg(long, value_name = "SECONDS", value_parser = parse::length)]
+    pub duration: Option<f64>,
+    /// Instead of the scene's detector mode
+    #[arg(long, value_enum)]
+    pub mode: Option<Mode>,
+    /// Instead of the geometry of a body: a .tesdf file, or a mesh that is encoded; may be given several times
+    #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = geometry)]
+    pub geometries: Vec<(String, PathBuf)>,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What is tested against the other body's field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Mode {
+    /// The vertices
+    Node,
+    /// The faces, by Frank-Wolfe iterations
+    Face,
+    /// The faces, the exact minimum
+    Exact,
+    /// Nothing: bodies pass through each other, and a criterion should fail
+    Off,
+}
+
+fn geometry(text: &str) -> Result<(String, PathBuf), String> {
+    let (body, file) = text.split_once('=').ok_or("expected BODY=FILE")?;
+    Ok((body.into(), file.into()))
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    scene: String,
+    output: String,
+    #[serde(flatten)]
+    summary: &'a Summary,
+}
+
+/// Runs a scene and writes the run in one step at the end.
+///
+/// # Errors
+/// The scene cannot be loaded, a step failed, the file cannot be written, or Ctrl-C was pressed; the output file is then as it
+/// was. A run that does not meet the scene's criterion is written, and is not good.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let loaded = load(args)?;
+    crate::encode::check_output(&args.scene, &args.output)?;
+    let interrupted = interrupt_flag()?;
+    let progress = EncodeProgress::default();
+    let system = watched(&progress, &interrupted, || loaded.system(&progress));
+    let system = system.map_err(|e| match e {
+        SceneError::Cancelled => as_it_was("interrupted", &args.output),
+        e => Failure::new(e),
+    })?;
+    let mut engine = loaded.newton(system).map_err(Failure::new)?;
+    let bar = LiveProgress::new(&interrupted);
+    let ended = simulate(&loaded.scene, &mut engine, |moment| bar.show(moment));
+    drop(bar);
+    let (record, summary) = ended.map_err(|e| match e {
+        SimulateError::Interrupted { .. } => as_it_was(&e.to_string(), &args.output),
+        e => Failure::new(format!("{}: {e}", args.scene.display())),
+    })?;
+    record.save(&args.output).map_err(Failure::new)?;
+    print(args, &summary)?;
+    Ok(if summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
+}
+
+fn as_it_was(what: &str, output: &Path) -> Failure {
+    Failure::new(format!("{what}; {} is as it was", output.display()))
+}
+
+/// The scene with what the command line replaces.
+fn load(args: &Args) -> Result<LoadedScene, Failure> {
+    let mut loaded = LoadedScene::read(&args.scene).map_err(Failure::new)?;
+    let scene = &mut loaded.scene;
+    scene.time_step = args.time_step.unwrap_or(scene.time_step);
+    scene.duration = args.duration.unwrap_or(scene.duration);
+    if let Some(mode) = args.mode {
+        scene.detector.mode = match mode {
+            Mode::Node => DetectorMode::Node,
+            Mode::Face => DetectorMode::Face,
+            Mode::Exact => DetectorMode::Exact,
+            Mode::Off => DetectorMode::Off,
+        };
+    }
+    for (name, file) in &args.geometries {
+        // Paths of a scene are relative to its folder, those of a command to where it runs.
+        let file = std::path::absolute(file).map_err(|e| Failure::new(format!("{}: {e}", file.display())))?;
+        let body = scene.bodies.iter_mut().map(|body| body.get_mut()).find(|body| &body.name == name);
+        let Some(body) = body else {
+            return Err(Failure::new(format!("{}: there is no body {name}", args.scene.display())));
+        };
+        (body.asset, body.mesh, body.shape) = match file.extension().is_some_and(|e| e == "tesdf") {
+            true => (Some(file), None, None),
+            false => (None, Some(file), None),
+        };
+    }
+    Ok(loaded)
+}
+
+/// A bar on stderr with what the run does now.
+struct LiveProgress<'a> {
+    bar: ProgressBar,
+    interrupted: &'a AtomicBool,
+    begin: Instant,
+}
+
+impl<'a> LiveProgress<'a> {
+    fn new(interrupted: &'a AtomicBool) -> Self {
+        let bar = ProgressBar::new(1);
+        if let Ok(style) = ProgressStyle::with_template("[{bar:24}] {percent:>3} %  {eta} left  {msg}") {
+            bar.set_style(style.progress_chars("=> "));
+        }
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Self { bar, interrupted, begin: Instant::now() }
+    }
+
+    fn show(&self, moment: &Moment<'_>) -> ControlFlow<()> {
+        let Moment { step, steps, time, report, system } = moment;
+        self.bar.set_length(*steps);
+        self.bar.set_position(*step);
+        self.bar.set_message(format!(
+            "{time:.3} s, {}, deepest {:.1e} m, kinetic energy {:.2e} J, {:.1} ms per step",
+            report::count(report.contacts, "contact"),
+            (-report.deepest.unwrap_or(0.0)).max(0.0),
+            system.kinetic_energy(),
+            self.begin.elapsed().as_secs_f64() * 1e3 / *step as f64
+        ));
+        match self.interrupted.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    }
+}
+
+impl Drop for LiveProgress<'_> {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn print(args: &Args, summary: &Summary) -> Result<(), Failure> {
+    let [scene, output] = [&args.scene, &args.output].map(|path| path.display().to_string());
+    if args.json {
+        return report::json(&Report { scene, output, summary });
+    }
+    let Summary { steps, seconds, .. } = summary;
+    let mut rows = vec![
+        ("run", format!("{output}, {} over {seconds} s", report::count(*steps as usize, "step"))),
+        (
+            "contacts",
+            format!("{:.0} per step on average, at most {}", summary.mean_contacts, summary.most_contacts),
+        ),
+        ("penetration", format!("at most {:.1e} m, as the detection saw it", summary.deepest_penetration)),
+        (
+            "energy",
+            format!(
+                "{:.3e} J of motion, from {:.3e} J released",
+                summary.kinetic_energy, summary.released_energy
+            ),
+        ),
+        (
+            "solver",
+            format!(
+                "{:.1} iterations per step, {} not converged",
+                summary.mean_iterations,
+                report::count(summary.unconverged_steps as usize, "step")
+            ),
+        ),
+        (
+            "time",
+            format!(
+                "{:.2} ms per step for detection, {:.2} ms for the rest",
+                summary.detection_ms, summary.solution_ms
+            ),
+        ),
+    ];
+    if let Some(screw) = &summary.screw {
+        rows.extend(screw_rows(screw));
+    }
+    report::table(&rows)
+}
+
+fn screw_rows(screw: &ScrewReport) -> Vec<(&'static str, String)> {
+    let mut rows = vec![
+        (
+            "screw",
+            format!(
+                "{:.4} mm and {:.4} turns, {:.1} µm apart at most",
+                screw.travel * 1e3,
+                screw.turns,
+                screw.largest_pitch_error * 1e6
+            ),
+        ),
+        (
+            "acceleration",
+            format!(
+                "{:.3e} m/s², of an ideal screw {:.3e}; {:.1} % of its travel",
+                screw.acceleration,
+                screw.analytic_acceleration,
+                100.0 * screw.travel_of_analytic
+            ),
+        ),
+    ];
+    rows.extend(screw.failures.iter().map(|failure| ("not met", failure.clone())));
+    rows.push(("criterion", if screw.failures.is_empty() { "passed" } else { "not passed" }.into()));
+    rows
+}

@@ -1,0 +1,228 @@
+//! What makes a run a success, and the analytic screw that a run is compared with.
+use std::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+use tesdf::collide::Pose;
+use tesdf::glam::DVec3;
+
+use crate::{Mass, MassProperties, System};
+
+/// A body turns along a thread: at every moment its travel along the axis is its turns × pitch, up to the backlash.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScrewCriterion {
+    /// Name of the body.
+    pub body: String,
+    /// Direction in which it is expected to move; unit.
+    pub axis: [f64; 3],
+    /// Travel per turn, right-handed, m.
+    pub pitch: f64,
+    /// Turns that it makes at least.
+    pub min_turns: f64,
+    /// How far travel and turns × pitch may differ, m.
+    pub backlash: f64,
+    /// Share of the acceleration of an ideal screw that it reaches at least.
+    #[serde(default)]
+    pub min_acceleration: f64,
+    /// Share of the lost potential energy that its motion may have at most.
+    #[serde(default = "no_gain")]
+    pub max_energy: f64,
+}
+
+/// Energy does not grow: rounding, and what the contacts' springs hold, aside.
+fn no_gain() -> f64 {
+    1.001
+}
+
+/// What became of a screw.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScrewReport {
+    /// Of the centre of mass along the axis, m.
+    pub travel: f64,
+    /// About the axis, right-handed.
+    pub turns: f64,
+    /// Largest difference of travel and turns × pitch at any step, m.
+    pub largest_pitch_error: f64,
+    /// Over the second half of the run, along the axis, m/s².
+    pub acceleration: f64,
+    /// Of an ideal frictionless screw, m/s².
+    pub analytic_acceleration: f64,
+    /// Travel, as a share of the ideal screw's.
+    pub travel_of_analytic: f64,
+    /// Energy of the motion, as a share of the lost potential energy.
+    pub energy: f64,
+    /// Which demands were not met; empty when it passed.
+    pub failures: Vec<String>,
+}
+
+impl ScrewCriterion {
+    /// Checks the values, and that the body is there and free.
+    ///
+    /// # Errors
+    /// What was found and expected.
+    pub fn validate(&self, system: &System) -> Result<(), String> {
+        let axis = DVec3::from_array(self.axis);
+        if (axis.length() - 1.0).abs() > 1e-6 || axis.is_nan() {
+            return Err(format!("axis has length {}; expected 1", axis.length()));
+        }
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        for (key, value, good) in [
+            ("pitch", self.pitch, positive(self.pitch)),
+            ("min_turns", self.min_turns, positive(self.min_turns)),
+            ("backlash", self.backlash, positive(self.backlash)),
+            ("min_acceleration", self.min_acceleration, self.min_acceleration >= 0.0),
+            ("max_energy", self.max_energy, positive(self.max_energy)),
+        ] {
+            if !good {
+                return Err(format!("{key} is {value}; expected a positive number"));
+            }
+        }
+        self.find(system).map(|_| ())
+    }
+
+    fn find(&self, system: &System) -> Result<(usize, MassProperties), String> {
+        let names = || system.bodies().iter().map(|b| b.name.as_str()).collect::<Vec<_>>().join(", ");
+        let body = system
+            .bodies()
+            .iter()
+            .position(|b| b.name == self.body)
+            .ok_or_else(|| format!("there is no body {}; the bodies are {}", self.body, names()))?;
+        match system.bodies()[body].mass {
+            Mass::Free(mass) => Ok((body, mass)),
+            Mass::Fixed => Err(format!("body {} is fixed; it cannot turn", self.body)),
+        }
+    }
+}
+
+/// Acceleration of an ideal frictionless screw along its axis under an acceleration `along` in that direction: the part
+/// 1 / (1 + (k / (p / 2π))²) of it, as the rest turns the body. `gyration` is k, `pitch` p.
+pub fn screw_acceleration(along: f64, gyration: f64, pitch: f64) -> f64 {
+    along / (1.0 + (gyration * TAU / pitch).powi(2))
+}
+
+/// Follows a body along a run.
+#[derive(Clone, Debug)]
+pub struct ScrewTracker {
+    criterion: ScrewCriterion,
+    axis: DVec3,
+    body: usize,
+    mass: MassProperties,
+    analytic: f64,
+    energy: f64,
+    last: Pose,
+    turns: f64,
+    time: f64,
+    largest_pitch_error: f64,
+    /// Time at the end of each step, and travel up to there.
+    path: Vec<(f64, f64)>,
+}
+
+impl ScrewTracker {
+    /// From the state at the beginning.
+    ///
+    /// # Errors
+    /// As [`ScrewCriterion::validate`].
+    pub fn new(criterion: &ScrewCriterion, system: &System) -> Result<Self, String> {
+        criterion.validate(system)?;
+        let (body, mass) = criterion.find(system)?;
+        let axis = DVec3::from_array(criterion.axis);
+        let last = system.states()[body].pose;
+        let gyration = mass.radius_of_gyration(last.rotation.inverse() * axis);
+        Ok(Self {
+            criterion: criterion.clone(),
+            axis,
+            body,
+            mass,
+            analytic: screw_acceleration(system.gravity.dot(axis), gyration, criterion.pitch),
+            energy: system.kinetic_energy() + system.potential_energy(),
+            last,
+            turns: 0.0,
+            time: 0.0,
+            largest_pitch_error: 0.0,
+            path: vec![(0.0, 0.0)],
+        })
+    }
+
+    /// Takes in the state after a step of `time_step` seconds.
+    pub fn observe(&mut self, system: &System, time_step: f64) {
+        let pose = system.states()[self.body].pose;
+        let turn = (pose.rotation * self.last.rotation.inverse()).to_scaled_axis().dot(self.axis);
+        self.turns += turn / TAU;
+        let moved = pose.to_world(self.mass.center) - self.last.to_world(self.mass.center);
+        let travel = self.travel() + moved.dot(self.axis);
+        self.time += time_step;
+        self.path.push((self.time, travel));
+        self.last = pose;
+        let error = (travel - self.turns * self.criterion.pitch).abs();
+        self.largest_pitch_error = self.largest_pitch_error.max(error);
+    }
+
+    /// Travel along the axis so far, m.
+    pub fn travel(&self) -> f64 {
+        self.path.last().map_or(0.0, |(_, travel)| *travel)
+    }
+
+    /// Turns about the axis so far.
+    pub fn turns(&self) -> f64 {
+        self.turns
+    }
+
+    /// What came of it.
+    pub fn report(&self, system: &System) -> ScrewReport {
+        let kinetic = system.kinetic_energy();
+        let criterion = &self.criterion;
+        let mut report = ScrewReport {
+            travel: self.travel(),
+            turns: self.turns,
+            largest_pitch_error: self.largest_pitch_error,
+            acceleration: self.acceleration(),
+            analytic_acceleration: self.analytic,
+            travel_of_analytic: self.travel() / (0.5 * self.analytic * self.time * self.time),
+            energy: kinetic / (self.energy - system.potential_energy()),
+            failures: Vec::new(),
+        };
+        let mut demand = |met: bool, text: String| {
+            if !met {
+                report.failures.push(text);
+            }
+        };
+        let (error, backlash) = (self.largest_pitch_error, criterion.backlash);
+        demand(
+            self.turns >= criterion.min_turns,
+            format!("{:.4} turns; expected at least {}", self.turns, criterion.min_turns),
+        );
+        demand(
+            error <= backlash,
+            format!("travel and turns × pitch differ by {error:.3e} m; expected at most {backlash:.3e} m"),
+        );
+        let share = self.acceleration() / self.analytic;
+        demand(
+            share >= criterion.min_acceleration,
+            format!(
+                "{share:.3} of the acceleration of an ideal screw; expected at least {}",
+                criterion.min_acceleration
+            ),
+        );
+        let energy = kinetic / (self.energy - system.potential_energy());
+        demand(
+            energy <= criterion.max_energy,
+            format!(
+                "the motion has {energy:.4} of the lost potential energy; expected at most {}",
+                criterion.max_energy
+            ),
+        );
+        report
+    }
+
+    /// Slope of the velocity over the second half, by least squares.
+    fn acceleration(&self) -> f64 {
+        let velocities: Vec<(f64, f64)> = self.path[self.path.len() / 2..]
+            .windows(2)
+            .map(|w| (0.5 * (w[0].0 + w[1].0), (w[1].1 - w[0].1) / (w[1].0 - w[0].0)))
+            .collect();
+        let n = velocities.len() as f64;
+        let mean = |f: &dyn Fn(&(f64, f64)) -> f64| velocities.iter().map(f).sum::<f64>() / n;
+        let (t, v) = (mean(&|p| p.0), mean(&|p| p.1));
+        mean(&|p| (p.0 - t) * (p.1 - v)) / mean(&|p| (p.0 - t).powi(2))
+    }
+}

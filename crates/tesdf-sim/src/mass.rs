@@ -1,0 +1,227 @@
+//! Mass, centre of mass and inertia of closed meshes and simple shapes.
+use std::f64::consts::PI;
+
+use glam::{DMat3, DVec3};
+use tesdf::collide::Shape;
+
+/// Mass, centre of mass and inertia of a rigid body, in the frame of its mesh or shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MassProperties {
+    /// kg; positive.
+    pub mass: f64,
+    /// Centre of mass, m.
+    pub center: DVec3,
+    /// Inertia about the centre of mass, axes of the body's frame, kg m²; symmetric and positive definite.
+    pub inertia: DMat3,
+}
+
+/// Why a body has no mass properties.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MassError {
+    /// A density or mass that is none.
+    #[error("{what} {found}; expected a finite number greater than 0")]
+    NotPositive {
+        /// Density or mass.
+        what: &'static str,
+        /// Its value.
+        found: f64,
+    },
+    /// A half space.
+    #[error("a plane has no finite mass; make the body fixed")]
+    Plane,
+    /// The mesh bounds no volume.
+    #[error("the mesh encloses {volume:e} m³; a free body needs a closed mesh whose faces point outward")]
+    NoVolume {
+        /// The signed volume.
+        volume: f64,
+    },
+}
+
+impl MassProperties {
+    /// Of a shape of uniform density, kg/m³, with `scale` world units per unit of the shape.
+    ///
+    /// A mesh counts by its winding number: what two of its shells share counts twice.
+    ///
+    /// # Errors
+    /// A density that is not positive, a plane, or a mesh without volume.
+    pub fn of_shape(shape: &Shape, scale: f64, density: f64) -> Result<Self, MassError> {
+        let unit = match shape {
+            Shape::Mesh(asset) => Self::of_triangles((0..asset.face_count()).map(|f| asset.face_corners(f)))?,
+            Shape::Plane => return Err(MassError::Plane),
+            Shape::Box { half_extents: h } => {
+                let mass = 8.0 * h.x * h.y * h.z;
+                let square = *h * *h;
+                Self::on_axes(mass, mass / 3.0 * (DVec3::splat(square.element_sum()) - square))
+            }
+            Shape::Sphere { radius: r } => {
+                let mass = 4.0 / 3.0 * PI * r.powi(3);
+                Self::on_axes(mass, DVec3::splat(0.4 * mass * r * r))
+            }
+            Shape::Capsule { half_height: l, radius: r } => {
+                let (cylinder, sphere) = (2.0 * PI * r * r * l, 4.0 / 3.0 * PI * r.powi(3));
+                let along = cylinder * r * r / 2.0 + sphere * 0.4 * r * r;
+                // A half sphere's centre lies 3/8 r from its base.
+                let across =
+                    cylinder * (r * r / 4.0 + l * l / 3.0) + sphere * (0.4 * r * r + l * l + 0.75 * l * r);
+                Self::on_axes(cylinder + sphere, DVec3::new(across, across, along))
+            }
+        };
+        check("density", density)?;
+        Ok(Self {
+            mass: unit.mass * density * scale.powi(3),
+            center: unit.center * scale,
+            inertia: unit.inertia * (density * scale.powi(5)),
+        })
+    }
+
+    /// Of the solid of density 1 that outward triangles bound: exact integrals over the tetrahedra between each triangle and a
+    /// point near the middle.
+    ///
+    /// # Errors
+    /// [`MassError::NoVolume`].
+    pub fn of_triangles(
+        triangles: impl ExactSizeIterator<Item = [DVec3; 3]> + Clone,
+    ) -> Result<Self, MassError> {
+        // About a point near the body, or a body far from the origin would lose its digits to cancellation.
+        let count = 3.0 * triangles.len().max(1) as f64;
+        let middle: DVec3 = triangles.clone().flatten().sum::<DVec3>() / count;
+        let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
+        for [a, b, c] in triangles {
+            let [a, b, c] = [a - middle, b - middle, c - middle];
+            let six = a.dot(b.cross(c));
+            let sum = a + b + c;
+            volume += six / 6.0;
+            first += six / 24.0 * sum;
+            second += six / 120.0 * (square(a) + square(b) + square(c) + square(sum));
+        }
+        if !(volume > 0.0 && volume.is_finite()) {
+            return Err(MassError::NoVolume { volume });
+        }
+        let arm = first / volume;
+        let second = second - volume * square(arm);
+        let trace = second.x_axis.x + second.y_axis.y + second.z_axis.z;
+        Ok(Self {
+            mass: volume,
+            center: middle + arm,
+            inertia: DMat3::from_diagonal(DVec3::splat(trace)) - second,
+        })
+    }
+
+    /// The same distribution with another mass, kg.
+    ///
+    /// # Errors
+    /// A mass that is not positive.
+    pub fn with_mass(self, mass: f64) -> Result<Self, MassError> {
+        check("mass", mass)?;
+        Ok(Self { mass, inertia: self.inertia * (mass / self.mass), ..self })
+    }
+
+    /// Radius of gyration about the axis of direction `axis` (body frame, unit) through the centre of mass, m.
+    pub fn radius_of_gyration(&self, axis: DVec3) -> f64 {
+        (axis.dot(self.inertia * axis) / self.mass).sqrt()
+    }
+
+    fn on_axes(mass: f64, inertia: DVec3) -> Self {
+        Self { mass, center: DVec3::ZERO, inertia: DMat3::from_diagonal(inertia) }
+    }
+}
+
+fn square(a: DVec3) -> DMat3 {
+    DMat3::from_cols(a * a.x, a * a.y, a * a.z)
+}
+
+fn check(what: &'static str, found: f64) -> Result<(), MassError> {
+    if found > 0.0 && found.is_finite() { Ok(()) } else { Err(MassError::NotPositive { what, found }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+
+    /// Corners of a box's twelve triangles, outward.
+    fn box_triangles(half: DVec3) -> Vec<[DVec3; 3]> {
+        let corner = |k: usize| {
+            let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            half * DVec3::new(sign(0), sign(1), sign(2))
+        };
+        let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).map(|t| t.map(corner)).collect()
+    }
+
+    fn assert_close(found: &MassProperties, expected: &MassProperties, bound: f64) {
+        assert!((found.mass / expected.mass - 1.0).abs() < bound, "{found:?} {expected:?}");
+        let scale = expected.inertia.x_axis.length();
+        let difference = found.inertia - expected.inertia;
+        let worst = difference.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+        assert!(worst < bound * scale, "{found:?} {expected:?}");
+        let size = (scale / expected.mass).sqrt();
+        assert!(found.center.distance(expected.center) < bound * size, "{found:?} {expected:?}");
+    }
+
+    #[test]
+    fn a_mesh_of_a_box_is_the_box() {
+        let half = DVec3::new(0.5, 1.0, 2.5);
+        let formula = MassProperties::of_shape(&Shape::Box { half_extents: half }, 1.0, 1.0).unwrap();
+        let triangles = box_triangles(half);
+        assert_close(&MassProperties::of_triangles(triangles.iter().copied()).unwrap(), &formula, 1e-14);
+
+        // Turned, and a thousand sizes from the origin.
+        let turn = DQuat::from_scaled_axis(DVec3::new(0.3, -1.0, 0.7));
+        let offset = DVec3::new(3000.0, -2000.0, 1000.0);
+        let moved = triangles.iter().map(|t| t.map(|p| turn * p + offset));
+        let r = DMat3::from_quat(turn);
+        let expected =
+            MassProperties { center: offset, inertia: r * formula.inertia * r.transpose(), ..formula };
+        assert_close(&MassProperties::of_triangles(moved).unwrap(), &expected, 1e-11);
+    }
+
+    /// Integrates by slices: a body of revolution of radius `r(z)` is a stack of discs.
+    fn revolved(radius: impl Fn(f64) -> f64, half: f64) -> MassProperties {
+        let n = 200_000;
+        let dz = 2.0 * half / f64::from(n);
+        let (mut mass, mut along, mut across) = (0.0, 0.0, 0.0);
+        for k in 0..n {
+            let z = -half + (f64::from(k) + 0.5) * dz;
+            let r = radius(z);
+            let m = PI * r * r * dz;
+            mass += m;
+            along += m * r * r / 2.0;
+            across += m * (r * r / 4.0 + z * z);
+        }
+        MassProperties::on_axes(mass, DVec3::new(across, across, along))
+    }
+
+    #[test]
+    fn spheres_and_capsules_are_their_slices() {
+        let (half_height, radius): (f64, f64) = (1.3, 0.7);
+        let capsule = MassProperties::of_shape(&Shape::Capsule { half_height, radius }, 1.0, 1.0).unwrap();
+        let profile = |z: f64| (radius.powi(2) - (z.abs() - half_height).max(0.0).powi(2)).sqrt();
+        assert_close(&capsule, &revolved(profile, half_height + radius), 1e-8);
+        let sphere = MassProperties::of_shape(&Shape::Sphere { radius }, 1.0, 1.0).unwrap();
+        assert_close(&sphere, &revolved(|z| (radius * radius - z * z).sqrt(), radius), 1e-8);
+    }
+
+    #[test]
+    fn density_scale_and_mass() {
+        let shape = Shape::Box { half_extents: DVec3::new(0.5, 1.0, 1.5) };
+        let large = Shape::Box { half_extents: DVec3::new(1.0, 2.0, 3.0) };
+        let scaled = MassProperties::of_shape(&shape, 2.0, 7.0).unwrap();
+        assert_close(&scaled, &MassProperties::of_shape(&large, 1.0, 7.0).unwrap(), 1e-14);
+        let heavy = scaled.with_mass(2.0 * scaled.mass).unwrap();
+        assert_close(&heavy, &MassProperties::of_shape(&large, 1.0, 14.0).unwrap(), 1e-14);
+        assert!((scaled.radius_of_gyration(DVec3::Z) - (20.0_f64 / 12.0).sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_has_no_mass_is_refused() {
+        assert_eq!(MassProperties::of_shape(&Shape::Plane, 1.0, 1.0), Err(MassError::Plane));
+        let sphere = Shape::Sphere { radius: 1.0 };
+        let zero = MassProperties::of_shape(&sphere, 1.0, 0.0);
+        assert_eq!(zero, Err(MassError::NotPositive { what: "density", found: 0.0 }));
+        let inside_out = box_triangles(DVec3::ONE).into_iter().map(|[a, b, c]| [a, c, b]).collect::<Vec<_>>();
+        let refused = MassProperties::of_triangles(inside_out.into_iter());
+        assert!(matches!(refused, Err(MassError::NoVolume { volume }) if (volume + 8.0).abs() < 1e-12));
+    }
+}

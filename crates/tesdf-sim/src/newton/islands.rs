@@ -1,0 +1,82 @@
+//! Groups of free bodies that no row connects to others.
+use super::rows::Row;
+
+/// Free bodies, and the rows between them, both ascending.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Island {
+    /// Free bodies.
+    pub bodies: Vec<usize>,
+    /// Rows, as positions in the list of rows.
+    pub rows: Vec<usize>,
+}
+
+/// The islands, by their lowest body; bodies without rows are in none.
+pub fn islands(bodies: usize, rows: &[Row]) -> Vec<Island> {
+    let mut parent: Vec<usize> = (0..bodies).collect();
+    for row in rows {
+        if let [Some((a, _)), Some((b, _))] = row.sides {
+            let (a, b) = (root(&mut parent, a), root(&mut parent, b));
+            // The lowest body is the root, so the order of the rows does not matter.
+            parent[a.max(b)] = a.min(b);
+        }
+    }
+    let mut of_root: Vec<Option<usize>> = vec![None; bodies];
+    let mut islands: Vec<Island> = Vec::new();
+    let mut touched = vec![false; bodies];
+    for row in rows {
+        row.sides.iter().flatten().for_each(|&(body, _)| touched[body] = true);
+    }
+    for body in (0..bodies).filter(|&body| touched[body]) {
+        let root = root(&mut parent, body);
+        let island = *of_root[root].get_or_insert_with(|| {
+            islands.push(Island::default());
+            islands.len() - 1
+        });
+        islands[island].bodies.push(body);
+    }
+    for (k, row) in rows.iter().enumerate() {
+        if let Some(&(body, _)) = row.sides.iter().flatten().next()
+            && let Some(island) = of_root[root(&mut parent, body)]
+        {
+            islands[island].rows.push(k);
+        }
+    }
+    islands
+}
+
+fn root(parent: &mut [usize], mut k: usize) -> usize {
+    while parent[k] != k {
+        parent[k] = parent[parent[k]];
+        k = parent[k];
+    }
+    k
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector6;
+
+    use super::*;
+
+    fn row(a: Option<usize>, b: Option<usize>) -> Row {
+        let side = |k: Option<usize>| k.map(|k| (k, Vector6::zeros()));
+        Row { sides: [side(a), side(b)], gap: 0.0, relaxed_gap: 0.0, stiffness: 1.0 }
+    }
+
+    #[test]
+    fn fixed_bodies_do_not_connect() {
+        let rows = [
+            row(Some(4), None),
+            row(Some(0), None),
+            row(Some(5), Some(2)),
+            row(None, Some(2)),
+            row(Some(0), Some(5)),
+        ];
+        let found = islands(6, &rows);
+        let expected = [
+            Island { bodies: vec![0, 2, 5], rows: vec![1, 2, 3, 4] },
+            Island { bodies: vec![4], rows: vec![0] },
+        ];
+        assert_eq!(found, expected);
+    }
+}

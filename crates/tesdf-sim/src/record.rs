@@ -1,0 +1,288 @@
+//! Runs as safetensors files.
+//!
+//! | tensor | type | content |
+//! |---|---|---|
+//! | `times` | f64 [S + 1] | s; the first is the beginning |
+//! | `poses` | f64 [S + 1, B, 7] | of each body's frame: translation, quaternion x y z w |
+//! | `velocities` | f64 [S + 1, B, 6] | of the centre of mass, then angular |
+//! | `contacts.steps` | u64 [R] | the steps whose contacts are kept, from 0; the contacts are those at its beginning, `poses[step]` |
+//! | `contacts.starts` | u64 [R + 1] | where the contacts of each of them begin |
+//! | `contacts.points`, `contacts.normals` | f32 [C, 3] | `point_a` and `normal` of [`Contact`], world |
+//! | `contacts.distances` | f32 [C] | signed distance |
+//! | `contacts.ids` | u32 [C, 4] | body of the face, body of the field, face of a, face of b |
+//!
+//! The metadata has one key, `tesdf_run`: JSON with `version`, `bodies` (names), and `scene` (the scene as JSON).
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView, serialize};
+use serde::{Deserialize, Serialize};
+use tesdf::asset::{AssetError, save_atomic};
+use tesdf::collide::{Contact, Pose};
+use tesdf::glam::{DQuat, DVec3};
+
+use crate::{State, System};
+
+/// The version that is written and read.
+pub const RUN_VERSION: u32 = 1;
+const KEY: &str = "tesdf_run";
+
+/// States of all bodies over time, and contacts of some steps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RunRecord {
+    /// Names of the bodies.
+    pub bodies: Vec<String>,
+    /// The scene as JSON.
+    pub scene: serde_json::Value,
+    times: Vec<f64>,
+    poses: Vec<[f64; 7]>,
+    velocities: Vec<[f64; 6]>,
+    contact_steps: Vec<u64>,
+    contact_starts: Vec<u64>,
+    points: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    distances: Vec<f32>,
+    ids: Vec<[u32; 4]>,
+}
+
+/// A contact as it is kept.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedContact {
+    /// World.
+    pub point: [f32; 3],
+    /// World, from b to a.
+    pub normal: [f32; 3],
+    /// Signed.
+    pub distance: f32,
+    /// The body whose face it is, and the body whose field it is.
+    pub bodies: [u32; 2],
+    /// Face of a, face of b.
+    pub faces: [u32; 2],
+}
+
+/// Why a run file cannot be written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The operating system.
+    #[error(transparent)]
+    Save(#[from] AssetError),
+    /// The operating system.
+    #[error("cannot read {}: {source}", .path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        source: std::io::Error,
+    },
+    /// No safetensors file.
+    #[error("not a safetensors file: {0}")]
+    Container(#[from] SafeTensorError),
+    /// No run.
+    #[error("not a run of tesdf: {0}; `tesdf simulate` writes runs")]
+    NotARun(String),
+    /// Another version.
+    #[error("the run has version {found}; this build reads {RUN_VERSION}: simulate the scene again")]
+    Version {
+        /// The version in the file.
+        found: u32,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+struct About {
+    version: u32,
+    bodies: Vec<String>,
+    scene: serde_json::Value,
+}
+
+impl RunRecord {
+    /// A record that begins with the state of `system` at time 0.
+    pub fn new(system: &System, scene: serde_json::Value) -> Self {
+        let bodies = system.bodies().iter().map(|body| body.name.clone()).collect();
+        let mut record = Self { bodies, scene, contact_starts: vec![0], ..Self::default() };
+        record.push(0.0, system);
+        record
+    }
+
+    /// Adds the state of `system` at a time.
+    pub fn push(&mut self, time: f64, system: &System) {
+        self.times.push(time);
+        for State { pose, linear, angular } in system.states() {
+            let [x, y, z] = pose.translation.to_array();
+            let [i, j, k, w] = pose.rotation.to_array();
+            self.poses.push([x, y, z, i, j, k, w]);
+            let ([x, y, z], [i, j, k]) = (linear.to_array(), angular.to_array());
+            self.velocities.push([x, y, z, i, j, k]);
+        }
+    }
+
+    /// Adds the contacts at the beginning of a step; steps ascend.
+    pub fn push_contacts(&mut self, step: u64, contacts: &[Contact], system: &System) {
+        let body = |instance| system.body_of(instance).map_or(u32::MAX, |body| body as u32);
+        self.contact_steps.push(step);
+        for contact in contacts {
+            self.points.push(contact.point_a.as_vec3().to_array());
+            self.normals.push(contact.normal.as_vec3().to_array());
+            self.distances.push(contact.distance as f32);
+            let bodies = [body(contact.instance_a), body(contact.instance_b)];
+            self.ids.push([bodies[0], bodies[1], contact.face_a, contact.face_b]);
+        }
+        self.contact_starts.push(self.distances.len() as u64);
+    }
+
+    /// Times, s; as many as there are states.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Pose of a body after `step` steps.
+    pub fn pose(&self, step: usize, body: usize) -> Option<Pose> {
+        let at = (body < self.bodies.len()).then(|| step * self.bodies.len() + body)?;
+        let [x, y, z, i, j, k, w] = *self.poses.get(at)?;
+        Some(Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(i, j, k, w) })
+    }
+
+    /// Velocity of a body's centre of mass, and its angular velocity, after `step` steps.
+    pub fn velocity(&self, step: usize, body: usize) -> Option<[DVec3; 2]> {
+        let at = (body < self.bodies.len()).then(|| step * self.bodies.len() + body)?;
+        let [x, y, z, i, j, k] = *self.velocities.get(at)?;
+        Some([DVec3::new(x, y, z), DVec3::new(i, j, k)])
+    }
+
+    /// The steps whose contacts are kept, with the contacts.
+    pub fn contacts(&self) -> impl Iterator<Item = (u64, Vec<RecordedContact>)> {
+        let contact = |k: usize| RecordedContact {
+            point: self.points[k],
+            normal: self.normals[k],
+            distance: self.distances[k],
+            bodies: [self.ids[k][0], self.ids[k][1]],
+            faces: [self.ids[k][2], self.ids[k][3]],
+        };
+        self.contact_steps
+            .iter()
+            .zip(self.contact_starts.windows(2))
+            .map(move |(&step, range)| (step, (range[0] as usize..range[1] as usize).map(contact).collect()))
+    }
+
+    /// The file's bytes; the same record gives the same bytes.
+    ///
+    /// # Errors
+    /// Metadata larger than safetensors allows.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, RecordError> {
+        let about = About { version: RUN_VERSION, bodies: self.bodies.clone(), scene: self.scene.clone() };
+        let about = serde_json::to_string(&about).map_err(|e| RecordError::NotARun(e.to_string()))?;
+        // One key: the crate keeps metadata in a hash map, and the order of several would vary from run to run.
+        let metadata = HashMap::from([(KEY.to_string(), about)]);
+        let (states, bodies) = (self.times.len(), self.bodies.len());
+        let contacts = self.distances.len();
+        let tensors = [
+            tensor("times", Dtype::F64, vec![states], &self.times)?,
+            tensor("poses", Dtype::F64, vec![states, bodies, 7], self.poses.as_flattened())?,
+            tensor("velocities", Dtype::F64, vec![states, bodies, 6], self.velocities.as_flattened())?,
+            tensor("contacts.steps", Dtype::U64, vec![self.contact_steps.len()], &self.contact_steps)?,
+            tensor("contacts.starts", Dtype::U64, vec![self.contact_starts.len()], &self.contact_starts)?,
+            tensor("contacts.points", Dtype::F32, vec![contacts, 3], self.points.as_flattened())?,
+            tensor("contacts.normals", Dtype::F32, vec![contacts, 3], self.normals.as_flattened())?,
+            tensor("contacts.distances", Dtype::F32, vec![contacts], &self.distances)?,
+            tensor("contacts.ids", Dtype::U32, vec![contacts, 4], self.ids.as_flattened())?,
+        ];
+        Ok(serialize(tensors, Some(metadata))?)
+    }
+
+    /// Writes the file whole or not at all.
+    ///
+    /// # Errors
+    /// What the operating system refused.
+    pub fn save(&self, path: &Path) -> Result<(), RecordError> {
+        Ok(save_atomic(path, &self.to_bytes()?)?)
+    }
+
+    /// Reads a run file.
+    ///
+    /// # Errors
+    /// As [`from_bytes`](Self::from_bytes), and what the operating system refused.
+    pub fn open(path: &Path) -> Result<Self, RecordError> {
+        let bytes =
+            std::fs::read(path).map_err(|source| RecordError::Read { path: path.to_path_buf(), source })?;
+        Self::from_bytes(&bytes)
+    }
+
+    /// A record from a file's bytes.
+    ///
+    /// # Errors
+    /// No safetensors file, no run, another version, or tensors that do not fit each other.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecordError> {
+        let (_, header) = SafeTensors::read_metadata(bytes)?;
+        let about = header.metadata().as_ref().and_then(|m| m.get(KEY));
+        let about = about.ok_or_else(|| RecordError::NotARun(format!("the metadata has no {KEY}")))?;
+        let About { version, bodies, scene } =
+            serde_json::from_str(about).map_err(|e| RecordError::NotARun(format!("{KEY}: {e}")))?;
+        if version != RUN_VERSION {
+            return Err(RecordError::Version { found: version });
+        }
+        let file = SafeTensors::deserialize(bytes)?;
+        let count = bodies.len();
+        let times: Vec<f64> = values(&file, "times", Dtype::F64, &[])?;
+        let record = Self {
+            poses: values(&file, "poses", Dtype::F64, &[count, 7])?,
+            velocities: values(&file, "velocities", Dtype::F64, &[count, 6])?,
+            contact_steps: values(&file, "contacts.steps", Dtype::U64, &[])?,
+            contact_starts: values(&file, "contacts.starts", Dtype::U64, &[])?,
+            points: values(&file, "contacts.points", Dtype::F32, &[3])?,
+            normals: values(&file, "contacts.normals", Dtype::F32, &[3])?,
+            distances: values(&file, "contacts.distances", Dtype::F32, &[])?,
+            ids: values(&file, "contacts.ids", Dtype::U32, &[4])?,
+            times,
+            bodies,
+            scene,
+        };
+        record.check()?;
+        Ok(record)
+    }
+
+    fn check(&self) -> Result<(), RecordError> {
+        let states = self.times.len() * self.bodies.len();
+        let contacts = self.distances.len();
+        let starts = &self.contact_starts;
+        let fits = self.poses.len() == states
+            && self.velocities.len() == states
+            && [self.points.len(), self.normals.len(), self.ids.len()] == [contacts; 3]
+            && starts.len() == self.contact_steps.len() + 1
+            && starts.first() == Some(&0)
+            && starts.last() == Some(&(contacts as u64))
+            && starts.is_sorted();
+        if fits {
+            return Ok(());
+        }
+        Err(RecordError::NotARun("its tensors do not fit each other; it was damaged or made by hand".into()))
+    }
+}
+
+fn tensor<'a, T: bytemuck::Pod>(
+    name: &'static str,
+    dtype: Dtype,
+    shape: Vec<usize>,
+    values: &'a [T],
+) -> Result<(&'static str, TensorView<'a>), RecordError> {
+    Ok((name, TensorView::new(dtype, shape, bytemuck::cast_slice(values))?))
+}
+
+/// The rows of a tensor of shape `[n, row…]`; copied, as a file's tensors need not be aligned.
+fn values<T: bytemuck::AnyBitPattern>(
+    file: &SafeTensors<'_>,
+    name: &str,
+    dtype: Dtype,
+    row: &[usize],
+) -> Result<Vec<T>, RecordError> {
+    let tensor = file.tensor(name)?;
+    match tensor.shape().split_first() {
+        Some((_, found)) if found == row && tensor.dtype() == dtype => {
+            Ok(tensor.data().chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
+        }
+        _ => Err(RecordError::NotARun(format!(
+            "{name} is {:?} {:?}; expected {dtype:?} [n, {row:?}]",
+            tensor.dtype(),
+            tensor.shape()
+        ))),
+    }
+}

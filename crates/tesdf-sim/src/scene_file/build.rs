@@ -1,0 +1,223 @@
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tesdf::TeSdf;
+use tesdf::asset::about::Source;
+use tesdf::collide::{
+    CollideError, CollideOptions, Contacts, FaceMethod, Instance, Mode, Pose, Scene, Shape, ShapeId,
+    Velocity, detect,
+};
+use tesdf::encode::{EncodeError, EncodeOptions, EncodeProgress, Length, Preset, encode};
+use tesdf::glam::{DQuat, DVec3};
+use tesdf::mesh::{self, LoadedMesh, SolidMesh};
+
+use super::read::LoadedScene;
+use super::{BodySection, DetectorMode, DetectorSection, SceneError, ShapeSection};
+use crate::newton::Newton;
+use crate::{Mass, MassProperties, System};
+
+/// Share of the smallest free body's diagonal up to which contacts are taken by default.
+const CONTACT_DISTANCE: f64 = 5e-3;
+
+impl LoadedScene {
+    /// Opens and encodes what the bodies are, and makes the system. `progress` is told of every encoding.
+    ///
+    /// # Errors
+    /// The body at fault, with its line; or [`SceneError::Cancelled`].
+    pub fn system(&self, progress: &EncodeProgress) -> Result<System, SceneError> {
+        let scene = &self.scene;
+        for (key, value) in [("time_step", scene.time_step), ("duration", scene.duration)] {
+            if !(value > 0.0 && value.is_finite()) {
+                return Err(self.value(key, format!("{value}; expected a number of seconds above 0")));
+            }
+        }
+        let gravity = DVec3::from_array(scene.gravity);
+        if !gravity.is_finite() {
+            return Err(self.value("gravity", format!("{gravity}; expected finite numbers, in m/s²")));
+        }
+        let mut system = System::new(gravity);
+        let mut shapes = Shapes::default();
+        for (k, body) in scene.bodies.iter().enumerate() {
+            let at = |reason: String| self.body_error(k, reason);
+            let section = body.get_ref();
+            if scene.bodies[..k].iter().any(|other| other.get_ref().name == section.name) {
+                return Err(at("the name is used twice; give each body its own".into()));
+            }
+            let shape = shapes.get(self, section, &mut system, progress).map_err(|e| match e {
+                ShapeFailure::Cancelled => SceneError::Cancelled,
+                ShapeFailure::Reason(reason) => at(reason),
+            })?;
+            let mass = mass(&system, section, shape).map_err(at)?;
+            let instance = instance(section, shape).map_err(at)?;
+            system.add(&section.name, instance, mass).map_err(|e| self.body_error(k, instance_reason(e)))?;
+        }
+        if let Some(screw) = &scene.criterion.screw {
+            screw.validate(&system).map_err(|reason| self.value("criterion.screw", reason))?;
+        }
+        Ok(system)
+    }
+
+    /// The embedded engine for the scene's system.
+    ///
+    /// # Errors
+    /// A value of the sections `detector` and `solver` that makes no sense.
+    pub fn newton(&self, system: System) -> Result<Newton, SceneError> {
+        let collide = collide_options(&self.scene.detector, &system);
+        collide.validate().map_err(|e| self.value("detector", e))?;
+        let solver = self.scene.solver;
+        match self.scene.detector.mode {
+            DetectorMode::Off => Newton::new(system, nothing, collide, solver),
+            _ => Newton::new(system, detect, collide, solver),
+        }
+        .map_err(|e| self.value("solver", e))
+    }
+
+    fn body_error(&self, body: usize, reason: String) -> SceneError {
+        let body = &self.scene.bodies[body];
+        SceneError::Body {
+            path: self.path.clone(),
+            line: self.line(body.span().start),
+            name: body.get_ref().name.clone(),
+            reason,
+        }
+    }
+}
+
+fn nothing(_: &Scene, _: &CollideOptions) -> Result<Contacts, CollideError> {
+    Ok(Contacts::default())
+}
+
+/// What the detector is asked for.
+fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions {
+    let mode = match section.mode {
+        DetectorMode::Node | DetectorMode::Off => Mode::Node,
+        DetectorMode::Face => Mode::Face(FaceMethod::FrankWolfe { iterations: section.iterations }),
+        DetectorMode::Exact => {
+            Mode::Face(FaceMethod::Exact { tolerance: Length::OfDiagonal(section.tolerance) })
+        }
+    };
+    let contact_distance =
+        section.contact_distance.unwrap_or_else(|| CONTACT_DISTANCE * smallest_free_body(system));
+    CollideOptions { contact_distance, cos_theta: section.cos_theta, ..CollideOptions::with_mode(mode) }
+}
+
+/// Diagonal of the smallest free body; 0 when there is none.
+fn smallest_free_body(system: &System) -> f64 {
+    let size = |body: &crate::Body| {
+        let instance = system.scene().instance(body.instance).ok()?;
+        Some(system.scene().shape(instance.shape).ok()?.diagonal() * instance.scale)
+    };
+    let free = system.bodies().iter().filter(|body| body.mass != Mass::Fixed);
+    free.filter_map(size).reduce(f64::min).unwrap_or(0.0)
+}
+
+enum ShapeFailure {
+    Cancelled,
+    Reason(String),
+}
+
+/// Shapes by file, so that bodies share them.
+#[derive(Default)]
+struct Shapes(BTreeMap<PathBuf, ShapeId>);
+
+impl Shapes {
+    fn get(
+        &mut self,
+        scene: &LoadedScene,
+        body: &BodySection,
+        system: &mut System,
+        progress: &EncodeProgress,
+    ) -> Result<ShapeId, ShapeFailure> {
+        let shape = match (&body.asset, &body.mesh, &body.shape) {
+            (Some(file), None, None) | (None, Some(file), None) => {
+                let file = scene.resolve(file);
+                if let Some(&shape) = self.0.get(&file) {
+                    return Ok(shape);
+                }
+                let opened = match body.asset {
+                    Some(_) => TeSdf::open(&file)
+                        .map_err(|e| ShapeFailure::Reason(format!("{}: {e}", file.display())))?,
+                    None => encode_mesh(&file, progress)?,
+                };
+                let shape = add_shape(system, Shape::Mesh(Arc::new(opened)))?;
+                self.0.insert(file, shape);
+                return Ok(shape);
+            }
+            (None, None, Some(shape)) => shape.to_shape(),
+            (None, None, None) => {
+                return Err(ShapeFailure::Reason(
+                    "it has no geometry; give asset = \"FILE.tesdf\", mesh = \"FILE\" or a shape".into(),
+                ));
+            }
+            _ => {
+                return Err(ShapeFailure::Reason(
+                    "more than one of asset, mesh and shape is given; keep one".into(),
+                ));
+            }
+        };
+        add_shape(system, shape)
+    }
+}
+
+fn add_shape(system: &mut System, shape: Shape) -> Result<ShapeId, ShapeFailure> {
+    system.add_shape(shape).map_err(|e| ShapeFailure::Reason(e.to_string()))
+}
+
+fn encode_mesh(file: &Path, progress: &EncodeProgress) -> Result<TeSdf, ShapeFailure> {
+    let at = |e: &dyn std::fmt::Display| ShapeFailure::Reason(format!("{}: {e}", file.display()));
+    let LoadedMesh { mesh, report, .. } = mesh::read(file).map_err(|e| at(&e))?;
+    let solid = SolidMesh::new(mesh).map_err(|e| at(&e))?;
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let source = Source { name, blake3: report.source_blake3 };
+    encode(&solid, &source, &EncodeOptions::preset(Preset::Fast), progress).map_err(|e| match e {
+        EncodeError::Cancelled => ShapeFailure::Cancelled,
+        e => at(&e),
+    })
+}
+
+impl ShapeSection {
+    fn to_shape(self) -> Shape {
+        match self {
+            Self::Plane => Shape::Plane,
+            Self::Box { half_extents } => Shape::Box { half_extents: DVec3::from_array(half_extents) },
+            Self::Sphere { radius } => Shape::Sphere { radius },
+            Self::Capsule { half_height, radius } => Shape::Capsule { half_height, radius },
+        }
+    }
+}
+
+fn mass(system: &System, body: &BodySection, shape: ShapeId) -> Result<Mass, String> {
+    let of_density = |density| {
+        let shape = system.scene().shape(shape).map_err(|e| e.to_string())?;
+        MassProperties::of_shape(shape, body.scale, density).map_err(|e| e.to_string())
+    };
+    Ok(match (body.fixed, body.density, body.mass) {
+        (true, _, None) => Mass::Fixed,
+        (true, _, Some(_)) => return Err("it is fixed, so it needs no mass; take one of the two out".into()),
+        (false, Some(density), None) => Mass::Free(of_density(density)?),
+        (false, None, Some(mass)) => Mass::Free(of_density(1.0)?.with_mass(mass).map_err(|e| e.to_string())?),
+        (false, Some(_), Some(_)) => return Err("it has a density and a mass; keep one".into()),
+        (false, None, None) => {
+            return Err("it has neither density nor mass; give one, or fixed = true".into());
+        }
+    })
+}
+
+fn instance(body: &BodySection, shape: ShapeId) -> Result<Instance, String> {
+    let rotation = DQuat::from_array(body.rotation);
+    let pose = Pose::new(DVec3::from_array(body.translation), rotation).map_err(|e| e.to_string())?;
+    let velocity = Velocity {
+        linear: DVec3::from_array(body.velocity),
+        angular: DVec3::from_array(body.angular_velocity),
+    };
+    Ok(Instance { velocity, scale: body.scale, ..Instance::new(shape, pose) })
+}
+
+/// Without the number of the instance: the body is named already.
+fn instance_reason(error: CollideError) -> String {
+    match error {
+        CollideError::Instance { reason, .. } => reason,
+        e => e.to_string(),
+    }
+}

@@ -1,0 +1,146 @@
+//! Scene files, their errors, and run files.
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use tesdf::encode::EncodeProgress;
+use tesdf::glam::DVec3;
+use tesdf_sim::record::{RecordError, RunRecord};
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
+use tesdf_sim::{Mass, SimulateError, simulate};
+
+const DROP: &str = r#"
+time_step = 1e-3
+duration = 0.05
+
+[record]
+contacts_every = 2
+
+[[bodies]]
+name = "floor"
+shape = "plane"
+fixed = true
+
+[[bodies]]
+name = "brick"
+shape = { box = { half_extents = [0.01, 0.02, 0.03] } }
+mass = 0.5
+translation = [0, 0, 0.031]
+"#;
+
+fn load(text: &str) -> Result<LoadedScene, SceneError> {
+    LoadedScene::parse(text.into(), Path::new("drop.toml"))
+}
+
+/// What becomes of a text: the error of parsing it or of building its system and engine.
+fn refusal(text: &str) -> String {
+    let error = load(text).and_then(|scene| {
+        let system = scene.system(&EncodeProgress::default())?;
+        scene.newton(system).map(|_| ())
+    });
+    error.expect_err("it was accepted").to_string()
+}
+
+#[test]
+fn a_scene_is_what_it_says() {
+    let loaded = load(DROP).unwrap();
+    assert_eq!(loaded.scene.detector.mode, DetectorMode::Exact);
+    assert_eq!(loaded.scene.gravity, [0.0, 0.0, -9.81]);
+    let system = loaded.system(&EncodeProgress::default()).unwrap();
+    assert_eq!(system.bodies()[0].mass, Mass::Fixed);
+    let Mass::Free(mass) = system.bodies()[1].mass else { panic!("the brick is fixed") };
+    assert!((mass.mass - 0.5).abs() < 1e-15);
+    assert_eq!(system.states()[1].pose.translation, DVec3::new(0.0, 0.0, 0.031));
+}
+
+#[test]
+fn errors_say_where() {
+    let change = |from: &str, to: &str| {
+        assert!(DROP.contains(from));
+        refusal(&DROP.replacen(from, to, 1))
+    };
+    let cases = [
+        (change("duration", "durations"), vec!["line 3", "durations", "expected"]),
+        (change("mass = 0.5", "mass = \"0.5\""), vec!["line 16", "mass", "expected"]),
+        (change("mass = 0.5", ""), vec!["line 13", "brick", "neither density nor mass"]),
+        (change("mass = 0.5", "mass = 0.5\ndensity = 1"), vec!["line 13", "brick", "keep one"]),
+        (change("mass = 0.5", "mass = -1"), vec!["brick", "mass -1", "greater than 0"]),
+        (change("fixed = true", "density = 1"), vec!["line 8", "floor", "plane has no finite mass"]),
+        (change("\"brick\"", "\"floor\""), vec!["line 13", "used twice"]),
+        (change("shape = \"plane\"\n", ""), vec!["line 8", "floor", "no geometry"]),
+        (change("shape = \"plane\"", "mesh = \"none.obj\""), vec!["line 8", "none.obj"]),
+        (change("shape = \"plane\"", "asset = \"none.tesdf\""), vec!["line 8", "none.tesdf"]),
+        (change("shape = \"plane\"", "shape = \"plain\""), vec!["line 10", "plain"]),
+        (change("0.02, 0.03", "-0.02, 0.03"), vec!["line 13", "brick", "greater than 0"]),
+        (change("[0, 0, 0.031]", "[0, 0, nan]"), vec!["line 13", "brick", "finite"]),
+        (change("mass = 0.5", "mass = 0.5\nrotation = [0, 0, 0, 2]"), vec!["brick", "length 1"]),
+        (change("time_step = 1e-3", "time_step = 0"), vec!["time_step", "above 0"]),
+        (change("[record]", "[solver]\nredetections = 3\n[record]"), vec!["solver", "redetections"]),
+        (change("[record]", "[detector]\ntolerance = 0\n[record]"), vec!["detector", "tolerance"]),
+        (change("[record]", "[detector]\nmode = \"edge\"\n[record]"), vec!["line 6", "edge"]),
+        (
+            DROP.to_string()
+                + "[criterion.screw]\nbody = \"nut\"\naxis = [0,0,1]\npitch = 1\nmin_turns = 1\nbacklash = 1",
+            vec!["no body nut", "floor, brick"],
+        ),
+    ];
+    for (k, (text, expected)) in cases.into_iter().enumerate() {
+        let text = if k == 18 { refusal(&text) } else { text };
+        assert!(text.starts_with("drop.toml"), "case {k}: {text}");
+        for part in expected {
+            assert!(text.contains(part), "case {k}: no {part:?} in {text}");
+        }
+    }
+}
+
+#[test]
+fn a_run_survives_its_file() {
+    let run = || {
+        let loaded = load(DROP).unwrap();
+        let system = loaded.system(&EncodeProgress::default()).unwrap();
+        let mut engine = loaded.newton(system).unwrap();
+        simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap()
+    };
+    let (record, summary) = run();
+    assert_eq!((summary.steps, summary.passed), (50, None));
+    assert!(summary.mean_contacts > 1.0 && summary.kinetic_energy <= summary.released_energy);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("run.safetensors");
+    record.save(&file).unwrap();
+    let read = RunRecord::open(&file).unwrap();
+    assert_eq!(read, record);
+    assert_eq!(read.times().len(), 51);
+    assert_eq!(read.pose(0, 1).unwrap().translation, DVec3::new(0.0, 0.0, 0.031));
+    assert!(read.velocity(3, 1).unwrap()[0].z < 0.0);
+    assert_eq!((read.pose(51, 0), read.pose(0, 2)), (None, None));
+    let steps: Vec<u64> = read.contacts().map(|(step, _)| step).collect();
+    assert_eq!(steps, (0..50).step_by(2).collect::<Vec<_>>());
+    let last = read.contacts().last().unwrap().1;
+    assert!(!last.is_empty() && last.iter().all(|c| c.normal[2].abs() > 0.999));
+    assert_eq!(read.scene["bodies"][1]["name"], "brick");
+    assert_eq!(run().0.to_bytes().unwrap(), record.to_bytes().unwrap(), "same scene, other bytes");
+}
+
+#[test]
+fn what_is_no_run_is_refused() {
+    let bytes = RunRecord::new(&tesdf_sim::System::new(DVec3::ZERO), "scene".into()).to_bytes().unwrap();
+    assert!(RunRecord::from_bytes(&bytes).is_ok());
+    for end in 0..bytes.len() {
+        assert!(RunRecord::from_bytes(&bytes[..end]).is_err(), "{end} of {} bytes", bytes.len());
+    }
+    let newer = String::from_utf8_lossy(&bytes).replace(r#"\"version\":1"#, r#"\"version\":9"#);
+    let refused = RunRecord::from_bytes(newer.as_bytes());
+    assert!(matches!(refused, Err(RecordError::Version { found: 9 })), "{refused:?}");
+    assert!(matches!(RunRecord::open(Path::new("none")), Err(RecordError::Read { .. })));
+}
+
+#[test]
+fn a_run_can_be_broken_off() {
+    let loaded = load(DROP).unwrap();
+    let mut engine = loaded.newton(loaded.system(&EncodeProgress::default()).unwrap()).unwrap();
+    let stop = |m: &tesdf_sim::Moment<'_>| match m.step {
+        3 => ControlFlow::Break(()),
+        _ => ControlFlow::Continue(()),
+    };
+    let ended = simulate(&loaded.scene, &mut engine, stop);
+    assert!(matches!(ended, Err(SimulateError::Interrupted { steps: 3 })));
+}
