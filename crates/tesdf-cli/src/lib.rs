@@ -19,6 +19,7 @@ pub mod mesh_file;
 pub mod parse;
 pub mod progress;
 pub mod query;
+pub mod render;
 pub mod repair;
 pub mod report;
 pub mod slice;
@@ -54,6 +55,8 @@ pub enum Command {
     Collide(collide::Args),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
+    /// Draw a scene of one or more bodies as a PNG picture
+    Render(render::Args),
     /// Print a completion script for a shell
     Completions(completions::Args),
 }
@@ -93,6 +96,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Verify(args) => verify::run(args),
         Command::Collide(args) => collide::run(args),
         Command::Slice(args) => slice::run(args),
+        Command::Render(args) => render::run(args),
         Command::Completions(args) => completions::run(args),
     }
 }

@@ -25,6 +25,8 @@ mod polygon;
 mod pose;
 mod scene;
 mod shape;
+mod shape_distance;
+mod shape_ray;
 mod simple;
 mod surface;
 
@@ -36,3 +38,4 @@ pub use options::{CollideOptions, FaceMethod, Mode, Reduction};
 pub use pose::{Placement, Pose};
 pub use scene::{Groups, Instance, InstanceId, Scene, ShapeId, Velocity};
 pub use shape::Shape;
+pub use shape_ray::ShapeHit;
