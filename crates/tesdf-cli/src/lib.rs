@@ -19,6 +19,7 @@ pub mod mesh_file;
 pub mod parse;
 pub mod progress;
 pub mod query;
+pub mod render;
 pub mod repair;
 pub mod report;
 pub mod simulate;
@@ -57,6 +58,8 @@ pub enum Command {
     Slice(slice::Args),
     /// Move the bodies of a scene and write the run
     Simulate(simulate::Args),
+    /// Draw a scene of one or more bodies as a PNG picture
+    Render(render::Args),
     /// Print a completion script for a shell
     Completions(completions::Args),
 }
@@ -97,6 +100,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Collide(args) => collide::run(args),
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
+        Command::Render(args) => render::run(args),
         Command::Completions(args) => completions::run(args),
     }
 }

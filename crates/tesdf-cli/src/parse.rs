@@ -62,8 +62,62 @@ pub fn pose(text: &str) -> Result<Pose, String> {
     Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| e.to_string())
 }
 
-/// `N` numbers, separated by spaces or commas.
-fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
+/// A point as `x y z`.
+///
+/// # Errors
+/// As [`numbers`].
+pub fn point(text: &str) -> Result<DVec3, String> {
+    numbers(text, "three, \"x y z\"").map(DVec3::from_array)
+}
+
+/// The size of a picture, `WIDTHxHEIGHT`.
+///
+/// # Errors
+/// Says what was expected.
+pub fn size(text: &str) -> Result<[u32; 2], String> {
+    let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    sides.ok_or_else(|| "expected WIDTHxHEIGHT in pixels, such as 1200x800".into())
+}
+
+/// A direction to look from, `azimuth elevation` in degrees.
+///
+/// # Errors
+/// As [`numbers`]; the elevation is -90 to 90.
+pub fn direction(text: &str) -> Result<[f64; 2], String> {
+    let [azimuth, elevation] = numbers(text, "two, \"azimuth elevation\"")?;
+    match (-90.0..=90.0).contains(&elevation) {
+        true => Ok([azimuth, elevation]),
+        false => Err(format!("elevation {elevation} is not between -90 and 90")),
+    }
+}
+
+/// An angle of view, in degrees.
+///
+/// # Errors
+/// Says what was found.
+pub fn field_of_view(text: &str) -> Result<f64, String> {
+    number(text).and_then(|value| match (1.0..=150.0).contains(&value) {
+        true => Ok(value),
+        false => Err(format!("{value} is not between 1 and 150")),
+    })
+}
+
+/// A finite number greater than 0.
+///
+/// # Errors
+/// Says what was found.
+pub fn factor(text: &str) -> Result<f64, String> {
+    number(text).and_then(|value| match value > 0.0 {
+        true => Ok(value),
+        false => Err(format!("{value} is not greater than 0")),
+    })
+}
+
+/// `N` numbers, separated by spaces or commas; `expected` says how many they are.
+///
+/// # Errors
+/// Says how many were found, or which is at fault.
+pub fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
     let words: Vec<&str> =
         text.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty()).collect();
     let words: [&str; N] =
@@ -89,6 +143,14 @@ mod tests {
         assert_eq!(region("-1 -2,-3  1, 2 3"), Ok(expected));
         assert_eq!(region("1 2 3"), Err("3 numbers; expected six, \"x0 y0 z0 x1 y1 z1\"".into()));
         assert_eq!(region("0 0 a 1 1 1"), Err("a: not a number".into()));
+        assert_eq!(size("30x20"), Ok([30, 20]));
+        assert!(size("30").is_err() && size("30x-1").is_err());
+        assert_eq!(direction("-30, 90"), Ok([-30.0, 90.0]));
+        assert_eq!(direction("0 91"), Err("elevation 91 is not between -90 and 90".into()));
+        assert_eq!(pose("1 2 -3 0 0 0 1"), Ok(Pose::at(DVec3::new(1.0, 2.0, -3.0))));
+        assert!(pose("1 2 -3 0 0 0 2").unwrap_err().contains("of length 2"));
+        assert_eq!(factor("0"), Err("0 is not greater than 0".into()));
+        assert_eq!(field_of_view("180"), Err("180 is not between 1 and 150".into()));
         assert_eq!(region("0 2 0 1 1 1"), Err("y0 = 2 is not below y1 = 1".into()));
     }
 }

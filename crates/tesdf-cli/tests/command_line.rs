@@ -53,6 +53,7 @@ fn bad_usage_is_2_and_says_why_on_stderr() {
         (&["query", "f.tesdf"], "--points <CSV>"),
         (&["verify", "f.tesdf", "--samples", "-1"], "error: "),
         (&["slice", "f", "-o", "p", "--at", "0.5", "--offset", "1"], "cannot be used with"),
+        (&["render", "f.tesdf"], "--output <PNG>"),
         (&["completions", "tcl"], "[possible values: bash, elvish, fish, powershell, zsh]"),
     ] {
         let out = tesdf(args);

@@ -6,7 +6,7 @@ mod colour;
 mod cut;
 mod picture;
 mod text;
-mod ticks;
+pub(crate) mod ticks;
 
 use std::path::PathBuf;
 

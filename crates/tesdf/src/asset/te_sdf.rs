@@ -191,9 +191,19 @@ impl TeSdf {
         self.cell_bounds.get_or_init(|| CellBounds::new(self))
     }
 
-    /// Corners of face `face` (its id in the source mesh, 0-based), in the mesh's unit.
+    /// Corners of the face at `position`, its place in the file, in the mesh's unit.
     pub fn face_corners(&self, position: usize) -> [DVec3; 3] {
         self.faces[position].map(|v| DVec3::from_array(self.vertices[v as usize]))
+    }
+
+    /// Vertices of the face at `position`, its place in the file; 0-based ids of the encoded mesh.
+    pub fn face_vertices(&self, position: usize) -> [u32; 3] {
+        self.faces[position]
+    }
+
+    /// Id in the source mesh of the face at `position`, its place in the file; below [`face_count`](Self::face_count).
+    pub fn face_id(&self, position: usize) -> u32 {
+        self.face_ids[position]
     }
 
     /// What opening made besides the file, in bytes: the faces in `f32`, and where descents begin.

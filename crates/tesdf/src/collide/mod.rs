@@ -28,6 +28,8 @@ mod pose;
 mod reduce;
 mod scene;
 mod shape;
+mod shape_distance;
+mod shape_ray;
 mod simple;
 mod surface;
 
@@ -40,3 +42,4 @@ pub use pose::{Placement, Pose};
 pub use reduce::reduce_pairs;
 pub use scene::{Groups, Instance, InstanceId, Scene, ShapeId, Velocity};
 pub use shape::Shape;
+pub use shape_ray::ShapeHit;

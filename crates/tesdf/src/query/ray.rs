@@ -31,16 +31,23 @@ impl TeSdf {
         let along = direction * self.frame.scale;
         let relative = from - self.cube.middle();
         let mut best: Option<(f64, u32, u32)> = None;
-        let mut stack = vec![TreeChild::Node(0)];
-        while let Some(child) = stack.pop() {
+        let mut stack = vec![(0.0, TreeChild::Node(0))];
+        while let Some((enter, child)) = stack.pop() {
+            let reach = best.map_or(limit, |b| b.0);
+            if enter > reach {
+                continue;
+            }
             match child {
                 TreeChild::Node(n) => {
-                    let boxes = &self.tree_boxes[n as usize];
-                    for (side, &word) in self.tree_children[n as usize].iter().enumerate() {
-                        let reach = best.map_or(limit, |b| b.0);
-                        if meets_box(relative, along, reach, &boxes[6 * side..6 * side + 6]) {
-                            stack.push(TreeChild::decode(word));
-                        }
+                    let (boxes, words) = (&self.tree_boxes[n as usize], self.tree_children[n as usize]);
+                    let met = [0, 1].map(|side| {
+                        let enter = enters_box(relative, along, reach, &boxes[6 * side..6 * side + 6])?;
+                        Some((enter, TreeChild::decode(words[side])))
+                    });
+                    // The nearer child is taken first: what it holds often ends the search of the other.
+                    match met {
+                        [Some(a), Some(b)] if a.0 <= b.0 => stack.extend([b, a]),
+                        _ => stack.extend(met.into_iter().flatten()),
                     }
                 }
                 TreeChild::Leaf(start, count) => {
@@ -66,14 +73,14 @@ impl TeSdf {
     }
 }
 
-/// Slab test, widened by more than its rounding.
-fn meets_box(from: DVec3, along: DVec3, limit: f64, b: &[f32]) -> bool {
+/// Where the ray enters the box, at most: a slab test, widened by more than its rounding.
+fn enters_box(from: DVec3, along: DVec3, limit: f64, b: &[f32]) -> Option<f64> {
     let (mut enter, mut leave) = (0.0f64, limit);
     for a in 0..3 {
         let (low, high) = (f64::from(b[a]) - from[a], f64::from(b[a + 3]) - from[a]);
         if along[a] == 0.0 {
             if low > 0.0 || high < 0.0 {
-                return false;
+                return None;
             }
             continue;
         }
@@ -81,7 +88,8 @@ fn meets_box(from: DVec3, along: DVec3, limit: f64, b: &[f32]) -> bool {
         enter = enter.max(s.min(t));
         leave = leave.min(s.max(t));
     }
-    enter * (1.0 - 1e-12) <= leave * (1.0 + 1e-12)
+    let enter = enter * (1.0 - 1e-12);
+    (enter <= leave * (1.0 + 1e-12)).then_some(enter)
 }
 
 fn meets_face(from: DVec3, along: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {

@@ -1,0 +1,84 @@
+//! Bodies as they are named on the command line.
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tesdf::collide::Shape;
+use tesdf::glam::DVec3;
+
+use crate::report::Failure;
+use crate::{asset_file, parse};
+
+/// A body's geometry: a file, or a simple shape.
+#[derive(Clone, Debug)]
+pub enum BodyName {
+    /// A .tesdf file.
+    File(PathBuf),
+    /// A plane, box, sphere or capsule.
+    Simple(Shape),
+}
+
+/// `plane`, `box:HX,HY,HZ`, `sphere:R`, `capsule:HALF_HEIGHT,R`, or else the name of a file.
+///
+/// # Errors
+/// Says which number is at fault.
+pub fn body_name(text: &str) -> Result<BodyName, String> {
+    let shape = match text.split_once(':') {
+        None if text == "plane" => Shape::Plane,
+        Some(("box", sizes)) => {
+            Shape::Box { half_extents: DVec3::from_array(parse::numbers(sizes, "three, box:HX,HY,HZ")?) }
+        }
+        Some(("sphere", sizes)) => {
+            let [radius] = parse::numbers(sizes, "one, sphere:R")?;
+            Shape::Sphere { radius }
+        }
+        Some(("capsule", sizes)) => {
+            let [half_height, radius] = parse::numbers(sizes, "two, capsule:HALF_HEIGHT,R")?;
+            Shape::Capsule { half_height, radius }
+        }
+        _ => return Ok(BodyName::File(text.into())),
+    };
+    shape.validate().map_err(|e| e.to_string())?;
+    Ok(BodyName::Simple(shape))
+}
+
+/// The shapes of bodies; a file that is named twice is opened once.
+///
+/// # Errors
+/// A file cannot be opened.
+pub fn open(names: &[BodyName]) -> Result<Vec<Shape>, Failure> {
+    let mut opened: Vec<(&Path, Shape)> = Vec::new();
+    names
+        .iter()
+        .map(|name| match name {
+            BodyName::Simple(shape) => Ok(shape.clone()),
+            BodyName::File(path) => match opened.iter().find(|(other, _)| other == path) {
+                Some((_, shape)) => Ok(shape.clone()),
+                None => {
+                    let shape = Shape::Mesh(Arc::new(asset_file::open(path)?));
+                    opened.push((path, shape.clone()));
+                    Ok(shape)
+                }
+            },
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_shapes_and_files() {
+        let simple = |text| match body_name(text) {
+            Ok(BodyName::Simple(shape)) => format!("{shape:?}"),
+            other => format!("{other:?}"),
+        };
+        assert_eq!(simple("plane"), "Plane");
+        assert_eq!(simple("sphere:0.5"), "Sphere { radius: 0.5 }");
+        assert_eq!(simple("capsule:2 1"), "Capsule { half_height: 2.0, radius: 1.0 }");
+        assert_eq!(simple("box:1,2,3"), "Box { half_extents: DVec3(1.0, 2.0, 3.0) }");
+        assert_eq!(simple("a/b.tesdf"), "Ok(File(\"a/b.tesdf\"))");
+        assert_eq!(body_name("box:1,2").unwrap_err(), "2 numbers; expected three, box:HX,HY,HZ");
+        assert!(body_name("sphere:-1").unwrap_err().contains("radius -1"));
+    }
+}

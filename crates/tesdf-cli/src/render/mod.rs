@@ -1,0 +1,148 @@
+//! `tesdf render BODY... -o out.png`: a picture of a scene, with a cutaway on request.
+//!
+//! In go bodies with their places in the world ([`Drawn`]), what is cut away ([`Cut`]), contacts, and a [`View`]; out
+//! comes a picture ([`render`]). Rays find the surface in the encoded mesh; its distances give shadows and occlusion.
+mod body;
+mod camera;
+mod colour;
+mod cut;
+mod light;
+mod normals;
+mod overlay;
+mod picture;
+mod stage;
+
+use std::path::PathBuf;
+
+use tesdf::asset::save_atomic;
+use tesdf::collide::{Placement, Pose, Shape};
+use tesdf::glam::DVec3;
+
+pub use body::{BodyName, body_name, open};
+pub use camera::View;
+pub use colour::{Linear, linear, of_body};
+pub use cut::{Cut, HalfSpace};
+pub use picture::{Scenery, render};
+pub use stage::{Drawn, Exposure};
+
+use crate::parse;
+use crate::report::{Failure, Outcome};
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// The picture cannot have this size.
+    #[error("a picture of {}x{} pixels; expected {min} to {max} each", .0[0], .0[1], min = picture::SIZES.start(), max = picture::SIZES.end())]
+    Size([u32; 2]),
+    /// There are only planes, or coordinates that overflow.
+    #[error("nothing to fit the picture to; add a body that is no plane")]
+    Nothing,
+    /// The PNG cannot be made.
+    #[error("the picture cannot be encoded: {0}")]
+    Encode(String),
+}
+
+/// Arguments of `tesdf render`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// A .tesdf file, or plane, box:HX,HY,HZ, sphere:R, capsule:HALF_HEIGHT,R
+    #[arg(required = true, value_name = "BODY", value_parser = body_name)]
+    pub bodies: Vec<BodyName>,
+    /// The PNG file to write; an existing one is replaced
+    #[arg(short, long, value_name = "PNG")]
+    pub output: PathBuf,
+    /// Translation and rotation of a body, one option per body in their order [default: none is moved]
+    #[arg(long = "pose", value_name = "tx ty tz qx qy qz qw", value_parser = parse::pose, allow_hyphen_values = true)]
+    pub poses: Vec<Pose>,
+    /// Pixels
+    #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1200x800")]
+    pub size: [u32; 2],
+    /// Where the camera stands, in degrees around the z axis and above the ground
+    #[arg(long, value_name = "azimuth elevation", value_parser = parse::direction, default_value = "-60 25", allow_hyphen_values = true)]
+    pub view: [f64; 2],
+    /// Perspective with this angle, in degrees [default: orthographic]
+    #[arg(long, value_name = "DEGREES", value_parser = parse::field_of_view, allow_hyphen_values = true)]
+    pub field_of_view: Option<f64>,
+    /// How much larger than fitted to draw
+    #[arg(long, value_name = "FACTOR", value_parser = parse::factor, default_value = "1", allow_hyphen_values = true)]
+    pub zoom: f64,
+    /// The point in the middle of the picture [default: the middle of the scene]
+    #[arg(long, value_name = "x y z", value_parser = parse::point, allow_hyphen_values = true)]
+    pub target: Option<DVec3>,
+    /// Removes what has nx x + ny y + nz z > d and shows the section; given twice, only what both remove
+    #[arg(long = "cut", value_name = "nx ny nz d", value_parser = half_space, allow_hyphen_values = true)]
+    pub cuts: Vec<HalfSpace>,
+    /// Bodies that are cut, by their place in the list from 0 [default: all but planes]
+    #[arg(long, value_name = "PLACES", value_delimiter = ',', requires = "cuts")]
+    pub cut_bodies: Option<Vec<usize>>,
+}
+
+/// A half space from `nx ny nz d`.
+///
+/// # Errors
+/// Says which number is at fault.
+fn half_space(text: &str) -> Result<HalfSpace, String> {
+    let [x, y, z, offset] = parse::numbers(text, "four, \"nx ny nz d\"")?;
+    HalfSpace::new(DVec3::new(x, y, z), offset)
+        .ok_or_else(|| format!("the normal ({x}, {y}, {z}) has no direction"))
+}
+
+impl Args {
+    /// The camera's place.
+    pub fn view(&self) -> View {
+        let Self { view: [azimuth, elevation], field_of_view, zoom, target, .. } = *self;
+        View { azimuth, elevation, field_of_view, zoom, target }
+    }
+
+    /// Which body is cut, for the shapes of all.
+    fn exposures(&self, shapes: &[Shape]) -> Result<Vec<Exposure>, Failure> {
+        if let Some(&place) = self.cut_bodies.iter().flatten().find(|&&place| place >= shapes.len()) {
+            let last = shapes.len().saturating_sub(1);
+            return Err(Failure::new(format!("--cut-bodies names {place}; the bodies are 0 to {last}")));
+        }
+        let is_cut = |(place, shape): (usize, &Shape)| match &self.cut_bodies {
+            Some(places) => places.contains(&place),
+            None => !matches!(shape, Shape::Plane),
+        };
+        let exposure = |cut| if cut { Exposure::Cut } else { Exposure::Whole };
+        Ok(shapes.iter().enumerate().map(is_cut).map(exposure).collect())
+    }
+}
+
+/// Draws the scene and saves it.
+///
+/// # Errors
+/// A file cannot be opened, the options do not fit each other, nothing can be drawn, or the file cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    if !args.poses.is_empty() && args.poses.len() != args.bodies.len() {
+        let message = format!("--pose is given {} times for {} bodies", args.poses.len(), args.bodies.len());
+        return Err(Failure::new(message).hint("give one for each body, in their order, or none"));
+    }
+    let shapes = open(&args.bodies)?;
+    let exposures = args.exposures(&shapes)?;
+    // Planes are grey and take no colour from the others.
+    let mut colours = (0..).map(of_body);
+    let bodies: Vec<Drawn> = shapes
+        .iter()
+        .zip(exposures)
+        .enumerate()
+        .map(|(place, (shape, exposure))| Drawn {
+            shape,
+            placement: Placement {
+                pose: args.poses.get(place).copied().unwrap_or(Pose::IDENTITY),
+                scale: 1.0,
+            },
+            colour: match shape {
+                Shape::Plane => linear([225; 3]),
+                _ => colours.next().unwrap_or_default(),
+            },
+            exposure,
+        })
+        .collect();
+    let cut = Cut(args.cuts.clone());
+    let scenery = Scenery { bodies: &bodies, cut: &cut, contacts: &[] };
+    let map = render(&scenery, &args.view(), args.size).map_err(Failure::new)?;
+    let png = map.encode_png().map_err(|e| Failure::new(RenderError::Encode(e.to_string())))?;
+    save_atomic(&args.output, &png).map_err(Failure::new)?;
+    Ok(Outcome::Good)
+}
