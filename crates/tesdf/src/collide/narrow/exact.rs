@@ -72,6 +72,16 @@ struct Query<'a> {
 }
 
 impl Query<'_> {
+    /// Whether all of the polygon is farther than `limit` from the plane of a face: in `f32` already, without making the face's
+    /// normal.
+    fn plane_is_beyond(&self, points: &[DVec3], face: u32, limit: f64) -> bool {
+        let plane = self.asset.records[face as usize].triangle();
+        let middle = self.asset.cube.middle() + plane.corners[0];
+        let heights = points.iter().map(|&p| plane.normal.dot(p - middle));
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        low.max(-high) > limit + ROUNDING
+    }
+
     /// The least distance between the polygon and a face, up to the tolerance, and where on the polygon; `likely` is looked at
     /// first.
     fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3) {
@@ -80,11 +90,13 @@ impl Query<'_> {
         let points = &points[..self.polygon.vertices().len()];
         let mut best = (f64::INFINITY, self.center);
         let mut offer = |face: u32| {
-            let triangle = self.asset.local_triangle(face as usize);
             // What is nearer by less than the tolerance does not count, unless the polygon may go through it.
             let limit = if best.0 > 2.0 * self.tolerance { best.0 - self.tolerance } else { best.0 };
-            if let Some(found) = polygon_to_triangle(points, self.normal, &triangle, limit) {
-                best = found;
+            if !self.plane_is_beyond(points, face, limit) {
+                let triangle = self.asset.local_triangle(face as usize);
+                if let Some(found) = polygon_to_triangle(points, self.normal, &triangle, limit) {
+                    best = found;
+                }
             }
             best.0
         };
