@@ -16,6 +16,7 @@ mod parry;
 mod points;
 mod query;
 mod reference;
+mod scaling;
 mod screw;
 mod timing;
 
@@ -44,6 +45,8 @@ enum Command {
     Exactness(exactness::Args),
     /// A nut on a bolt: travel, energy, penetration and time by clearance, time step and detector
     Screw(screw::Args),
+    /// Time of a detection as a scene grows: instances in a row, worlds side by side
+    Scaling(scaling::Args),
 }
 
 fn main() -> ExitCode {
@@ -54,6 +57,7 @@ fn main() -> ExitCode {
         Command::Curve(args) => curve::run(args),
         Command::Exactness(args) => exactness::run(args),
         Command::Screw(args) => screw::run(args),
+        Command::Scaling(args) => scaling::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

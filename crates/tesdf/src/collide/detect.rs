@@ -40,17 +40,17 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
         ..Statistics::default()
     };
     let mut contacts = Vec::with_capacity(found.iter().map(|f| f.contacts.len()).sum());
-    for part in &found {
+    for part in found {
         statistics.polygons += part.polygons;
         statistics.filtered += part.filtered;
-        contacts.extend_from_slice(&part.contacts);
+        contacts.extend(part.contacts);
     }
     statistics.touching = contacts.len() + statistics.filtered;
     statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
     statistics.bytes = size_of_val(directions.as_slice())
         + statistics.candidates * size_of::<u32>()
         + size_of_val(tasks.as_slice())
-        + 2 * size_of_val(contacts.as_slice());
+        + size_of_val(contacts.as_slice());
     // Tasks follow the pairs, which are sorted; within a pair a face has one place.
     contacts
         .chunk_by_mut(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b))
