@@ -7,18 +7,21 @@
 //! - [`Scene`]: shapes (an encoded mesh, a plane, a box, a sphere, a capsule), and instances of them: a pose, a
 //!   velocity, a scale, a world. An instance costs its state only.
 //! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
-//! - `clearance`: the signed distance between two instances, with witnesses.
-//! - `time_of_impact`: when two moving instances first touch, never too late.
-//! - `why`: why a contact is, or is not, there.
+//! - [`clearance`](clearance()): the signed distance between two instances, with witnesses.
+//! - [`time_of_impact`](time_of_impact()): when two moving instances first touch, never too late.
+//! - [`why`](why()): why a contact is, or is not, there.
 //!
 //! In each contact *a* is the body whose face (or node) it is and *b* the body whose signed distance field it is; both
 //! directions of a pair are evaluated.
+mod clearance;
 mod contact;
 mod detect;
 mod error;
 mod field;
 mod instance_pairs;
+mod least;
 mod middle;
+mod motion;
 mod narrow;
 mod options;
 mod polygon;
@@ -27,12 +30,18 @@ mod scene;
 mod shape;
 mod simple;
 mod surface;
+mod time_of_impact;
+mod why;
 
+pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, Statistics};
 pub use detect::detect;
 pub use error::CollideError;
 pub use instance_pairs::{InstancePair, instance_pairs};
+pub use motion::Motion;
 pub use options::{CollideOptions, FaceMethod, Mode, Reduction};
 pub use pose::{Placement, Pose};
 pub use scene::{Groups, Instance, InstanceId, Scene, ShapeId, Velocity};
 pub use shape::Shape;
+pub use time_of_impact::{Impact, TimeOfImpactOptions, time_of_impact};
+pub use why::{BroadVerdict, PairVerdict, PartReport, PolygonReport, PolygonVerdict, WhyReport, why};

@@ -34,7 +34,7 @@ pub fn lowest(
         return None;
     }
     let CellField::Mesh { asset, place, faces } = *cell else {
-        return Some(branch_and_bound(cell, polygon, tolerance, precision));
+        return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     };
     let crossing = matches!(place, Place::Listed { label: Label::Crossing(_), .. });
     let inside = match place {
@@ -44,13 +44,16 @@ pub fn lowest(
         _ => false,
     };
     if inside {
-        return Some(branch_and_bound(cell, polygon, tolerance, precision));
+        return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
+    }
+    if !crossing && reach < 0.0 {
+        return None;
     }
     let (distance, point) = nearest_to_faces(asset, place, faces, polygon, normal, center, radius);
     // Clear of the surface, the polygon is all on one side of it.
     let all_outside = !crossing || (distance > 0.0 && cell.value(point, Precision::F64).distance > 0.0);
     if !all_outside {
-        return Some(branch_and_bound(cell, polygon, tolerance, precision));
+        return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     }
     (distance <= reach).then_some(Lowest { point, converged: true })
 }
@@ -112,8 +115,16 @@ impl Ord for Piece {
     }
 }
 
-fn branch_and_bound(cell: &CellField, polygon: &Polygon, tolerance: f64, precision: Precision) -> Lowest {
-    let mut search = Branches { cell, precision, best: (f64::INFINITY, polygon.center()), evaluations: 0 };
+/// What is found above `reach` is the least point seen, no more.
+fn branch_and_bound(
+    cell: &CellField,
+    polygon: &Polygon,
+    tolerance: f64,
+    reach: f64,
+    precision: Precision,
+) -> Lowest {
+    let best = (f64::INFINITY, polygon.center());
+    let mut search = Branches { cell, precision, tolerance, reach, best, evaluations: 0 };
     polygon.points().for_each(|p| {
         search.value(p);
     });
@@ -125,7 +136,7 @@ fn branch_and_bound(cell: &CellField, polygon: &Polygon, tolerance: f64, precisi
         open.push(search.piece(corners));
     }
     while let Some(piece) = open.pop() {
-        if piece.bound >= search.best.0 - tolerance {
+        if !search.is_open(piece.bound) {
             return Lowest { point: search.best.1, converged: true };
         }
         if search.evaluations > MOST_EVALUATIONS {
@@ -133,7 +144,7 @@ fn branch_and_bound(cell: &CellField, polygon: &Polygon, tolerance: f64, precisi
         }
         for half in halves(piece.corners) {
             let piece = search.piece(half);
-            if piece.bound < search.best.0 - tolerance {
+            if search.is_open(piece.bound) {
                 open.push(piece);
             }
         }
@@ -156,9 +167,24 @@ fn halves([a, b, c]: [DVec3; 3]) -> [[DVec3; 3]; 2] {
     [[a, m, c], [m, b, c]]
 }
 
+/// A bound of min(u, v) over a triangle, of convex functions with these values at its corners: the least over all mixtures
+/// (1 − t) u + t v of their greatest value, which is at a corner.
+fn least_mix(u: [f64; 3], v: [f64; 3]) -> f64 {
+    let greatest = |t: f64| (0..3).map(|i| u[i] + t * (v[i] - u[i])).fold(f64::NEG_INFINITY, f64::max);
+    // A convex function of t, with kinks only where two corners have the same value.
+    let kink = |i: usize, j: usize| (u[j] - u[i]) / ((v[i] - u[i]) - (v[j] - u[j]));
+    [1.0, kink(0, 1), kink(1, 2), kink(2, 0)]
+        .into_iter()
+        .filter(|t| (0.0..=1.0).contains(t))
+        .map(greatest)
+        .fold(greatest(0.0), f64::min)
+}
+
 struct Branches<'a> {
     cell: &'a CellField<'a>,
     precision: Precision,
+    tolerance: f64,
+    reach: f64,
     best: (f64, DVec3),
     evaluations: usize,
 }
@@ -173,6 +199,11 @@ impl Branches<'_> {
         value
     }
 
+    /// Whether something that matters can be above this bound.
+    fn is_open(&self, bound: f64) -> bool {
+        bound < self.best.0 - self.tolerance && bound <= self.reach
+    }
+
     fn piece(&mut self, corners: [DVec3; 3]) -> Piece {
         let center = (corners[0] + corners[1] + corners[2]) / 3.0;
         let value = self.value(center);
@@ -181,8 +212,20 @@ impl Branches<'_> {
         let bound = match *self.cell {
             // Nowhere is the surface farther than the face that is nearest at the centre.
             CellField::Mesh { asset, .. } => {
-                let face: Triangle = asset.local_triangle(value.position as usize);
-                -corners.iter().map(|&c| face.closest(c).distance).fold(0.0, f64::max)
+                let distances = |position: u32| {
+                    let face: Triangle = asset.local_triangle(position as usize);
+                    corners.map(|c| face.closest(c).distance)
+                };
+                let near = distances(value.position);
+                let farthest = (0..3).max_by(|&i, &j| near[i].total_cmp(&near[j])).unwrap_or(0);
+                let bound = -near[farthest];
+                if self.is_open(bound.max(lipschitz)) {
+                    // Between two walls the least is along a whole line; each wall alone would leave all of it open.
+                    let other = self.value(corners[farthest]).position;
+                    -least_mix(near, distances(other))
+                } else {
+                    bound
+                }
             }
             // A convex function is above its tangent.
             CellField::Simple(_) => {

@@ -70,7 +70,8 @@ impl Search {
         let reach = self.reach + part.radius;
         match field.field {
             Field::Mesh(asset) => {
-                middle::clip(asset, &Polygon::new(part.points()), reach, &mut |clipped| {
+                // Cells know the least distance outside only: 0 for those that hold a part of the solid.
+                middle::clip(asset, &Polygon::new(part.points()), reach.max(0.0), &mut |clipped| {
                     polygon(clipped);
                     let mut look = |faces: &Faces| {
                         let cell = CellField::Mesh { asset, place: clipped.place, faces };
