@@ -85,8 +85,7 @@ pub fn instance_pairs(
 /// How far an instance's velocity can take a point of it in a time.
 pub fn motion_ahead(shape: &Shape, instance: &Instance, time: f64) -> f64 {
     if time > 0.0 {
-        let arm =
-            if matches!(shape, Shape::Plane) { 0.0 } else { reach(shape.bounds()) * instance.scale };
+        let arm = if matches!(shape, Shape::Plane) { 0.0 } else { reach(shape.bounds()) * instance.scale };
         let Velocity { linear, angular } = instance.velocity;
         time * (linear.length() + angular.length() * arm)
     } else {

@@ -139,7 +139,8 @@ impl Twist {
 /// A point's speed is its body's drift and, across the axis, at most the turning speed. About one direction (or when one body does not turn)
 /// drift along the axis and turning are at right angles; in general they add up.
 pub fn closing_speed(bodies: [(Twist, &Shape, Placement); 2]) -> f64 {
-    let [turning_a, turning_b] = bodies.map(|(twist, shape, placement)| twist.turning_speed(shape, placement));
+    let [turning_a, turning_b] =
+        bodies.map(|(twist, shape, placement)| twist.turning_speed(shape, placement));
     let [a, b] = bodies.map(|(twist, ..)| twist);
     let (drift, turning) = (a.drift - b.drift, turning_a + turning_b);
     let one_axis = a.spin.cross(b.spin) == DVec3::ZERO;
@@ -198,7 +199,8 @@ mod tests {
             let bound = closing_speed([(motion.twist(start), &shape, placement), rest]);
             let mut fastest = 0.0f64;
             for k in 0..8u32 {
-                let corner = DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - 1.0;
+                let corner =
+                    DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) * 2.0 - 1.0;
                 let p = 2.0 * corner * DVec3::new(1.0, 2.0, 0.5);
                 for i in 0..200 {
                     let (t, dt) = (0.01 * f64::from(i), 1e-6);

@@ -111,7 +111,9 @@ fn moving<'a>(body: &Body<'a>, motion: Motion) -> Result<(Twist, &'a Shape, Plac
     }
     let twist = motion.twist(body.placement.pose);
     if twist.turns() && matches!(body.shape, Shape::Plane) {
-        return refuse("a plane that turns has points of any speed; expected a motion without turning".into());
+        return refuse(
+            "a plane that turns has points of any speed; expected a motion without turning".into(),
+        );
     }
     Ok((twist, body.shape, body.placement))
 }

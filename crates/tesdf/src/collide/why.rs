@@ -228,12 +228,9 @@ impl Stages<'_> {
         // What the detection sees, then everything.
         let mut seen = Vec::new();
         let mut kept = Vec::new();
-        search.minima(
-            field,
-            &part,
-            &mut |polygon| seen.push(key(polygon)),
-            &mut |polygon, minimum| kept.push((key(polygon), minimum)),
-        );
+        search.minima(field, &part, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
+            kept.push((key(polygon), minimum))
+        });
         let mut polygons = Vec::new();
         search.within(f64::INFINITY).minima(field, &part, &mut |_| (), &mut |polygon, minimum| {
             let key = key(polygon);
