@@ -189,15 +189,15 @@ fn a_turning_bar_hits_what_is_in_its_way() {
 
 #[test]
 fn random_motions_are_free_before_the_impact_and_touch_at_it() {
-    let mut random = Random(5);
+    let mut random = Random(6);
     let bumpy = asset(&Surface::default().add_sphere(DVec3::ZERO, 1, || random.between(0.7, 1.0)).solid());
     let tetra = boxed(DVec3::new(0.9, 0.2, 0.4));
     let mut hits = 0;
     for _ in 0..12 {
         let turn = DQuat::from_axis_angle(random.direction(), random.between(0.0, 6.0));
-        let from = 4.0 * random.direction();
+        let from = 3.0 * random.direction();
         let start = Pose::new(from, turn).expect("a pose");
-        let velocity = -from * random.between(0.1, 0.4) + random.in_cube();
+        let velocity = -from * random.between(0.2, 0.6) + 0.5 * random.in_cube();
         let motion = linear(velocity.to_array(), (2.0 * random.in_cube()).to_array());
         let screw = Motion::Screw {
             point: random.in_cube(),

@@ -1,4 +1,5 @@
 //! Narrow phase: the least signed distance over a node or a clipped polygon, and where.
+mod branch_and_bound;
 mod exact;
 mod frank_wolfe;
 
@@ -6,7 +7,7 @@ use glam::DVec3;
 
 use super::field::{CellField, Field, FieldBody, FieldValue, ROUNDING};
 use super::middle::{self, ClippedPolygon};
-use super::polygon::Polygon;
+use super::polygon::{MOST_VERTICES, Polygon};
 use super::surface::Part;
 use super::{CollideOptions, FaceMethod, Mode};
 use crate::query::{Faces, Place, Precision};
