@@ -61,7 +61,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let scenes = ROWS.map(|n| (n, row(&link, n)));
         print(&format!("row, {name}"), args.repeats, &options, scenes)?;
     }
-    for (name, mode) in modes {
+    for ((name, mode), worlds_of_mode) in modes.into_iter().zip(WORLDS) {
         let options =
             CollideOptions { contact_distance: CONTACT_DISTANCE, ..CollideOptions::with_mode(mode) };
         let scenes = worlds_of_mode.map(|n| (2 * n as usize, worlds(&nut, &bolt, n)));

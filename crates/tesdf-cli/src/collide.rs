@@ -9,7 +9,7 @@ use tesdf::collide::{
 use tesdf::encode::Length;
 
 use crate::report::{self, Failure, Outcome, count};
-use crate::{asset_file, parse};
+use crate::{asset_file, parse, why};
 
 /// Two placed bodies: arguments that several commands share.
 #[derive(clap::Args, Debug)]
@@ -77,7 +77,11 @@ pub struct Args {
     /// Most contacts to keep of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
-    /// Print the contacts as a JSON array
+    /// Say instead why contacts are or are not there: what each stage made of all candidates, or of one face (in the mode `node`, node) of
+    /// instance 0, or as INSTANCE:FACE of one of either
+    #[arg(long, value_name = "FACE", value_parser = parse::part, num_args = 0..=1)]
+    pub why: Option<Option<(u32, u32)>>,
+    /// Print the contacts as a JSON array; with --why the reports
     #[arg(long)]
     pub json: bool,
 }
@@ -130,7 +134,10 @@ impl Args {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let options = args.options();
     options.validate().map_err(Failure::new)?;
-    let (scene, _) = args.bodies.scene()?;
+    let (scene, ids) = args.bodies.scene()?;
+    if let Some(part) = args.why {
+        return why::run(&scene, ids, &options, part, args.json);
+    }
     let found = detect(&scene, &options).map_err(Failure::new)?;
     if args.json {
         report::json(&found.contacts)?;
@@ -163,7 +170,6 @@ fn text(found: &Contacts) -> String {
         text += "deepest first: distance, face of a, face of b, point on a, normal from b to a\n";
     }
     for c in deepest.iter().take(SHOWN) {
-        let point = |p: tesdf::glam::DVec3| format!("{:.6e} {:.6e} {:.6e}", p.x, p.y, p.z);
         let _ = writeln!(
             text,
             "{:>13.6e}  {}:{:<7} {}:{:<7} ({})  ({:.4} {:.4} {:.4})",
@@ -172,7 +178,7 @@ fn text(found: &Contacts) -> String {
             c.face_a,
             c.instance_b,
             c.face_b,
-            point(c.point_a),
+            report::point(c.point_a),
             c.normal.x,
             c.normal.y,
             c.normal.z

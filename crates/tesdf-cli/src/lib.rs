@@ -11,6 +11,7 @@ use clap::{Parser, Subcommand};
 
 pub mod asset_file;
 pub mod check;
+pub mod clearance;
 pub mod collide;
 pub mod completions;
 pub mod encode;
@@ -24,7 +25,9 @@ pub mod repair;
 pub mod report;
 pub mod simulate;
 pub mod slice;
+pub mod toi;
 pub mod verify;
+pub mod why;
 
 use report::{Failure, Outcome};
 
@@ -54,6 +57,10 @@ pub enum Command {
     Verify(verify::Args),
     /// Contacts between two bodies
     Collide(collide::Args),
+    /// How far two bodies are apart, or how deep they are in each other
+    Clearance(clearance::Args),
+    /// When two moving bodies first touch
+    Toi(toi::Args),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
     /// Move the bodies of a scene and write the run
@@ -98,6 +105,8 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Inspect(args) => inspect::run(args),
         Command::Verify(args) => verify::run(args),
         Command::Collide(args) => collide::run(args),
+        Command::Clearance(args) => clearance::run(args),
+        Command::Toi(args) => toi::run(args),
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),

@@ -1,5 +1,5 @@
 //! Values of options.
-use tesdf::collide::Pose;
+use tesdf::collide::{Motion, Pose, Velocity};
 use tesdf::geometry::Aabb;
 use tesdf::glam::{DQuat, DVec3};
 
@@ -113,6 +113,41 @@ pub fn factor(text: &str) -> Result<f64, String> {
     })
 }
 
+/// A velocity as `vx vy vz wx wy wz`, separated by spaces or commas.
+///
+/// # Errors
+/// Says which number is at fault.
+pub fn velocity(text: &str) -> Result<Motion, String> {
+    let [x, y, z, u, v, w] = numbers(text, "six, \"vx vy vz wx wy wz\"")?;
+    let velocity = Velocity { linear: DVec3::new(x, y, z), angular: DVec3::new(u, v, w) };
+    Ok(Motion::Linear { velocity })
+}
+
+/// A screw as `px py pz ax ay az omega pitch`, separated by spaces or commas.
+///
+/// # Errors
+/// Says which number is at fault, or that the axis has no direction.
+pub fn screw(text: &str) -> Result<Motion, String> {
+    let [x, y, z, i, j, k, angular_speed, pitch] = numbers(text, "eight, \"px py pz ax ay az omega pitch\"")?;
+    let axis = DVec3::new(i, j, k);
+    match axis.try_normalize() {
+        Some(_) => Ok(Motion::Screw { point: DVec3::new(x, y, z), axis, angular_speed, pitch }),
+        None => Err(format!("axis {axis} has no direction; expected numbers that are not all 0")),
+    }
+}
+
+/// A part of a body as `PART` or `INSTANCE:PART`.
+///
+/// # Errors
+/// Says what was expected.
+pub fn part(text: &str) -> Result<(u32, u32), String> {
+    let (instance, part) = text.split_once(':').unwrap_or(("0", text));
+    match (instance.trim().parse(), part.trim().parse()) {
+        (Ok(instance @ 0..=1), Ok(part)) => Ok((instance, part)),
+        _ => Err("expected a number of a face of instance 0, or INSTANCE:FACE with instance 0 or 1".into()),
+    }
+}
+
 /// `N` numbers, separated by spaces or commas; `expected` says how many they are.
 ///
 /// # Errors
@@ -152,5 +187,11 @@ mod tests {
         assert_eq!(factor("0"), Err("0 is not greater than 0".into()));
         assert_eq!(field_of_view("180"), Err("180 is not between 1 and 150".into()));
         assert_eq!(region("0 2 0 1 1 1"), Err("y0 = 2 is not below y1 = 1".into()));
+        let motion = Motion::Screw { point: DVec3::ZERO, axis: -DVec3::Z, angular_speed: 2.0, pitch: -0.5 };
+        assert_eq!(screw("0 0 0, 0 0 -1, 2 -0.5"), Ok(motion));
+        assert!(screw("0 0 0 0 0 0 1 1").is_err_and(|e| e.contains("no direction")));
+        assert!(velocity("1 2 3").is_err_and(|e| e == "3 numbers; expected six, \"vx vy vz wx wy wz\""));
+        assert_eq!((part("7"), part("1:7")), (Ok((0, 7)), Ok((1, 7))));
+        assert!(part("2:7").is_err() && part("x").is_err());
     }
 }

@@ -108,6 +108,11 @@ pub fn count(number: usize, word: &str) -> String {
     format!("{number} {}", if number == 1 { word } else { &plural })
 }
 
+/// A point for people.
+pub fn point(p: tesdf::glam::DVec3) -> String {
+    format!("{:.6e} {:.6e} {:.6e}", p.x, p.y, p.z)
+}
+
 /// A number of bytes for people, in powers of 1000.
 pub fn size(bytes: usize) -> String {
     match bytes as f64 {

@@ -1,7 +1,7 @@
 use rayon::prelude::*;
 
 use super::field::FieldBody;
-use super::instance_pairs::{InstancePair, instance_pairs};
+use super::instance_pairs::instance_pairs;
 use super::narrow::{Minimum, Search};
 use super::surface::{Candidates, Part, SurfaceBody};
 use super::{
@@ -25,7 +25,7 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
     let directions = pairs
         .iter()
         .flat_map(|pair| [(pair.first, pair.second, pair), (pair.second, pair.first, pair)])
-        .map(|(a, b, pair)| Direction::new(scene, options, a, b, pair))
+        .map(|(a, b, pair)| Direction::new(scene, options, a, b, pair.contact_distance))
         .collect::<Result<Vec<_>, _>>()?;
     let candidates: Vec<Candidates> = directions.par_iter().map(Direction::candidates).collect();
     let tasks: Vec<(&Direction, &[u32])> = directions
@@ -67,10 +67,13 @@ fn order(c: &Contact) -> (u32, u32, Option<u32>, [u64; 3]) {
 }
 
 /// One body's surface against another's field.
-struct Direction<'a> {
-    surface: SurfaceBody<'a>,
-    field: FieldBody<'a>,
-    search: Search,
+pub struct Direction<'a> {
+    /// Whose faces or nodes.
+    pub surface: SurfaceBody<'a>,
+    /// Whose signed distances.
+    pub field: FieldBody<'a>,
+    /// How minima are found, and up to which value.
+    pub search: Search,
     options: &'a CollideOptions,
     a: InstanceId,
     b: InstanceId,
@@ -84,24 +87,25 @@ struct Found {
 }
 
 impl<'a> Direction<'a> {
-    fn new(
+    /// `contact_distance` is that of the pair, in the world's unit.
+    pub fn new(
         scene: &'a Scene,
         options: &'a CollideOptions,
         a: InstanceId,
         b: InstanceId,
-        pair: &InstancePair,
+        contact_distance: f64,
     ) -> Result<Self, CollideError> {
         let (of_a, of_b) = (scene.instance(a)?, scene.instance(b)?);
         let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
         let field = FieldBody::new(shape_b, of_b.placement());
         let surface = SurfaceBody::new(shape_a, of_a.placement(), &field);
         let diagonal = shape_b.diagonal().min(f64::MAX) * of_b.scale;
-        let search = Search::new(options, pair.contact_distance, &field, diagonal);
+        let search = Search::new(options, contact_distance, &field, diagonal);
         Ok(Self { surface, field, search, options, a, b })
     }
 
     /// Broad phase.
-    fn candidates(&self) -> Candidates {
+    pub fn candidates(&self) -> Candidates {
         match self.options.mode {
             Mode::Node => self.surface.nodes(&self.field, self.search.reach),
             Mode::Face(_) => self.surface.faces(&self.field, self.search.reach),
@@ -113,13 +117,7 @@ impl<'a> Direction<'a> {
         let mut found = Found::default();
         let Found { contacts, polygons, filtered } = &mut found;
         for &candidate in candidates {
-            let (part, face_a, feature) = match self.options.mode {
-                Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
-                Mode::Face(_) => {
-                    let face = self.surface.face_id(candidate);
-                    (self.surface.face(candidate, &self.field, self.search.reach), face, face)
-                }
-            };
+            let (part, face_a, feature) = self.part(candidate);
             self.search.minima(&self.field, &part, &mut |_| *polygons += 1, &mut |_, minimum| {
                 if self.is_filtered(&part, &minimum) {
                     *filtered += 1;
@@ -131,8 +129,19 @@ impl<'a> Direction<'a> {
         found
     }
 
+    /// A candidate, the user's number of its face, and its own: of the node or the face.
+    pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
+        match self.options.mode {
+            Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
+            Mode::Face(_) => {
+                let face = self.surface.face_id(candidate);
+                (self.surface.face(candidate, &self.field, self.search.reach), face, face)
+            }
+        }
+    }
+
     /// Eq. (10). What is rounded has every normal.
-    fn is_filtered(&self, part: &Part, minimum: &Minimum) -> bool {
+    pub fn is_filtered(&self, part: &Part, minimum: &Minimum) -> bool {
         match (self.options.mode, self.options.cos_theta) {
             (Mode::Face(_), Some(cos)) if part.points().len() == 3 => {
                 minimum.value.gradient.dot(part.normal) > -cos
@@ -141,7 +150,7 @@ impl<'a> Direction<'a> {
         }
     }
 
-    fn contact(&self, part: &Part, minimum: &Minimum, face_a: u32, feature: u32) -> Contact {
+    pub fn contact(&self, part: &Part, minimum: &Minimum, face_a: u32, feature: u32) -> Contact {
         let Minimum { point, value, cell, converged } = *minimum;
         let (face_b, feature_b) = self.field.names(&value);
         Contact {

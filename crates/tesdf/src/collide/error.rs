@@ -43,6 +43,16 @@ pub enum CollideError {
         /// What was expected.
         expected: &'static str,
     },
+    /// Two instances that have no distance.
+    #[error("instances {a} and {b} have no clearance: {reason}")]
+    NoClearance {
+        /// The one.
+        a: InstanceId,
+        /// The other.
+        b: InstanceId,
+        /// Why not, and what was expected.
+        reason: &'static str,
+    },
     /// An option has a value that makes no sense.
     #[error("{option} is {found}; expected {expected}")]
     Option {

@@ -49,6 +49,9 @@ impl From<Found> for FieldValue {
 /// What `f32` may be off by, in the local frame of an asset: twice what is promised for queries.
 pub const ROUNDING: f64 = 2e-6;
 
+/// What a value may be off by in `f64`, relative to the numbers that it is made of.
+const FAR: f64 = 1e-12;
+
 impl<'a> FieldBody<'a> {
     /// The field of a shape.
     pub fn new(shape: &'a Shape, placement: Placement) -> Self {
@@ -97,20 +100,36 @@ impl<'a> FieldBody<'a> {
     /// Whether no point within `radius` of `p` can have a signed distance up to `reach`; all in the field's frame. May
     /// say no where it is so.
     pub fn is_beyond(&self, p: DVec3, radius: f64, reach: f64) -> bool {
+        let limit = radius + reach;
+        // Far out the bounds are nearly the body.
+        if let Field::Mesh(asset) = self.field
+            && asset.local_bounds().distance_squared(p) > (limit.max(0.0) + ROUNDING).powi(2)
+        {
+            return true;
+        }
+        let (distance, slack) = self.rough(p);
+        distance > limit + slack
+    }
+
+    /// The signed distance at `p`, and what it may be off by; in the field's frame.
+    pub fn rough(&self, p: DVec3) -> (f64, f64) {
         match self.field {
             Field::Mesh(asset) => {
-                let limit = radius + reach;
-                let outside = asset.local_bounds().distance_squared(p);
-                // Far out the bounds are nearly the body.
-                outside > (limit + ROUNDING).powi(2)
-                    || asset.found_at(p, asset.place(p)).signed_distance > limit + ROUNDING
+                let distance = asset.found_at(p, asset.place(p)).signed_distance;
+                (distance, ROUNDING + FAR * distance.abs())
             }
+            // Rounding of a formula, relative to the size of its numbers.
             Field::Simple(simple) => {
-                // Rounding of a formula, relative to the size of its numbers.
-                let slack = 1e-12 * (1.0 + p.abs().max_element() + radius);
-                simple.value(p).distance > radius + reach + slack
+                let distance = simple.value(p).distance;
+                (distance, FAR * (distance.abs() + p.abs().max_element()))
             }
         }
+    }
+
+    /// No point within `radius` of `p` has a lower signed distance than this; all in the field's frame.
+    pub fn least_within(&self, p: DVec3, radius: f64) -> f64 {
+        let (distance, slack) = self.rough(p);
+        distance - slack - radius
     }
 
     /// The names of a face and a feature, as the user knows them.

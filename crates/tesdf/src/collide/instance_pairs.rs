@@ -1,7 +1,7 @@
 //! Which instances can touch: those of one world whose bounds meet.
 use std::collections::BTreeMap;
 
-use super::{CollideError, InstanceId, Scene, Shape, Velocity};
+use super::{CollideError, Instance, InstanceId, Scene, Shape, Velocity};
 use crate::geometry::{Aabb, AabbTree};
 
 /// Two instances whose bounds come within their contact distance.
@@ -41,13 +41,7 @@ pub fn instance_pairs(
             .shape(instance.shape)
             .map_err(|e| CollideError::Instance { instance: id.0, reason: e.to_string() })?;
         let is_plane = matches!(shape, Shape::Plane);
-        let motion = if speculative_time > 0.0 {
-            let arm = if is_plane { 0.0 } else { reach(shape.bounds()) * instance.scale };
-            let Velocity { linear, angular } = instance.velocity;
-            speculative_time * (linear.length() + angular.length() * arm)
-        } else {
-            0.0
-        };
+        let motion = motion_ahead(shape, instance, speculative_time);
         let bounds = scene.bounds(id)?.grown(0.5 * contact_distance + motion);
         worlds.entry(instance.world).or_default().push(Entry { id, bounds, motion, is_plane });
     }
@@ -86,6 +80,17 @@ pub fn instance_pairs(
         pairs[first..].sort_unstable_by_key(|p| (p.first, p.second));
     }
     Ok(pairs)
+}
+
+/// How far an instance's velocity can take a point of it in a time.
+pub fn motion_ahead(shape: &Shape, instance: &Instance, time: f64) -> f64 {
+    if time > 0.0 {
+        let arm = if matches!(shape, Shape::Plane) { 0.0 } else { reach(shape.bounds()) * instance.scale };
+        let Velocity { linear, angular } = instance.velocity;
+        time * (linear.length() + angular.length() * arm)
+    } else {
+        0.0
+    }
 }
 
 /// Greatest distance from the origin to a point of a box.

@@ -8,19 +8,22 @@
 //!   velocity, a scale, a world. An instance costs its state only.
 //! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
 //! - [`reduce_pairs`]: fewer contacts per pair, with a bound on what is lost.
-//! - `clearance`: the signed distance between two instances, with witnesses.
-//! - `time_of_impact`: when two moving instances first touch, never too late.
-//! - `why`: why a contact is, or is not, there.
+//! - [`clearance`](clearance()): the signed distance between two instances, with witnesses.
+//! - [`time_of_impact`](time_of_impact()): when two moving instances first touch, never too late.
+//! - [`why`](why()): why a contact is, or is not, there.
 //!
 //! In each contact *a* is the body whose face (or node) it is and *b* the body whose signed distance field it is; both
 //! directions of a pair are evaluated.
+mod clearance;
 mod contact;
 mod detect;
 mod error;
 mod field;
 mod hull;
 mod instance_pairs;
+mod least;
 mod middle;
+mod motion;
 mod narrow;
 mod options;
 mod polygon;
@@ -32,14 +35,20 @@ mod shape_distance;
 mod shape_ray;
 mod simple;
 mod surface;
+mod time_of_impact;
+mod why;
 
+pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};
 pub use detect::detect;
 pub use error::CollideError;
 pub use instance_pairs::{InstancePair, instance_pairs};
+pub use motion::Motion;
 pub use options::{CollideOptions, FaceMethod, Mode, Reduction};
 pub use pose::{Placement, Pose};
 pub use reduce::reduce_pairs;
 pub use scene::{Groups, Instance, InstanceId, Scene, ShapeId, Velocity};
 pub use shape::Shape;
 pub use shape_ray::ShapeHit;
+pub use time_of_impact::{Impact, TimeOfImpactOptions, time_of_impact};
+pub use why::{BroadVerdict, PairVerdict, PartReport, PolygonReport, PolygonVerdict, WhyReport, why};

@@ -233,10 +233,12 @@ impl Scene {
 
     /// Whether two instances may meet: of one world, of groups that meet, not excluded, not the same.
     pub fn may_meet(&self, a: (InstanceId, &Instance), b: (InstanceId, &Instance)) -> bool {
-        a.0 != b.0
-            && a.1.world == b.1.world
-            && a.1.groups.meet(b.1.groups)
-            && (self.excluded.is_empty() || !self.excluded.contains(&(a.0.min(b.0), a.0.max(b.0))))
+        a.0 != b.0 && a.1.world == b.1.world && a.1.groups.meet(b.1.groups) && !self.is_excluded(a.0, b.0)
+    }
+
+    /// Whether two instances were told never to meet.
+    pub fn is_excluded(&self, a: InstanceId, b: InstanceId) -> bool {
+        !self.excluded.is_empty() && self.excluded.contains(&(a.min(b), a.max(b)))
     }
 
     /// Bounds of an instance in the world.

@@ -3,7 +3,7 @@ use glam::{DMat3, DVec3, Vec3};
 
 use super::field::{Field, FieldBody};
 use super::simple::{Simple, plane_square};
-use super::{Placement, Shape};
+use super::{Mode, Placement, Shape};
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
 use crate::geometry::Aabb;
@@ -21,6 +21,17 @@ pub struct SurfaceBody<'a> {
 
 /// What the broad phase left of a surface: faces or nodes that can touch, in order.
 pub type Candidates = Vec<u32>;
+
+/// A part of the face tree.
+#[derive(Clone, Copy, Debug)]
+pub struct Branch {
+    /// The node or leaf.
+    pub child: TreeChild,
+    /// Middle of a ball that holds it, in the field's frame.
+    pub center: DVec3,
+    /// Radius of the ball.
+    pub radius: f64,
+}
 
 /// A face, or the core of a rounded shape, in the field's frame.
 #[derive(Clone, Copy, Debug)]
@@ -155,33 +166,107 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
+    /// How many faces there are to name, of a simple shape its parts.
+    pub fn face_count(&self) -> u32 {
+        match self.shape {
+            Shape::Mesh(asset) => asset.face_count() as u32,
+            Shape::Plane => 2,
+            simple => Simple::new(simple).parts().0.len() as u32,
+        }
+    }
+
+    /// How many nodes there are to name: vertices, or corners of a simple shape's parts.
+    pub fn node_count(&self) -> u32 {
+        match self.shape {
+            Shape::Mesh(asset) => asset.vertices.len() as u32,
+            simple => Simple::new(simple).nodes().0.len() as u32,
+        }
+    }
+
+    /// Whether a run of faces has a face, or in node mode a node.
+    pub fn holds(&self, start: u32, count: u32, candidate: u32, mode: Mode) -> bool {
+        match (mode, self.shape) {
+            (Mode::Node, Shape::Mesh(asset)) => {
+                asset.faces[start as usize..(start + count) as usize].as_flattened().contains(&candidate)
+            }
+            _ => (start..start + count).contains(&candidate),
+        }
+    }
+
+    /// Everything: the root of the face tree, or all parts of a simple shape.
+    pub fn whole(&self) -> TreeChild {
+        match self.shape {
+            Shape::Mesh(_) => TreeChild::Node(0),
+            _ => TreeChild::Leaf(0, self.face_count()),
+        }
+    }
+
+    /// The two halves of a node of the face tree; nothing for simple shapes, which have none.
+    pub fn halves(&self, node: u32) -> Option<[Branch; 2]> {
+        match self.shape {
+            Shape::Mesh(asset) => Some(self.branches(asset, node)),
+            _ => None,
+        }
+    }
+
+    fn branches(&self, asset: &TeSdf, node: u32) -> [Branch; 2] {
+        let children = asset.tree_children[node as usize].map(TreeChild::decode);
+        let (boxes, _) = asset.tree_boxes[node as usize].as_chunks::<6>();
+        [0, 1].map(|side| {
+            let low = Vec3::from_slice(&boxes[side]).as_dvec3();
+            let high = Vec3::from_slice(&boxes[side][3..]).as_dvec3();
+            Branch {
+                child: children[side],
+                center: self.to_field(asset.frame.to_world(0.5 * (low + high) + asset.cube.middle())),
+                radius: 0.5 * (high - low).length() * asset.frame.inverse_scale() * self.scale,
+            }
+        })
+    }
+
     /// The leaves of the face tree that can come within `reach` of the solid: a node is left out when the ball around its box
     /// is out of the field's reach (the field is 1-Lipschitz).
     fn visit_leaves(&self, asset: &TeSdf, field: &FieldBody, reach: f64, mut leaf: impl FnMut(u32, u32)) {
-        let unit = asset.frame.inverse_scale();
-        let middle = asset.cube.middle();
         let mut stack = vec![TreeChild::Node(0)];
         while let Some(child) = stack.pop() {
-            let node = match child {
-                TreeChild::Leaf(start, count) => {
-                    leaf(start, count);
-                    continue;
+            match child {
+                TreeChild::Leaf(start, count) => leaf(start, count),
+                // The first child comes out first.
+                TreeChild::Node(node) => stack.extend(
+                    self.branches(asset, node)
+                        .into_iter()
+                        .rev()
+                        .filter(|branch| !field.is_beyond(branch.center, branch.radius, reach))
+                        .map(|branch| branch.child),
+                ),
+            }
+        }
+    }
+
+    /// The bound by which the broad phase leaves out all leaves that `holds` (first face, number of faces) says yes to: the least signed
+    /// distance that the node's ball can have (field's frame). `None` when one of them is kept.
+    pub fn pruned_by(&self, field: &FieldBody, reach: f64, holds: impl Fn(u32, u32) -> bool) -> Option<f64> {
+        let mut least: Option<f64> = None;
+        let mut stack = vec![(self.whole(), None)];
+        while let Some((child, pruned)) = stack.pop() {
+            match child {
+                TreeChild::Leaf(start, count) if holds(start, count) => {
+                    let bound: f64 = pruned?;
+                    least = Some(least.map_or(bound, |l| l.min(bound)));
                 }
-                TreeChild::Node(node) => node as usize,
-            };
-            let children = asset.tree_children[node].map(TreeChild::decode);
-            let (boxes, _) = asset.tree_boxes[node].as_chunks::<6>();
-            // The first child comes out first.
-            for side in [1, 0] {
-                let low = Vec3::from_slice(&boxes[side]).as_dvec3();
-                let high = Vec3::from_slice(&boxes[side][3..]).as_dvec3();
-                let center = self.to_field(asset.frame.to_world(0.5 * (low + high) + middle));
-                let radius = 0.5 * (high - low).length() * unit * self.scale;
-                if !field.is_beyond(center, radius, reach) {
-                    stack.push(children[side]);
+                TreeChild::Leaf(..) => {}
+                TreeChild::Node(node) => {
+                    for branch in self.halves(node).into_iter().flatten() {
+                        let beyond = || {
+                            field
+                                .is_beyond(branch.center, branch.radius, reach)
+                                .then(|| field.least_within(branch.center, branch.radius))
+                        };
+                        stack.push((branch.child, pruned.or_else(beyond)));
+                    }
                 }
             }
         }
+        least
     }
 }
 

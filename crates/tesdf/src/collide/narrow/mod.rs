@@ -1,4 +1,5 @@
 //! Narrow phase: the least signed distance over a node or a clipped polygon, and where.
+mod branch_and_bound;
 mod exact;
 mod frank_wolfe;
 
@@ -6,7 +7,7 @@ use glam::DVec3;
 
 use super::field::{CellField, Field, FieldBody, FieldValue, ROUNDING};
 use super::middle::{self, ClippedPolygon};
-use super::polygon::Polygon;
+use super::polygon::{MOST_VERTICES, Polygon};
 use super::surface::Part;
 use super::{CollideOptions, FaceMethod, Mode};
 use crate::query::{Faces, Place, Precision};
@@ -84,8 +85,9 @@ impl Search {
                     }
                 };
                 match *part.points() {
-                    [point] => middle::locate(asset, point, reach, &mut visit),
-                    _ => middle::clip(asset, Polygon::new(part.points()), reach, &mut visit),
+                    // Cells know the least distance outside only: 0 for those that hold a part of the solid.
+                    [point] => middle::locate(asset, point, reach.max(0.0), &mut visit),
+                    _ => middle::clip(asset, Polygon::new(part.points()), reach.max(0.0), &mut visit),
                 }
             }
             Field::Simple(simple) => {

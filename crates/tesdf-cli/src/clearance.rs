@@ -1,0 +1,57 @@
+//! `tesdf clearance A.tesdf B.tesdf`
+use tesdf::collide::{Clearance, ClearanceOptions, InstanceId, clearance};
+use tesdf::encode::Length;
+
+use crate::collide::Bodies;
+use crate::parse;
+use crate::report::{self, Failure, Outcome};
+
+/// Arguments of `tesdf clearance`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// The bodies.
+    #[command(flatten)]
+    pub bodies: Bodies,
+    /// Bound on the error, in the meshes' unit [default: 1e-9 of the smaller body's diagonal]
+    #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true)]
+    pub tolerance: Option<f64>,
+    /// Print the result as a JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Prints the clearance of two bodies.
+///
+/// # Errors
+/// A file that cannot be opened, an option out of range, or stdout cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let mut options = ClearanceOptions::default();
+    if let Some(tolerance) = args.tolerance {
+        options.tolerance = Length::Absolute(tolerance);
+    }
+    let (scene, [a, b]) = args.bodies.scene()?;
+    let found = clearance(&scene, a, b, &options).map_err(Failure::new)?;
+    if args.json {
+        report::json(&found)?;
+    } else {
+        report::table(&rows(&found, [a, b]))?;
+    }
+    Ok(Outcome::Good)
+}
+
+/// What people see of a clearance.
+pub fn rows(found: &Clearance, [a, b]: [InstanceId; 2]) -> Vec<(&'static str, String)> {
+    let what = if found.distance < 0.0 { "deep in each other" } else { "apart" };
+    let normal = found.normal;
+    let mut rows = vec![
+        ("clearance", format!("{:e} ({what})", found.distance)),
+        ("point on a", format!("({}) of face {a}:{}", report::point(found.point_a), found.face_a)),
+        ("point on b", format!("({}) of face {b}:{}", report::point(found.point_b), found.face_b)),
+        ("normal from b to a", format!("({:.6} {:.6} {:.6})", normal.x, normal.y, normal.z)),
+        ("field", format!("of instance {}", found.field)),
+    ];
+    if !found.converged {
+        rows.push(("accuracy", "not within the tolerance: the search was cut short".into()));
+    }
+    rows
+}

@@ -1,0 +1,82 @@
+//! `tesdf toi A.tesdf B.tesdf`
+use serde::Serialize;
+use tesdf::collide::{Impact, Motion, TimeOfImpactOptions, time_of_impact};
+use tesdf::encode::Length;
+
+use crate::collide::Bodies;
+use crate::report::{self, Failure, Outcome};
+use crate::{clearance, parse};
+
+/// Arguments of `tesdf toi`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// The bodies.
+    #[command(flatten)]
+    pub bodies: Bodies,
+    /// Velocity of A's origin, and angular velocity about it in radians; A rests without one
+    #[arg(long, value_name = "\"vx vy vz wx wy wz\"", value_parser = parse::velocity, allow_hyphen_values = true)]
+    pub velocity_a: Option<Motion>,
+    /// That of B
+    #[arg(long, value_name = "\"vx vy vz wx wy wz\"", value_parser = parse::velocity, allow_hyphen_values = true)]
+    pub velocity_b: Option<Motion>,
+    /// A turns about a line instead: a point and the direction of the line, angular speed in radians, way along the line per turn
+    #[arg(long, value_name = "\"px py pz ax ay az omega pitch\"", value_parser = parse::screw, allow_hyphen_values = true, conflicts_with = "velocity_a")]
+    pub screw_a: Option<Motion>,
+    /// B does
+    #[arg(long, value_name = "\"px py pz ax ay az omega pitch\"", value_parser = parse::screw, allow_hyphen_values = true, conflicts_with = "velocity_b")]
+    pub screw_b: Option<Motion>,
+    /// Follow the motion from time 0 to this
+    #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true, default_value_t = TimeOfImpactOptions::default().end)]
+    pub end: f64,
+    /// Bodies this near touch, in the meshes' unit [default: 1e-6 of the smaller body's diagonal]
+    #[arg(long, value_name = "L", value_parser = parse::number, allow_hyphen_values = true)]
+    pub tolerance: Option<f64>,
+    /// Most steps
+    #[arg(long, value_name = "N", default_value_t = TimeOfImpactOptions::default().iterations)]
+    pub iterations: u32,
+    /// Print the result as a JSON object; its `time` is null when the bodies stay apart
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The result as JSON.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum Json {
+    Impact(Impact),
+    None { time: Option<f64>, end: f64 },
+}
+
+/// Prints when two bodies first touch.
+///
+/// # Errors
+/// A file that cannot be opened, an option out of range, or stdout cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let mut options =
+        TimeOfImpactOptions { end: args.end, iterations: args.iterations, ..Default::default() };
+    if let Some(tolerance) = args.tolerance {
+        options.tolerance = Length::Absolute(tolerance);
+    }
+    let motion_a = args.screw_a.or(args.velocity_a).unwrap_or_default();
+    let motion_b = args.screw_b.or(args.velocity_b).unwrap_or_default();
+    let (scene, [a, b]) = args.bodies.scene()?;
+    let impact = time_of_impact(&scene, a, b, motion_a, motion_b, &options).map_err(Failure::new)?;
+    if args.json {
+        report::json(&impact.map_or(Json::None { time: None, end: args.end }, Json::Impact))?;
+        return Ok(Outcome::Good);
+    }
+    let Some(impact) = impact else {
+        report::result(format!("no impact up to time {}\n", args.end).as_bytes())?;
+        return Ok(Outcome::Good);
+    };
+    let what = match impact {
+        Impact { touches: false, .. } => "free up to here; --iterations goes on",
+        Impact { time: 0.0, .. } => "at the start",
+        _ => "they touch",
+    };
+    let mut rows = vec![("time", format!("{:e} ({what})", impact.time))];
+    rows.extend(clearance::rows(&impact.clearance, [a, b]));
+    rows.push(("steps", impact.iterations.to_string()));
+    report::table(&rows)?;
+    Ok(Outcome::Good)
+}

@@ -1,0 +1,50 @@
+//! When two moving bodies first touch: a cube thrown at the floor, spinning.
+//!
+//! `cargo run --release --example time_of_impact -- [MESH]`; the default is a cube with an edge of 20 mm about the origin.
+use std::error::Error;
+use std::path::PathBuf;
+
+use tesdf::asset::about::Source;
+use tesdf::collide::{
+    Instance, Motion, Pose, Scene, Shape, TimeOfImpactOptions, Velocity, clearance, time_of_impact,
+};
+use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::glam::DVec3;
+use tesdf::mesh::{SolidMesh, read};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
+    let given = std::env::args_os().nth(1);
+    let solid = SolidMesh::new(read(&given.as_ref().map_or(PathBuf::from(cube), PathBuf::from))?.mesh)?;
+    let diagonal = solid.mesh().diagonal();
+    let asset =
+        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &EncodeProgress::default())?;
+
+    let mut scene = Scene::new();
+    let (mesh, plane) = (scene.add_shape(asset)?, scene.add_shape(Shape::Plane)?);
+    let start = Pose::at(DVec3::new(0.0, 0.0, 3.0 * diagonal));
+    let body = scene.add(Instance::new(mesh, start))?;
+    let floor = scene.add(Instance::new(plane, Pose::IDENTITY))?;
+    let thrown = Motion::Linear {
+        velocity: Velocity {
+            linear: DVec3::new(2.0, 0.0, -5.0) * diagonal,
+            angular: DVec3::new(3.0, 7.0, 0.0),
+        },
+    };
+    let options = TimeOfImpactOptions::default();
+    let impact = time_of_impact(&scene, body, floor, thrown, Motion::Rest, &options)?
+        .ok_or("nothing is met up to time 1")?;
+    println!(
+        "face {} touches at time {}, at {}, found in {} steps",
+        impact.clearance.face_a, impact.time, impact.clearance.point_a, impact.iterations
+    );
+    assert!(impact.touches && impact.clearance.distance <= 1e-6 * diagonal);
+
+    // Up to then it is free: the clearance at times before is positive.
+    for k in 0..10 {
+        let pose = thrown.pose_at(start, impact.time * f64::from(k) / 10.0);
+        scene.set_poses(&[(body, pose)])?;
+        assert!(clearance(&scene, body, floor, &Default::default())?.distance > 0.0);
+    }
+    Ok(())
+}

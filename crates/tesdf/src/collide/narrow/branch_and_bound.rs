@@ -1,0 +1,271 @@
+//! The least signed distance over a polygon inside of the solid: the greatest of a minimum of convex functions.
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+use glam::DVec3;
+
+use super::Lowest;
+use crate::TeSdf;
+use crate::collide::field::{CellField, FieldValue};
+use crate::collide::polygon::Polygon;
+use crate::geometry::Triangle;
+use crate::query::Precision;
+
+/// Evaluations after which a search gives up.
+const MOST_EVALUATIONS: usize = 20_000;
+
+/// A corner of a part of the polygon.
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    point: DVec3,
+    /// The face that is nearest to it, by position.
+    face: u32,
+}
+
+/// A part of the polygon that is still open.
+struct Piece {
+    /// No point of it has a lower signed distance.
+    bound: f64,
+    corners: [Corner; 3],
+}
+
+impl PartialEq for Piece {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+impl Eq for Piece {}
+impl PartialOrd for Piece {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Piece {
+    fn cmp(&self, other: &Self) -> Ordering {
+        // The heap gives the lowest bound first.
+        other.bound.total_cmp(&self.bound)
+    }
+}
+
+/// The least point to `tolerance`, if it is at most `reach`; what is found above `reach` is the least point seen, no more.
+pub fn branch_and_bound(
+    cell: &CellField,
+    polygon: &Polygon,
+    tolerance: f64,
+    reach: f64,
+    precision: Precision,
+) -> Lowest {
+    let best = (f64::INFINITY, polygon.center());
+    let mut search = Branches { cell, precision, tolerance, reach, best, evaluations: 0 };
+    let mut corners = [Corner { point: DVec3::ZERO, face: 0 }; super::MOST_VERTICES];
+    corners.iter_mut().zip(polygon.points()).for_each(|(corner, p)| *corner = search.corner(p));
+    let corners = &corners[..polygon.vertices().len()];
+    let mut open = BinaryHeap::new();
+    for k in 2..corners.len().max(3) {
+        // A segment is a triangle with two equal corners.
+        let piece = search.piece([corners[0], corners[k - 1], corners[k.min(corners.len() - 1)]]);
+        open.push(piece);
+    }
+    while let Some(piece) = open.pop() {
+        if !search.is_open(piece.bound) {
+            break;
+        }
+        if search.evaluations > MOST_EVALUATIONS {
+            return Lowest { point: search.best.1, converged: false };
+        }
+        for half in search.halves(piece.corners) {
+            let piece = search.piece(half);
+            if search.is_open(piece.bound) {
+                open.push(piece);
+            }
+        }
+    }
+    Lowest { point: search.best.1, converged: true }
+}
+
+struct Branches<'a> {
+    cell: &'a CellField<'a>,
+    precision: Precision,
+    tolerance: f64,
+    reach: f64,
+    best: (f64, DVec3),
+    evaluations: usize,
+}
+
+impl Branches<'_> {
+    fn value(&mut self, p: DVec3) -> FieldValue {
+        self.evaluations += 1;
+        let value = self.cell.value(p, self.precision);
+        if value.distance < self.best.0 {
+            self.best = (value.distance, p);
+        }
+        value
+    }
+
+    fn corner(&mut self, point: DVec3) -> Corner {
+        Corner { point, face: self.value(point).position }
+    }
+
+    /// Whether something that matters can be above this bound.
+    fn is_open(&self, bound: f64) -> bool {
+        bound < self.best.0 - self.tolerance && bound <= self.reach
+    }
+
+    /// Cuts the longest edge.
+    fn halves(&mut self, [a, b, c]: [Corner; 3]) -> [[Corner; 3]; 2] {
+        let edge = |p: Corner, q: Corner| p.point.distance_squared(q.point);
+        let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
+        let [a, b, c] = if ab >= bc && ab >= ca {
+            [a, b, c]
+        } else if bc >= ca {
+            [b, c, a]
+        } else {
+            [c, a, b]
+        };
+        let m = self.corner(0.5 * (a.point + b.point));
+        [[a, m, c], [m, b, c]]
+    }
+
+    fn piece(&mut self, corners: [Corner; 3]) -> Piece {
+        let points = corners.map(|c| c.point);
+        let center = (points[0] + points[1] + points[2]) / 3.0;
+        let value = self.value(center);
+        let radius = points.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max).sqrt();
+        let mut bound = value.distance - radius;
+        match *self.cell {
+            CellField::Mesh { asset, .. } => {
+                let triangle = |face: u32| asset.local_triangle(face as usize);
+                let distances = |t: &Triangle| points.map(|p| t.closest(p).distance);
+                // The distance to one face is convex: over a triangle at most what it is at a corner.
+                let near = distances(&triangle(value.position));
+                bound = bound.max(-near.into_iter().fold(0.0, f64::max));
+                if self.is_open(bound) {
+                    for face in corners.map(|c| c.face) {
+                        bound = bound.max(-coplanar_pair(asset, [value.position, face], points));
+                    }
+                }
+                if self.is_open(bound) {
+                    let [u, v, w] = corners.map(|c| distances(&triangle(c.face)));
+                    bound = bound.max(-greatest_minimum([near, u, v, w]));
+                }
+            }
+            // A convex function is above its tangent.
+            CellField::Simple(_) => {
+                let down = |c: &DVec3| value.gradient.dot(*c - center);
+                let tangent = points.iter().map(down).fold(f64::INFINITY, f64::min);
+                bound = bound.max(value.distance + tangent);
+            }
+        }
+        Piece { bound, corners }
+    }
+}
+
+/// A bound of the least of four convex functions with these values at the corners of a triangle, over the triangle: the greatest minimum of
+/// the four linear functions with these values.
+///
+/// That is where the minimum is at a corner, where two are equal on an edge, or three inside: of all such points none is
+/// left out. To one wall, or between two or three, it errs by the curvature of the distances only, so that a search converges where
+/// the least is along a whole line.
+fn greatest_minimum(values: [[f64; 3]; 4]) -> f64 {
+    let least = |weights: [f64; 3]| {
+        let at = |u: &[f64; 3]| u[0] * weights[0] + u[1] * weights[1] + u[2] * weights[2];
+        values.iter().map(at).fold(f64::INFINITY, f64::min)
+    };
+    let mut greatest = least([1.0, 0.0, 0.0]).max(least([0.0, 1.0, 0.0])).max(least([0.0, 0.0, 1.0]));
+    for k in 0..4 {
+        for l in k + 1..4 {
+            let d: [f64; 3] = std::array::from_fn(|i| values[k][i] - values[l][i]);
+            for i in 0..3 {
+                let j = (i + 1) % 3;
+                let t = d[i] / (d[i] - d[j]);
+                if (0.0..=1.0).contains(&t) {
+                    let mut weights = [0.0; 3];
+                    (weights[i], weights[j]) = (1.0 - t, t);
+                    greatest = greatest.max(least(weights));
+                }
+            }
+            for m in l + 1..4 {
+                // Weights across both differences, of sum 1.
+                let e: [f64; 3] = std::array::from_fn(|i| values[k][i] - values[m][i]);
+                let w = DVec3::from(d).cross(DVec3::from(e));
+                let weights = (w / (w.x + w.y + w.z)).to_array();
+                if weights.iter().all(|w| (0.0..=1.0).contains(w)) {
+                    greatest = greatest.max(least(weights));
+                }
+            }
+        }
+    }
+    // Rounding, of numbers below 1.
+    greatest + 1e-15
+}
+
+/// A bound of the distance to two faces of one plane that share an edge, over a triangle; infinite when they are not such.
+///
+/// Let the nearest points of the corners be in the union of the faces, and the segments between those that are in different ones go through
+/// the shared edge. Then the triangle between them is in the union, and every point is as near to its image as a corner at most.
+fn coplanar_pair(asset: &TeSdf, [f, g]: [u32; 2], points: [DVec3; 3]) -> f64 {
+    if f == g {
+        return f64::INFINITY;
+    }
+    let ids = [f, g].map(|face| asset.faces[face as usize]);
+    let Some(apex) = ids[0].iter().position(|v| !ids[1].contains(v)) else { return f64::INFINITY };
+    let (start, end) = (ids[0][(apex + 1) % 3], ids[0][(apex + 2) % 3]);
+    if !(ids[1].contains(&start) && ids[1].contains(&end)) {
+        return f64::INFINITY;
+    }
+    let triangles = [f, g].map(|face| asset.local_triangle(face as usize));
+    let (a, b) = (triangles[0].corners[(apex + 1) % 3], triangles[0].corners[(apex + 2) % 3]);
+    let normal = triangles[0].normal;
+    let off = triangles[1].corners.iter().map(|c| normal.dot(*c - a).abs()).fold(0.0, f64::max);
+    // Within the plane, across the shared edge.
+    let across = normal.cross(b - a).normalize_or_zero();
+    if off > COPLANAR || normal.dot(triangles[1].normal) < 0.5 || across == DVec3::ZERO {
+        return f64::INFINITY;
+    }
+    let nearest = points.map(|p| {
+        let [x, y] = [0, 1].map(|k| triangles[k].closest(p));
+        if x.distance <= y.distance { (x, true) } else { (y, false) }
+    });
+    let along = (b - a) / (b - a).length_squared();
+    for i in 0..3 {
+        let ((p, p_first), (q, q_first)) = (nearest[i], nearest[(i + 1) % 3]);
+        if p_first == q_first {
+            continue;
+        }
+        let (h, k) = (across.dot(p.point - a), across.dot(q.point - a));
+        let crossing = if h == k { p.point } else { p.point + h / (h - k) * (q.point - p.point) };
+        if !(0.0..=1.0).contains(&along.dot(crossing - a)) {
+            return f64::INFINITY;
+        }
+    }
+    nearest.iter().map(|n| n.0.distance).fold(0.0, f64::max) + off
+}
+
+/// Faces that are this near to one plane (local frame) are taken for coplanar; what they are off is added to the bound.
+const COPLANAR: f64 = 1e-12;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_greatest_minimum_is_that_of_dense_samples() {
+        // A few numbers of no order.
+        let number = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) >> 16) / 65536.0;
+        for case in 0..200u32 {
+            let values: [[f64; 3]; 4] =
+                std::array::from_fn(|k| std::array::from_fn(|i| number(case * 12 + 3 * k as u32 + i as u32)));
+            const N: u32 = 60;
+            let mut sampled = f64::NEG_INFINITY;
+            for i in 0..=N {
+                for j in 0..=N - i {
+                    let w = [i, j, N - i - j].map(|n| f64::from(n) / f64::from(N));
+                    let at = |u: &[f64; 3]| (0..3).map(|c| w[c] * u[c]).sum::<f64>();
+                    sampled = sampled.max(values.iter().map(at).fold(f64::INFINITY, f64::min));
+                }
+            }
+            let exact = greatest_minimum(values);
+            assert!(exact >= sampled && exact <= sampled + 2.0 / f64::from(N), "{exact} {sampled}");
+        }
+    }
+}

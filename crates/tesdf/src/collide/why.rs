@@ -1,0 +1,264 @@
+//! Why a contact is, or is not, there: what each stage of a detection saw of one ordered pair.
+use glam::DVec3;
+use serde::Serialize;
+
+use super::detect::Direction;
+use super::instance_pairs::motion_ahead;
+use super::middle::ClippedPolygon;
+use super::{CollideError, CollideOptions, InstanceId, Mode, Scene, Shape};
+
+/// What became of a pair of instances.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PairVerdict {
+    /// It goes on to the broad phase.
+    Tested,
+    /// They are one and the same.
+    SameInstance,
+    /// They are in different worlds.
+    OtherWorlds,
+    /// Their groups do not meet.
+    GroupsDoNotMeet,
+    /// They were told never to meet.
+    Excluded,
+    /// Both are planes.
+    BothPlanes,
+    /// Their bounds are farther apart than the contact distance.
+    BoundsApart,
+}
+
+/// What the broad phase made of a face or node; bounds are in the world's unit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BroadVerdict {
+    /// It goes on to the middle phase.
+    Candidate,
+    /// A node of the face tree over it has no signed distance below `bound`, which is above the contact distance.
+    PrunedByTree {
+        /// That of the first such node on the way down.
+        bound: f64,
+    },
+    /// The ball around it has no signed distance below `bound`, which is above the contact distance.
+    PrunedByBall {
+        /// Signed distance at the middle of the ball, less its radius.
+        bound: f64,
+    },
+}
+
+/// What the middle and the narrow phase made of a part of a face.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PolygonVerdict {
+    /// It is a contact.
+    Contact,
+    /// Its cell has no signed distance up to the contact distance: dropped unseen.
+    CellBeyond,
+    /// Its least signed distance is above the contact distance.
+    Beyond,
+    /// Dropped by the cosine filter, Eq. (10): the gradient meets the face's normal at this cosine, above −cos θ.
+    Filtered {
+        /// ∇φ · n.
+        cosine: f64,
+    },
+}
+
+/// A face clipped by one cell, or a node; in the world's unit and frame.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PolygonReport {
+    /// The cell's word in `domain.nodes`; `None` outside of the domain's cube, and in the field of a simple shape.
+    pub cell: Option<u32>,
+    /// Corners of the clipped polygon, of a rounded shape those of its core.
+    pub vertices: Vec<DVec3>,
+    /// The least signed distance, as the mode finds it without a limit.
+    pub distance: f64,
+    /// Where that is.
+    pub point: DVec3,
+    /// The nearest face of *b* from there.
+    pub face_b: u32,
+    /// What became of it.
+    pub verdict: PolygonVerdict,
+}
+
+/// A face of *a*, or in node mode a node.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PartReport {
+    /// The user's number of the face, or of the node.
+    pub id: u32,
+    /// What the broad phase made of it.
+    pub broad: BroadVerdict,
+    /// Its polygons, all of them, in the order of the forest.
+    pub polygons: Vec<PolygonReport>,
+}
+
+impl PartReport {
+    /// The least signed distance over all polygons.
+    pub fn distance(&self) -> f64 {
+        self.polygons.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min)
+    }
+
+    /// How many of its polygons are contacts.
+    pub fn contacts(&self) -> usize {
+        self.polygons.iter().filter(|p| p.verdict == PolygonVerdict::Contact).count()
+    }
+}
+
+/// One ordered pair, before reduction: faces (or nodes) of *a* in the field of *b*.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WhyReport {
+    /// Whose faces.
+    pub instance_a: InstanceId,
+    /// Whose field.
+    pub instance_b: InstanceId,
+    /// What became of the pair. The rest is reported as if it was tested.
+    pub pair: PairVerdict,
+    /// Contacts count up to this, in the world's unit: the options' contact distance and what velocities add.
+    pub contact_distance: f64,
+    /// Distance between the bounds of the two along the axis on which they are farthest apart; 0 when they meet.
+    pub bounds_gap: f64,
+    /// Faces or nodes of *a*.
+    pub total: usize,
+    /// Those that the broad phase left.
+    pub candidates: usize,
+    /// The one that was asked for, or else all candidates.
+    pub parts: Vec<PartReport>,
+}
+
+/// Says what each stage of [`detect`](super::detect()) makes of the faces (in node mode: nodes) of `a` in the field of `b`: of `part`, or of
+/// all candidates. The stages are those of the detection itself; what they drop is computed on for the report.
+///
+/// # Errors
+/// As [`detect`](super::detect()); an instance that is not there, a face or node that `a` does not have.
+pub fn why(
+    scene: &Scene,
+    options: &CollideOptions,
+    a: InstanceId,
+    b: InstanceId,
+    part: Option<u32>,
+) -> Result<WhyReport, CollideError> {
+    options.validate()?;
+    let (of_a, of_b) = (scene.instance(a)?, scene.instance(b)?);
+    let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
+    let contact_distance = options.contact_distance
+        + motion_ahead(shape_a, of_a, options.speculative_time)
+        + motion_ahead(shape_b, of_b, options.speculative_time);
+    let (bounds_a, bounds_b) = (scene.bounds(a)?, scene.bounds(b)?);
+    let bounds_gap = (bounds_a.min - bounds_b.max).max(bounds_b.min - bounds_a.max).max_element().max(0.0);
+    let pair = match () {
+        () if a == b => PairVerdict::SameInstance,
+        () if of_a.world != of_b.world => PairVerdict::OtherWorlds,
+        () if !of_a.groups.meet(of_b.groups) => PairVerdict::GroupsDoNotMeet,
+        () if scene.is_excluded(a, b) => PairVerdict::Excluded,
+        () if matches!((shape_a, shape_b), (Shape::Plane, Shape::Plane)) => PairVerdict::BothPlanes,
+        () if bounds_gap > contact_distance => PairVerdict::BoundsApart,
+        () => PairVerdict::Tested,
+    };
+    let mut report = WhyReport {
+        instance_a: a,
+        instance_b: b,
+        pair,
+        contact_distance,
+        bounds_gap,
+        total: 0,
+        candidates: 0,
+        parts: Vec::new(),
+    };
+    if pair == PairVerdict::BothPlanes {
+        return Ok(report);
+    }
+    let stages = Stages { direction: Direction::new(scene, options, a, b, contact_distance)?, options };
+    let candidates = stages.direction.candidates();
+    let wanted = match part {
+        None => candidates.clone(),
+        Some(id) => stages.named(id)?,
+    };
+    report.total = stages.total();
+    report.candidates = candidates.len();
+    report.parts = wanted.into_iter().map(|p| stages.part(p, candidates.binary_search(&p).is_ok())).collect();
+    Ok(report)
+}
+
+struct Stages<'a> {
+    direction: Direction<'a>,
+    options: &'a CollideOptions,
+}
+
+impl Stages<'_> {
+    fn total(&self) -> usize {
+        let surface = &self.direction.surface;
+        match self.options.mode {
+            Mode::Node => surface.node_count() as usize,
+            Mode::Face(_) => surface.face_count() as usize,
+        }
+    }
+
+    /// The candidates that go by the user's number: of a plane its two halves.
+    fn named(&self, id: u32) -> Result<Vec<u32>, CollideError> {
+        let total = self.total() as u32;
+        let found: Vec<u32> = match self.options.mode {
+            Mode::Node => (0..total).filter(|&node| node == id).collect(),
+            Mode::Face(_) => (0..total).filter(|&f| self.direction.surface.face_id(f) == id).collect(),
+        };
+        if found.is_empty() {
+            let (option, expected) = match self.options.mode {
+                Mode::Node => ("node", "a node of the body, counted from 0"),
+                Mode::Face(_) => ("face", "a face of the body, counted from 0 as in the encoded mesh"),
+            };
+            return Err(CollideError::Option { option, found: format!("{id} (of {total})"), expected });
+        }
+        Ok(found)
+    }
+
+    fn part(&self, candidate: u32, is_candidate: bool) -> PartReport {
+        let Direction { surface, field, search, .. } = &self.direction;
+        let (part, _, id) = self.direction.part(candidate);
+        let unit = field.unit();
+        let broad = if is_candidate {
+            BroadVerdict::Candidate
+        } else {
+            let holds = |start: u32, count: u32| surface.holds(start, count, candidate, self.options.mode);
+            match surface.pruned_by(field, search.reach, holds) {
+                Some(bound) => BroadVerdict::PrunedByTree { bound: bound * unit },
+                None => {
+                    let (center, radius) = part.ball();
+                    let bound = field.least_within(center, radius + part.radius) * unit;
+                    BroadVerdict::PrunedByBall { bound }
+                }
+            }
+        };
+        // What the detection sees, then everything.
+        let mut seen = Vec::new();
+        let mut kept = Vec::new();
+        search.minima(field, &part, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
+            kept.push((key(polygon), minimum))
+        });
+        let mut polygons = Vec::new();
+        search.within(f64::INFINITY).minima(field, &part, &mut |_| (), &mut |polygon, minimum| {
+            let key = key(polygon);
+            let verdict = match kept.iter().find(|k| k.0 == key) {
+                Some((_, minimum)) if self.direction.is_filtered(&part, minimum) => {
+                    PolygonVerdict::Filtered { cosine: minimum.value.gradient.dot(part.normal) }
+                }
+                Some(_) => PolygonVerdict::Contact,
+                None if seen.contains(&key) => PolygonVerdict::Beyond,
+                None => PolygonVerdict::CellBeyond,
+            };
+            polygons.push(PolygonReport {
+                cell: polygon.cell,
+                vertices: polygon.polygon.points().map(|p| field.to_world(p)).collect(),
+                distance: (minimum.value.distance - part.radius) * unit,
+                point: field.to_world(minimum.point - part.radius * minimum.value.gradient),
+                face_b: field.names(&minimum.value).0,
+                verdict,
+            });
+        });
+        PartReport { id, broad, polygons }
+    }
+}
+
+/// Tells the polygons of one face apart.
+type Key = (Option<u32>, [u64; 3]);
+
+fn key(polygon: &ClippedPolygon) -> Key {
+    let first = polygon.polygon.points().next().unwrap_or(DVec3::NAN);
+    (polygon.cell, first.to_array().map(f64::to_bits))
+}
