@@ -19,13 +19,7 @@ const TASK: usize = 64;
 /// # Errors
 /// An option that makes no sense, or an instance whose shape is gone.
 pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-    options.validate()?;
-    let pairs = instance_pairs(scene, options.contact_distance, options.speculative_time)?;
-    let directions = pairs
-        .iter()
-        .flat_map(|pair| [(pair.first, pair.second, pair), (pair.second, pair.first, pair)])
-        .map(|(a, b, pair)| Direction::new(scene, options, a, b, pair))
-        .collect::<Result<Vec<_>, _>>()?;
+    let directions = Direction::all(scene, options)?;
     let candidates: Vec<Candidates> = directions.par_iter().map(Direction::candidates).collect();
     let tasks: Vec<(&Direction, &[u32])> = directions
         .iter()
@@ -63,13 +57,13 @@ fn order(c: &Contact) -> (u32, u32, Option<u32>, [u64; 3]) {
 }
 
 /// One body's surface against another's field.
-struct Direction<'a> {
-    surface: SurfaceBody<'a>,
-    field: FieldBody<'a>,
-    search: Search,
+pub(super) struct Direction<'a> {
+    pub surface: SurfaceBody<'a>,
+    pub field: FieldBody<'a>,
+    pub search: Search,
     options: &'a CollideOptions,
-    a: InstanceId,
-    b: InstanceId,
+    pub a: InstanceId,
+    pub b: InstanceId,
 }
 
 #[derive(Default)]
@@ -80,6 +74,16 @@ struct Found {
 }
 
 impl<'a> Direction<'a> {
+    /// Both directions of all pairs of instances that can touch.
+    pub fn all(scene: &'a Scene, options: &'a CollideOptions) -> Result<Vec<Self>, CollideError> {
+        options.validate()?;
+        instance_pairs(scene, options.contact_distance, options.speculative_time)?
+            .iter()
+            .flat_map(|pair| [(pair.first, pair.second, pair), (pair.second, pair.first, pair)])
+            .map(|(a, b, pair)| Self::new(scene, options, a, b, pair))
+            .collect()
+    }
+
     fn new(
         scene: &'a Scene,
         options: &'a CollideOptions,
@@ -97,7 +101,7 @@ impl<'a> Direction<'a> {
     }
 
     /// Broad phase.
-    fn candidates(&self) -> Candidates {
+    pub fn candidates(&self) -> Candidates {
         match self.options.mode {
             Mode::Node => self.surface.nodes(&self.field, self.search.reach),
             Mode::Face(_) => self.surface.faces(&self.field, self.search.reach),
@@ -109,13 +113,7 @@ impl<'a> Direction<'a> {
         let mut found = Found::default();
         let Found { contacts, polygons, filtered } = &mut found;
         for &candidate in candidates {
-            let (part, face_a, feature) = match self.options.mode {
-                Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
-                Mode::Face(_) => {
-                    let face = self.surface.face_id(candidate);
-                    (self.surface.face(candidate, &self.field, self.search.reach), face, face)
-                }
-            };
+            let (part, face_a, feature) = self.part(candidate);
             self.search.minima(&self.field, &part, &mut |_| *polygons += 1, &mut |_, minimum| {
                 if self.is_filtered(&part, &minimum) {
                     *filtered += 1;
@@ -125,6 +123,17 @@ impl<'a> Direction<'a> {
             });
         }
         found
+    }
+
+    /// What is tested of a candidate, the user's number of its face, and that of the candidate itself.
+    pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
+        match self.options.mode {
+            Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
+            Mode::Face(_) => {
+                let face = self.surface.face_id(candidate);
+                (self.surface.face(candidate, &self.field, self.search.reach), face, face)
+            }
+        }
     }
 
     /// Eq. (10). What is rounded has every normal.

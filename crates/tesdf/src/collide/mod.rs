@@ -7,12 +7,14 @@
 //! - [`Scene`]: shapes (an encoded mesh, a plane, a box, a sphere, a capsule), and instances of them: a pose, a
 //!   velocity, a scale, a world. An instance costs its state only.
 //! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
+//! - [`candidates`](candidates()): what the broad and the middle phase leave, for debug views.
 //! - `clearance`: the signed distance between two instances, with witnesses.
 //! - `time_of_impact`: when two moving instances first touch, never too late.
 //! - `why`: why a contact is, or is not, there.
 //!
 //! In each contact *a* is the body whose face (or node) it is and *b* the body whose signed distance field it is; both
 //! directions of a pair are evaluated.
+mod candidates;
 mod contact;
 mod detect;
 mod error;
@@ -28,6 +30,7 @@ mod shape;
 mod simple;
 mod surface;
 
+pub use candidates::{Candidate, candidates};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, Statistics};
 pub use detect::detect;
 pub use error::CollideError;
