@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand};
 mod curve;
 mod encode;
 mod exactness;
+mod frank_wolfe;
 mod heading;
 mod input;
 mod memory;
@@ -41,6 +42,8 @@ enum Command {
     Curve(curve::Args),
     /// Largest errors and sign mistakes against brute force
     Exactness(exactness::Args),
+    /// How far Frank-Wolfe iterations are off the exact minimum, on two bodies in contact
+    FrankWolfe(frank_wolfe::Args),
 }
 
 fn main() -> ExitCode {
@@ -50,6 +53,7 @@ fn main() -> ExitCode {
         Command::Encode(args) => encode::run(args),
         Command::Curve(args) => curve::run(args),
         Command::Exactness(args) => exactness::run(args),
+        Command::FrankWolfe(args) => frank_wolfe::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -50,7 +50,7 @@ impl BruteForce {
                 let least = if at_middle - reach > contact_distance / b.at.scale {
                     f64::INFINITY
                 } else {
-                    sampled(&polygon, 4, 1e-7, value).0
+                    sampled(&polygon, 3, 1e-6, value).0
                 };
                 found.push(((face, *cell), (area(&polygon), least)));
             }
@@ -99,7 +99,9 @@ fn compare(a: usize, b: usize, bodies: &[Placed], stride: usize, contact_distanc
     }
     // Rounding may leave a point or a line in a cell that only touches it.
     let (faces, mut corners) = (&bodies[a], BTreeMap::new());
-    bodies[b].body.asset.visit_cells(|cell| drop(corners.insert(cell.id, cell.corners)));
+    bodies[b].body.asset.visit_cells(|cell| {
+        corners.insert(cell.id, cell.corners);
+    });
     for pair in looked_at.iter().chain(reported.keys()) {
         if all.pairs.contains_key(pair) {
             continue;
@@ -147,23 +149,23 @@ fn cube_and_tetrahedron() {
 
 #[test]
 fn brackets() {
-    hold(["l_bracket", "l_bracket"], &GENERAL, 7, 0.1);
+    hold(["l_bracket", "l_bracket"], &GENERAL, 31, 0.1);
 }
 
 #[test]
 fn sponge_and_cube() {
-    hold(["menger_2", "cube"], &GENERAL, 23, 0.1);
+    hold(["menger_2", "cube"], &GENERAL, 101, 0.1);
 }
 
 #[test]
 fn peg_in_a_hole() {
-    hold(["lobed_hole_c50", "lobed_peg"], &GENERAL, 61, 0.1);
+    hold(["lobed_hole_c50", "lobed_peg"], &GENERAL, 127, 0.1);
 }
 
 #[test]
 fn bolt_in_a_nut() {
     let mut random = Random(16);
-    for by in [0.0, 1e-4, 3e-4] {
+    for by in [0.0, 2e-4] {
         let bolt = Placed::around("iso_m16_bolt_6k", rotation(&mut random), 1.0, DVec3::ZERO);
         let nut = tesdf::collide::Placement {
             pose: tesdf::collide::Pose {
@@ -172,8 +174,8 @@ fn bolt_in_a_nut() {
             },
             scale: 1.0,
         };
-        let [needed, unclear] = compare_both(&[bolt, Placed::new("iso_m16_nut_c25", nut)], 97, 2e-4);
-        assert!(needed > 50 && unclear < needed / 5, "{needed} {unclear}");
+        let [needed, unclear] = compare_both(&[bolt, Placed::new("iso_m16_nut_c25", nut)], 211, 2e-4);
+        assert!(needed > 20 && unclear < needed / 5, "{needed} {unclear}");
     }
 }
 

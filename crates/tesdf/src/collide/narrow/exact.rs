@@ -14,6 +14,10 @@ use crate::query::{Faces, Place, Precision};
 /// Evaluations after which a search gives up: the hardest of 10^5 polygons on real parts took a tenth.
 const MOST_EVALUATIONS: usize = 20_000;
 
+/// Closer to the surface than this (local frame) a polygon may cross it: where two faces cross, the distance between them is
+/// rarely 0 but some 1e-17, and the sign there may be either. Far below any sensible tolerance.
+const CLEAR: f64 = 1e-9;
+
 /// The least signed distance over a polygon to `tolerance`, both in the field's frame; `None` when it is above `reach`.
 ///
 /// Outside of the solid it is the least distance between the polygon and a face, in closed form. Inside it is the greatest of a
@@ -48,7 +52,7 @@ pub fn lowest(
     }
     let (distance, point) = nearest_to_faces(asset, place, faces, polygon, normal, center, radius);
     // Clear of the surface, the polygon is all on one side of it.
-    let all_outside = !crossing || (distance > 0.0 && cell.value(point, Precision::F64).distance > 0.0);
+    let all_outside = !crossing || (distance > CLEAR && cell.value(point, Precision::F64).distance > 0.0);
     if !all_outside {
         return Some(branch_and_bound(cell, polygon, tolerance, precision));
     }
@@ -87,11 +91,16 @@ fn nearest_to_faces(
     best
 }
 
+/// What lies beyond the border of a face by less than this (local frame) does so by rounding.
+const BEYOND: f64 = 1e-13;
+
 /// A part of the polygon that is still open.
 struct Piece {
     /// No point of it has a lower signed distance.
     bound: f64,
     corners: [DVec3; 3],
+    /// The face that is nearest at its centre, by position.
+    nearest: u32,
 }
 
 impl PartialEq for Piece {
@@ -118,12 +127,7 @@ fn branch_and_bound(cell: &CellField, polygon: &Polygon, tolerance: f64, precisi
         search.value(p);
     });
     let mut open = BinaryHeap::new();
-    let v = polygon.vertices();
-    for k in 2..v.len().max(3) {
-        // A segment is a triangle with two equal corners.
-        let corners = [v[0].point, v[k - 1].point, v[k.min(v.len() - 1)].point];
-        open.push(search.piece(corners));
-    }
+    fan(polygon).for_each(|corners| open.push(search.piece(corners)));
     while let Some(piece) = open.pop() {
         if piece.bound >= search.best.0 - tolerance {
             return Lowest { point: search.best.1, converged: true };
@@ -131,14 +135,27 @@ fn branch_and_bound(cell: &CellField, polygon: &Polygon, tolerance: f64, precisi
         if search.evaluations > MOST_EVALUATIONS {
             return Lowest { point: search.best.1, converged: false };
         }
-        for half in halves(piece.corners) {
-            let piece = search.piece(half);
+        let mut go_on = |part: [DVec3; 3], search: &mut Branches| {
+            let piece = search.piece(part);
             if piece.bound < search.best.0 - tolerance {
                 open.push(piece);
             }
+        };
+        if let Some((at, inward)) = search.border(&piece, search.best.0 - tolerance) {
+            let (over, beyond) = Polygon::new(&piece.corners).cut(|v| inward.dot(v.point - at));
+            [over, beyond].iter().flat_map(fan).for_each(|part| go_on(part, &mut search));
+        } else {
+            halves(piece.corners).into_iter().for_each(|part| go_on(part, &mut search));
         }
     }
     Lowest { point: search.best.1, converged: true }
+}
+
+/// The triangles of a polygon; a segment is a triangle with two equal corners.
+fn fan(polygon: &Polygon) -> impl Iterator<Item = [DVec3; 3]> {
+    let v = polygon.vertices();
+    let last = if v.is_empty() { 2 } else { v.len().max(3) };
+    (2..last).map(move |k| [0, k - 1, k].map(|i| v[i.min(v.len() - 1)].point))
 }
 
 /// Cuts the longest edge.
@@ -190,6 +207,32 @@ impl Branches<'_> {
                 value.distance + corners.iter().map(down).fold(f64::INFINITY, f64::min)
             }
         };
-        Piece { bound: lipschitz.max(bound), corners }
+        Piece { bound: lipschitz.max(bound), corners, nearest: value.position }
+    }
+
+    /// Where the face that is nearest at a piece's centre ends within the piece: a point of that border, and the way from there over
+    /// the face; only if the part over the face is settled then, its bound being `enough`.
+    ///
+    /// Halving alone needs pieces of the size of the tolerance along the border of two faces of one plane: a box on a floor of a
+    /// hundred triangles ran into the limit.
+    fn border(&self, piece: &Piece, enough: f64) -> Option<(DVec3, DVec3)> {
+        let CellField::Mesh { asset, .. } = *self.cell else { return None };
+        let Triangle { corners, normal, .. } = asset.local_triangle(piece.nearest as usize);
+        let height = |p: &DVec3| normal.dot(*p - corners[0]).abs();
+        if -piece.corners.iter().map(height).fold(0.0, f64::max) < enough {
+            return None;
+        }
+        let center = piece.corners.iter().sum::<DVec3>() / 3.0;
+        (0..3)
+            .map(|k| {
+                let at = corners[k];
+                let inward = normal.cross(corners[(k + 1) % 3] - at).normalize_or_zero();
+                let outermost =
+                    piece.corners.iter().map(|p| inward.dot(*p - at)).fold(f64::INFINITY, f64::min);
+                (outermost, at, inward)
+            })
+            .filter(|(outermost, at, inward)| *outermost < -BEYOND && inward.dot(center - *at) > 0.0)
+            .min_by(|x, y| x.0.total_cmp(&y.0))
+            .map(|(_, at, inward)| (at, inward))
     }
 }
