@@ -8,6 +8,7 @@ use clap::{Parser, Subcommand};
 mod curve;
 mod encode;
 mod exactness;
+mod frank_wolfe;
 mod heading;
 mod input;
 mod memory;
@@ -47,6 +48,8 @@ enum Command {
     Screw(screw::Args),
     /// Time of a detection as a scene grows: instances in a row, worlds side by side
     Scaling(scaling::Args),
+    /// How far Frank-Wolfe iterations are off the exact minimum, on two bodies in contact
+    FrankWolfe(frank_wolfe::Args),
 }
 
 fn main() -> ExitCode {
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
         Command::Exactness(args) => exactness::run(args),
         Command::Screw(args) => screw::run(args),
         Command::Scaling(args) => scaling::run(args),
+        Command::FrankWolfe(args) => frank_wolfe::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -73,7 +73,8 @@ fn all_pairs(a: &[[DVec3; 3]], b: &[[DVec3; 3]]) -> f64 {
     let b: Vec<Triangle> = b.iter().map(|t| Triangle::new(*t)).collect();
     let normal = |[p, q, r]: [DVec3; 3]| (q - p).cross(r - p).normalize_or_zero();
     a.iter()
-        .flat_map(|t| b.iter().map(|s| polygon_to_triangle(t, normal(*t), s).0))
+        .flat_map(|t| b.iter().map(|s| polygon_to_triangle(t, normal(*t), s, f64::INFINITY)))
+        .map(|nearest| nearest.map_or(f64::INFINITY, |(distance, _)| distance))
         .fold(f64::INFINITY, f64::min)
 }
 

@@ -8,6 +8,8 @@ use crate::domain::Cell;
 /// A tetrahedron of the domain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellView {
+    /// The cell's name: the number of its word in `domain.nodes`, as [`Contact::tet_b`](crate::collide::Contact::tet_b) gives it.
+    pub id: u32,
     /// Corners, in the mesh's unit.
     pub corners: [DVec3; 4],
     /// Number of bisections from a sixth of the cube.
@@ -67,6 +69,7 @@ impl TeSdf {
             };
             let list = offset.and_then(|offset| List::decode(&self.lists, offset));
             visit(&CellView {
+                id: word,
                 corners: cell.corners.map(|p| self.frame.to_world(p)),
                 depth: cell.depth,
                 kind,

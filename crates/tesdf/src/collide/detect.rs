@@ -20,13 +20,7 @@ const TASK: usize = 64;
 /// # Errors
 /// An option that makes no sense, or an instance whose shape is gone.
 pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-    options.validate()?;
-    let pairs = instance_pairs(scene, options.contact_distance, options.speculative_time)?;
-    let directions = pairs
-        .iter()
-        .flat_map(|pair| [(pair.first, pair.second, pair), (pair.second, pair.first, pair)])
-        .map(|(a, b, pair)| Direction::new(scene, options, a, b, pair.contact_distance))
-        .collect::<Result<Vec<_>, _>>()?;
+    let directions = Direction::all(scene, options)?;
     let candidates: Vec<Candidates> = directions.par_iter().map(Direction::candidates).collect();
     let tasks: Vec<(&Direction, &[u32])> = directions
         .iter()
@@ -75,8 +69,8 @@ pub struct Direction<'a> {
     /// How minima are found, and up to which value.
     pub search: Search,
     options: &'a CollideOptions,
-    a: InstanceId,
-    b: InstanceId,
+    pub a: InstanceId,
+    pub b: InstanceId,
 }
 
 #[derive(Default)]
@@ -87,6 +81,16 @@ struct Found {
 }
 
 impl<'a> Direction<'a> {
+    /// Both directions of all pairs of instances that can touch.
+    pub fn all(scene: &'a Scene, options: &'a CollideOptions) -> Result<Vec<Self>, CollideError> {
+        options.validate()?;
+        instance_pairs(scene, options.contact_distance, options.speculative_time)?
+            .iter()
+            .flat_map(|pair| [(pair.first, pair.second, pair), (pair.second, pair.first, pair)])
+            .map(|(a, b, pair)| Self::new(scene, options, a, b, pair.contact_distance))
+            .collect()
+    }
+
     /// `contact_distance` is that of the pair, in the world's unit.
     pub fn new(
         scene: &'a Scene,

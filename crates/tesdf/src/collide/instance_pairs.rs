@@ -23,6 +23,9 @@ struct Entry {
     is_plane: bool,
 }
 
+/// What placing a box may round, in ulps of its largest coordinate.
+const ULPS: f64 = 8.0;
+
 /// Worlds of more instances than this get a tree.
 const FEW: usize = 16;
 
@@ -42,7 +45,10 @@ pub fn instance_pairs(
             .map_err(|e| CollideError::Instance { instance: id.0, reason: e.to_string() })?;
         let is_plane = matches!(shape, Shape::Plane);
         let motion = motion_ahead(shape, instance, speculative_time);
-        let bounds = scene.bounds(id)?.grown(0.5 * contact_distance + motion);
+        let bounds = scene.bounds(id)?;
+        // Bounds that touch would lose each other by rounding.
+        let rounding = ULPS * f64::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
+        let bounds = bounds.grown(0.5 * contact_distance + motion + rounding);
         worlds.entry(instance.world).or_default().push(Entry { id, bounds, motion, is_plane });
     }
     let mut pairs = Vec::new();

@@ -7,6 +7,7 @@
 //! - [`Scene`]: shapes (an encoded mesh, a plane, a box, a sphere, a capsule), and instances of them: a pose, a
 //!   velocity, a scale, a world. An instance costs its state only.
 //! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
+//! - [`candidates`](candidates()): what the broad and the middle phase leave, for debug views.
 //! - [`reduce_pairs`]: fewer contacts per pair, with a bound on what is lost.
 //! - [`clearance`](clearance()): the signed distance between two instances, with witnesses.
 //! - [`time_of_impact`](time_of_impact()): when two moving instances first touch, never too late.
@@ -14,6 +15,7 @@
 //!
 //! In each contact *a* is the body whose face (or node) it is and *b* the body whose signed distance field it is; both
 //! directions of a pair are evaluated.
+mod candidates;
 mod clearance;
 mod contact;
 mod detect;
@@ -38,6 +40,7 @@ mod surface;
 mod time_of_impact;
 mod why;
 
+pub use candidates::{Candidate, candidates};
 pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};
 pub use detect::detect;

@@ -2,7 +2,9 @@
 //! closed shapes, and the cells of an asset read from its bytes alone.
 #![allow(dead_code, reason = "each test program uses its own part")]
 
+pub mod bodies;
 pub mod cells;
+pub mod lowest;
 pub mod meshes;
 pub mod points;
 pub mod random;

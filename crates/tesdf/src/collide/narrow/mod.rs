@@ -60,6 +60,20 @@ impl Search {
         Self { reach, ..self }
     }
 
+    /// The parts of a part that the narrow phase is asked about, cell by cell.
+    pub fn polygons(&self, field: &FieldBody, part: &Part, visit: &mut impl FnMut(&ClippedPolygon)) {
+        let polygon = Polygon::new(part.points());
+        // Cells know the least distance outside only: 0 for those that hold a part of the solid.
+        let reach = (self.reach + part.radius).max(0.0);
+        match (field.field, part.points()) {
+            (Field::Mesh(asset), &[point]) => middle::locate(asset, point, reach, visit),
+            (Field::Mesh(asset), _) => middle::clip(asset, polygon, reach, visit),
+            (Field::Simple(_), _) => {
+                visit(&ClippedPolygon { polygon, place: Place::NotOfDomain, cell: None });
+            }
+        }
+    }
+
     /// The minima of a part, cell by cell, that are within reach; also tells every polygon.
     pub fn minima(
         &self,
@@ -69,39 +83,23 @@ impl Search {
         found: &mut impl FnMut(&ClippedPolygon, Minimum),
     ) {
         let reach = self.reach + part.radius;
-        match field.field {
-            Field::Mesh(asset) => {
-                let mut visit = |clipped: &ClippedPolygon| {
-                    polygon(clipped);
-                    let mut look = |faces: &Faces| {
-                        let cell = CellField::Mesh { asset, place: clipped.place, faces };
-                        if let Some(minimum) = self.in_cell(&cell, clipped, part, reach) {
-                            found(clipped, minimum);
-                        }
-                    };
-                    match clipped.place {
-                        Place::Listed { offset, .. } => asset.with_list(offset, |faces| look(faces)),
-                        _ => look(&Faces::default()),
-                    }
-                };
-                match *part.points() {
-                    // Cells know the least distance outside only: 0 for those that hold a part of the solid.
-                    [point] => middle::locate(asset, point, reach.max(0.0), &mut visit),
-                    _ => middle::clip(asset, Polygon::new(part.points()), reach.max(0.0), &mut visit),
+        self.polygons(field, part, &mut |clipped| {
+            polygon(clipped);
+            let mut look = |cell: &CellField| {
+                if let Some(minimum) = self.in_cell(cell, clipped, part, reach) {
+                    found(clipped, minimum);
+                }
+            };
+            match (field.field, clipped.place) {
+                (Field::Simple(simple), _) => look(&CellField::Simple(simple)),
+                (Field::Mesh(asset), place @ Place::Listed { offset, .. }) => {
+                    asset.with_list(offset, |faces| look(&CellField::Mesh { asset, place, faces }));
+                }
+                (Field::Mesh(asset), place) => {
+                    look(&CellField::Mesh { asset, place, faces: &Faces::default() })
                 }
             }
-            Field::Simple(simple) => {
-                let whole = ClippedPolygon {
-                    polygon: Polygon::new(part.points()),
-                    place: Place::NotOfDomain,
-                    cell: None,
-                };
-                polygon(&whole);
-                if let Some(minimum) = self.in_cell(&CellField::Simple(simple), &whole, part, reach) {
-                    found(&whole, minimum);
-                }
-            }
-        }
+        });
     }
 
     fn in_cell(

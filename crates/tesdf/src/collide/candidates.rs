@@ -1,0 +1,49 @@
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::detect::Direction;
+use super::{CollideError, CollideOptions, InstanceId, Scene};
+
+/// A face (or node) of one body within a cell of another: what the narrow phase is asked about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Candidate {
+    /// The body whose face it is.
+    pub instance_a: InstanceId,
+    /// The body whose cell it is.
+    pub instance_b: InstanceId,
+    /// The face of a, 0-based in the encoded mesh; for a node the lowest face that has it.
+    pub face_a: u32,
+    /// The cell of b's domain, as [`CellView::id`](crate::asset::CellView::id); `None` outside of its cube, and for a simple shape.
+    pub tet_b: Option<u32>,
+    /// The part of the face that lies in the cell, in the world: one to three points of a node, segment or triangle, clipped.
+    pub polygon: Vec<DVec3>,
+}
+
+/// What the broad and the middle phase leave of a scene: all pairs of a face and a cell that [`detect`](super::detect()) looks for a
+/// contact in, with the part of the face that is in the cell.
+///
+/// To draw, to count, and to see why something is no contact: a pair that is not here is farther apart than the contact distance.
+///
+/// # Errors
+/// As [`detect`](super::detect()).
+pub fn candidates(scene: &Scene, options: &CollideOptions) -> Result<Vec<Candidate>, CollideError> {
+    let directions = Direction::all(scene, options)?;
+    Ok(directions.par_iter().flat_map_iter(of_direction).collect())
+}
+
+fn of_direction(direction: &Direction) -> Vec<Candidate> {
+    let mut found = Vec::new();
+    for candidate in direction.candidates() {
+        let (part, face_a, _) = direction.part(candidate);
+        direction.search.polygons(&direction.field, &part, &mut |clipped| {
+            found.push(Candidate {
+                instance_a: direction.a,
+                instance_b: direction.b,
+                face_a,
+                tet_b: clipped.cell,
+                polygon: clipped.polygon.points().map(|p| direction.field.to_world(p)).collect(),
+            });
+        });
+    }
+    found
+}

@@ -1,0 +1,288 @@
+//! All meshes of `data/` of up to some 6,000 faces, lying to each other in every way: no contact is lost, and each is what it says.
+mod support;
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+use support::bodies::{Placed, RELATIONS, Relation, body, of_direction, rotation, scene};
+use support::lowest::sampled;
+use support::meshes;
+use support::random::Random;
+use tesdf::collide::{CollideOptions, Contact, Contacts, FeatureId, InstanceId, Mode, Pose, detect};
+use tesdf::geometry::Triangle;
+use tesdf::glam::DVec3;
+use tesdf::query::Precision;
+
+/// Larger meshes take too long to encode here; the exactness of their queries is tested elsewhere.
+const LARGEST: usize = 6_600;
+/// Faces of each direction that are sampled.
+const SAMPLED: usize = 30;
+/// Coordinates in the world are rounded; of their size.
+const ROUNDING: f64 = 1e-13;
+
+fn names() -> Vec<String> {
+    let rows = meshes::manifest().into_iter();
+    rows.filter(|r| r.faces <= LARGEST && !meshes::CRACKED.contains(&r.name.as_str()))
+        .map(|r| r.name)
+        .collect()
+}
+
+/// Two scenes for each mesh, with another mesh, so that all relations and all meshes take part.
+fn cases() -> Vec<(Relation, [Placed; 2])> {
+    let names = names();
+    assert!(names.len() > 50, "only {} meshes", names.len());
+    let mut random = Random(7);
+    // Encoded side by side.
+    names.par_iter().for_each(|name| drop(body(name)));
+    let pair = |k: usize| {
+        let relation = RELATIONS[k % RELATIONS.len()];
+        let (first, second) = (&names[k % names.len()], &names[random.index(names.len())]);
+        // The very same pose means most for the same mesh.
+        let second = if relation == Relation::Same { first } else { second };
+        (relation, relation.place([first, second], &mut random))
+    };
+    (0..2 * names.len() + 2).map(pair).collect()
+}
+
+/// Largest coordinate of the bodies' surroundings in the world.
+fn size(bodies: &[Placed]) -> f64 {
+    let of = |b: &Placed| {
+        let bounds = b.at.bounds(b.body.solid.mesh().bounds());
+        bounds.min.abs().max(bounds.max.abs()).max_element()
+    };
+    bodies.iter().map(of).fold(0.0, f64::max)
+}
+
+fn wide(k: usize, relation: Relation, bodies: &[Placed]) -> f64 {
+    let small = bodies.iter().all(|b| b.body.solid.mesh().faces().len() < 100);
+    let share = match (k % 3, relation) {
+        // Beyond the band of 0.05, which the face tree answers.
+        (_, Relation::Far) if small => 150.0,
+        (_, Relation::Apart) if small => 2.0,
+        (1, Relation::Apart) => 0.07,
+        (1, _) => 0.01,
+        _ => 0.0,
+    };
+    share * bodies[0].diagonal()
+}
+
+/// What every contact promises.
+fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
+    let (a, b) = (&bodies[c.instance_a.0 as usize], &bodies[c.instance_b.0 as usize]);
+    let diagonal = a.diagonal().max(b.diagonal());
+    let rounding = ROUNDING * size(bodies) + 1e-12 * diagonal;
+    let what = || format!("{c:?} {mode:?}");
+    assert!(c.distance <= contact_distance, "{}", what());
+    let face = a.body.face(c.face_a, a.at);
+    assert!(Triangle::new(face).closest(c.point_a).distance < 1e-9 * diagonal + rounding, "{}", what());
+    assert!((c.normal.length() - 1.0).abs() < 1e-9, "{}", what());
+    let between = c.point_a - c.point_b;
+    assert!((between.length() - c.distance.abs()).abs() < rounding, "{}", what());
+    let answer = b.body.asset.query(b.at.to_shape(c.point_a), Precision::F64);
+    let asked = b.at.scale * answer.signed_distance;
+    assert!((asked - c.distance).abs() < rounding, "{} query: {asked}", what());
+    let on_b = Triangle::new(b.body.face(c.face_b, b.at));
+    assert!(on_b.closest(c.point_b).distance < rounding, "{}", what());
+    if c.distance.abs() > 1e-6 * diagonal + 1e6 * rounding {
+        // The gradient, and that of the query unless another point is as near.
+        assert!(c.normal.distance(between / c.distance) < 1e-5, "{}", what());
+        let same = (b.at.to_world(answer.closest_point) - c.point_b).length() < 1e-6 * diagonal;
+        let gradient = b.at.pose.rotation * answer.gradient;
+        assert!(!same || c.normal.distance(gradient) < 1e-3, "{} query: {gradient}", what());
+    }
+    if mode == Mode::Node {
+        let node = a.at.to_world(a.body.solid.mesh().vertices()[c.feature.a as usize]);
+        assert!(node.distance(c.point_a) < rounding, "{}", what());
+        let faces = a.body.solid.mesh().faces();
+        assert_eq!(faces.iter().position(|f| f.contains(&c.feature.a)), Some(c.face_a as usize));
+    } else {
+        assert_eq!(c.feature.a, c.face_a);
+    }
+}
+
+/// Sorted by pair, direction, face and cell; no face has two contacts in one cell.
+fn is_sorted(contacts: &[Contact]) {
+    let key = |c: &Contact| {
+        let (a, b) = (c.instance_a, c.instance_b);
+        (a.min(b), a.max(b), a > b, c.face_a, c.feature.a, c.tet_b)
+    };
+    for pair in contacts.windows(2) {
+        let (x, y) = (key(&pair[0]), key(&pair[1]));
+        assert!(x < y || (x == y && x.5.is_none()), "{:?} {:?}", pair[0], pair[1]);
+    }
+}
+
+/// The least distance of each face or node.
+fn least(contacts: &[Contact], a: u32, b: u32) -> BTreeMap<u32, f64> {
+    let mut least = BTreeMap::new();
+    for c in of_direction(contacts, a, b) {
+        let known: &mut f64 = least.entry(c.feature.a).or_insert(f64::INFINITY);
+        *known = known.min(c.distance);
+    }
+    least
+}
+
+/// Vertices of `a` against the field of `b`.
+fn has_all_nodes(found: &Contacts, bodies: &[Placed], a: usize, b: usize, contact_distance: f64) {
+    let nodes = least(&found.contacts, a as u32, b as u32);
+    let (from, to) = (&bodies[a], &bodies[b]);
+    let band = ROUNDING * size(bodies) + 1e-12 * to.diagonal();
+    let mut used = vec![false; from.body.solid.mesh().vertices().len()];
+    let faces = from.body.solid.mesh().faces();
+    faces.as_flattened().iter().for_each(|&v| used[v as usize] = true);
+    for (v, &p) in from.body.solid.mesh().vertices().iter().enumerate() {
+        if !used[v] {
+            continue;
+        }
+        let p = from.at.to_world(p);
+        let distance = to.at.scale * to.body.asset.query(to.at.to_shape(p), Precision::F64).signed_distance;
+        match nodes.get(&(v as u32)) {
+            Some(known) => assert!((known - distance).abs() < band, "vertex {v}: {known} {distance}"),
+            None => assert!(distance > contact_distance - band, "vertex {v}, {distance}, is lost"),
+        }
+    }
+}
+
+/// Samples of some faces of `a`, and all of its vertices, in the field of `b`: none is deeper. `shallow` is what the method may miss.
+fn has_the_deepest(
+    found: &Contacts,
+    bodies: &[Placed],
+    a: usize,
+    b: usize,
+    contact_distance: f64,
+    shallow: f64,
+) {
+    let faces = least(&found.contacts, a as u32, b as u32);
+    let (from, to) = (&bodies[a], &bodies[b]);
+    let band = ROUNDING * size(bodies) + shallow * to.diagonal();
+    let count = from.body.solid.mesh().faces().len();
+    for face in (0..count as u32).step_by(count.div_ceil(SAMPLED)) {
+        let triangle = from.body.face(face, from.at);
+        let (lowest, at) = sampled(&triangle, 5, 1.0, |p| to.distance_by_tree(p));
+        let known = faces.get(&face).copied().unwrap_or(contact_distance);
+        assert!(
+            known.min(contact_distance) < lowest + band || lowest > contact_distance,
+            "face {face} is {lowest} deep at {at}; reported {:?}",
+            faces.get(&face)
+        );
+    }
+}
+
+/// The contacts with the instances named the other way around.
+fn renamed(contacts: &[Contact]) -> Vec<Contact> {
+    let other = |id: InstanceId| InstanceId(1 - id.0);
+    let mut all: Vec<Contact> = contacts
+        .iter()
+        .map(|c| Contact { instance_a: other(c.instance_a), instance_b: other(c.instance_b), ..*c })
+        .collect();
+    all.sort_by_key(|c| c.instance_a);
+    all
+}
+
+/// Faces with their least distances are the same but for rounding, and for those at the threshold.
+fn same_but_rounding(one: &Contacts, other: &Contacts, bodies: &[Placed], contact_distance: f64, error: f64) {
+    for (a, b) in [(0, 1), (1, 0)] {
+        let band = error * bodies[b as usize].diagonal() + 1e-12 * size(bodies);
+        let [one, other] = [one, other].map(|c| least(&c.contacts, a, b));
+        for (x, y) in [(&one, &other), (&other, &one)] {
+            for (part, distance) in x {
+                match y.get(part) {
+                    Some(again) => assert!((distance - again).abs() < band, "{part}: {distance} {again}"),
+                    None => assert!(*distance > contact_distance - band, "{part}, {distance}, is lost"),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn no_contact_is_lost() {
+    let cases = cases();
+    let counts: Vec<(Relation, usize)> = cases
+        .par_iter()
+        .enumerate()
+        .map(|(k, (relation, bodies))| {
+            let contact_distance = wide(k, *relation, bodies);
+            let (scene, mut count) = (scene(bodies), 0);
+            let swapped = support::bodies::scene(&[bodies[1].clone(), bodies[0].clone()]);
+            let mut random = Random(k as u64);
+            let motion = Pose {
+                translation: bodies[0].diagonal() * random.in_cube(),
+                rotation: rotation(&mut random),
+            };
+            let moved = [bodies[0].moved(motion), bodies[1].moved(motion)];
+            // What the modes may be off by: Exact's tolerance twice, and nothing for nodes.
+            for (mode, error) in [(Mode::Node, 1e-12), (Mode::EXACT, 2e-7), (Mode::FACE, f64::INFINITY)] {
+                let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
+                let found = detect(&scene, &options).expect("a good scene");
+                let of_others = detect(&swapped, &options).expect("a good scene");
+                count += found.contacts.len();
+                is_sorted(&found.contacts);
+                found.contacts.iter().for_each(|c| is_sound(c, bodies, mode, contact_distance));
+                assert_eq!(renamed(&of_others.contacts), {
+                    let mut all = found.contacts.clone();
+                    all.sort_by_key(|c| c.instance_a);
+                    all
+                });
+                for (a, b) in [(0, 1), (1, 0)] {
+                    match mode {
+                        Mode::Node => has_all_nodes(&found, bodies, a, b, contact_distance),
+                        Mode::FACE => has_the_deepest(&found, bodies, a, b, contact_distance, 1e-2),
+                        _ => has_the_deepest(&found, bodies, a, b, contact_distance, 1e-6),
+                    }
+                }
+                if error.is_finite() {
+                    let after = detect(&support::bodies::scene(&moved), &options).expect("a good scene");
+                    same_but_rounding(&found, &after, bodies, contact_distance, error);
+                }
+            }
+            (*relation, count)
+        })
+        .collect();
+    for relation in RELATIONS {
+        let found: usize = counts.iter().filter(|c| c.0 == relation).map(|c| c.1).sum();
+        // Apart and far, small bodies meet by a wide contact distance.
+        assert!(found > 0, "{relation:?}: no contact at all");
+    }
+}
+
+#[test]
+fn the_same_bytes_on_any_number_of_threads() {
+    let mut random = Random(11);
+    let names = ["iso_m16_bolt_6k", "l_bracket", "spot", "torus_quads"];
+    let bodies: Vec<Placed> = (0..8)
+        .map(|k| {
+            let to = 0.02 * random.in_cube();
+            let name = names[k % names.len()];
+            Placed::around(name, rotation(&mut random), 0.03 / body(name).diagonal(), to)
+        })
+        .collect();
+    let scene = scene(&bodies);
+    for mode in [Mode::Node, Mode::FACE, Mode::EXACT] {
+        let options = CollideOptions { contact_distance: 1e-4, ..CollideOptions::with_mode(mode) };
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            pool.install(|| detect(&scene, &options).expect("a good scene"))
+        };
+        let [one, two, eight] = [1, 2, 8].map(on);
+        assert!(one.contacts.len() > 100, "{mode:?}: {} contacts", one.contacts.len());
+        is_sorted(&one.contacts);
+        for other in [two, eight] {
+            assert_eq!(bits(&one.contacts), bits(&other.contacts), "{mode:?}");
+            assert_eq!(one.statistics, other.statistics);
+        }
+    }
+}
+
+type Bits = ([u64; 10], [u32; 4], Option<u32>, FeatureId, bool);
+
+/// Every bit of a contact; equal numbers may differ in them.
+fn bits(contacts: &[Contact]) -> Vec<Bits> {
+    let all = |c: &Contact| {
+        let [p, q, n]: [DVec3; 3] = [c.point_a, c.point_b, c.normal];
+        let numbers = [p.x, p.y, p.z, q.x, q.y, q.z, n.x, n.y, n.z, c.distance].map(f64::to_bits);
+        let ids = [c.face_a, c.face_b, c.instance_a.0, c.instance_b.0];
+        (numbers, ids, c.tet_b, c.feature, c.converged)
+    };
+    contacts.iter().map(all).collect()
+}
