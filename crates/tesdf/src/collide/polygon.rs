@@ -97,7 +97,9 @@ impl Polygon {
             if h <= 0.0 {
                 second.push(v);
             }
-            if (h > 0.0 && h_next < 0.0) || (h < 0.0 && h_next > 0.0) {
+            // A segment has no edge back.
+            let is_edge = n > 2 || i == 0;
+            if is_edge && ((h > 0.0 && h_next < 0.0) || (h < 0.0 && h_next > 0.0)) {
                 // From the same end on both sides of an edge that two polygons share.
                 let v = if h > 0.0 {
                     Vertex::between(&v, &self.0[j], h / (h - h_next))
