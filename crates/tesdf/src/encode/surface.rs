@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use super::filter::MARGIN;
 use crate::geometry::{Feature, Triangle};
 use crate::mesh::TriangleMesh;
+use crate::query::Isa;
 
 /// A part of the surface whose distance a cell needs: a face, an edge or a vertex.
 ///
@@ -41,6 +42,8 @@ pub struct Surface {
     pub area: f64,
     /// What a distance must be less by to count as less: [`MARGIN`] times the size of the domain.
     pub margin: f64,
+    /// What the filter computes with; the results are the same.
+    pub isa: Isa,
 }
 
 impl Surface {
@@ -84,6 +87,7 @@ impl Surface {
             vertex_faces,
             area,
             margin: MARGIN * side.max(1.0),
+            isa: Isa::detect(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! Shortens the list of a finished cell to what some point of it needs.
 
-use super::filter::{Candidate, Scratch, filter, probe};
+use super::candidates::{Candidates, Pool};
+use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
 use crate::domain::Cell;
 
@@ -10,12 +11,11 @@ use crate::domain::Cell;
 /// settled once some probed point has it closest; bisection goes on only where a survivor is not
 /// settled yet, so that nearly all of the work goes to the faces in doubt.
 pub fn tighten(surface: &Surface, cell: &Cell, list: &[u32], levels: u32, scratch: &mut Scratch) -> Vec<u32> {
-    let candidates = list
-        .iter()
-        .map(|&face| Candidate { face, at: cell.corners.map(|c| probe(surface, face, c)) })
-        .collect();
     let mut needed = Needed { surface, settled: Vec::with_capacity(list.len()) };
-    needed.descend(*cell, candidates, levels, scratch);
+    let mut pool = scratch.pool();
+    pool.fill(surface, list, cell);
+    needed.descend(*cell, &pool.seen_from([0, 1, 2, 3]), levels, scratch);
+    scratch.give_back(pool);
     needed.settled.sort_unstable();
     surface.cover(&needed.settled)
 }
@@ -26,10 +26,10 @@ struct Needed<'a> {
 }
 
 impl Needed<'_> {
-    fn descend(&mut self, cell: Cell, candidates: Vec<Candidate>, levels: u32, scratch: &mut Scratch) {
-        let filtered = filter(self.surface, &cell, &candidates, scratch);
+    fn descend(&mut self, cell: Cell, candidates: &Candidates, levels: u32, scratch: &mut Scratch) {
+        let filtered = filter(self.surface, &cell, candidates, scratch);
         for &(index, feature) in &filtered.closest {
-            self.settle(self.surface.requirement(candidates[index as usize].face, feature));
+            self.settle(self.surface.requirement(candidates.faces[index as usize], feature));
         }
         let mut open = false;
         for s in &filtered.survivors {
@@ -41,22 +41,14 @@ impl Needed<'_> {
         if !open {
             return;
         }
-        let midpoint = cell.midpoint();
-        let alive: Vec<_> = filtered
-            .survivors
-            .iter()
-            .map(|s| &candidates[s.index as usize])
-            .map(|g| (g, probe(self.surface, g.face, midpoint)))
-            .collect();
-        let children = [0, 1].map(|side| {
-            let from = cell.child_corners(side);
-            let at = |g: &Candidate, m| from.map(|k| if k == 4 { m } else { g.at[k] });
-            alive.iter().map(|&(g, m)| Candidate { face: g.face, at: at(g, m) }).collect::<Vec<_>>()
-        });
-        drop(alive);
-        for (side, child) in children.into_iter().enumerate() {
-            self.descend(cell.child(side), child, levels - 1, scratch);
+        let mut pool: Pool = scratch.pool();
+        pool.narrow(self.surface, &cell, candidates, &filtered.survivors);
+        drop(filtered);
+        for side in 0..2 {
+            let seen = pool.seen_from(cell.child_corners(side));
+            self.descend(cell.child(side), &seen, levels - 1, scratch);
         }
+        scratch.give_back(pool);
     }
 
     fn settle(&mut self, requirement: Requirement) {

@@ -1,0 +1,185 @@
+//! Rule B of the filter: a linear lower bound of a face's distance against a rival's chord.
+
+use glam::DVec3;
+
+use super::candidates::{Candidates, GRADIENT};
+use super::doubles::{Doubles, GROUP, Vector, dispatch};
+use super::surface::Surface;
+use crate::domain::Cell;
+
+/// At most this many faces stand against each candidate; the nearest ones.
+const MAX_RIVALS: usize = 96;
+
+/// The chords that candidates are held against: values at the four corners, in rows.
+#[derive(Debug, Default)]
+pub struct Rivals {
+    rows: [Vec<f64>; 4],
+    /// The least at each corner.
+    least: [f64; 4],
+}
+
+impl Rivals {
+    /// Takes the [`MAX_RIVALS`] of `candidates` whose chords have the least sum.
+    pub fn choose(&mut self, distances: [&[f64]; 4], candidates: impl Iterator<Item = usize> + Clone) {
+        for (row, from) in self.rows.iter_mut().zip(distances) {
+            row.clear();
+            row.extend(candidates.clone().map(|index| from[index]));
+        }
+        let n = self.rows[0].len();
+        if n > MAX_RIVALS {
+            let sum = |h: usize| self.rows[0][h] + self.rows[1][h] + self.rows[2][h] + self.rows[3][h];
+            let mut order: Vec<usize> = (0..n).collect();
+            order.select_nth_unstable_by(MAX_RIVALS, |&a, &b| sum(a).total_cmp(&sum(b)).then(a.cmp(&b)));
+            order.truncate(MAX_RIVALS);
+            self.rows = std::array::from_fn(|k| order.iter().map(|&h| self.rows[k][h]).collect());
+        }
+        for (row, least) in self.rows.iter_mut().zip(&mut self.least) {
+            *least = row.iter().copied().fold(f64::INFINITY, f64::min);
+            row.resize(row.len().next_multiple_of(GROUP), f64::INFINITY);
+        }
+    }
+}
+
+/// What the rule says of each candidate.
+#[derive(Debug, Default)]
+pub struct Verdict {
+    low: Vec<f64>,
+    beaten: Vec<u8>,
+}
+
+impl Verdict {
+    /// A lower bound of the candidate's distance all over the cell, and whether it is beaten.
+    pub fn of(&self, index: usize) -> (f64, bool) {
+        (self.low[index], self.beaten[index / GROUP] >> (index % GROUP) & 1 == 1)
+    }
+}
+
+/// All that the rule reads.
+pub struct PlaneRule<'a> {
+    /// What the centroid and the corners see of each candidate.
+    seen: [&'a [f64]; 5],
+    stride: usize,
+    /// From the centroid and from each corner to the corners.
+    offsets: [[DVec3; 4]; 5],
+    margin: f64,
+    /// The margin times the width of the cell.
+    turn: f64,
+    rivals: &'a Rivals,
+}
+
+impl<'a> PlaneRule<'a> {
+    /// For a cell whose centroid sees `centroid`.
+    pub fn new(
+        surface: &Surface,
+        cell: &Cell,
+        candidates: &Candidates<'a>,
+        centroid: &'a [f64],
+        rivals: &'a Rivals,
+    ) -> Self {
+        let [a, b, c, d] = cell.corners;
+        let [seen_a, seen_b, seen_c, seen_d] = candidates.seen;
+        Self {
+            seen: [centroid, seen_a, seen_b, seen_c, seen_d],
+            stride: candidates.stride,
+            offsets: [cell.centroid(), a, b, c, d].map(|at| cell.corners.map(|c| c - at)),
+            margin: surface.margin,
+            turn: surface.margin * cell.width(),
+            rivals,
+        }
+    }
+
+    /// Judges the candidates that are `alive`, and bounds those that are `near` as well.
+    ///
+    /// d(·, g) is convex, so it lies above its tangent at the centroid and at each corner. The slope is off by the
+    /// rounding of the closest point over the distance, so the bound is lowered by as much times the width of the cell,
+    /// and once more by the margin that the rule asks for. A candidate is beaten when some rival's chord lies below one
+    /// of its tangents at all four corners.
+    pub fn judge(&self, isa: crate::query::Isa, alive: &[u8], near: &[u8], verdict: &mut Verdict) {
+        verdict.low.resize(self.stride, 0.0);
+        verdict.beaten.resize(self.stride / GROUP, 0);
+        judge(isa, self, alive, near, &mut verdict.low, &mut verdict.beaten);
+    }
+}
+
+dispatch! {
+    fn judge(rule: &PlaneRule, alive: &[u8], near: &[u8], low: &mut [f64], beaten: &mut [u8]) = judge_lanes
+}
+
+#[inline(always)]
+fn judge_lanes<L: Doubles>(
+    rule: &PlaneRule,
+    alive: &[u8],
+    near: &[u8],
+    low: &mut [f64],
+    beaten: &mut [u8],
+) {
+    for group in 0..alive.len() {
+        beaten[group] = 0;
+        if alive[group] | near[group] == 0 {
+            continue;
+        }
+        let mut lane = 0;
+        while lane < GROUP {
+            let in_question = alive[group] >> lane;
+            beaten[group] |= judge_at::<L>(rule, group * GROUP + lane, in_question, low) << lane;
+            lane += L::LANES;
+        }
+    }
+}
+
+/// The bounds of one vector of candidates; returns which of those in question are beaten.
+#[inline(always)]
+fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut [f64]) -> u8 {
+    let least = &rule.rivals.least;
+    let margin = L::splat(rule.margin);
+    let floor = L::splat(-rule.margin);
+    let mut highest = L::splat(f64::NEG_INFINITY);
+    let mut beaten = 0;
+    for from in 0..5 {
+        let rows = rule.seen[from];
+        let distance = L::load(rows, at);
+        let slope = Vector::<L>::load(&rows[GRADIENT * rule.stride..], rule.stride, at);
+        let lowered = distance.sub(margin).sub(L::splat(rule.turn).div(distance));
+        let touching = margin.at_least(distance);
+        let mut tangent = [floor; 4];
+        for k in 0..4 {
+            let offset = Vector::splat(rule.offsets[from][k]);
+            tangent[k] = L::select(touching, floor, lowered.add(slope.dot(offset)));
+        }
+        let [a, b, c, d] = tangent;
+        highest = highest.max(a.min(b).min(c.min(d)));
+        let first = L::both(a.at_least(L::splat(least[0])), b.at_least(L::splat(least[1])));
+        let second = L::both(c.at_least(L::splat(least[2])), d.at_least(L::splat(least[3])));
+        let mut open = L::bits(L::both(first, second)) & in_question & !beaten;
+        if open != 0 {
+            let mut values = [[0.0; GROUP]; 4];
+            for k in 0..4 {
+                tangent[k].store(&mut values[k], 0);
+            }
+            while open != 0 {
+                let lane = open.trailing_zeros() as usize;
+                open &= open - 1;
+                let t = [values[0][lane], values[1][lane], values[2][lane], values[3][lane]];
+                beaten |= u8::from(any_below::<L>(&rule.rivals.rows, t)) << lane;
+            }
+        }
+    }
+    highest.store(low, at);
+    beaten
+}
+
+/// Whether some chord lies below all four values.
+#[inline(always)]
+fn any_below<L: Doubles>(chords: &[Vec<f64>; 4], t: [f64; 4]) -> bool {
+    let t = [L::splat(t[0]), L::splat(t[1]), L::splat(t[2]), L::splat(t[3])];
+    let mut at = 0;
+    while at < chords[0].len() {
+        let first = L::both(t[0].at_least(L::load(&chords[0], at)), t[1].at_least(L::load(&chords[1], at)));
+        let second = L::both(t[2].at_least(L::load(&chords[2], at)), t[3].at_least(L::load(&chords[3], at)));
+        if L::bits(L::both(first, second)) != 0 {
+            return true;
+        }
+        at += L::LANES;
+    }
+    false
+}
