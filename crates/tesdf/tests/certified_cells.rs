@@ -157,7 +157,7 @@ proptest! {
         let cell = tetrahedron(&mut random);
         let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
         let pool = Pool::new(&surface, &all, &cell);
-        let candidates = pool.seen_from([0, 1, 2, 3]);
+        let candidates = pool.candidates();
         let mut scratch = Scratch::default();
         let filtered = filter(&surface, &cell, &candidates, &mut scratch);
         let survivors: Vec<u32> = filtered.survivors.iter().map(|s| candidates.faces[s.index as usize]).collect();

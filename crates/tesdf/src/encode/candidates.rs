@@ -67,19 +67,23 @@ impl Candidates<'_> {
 
     /// Looks at all candidates from `p`, into `out`.
     pub(super) fn look_from(&self, surface: &Surface, p: DVec3, out: &mut Vec<f64>) -> Nearest {
-        out.resize(LOOK * self.stride, 0.0);
+        grow(out, LOOK * self.stride);
         look(surface.isa, &surface.triangles, self.faces, self.shape, p, out);
         nearest_seen(self.faces.len(), self.stride, out)
     }
 }
 
-/// Candidates seen from up to five points: the corners of a cell, and the middle of the edge where it is bisected.
+/// Memory of candidates as seen from up to five points: the corners of a cell, and the middle of the edge where it is
+/// bisected.
 #[derive(Debug, Default)]
 pub struct Pool {
     faces: Vec<u32>,
     stride: usize,
+    /// Shapes, what each corner sees, what the midpoint sees; only the last where [`is_shared`](Self::is_shared).
     rows: Vec<f64>,
     nearest: Vec<Nearest>,
+    /// All candidates survived: their rows are read where they are.
+    is_shared: bool,
 }
 
 impl Pool {
@@ -93,32 +97,46 @@ impl Pool {
     /// As [`new`](Self::new), in the memory of this pool.
     pub fn fill(&mut self, surface: &Surface, faces: &[u32], cell: &Cell) {
         self.start(faces.iter().copied());
-        let (shape, seen) = self.rows.split_at_mut(SHAPE * self.stride);
+        let stride = self.stride;
+        let (shape, seen) = self.rows.split_at_mut(SHAPE * stride);
         for (at, &face) in faces.iter().enumerate() {
             let t = &surface.triangles[face as usize];
             let [a, b, c] = t.corners;
             for (k, v) in [a, b, c, t.normal].into_iter().enumerate() {
                 for axis in 0..3 {
-                    shape[(3 * k + axis) * self.stride + at] = v[axis];
+                    shape[(3 * k + axis) * stride + at] = v[axis];
                 }
             }
-            shape[NEEDLE * self.stride + at] = f64::from(u8::from(t.is_needle()));
+            shape[NEEDLE * stride + at] = f64::from(u8::from(t.is_needle()));
         }
         if let Some(last) = faces.len().checked_sub(1) {
-            shape.chunks_exact_mut(self.stride).for_each(|row| {
+            shape.chunks_exact_mut(stride).for_each(|row| {
                 let value = row[last];
                 row[last..].fill(value);
             });
         }
         for (k, &corner) in cell.corners.iter().enumerate() {
-            let out = &mut seen[k * SEEN * self.stride..][..LOOK * self.stride];
+            let out = &mut seen[k * SEEN * stride..][..LOOK * stride];
             look(surface.isa, &surface.triangles, faces, shape, corner, out);
-            self.nearest.push(nearest_seen(faces.len(), self.stride, out));
+            self.nearest.push(nearest_seen(faces.len(), stride, out));
         }
+    }
+
+    /// The candidates of a cell that was [filled](Self::fill) in.
+    pub fn candidates(&self) -> Candidates<'_> {
+        self.seen_from([0, 1, 2, 3])
     }
 
     /// The survivors among a cell's candidates, seen from its corners and from its midpoint.
     pub fn narrow(&mut self, surface: &Surface, cell: &Cell, from: &Candidates, survivors: &[Survivor]) {
+        let midpoint = cell.midpoint();
+        if survivors.len() == from.faces.len() && (0..).zip(survivors).all(|(i, s)| s.index == i) {
+            self.is_shared = true;
+            self.nearest.clear();
+            self.nearest.extend(from.nearest);
+            self.nearest.push(from.look_from(surface, midpoint, &mut self.rows));
+            return;
+        }
         self.start(survivors.iter().map(|s| from.faces[s.index as usize]));
         let stride = self.stride;
         let (shape, seen) = self.rows.split_at_mut(SHAPE * stride);
@@ -128,28 +146,37 @@ impl Pool {
             pick_rows(rows, stride, from.seen[k], from.stride, survivors);
             let (index, distance) = least(&rows[..survivors.len()]);
             let old = &from.nearest[k];
-            let same = survivors.get(index).is_some_and(|s| s.index == old.index);
-            self.nearest.push(if same {
-                Nearest { index: index as u32, ..*old }
-            } else {
-                match self.faces.get(index) {
-                    Some(&face) => {
-                        let (closest, regions) =
-                            surface.triangles[face as usize].closest_and_regions(corner);
-                        let (point, feature) = (closest.point, regions.least());
-                        Nearest { index: index as u32, distance, point, feature }
-                    }
-                    None => Nearest::NONE,
+            let nearest = match survivors.get(index) {
+                Some(s) if s.index == old.index => Nearest { index: index as u32, ..*old },
+                Some(_) => {
+                    let triangle = &surface.triangles[self.faces[index] as usize];
+                    let (closest, regions) = triangle.closest_and_regions(corner);
+                    let (point, feature) = (closest.point, regions.least());
+                    Nearest { index: index as u32, distance, point, feature }
                 }
-            });
+                None => Nearest::NONE,
+            };
+            self.nearest.push(nearest);
         }
-        let out = &mut seen[4 * SEEN * stride..];
-        look(surface.isa, &surface.triangles, &self.faces, shape, cell.midpoint(), out);
+        let out = &mut seen[4 * SEEN * stride..][..LOOK * stride];
+        look(surface.isa, &surface.triangles, &self.faces, shape, midpoint, out);
         self.nearest.push(nearest_seen(self.faces.len(), stride, out));
     }
 
-    /// The candidates as a cell sees them whose corners are these of the five points.
-    pub fn seen_from(&self, points: [usize; 4]) -> Candidates<'_> {
+    /// The candidates of a child of the cell whose candidates `from` were [narrowed](Self::narrow); its corners are these
+    /// of the cell's and, as number 4, the midpoint.
+    pub fn of_child<'a>(&'a self, from: &Candidates<'a>, corners: [usize; 4]) -> Candidates<'a> {
+        if !self.is_shared {
+            return self.seen_from(corners);
+        }
+        Candidates {
+            seen: corners.map(|k| from.seen.get(k).copied().unwrap_or(&self.rows)),
+            nearest: corners.map(|k| self.nearest[k]),
+            ..*from
+        }
+    }
+
+    fn seen_from(&self, points: [usize; 4]) -> Candidates<'_> {
         let (shape, seen) = self.rows.split_at(SHAPE * self.stride);
         Candidates {
             faces: &self.faces,
@@ -161,11 +188,19 @@ impl Pool {
     }
 
     fn start(&mut self, faces: impl Iterator<Item = u32>) {
+        self.is_shared = false;
+        self.nearest.clear();
         self.faces.clear();
         self.faces.extend(faces);
         self.stride = self.faces.len().next_multiple_of(GROUP).max(GROUP);
-        self.rows.resize((SHAPE + 4 * SEEN + LOOK) * self.stride, 0.0);
-        self.nearest.clear();
+        grow(&mut self.rows, (SHAPE + 4 * SEEN + LOOK) * self.stride);
+    }
+}
+
+/// Makes room for rows that are written before they are read.
+fn grow(rows: &mut Vec<f64>, length: usize) {
+    if rows.len() < length {
+        rows.resize(length, 0.0);
     }
 }
 

@@ -40,8 +40,6 @@ pub trait Doubles: Copy {
     fn less(self, o: Self) -> Self::Mask;
     /// Where both hold.
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Where either holds.
-    fn either(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
     /// The mask, lane 0 the lowest bit.
@@ -181,10 +179,6 @@ impl Doubles for f64 {
         a & b
     }
     #[inline(always)]
-    fn either(a: bool, b: bool) -> bool {
-        a | b
-    }
-    #[inline(always)]
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
     }
@@ -269,9 +263,6 @@ mod x86_64 {
         fn both(a: __m256d, b: __m256d) -> __m256d {
             unsafe { _mm256_and_pd(a, b) }
         }
-        fn either(a: __m256d, b: __m256d) -> __m256d {
-            unsafe { _mm256_or_pd(a, b) }
-        }
         fn select(mask: __m256d, yes: Self, no: Self) -> Self {
             unsafe { _mm256_blendv_pd(no, yes, mask) }
         }
@@ -293,9 +284,6 @@ mod x86_64 {
         }
         fn both(a: u8, b: u8) -> u8 {
             a & b
-        }
-        fn either(a: u8, b: u8) -> u8 {
-            a | b
         }
         fn select(mask: u8, yes: Self, no: Self) -> Self {
             unsafe { _mm512_mask_blend_pd(mask, no, yes) }

@@ -4,6 +4,7 @@ use super::candidates::{Candidates, Pool};
 use super::doubles::{Doubles, GROUP, dispatch};
 use super::plane_rule::{PlaneRule, Rivals, Verdict};
 use super::surface::{Requirement, Surface};
+use super::tighten::Settled;
 use crate::domain::Cell;
 use crate::geometry::{Feature, triangle_meets_tetrahedron};
 
@@ -54,10 +55,18 @@ pub struct Scratch {
     near: Vec<u8>,
     verdict: Verdict,
     rivals: Rivals,
+    survivors: Vec<Survivor>,
+    meeting: Vec<Survivor>,
     pools: Vec<Pool>,
+    pub(super) settled: Settled,
 }
 
 impl Scratch {
+    /// Keeps the memory of a result that was read.
+    pub fn reuse(&mut self, filtered: Filtered) {
+        self.survivors = filtered.survivors;
+    }
+
     /// Memory for candidates.
     pub fn pool(&mut self) -> Pool {
         self.pools.pop().unwrap_or_default()
@@ -91,8 +100,10 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: 
     let nearest = [a, b, c, d, at_centroid];
     let reach = nearest.map(|h| cell.corners.map(|c| c.distance(h.point) + surface.margin));
     let closest = nearest.map(|h| (h.index, h.feature));
+    let mut survivors = std::mem::take(&mut scratch.survivors);
+    survivors.clear();
     let mut filtered = Filtered {
-        survivors: Vec::new(),
+        survivors,
         crossing: false,
         radius,
         distance: at_centroid.distance,
@@ -115,54 +126,52 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: 
     if n > MANY {
         // Shallow cells are bisected anyway, and rules B and C compare pairs. Whatever may come within the padding
         // of the cell stays.
-        filtered.survivors.extend(members(&scratch.alive, &scratch.near).map(|(index, _)| {
+        visit_members(&scratch.alive, &scratch.near, |index, _| {
             let requirement = surface.requirement(candidates.faces[index], Feature::Face);
-            Survivor { index: index as u32, requirement, meets: true }
-        }));
+            filtered.survivors.push(Survivor { index: index as u32, requirement, meets: true });
+        });
         filtered.crossing = filtered.distance <= radius + PAD;
         return filtered;
     }
 
-    scratch.rivals.choose(distances, members(&scratch.alive, &[]).map(|(index, _)| index));
-    PlaneRule::new(surface, cell, candidates, &scratch.centroid, &scratch.rivals).judge(
+    let rivals = scratch.rivals.choose(candidates, &scratch.alive);
+    PlaneRule::new(surface, cell, candidates, &scratch.centroid, rivals).judge(
         surface.isa,
         &scratch.alive,
         &scratch.near,
         &mut scratch.verdict,
     );
-    let mut dropped_but_meeting = Vec::new();
-    for (index, alive) in members(&scratch.alive, &scratch.near) {
+    scratch.meeting.clear();
+    visit_members(&scratch.alive, &scratch.near, |index, alive| {
         let face = candidates.faces[index];
         let (low, beaten) = scratch.verdict.of(index);
         let meets = low <= PAD
             && triangle_meets_tetrahedron(&surface.triangles[face as usize].corners, &cell.corners, PAD);
         filtered.crossing |= meets;
-        let whole = surface.requirement(face, Feature::Face);
+        let feature = if meets { Feature::Face } else { candidates.feature(index) };
+        let survivor =
+            Survivor { index: index as u32, requirement: surface.requirement(face, feature), meets };
         if alive && !beaten {
-            let requirement =
-                if meets { whole } else { surface.requirement(face, candidates.feature(index)) };
-            filtered.survivors.push(Survivor { index: index as u32, requirement, meets });
+            filtered.survivors.push(survivor);
         } else if meets {
-            dropped_but_meeting.push(Survivor { index: index as u32, requirement: whole, meets });
+            scratch.meeting.push(survivor);
         }
-    }
+    });
     share_features(surface, candidates, &mut filtered.survivors);
-    filtered.survivors.extend(dropped_but_meeting);
+    filtered.survivors.extend_from_slice(&scratch.meeting);
     filtered
 }
 
-/// The indices in either of two sets, ascending, and whether each is in the first. A set is a bit per index.
-fn members<'a>(first: &'a [u8], second: &'a [u8]) -> impl Iterator<Item = (usize, bool)> + Clone + 'a {
-    first.iter().enumerate().flat_map(|(group, &bits)| {
-        let mut open = bits | second.get(group).copied().unwrap_or(0);
-        std::iter::from_fn(move || {
+/// Visits the indices in either of two sets, ascending; tells whether each is in the first. A set is a bit per index.
+pub(super) fn visit_members(first: &[u8], second: &[u8], mut visit: impl FnMut(usize, bool)) {
+    for (group, (&a, &b)) in first.iter().zip(second).enumerate() {
+        let mut open = a | b;
+        while open != 0 {
             let lane = open.trailing_zeros() as usize;
-            (open != 0).then(|| {
-                open &= open - 1;
-                (group * GROUP + lane, bits >> lane & 1 == 1)
-            })
-        })
-    })
+            open &= open - 1;
+            visit(group * GROUP + lane, a >> lane & 1 == 1);
+        }
+    }
 }
 
 dispatch! {

@@ -4,39 +4,55 @@ use glam::DVec3;
 
 use super::candidates::{Candidates, GRADIENT};
 use super::doubles::{Doubles, GROUP, Vector, dispatch};
+use super::filter::visit_members;
 use super::surface::Surface;
 use crate::domain::Cell;
 
 /// At most this many faces stand against each candidate; the nearest ones.
 const MAX_RIVALS: usize = 96;
 
-/// The chords that candidates are held against: values at the four corners, in rows.
+/// Buffers for the chords of chosen rivals.
 #[derive(Debug, Default)]
 pub struct Rivals {
+    order: Vec<u32>,
     rows: [Vec<f64>; 4],
+}
+
+/// The chords that candidates are held against: values at the four corners, in rows.
+#[derive(Clone, Copy)]
+pub struct Chords<'a> {
+    rows: [&'a [f64]; 4],
     /// The least at each corner.
     least: [f64; 4],
 }
 
 impl Rivals {
-    /// Takes the [`MAX_RIVALS`] of `candidates` whose chords have the least sum.
-    pub fn choose(&mut self, distances: [&[f64]; 4], candidates: impl Iterator<Item = usize> + Clone) {
+    /// All candidates where they are few, else the [`MAX_RIVALS`] of those `alive` whose chords have the least sum.
+    ///
+    /// It makes no difference that rule A has dropped some of the few: the point that beats one is of a face whose chord
+    /// lies lower at all corners.
+    pub fn choose<'a>(&'a mut self, candidates: &Candidates<'a>, alive: &[u8]) -> Chords<'a> {
+        let distances = candidates.seen.map(|rows| &rows[..candidates.stride]);
+        let least = candidates.nearest.map(|h| h.distance);
+        if candidates.stride <= MAX_RIVALS {
+            return Chords { rows: distances, least };
+        }
+        self.order.clear();
+        visit_members(alive, alive, |index, _| self.order.push(index as u32));
+        if self.order.len() > MAX_RIVALS {
+            let [a, b, c, d] = distances;
+            let sum = |h: u32| a[h as usize] + b[h as usize] + c[h as usize] + d[h as usize];
+            self.order
+                .select_nth_unstable_by(MAX_RIVALS, |&a, &b| sum(a).total_cmp(&sum(b)).then(a.cmp(&b)));
+            self.order.truncate(MAX_RIVALS);
+        }
         for (row, from) in self.rows.iter_mut().zip(distances) {
             row.clear();
-            row.extend(candidates.clone().map(|index| from[index]));
-        }
-        let n = self.rows[0].len();
-        if n > MAX_RIVALS {
-            let sum = |h: usize| self.rows[0][h] + self.rows[1][h] + self.rows[2][h] + self.rows[3][h];
-            let mut order: Vec<usize> = (0..n).collect();
-            order.select_nth_unstable_by(MAX_RIVALS, |&a, &b| sum(a).total_cmp(&sum(b)).then(a.cmp(&b)));
-            order.truncate(MAX_RIVALS);
-            self.rows = std::array::from_fn(|k| order.iter().map(|&h| self.rows[k][h]).collect());
-        }
-        for (row, least) in self.rows.iter_mut().zip(&mut self.least) {
-            *least = row.iter().copied().fold(f64::INFINITY, f64::min);
+            row.extend(self.order.iter().map(|&h| from[h as usize]));
             row.resize(row.len().next_multiple_of(GROUP), f64::INFINITY);
         }
+        let [a, b, c, d] = &self.rows;
+        Chords { rows: [a, b, c, d], least }
     }
 }
 
@@ -64,7 +80,7 @@ pub struct PlaneRule<'a> {
     margin: f64,
     /// The margin times the width of the cell.
     turn: f64,
-    rivals: &'a Rivals,
+    rivals: Chords<'a>,
 }
 
 impl<'a> PlaneRule<'a> {
@@ -74,7 +90,7 @@ impl<'a> PlaneRule<'a> {
         cell: &Cell,
         candidates: &Candidates<'a>,
         centroid: &'a [f64],
-        rivals: &'a Rivals,
+        rivals: Chords<'a>,
     ) -> Self {
         let [a, b, c, d] = cell.corners;
         let [seen_a, seen_b, seen_c, seen_d] = candidates.seen;
@@ -95,8 +111,10 @@ impl<'a> PlaneRule<'a> {
     /// and once more by the margin that the rule asks for. A candidate is beaten when some rival's chord lies below one
     /// of its tangents at all four corners.
     pub fn judge(&self, isa: crate::query::Isa, alive: &[u8], near: &[u8], verdict: &mut Verdict) {
-        verdict.low.resize(self.stride, 0.0);
-        verdict.beaten.resize(self.stride / GROUP, 0);
+        if verdict.low.len() < self.stride {
+            verdict.low.resize(self.stride, 0.0);
+            verdict.beaten.resize(self.stride / GROUP, 0);
+        }
         judge(isa, self, alive, near, &mut verdict.low, &mut verdict.beaten);
     }
 }
@@ -170,12 +188,12 @@ fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut 
 
 /// Whether some chord lies below all four values.
 #[inline(always)]
-fn any_below<L: Doubles>(chords: &[Vec<f64>; 4], t: [f64; 4]) -> bool {
+fn any_below<L: Doubles>(chords: &[&[f64]; 4], t: [f64; 4]) -> bool {
     let t = [L::splat(t[0]), L::splat(t[1]), L::splat(t[2]), L::splat(t[3])];
     let mut at = 0;
     while at < chords[0].len() {
-        let first = L::both(t[0].at_least(L::load(&chords[0], at)), t[1].at_least(L::load(&chords[1], at)));
-        let second = L::both(t[2].at_least(L::load(&chords[2], at)), t[3].at_least(L::load(&chords[3], at)));
+        let first = L::both(t[0].at_least(L::load(chords[0], at)), t[1].at_least(L::load(chords[1], at)));
+        let second = L::both(t[2].at_least(L::load(chords[2], at)), t[3].at_least(L::load(chords[3], at)));
         if L::bits(L::both(first, second)) != 0 {
             return true;
         }

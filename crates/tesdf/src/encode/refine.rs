@@ -90,7 +90,7 @@ impl Refiner<'_> {
         let cell = cube.root(root);
         let all: Vec<u32> = (0..self.surface.faces.len() as u32).collect();
         let pool = Pool::new(self.surface, &all, &cell);
-        self.refine(cell, &pool.seen_from([0, 1, 2, 3]), &mut Scratch::default()).map(|p| p.tree)
+        self.refine(cell, &pool.candidates(), &mut Scratch::default()).map(|p| p.tree)
     }
 
     fn refine(&self, cell: Cell, candidates: &Candidates, scratch: &mut Scratch) -> Option<Pruned> {
@@ -111,6 +111,7 @@ impl Refiner<'_> {
             && !(self.inside)(centroid);
         if beyond && !reach.overlaps(self.bounds) {
             self.finish(&cell);
+            scratch.reuse(filtered);
             let union = (n <= MAX_UNION).then_some(own);
             return Some(Pruned { tree: Tree::Leaf(Leaf::Outside), cost: 0.0, union, crossing: false });
         }
@@ -127,20 +128,22 @@ impl Refiner<'_> {
 
         if !split {
             self.finish(&cell);
-            return Some(self.leaf(own, filtered.crossing, weight, unlisted));
+            let crossing = filtered.crossing;
+            scratch.reuse(filtered);
+            return Some(self.leaf(own, crossing, weight, unlisted));
         }
         let mut pool = scratch.pool();
         pool.narrow(self.surface, &cell, candidates, &filtered.survivors);
-        drop(filtered);
+        scratch.reuse(filtered);
         let (first, second) = (cell.child_corners(0), cell.child_corners(1));
         let (left, right) = if cell.depth < 14 {
             rayon::join(
-                || self.refine(cell.child(0), &pool.seen_from(first), &mut Scratch::default()),
-                || self.refine(cell.child(1), &pool.seen_from(second), &mut Scratch::default()),
+                || self.refine(cell.child(0), &pool.of_child(candidates, first), &mut Scratch::default()),
+                || self.refine(cell.child(1), &pool.of_child(candidates, second), &mut Scratch::default()),
             )
         } else {
-            let left = self.refine(cell.child(0), &pool.seen_from(first), scratch);
-            (left, self.refine(cell.child(1), &pool.seen_from(second), scratch))
+            let left = self.refine(cell.child(0), &pool.of_child(candidates, first), scratch);
+            (left, self.refine(cell.child(1), &pool.of_child(candidates, second), scratch))
         };
         scratch.give_back(pool);
         let (left, right) = (left?, right?);

@@ -13,6 +13,13 @@ use crate::query::Isa;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Requirement(u32);
 
+impl Requirement {
+    /// Faces first, then edges, then vertices; less than [`Surface::parts`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
+
 /// What a [`Requirement`] names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
@@ -101,6 +108,11 @@ impl Surface {
         })
     }
 
+    /// How many requirements there are: faces, edges and vertices.
+    pub fn parts(&self) -> usize {
+        self.faces.len() + self.edge_faces.len() + self.vertex_faces.len()
+    }
+
     /// What a requirement names.
     pub fn part(&self, requirement: Requirement) -> Part {
         let (f, e) = (self.faces.len() as u32, self.edge_count);
@@ -135,9 +147,11 @@ impl Surface {
         }
     }
 
-    /// Whether `whole` is a face that holds the part that `requirement` names.
-    pub fn implies(&self, whole: Requirement, requirement: Requirement) -> bool {
-        matches!(self.part(whole), Part::Face(f) if self.holds(f, requirement))
+    /// The edges and corners of a face.
+    pub fn implied(&self, face: u32) -> [Requirement; 6] {
+        let [a, b, c] = [0, 1, 2].map(|k| self.requirement(face, Feature::Edge(k)));
+        let [d, e, f] = [0, 1, 2].map(|k| self.requirement(face, Feature::Vertex(k)));
+        [a, b, c, d, e, f]
     }
 
     /// The fewest faces, greedily, that hold all of `requirements` (sorted), in ascending order.
