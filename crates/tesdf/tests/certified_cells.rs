@@ -17,7 +17,7 @@ use tesdf::encode::tighten::tighten;
 use tesdf::encode::{EncodeOptions, EncodeProgress, Length, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
-use tesdf::query::Precision;
+use tesdf::query::{Isa, Precision};
 
 fn options(preset: Preset, band: f64) -> EncodeOptions {
     EncodeOptions { band: Length::OfDiagonal(band), ..EncodeOptions::preset(preset) }
@@ -153,13 +153,16 @@ proptest! {
     #[test]
     fn random_tetrahedra(kind in prop::sample::select(SOUPS.to_vec()), seed in any::<u64>(), levels in 0u32..9) {
         let mut random = Random(seed);
-        let surface = Surface::new(&soup(kind, &mut random), 1.0);
+        let mut surface = Surface::new(&soup(kind, &mut random), 1.0);
         let cell = tetrahedron(&mut random);
         let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
         let pool = Pool::new(&surface, &all, &cell);
         let candidates = pool.candidates();
         let mut scratch = Scratch::default();
         let filtered = filter(&surface, &cell, &candidates, &mut scratch);
+        surface.isa = Isa::Baseline;
+        let scalar = filter(&surface, &cell, &candidates, &mut scratch);
+        prop_assert_eq!(&filtered.survivors, &scalar.survivors);
         let survivors: Vec<u32> = filtered.survivors.iter().map(|s| candidates.faces[s.index as usize]).collect();
         let mut required: Vec<_> = filtered.survivors.iter().map(|s| s.requirement).collect();
         required.sort_unstable();

@@ -329,7 +329,8 @@ fn look_at<L: Doubles>(shape: &[f64], stride: usize, p: Vector<L>, out: &mut [f6
     for k in 0..3 {
         let beside = L::both(zero.at_least(side[k]), L::both(start[k].at_least(zero), zero.at_least(end[k])));
         let beyond = L::both(zero.at_least(start[k]), end[(k + 2) % 3].at_least(zero));
-        regions = regions.add(bit::<L>(beside, f64::from(2u8 << k))).add(bit::<L>(beyond, f64::from(16u8 << k)));
+        regions =
+            regions.add(bit::<L>(beside, f64::from(2u8 << k))).add(bit::<L>(beyond, f64::from(16u8 << k)));
     }
     regions = L::select(has_area, regions, L::splat(f64::from(Regions::FACE.0)));
 
@@ -356,4 +357,58 @@ fn bit<L: Doubles>(mask: L::Mask, value: f64) -> L {
 #[inline(always)]
 fn length<L: Doubles>(v: Vector<L>) -> L {
     v.dot(v).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::TriangleMesh;
+    use crate::query::Isa;
+    use proptest::prelude::*;
+
+    fn isas() -> Vec<Isa> {
+        let mut isas = vec![Isa::Baseline];
+        #[cfg(target_arch = "x86_64")]
+        if Isa::detect() != Isa::Baseline {
+            isas.extend([Isa::Avx2, Isa::detect()]);
+        }
+        isas
+    }
+
+    fn coordinate() -> impl Strategy<Value = f64> {
+        // A coarse lattice, so that ties and degenerate triangles are common, and needles beside it.
+        prop_oneof![3 => (-3i32..4).prop_map(f64::from), 1 => -3.0..3.0f64, 1 => (0i32..4).prop_map(|x| 1e-3 * f64::from(x))]
+    }
+
+    proptest! {
+        /// Every instruction set sees the bits that the scalar code computes.
+        #[test]
+        fn looks_like_the_scalar_code(
+            corners in prop::collection::vec([coordinate(), coordinate(), coordinate()], 9..40),
+            p in [coordinate(), coordinate(), coordinate()],
+        ) {
+            let vertices: Vec<DVec3> = corners.into_iter().map(DVec3::from).collect();
+            let faces = (0..vertices.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+            let mut surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0);
+            let p = DVec3::from(p);
+            let cell = Cell { corners: [p, p + DVec3::X, p + DVec3::Y, p + DVec3::Z], depth: 0 };
+            let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
+            for isa in isas() {
+                surface.isa = isa;
+                let pool = Pool::new(&surface, &all, &cell);
+                let mut rows = Vec::new();
+                pool.candidates().look_from(&surface, p, &mut rows);
+                for (i, triangle) in surface.triangles.iter().enumerate() {
+                    let (closest, regions) = triangle.closest_and_regions(p);
+                    let at = |row: usize| rows[row * pool.stride + i];
+                    let point = DVec3::new(at(POINT), at(POINT + 1), at(POINT + 2));
+                    prop_assert_eq!((at(0), point), (closest.distance, closest.point), "{:?}", isa);
+                    prop_assert_eq!(at(REGIONS), f64::from(regions.0), "{:?}", isa);
+                    let gradient = DVec3::new(at(GRADIENT), at(GRADIENT + 1), at(GRADIENT + 2));
+                    let expected = (p - closest.point) / closest.distance;
+                    prop_assert!(closest.distance == 0.0 || gradient == expected, "{:?}", isa);
+                }
+            }
+        }
+    }
 }

@@ -294,9 +294,8 @@ mod x86_64 {
     });
 }
 
-/// Calls a function that is generic over [`Doubles`] and inlined with the widest instruction set of the processor.
-///
-/// `dispatch!(pub fn name(a: A, …) -> R = generic)` makes `pub fn name(isa: Isa, a: A, …) -> R`.
+/// `dispatch! { fn name(a: A, …) -> R = generic }` makes `fn name(isa: Isa, a: A, …) -> R`, which runs the function `generic::<L>`,
+/// `L` of [`Doubles`], compiled for the instruction set; it must be `#[inline(always)]`, as all that it calls with an `L`.
 macro_rules! dispatch {
     ($(#[$doc:meta])* fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $out:ty)? = $generic:ident) => {
         $(#[$doc])*

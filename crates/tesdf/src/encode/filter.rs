@@ -22,7 +22,7 @@ pub const MARGIN: f64 = 4e-15;
 pub const PAD: f64 = 2.5e-9;
 
 /// A candidate that the rules did not drop.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Survivor {
     /// Index among the candidates.
     pub index: u32,
@@ -102,13 +102,8 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: 
     let closest = nearest.map(|h| (h.index, h.feature));
     let mut survivors = std::mem::take(&mut scratch.survivors);
     survivors.clear();
-    let mut filtered = Filtered {
-        survivors,
-        crossing: false,
-        radius,
-        distance: at_centroid.distance,
-        closest,
-    };
+    let mut filtered =
+        Filtered { survivors, crossing: false, radius, distance: at_centroid.distance, closest };
 
     scratch.alive.resize(candidates.stride / GROUP, 0);
     scratch.near.resize(candidates.stride / GROUP, 0);

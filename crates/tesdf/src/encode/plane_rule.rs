@@ -42,8 +42,7 @@ impl Rivals {
         if self.order.len() > MAX_RIVALS {
             let [a, b, c, d] = distances;
             let sum = |h: u32| a[h as usize] + b[h as usize] + c[h as usize] + d[h as usize];
-            self.order
-                .select_nth_unstable_by(MAX_RIVALS, |&a, &b| sum(a).total_cmp(&sum(b)).then(a.cmp(&b)));
+            self.order.select_nth_unstable_by(MAX_RIVALS, |&a, &b| sum(a).total_cmp(&sum(b)).then(a.cmp(&b)));
             self.order.truncate(MAX_RIVALS);
         }
         for (row, from) in self.rows.iter_mut().zip(distances) {
@@ -124,13 +123,7 @@ dispatch! {
 }
 
 #[inline(always)]
-fn judge_lanes<L: Doubles>(
-    rule: &PlaneRule,
-    alive: &[u8],
-    near: &[u8],
-    low: &mut [f64],
-    beaten: &mut [u8],
-) {
+fn judge_lanes<L: Doubles>(rule: &PlaneRule, alive: &[u8], near: &[u8], low: &mut [f64], beaten: &mut [u8]) {
     for group in 0..alive.len() {
         beaten[group] = 0;
         if alive[group] | near[group] == 0 {
