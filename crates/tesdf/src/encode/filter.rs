@@ -110,7 +110,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: 
     let distances = candidates.seen.map(|rows| &rows[..candidates.stride]);
     let centroid = &scratch.centroid[..candidates.stride];
     point_rule(surface.isa, distances, &reach, centroid, radius + PAD, &mut scratch.alive, &mut scratch.near);
-    if n % GROUP != 0
+    if !n.is_multiple_of(GROUP)
         && let (Some(alive), Some(near)) = (scratch.alive.last_mut(), scratch.near.last_mut())
     {
         let used = (1 << (n % GROUP)) - 1;

@@ -152,21 +152,21 @@ fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut 
         let slope = Vector::<L>::load(&rows[GRADIENT * rule.stride..], rule.stride, at);
         let lowered = distance.sub(margin).sub(L::splat(rule.turn).div(distance));
         let touching = margin.at_least(distance);
-        let mut tangent = [floor; 4];
-        for k in 0..4 {
-            let offset = Vector::splat(rule.offsets[from][k]);
-            tangent[k] = L::select(touching, floor, lowered.add(slope.dot(offset)));
-        }
-        let [a, b, c, d] = tangent;
+        let [to_a, to_b, to_c, to_d] = rule.offsets[from];
+        let a = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_a))));
+        let b = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_b))));
+        let c = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_c))));
+        let d = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_d))));
         highest = highest.max(a.min(b).min(c.min(d)));
         let first = L::both(a.at_least(L::splat(least[0])), b.at_least(L::splat(least[1])));
         let second = L::both(c.at_least(L::splat(least[2])), d.at_least(L::splat(least[3])));
         let mut open = L::bits(L::both(first, second)) & in_question & !beaten;
         if open != 0 {
             let mut values = [[0.0; GROUP]; 4];
-            for k in 0..4 {
-                tangent[k].store(&mut values[k], 0);
-            }
+            a.store(&mut values[0], 0);
+            b.store(&mut values[1], 0);
+            c.store(&mut values[2], 0);
+            d.store(&mut values[3], 0);
             while open != 0 {
                 let lane = open.trailing_zeros() as usize;
                 open &= open - 1;
