@@ -10,13 +10,14 @@ use support::shapes::{FAMILIES, Family, Shape};
 use support::well_formed::WellFormed;
 use tesdf::asset::about::Source;
 use tesdf::domain::Cell;
-use tesdf::encode::filter::{Candidate, Scratch, filter, probe};
+use tesdf::encode::candidates::Pool;
+use tesdf::encode::filter::{Scratch, filter};
 use tesdf::encode::surface::Surface;
 use tesdf::encode::tighten::tighten;
 use tesdf::encode::{EncodeOptions, EncodeProgress, Length, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
-use tesdf::query::Precision;
+use tesdf::query::{Isa, Precision};
 
 fn options(preset: Preset, band: f64) -> EncodeOptions {
     EncodeOptions { band: Length::OfDiagonal(band), ..EncodeOptions::preset(preset) }
@@ -152,16 +153,17 @@ proptest! {
     #[test]
     fn random_tetrahedra(kind in prop::sample::select(SOUPS.to_vec()), seed in any::<u64>(), levels in 0u32..9) {
         let mut random = Random(seed);
-        let surface = Surface::new(&soup(kind, &mut random), 1.0);
+        let mut surface = Surface::new(&soup(kind, &mut random), 1.0);
         let cell = tetrahedron(&mut random);
         let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
-        let candidates: Vec<Candidate> = all
-            .iter()
-            .map(|&face| Candidate { face, at: cell.corners.map(|c| probe(&surface, face, c)) })
-            .collect();
+        let pool = Pool::new(&surface, &all, &cell);
+        let candidates = pool.candidates();
         let mut scratch = Scratch::default();
         let filtered = filter(&surface, &cell, &candidates, &mut scratch);
-        let survivors: Vec<u32> = filtered.survivors.iter().map(|s| candidates[s.index as usize].face).collect();
+        surface.isa = Isa::Baseline;
+        let scalar = filter(&surface, &cell, &candidates, &mut scratch);
+        prop_assert_eq!(&filtered.survivors, &scalar.survivors);
+        let survivors: Vec<u32> = filtered.survivors.iter().map(|s| candidates.faces[s.index as usize]).collect();
         let mut required: Vec<_> = filtered.survivors.iter().map(|s| s.requirement).collect();
         required.sort_unstable();
         let cover = surface.cover(&required);

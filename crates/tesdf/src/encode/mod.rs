@@ -6,10 +6,13 @@
 //! 3. labels each cell by its winding number.
 //! 4. [`assemble`]: lays the forest and its lists out as bytes.
 pub mod assemble;
+pub mod candidates;
 mod certified;
+mod doubles;
 pub mod filter;
 pub mod hints;
 mod options;
+mod plane_rule;
 mod progress;
 pub mod refine;
 pub mod surface;

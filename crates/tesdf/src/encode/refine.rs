@@ -1,7 +1,8 @@
 //! Over-refines the domain and prunes it while unwinding.
 
 use super::EncodeProgress;
-use super::filter::{Candidate, Scratch, filter, probe, radius};
+use super::candidates::{Candidates, Pool};
+use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
 use crate::domain::{Cell, DomainCube, MAX_DEPTH};
 use crate::geometry::Aabb;
@@ -87,20 +88,18 @@ impl Refiner<'_> {
     /// Refines root `root` of the cube. `None` when cancelled.
     pub fn root(&self, cube: &DomainCube, root: usize) -> Option<Tree> {
         let cell = cube.root(root);
-        let candidates: Vec<Candidate> = (0..self.surface.faces.len() as u32)
-            .map(|face| Candidate { face, at: cell.corners.map(|c| probe(self.surface, face, c)) })
-            .collect();
-        self.refine(cell, candidates, &mut Scratch::default()).map(|p| p.tree)
+        let all: Vec<u32> = (0..self.surface.faces.len() as u32).collect();
+        let pool = Pool::new(self.surface, &all, &cell);
+        self.refine(cell, &pool.candidates(), &mut Scratch::default()).map(|p| p.tree)
     }
 
-    fn refine(&self, cell: Cell, candidates: Vec<Candidate>, scratch: &mut Scratch) -> Option<Pruned> {
+    fn refine(&self, cell: Cell, candidates: &Candidates, scratch: &mut Scratch) -> Option<Pruned> {
         if self.progress.is_cancelled() {
             return None;
         }
-        let filtered = filter(self.surface, &cell, &candidates, scratch);
+        let filtered = filter(self.surface, &cell, candidates, scratch);
         let centroid = cell.centroid();
-        let radius = radius(&cell);
-        let nearest = filtered.distance - radius;
+        let nearest = filtered.distance - filtered.radius;
         let n = filtered.survivors.len();
 
         let mut own: Vec<Requirement> = filtered.survivors.iter().map(|s| s.requirement).collect();
@@ -112,6 +111,7 @@ impl Refiner<'_> {
             && !(self.inside)(centroid);
         if beyond && !reach.overlaps(self.bounds) {
             self.finish(&cell);
+            scratch.reuse(filtered);
             let union = (n <= MAX_UNION).then_some(own);
             return Some(Pruned { tree: Tree::Leaf(Leaf::Outside), cost: 0.0, union, crossing: false });
         }
@@ -128,35 +128,24 @@ impl Refiner<'_> {
 
         if !split {
             self.finish(&cell);
-            return Some(self.leaf(own, filtered.crossing, weight, unlisted));
+            let crossing = filtered.crossing;
+            scratch.reuse(filtered);
+            return Some(self.leaf(own, crossing, weight, unlisted));
         }
-        let midpoint = cell.midpoint();
-        let alive: Vec<(&Candidate, _)> = filtered
-            .survivors
-            .iter()
-            .map(|s| &candidates[s.index as usize])
-            .map(|g| (g, probe(self.surface, g.face, midpoint)))
-            .collect();
-        let below = |side: usize| -> Vec<Candidate> {
-            let from = cell.child_corners(side);
-            let take = |(g, m): &(&Candidate, _)| Candidate {
-                face: g.face,
-                at: from.map(|k| if k == 4 { *m } else { g.at[k] }),
-            };
-            alive.iter().map(take).collect()
-        };
-        let (first, second) = (below(0), below(1));
-        drop(alive);
-        drop(candidates);
+        let mut pool = scratch.pool();
+        pool.narrow(self.surface, &cell, candidates, &filtered.survivors);
+        scratch.reuse(filtered);
+        let (first, second) = (cell.child_corners(0), cell.child_corners(1));
         let (left, right) = if cell.depth < 14 {
             rayon::join(
-                || self.refine(cell.child(0), first, &mut Scratch::default()),
-                || self.refine(cell.child(1), second, &mut Scratch::default()),
+                || self.refine(cell.child(0), &pool.of_child(candidates, first), &mut Scratch::default()),
+                || self.refine(cell.child(1), &pool.of_child(candidates, second), &mut Scratch::default()),
             )
         } else {
-            let left = self.refine(cell.child(0), first, scratch);
-            (left, self.refine(cell.child(1), second, scratch))
+            let left = self.refine(cell.child(0), &pool.of_child(candidates, first), scratch);
+            (left, self.refine(cell.child(1), &pool.of_child(candidates, second), scratch))
         };
+        scratch.give_back(pool);
         let (left, right) = (left?, right?);
         Some(self.prune(left, right, own, weight, unlisted))
     }

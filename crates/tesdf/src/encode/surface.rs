@@ -5,12 +5,20 @@ use std::collections::HashMap;
 use super::filter::MARGIN;
 use crate::geometry::{Feature, Triangle};
 use crate::mesh::TriangleMesh;
+use crate::query::Isa;
 
 /// A part of the surface whose distance a cell needs: a face, an edge or a vertex.
 ///
 /// Ordered: faces, then edges, then vertices, each by its id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Requirement(u32);
+
+impl Requirement {
+    /// Faces first, then edges, then vertices; less than [`Surface::parts`].
+    pub fn index(self) -> usize {
+        self.0 as usize
+    }
+}
 
 /// What a [`Requirement`] names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +49,8 @@ pub struct Surface {
     pub area: f64,
     /// What a distance must be less by to count as less: [`MARGIN`] times the size of the domain.
     pub margin: f64,
+    /// What the filter computes with; the results are the same.
+    pub isa: Isa,
 }
 
 impl Surface {
@@ -84,6 +94,7 @@ impl Surface {
             vertex_faces,
             area,
             margin: MARGIN * side.max(1.0),
+            isa: Isa::detect(),
         }
     }
 
@@ -95,6 +106,11 @@ impl Surface {
             Feature::Edge(k) => f + self.edges[face as usize][k as usize],
             Feature::Vertex(k) => f + e + self.faces[face as usize][k as usize],
         })
+    }
+
+    /// How many requirements there are: faces, edges and vertices.
+    pub fn parts(&self) -> usize {
+        self.faces.len() + self.edge_faces.len() + self.vertex_faces.len()
     }
 
     /// What a requirement names.
@@ -131,9 +147,11 @@ impl Surface {
         }
     }
 
-    /// Whether `whole` is a face that holds the part that `requirement` names.
-    pub fn implies(&self, whole: Requirement, requirement: Requirement) -> bool {
-        matches!(self.part(whole), Part::Face(f) if self.holds(f, requirement))
+    /// The edges and corners of a face.
+    pub fn implied(&self, face: u32) -> [Requirement; 6] {
+        let [a, b, c] = [0, 1, 2].map(|k| self.requirement(face, Feature::Edge(k)));
+        let [d, e, f] = [0, 1, 2].map(|k| self.requirement(face, Feature::Vertex(k)));
+        [a, b, c, d, e, f]
     }
 
     /// The fewest faces, greedily, that hold all of `requirements` (sorted), in ascending order.

@@ -1,8 +1,10 @@
 //! Shortens the list of a finished cell to what some point of it needs.
 
-use super::filter::{Candidate, Scratch, filter, probe};
-use super::surface::{Requirement, Surface};
+use super::candidates::Candidates;
+use super::filter::{Scratch, filter};
+use super::surface::{Part, Requirement, Surface};
 use crate::domain::Cell;
+use crate::geometry::Feature;
 
 /// The shortest list that the filter can certify by bisecting up to `levels` deeper.
 ///
@@ -10,62 +12,94 @@ use crate::domain::Cell;
 /// settled once some probed point has it closest; bisection goes on only where a survivor is not
 /// settled yet, so that nearly all of the work goes to the faces in doubt.
 pub fn tighten(surface: &Surface, cell: &Cell, list: &[u32], levels: u32, scratch: &mut Scratch) -> Vec<u32> {
-    let candidates = list
-        .iter()
-        .map(|&face| Candidate { face, at: cell.corners.map(|c| probe(surface, face, c)) })
-        .collect();
-    let mut needed = Needed { surface, settled: Vec::with_capacity(list.len()) };
-    needed.descend(*cell, candidates, levels, scratch);
-    needed.settled.sort_unstable();
-    surface.cover(&needed.settled)
+    let mut settled = std::mem::take(&mut scratch.settled);
+    settled.start(surface);
+    let mut needed = Needed { surface, settled };
+    let mut pool = scratch.pool();
+    pool.fill(surface, list, cell);
+    needed.descend(*cell, &pool.candidates(), levels, scratch);
+    scratch.give_back(pool);
+    needed.settled.list.sort_unstable();
+    let tight = surface.cover(&needed.settled.list);
+    scratch.settled = needed.settled;
+    tight
+}
+
+/// A set of requirements, with what its faces imply.
+#[derive(Debug, Default)]
+pub struct Settled {
+    list: Vec<Requirement>,
+    /// By the index of a requirement: the round in which it was implied (doubled), or settled (and one more).
+    mark: Vec<u64>,
+    round: u64,
+}
+
+impl Settled {
+    /// Empties the set.
+    fn start(&mut self, surface: &Surface) {
+        self.list.clear();
+        self.mark.resize(surface.parts(), 0);
+        self.round += 2;
+    }
+
+    fn settle(&mut self, surface: &Surface, requirement: Requirement) {
+        if self.mark[requirement.index()] == self.round + 1 {
+            return;
+        }
+        self.mark[requirement.index()] = self.round + 1;
+        self.list.push(requirement);
+        if let Part::Face(face) = surface.part(requirement) {
+            for part in surface.implied(face) {
+                let mark = &mut self.mark[part.index()];
+                *mark = self.round.max(*mark);
+            }
+        }
+    }
+
+    /// Whether it, or a face that has it, is in the set.
+    fn holds(&self, requirement: Requirement) -> bool {
+        self.mark[requirement.index()] >= self.round
+    }
 }
 
 struct Needed<'a> {
     surface: &'a Surface,
-    settled: Vec<Requirement>,
+    settled: Settled,
 }
 
 impl Needed<'_> {
-    fn descend(&mut self, cell: Cell, candidates: Vec<Candidate>, levels: u32, scratch: &mut Scratch) {
-        let filtered = filter(self.surface, &cell, &candidates, scratch);
+    fn descend(&mut self, cell: Cell, candidates: &Candidates, levels: u32, scratch: &mut Scratch) {
+        // Nothing below can add what these faces do not imply.
+        if candidates.faces.iter().all(|&face| self.holds_whole(face)) {
+            return;
+        }
+        let surface = self.surface;
+        let filtered = filter(surface, &cell, candidates, scratch);
         for &(index, feature) in &filtered.closest {
-            self.settle(self.surface.requirement(candidates[index as usize].face, feature));
+            self.settled.settle(surface, surface.requirement(candidates.faces[index as usize], feature));
         }
         let mut open = false;
         for s in &filtered.survivors {
             if s.meets || levels == 0 {
-                self.settle(s.requirement);
+                self.settled.settle(surface, s.requirement);
             }
-            open |= !self.is_settled(s.requirement);
+            open |= !self.settled.holds(s.requirement);
         }
-        if !open {
-            return;
-        }
-        let midpoint = cell.midpoint();
-        let alive: Vec<_> = filtered
-            .survivors
-            .iter()
-            .map(|s| &candidates[s.index as usize])
-            .map(|g| (g, probe(self.surface, g.face, midpoint)))
-            .collect();
-        let children = [0, 1].map(|side| {
-            let from = cell.child_corners(side);
-            let at = |g: &Candidate, m| from.map(|k| if k == 4 { m } else { g.at[k] });
-            alive.iter().map(|&(g, m)| Candidate { face: g.face, at: at(g, m) }).collect::<Vec<_>>()
-        });
-        drop(alive);
-        for (side, child) in children.into_iter().enumerate() {
-            self.descend(cell.child(side), child, levels - 1, scratch);
+        if open {
+            let mut pool = scratch.pool();
+            pool.narrow(surface, &cell, candidates, &filtered.survivors);
+            scratch.reuse(filtered);
+            for side in 0..2 {
+                let below = pool.of_child(candidates, cell.child_corners(side));
+                self.descend(cell.child(side), &below, levels - 1, scratch);
+            }
+            scratch.give_back(pool);
+        } else {
+            scratch.reuse(filtered);
         }
     }
 
-    fn settle(&mut self, requirement: Requirement) {
-        if !self.settled.contains(&requirement) {
-            self.settled.push(requirement);
-        }
-    }
-
-    fn is_settled(&self, requirement: Requirement) -> bool {
-        self.settled.iter().any(|&s| s == requirement || self.surface.implies(s, requirement))
+    fn holds_whole(&self, face: u32) -> bool {
+        self.settled.holds(self.surface.requirement(face, Feature::Face))
     }
 }

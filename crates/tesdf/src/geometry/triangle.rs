@@ -123,6 +123,11 @@ impl Triangle {
         Self { corners, normal, is_needle: true }
     }
 
+    /// Whether it is so much longer than wide that [`closest`](Self::closest) looks at its sides twice.
+    pub(crate) fn is_needle(&self) -> bool {
+        self.is_needle
+    }
+
     /// The closest point to `p`.
     ///
     /// Inside of the prism over the face the distance is that to the plane, elsewhere the least of the

@@ -1,0 +1,196 @@
+//! Rule B of the filter: a linear lower bound of a face's distance against a rival's chord.
+
+use glam::DVec3;
+
+use super::candidates::{Candidates, GRADIENT};
+use super::doubles::{Doubles, GROUP, Vector, dispatch};
+use super::filter::visit_members;
+use super::surface::Surface;
+use crate::domain::Cell;
+
+/// At most this many faces stand against each candidate; the nearest ones.
+const MAX_RIVALS: usize = 96;
+
+/// Buffers for the chords of chosen rivals.
+#[derive(Debug, Default)]
+pub struct Rivals {
+    order: Vec<u32>,
+    rows: [Vec<f64>; 4],
+}
+
+/// The chords that candidates are held against: values at the four corners, in rows.
+#[derive(Clone, Copy)]
+pub struct Chords<'a> {
+    rows: [&'a [f64]; 4],
+    /// The least at each corner.
+    least: [f64; 4],
+}
+
+impl Rivals {
+    /// All candidates where they are few, else the [`MAX_RIVALS`] of those `alive` whose chords have the least sum.
+    ///
+    /// It makes no difference that rule A has dropped some of the few: the point that beats one is of a face whose chord
+    /// lies lower at all corners.
+    pub fn choose<'a>(&'a mut self, candidates: &Candidates<'a>, alive: &[u8]) -> Chords<'a> {
+        let distances = candidates.seen.map(|rows| &rows[..candidates.stride]);
+        let least = candidates.nearest.map(|h| h.distance);
+        if candidates.stride <= MAX_RIVALS {
+            return Chords { rows: distances, least };
+        }
+        self.order.clear();
+        visit_members(alive, alive, |index, _| self.order.push(index as u32));
+        if self.order.len() > MAX_RIVALS {
+            let [a, b, c, d] = distances;
+            let sum = |h: u32| a[h as usize] + b[h as usize] + c[h as usize] + d[h as usize];
+            self.order.select_nth_unstable_by(MAX_RIVALS, |&a, &b| sum(a).total_cmp(&sum(b)).then(a.cmp(&b)));
+            self.order.truncate(MAX_RIVALS);
+        }
+        for (row, from) in self.rows.iter_mut().zip(distances) {
+            row.clear();
+            row.extend(self.order.iter().map(|&h| from[h as usize]));
+            row.resize(row.len().next_multiple_of(GROUP), f64::INFINITY);
+        }
+        let [a, b, c, d] = &self.rows;
+        Chords { rows: [a, b, c, d], least }
+    }
+}
+
+/// What the rule says of each candidate.
+#[derive(Debug, Default)]
+pub struct Verdict {
+    low: Vec<f64>,
+    beaten: Vec<u8>,
+}
+
+impl Verdict {
+    /// A lower bound of the candidate's distance all over the cell, and whether it is beaten.
+    pub fn of(&self, index: usize) -> (f64, bool) {
+        (self.low[index], self.beaten[index / GROUP] >> (index % GROUP) & 1 == 1)
+    }
+}
+
+/// All that the rule reads.
+pub struct PlaneRule<'a> {
+    /// What the centroid and the corners see of each candidate.
+    seen: [&'a [f64]; 5],
+    stride: usize,
+    /// From the centroid and from each corner to the corners.
+    offsets: [[DVec3; 4]; 5],
+    margin: f64,
+    /// The margin times the width of the cell.
+    turn: f64,
+    rivals: Chords<'a>,
+}
+
+impl<'a> PlaneRule<'a> {
+    /// For a cell whose centroid sees `centroid`.
+    pub fn new(
+        surface: &Surface,
+        cell: &Cell,
+        candidates: &Candidates<'a>,
+        centroid: &'a [f64],
+        rivals: Chords<'a>,
+    ) -> Self {
+        let [a, b, c, d] = cell.corners;
+        let [seen_a, seen_b, seen_c, seen_d] = candidates.seen;
+        Self {
+            seen: [centroid, seen_a, seen_b, seen_c, seen_d],
+            stride: candidates.stride,
+            offsets: [cell.centroid(), a, b, c, d].map(|at| cell.corners.map(|c| c - at)),
+            margin: surface.margin,
+            turn: surface.margin * cell.width(),
+            rivals,
+        }
+    }
+
+    /// Judges the candidates that are `alive`, and bounds those that are `near` as well.
+    ///
+    /// d(·, g) is convex, so it lies above its tangent at the centroid and at each corner. The slope is off by the
+    /// rounding of the closest point over the distance, so the bound is lowered by as much times the width of the cell,
+    /// and once more by the margin that the rule asks for. A candidate is beaten when some rival's chord lies below one
+    /// of its tangents at all four corners.
+    pub fn judge(&self, isa: crate::query::Isa, alive: &[u8], near: &[u8], verdict: &mut Verdict) {
+        if verdict.low.len() < self.stride {
+            verdict.low.resize(self.stride, 0.0);
+            verdict.beaten.resize(self.stride / GROUP, 0);
+        }
+        judge(isa, self, alive, near, &mut verdict.low, &mut verdict.beaten);
+    }
+}
+
+dispatch! {
+    fn judge(rule: &PlaneRule, alive: &[u8], near: &[u8], low: &mut [f64], beaten: &mut [u8]) = judge_lanes
+}
+
+#[inline(always)]
+fn judge_lanes<L: Doubles>(rule: &PlaneRule, alive: &[u8], near: &[u8], low: &mut [f64], beaten: &mut [u8]) {
+    for group in 0..alive.len() {
+        beaten[group] = 0;
+        if alive[group] | near[group] == 0 {
+            continue;
+        }
+        let mut lane = 0;
+        while lane < GROUP {
+            let in_question = alive[group] >> lane;
+            beaten[group] |= judge_at::<L>(rule, group * GROUP + lane, in_question, low) << lane;
+            lane += L::LANES;
+        }
+    }
+}
+
+/// The bounds of one vector of candidates; returns which of those in question are beaten.
+#[inline(always)]
+fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut [f64]) -> u8 {
+    let least = &rule.rivals.least;
+    let margin = L::splat(rule.margin);
+    let floor = L::splat(-rule.margin);
+    let mut highest = L::splat(f64::NEG_INFINITY);
+    let mut beaten = 0;
+    for from in 0..5 {
+        let rows = rule.seen[from];
+        let distance = L::load(rows, at);
+        let slope = Vector::<L>::load(&rows[GRADIENT * rule.stride..], rule.stride, at);
+        let lowered = distance.sub(margin).sub(L::splat(rule.turn).div(distance));
+        let touching = margin.at_least(distance);
+        let [to_a, to_b, to_c, to_d] = rule.offsets[from];
+        let a = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_a))));
+        let b = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_b))));
+        let c = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_c))));
+        let d = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_d))));
+        highest = highest.max(a.min(b).min(c.min(d)));
+        let first = L::both(a.at_least(L::splat(least[0])), b.at_least(L::splat(least[1])));
+        let second = L::both(c.at_least(L::splat(least[2])), d.at_least(L::splat(least[3])));
+        let mut open = L::bits(L::both(first, second)) & in_question & !beaten;
+        if open != 0 {
+            let mut values = [[0.0; GROUP]; 4];
+            a.store(&mut values[0], 0);
+            b.store(&mut values[1], 0);
+            c.store(&mut values[2], 0);
+            d.store(&mut values[3], 0);
+            while open != 0 {
+                let lane = open.trailing_zeros() as usize;
+                open &= open - 1;
+                let t = [values[0][lane], values[1][lane], values[2][lane], values[3][lane]];
+                beaten |= u8::from(any_below::<L>(&rule.rivals.rows, t)) << lane;
+            }
+        }
+    }
+    highest.store(low, at);
+    beaten
+}
+
+/// Whether some chord lies below all four values.
+#[inline(always)]
+fn any_below<L: Doubles>(chords: &[&[f64]; 4], t: [f64; 4]) -> bool {
+    let t = [L::splat(t[0]), L::splat(t[1]), L::splat(t[2]), L::splat(t[3])];
+    let mut at = 0;
+    while at < chords[0].len() {
+        let first = L::both(t[0].at_least(L::load(chords[0], at)), t[1].at_least(L::load(chords[1], at)));
+        let second = L::both(t[2].at_least(L::load(chords[2], at)), t[3].at_least(L::load(chords[3], at)));
+        if L::bits(L::both(first, second)) != 0 {
+            return true;
+        }
+        at += L::LANES;
+    }
+    false
+}
