@@ -50,7 +50,7 @@ fn between(a: (Shape, Pose, f64), b: (Shape, Pose, f64)) -> Clearance {
     let (found, back) = (clearance(&scene, a, b, &options), clearance(&scene, b, a, &options));
     let (found, back) = (found.expect("a clearance"), back.expect("a clearance"));
     assert!((found.distance - back.distance).abs() <= 1e-8 * found.distance.abs().max(1.0));
-    assert!(found.converged);
+    assert!(found.converged, "{found:?}");
     assert!((found.normal.length() - 1.0).abs() < 1e-12);
     found
 }

@@ -18,8 +18,7 @@ const MOST_EVALUATIONS: usize = 20_000;
 #[derive(Clone, Copy, Debug)]
 struct Corner {
     point: DVec3,
-    /// The face that is nearest to it, by position.
-    face: u32,
+    value: FieldValue,
 }
 
 /// A part of the polygon that is still open.
@@ -56,10 +55,8 @@ pub fn branch_and_bound(
     precision: Precision,
 ) -> Lowest {
     let best = (f64::INFINITY, polygon.center());
-    let mut search = Branches { cell, precision, tolerance, reach, best, evaluations: 0 };
-    let mut corners = [Corner { point: DVec3::ZERO, face: 0 }; super::MOST_VERTICES];
-    corners.iter_mut().zip(polygon.points()).for_each(|(corner, p)| *corner = search.corner(p));
-    let corners = &corners[..polygon.vertices().len()];
+    let mut search = Branches { cell, precision, tolerance, reach, best, best_face: 0, evaluations: 0 };
+    let corners: Vec<Corner> = polygon.points().map(|p| search.corner(p)).collect();
     let mut open = BinaryHeap::new();
     for k in 2..corners.len().max(3) {
         // A segment is a triangle with two equal corners.
@@ -89,6 +86,8 @@ struct Branches<'a> {
     tolerance: f64,
     reach: f64,
     best: (f64, DVec3),
+    /// Nearest to the best point.
+    best_face: u32,
     evaluations: usize,
 }
 
@@ -98,12 +97,13 @@ impl Branches<'_> {
         let value = self.cell.value(p, self.precision);
         if value.distance < self.best.0 {
             self.best = (value.distance, p);
+            self.best_face = value.position;
         }
         value
     }
 
     fn corner(&mut self, point: DVec3) -> Corner {
-        Corner { point, face: self.value(point).position }
+        Corner { point, value: self.value(point) }
     }
 
     /// Whether something that matters can be above this bound.
@@ -140,40 +140,43 @@ impl Branches<'_> {
                 let near = distances(&triangle(value.position));
                 bound = bound.max(-near.into_iter().fold(0.0, f64::max));
                 if self.is_open(bound) {
-                    for face in corners.map(|c| c.face) {
+                    for face in corners.map(|c| c.value.position) {
                         bound = bound.max(-coplanar_pair(asset, [value.position, face], points));
                     }
                 }
                 if self.is_open(bound) {
-                    let [u, v, w] = corners.map(|c| distances(&triangle(c.face)));
-                    bound = bound.max(-greatest_minimum([near, u, v, w]));
+                    let [u, v, w] = corners.map(|c| distances(&triangle(c.value.position)));
+                    // One that matters at the deepest point may be the nearest at none of these.
+                    let deepest = distances(&triangle(self.best_face));
+                    bound = bound.max(-greatest_minimum([near, u, v, w, deepest]));
                 }
             }
-            // A convex function is above its tangent.
+            // A convex function is above its tangents.
             CellField::Simple(_) => {
-                let down = |c: &DVec3| value.gradient.dot(*c - center);
-                let tangent = points.iter().map(down).fold(f64::INFINITY, f64::min);
-                bound = bound.max(value.distance + tangent);
+                let tangent =
+                    |v: &FieldValue, from: DVec3| points.map(|p| -(v.distance + v.gradient.dot(p - from)));
+                let [u, v, w] = corners.map(|c| tangent(&c.value, c.point));
+                bound = bound.max(-greatest_minimum([tangent(&value, center), u, v, w]));
             }
         }
         Piece { bound, corners }
     }
 }
 
-/// A bound of the least of four convex functions with these values at the corners of a triangle, over the triangle: the greatest minimum of
-/// the four linear functions with these values.
+/// A bound of the least of some convex functions with these values at the corners of a triangle, over the triangle: the greatest minimum of
+/// the linear functions with these values.
 ///
 /// That is where the minimum is at a corner, where two are equal on an edge, or three inside: of all such points none is
 /// left out. To one wall, or between two or three, it errs by the curvature of the distances only, so that a search converges where
 /// the least is along a whole line.
-fn greatest_minimum(values: [[f64; 3]; 4]) -> f64 {
+fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
     let least = |weights: [f64; 3]| {
         let at = |u: &[f64; 3]| u[0] * weights[0] + u[1] * weights[1] + u[2] * weights[2];
         values.iter().map(at).fold(f64::INFINITY, f64::min)
     };
     let mut greatest = least([1.0, 0.0, 0.0]).max(least([0.0, 1.0, 0.0])).max(least([0.0, 0.0, 1.0]));
-    for k in 0..4 {
-        for l in k + 1..4 {
+    for k in 0..N {
+        for l in k + 1..N {
             let d: [f64; 3] = std::array::from_fn(|i| values[k][i] - values[l][i]);
             for i in 0..3 {
                 let j = (i + 1) % 3;
@@ -184,7 +187,7 @@ fn greatest_minimum(values: [[f64; 3]; 4]) -> f64 {
                     greatest = greatest.max(least(weights));
                 }
             }
-            for m in l + 1..4 {
+            for m in l + 1..N {
                 // Weights across both differences, of sum 1.
                 let e: [f64; 3] = std::array::from_fn(|i| values[k][i] - values[m][i]);
                 let w = DVec3::from(d).cross(DVec3::from(e));
@@ -195,8 +198,8 @@ fn greatest_minimum(values: [[f64; 3]; 4]) -> f64 {
             }
         }
     }
-    // Rounding, of numbers below 1.
-    greatest + 1e-15
+    // Rounding.
+    greatest + 1e-15 * values.as_flattened().iter().fold(0.0, |m: f64, v| m.max(v.abs()))
 }
 
 /// A bound of the distance to two faces of one plane that share an edge, over a triangle; infinite when they are not such.

@@ -52,13 +52,14 @@ pub fn lowest(
     let (distance, point) = query.nearest_to_faces(first.position);
     // Clear of the surface, the polygon is all on one side of it.
     let all_outside = !crossing || (distance > CLEAR && cell.value(point, Precision::F64).distance > 0.0);
-    if !all_outside {
+    if !all_outside && !query.only_touches(cell, distance, point) {
         return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     }
     (distance <= reach).then_some(Lowest { point, converged: true })
 }
 
 /// A polygon and the faces that can be nearest to its points; all of it is within a ball.
+#[derive(Clone, Copy)]
 struct Query<'a> {
     asset: &'a TeSdf,
     place: Place,
@@ -101,6 +102,21 @@ impl Query<'_> {
             _ => self.asset.near_in_tree(self.center, self.radius, &mut offer),
         }
         best
+    }
+
+    /// Whether the polygon, `distance` from the surface at `point`, touches it along an edge or a whole face but does not go in: it is then free a
+    /// hair's breadth out, or back, and its least is 0 up to that.
+    fn only_touches(&self, cell: &CellField, distance: f64, point: DVec3) -> bool {
+        let hair = self.tolerance.min(CLEAR);
+        let is_free = |outward: DVec3| {
+            let moved: Vec<DVec3> = self.polygon.points().map(|p| p + hair * outward).collect();
+            let (polygon, center) = (&Polygon::new(&moved), self.center + hair * outward);
+            let moved = Query { polygon, center, reach: hair, ..*self };
+            let face = cell.value(center, Precision::F32).position;
+            let (clear, at) = moved.nearest_to_faces(face);
+            clear > 0.1 * hair && cell.value(at, Precision::F64).distance > 0.0
+        };
+        distance <= hair && (is_free(cell.value(point, Precision::F64).gradient) || is_free(-self.normal))
     }
 
     /// Whether all of the polygon is farther than `limit` from the plane of a face: in `f32` already, without making the face's

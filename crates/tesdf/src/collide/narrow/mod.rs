@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::field::{CellField, Field, FieldBody, FieldValue, ROUNDING};
 use super::middle::{self, ClippedPolygon};
-use super::polygon::{MOST_VERTICES, Polygon};
+use super::polygon::Polygon;
 use super::surface::Part;
 use super::{CollideOptions, FaceMethod, Mode};
 use crate::query::{Faces, Place, Precision};

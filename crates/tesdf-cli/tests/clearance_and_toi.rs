@@ -1,0 +1,106 @@
+//! `tesdf clearance`, `tesdf toi` and `tesdf collide --why`, as a script sees them.
+mod folder;
+
+use folder::Folder;
+use serde_json::Value;
+
+/// A cube of edge 2, one corner at the origin.
+const CUBE: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n\
+                    f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+fn cube() -> Folder {
+    let folder = Folder::new();
+    folder.write("c.obj", CUBE);
+    folder.good(&["encode", "c.obj", "-o", "c.tesdf", "--preset", "fast", "--unit", "mm"]);
+    folder
+}
+
+fn json(folder: &Folder, args: &[&str]) -> Value {
+    serde_json::from_str(&folder.good(args)).unwrap()
+}
+
+#[test]
+fn clearance_of_two_cubes() {
+    let folder = cube();
+    let at = |z: &str| {
+        let pose = format!("-0.5 0 {z} 0 0 0 1");
+        json(&folder, &["clearance", "c.tesdf", "c.tesdf", "--pose-a", &pose, "--json"])
+    };
+    let apart = at("-3.5");
+    assert!((apart["distance"].as_f64().unwrap() - 1.5).abs() < 1e-8, "{apart}");
+    assert_eq!((&apart["normal"][2], &apart["converged"]), (&(-1.0).into(), &true.into()));
+    assert_eq!((apart["point_a"][2].as_f64(), apart["point_b"][2].as_f64()), (Some(-1.5), Some(0.0)));
+    for key in ["face_a", "face_b", "field"] {
+        assert!(apart[key].is_u64(), "{key}: {apart}");
+    }
+    let deep = at("-1.75");
+    assert!((deep["distance"].as_f64().unwrap() + 0.25).abs() < 1e-8, "{deep}");
+    let text = folder.good(&["clearance", "c.tesdf", "c.tesdf", "--pose-b", "0 0 3 0 0 0 1"]);
+    assert!(text.contains("1e0 (apart)"), "{text}");
+    let (code, _, error) = folder.tesdf(&["clearance", "c.tesdf", "c.tesdf", "--tolerance", "-1"]);
+    assert!(code == Some(2) && error.contains("tolerance is -1"), "{error}");
+}
+
+#[test]
+fn time_of_impact_of_two_cubes() {
+    let folder = cube();
+    let toi = |more: &[&str]| {
+        let args =
+            ["toi", "c.tesdf", "c.tesdf", "--pose-a", "0 0 5 0 0 0 1", "--tolerance", "1e-6", "--json"];
+        json(&folder, &[&args[..], more].concat())
+    };
+    let hit = toi(&["--velocity-a", "0 0 -2 0 0 0", "--velocity-b", "0 0 1 0 0 0", "--end", "2"]);
+    let time = hit["time"].as_f64().unwrap();
+    assert!(time <= 1.0 && time > 1.0 - 1e-6, "{hit}");
+    assert!(hit["distance"].as_f64().unwrap() >= 0.0 && hit["touches"] == true, "{hit}");
+    assert_eq!(hit["normal"][2], 1.0);
+    // Down by 4 per turn, once around in 2π.
+    let screwed = toi(&["--screw-a", "1 1 0 0 0 -1 1 4", "--end", "9"]);
+    let time = screwed["time"].as_f64().unwrap();
+    assert!((time - 0.75 * std::f64::consts::TAU).abs() < 1e-5, "{screwed}");
+    let miss = toi(&["--velocity-a", "0 0 -2 0 0 0"]);
+    assert_eq!(miss, serde_json::json!({"time": null, "end": 1.0}));
+    let text = folder.good(&["toi", "c.tesdf", "c.tesdf", "--pose-a", "0 0 5 0 0 0 1"]);
+    assert_eq!(text, "no impact up to time 1\n");
+    let both = ["toi", "c.tesdf", "c.tesdf", "--velocity-a", "0 0 0 0 0 0", "--screw-a", "0 0 0 0 0 1 1 1"];
+    assert_eq!(folder.tesdf(&both).0, Some(2));
+}
+
+#[test]
+fn why_contacts_are_or_are_not_there() {
+    let folder = cube();
+    let why = |more: &[&str]| {
+        let args = ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0.5 0.25 1.75 0 0 0 1", "--json"];
+        json(&folder, &[&args[..], more].concat())
+    };
+    let contacts = why(&[]);
+    let reports = why(&["--why"]);
+    let reported: usize = reports
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|r| r["parts"].as_array().unwrap())
+        .flat_map(|p| p["polygons"].as_array().unwrap())
+        .filter(|p| p["verdict"] == "contact")
+        .count();
+    assert_eq!(reported, contacts.as_array().unwrap().len());
+    assert_eq!((&reports[0]["pair"], &reports[1]["instance_a"]), (&"tested".into(), &1.into()));
+    // Face 0 is in the bottom of the cube: of A it is far from B, of B it is in A.
+    let far = why(&["--why", "0"]);
+    assert_eq!(far.as_array().unwrap().len(), 1);
+    let part = &far[0]["parts"][0];
+    let bound = part["broad"]["pruned_by_tree"].get("bound").or(part["broad"]["pruned_by_ball"].get("bound"));
+    assert!(part["broad"] == "candidate" || bound.is_some_and(|b| b.as_f64() > Some(0.0)), "{part}");
+    assert!(part["polygons"].as_array().unwrap().iter().all(|p| p["verdict"] != "contact"), "{part}");
+    let deep = why(&["--why", "1:0"]);
+    assert_eq!((&deep[0]["instance_a"], &deep[0]["parts"][0]["broad"]), (&1.into(), &"candidate".into()));
+    // What the cosine filter drops.
+    let filtered = why(&["--why", "--cos-theta", "1"]);
+    let text = filtered.to_string();
+    assert!(text.contains("filtered") && text.contains("cosine"), "{text}");
+    let apart = ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0 0 9 0 0 0 1", "--why"];
+    let text = folder.good(&apart);
+    assert!(text.contains("not tested: bounds are 7e0 apart"), "{text}");
+    let (code, _, error) = folder.tesdf(&[&apart[..], &["1:99"]].concat());
+    assert!(code == Some(2) && error.contains("face is 99 (of 12)"), "{error}");
+}
