@@ -12,7 +12,7 @@ pub struct Args {
     /// The bodies.
     #[command(flatten)]
     pub bodies: Bodies,
-    /// Bound on the error, in the meshes' unit [default: 1e-9 of the smaller body's diagonal]
+    /// Bound on the error, in the meshes' unit [default: 1e-8 of the smaller body's diagonal]
     #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
     /// Print the result as a JSON object

@@ -229,7 +229,7 @@ fn what_touches_or_penetrates_at_the_start_has_time_0() {
         );
         let impact = case.impact(&EXACT).expect("it touches");
         assert_eq!((impact.time, impact.iterations, impact.touches), (0.0, 0, true));
-        assert!((impact.clearance.distance - distance).abs() < 1e-9, "{impact:?}");
+        assert!((impact.clearance.distance - distance).abs() < 2e-7, "{impact:?}");
     }
 }
 

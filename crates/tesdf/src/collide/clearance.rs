@@ -17,9 +17,9 @@ pub struct ClearanceOptions {
 }
 
 impl Default for ClearanceOptions {
-    /// 1e-9 of the smaller diagonal.
+    /// 1e-8 of the smaller diagonal.
     fn default() -> Self {
-        Self { tolerance: Length::OfDiagonal(1e-9) }
+        Self { tolerance: Length::OfDiagonal(1e-8) }
     }
 }
 
