@@ -144,7 +144,7 @@ fn a_collision_of_two_bodies_keeps_momentum() {
     let exact = angular_error(plain, 5e-4);
     assert!(exact < 1e-12, "{exact:e}");
     let [coarse, fine] = [1e-3, 1.25e-4].map(|h| angular_error(NewtonOptions::default(), h));
-    assert!(coarse < 0.02 && fine < coarse / 4.0, "{coarse} {fine}");
+    assert!(coarse < 0.05 && fine < coarse / 4.0, "{coarse} {fine}");
 }
 
 #[test]
