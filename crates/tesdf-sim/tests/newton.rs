@@ -188,6 +188,28 @@ fn islands_of_any_size_give_the_same_motion() {
     }
 }
 
+/// Ten bricks that fall on a plane and never meet: ten islands, solved in parallel.
+#[test]
+fn any_number_of_threads_gives_the_same_bits() {
+    let run = || {
+        let mut system = System::new(GRAVITY);
+        add_plane(&mut system, Pose::IDENTITY);
+        for k in 0..10 {
+            let rotation = DQuat::from_scaled_axis(DVec3::new(0.1, 0.2, 0.3) * f64::from(k));
+            let translation = DVec3::new(0.1 * f64::from(k), 0.0, 0.04);
+            add_free(&mut system, BRICK, Pose { translation, rotation }, Velocity::default());
+        }
+        let mut engine = Newton::new(system, detect, nodes(1e-3), NewtonOptions::default()).unwrap();
+        let most = (0..100).map(|_| engine.step(1e-3).unwrap().islands).max();
+        assert_eq!(most, Some(10));
+        engine.system().states().to_vec()
+    };
+    let on = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(run);
+    let one = on(1);
+    assert_eq!(one, on(2));
+    assert_eq!(one, on(8));
+}
+
 #[test]
 fn deep_overlap_is_removed_without_a_kick() {
     let mut system = System::new(DVec3::ZERO);
