@@ -21,6 +21,9 @@ pub struct Args {
     /// Geometries of the turning body, one after the other: meshes or .tesdf files [default: that of the scene]
     #[arg(long, value_name = "FILE", num_args = 1..)]
     geometries: Vec<PathBuf>,
+    /// Play of each geometry along the axis, µm, instead of the criterion's
+    #[arg(long, value_name = "UM", value_delimiter = ',', requires = "geometries")]
+    backlash: Vec<f64>,
     /// Time steps, ms
     #[arg(long, value_name = "MS", value_delimiter = ',', default_value = "1,3,5")]
     time_steps: Vec<f64>,
@@ -86,7 +89,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             .map(|file| with_geometry(&loaded, &screw.body, file.clone()))
             .collect::<Result<_, _>>()?,
     };
-    for (name, mut loaded) in scenes {
+    if !args.backlash.is_empty() && args.backlash.len() != scenes.len() {
+        return Err(format!("{} backlashes for {} geometries", args.backlash.len(), scenes.len()).into());
+    }
+    for (k, (name, mut loaded)) in scenes.into_iter().enumerate() {
+        if let (Some(screw), Some(play)) = (&mut loaded.scene.criterion.screw, args.backlash.get(k)) {
+            screw.backlash = play * 1e-6;
+        }
         let system = loaded.system(&EncodeProgress::default())?;
         for &mode in &args.modes {
             loaded.scene.detector.mode = match mode {
