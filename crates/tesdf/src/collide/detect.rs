@@ -48,7 +48,7 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
     // Tasks follow the pairs, which are sorted; within a pair a face has one place.
     contacts
         .chunk_by_mut(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b))
-        .for_each(|run| run.sort_unstable_by(|x, y| order(x).cmp(&order(y))));
+        .for_each(|run| run.sort_unstable_by_key(order));
     let all = contacts.len();
     let (contacts, reductions) = reduce_pairs(contacts, options.reduction);
     statistics.reduced = all - contacts.len();

@@ -17,7 +17,7 @@ pub enum Field<'a> {
 }
 
 /// A field placed in the world.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct FieldBody<'a> {
     /// The field.
     pub field: Field<'a>,

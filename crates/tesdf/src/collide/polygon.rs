@@ -28,6 +28,10 @@ impl Vertex {
 pub struct Polygon(ArrayVec<Vertex, MOST_VERTICES>);
 
 /// Where a polygon lies, seen from a plane.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "made and taken apart in one place, a million times a step: no box"
+)]
 pub enum Parts {
     /// Above, or in the plane.
     Above,

@@ -58,7 +58,7 @@ impl Simple {
         match *self {
             Self::Plane => (Vec::new(), 0.0),
             Self::Box(half) => (box_triangles(half), 0.0),
-            Self::Round { half_height, radius } if half_height == 0.0 => (vec![vec![DVec3::ZERO]], radius),
+            Self::Round { half_height: 0.0, radius } => (vec![vec![DVec3::ZERO]], radius),
             Self::Round { half_height, radius } => {
                 (vec![vec![DVec3::new(0.0, 0.0, -half_height), DVec3::new(0.0, 0.0, half_height)]], radius)
             }

@@ -9,7 +9,7 @@ use crate::asset::layout::TreeChild;
 use crate::geometry::Aabb;
 
 /// A surface placed in the world, seen from the frame of a field.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct SurfaceBody<'a> {
     shape: &'a Shape,
     /// Field = `linear` · p + `shift`, of points p of the shape's frame.

@@ -1,0 +1,182 @@
+use std::time::Instant;
+
+use rapier3d_f64::geometry::{ContactData, ContactManifold, ContactManifoldData, Shape};
+use rapier3d_f64::math::{Pose, Vector};
+use rapier3d_f64::parry::query::details::{ContactManifoldsWorkspace, NormalConstraints, ShapeCastOptions};
+use rapier3d_f64::parry::query::{
+    ClosestPoints, Contact as ParryContact, DefaultQueryDispatcher, NonlinearRigidMotion,
+    PersistentQueryDispatcher, QueryDispatcher, ShapeCastHit, ShapeDistance, ShapeIntersection, Unsupported,
+};
+use tesdf::collide::{self, CollideError, CollideOptions, Contact, Instance, Placement, Scene};
+
+use crate::known::{self, Known};
+use crate::manifolds::{self, FIRST};
+use crate::record::Record;
+
+/// Finds the contacts of pairs of shapes with [`tesdf::collide::detect`], faces of each against the field of the other.
+///
+/// A pair has a [`TesdfShape`](crate::TesdfShape) and another one, or a half space, cuboid, ball or capsule. All else is
+/// `Unsupported`, which [`query_dispatcher`] leaves to parry: so are distances and sweeps, hence Rapier's continuous collision
+/// detection does nothing for these shapes. Contacts ahead of time take its place.
+#[derive(Clone, Debug)]
+pub struct TesdfDispatcher {
+    options: CollideOptions,
+    record: Option<Record>,
+}
+
+/// [`TesdfDispatcher`], and parry's own for pairs that it does not answer.
+///
+/// Of `options` the contact distance and the speculative time are not used: how far ahead contacts are taken is Rapier's
+/// prediction distance. An option that makes no sense means that no contact is found.
+pub fn query_dispatcher(
+    options: CollideOptions,
+) -> impl PersistentQueryDispatcher<ContactManifoldData, ContactData> + 'static {
+    TesdfDispatcher::new(options).chain(DefaultQueryDispatcher)
+}
+
+impl TesdfDispatcher {
+    /// See [`query_dispatcher`] for what is used of `options`.
+    pub fn new(options: CollideOptions) -> Self {
+        Self { options, record: None }
+    }
+
+    /// A dispatcher that records what it finds. It answers pairs of simple shapes, too, so that the record is complete.
+    pub(crate) fn recording(options: CollideOptions, record: Record) -> Self {
+        Self { options, record: Some(record) }
+    }
+
+    /// The shapes of a pair that this dispatcher answers.
+    fn pair(&self, g1: &dyn Shape, g2: &dyn Shape) -> Result<[Known; 2], Unsupported> {
+        let pair = [Known::new(g1).ok_or(Unsupported)?, Known::new(g2).ok_or(Unsupported)?];
+        let answered = self.record.is_some() || pair.iter().any(Known::is_mesh);
+        answered.then_some(pair).ok_or(Unsupported)
+    }
+
+    /// Contacts up to a distance in the frame of the first shape, which is instance 0.
+    fn contacts(&self, pos12: &Pose, pair: [Known; 2], distance: f64) -> Result<Vec<Contact>, CollideError> {
+        let mut scene = Scene::new();
+        let placed = |known: &Known, pose| Placement { pose, scale: known.scale };
+        let [first, second] = pair;
+        let placements = [placed(&first, first.pose), placed(&second, known::pose(pos12).after(second.pose))];
+        for (known, Placement { pose, scale }) in [first, second].into_iter().zip(placements) {
+            let shape = scene.add_shape(known.shape)?;
+            scene.add(Instance { scale, ..Instance::new(shape, pose) })?;
+        }
+        let options = CollideOptions { contact_distance: distance, speculative_time: 0.0, ..self.options };
+        Ok(collide::detect(&scene, &options)?.contacts)
+    }
+}
+
+impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TesdfDispatcher {
+    fn contact_manifolds(
+        &self,
+        pos12: &Pose,
+        g1: &dyn Shape,
+        g2: &dyn Shape,
+        prediction: f64,
+        manifolds: &mut Vec<ContactManifold>,
+        workspace: &mut Option<ContactManifoldsWorkspace>,
+    ) -> Result<(), Unsupported> {
+        let begin = Instant::now();
+        let pair = self.pair(g1, g2)?;
+        let found = self.contacts(pos12, pair, prediction.max(0.0));
+        let contacts = found.as_deref().unwrap_or(&[]);
+        manifolds::replace(contacts, pos12, manifolds, workspace);
+        if let Some(record) = &self.record {
+            let mut record = record.lock();
+            record.time += begin.elapsed();
+            for (manifold, contact) in manifolds.iter_mut().zip(contacts) {
+                manifold.data.user_data = record.contacts.len() as u32;
+                record.contacts.push(*contact);
+            }
+            if let Err(error) = found {
+                record.error.get_or_insert(error);
+            }
+        }
+        Ok(())
+    }
+
+    fn contact_manifold_convex_convex(
+        &self,
+        _: &Pose,
+        _: &dyn Shape,
+        _: &dyn Shape,
+        _: Option<&dyn NormalConstraints>,
+        _: Option<&dyn NormalConstraints>,
+        _: f64,
+        _: &mut ContactManifold,
+    ) -> Result<(), Unsupported> {
+        Err(Unsupported)
+    }
+}
+
+impl QueryDispatcher for TesdfDispatcher {
+    fn intersection_test(
+        &self,
+        pos12: &Pose,
+        g1: &dyn Shape,
+        g2: &dyn Shape,
+    ) -> Result<ShapeIntersection, Unsupported> {
+        let pair = self.pair(g1, g2)?;
+        let contacts = self.contacts(pos12, pair, 0.0).map_err(|_| Unsupported)?;
+        Ok(ShapeIntersection::new(!contacts.is_empty()))
+    }
+
+    /// The deepest contact.
+    fn contact(
+        &self,
+        pos12: &Pose,
+        g1: &dyn Shape,
+        g2: &dyn Shape,
+        prediction: f64,
+    ) -> Result<Option<ParryContact>, Unsupported> {
+        let pair = self.pair(g1, g2)?;
+        let contacts = self.contacts(pos12, pair, prediction.max(0.0)).map_err(|_| Unsupported)?;
+        let deepest = contacts.iter().min_by(|c, d| c.distance.total_cmp(&d.distance));
+        Ok(deepest.map(|c| {
+            let flipped = c.instance_a != FIRST;
+            let (first, second) = if flipped { (c.point_b, c.point_a) } else { (c.point_a, c.point_b) };
+            let normal = if flipped { c.normal } else { -c.normal };
+            let second_normal = -(pos12.rotation.inverse() * normal);
+            ParryContact::new(first, pos12.inverse_transform_point(second), normal, second_normal, c.distance)
+        }))
+    }
+
+    fn distance(&self, _: &Pose, _: &dyn Shape, _: &dyn Shape) -> Result<ShapeDistance, Unsupported> {
+        Err(Unsupported)
+    }
+
+    fn closest_points(
+        &self,
+        _: &Pose,
+        _: &dyn Shape,
+        _: &dyn Shape,
+        _: f64,
+    ) -> Result<ClosestPoints, Unsupported> {
+        Err(Unsupported)
+    }
+
+    fn cast_shapes(
+        &self,
+        _: &Pose,
+        _: Vector,
+        _: &dyn Shape,
+        _: &dyn Shape,
+        _: ShapeCastOptions,
+    ) -> Result<Option<ShapeCastHit>, Unsupported> {
+        Err(Unsupported)
+    }
+
+    fn cast_shapes_nonlinear(
+        &self,
+        _: &NonlinearRigidMotion,
+        _: &dyn Shape,
+        _: &NonlinearRigidMotion,
+        _: &dyn Shape,
+        _: f64,
+        _: f64,
+        _: bool,
+    ) -> Result<Option<ShapeCastHit>, Unsupported> {
+        Err(Unsupported)
+    }
+}

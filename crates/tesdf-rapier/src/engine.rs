@@ -1,0 +1,178 @@
+use std::time::Instant;
+
+use rapier3d_f64::geometry::PairContacts;
+use tesdf::collide::{CollideOptions, Contact, Pose};
+use tesdf_sim::{Dynamics, DynamicsError, State, StepReport, System};
+
+use crate::RapierOptions;
+use crate::manifolds::FIRST;
+use crate::record::{Found, Record};
+use crate::world::{MayMeet, World};
+
+/// Contacts reach at least this much farther than a body at rest falls in a step.
+const MARGIN: f64 = 1.2;
+
+/// Rapier as the engine of a system, with contacts of [`tesdf::collide`].
+///
+/// Sleeping and continuous collision detection are off. In a report, a step converged whenever it was done, as Rapier has a number of
+/// iterations instead of a tolerance; all bodies are one island, and contacts are detected once.
+pub struct RapierEngine {
+    system: System,
+    collide: CollideOptions,
+    options: RapierOptions,
+    record: Record,
+    /// Made by the first step, and anew when the prediction distance changes: Rapier keeps boxes that were made with it.
+    world: Option<World>,
+    contacts: Vec<Contact>,
+}
+
+impl RapierEngine {
+    /// An engine for `system`. Of `collide` everything is used but the speculative time. Contacts reach as far as the contact distance, what
+    /// a body at rest falls in a step, and what [`RapierOptions::speculative_distance`] says. Each contact is
+    /// a manifold, which costs Rapier some 5 µs in each step; see `docs/dynamics.md` for what a reduction to 64 per pair gives and takes.
+    ///
+    /// # Errors
+    /// An option that makes no sense.
+    pub fn new(
+        system: System,
+        collide: CollideOptions,
+        options: RapierOptions,
+    ) -> Result<Self, DynamicsError> {
+        options.validate()?;
+        collide.validate()?;
+        let (record, contacts) = (Record::default(), Vec::new());
+        Ok(Self { system, collide, options, record, world: None, contacts })
+    }
+
+    /// Bodies and colliders as Rapier has them, in the order of the system's bodies; `None` before the first step.
+    pub fn rapier(&self) -> Option<&rapier3d_f64::pipeline::PhysicsWorld> {
+        self.world.as_ref().map(|world| &world.rapier)
+    }
+
+    /// The world as it is now, for steps of `h`.
+    fn world(&mut self, h: f64) -> Result<World, DynamicsError> {
+        let fall = MARGIN * self.system.gravity.length() * h * h;
+        let prediction = self.collide.contact_distance.max(fall);
+        let mut world = match self.world.take() {
+            Some(world) if world.prediction() == prediction => world,
+            _ => World::new(&self.system, self.collide, &self.options, prediction, &self.record)?,
+        };
+        world.rapier.gravity = self.system.gravity;
+        let mut parameters = self.options.parameters(h, prediction);
+        // The dispatcher answers no sweeps.
+        parameters.max_ccd_substeps = 0;
+        world.rapier.integration_parameters = parameters;
+        Ok(world)
+    }
+
+    /// The contacts of the last detection, in the world's frame at `self.system`'s states.
+    fn contacts_of(&self, world: &World, found: &Found) -> Vec<Contact> {
+        let mut contacts = Vec::with_capacity(found.contacts.len());
+        for pair in world.rapier.narrow_phase.contact_pairs() {
+            let bodies = [pair.collider1, pair.collider2].map(|collider| world.body_of(collider));
+            let (PairContacts::Rigid(rigid), [Some(first), Some(second)]) = (&pair.contacts, bodies) else {
+                continue;
+            };
+            let pose = self.system.states()[first].pose;
+            let ids = [first, second].map(|body| self.system.bodies()[body].instance);
+            for manifold in rigid.manifolds.iter().filter(|m| !m.points.is_empty()) {
+                let Some(contact) = found.contacts.get(manifold.data.user_data as usize) else { continue };
+                let flipped = contact.instance_a != FIRST;
+                let [instance_a, instance_b] = if flipped { [ids[1], ids[0]] } else { ids };
+                contacts.push(Contact { instance_a, instance_b, ..in_world(contact, pose) });
+            }
+        }
+        let order = |c: &Contact| {
+            let world = self.system.scene().instance(c.instance_a).map_or(0, |instance| instance.world);
+            (world, c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b), c.instance_a)
+        };
+        // Stable: a pair's contacts are in the detector's order.
+        contacts.sort_by_key(order);
+        contacts
+    }
+
+    /// Replaces all states, or none.
+    fn set_states(&mut self, states: &[State]) -> Result<(), DynamicsError> {
+        let before = self.system.states().to_vec();
+        for (body, state) in states.iter().enumerate() {
+            if let Err(error) = self.system.set_state(body, *state) {
+                before
+                    .iter()
+                    .enumerate()
+                    .try_for_each(|(body, state)| self.system.set_state(body, *state))?;
+                return Err(error);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn in_world(contact: &Contact, pose: Pose) -> Contact {
+    Contact {
+        point_a: pose.to_world(contact.point_a),
+        point_b: pose.to_world(contact.point_b),
+        normal: pose.rotation * contact.normal,
+        ..*contact
+    }
+}
+
+impl Dynamics for RapierEngine {
+    fn system(&self) -> &System {
+        &self.system
+    }
+
+    fn set_state(&mut self, body: usize, state: State) -> Result<(), DynamicsError> {
+        self.system.set_state(body, state)?;
+        if let Some(world) = &mut self.world {
+            world.set_state(body, &self.system.states()[body]);
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, time_step: f64) -> Result<StepReport, DynamicsError> {
+        let begin = Instant::now();
+        if !(time_step > 0.0 && time_step.is_finite()) {
+            let expected = "a finite number of seconds, greater than 0";
+            return Err(DynamicsError::Option { option: "time step", found: time_step, expected });
+        }
+        // After an error there is no world, and the next step makes one of the system's states.
+        let mut world = self.world(time_step)?;
+        *self.record.lock() = Found::default();
+        world.rapier.step_with_events(&MayMeet(&self.system), &());
+        let found = std::mem::take(&mut *self.record.lock());
+        if let Some(error) = found.error {
+            return Err(error.into());
+        }
+        // Rapier puts bodies aside whose state stops being finite.
+        if let Some(&body) = world.rapier.quarantine().bodies().first() {
+            let body =
+                world.rapier.bodies.get(body).and_then(|b| usize::try_from(b.user_data).ok()).unwrap_or(0);
+            let name = self.system.body(body)?.name.clone();
+            return Err(DynamicsError::NotFinite {
+                body,
+                name,
+                found: "put into Rapier's quarantine".into(),
+            });
+        }
+        let contacts = self.contacts_of(&world, &found);
+        let states = world.states(self.system.states());
+        self.set_states(&states)?;
+        self.contacts = contacts;
+        let report = StepReport {
+            contacts: self.contacts.len(),
+            deepest: self.contacts.iter().map(|c| c.distance).reduce(f64::min),
+            detections: 1,
+            islands: 1,
+            iterations: self.options.substeps as u32,
+            converged: true,
+            detection: found.time,
+            solution: begin.elapsed().saturating_sub(found.time),
+        };
+        self.world = Some(world);
+        Ok(report)
+    }
+
+    fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+}

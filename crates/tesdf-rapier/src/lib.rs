@@ -1,0 +1,58 @@
+//! Encoded meshes as collision shapes of [Rapier](https://rapier.rs), and Rapier as an engine for
+//! [`tesdf_sim`](tesdf_sim::Dynamics).
+//!
+//! ```text
+//! TesdfShape ─┐
+//! Ball, …     ├─TesdfDispatcher: tesdf::collide::detect─▶ contacts ──one manifold each──▶ Rapier's solver
+//! HalfSpace ──┘                                              └── impulses of the last step, by feature id
+//! ```
+//!
+//! - [`TesdfShape`]: an encoded mesh as a shape; put it into a collider as `SharedShape::new(TesdfShape::new(asset))`.
+//! - [`TesdfDispatcher`]: finds the contacts of pairs with such a shape. [`query_dispatcher`] leaves all other pairs to Rapier.
+//! - [`RapierEngine`]: moves the bodies of a [`tesdf_sim::System`] with both.
+//!
+//! Everything is in `f64` (`rapier3d-f64`), so that nothing is rounded on the way: in `f32` a position 1 m from the origin is off by up to
+//! 0.06 µm after every substep, and clearances are 25 µm. Lengths are in metres as long as the options' defaults are kept.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use rapier3d_f64::prelude::*;
+//! use tesdf::collide::{CollideOptions, Mode};
+//! use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
+//! use tesdf_rapier::{RapierOptions, TesdfShape, query_dispatcher};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+//! let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
+//! let asset = Arc::new(tesdf::encode::encode(&solid, &Default::default(), &Default::default(), &Default::default())?);
+//!
+//! let mut world = PhysicsWorld { gravity: Vector::new(0.0, 0.0, -9.81), ..PhysicsWorld::default() };
+//! world.narrow_phase.set_query_dispatcher(query_dispatcher(CollideOptions::with_mode(Mode::EXACT)));
+//! world.integration_parameters = RapierOptions::default().parameters(1e-3, 1e-3); // s, m
+//! world.insert_collider(ColliderBuilder::new(SharedShape::new(HalfSpace::new(Vector::Z))), None);
+//! let body = world.insert_body(RigidBodyBuilder::dynamic().translation(Vector::new(0.0, 0.0, 1e-3)));
+//! let tetra = SharedShape::new(TesdfShape::new(asset));
+//! world.insert_collider(ColliderBuilder::new(tetra).density(1000.0), Some(body));
+//! for _ in 0..100 {
+//!     world.step();
+//! }
+//! assert!(world.bodies[body].translation().z.abs() < 1e-4); // it fell by a millimetre and lies on the plane
+//! # Ok(())
+//! # }
+//! ```
+#![warn(missing_docs)]
+
+mod dispatcher;
+mod engine;
+mod known;
+mod manifolds;
+mod options;
+mod record;
+mod shape;
+mod world;
+
+pub use dispatcher::{TesdfDispatcher, query_dispatcher};
+pub use engine::RapierEngine;
+pub use options::RapierOptions;
+pub use rapier3d_f64;
+pub use shape::TesdfShape;

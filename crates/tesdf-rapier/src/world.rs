@@ -1,0 +1,142 @@
+//! A system's bodies in Rapier.
+use glam::DVec3;
+use rapier3d_f64::dynamics::{RigidBody, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d_f64::geometry::{
+    Capsule, Collider, ColliderBuilder, ColliderHandle, Cuboid, HalfSpace, SharedShape, SolverFlags,
+};
+use rapier3d_f64::parry::mass_properties::MassProperties;
+use rapier3d_f64::parry::shape::Ball;
+use rapier3d_f64::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks, PhysicsWorld};
+use tesdf::collide::{CollideError, CollideOptions, Instance, Shape};
+use tesdf_sim::{Body, Mass, State, System};
+
+use crate::known::{parry_pose, pose};
+use crate::record::Record;
+use crate::{RapierOptions, TesdfDispatcher, TesdfShape};
+
+/// Bodies of a system, and the world that moves them.
+pub struct World {
+    pub rapier: PhysicsWorld,
+    /// Of each body.
+    handles: Vec<RigidBodyHandle>,
+    /// What the time step makes of the contact distance.
+    prediction: f64,
+}
+
+impl World {
+    /// All bodies where the system says, without impulses of a step before.
+    pub fn new(
+        system: &System,
+        collide: CollideOptions,
+        options: &RapierOptions,
+        prediction: f64,
+        record: &Record,
+    ) -> Result<Self, CollideError> {
+        let mut rapier = PhysicsWorld::default();
+        let dispatcher = TesdfDispatcher::recording(collide, record.clone());
+        rapier.narrow_phase.set_query_dispatcher(dispatcher);
+        let mut handles = Vec::with_capacity(system.bodies().len());
+        for (number, (body, state)) in system.bodies().iter().zip(system.states()).enumerate() {
+            let instance = system.scene().instance(body.instance)?;
+            let shape = shape(system.scene().shape(instance.shape)?, instance);
+            let handle = rapier.insert_body(rigid_body(number, body, state, options));
+            rapier.insert_collider(collider(shape, options), Some(handle));
+            handles.push(handle);
+        }
+        Ok(Self { rapier, handles, prediction })
+    }
+
+    pub fn prediction(&self) -> f64 {
+        self.prediction
+    }
+
+    pub fn set_state(&mut self, body: usize, state: &State) {
+        let Some(body) = self.rapier.bodies.get_mut(self.handles[body]) else { return };
+        body.set_position(parry_pose(state.pose), true);
+        if body.is_dynamic() {
+            body.set_linvel(state.linear, true);
+            body.set_angvel(state.angular, true);
+        }
+    }
+
+    /// Of each body, in order; a fixed body keeps its state of `before`.
+    pub fn states(&self, before: &[State]) -> Vec<State> {
+        let state = |(handle, before): (&RigidBodyHandle, &State)| match self.rapier.bodies.get(*handle) {
+            Some(body) if body.is_dynamic() => {
+                State { pose: pose(body.position()), linear: body.linvel(), angular: body.angvel() }
+            }
+            _ => *before,
+        };
+        self.handles.iter().zip(before).map(state).collect()
+    }
+
+    /// The body of a collider.
+    pub fn body_of(&self, collider: ColliderHandle) -> Option<usize> {
+        let parent = self.rapier.colliders.get(collider)?.parent()?;
+        number(self.rapier.bodies.get(parent)?)
+    }
+}
+
+fn number(body: &RigidBody) -> Option<usize> {
+    usize::try_from(body.user_data).ok()
+}
+
+fn rigid_body(number: usize, body: &Body, state: &State, options: &RapierOptions) -> RigidBody {
+    let builder = match body.mass {
+        Mass::Fixed => RigidBodyBuilder::fixed(),
+        Mass::Free(mass) => RigidBodyBuilder::dynamic()
+            .additional_mass_properties(MassProperties::with_inertia_matrix(
+                mass.center,
+                mass.mass,
+                mass.inertia,
+            ))
+            .linvel(state.linear)
+            .angvel(state.angular)
+            .soft_ccd_prediction(options.speculative_distance)
+            .can_sleep(false),
+    };
+    builder.pose(parry_pose(state.pose)).user_data(number as u128).build()
+}
+
+fn collider(shape: SharedShape, options: &RapierOptions) -> Collider {
+    // The mass is the body's.
+    ColliderBuilder::new(shape)
+        .density(0.0)
+        .friction(options.friction)
+        .restitution(0.0)
+        .active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS)
+        .build()
+}
+
+fn shape(shape: &Shape, instance: &Instance) -> SharedShape {
+    let scale = instance.scale;
+    match *shape {
+        Shape::Mesh(ref asset) => match TesdfShape::scaled(asset.clone(), scale) {
+            Some(shape) => SharedShape::new(shape),
+            // The scene has checked the scale.
+            None => SharedShape::new(TesdfShape::new(asset.clone())),
+        },
+        Shape::Plane => SharedShape::new(HalfSpace::new(DVec3::Z)),
+        Shape::Box { half_extents } => SharedShape::new(Cuboid::new(half_extents * scale)),
+        Shape::Sphere { radius } => SharedShape::new(Ball::new(radius * scale)),
+        Shape::Capsule { half_height, radius } => {
+            let end = DVec3::Z * half_height * scale;
+            SharedShape::new(Capsule::new(-end, end, radius * scale))
+        }
+    }
+}
+
+/// Worlds, groups and excluded pairs of the system's scene.
+pub struct MayMeet<'a>(pub &'a System);
+
+impl PhysicsHooks for MayMeet<'_> {
+    fn filter_contact_pair(&self, context: &PairFilterContext) -> Option<SolverFlags> {
+        let instance = |handle: Option<RigidBodyHandle>| {
+            let number = number(context.bodies.get(handle?)?)?;
+            let id = self.0.body(number).ok()?.instance;
+            Some((id, self.0.scene().instance(id).ok()?))
+        };
+        let [a, b] = [instance(context.rigid_body1)?, instance(context.rigid_body2)?];
+        self.0.scene().may_meet(a, b).then(SolverFlags::default)
+    }
+}
