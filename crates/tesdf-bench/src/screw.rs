@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use tesdf::collide::{ClearanceOptions, CollideError, clearance};
-use tesdf::encode::EncodeProgress;
+use tesdf::encode::{EncodeProgress, Length};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Moment, Summary, System, simulate};
 
@@ -68,7 +68,7 @@ const COLUMNS: [&str; 15] = [
 pub fn run(args: &Args) -> Result<(), Failure> {
     heading::print()?;
     output::line(
-        "*Penetration*: by the exact clearance of the bodies (to 1e-8 of the diagonal) at times spread over the run, not by \
+        "*Penetration*: by the exact clearance of the bodies (to 10 nm) at times spread over the run, not by \
          the detector under test. *From pitch*: largest difference of travel and \
          turns × pitch. *Ideal*: the frictionless screw without play.\n",
     )?;
@@ -164,6 +164,9 @@ fn print(start: impl Iterator<Item = String>, summary: &Summary, depth: f64) -> 
     output::row(&start.chain(rest).collect::<Vec<_>>())
 }
 
+/// Bound on the error of a penetration, m: 10 nm.
+const TOLERANCE: Length = Length::Absolute(1e-8);
+
 /// How deep any two bodies are in each other by their exact clearance, m; 0 when none is.
 fn penetration(system: &System) -> Result<f64, CollideError> {
     let scene = system.scene();
@@ -171,7 +174,7 @@ fn penetration(system: &System) -> Result<f64, CollideError> {
     let mut depth = 0.0_f64;
     for (i, a) in bodies.iter().enumerate() {
         for b in &bodies[i + 1..] {
-            let found = clearance(scene, a.instance, b.instance, &ClearanceOptions::default())?;
+            let found = clearance(scene, a.instance, b.instance, &ClearanceOptions { tolerance: TOLERANCE })?;
             depth = depth.max(-found.distance);
         }
     }
