@@ -254,10 +254,10 @@ impl TeSdf {
             _ => Side::Outside,
         };
         let on_surface = |d: f64| match place {
-            Place::Listed { .. } if d < ON_SURFACE_F64 => {
-                Some(self.pseudonormal(faces, position, closest.feature))
-            }
-            _ => None,
+            _ if d >= ON_SURFACE_F64 => None,
+            Place::Listed { .. } => Some(self.pseudonormal(faces, position, closest.feature)),
+            // A cell that no list was worth its bytes for may touch the surface.
+            _ => Some(self.local_triangle(position as usize).normal),
         };
         self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
     }

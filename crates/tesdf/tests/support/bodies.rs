@@ -21,19 +21,20 @@ pub struct Body {
 /// The mesh of a row of the manifest, by name; cells are as coarse as detection still likes, as nobody waits for queries here.
 pub fn body(name: &str) -> Arc<Body> {
     static BODIES: LazyLock<Mutex<HashMap<String, Arc<Body>>>> = LazyLock::new(Mutex::default);
-    let mut bodies = BODIES.lock().expect("no test panics while it encodes");
-    if let Some(body) = bodies.get(name) {
+    let known = || BODIES.lock().expect("no test panics while it looks");
+    if let Some(body) = known().get(name) {
         return body.clone();
     }
+    // Not under the lock: encoding is parallel, and its thread may take up another task that wants a body.
     let row = meshes::manifest().into_iter().find(|r| r.name == name).expect("a row of the manifest");
     let body = Arc::new(Body::new(row.solid().expect("a solid")));
-    bodies.insert(name.into(), body.clone());
-    body
+    known().entry(name.into()).or_insert(body).clone()
 }
 
 impl Body {
     pub fn new(solid: SolidMesh) -> Self {
-        let options = EncodeOptions { byte_worth: 0.5, ..EncodeOptions::preset(Preset::Fast) };
+        let byte_worth = if solid.mesh().faces().len() > 1000 { 2.0 } else { 0.5 };
+        let options = EncodeOptions { byte_worth, ..EncodeOptions::preset(Preset::Fast) };
         let asset =
             encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
         Self { solid, asset: Arc::new(asset) }
