@@ -5,7 +5,7 @@ use super::branch_and_bound::branch_and_bound;
 use crate::TeSdf;
 use crate::asset::layout::{Label, Side};
 use crate::collide::field::{CellField, ROUNDING};
-use crate::collide::polygon::{MOST_VERTICES, Polygon};
+use crate::collide::polygon::{MOST_VERTICES, Parts, Polygon};
 use crate::geometry::polygon_to_triangle;
 use crate::query::{Faces, Place, Precision};
 
@@ -50,13 +50,18 @@ pub fn lowest(
     }
     let query = Query { asset, place, faces, polygon, normal, center, radius, tolerance, reach };
     let (distance, point) = query.nearest_to_faces(first.position);
+    if crossing && distance <= CLEAR && !query.only_touches(cell, distance, point) {
+        return query.lowest_of_parts(cell, precision);
+    }
     // Clear of the surface, the polygon is all on one side of it.
-    let all_outside = !crossing || (distance > CLEAR && cell.value(point, Precision::F64).distance > 0.0);
-    if !all_outside && !query.only_touches(cell, distance, point) {
+    if crossing && distance > CLEAR && cell.value(point, Precision::F64).distance < 0.0 {
         return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     }
     (distance <= reach).then_some(Lowest { point, converged: true })
 }
+
+/// Cuts after which what is left of a polygon is searched as it is.
+const MOST_CUTS: usize = 64;
 
 /// A polygon and the faces that can be nearest to its points; all of it is within a ball.
 #[derive(Clone, Copy)]
@@ -102,6 +107,71 @@ impl Query<'_> {
             _ => self.asset.near_in_tree(self.center, self.radius, &mut offer),
         }
         best
+    }
+
+    /// The least of a polygon that crosses the surface: it is cut along the faces that it crosses, so that each part is all on
+    /// one side.
+    ///
+    /// Branch and bound alone needs pieces as small as the gap on the outer side: two flanks a micrometre apart that touch
+    /// somewhere took all evaluations there are.
+    fn lowest_of_parts(&self, cell: &CellField, precision: Precision) -> Option<Lowest> {
+        let mut least = (f64::INFINITY, self.center);
+        let mut converged = true;
+        let mut parts = vec![self.polygon.clone()];
+        let mut cuts = 0;
+        while let Some(polygon) = parts.pop() {
+            let center = polygon.center();
+            let reach = self.reach.min(least.0);
+            let part = Query { polygon: &polygon, center, radius: polygon.reach(center), reach, ..*self };
+            if cuts < MOST_CUTS
+                && let Some((above, below)) = part.cut()
+            {
+                cuts += 1;
+                parts.extend([above, below]);
+                continue;
+            }
+            let value = cell.value(center, Precision::F64);
+            let (distance, point) = part.nearest_to_faces(value.position);
+            let found = if value.distance > CLEAR || part.only_touches(cell, distance, point) {
+                (distance, point)
+            } else {
+                let lowest = branch_and_bound(cell, &polygon, self.tolerance, reach, precision);
+                converged &= lowest.converged;
+                (cell.value(lowest.point, Precision::F64).distance, lowest.point)
+            };
+            if found.0 < least.0 {
+                least = found;
+            }
+        }
+        (least.0 <= self.reach).then_some(Lowest { point: least.1, converged })
+    }
+
+    /// The polygon cut along the plane of the face that it goes through deepest; `None` when it goes through none.
+    fn cut(&self) -> Option<(Polygon, Polygon)> {
+        let mut points = [DVec3::ZERO; MOST_VERTICES];
+        points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
+        let points = &points[..self.polygon.vertices().len()];
+        let mut deepest = (CLEAR, None);
+        self.asset.near_in_list(self.faces, self.center, self.radius, &mut |face| {
+            let triangle = self.asset.local_triangle(face as usize);
+            let height = |p: &DVec3| triangle.normal.dot(*p - triangle.corners[0]);
+            let heights = points.iter().map(height);
+            let (low, high) =
+                heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+            let depth = high.min(-low);
+            if depth > deepest.0
+                && polygon_to_triangle(points, self.normal, &triangle, 2.0 * CLEAR)
+                    .is_some_and(|(distance, _)| distance <= CLEAR)
+            {
+                deepest = (depth, Some(triangle));
+            }
+            f64::INFINITY
+        });
+        let triangle = deepest.1?;
+        match self.polygon.cut(|v| triangle.normal.dot(v.point - triangle.corners[0])) {
+            Parts::Across(above, below) => Some((above, below)),
+            Parts::Above | Parts::Below => None,
+        }
     }
 
     /// Whether the polygon, `distance` from the surface at `point`, touches it along an edge or a whole face but does not go in: it is then free a
