@@ -78,11 +78,14 @@ impl Clipping<'_> {
         let mut swapped = axes;
         swapped.swap(at, at + 1);
         let [i, j] = [axes[at], axes[at + 1]];
+        // Without an exchange the last comparison is the first one again: rounding would split off what lies in its plane, and one
+        // face would have two polygons in a cell.
+        let unchanged = if comparison == 1 { 3 } else { comparison + 1 };
         match polygon.cut(|v| (v.point[i] - origin[i]) - (v.point[j] - origin[j])) {
-            Parts::Above => self.order(polygon, axes, comparison + 1, visit),
+            Parts::Above => self.order(polygon, axes, unchanged, visit),
             Parts::Below => self.order(polygon, swapped, comparison + 1, visit),
             Parts::Across(above, below) => {
-                self.order(above, axes, comparison + 1, visit);
+                self.order(above, axes, unchanged, visit);
                 self.order(below, swapped, comparison + 1, visit);
             }
         }
