@@ -1,10 +1,12 @@
-//! `tesdf-bench`: the tables of `docs/benchmarks.md`, each one command, as Markdown on stdout.
+//! `tesdf-bench`: the tables of `docs/benchmarks.md`, each one command, as Markdown on stdout (`collide-peers`: JSON).
 //!
 //! Every table says on which processor, when and by which command it was made. Speeds are meant as ratios within one run.
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod clearance;
+mod collide_peers;
 mod curve;
 mod encode;
 mod exactness;
@@ -15,6 +17,7 @@ mod memory;
 mod output;
 mod parry;
 mod points;
+mod poses;
 mod query;
 mod reference;
 mod scaling;
@@ -22,9 +25,9 @@ mod screw;
 mod timing;
 
 /// Why a benchmark could not run: what was found, where, and what to do.
-type Failure = Box<dyn std::error::Error>;
+type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// Benchmarks of tesdf; each prints one Markdown table.
+/// Benchmarks of tesdf; each prints one table.
 #[derive(Parser)]
 #[command(name = "tesdf-bench", version, arg_required_else_help = true)]
 struct Cli {
@@ -50,6 +53,8 @@ enum Command {
     Scaling(scaling::Args),
     /// How far Frank-Wolfe iterations are off the exact minimum, on two bodies in contact
     FrankWolfe(frank_wolfe::Args),
+    /// Contacts of two posed meshes, ours and parry3d's, with the true clearances, as JSON for `scripts/peers.py`
+    CollidePeers(collide_peers::Args),
 }
 
 fn main() -> ExitCode {
@@ -62,6 +67,7 @@ fn main() -> ExitCode {
         Command::Screw(args) => screw::run(args),
         Command::Scaling(args) => scaling::run(args),
         Command::FrankWolfe(args) => frank_wolfe::run(args),
+        Command::CollidePeers(args) => collide_peers::run(args),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,11 +1,15 @@
 //! The peer: `parry3d`, in `f32`, with pseudonormals.
-use parry3d::math::Vector;
-use parry3d::query::PointQuery;
+use parry3d::math::{Pose as ParryPose, Rotation, Vector};
+use parry3d::query::{
+    ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, PointQuery, contact, distance,
+    intersection_test,
+};
 use parry3d::shape::{TriMesh, TriMeshFlags};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 
 use crate::Failure;
+use crate::poses::Pose;
 
 /// Name with version and features.
 pub const NAME: &str = if cfg!(feature = "parry-simd8") {
@@ -35,6 +39,46 @@ impl Peer {
         built.map(Self).map_err(|e| format!("parry3d does not take the mesh: {e}").into())
     }
 
+    /// Whether the surfaces, meet.
+    pub fn meets(&self, other: &Self, poses: &[ParryPose; 2]) -> Result<bool, Failure> {
+        Ok(intersection_test(&poses[0], &self.0, &poses[1], &other.0)?.intersecting)
+    }
+
+    /// The distance of the surfaces, 0 where they meet.
+    pub fn separation(&self, other: &Self, poses: &[ParryPose; 2]) -> Result<f32, Failure> {
+        Ok(distance(&poses[0], &self.0, &poses[1], &other.0)?.distance)
+    }
+
+    /// The deepest contact of any two triangles, if one is within the prediction.
+    pub fn deepest_contact(
+        &self,
+        other: &Self,
+        poses: &[ParryPose; 2],
+        prediction: f32,
+    ) -> Result<Option<f32>, Failure> {
+        Ok(contact(&poses[0], &self.0, &poses[1], &other.0, prediction)?.map(|c| c.dist))
+    }
+
+    /// The distances of all contacts of all pairs of triangles within the prediction, afresh.
+    pub fn contacts(
+        &self,
+        other: &Self,
+        poses: &[ParryPose; 2],
+        prediction: f32,
+    ) -> Result<Vec<f32>, Failure> {
+        let mut manifolds: Vec<ContactManifold<(), ()>> = Vec::new();
+        let between = poses[0].inv_mul(&poses[1]);
+        DefaultQueryDispatcher.contact_manifolds(
+            &between,
+            &self.0,
+            &other.0,
+            prediction,
+            &mut manifolds,
+            &mut None,
+        )?;
+        Ok(manifolds.iter().flat_map(|m| &m.points).map(|p| p.dist).collect())
+    }
+
     /// Signed projection, and the distance and gradient that follow from it.
     #[inline]
     pub fn query(&self, p: Vector) -> PeerAnswer {
@@ -49,4 +93,14 @@ impl Peer {
 /// As the peer takes it.
 pub fn point(p: DVec3) -> Vector {
     p.as_vec3().to_array().into()
+}
+
+/// As the peer takes it, in a unit of `scale` to the mesh's unit. The pose of the first in the frame of the second is found in `f64`.
+pub fn pair(poses: [Pose; 2], scale: f64) -> [ParryPose; 2] {
+    let first = poses[0].in_frame_of(poses[1]);
+    let rotation: [f32; 4] = first.rotation.as_quat().to_array();
+    [
+        ParryPose::from_parts(point(first.translation * scale), Rotation::from_array(rotation)),
+        ParryPose::IDENTITY,
+    ]
 }

@@ -26,8 +26,30 @@ impl Reference {
     }
 
     fn signed_distance(&self, p: DVec3) -> f64 {
-        let squared = |face: u32| self.triangles[face as usize].closest(p).distance.powi(2);
-        let distance = self.tree.nearest(p, squared).map_or(f64::INFINITY, |(d, _)| d.sqrt());
-        if self.winding.at_perturbed(p) >= 1 { -distance } else { distance }
+        let distance = self.distance(p).0;
+        if self.is_inside(p) { -distance } else { distance }
+    }
+
+    /// Distance of the nearest face, and the face.
+    pub fn distance(&self, p: DVec3) -> (f64, u32) {
+        let squared = |face: u32| self.face(face).closest(p).distance.powi(2);
+        self.tree.nearest(p, squared).map_or((f64::INFINITY, 0), |(d, face)| (d.sqrt(), face))
+    }
+
+    /// By the winding number.
+    pub fn is_inside(&self, p: DVec3) -> bool {
+        self.winding.at_perturbed(p) >= 1
+    }
+
+    /// A face of the mesh.
+    pub fn face(&self, face: u32) -> &Triangle {
+        &self.triangles[face as usize]
+    }
+
+    /// All faces whose boxes meet the bounds, and a few others.
+    pub fn faces_meeting(&self, bounds: Aabb) -> Vec<u32> {
+        let mut found = Vec::new();
+        self.tree.visit(|node| node.overlaps(bounds), |faces| found.extend_from_slice(faces));
+        found
     }
 }

@@ -1,0 +1,239 @@
+//! `tesdf-bench collide-peers`: one JSON document for `scripts/peers.py`, which runs the other peers and makes the table.
+//!
+//! Per pose set: the true clearance of each pose, and rows of raw measurements, one entry a pose. All lengths are in the meshes' unit.
+use std::collections::HashMap;
+use std::hint::black_box;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use parry3d::math::Pose as ParryPose;
+use rayon::ThreadPoolBuilder;
+use serde::Serialize;
+use tesdf::TeSdf;
+use tesdf::glam::DVec3;
+use tesdf::mesh::TriangleMesh;
+use tesdf::query::Precision;
+
+use crate::clearance::Body;
+use crate::input::{Input, Preset};
+use crate::parry::{self, Peer};
+use crate::poses::{Pose, PoseSet};
+use crate::{Failure, output};
+
+/// Arguments of `tesdf-bench collide-peers`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Pose sets, as in `data/poses`
+    #[arg(required = true)]
+    sets: Vec<PathBuf>,
+    /// What is encoded
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    preset: Preset,
+    /// parry3d computes in f32 with absolute tolerances: its unit, in units of the mesh
+    #[arg(long, default_value_t = 1000.0)]
+    parry_scale: f64,
+}
+
+/// One pose set.
+#[derive(Serialize)]
+struct Measured {
+    set: String,
+    /// One per pose: see [`Body::clearance`].
+    clearance: Vec<f64>,
+    rows: Vec<Row>,
+}
+
+/// One way to ask one contender.
+#[derive(Serialize)]
+struct Row {
+    contender: String,
+    operation: &'static str,
+    /// Whether what it yields is exact for the meshes as given, or why not.
+    exact: &'static str,
+    /// Seconds to prepare both meshes.
+    build: f64,
+    poses: Vec<Outcome>,
+}
+
+/// What one pose gave.
+#[derive(Serialize)]
+struct Outcome {
+    /// The best of a few runs.
+    seconds: f64,
+    /// Whether the solids overlap, where the operation says it.
+    overlap: Option<bool>,
+    /// Number of contacts, where it yields contacts.
+    contacts: Option<usize>,
+    /// Distance, or negative depth, where it yields either.
+    clearance: Option<f64>,
+}
+
+/// What a contender found at a pose.
+#[derive(Default)]
+struct Found {
+    overlap: Option<bool>,
+    contacts: Option<usize>,
+    clearance: Option<f64>,
+}
+
+pub fn run(args: &Args) -> Result<(), Failure> {
+    // Encoding may use all threads, nothing that is measured does.
+    let one = ThreadPoolBuilder::new().num_threads(1).build()?;
+    let mut bodies = HashMap::new();
+    let mut all = Vec::new();
+    for path in &args.sets {
+        let set = PoseSet::read(path)?;
+        for mesh in &set.meshes {
+            if !bodies.contains_key(mesh) {
+                eprintln!("encoding {}", mesh.display());
+                bodies.insert(mesh.clone(), Encoded::new(mesh, args)?);
+            }
+        }
+        eprintln!("measuring {}", set.name);
+        let [a, b] = set.meshes.each_ref().map(|mesh| &bodies[mesh]);
+        let (first, second) = (Body::new(a.input.solid.mesh()), Body::new(b.input.solid.mesh()));
+        let rows = one.install(|| {
+            let mut rows = ours(&set, a, b)?;
+            rows.extend(peers(&set, a, b, args.parry_scale)?);
+            Ok::<_, Failure>(rows)
+        })?;
+        let clearance = set.poses.iter().map(|&poses| first.clearance(&second, poses)).collect();
+        all.push(Measured { set: set.name, clearance, rows });
+    }
+    output::line(&serde_json::to_string_pretty(&all)?)
+}
+
+/// A mesh made ready for all contenders.
+struct Encoded {
+    input: Input,
+    asset: TeSdf,
+    encode_seconds: f64,
+    peer: Peer,
+    peer_seconds: f64,
+}
+
+impl Encoded {
+    fn new(path: &Path, args: &Args) -> Result<Self, Failure> {
+        let input = Input::read(path)?;
+        let (asset, encode_seconds) = input.encode(&args.preset.options())?;
+        let start = Instant::now();
+        let mesh = input.solid.mesh();
+        let vertices = mesh.vertices().iter().map(|&v| v * args.parry_scale).collect();
+        let peer = Peer::new(&TriangleMesh::new(vertices, mesh.faces().to_vec())?)?;
+        let peer_seconds = start.elapsed().as_secs_f64();
+        Ok(Self { input, asset, encode_seconds, peer, peer_seconds })
+    }
+}
+
+/// Our rows.
+fn ours(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
+    let build = a.encode_seconds + b.encode_seconds;
+    [(Precision::F32, "f32"), (Precision::F64, "f64")]
+        .map(|(precision, name)| {
+            let poses = measure(set, |[pose_a, pose_b], distance| {
+                let of_a = vertex_contacts(a, b, pose_a.in_frame_of(pose_b), distance, precision);
+                let of_b = vertex_contacts(b, a, pose_b.in_frame_of(pose_a), distance, precision);
+                Ok(Found {
+                    contacts: Some(of_a.0 + of_b.0),
+                    clearance: Some(of_a.1.min(of_b.1)).filter(|c| c.is_finite()),
+                    overlap: Some(of_a.1.min(of_b.1) < 0.0),
+                })
+            })?;
+            Ok(Row {
+                contender: format!("tesdf {}, {name}", env!("CARGO_PKG_VERSION")),
+                operation: "signed distance at vertices, both ways",
+                exact: "no: at vertices only",
+                build,
+                poses,
+            })
+        })
+        .into_iter()
+        .collect()
+}
+
+/// How many vertices of `a` are within the distance of `b`, and the least signed distance of those that are near its bounds.
+fn vertex_contacts(
+    a: &Encoded,
+    b: &Encoded,
+    pose: Pose,
+    distance: f64,
+    precision: Precision,
+) -> (usize, f64) {
+    let bounds = b.input.solid.mesh().bounds().grown(distance);
+    let vertices = a.input.solid.mesh().vertices().iter().map(|&v| pose.apply(v));
+    let near: Vec<DVec3> = vertices.filter(|&v| bounds.contains(v)).collect();
+    let answers = b.asset.query_batch(&near, precision);
+    let contacts = answers.iter().filter(|a| a.signed_distance <= distance).count();
+    (contacts, answers.iter().map(|a| a.signed_distance).fold(f64::INFINITY, f64::min))
+}
+
+/// Rows of parry3d.
+fn peers(set: &PoseSet, a: &Encoded, b: &Encoded, scale: f64) -> Result<Vec<Row>, Failure> {
+    type Find<'a> = &'a dyn Fn(&[ParryPose; 2], f32) -> Result<Found, Failure>;
+    let row = |operation, exact, find: Find<'_>| -> Result<Row, Failure> {
+        Ok(Row {
+            contender: parry::NAME.into(),
+            operation,
+            exact,
+            build: a.peer_seconds + b.peer_seconds,
+            poses: measure(set, |poses, distance| {
+                find(&parry::pair(poses, scale), (distance * scale) as f32)
+            })?,
+        })
+    };
+    let unscaled = |distance: f32| f64::from(distance) / scale;
+    Ok(vec![
+        row("intersection_test", "f32; surfaces only", &|poses, _| {
+            Ok(Found { overlap: Some(a.peer.meets(&b.peer, poses)?), ..Found::default() })
+        })?,
+        row("distance", "f32; 0 where they overlap", &|poses, _| {
+            let separation = a.peer.separation(&b.peer, poses)?;
+            Ok(Found {
+                overlap: Some(separation <= 0.0),
+                clearance: Some(separation).filter(|&s| s > 0.0).map(unscaled),
+                ..Found::default()
+            })
+        })?,
+        row("contact", "no: depth of two triangles", &|poses, distance| {
+            let deepest = a.peer.deepest_contact(&b.peer, poses, distance)?;
+            Ok(Found {
+                overlap: Some(deepest.is_some_and(|d| d < 0.0)),
+                contacts: Some(usize::from(deepest.is_some())),
+                clearance: deepest.map(unscaled),
+            })
+        })?,
+        row("contact_manifolds", "no: depth of two triangles", &|poses, distance| {
+            let contacts = a.peer.contacts(&b.peer, poses, distance)?;
+            let least = contacts.iter().copied().reduce(f32::min);
+            Ok(Found {
+                overlap: Some(least.is_some_and(|d| d < 0.0)),
+                contacts: Some(contacts.len()),
+                clearance: least.map(unscaled),
+            })
+        })?,
+    ])
+}
+
+/// Asks at each pose, after one run to warm up, three times or until half a second is over; `find` takes the poses and the contact distance.
+fn measure(
+    set: &PoseSet,
+    find: impl Fn([Pose; 2], f64) -> Result<Found, Failure>,
+) -> Result<Vec<Outcome>, Failure> {
+    const ENOUGH: Duration = Duration::from_millis(500);
+    let at = |&poses: &[Pose; 2]| {
+        let begin = Instant::now();
+        let mut found = find(poses, set.contact_distance)?;
+        let mut best = begin.elapsed();
+        for _ in 0..3 {
+            if begin.elapsed() > ENOUGH {
+                break;
+            }
+            let start = Instant::now();
+            found = black_box(find(black_box(poses), set.contact_distance)?);
+            best = best.min(start.elapsed());
+        }
+        let Found { overlap, contacts, clearance } = found;
+        Ok(Outcome { seconds: best.as_secs_f64(), overlap, contacts, clearance })
+    };
+    set.poses.iter().map(at).collect()
+}

@@ -1,0 +1,94 @@
+//! Pose sets: two meshes and the poses at which their contacts are measured. `data/poses/generate.py` says what is in a file.
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use tesdf::glam::{DQuat, DVec3};
+
+use crate::Failure;
+
+/// A rigid motion from a mesh's frame to the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Pose {
+    /// Unit quaternion.
+    pub rotation: DQuat,
+    /// In the mesh's unit.
+    pub translation: DVec3,
+}
+
+impl Pose {
+    /// The point in the world.
+    pub fn apply(self, p: DVec3) -> DVec3 {
+        self.rotation * p + self.translation
+    }
+
+    /// The same pose as seen from the frame that the other pose places.
+    pub fn in_frame_of(self, frame: Self) -> Self {
+        let back = frame.rotation.conjugate();
+        Self {
+            rotation: (back * self.rotation).normalize(),
+            translation: back * (self.translation - frame.translation),
+        }
+    }
+}
+
+/// A file of `data/poses`.
+pub struct PoseSet {
+    /// File name without extension.
+    pub name: String,
+    /// The meshes `a` and `b`.
+    pub meshes: [PathBuf; 2],
+    /// Contacts up to this distance are asked for, in the meshes' unit.
+    pub contact_distance: f64,
+    /// Of `a` and of `b`.
+    pub poses: Vec<[Pose; 2]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    a: PathBuf,
+    b: PathBuf,
+    contact_distance: f64,
+    poses: Vec<Pair>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Pair {
+    a: String,
+    b: String,
+}
+
+impl PoseSet {
+    /// Reads a file; its meshes are named relative to it.
+    pub fn read(path: &Path) -> Result<Self, Failure> {
+        let at = |e: &dyn std::fmt::Display| Failure::from(format!("{}: {e}", path.display()));
+        let text = std::fs::read_to_string(path).map_err(|e| at(&e))?;
+        let file: File = serde_json::from_str(&text).map_err(|e| at(&e))?;
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let poses = file.poses.iter().enumerate().map(|(i, pair)| {
+            let read = |text: &str| parse(text).map_err(|e| at(&format!("pose {i}: {e}")));
+            Ok([read(&pair.a)?, read(&pair.b)?])
+        });
+        Ok(Self {
+            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            meshes: [folder.join(file.a), folder.join(file.b)],
+            contact_distance: file.contact_distance,
+            poses: poses.collect::<Result<_, Failure>>()?,
+        })
+    }
+}
+
+fn parse(text: &str) -> Result<Pose, String> {
+    let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z, qx, qy, qz, qw]) => {
+            let (translation, rotation) = (DVec3::new(x, y, z), DQuat::from_xyzw(qx, qy, qz, qw));
+            if translation.is_finite() && (rotation.length() - 1.0).abs() < 1e-9 {
+                return Ok(Pose { rotation: rotation.normalize(), translation });
+            }
+            Err(format!("not finite, or not a unit quaternion: {text:?}"))
+        }
+        _ => Err(format!("expected seven numbers, tx ty tz qx qy qz qw, found {text:?}")),
+    }
+}
