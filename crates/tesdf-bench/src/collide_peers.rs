@@ -4,12 +4,17 @@
 use std::collections::HashMap;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use parry3d::math::Pose as ParryPose;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::TeSdf;
+use tesdf::collide::{
+    self, ClearanceOptions, CollideOptions, Instance, InstanceId, Mode, Scene, clearance, detect,
+};
+use tesdf::encode::Length;
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 use tesdf::query::Precision;
@@ -106,7 +111,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// A mesh made ready for all contenders.
 struct Encoded {
     input: Input,
-    asset: TeSdf,
+    asset: Arc<TeSdf>,
     encode_seconds: f64,
     peer: Peer,
     peer_seconds: f64,
@@ -121,12 +126,63 @@ impl Encoded {
         let vertices = mesh.vertices().iter().map(|&v| v * args.parry_scale).collect();
         let peer = Peer::new(&TriangleMesh::new(vertices, mesh.faces().to_vec())?)?;
         let peer_seconds = start.elapsed().as_secs_f64();
-        Ok(Self { input, asset, encode_seconds, peer, peer_seconds })
+        Ok(Self { input, asset: Arc::new(asset), encode_seconds, peer, peer_seconds })
     }
 }
 
 /// Our rows.
 fn ours(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
+    let mut rows = detector(set, a, b)?;
+    rows.extend(vertices(set, a, b)?);
+    Ok(rows)
+}
+
+/// The detector, by mode, and the clearance.
+fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
+    let scene = |poses: [Pose; 2]| -> Result<(Scene, [InstanceId; 2]), Failure> {
+        let mut scene = Scene::new();
+        let mut add = |asset: &Arc<TeSdf>, pose: Pose| -> Result<InstanceId, Failure> {
+            let shape = scene.add_shape(asset.clone())?;
+            Ok(scene.add(Instance::new(shape, collide::Pose::new(pose.translation, pose.rotation)?))?)
+        };
+        let ids = [add(&a.asset, poses[0])?, add(&b.asset, poses[1])?];
+        Ok((scene, ids))
+    };
+    let row = |operation, exact, poses| Row {
+        contender: format!("tesdf {}", env!("CARGO_PKG_VERSION")),
+        operation,
+        exact,
+        build: a.encode_seconds + b.encode_seconds,
+        poses,
+    };
+    let contacts = |mode| {
+        measure(set, |poses, contact_distance| {
+            let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
+            let found = detect(&scene(poses)?.0, &options)?.contacts;
+            let least = found.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
+            Ok(Found {
+                contacts: Some(found.len()),
+                clearance: Some(least).filter(|c| c.is_finite()),
+                overlap: Some(least < 0.0),
+            })
+        })
+    };
+    let apart = measure(set, |poses, _| {
+        let (scene, [a, b]) = scene(poses)?;
+        let options = ClearanceOptions { tolerance: Length::OfDiagonal(1e-7) };
+        let found = clearance(&scene, a, b, &options)?.distance;
+        Ok(Found { contacts: None, clearance: Some(found), overlap: Some(found < 0.0) })
+    })?;
+    Ok(vec![
+        row("detect, nodes", "no: at vertices only", contacts(Mode::Node)?),
+        row("detect, Frank-Wolfe, 16", "no: minima from above", contacts(Mode::FACE)?),
+        row("detect, exact", "f64; signed, of the solids, to 1e-7", contacts(Mode::EXACT)?),
+        row("clearance", "f64; signed, of the solids, to 1e-7", apart),
+    ])
+}
+
+/// Queries without the detector.
+fn vertices(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
     let build = a.encode_seconds + b.encode_seconds;
     [(Precision::F32, "f32"), (Precision::F64, "f64")]
         .map(|(precision, name)| {
