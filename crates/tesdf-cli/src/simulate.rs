@@ -54,7 +54,11 @@ pub enum Mode {
     Off,
 }
 
-fn geometry(text: &str) -> Result<(String, PathBuf), String> {
+/// A body and its geometry from `BODY=FILE`.
+///
+/// # Errors
+/// There is no `=`.
+pub fn geometry(text: &str) -> Result<(String, PathBuf), String> {
     let (body, file) = text.split_once('=').ok_or("expected BODY=FILE")?;
     Ok((body.into(), file.into()))
 }
@@ -87,10 +91,13 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let bar = LiveProgress::new(&interrupted);
     let ended = simulate(&loaded.scene, &mut engine, |moment| bar.show(moment));
     drop(bar);
-    let (record, summary) = ended.map_err(|e| match e {
+    let (mut record, summary) = ended.map_err(|e| match e {
         SimulateError::Interrupted { .. } => as_it_was(&e.to_string(), &args.output),
         e => Failure::new(format!("{}: {e}", args.scene.display())),
     })?;
+    // So that the run finds its meshes, wherever it is read.
+    let scene = absolute(&args.scene)?;
+    record.folder = scene.parent().unwrap_or(&scene).to_string_lossy().into_owned();
     record.save(&args.output).map_err(Failure::new)?;
     print(args, &summary)?;
     Ok(if summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
@@ -114,19 +121,30 @@ fn load(args: &Args) -> Result<LoadedScene, Failure> {
             Mode::Off => DetectorMode::Off,
         };
     }
-    for (name, file) in &args.geometries {
-        // Paths of a scene are relative to its folder, those of a command to where it runs.
-        let file = std::path::absolute(file).map_err(|e| Failure::new(format!("{}: {e}", file.display())))?;
-        let body = scene.bodies.iter_mut().map(|body| body.get_mut()).find(|body| &body.name == name);
-        let Some(body) = body else {
-            return Err(Failure::new(format!("{}: there is no body {name}", args.scene.display())));
-        };
-        (body.asset, body.mesh, body.shape) = match file.extension().is_some_and(|e| e == "tesdf") {
-            true => (Some(file), None, None),
-            false => (None, Some(file), None),
-        };
-    }
+    replace_geometries(&mut loaded, &args.geometries, &args.scene)?;
     Ok(loaded)
+}
+
+/// Puts other geometry in the place of that of the scene's bodies; `file` is what the scene was read from.
+///
+/// # Errors
+/// There is no such body, or no current folder.
+pub fn replace_geometries(
+    loaded: &mut LoadedScene,
+    geometries: &[(String, PathBuf)],
+    file: &Path,
+) -> Result<(), Failure> {
+    for (body, geometry) in geometries {
+        // Paths of a scene are relative to its folder, those of a command to where it runs.
+        if !loaded.replace_geometry(body, absolute(geometry)?) {
+            return Err(Failure::new(format!("{}: there is no body {body}", file.display())));
+        }
+    }
+    Ok(())
+}
+
+fn absolute(path: &Path) -> Result<PathBuf, Failure> {
+    std::path::absolute(path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
 }
 
 /// A bar on stderr with what the run does now.

@@ -4,9 +4,10 @@ mod folder;
 use std::path::Path;
 
 use folder::{Folder, texts};
-use tesdf::collide::{Contact, FeatureB, FeatureId, InstanceId, Placement, Pose, Scene, Shape};
+use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::glam::DVec3;
-use tesdf_cli::render::{Cut, Drawn, Exposure, HalfSpace, RenderError, Scenery, View, linear, render};
+use tesdf_cli::render::{ContactMark, Cut, Drawn, Exposure, HalfSpace, RenderError, Scenery, View, linear, render};
+use tesdf_sim::RunRecord;
 use tiny_skia::Pixmap;
 
 const RED: [u8; 3] = [220, 40, 40];
@@ -86,25 +87,10 @@ fn a_cut_opens_what_it_should_and_shows_overlaps() {
 #[test]
 fn contacts_are_drawn_on_top_and_fainter_behind_a_body() {
     let block = Shape::Box { half_extents: DVec3::ONE };
-    let mut scene = Scene::new();
-    let shape = scene.add_shape(block.clone()).unwrap();
-    let id: InstanceId = scene.add(tesdf::collide::Instance::new(shape, Pose::IDENTITY)).unwrap();
-    let contact = |p: DVec3| Contact {
-        point_a: p,
-        point_b: p,
-        normal: p.normalize(),
-        distance: 0.0,
-        face_a: 0,
-        face_b: 0,
-        tet_b: None,
-        instance_a: id,
-        instance_b: id,
-        feature: FeatureId { a: 0, b: FeatureB::Face(0) },
-        converged: true,
-    };
+    let contact = |p: DVec3| ContactMark { point: p, normal: p.normalize() };
     let cut = Cut::default();
     let bodies = [drawn(&block, DVec3::ZERO, GREEN, Exposure::Whole)];
-    let redness = |contacts: &[Contact]| {
+    let redness = |contacts: &[ContactMark]| {
         let map = render(&Scenery { bodies: &bodies, cut: &cut, contacts }, &FRONT, [400, 400]).unwrap();
         let p = map.pixel(200, 200).unwrap();
         i32::from(p.red()) - i32::from(p.green())
@@ -175,6 +161,85 @@ fn the_binary_draws_the_same_bytes_on_any_number_of_threads() {
     assert_eq!(folder.names(), ["p.png", "t.obj", "t.tesdf"]);
 }
 
+/// A ball falls by 14 of its radii beside a body that stays.
+const DROP: &str = r#"
+time_step = 0.05
+duration = 0.5
+
+[[bodies]]
+name = "ball"
+shape = { sphere = { radius = 0.1 } }
+density = 1000
+translation = [0, 0, 2]
+
+[[bodies]]
+name = "block"
+mesh = "meshes/t.obj"
+fixed = true
+translation = [1, 0, 0]
+
+[record]
+contacts_every = 4
+"#;
+
+#[test]
+fn a_run_is_drawn_at_a_time_like_its_bodies_by_hand() {
+    let folder = Folder::new();
+    std::fs::create_dir_all(folder.path("scene/meshes")).unwrap();
+    folder.write("scene/meshes/t.obj", TETRAHEDRON);
+    folder.write("scene/drop.toml", DROP);
+    folder.good(&["encode", "scene/meshes/t.obj", "-o", "t.tesdf", "--preset", "fast"]);
+    folder.good(&["simulate", "scene/drop.toml", "-o", "run"]);
+    let picture = |args: &[&str]| {
+        let common = ["-o", "p.png", "--size", "90x90", "--target", "0.5 0 1"];
+        folder.good(&[&["render"][..], args, &common].concat());
+        std::fs::read(folder.path("p.png")).unwrap()
+    };
+    let record = RunRecord::open(&folder.path("run")).unwrap();
+    let by_hand = |step: usize| {
+        let z = record.pose(step, 0).unwrap().translation.z;
+        let pose = format!("0 0 {z:?} 0 0 0 1");
+        picture(&["sphere:0.1", "t.tesdf", "--pose", &pose, "--pose", "1 0 0 0 0 0 1"])
+    };
+    let end = by_hand(10);
+    assert!(end != by_hand(4), "the ball falls");
+    assert!(end == picture(&["--run", "run"]), "the end");
+    assert!(by_hand(4) == picture(&["--run", "run", "--time", "0.21"]), "the nearest step");
+    // Contacts are kept of the steps 0, 4 and 8; there are none.
+    assert!(by_hand(8) == picture(&["--run", "run", "--contacts"]), "the nearest step with contacts");
+
+    std::fs::rename(folder.path("scene"), folder.path("elsewhere")).unwrap();
+    let (code, _, err) = folder.tesdf(&["render", "--run", "run", "-o", "p.png"]);
+    assert!(code == Some(2) && err.contains("body block") && err.contains("--geometry BODY=FILE"), "{err}");
+    assert!(end == picture(&["--run", "run", "--geometry", "block=t.tesdf"]), "geometry that moved");
+}
+
+#[test]
+fn contacts_of_a_run_are_drawn_where_they_are() {
+    let folder = Folder::new();
+    let rest = DROP.replace("translation = [0, 0, 2]", "translation = [0, 0, 0.1]").replace(
+        "mesh = \"meshes/t.obj\"\nfixed = true\ntranslation = [1, 0, 0]",
+        "shape = \"plane\"\nfixed = true",
+    );
+    folder.write("rest.toml", rest);
+    folder.good(&["simulate", "rest.toml", "-o", "run"]);
+    let common =
+        ["render", "--run", "run", "-o", "p.png", "--size", "90x90", "--view", "-90 0", "--time", "0.2"];
+    let redness = |args: &[&str]| {
+        folder.good(&[&common[..], args].concat());
+        let map = Pixmap::load_png(folder.path("p.png")).unwrap();
+        map.pixels().iter().filter(|p| i32::from(p.red()) > i32::from(p.green().max(p.blue())) + 60).count()
+    };
+    let [bare, marked] = [redness(&[]), redness(&["--contacts"])];
+    assert!(marked > bare, "{bare} {marked}");
+
+    let no_contacts = std::fs::read_to_string(folder.path("rest.toml")).unwrap().replace("= 4", "= 0");
+    folder.write("rest.toml", no_contacts);
+    folder.good(&["simulate", "rest.toml", "-o", "run"]);
+    let (code, _, err) = folder.tesdf(&[&common[..], &["--contacts"]].concat());
+    assert!(code == Some(2) && err.contains("contacts_every"), "{err}");
+}
+
 #[test]
 fn bad_arguments_are_2_and_leave_no_file() {
     let folder = Folder::new();
@@ -191,6 +256,8 @@ fn bad_arguments_are_2_and_leave_no_file() {
         (&["--size", "big"], "expected WIDTHxHEIGHT"),
         (&["--zoom", "-1"], "-1 is not greater than 0"),
         (&["box:1,1"], "2 numbers; expected three"),
+        (&["--time", "1"], "--run <RUN>"),
+        (&["--run", "run"], "cannot be used with"),
         (&["missing.tesdf"], "missing.tesdf"),
         (&["bad.tesdf"], "bad.tesdf"),
     ] {

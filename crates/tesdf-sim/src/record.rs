@@ -11,7 +11,8 @@
 //! | `contacts.distances` | f32 [C] | signed distance |
 //! | `contacts.ids` | u32 [C, 4] | body of the face, body of the field, face of a, face of b |
 //!
-//! The metadata has one key, `tesdf_run`: JSON with `version`, `bodies` (names), and `scene` (the scene as JSON).
+//! The metadata has one key, `tesdf_run`: JSON with `version`, `bodies` (names), `scene` (the scene as JSON), and `folder`, which the
+//! scene's paths are relative to.
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -34,6 +35,8 @@ pub struct RunRecord {
     pub bodies: Vec<String>,
     /// The scene as JSON.
     pub scene: serde_json::Value,
+    /// What the scene's paths are relative to; empty: the folder of whoever reads.
+    pub folder: String,
     times: Vec<f64>,
     poses: Vec<[f64; 7]>,
     velocities: Vec<[f64; 6]>,
@@ -93,6 +96,8 @@ struct About {
     version: u32,
     bodies: Vec<String>,
     scene: serde_json::Value,
+    #[serde(default)]
+    folder: String,
 }
 
 impl RunRecord {
@@ -135,6 +140,17 @@ impl RunRecord {
         &self.times
     }
 
+    /// The number of steps after which the time is nearest to `time`; the earlier one of two.
+    pub fn nearest_step(&self, time: f64) -> Option<usize> {
+        nearest(0..self.times.len(), |step| self.times[step], time)
+    }
+
+    /// As [`nearest_step`](Self::nearest_step), among the steps whose contacts are kept.
+    pub fn nearest_contacts(&self, time: f64) -> Option<usize> {
+        let kept = self.contact_steps.iter().map(|&step| step as usize).filter(|&step| step < self.times.len());
+        nearest(kept, |step| self.times[step], time)
+    }
+
     /// Pose of a body after `step` steps.
     pub fn pose(&self, step: usize, body: usize) -> Option<Pose> {
         let at = (body < self.bodies.len()).then(|| step * self.bodies.len() + body)?;
@@ -169,7 +185,12 @@ impl RunRecord {
     /// # Errors
     /// Metadata larger than safetensors allows.
     pub fn to_bytes(&self) -> Result<Vec<u8>, RecordError> {
-        let about = About { version: RUN_VERSION, bodies: self.bodies.clone(), scene: self.scene.clone() };
+        let about = About {
+            version: RUN_VERSION,
+            bodies: self.bodies.clone(),
+            scene: self.scene.clone(),
+            folder: self.folder.clone(),
+        };
         let about = serde_json::to_string(&about).map_err(|e| RecordError::NotARun(e.to_string()))?;
         // One key: the crate keeps metadata in a hash map, and the order of several would vary from run to run.
         let metadata = HashMap::from([(KEY.to_string(), about)]);
@@ -215,7 +236,7 @@ impl RunRecord {
         let (_, header) = SafeTensors::read_metadata(bytes)?;
         let about = header.metadata().as_ref().and_then(|m| m.get(KEY));
         let about = about.ok_or_else(|| RecordError::NotARun(format!("the metadata has no {KEY}")))?;
-        let About { version, bodies, scene } =
+        let About { version, bodies, scene, folder } =
             serde_json::from_str(about).map_err(|e| RecordError::NotARun(format!("{KEY}: {e}")))?;
         if version != RUN_VERSION {
             return Err(RecordError::Version { found: version });
@@ -235,6 +256,7 @@ impl RunRecord {
             times,
             bodies,
             scene,
+            folder,
         };
         record.check()?;
         Ok(record)
@@ -256,6 +278,11 @@ impl RunRecord {
         }
         Err(RecordError::NotARun("its tensors do not fit each other; it was damaged or made by hand".into()))
     }
+}
+
+fn nearest(steps: impl Iterator<Item = usize>, at: impl Fn(usize) -> f64, time: f64) -> Option<usize> {
+    let distance = |&step: &usize| (at(step) - time).abs();
+    steps.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 fn tensor<'a, T: bytemuck::Pod>(

@@ -1,4 +1,4 @@
-//! `tesdf render BODY... -o out.png`: a picture of a scene, with a cutaway on request.
+//! `tesdf render BODY... -o out.png`, `tesdf render --run RUN -o out.png`: a picture of a scene, with a cutaway on request.
 //!
 //! In go bodies with their places in the world ([`Drawn`]), what is cut away ([`Cut`]), contacts, and a [`View`]; out
 //! comes a picture ([`render`]). Rays find the surface in the encoded mesh; its distances give shadows and occlusion.
@@ -10,6 +10,7 @@ mod light;
 mod normals;
 mod overlay;
 mod picture;
+mod run_file;
 mod stage;
 
 use std::path::PathBuf;
@@ -22,6 +23,7 @@ pub use body::{BodyName, body_name, open};
 pub use camera::View;
 pub use colour::{Linear, linear, of_body};
 pub use cut::{Cut, HalfSpace};
+pub use overlay::ContactMark;
 pub use picture::{Scenery, render};
 pub use stage::{Drawn, Exposure};
 
@@ -46,8 +48,20 @@ pub enum RenderError {
 #[derive(clap::Args, Debug)]
 pub struct Args {
     /// A .tesdf file, or plane, box:HX,HY,HZ, sphere:R, capsule:HALF_HEIGHT,R
-    #[arg(required = true, value_name = "BODY", value_parser = body_name)]
+    #[arg(required_unless_present = "run", value_name = "BODY", value_parser = body_name)]
     pub bodies: Vec<BodyName>,
+    /// Draw the bodies of this run instead, as `tesdf simulate` wrote it
+    #[arg(long, value_name = "RUN", conflicts_with_all = ["bodies", "poses"])]
+    pub run: Option<PathBuf>,
+    /// Time of the run, s; the nearest step is drawn [default: its end]
+    #[arg(long, value_name = "SECONDS", value_parser = parse::number, requires = "run", allow_hyphen_values = true)]
+    pub time: Option<f64>,
+    /// Draw the run's contacts too, gaps up to its contact distance included, at the nearest step whose contacts are recorded
+    #[arg(long, requires = "run")]
+    pub contacts: bool,
+    /// Instead of the geometry of a body of the run: a .tesdf file, or a mesh that is encoded; may be given several times
+    #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry, requires = "run")]
+    pub geometries: Vec<(String, PathBuf)>,
     /// The PNG file to write; an existing one is replaced
     #[arg(short, long, value_name = "PNG")]
     pub output: PathBuf,
@@ -114,24 +128,20 @@ impl Args {
 /// # Errors
 /// A file cannot be opened, the options do not fit each other, nothing can be drawn, or the file cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    if !args.poses.is_empty() && args.poses.len() != args.bodies.len() {
-        let message = format!("--pose is given {} times for {} bodies", args.poses.len(), args.bodies.len());
-        return Err(Failure::new(message).hint("give one for each body, in their order, or none"));
-    }
-    let shapes = open(&args.bodies)?;
+    let Posed { shapes, placements, contacts } = match &args.run {
+        Some(run) => run_file::posed(args, run)?,
+        None => named(args)?,
+    };
     let exposures = args.exposures(&shapes)?;
     // Planes are grey and take no colour from the others.
     let mut colours = (0..).map(of_body);
     let bodies: Vec<Drawn> = shapes
         .iter()
+        .zip(placements)
         .zip(exposures)
-        .enumerate()
-        .map(|(place, (shape, exposure))| Drawn {
+        .map(|((shape, placement), exposure)| Drawn {
             shape,
-            placement: Placement {
-                pose: args.poses.get(place).copied().unwrap_or(Pose::IDENTITY),
-                scale: 1.0,
-            },
+            placement,
             colour: match shape {
                 Shape::Plane => linear([225; 3]),
                 _ => colours.next().unwrap_or_default(),
@@ -140,9 +150,29 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         })
         .collect();
     let cut = Cut(args.cuts.clone());
-    let scenery = Scenery { bodies: &bodies, cut: &cut, contacts: &[] };
+    let scenery = Scenery { bodies: &bodies, cut: &cut, contacts: &contacts };
     let map = render(&scenery, &args.view(), args.size).map_err(Failure::new)?;
     let png = map.encode_png().map_err(|e| Failure::new(RenderError::Encode(e.to_string())))?;
     save_atomic(&args.output, &png).map_err(Failure::new)?;
     Ok(Outcome::Good)
+}
+
+/// Bodies in their places.
+struct Posed {
+    shapes: Vec<Shape>,
+    /// One per shape.
+    placements: Vec<Placement>,
+    contacts: Vec<ContactMark>,
+}
+
+/// The bodies that the command line names.
+fn named(args: &Args) -> Result<Posed, Failure> {
+    if !args.poses.is_empty() && args.poses.len() != args.bodies.len() {
+        let message = format!("--pose is given {} times for {} bodies", args.poses.len(), args.bodies.len());
+        return Err(Failure::new(message).hint("give one for each body, in their order, or none"));
+    }
+    let shapes = open(&args.bodies)?;
+    let poses = args.poses.iter().copied().chain(std::iter::repeat(Pose::IDENTITY));
+    let placements = poses.take(shapes.len()).map(|pose| Placement { pose, scale: 1.0 }).collect();
+    Ok(Posed { shapes, placements, contacts: Vec::new() })
 }

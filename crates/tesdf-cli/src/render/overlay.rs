@@ -1,5 +1,4 @@
 //! Contacts on top of a picture.
-use tesdf::collide::Contact;
 use tesdf::glam::{DVec2, DVec3};
 use tiny_skia::{Color, FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Stroke, Transform};
 
@@ -17,13 +16,22 @@ const ARROW: [u8; 3] = [120, 10, 40];
 /// Corners of a disc's outline.
 const CORNERS: u32 = 28;
 
-/// Draws each contact as a disc across its normal at `point_b`, and the normal; `depth` gives the distance that the
+/// Where a contact is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactMark {
+    /// World.
+    pub point: DVec3,
+    /// Unit, world.
+    pub normal: DVec3,
+}
+
+/// Draws each contact as a disc across its normal at its point, and the normal; `depth` gives the distance that the
 /// picture shows at a pixel.
-pub fn contacts(map: &mut Pixmap, camera: &Camera, contacts: &[Contact], depth: impl Fn(u32, u32) -> f64) {
+pub fn contacts(map: &mut Pixmap, camera: &Camera, contacts: &[ContactMark], depth: impl Fn(u32, u32) -> f64) {
     let longer = f64::from(map.width().max(map.height()));
-    let mut seen: Vec<(DVec2, f64, &Contact)> = contacts
+    let mut seen: Vec<(DVec2, f64, &ContactMark)> = contacts
         .iter()
-        .filter_map(|contact| camera.project(contact.point_b).map(|(at, far)| (at, far, contact)))
+        .filter_map(|contact| camera.project(contact.point).map(|(at, far)| (at, far, contact)))
         .filter(|(at, _, _)| at.x >= 0.0 && at.y >= 0.0)
         .filter(|(at, _, _)| at.x < f64::from(map.width()) && at.y < f64::from(map.height()))
         .collect();
@@ -36,11 +44,11 @@ pub fn contacts(map: &mut Pixmap, camera: &Camera, contacts: &[Contact], depth: 
         let line = |width: f64| Stroke { width: width as f32, line_cap: LineCap::Round, ..Stroke::default() };
         let thin = (0.1 * RADIUS * longer).max(0.75);
         if let Some(path) =
-            segment(camera, contact.point_b, contact.point_b + NORMAL * radius * contact.normal)
+            segment(camera, contact.point, contact.point + NORMAL * radius * contact.normal)
         {
             map.stroke_path(&path, &paint(ARROW, alpha), &line(2.5 * thin), Transform::identity(), None);
         }
-        if let Some(path) = disc(camera, contact.point_b, contact.normal, radius) {
+        if let Some(path) = disc(camera, contact.point, contact.normal, radius) {
             map.fill_path(&path, &paint(DISC, alpha), FillRule::Winding, Transform::identity(), None);
             map.stroke_path(&path, &paint(RIM, alpha), &line(1.5 * thin), Transform::identity(), None);
         }

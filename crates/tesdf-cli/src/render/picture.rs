@@ -1,5 +1,5 @@
 use rayon::prelude::*;
-use tesdf::collide::{Contact, Shape};
+use tesdf::collide::Shape;
 use tesdf::glam::{DVec2, DVec3};
 use tiny_skia::{Pixmap, PremultipliedColorU8};
 
@@ -8,7 +8,7 @@ use super::colour::{Linear, linear, srgb};
 use super::cut::Cut;
 use super::light::Lights;
 use super::stage::{Drawn, Part, Stage};
-use super::{RenderError, overlay};
+use super::{ContactMark, RenderError, overlay};
 use crate::slice::ticks;
 
 /// Pixels of each side of a picture.
@@ -28,7 +28,7 @@ pub struct Scenery<'a> {
     /// What is removed of those that are cut.
     pub cut: &'a Cut,
     /// Drawn as discs with their normals; faint where a body hides them.
-    pub contacts: &'a [Contact],
+    pub contacts: &'a [ContactMark],
 }
 
 /// Draws bodies, fitted into a picture of `size` pixels; planes are floor and do not count for the fit.

@@ -1,6 +1,9 @@
 use std::path::{Path, PathBuf};
 
-use super::{SceneError, SceneFile};
+use toml::Spanned;
+
+use super::{BodySection, SceneError, SceneFile};
+use crate::RunRecord;
 
 /// A scene file with what its errors and paths refer to.
 #[derive(Clone, Debug)]
@@ -33,6 +36,37 @@ impl LoadedScene {
             message: e.to_string().trim_end().to_string(),
         })?;
         Ok(Self { scene, path: path.to_path_buf(), text })
+    }
+
+    /// The scene of a run that was read from `run`. Errors of bodies name the run and its line 1: the scene's own lines are not kept.
+    ///
+    /// # Errors
+    /// [`SceneError::Parse`]: the run holds no scene.
+    pub fn of_run(record: &RunRecord, run: &Path) -> Result<Self, SceneError> {
+        let no_scene =
+            |e| SceneError::Parse { path: run.to_path_buf(), message: format!("the scene in it: {e}") };
+        // `Spanned` reads from TOML only.
+        let mut json = record.scene.clone();
+        let bodies = json.get_mut("bodies").map(serde_json::Value::take).unwrap_or_default();
+        let bodies: Vec<BodySection> = serde_json::from_value(bodies).map_err(no_scene)?;
+        json["bodies"] = serde_json::Value::Array(Vec::new());
+        let mut scene: SceneFile = serde_json::from_value(json).map_err(no_scene)?;
+        scene.bodies = bodies.into_iter().map(|body| Spanned::new(0..0, body)).collect();
+        let path = run.file_name().map_or_else(|| run.to_path_buf(), |name| Path::new(&record.folder).join(name));
+        Ok(Self { scene, path, text: String::new() })
+    }
+
+    /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`, a mesh otherwise. A relative path is
+    /// relative to the scene's folder. `false`: there is no such body.
+    #[must_use]
+    pub fn replace_geometry(&mut self, body: &str, file: PathBuf) -> bool {
+        let body = self.scene.bodies.iter_mut().map(|b| b.get_mut()).find(|b| b.name == body);
+        let Some(body) = body else { return false };
+        (body.asset, body.mesh, body.shape) = match file.extension().is_some_and(|e| e == "tesdf") {
+            true => (Some(file), None, None),
+            false => (None, Some(file), None),
+        };
+        true
     }
 
     /// Line of a byte of the text, from 1.

@@ -1,0 +1,58 @@
+//! The bodies of a recorded run at one of its steps.
+use std::path::Path;
+
+use tesdf::collide::Placement;
+use tesdf::encode::EncodeProgress;
+use tesdf::glam::Vec3;
+use tesdf_sim::RunRecord;
+use tesdf_sim::record::RecordedContact;
+use tesdf_sim::scene_file::{LoadedScene, SceneError};
+
+use super::{Args, ContactMark, Posed};
+use crate::progress::{interrupt_flag, watched};
+use crate::report::Failure;
+use crate::simulate::replace_geometries;
+
+/// Reads a run and opens what its bodies are.
+///
+/// # Errors
+/// No run, geometry that is not where it was, or no contacts where some are asked for.
+pub fn posed(args: &Args, run: &Path) -> Result<Posed, Failure> {
+    let at = |reason: &dyn std::fmt::Display| Failure::new(format!("{}: {reason}", run.display()));
+    let record = RunRecord::open(run).map_err(|e| at(&e))?;
+    let mut loaded = LoadedScene::of_run(&record, run).map_err(Failure::new)?;
+    replace_geometries(&mut loaded, &args.geometries, run)?;
+    let (progress, interrupted) = (EncodeProgress::default(), interrupt_flag()?);
+    let system = watched(&progress, &interrupted, || loaded.system(&progress)).map_err(|e| match e {
+        SceneError::Body { name, reason, .. } => at(&format!("body {name}: {reason}"))
+            .hint("the run holds paths, not meshes; --geometry BODY=FILE says where they are now"),
+        e => Failure::new(e),
+    })?;
+
+    let end = record.times().last().copied();
+    let time = args.time.or(end).ok_or_else(|| at(&"it has no steps"))?;
+    let step = match args.contacts {
+        false => record.nearest_step(time).ok_or_else(|| at(&"it has no steps"))?,
+        true => record.nearest_contacts(time).ok_or_else(|| {
+            at(&"it has no contacts").hint("simulate with contacts_every in the scene's section [record]")
+        })?,
+    };
+    let mut posed = Posed { shapes: Vec::new(), placements: Vec::new(), contacts: Vec::new() };
+    for (place, body) in system.bodies().iter().enumerate() {
+        let instance = system.scene().instance(body.instance).map_err(|e| at(&e))?;
+        let pose = record.pose(step, place).ok_or_else(|| at(&format!("it has no pose of {}", body.name)))?;
+        posed.shapes.push(system.scene().shape(instance.shape).map_err(|e| at(&e))?.clone());
+        posed.placements.push(Placement { pose, scale: instance.scale });
+    }
+    if args.contacts {
+        let kept = record.contacts().find(|(kept, _)| *kept == step as u64);
+        posed.contacts = kept.iter().flat_map(|(_, contacts)| contacts.iter().map(mark)).collect();
+    }
+    Ok(posed)
+}
+
+/// On the body whose field it is, as the normal points away from it.
+fn mark(contact: &RecordedContact) -> ContactMark {
+    let [point, normal] = [contact.point, contact.normal].map(|v| Vec3::from_array(v).as_dvec3());
+    ContactMark { point: point - f64::from(contact.distance) * normal, normal }
+}
