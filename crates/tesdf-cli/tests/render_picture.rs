@@ -6,7 +6,9 @@ use std::path::Path;
 use folder::{Folder, texts};
 use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::glam::DVec3;
-use tesdf_cli::render::{ContactMark, Cut, Drawn, Exposure, HalfSpace, RenderError, Scenery, View, linear, render};
+use tesdf_cli::render::{
+    ContactMark, Cut, Drawn, Exposure, HalfSpace, RenderError, Scenery, View, linear, render,
+};
 use tesdf_sim::RunRecord;
 use tiny_skia::Pixmap;
 

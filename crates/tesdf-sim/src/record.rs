@@ -2,14 +2,14 @@
 //!
 //! | tensor | type | content |
 //! |---|---|---|
-//! | `times` | f64 [S + 1] | s; the first is the beginning |
-//! | `poses` | f64 [S + 1, B, 7] | of each body's frame: translation, quaternion x y z w |
-//! | `velocities` | f64 [S + 1, B, 6] | of the centre of mass, then angular |
-//! | `contacts.steps` | u64 [R] | the steps whose contacts are kept, from 0; the contacts are those at its beginning, `poses[step]` |
-//! | `contacts.starts` | u64 [R + 1] | where the contacts of each of them begin |
-//! | `contacts.points`, `contacts.normals` | f32 [C, 3] | `point_a` and `normal` of [`Contact`], world |
-//! | `contacts.distances` | f32 [C] | signed distance |
-//! | `contacts.ids` | u32 [C, 4] | body of the face, body of the field, face of a, face of b |
+//! | `times` | `f64 [S + 1]` | s; the first is the beginning |
+//! | `poses` | `f64 [S + 1, B, 7]` | of each body's frame: translation, quaternion x y z w |
+//! | `velocities` | `f64 [S + 1, B, 6]` | of the centre of mass, then angular |
+//! | `contacts.steps` | `u64 [R]` | the steps whose contacts are kept, from 0; the contacts are those at its beginning, `poses[step]` |
+//! | `contacts.starts` | `u64 [R + 1]` | where the contacts of each of them begin |
+//! | `contacts.points`, `contacts.normals` | `f32 [C, 3]` | `point_a` and `normal` of [`Contact`], world |
+//! | `contacts.distances` | `f32 [C]` | signed distance |
+//! | `contacts.ids` | `u32 [C, 4]` | body of the face, body of the field, face of a, face of b |
 //!
 //! The metadata has one key, `tesdf_run`: JSON with `version`, `bodies` (names), `scene` (the scene as JSON), and `folder`, which the
 //! scene's paths are relative to.
@@ -147,7 +147,8 @@ impl RunRecord {
 
     /// As [`nearest_step`](Self::nearest_step), among the steps whose contacts are kept.
     pub fn nearest_contacts(&self, time: f64) -> Option<usize> {
-        let kept = self.contact_steps.iter().map(|&step| step as usize).filter(|&step| step < self.times.len());
+        let kept =
+            self.contact_steps.iter().map(|&step| step as usize).filter(|&step| step < self.times.len());
         nearest(kept, |step| self.times[step], time)
     }
 

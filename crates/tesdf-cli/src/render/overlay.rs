@@ -27,7 +27,12 @@ pub struct ContactMark {
 
 /// Draws each contact as a disc across its normal at its point, and the normal; `depth` gives the distance that the
 /// picture shows at a pixel.
-pub fn contacts(map: &mut Pixmap, camera: &Camera, contacts: &[ContactMark], depth: impl Fn(u32, u32) -> f64) {
+pub fn contacts(
+    map: &mut Pixmap,
+    camera: &Camera,
+    contacts: &[ContactMark],
+    depth: impl Fn(u32, u32) -> f64,
+) {
     let longer = f64::from(map.width().max(map.height()));
     let mut seen: Vec<(DVec2, f64, &ContactMark)> = contacts
         .iter()
@@ -43,9 +48,7 @@ pub fn contacts(map: &mut Pixmap, camera: &Camera, contacts: &[ContactMark], dep
         let alpha = if hidden { HIDDEN } else { 1.0 };
         let line = |width: f64| Stroke { width: width as f32, line_cap: LineCap::Round, ..Stroke::default() };
         let thin = (0.1 * RADIUS * longer).max(0.75);
-        if let Some(path) =
-            segment(camera, contact.point, contact.point + NORMAL * radius * contact.normal)
-        {
+        if let Some(path) = segment(camera, contact.point, contact.point + NORMAL * radius * contact.normal) {
             map.stroke_path(&path, &paint(ARROW, alpha), &line(2.5 * thin), Transform::identity(), None);
         }
         if let Some(path) = disc(camera, contact.point, contact.normal, radius) {

@@ -13,7 +13,7 @@
 //! velocity that is carried on comes from a second minimisation that leaves out what pushes penetrating bodies apart.
 //! With re-detection the gaps and rows are those of the predicted pose: sequential quadratic programming on the exact distance.
 //!
-//! A joint, a motor or a friction cone is one more convex term of a row; [`problem`] is the only place that would change.
+//! A joint, a motor or a friction cone is one more convex term of a row; `problem.rs` is the only place that would change.
 
 mod engine;
 mod integrate;

@@ -52,7 +52,8 @@ impl LoadedScene {
         json["bodies"] = serde_json::Value::Array(Vec::new());
         let mut scene: SceneFile = serde_json::from_value(json).map_err(no_scene)?;
         scene.bodies = bodies.into_iter().map(|body| Spanned::new(0..0, body)).collect();
-        let path = run.file_name().map_or_else(|| run.to_path_buf(), |name| Path::new(&record.folder).join(name));
+        let path =
+            run.file_name().map_or_else(|| run.to_path_buf(), |name| Path::new(&record.folder).join(name));
         Ok(Self { scene, path, text: String::new() })
     }
 
