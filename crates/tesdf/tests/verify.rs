@@ -105,12 +105,12 @@ fn a_face_that_is_missing_from_the_lists_is_found() {
 }
 
 #[test]
-fn a_wrong_sign_hint_fails_f32_alone() {
+fn a_wrong_sign_hint_is_found() {
     // "Points that this feature is closest to are inside", for every feature.
     let asset = changed(&hollow(), layout::SIGN_HINTS, |bytes| bytes.fill(0xff));
-    let [single, double] = verified(&asset, 2000).precisions;
-    assert!(!single.passed && single.sign_mistakes > 50, "{single:#?}");
-    assert!(double.passed, "{double:#?}");
+    for precision in verified(&asset, 2000).precisions {
+        assert!(!precision.passed && precision.sign_mistakes > 50, "{precision:#?}");
+    }
 }
 
 #[test]
