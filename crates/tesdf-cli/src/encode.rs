@@ -102,6 +102,16 @@ impl Args {
     }
 }
 
+fn exactness(certificate: &Certificate) -> String {
+    match (certificate.delta_of_diagonal, certificate.exactness_distance) {
+        (Some(delta), None) => format!("to {delta:.1e} of the diagonal, proven"),
+        (Some(delta), Some(within)) => {
+            format!("to {delta:.1e} of the diagonal up to {within:.4e} from the surface, proven")
+        }
+        (None, _) => "not proven: faces between samples may be missing".into(),
+    }
+}
+
 /// What `--json` prints; all ids are 0-based.
 #[derive(Serialize)]
 struct Report<'a> {
@@ -236,7 +246,7 @@ fn print(
         ("file", format!("{output}, {}, {bytes_per_face:.0} per face", report::size(bytes))),
         ("cells", format!("{cells}, of which {} with a list", statistics.listed_cells)),
         ("lists", format!("{mean:.1} faces on average, at most {}", statistics.longest_list)),
-        ("exact", format!("to {:.1e} of the diagonal, proven", about.certificate.delta_of_diagonal)),
+        ("exact", exactness(&about.certificate)),
         ("time", format!("{seconds:.1} s")),
     ])
 }

@@ -129,10 +129,12 @@ fn rows(report: &Report) -> Vec<(String, String)> {
         ("encoder", format!("{}, domain {}", certificate.encoder, certificate.domain)),
         (
             "exact",
-            format!(
-                "{exact}, to {:.1e}{unit} ({:.1e} of the diagonal)",
-                certificate.delta, certificate.delta_of_diagonal
-            ),
+            match (certificate.delta, certificate.delta_of_diagonal) {
+                (Some(delta), Some(share)) => {
+                    format!("{exact}, to {delta:.1e}{unit} ({share:.1e} of the diagonal)")
+                }
+                _ => "not proven".into(),
+            },
         ),
         ("lists cut", yes_no(certificate.truncated).into()),
         ("band", band),

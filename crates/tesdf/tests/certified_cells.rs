@@ -12,7 +12,7 @@ use tesdf::asset::about::Source;
 use tesdf::domain::Cell;
 use tesdf::encode::candidates::Pool;
 use tesdf::encode::filter::{Scratch, filter};
-use tesdf::encode::surface::Surface;
+use tesdf::encode::surface::{Surface, Touching};
 use tesdf::encode::tighten::tighten;
 use tesdf::encode::{EncodeOptions, EncodeProgress, Length, Preset, encode};
 use tesdf::glam::DVec3;
@@ -153,7 +153,7 @@ proptest! {
     #[test]
     fn random_tetrahedra(kind in prop::sample::select(SOUPS.to_vec()), seed in any::<u64>(), levels in 0u32..9) {
         let mut random = Random(seed);
-        let mut surface = Surface::new(&soup(kind, &mut random), 1.0);
+        let mut surface = Surface::new(&soup(kind, &mut random), 1.0, Touching::Kept);
         let cell = tetrahedron(&mut random);
         let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
         let pool = Pool::new(&surface, &all, &cell);

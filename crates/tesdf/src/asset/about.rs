@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::AssetError;
 use super::layout::Label;
 use crate::domain::{Cell, DomainCube};
-use crate::encode::EncodeOptions;
 use crate::encode::refine::{Leaf, Tree};
+use crate::encode::{Domain, EncodeOptions, Encoder, Sampling, Threshold};
 use crate::geometry::LocalFrame;
 use crate::mesh::TriangleMesh;
 
@@ -32,10 +32,10 @@ pub struct Certificate {
     pub encoder: String,
     /// How the domain was made.
     pub domain: String,
-    /// Bound on the distance that rounding in the encoder can cost, in the mesh's unit.
-    pub delta: f64,
+    /// Bound on the distance that rounding in the encoder can cost, in the mesh's unit; `None`: nothing is proved.
+    pub delta: Option<f64>,
     /// `delta` as a share of the mesh's diagonal.
-    pub delta_of_diagonal: f64,
+    pub delta_of_diagonal: Option<f64>,
     /// Whether lists were cut to a largest length.
     pub truncated: bool,
     /// Distance from the surface within which every cell is exact, in the mesh's unit; `None`: everywhere.
@@ -47,16 +47,32 @@ impl Certificate {
     /// face is dropped only for one that is closer by more than the rounding of both.
     pub const DELTA: f64 = 1e-13;
 
-    /// The certificate of the certified encoder: nothing truncated. `side` is the domain's, in the local frame.
-    pub fn exact(diagonal: f64, side: f64) -> Self {
-        let delta = Self::DELTA * side.max(1.0);
+    /// What an encoding with `options` proves. `cube` is the one around the domain, local frame; lists are exact `within` that
+    /// distance from the surface, in the mesh's unit.
+    pub(crate) fn of(
+        options: &EncodeOptions,
+        domain: &Domain,
+        diagonal: f64,
+        cube: &DomainCube,
+        within: f64,
+    ) -> Self {
+        let delta = Self::DELTA * cube.side().max(1.0);
+        let (encoder, proved) = match options.encoder {
+            Encoder::Certified => ("certified", true),
+            Encoder::Sampled(Sampling { threshold: Threshold::CoveringRadius, .. }) => ("sampled", true),
+            Encoder::Sampled(_) => ("sampled", false),
+        };
+        let domain = match domain {
+            Domain::Bisection => "bisection",
+            Domain::Conforming(_) => "conforming",
+        };
         Self {
-            encoder: "certified".into(),
-            domain: "bisection".into(),
-            delta: delta * diagonal,
-            delta_of_diagonal: delta,
-            truncated: false,
-            exactness_distance: None,
+            encoder: encoder.into(),
+            domain: domain.into(),
+            delta: proved.then_some(delta * diagonal),
+            delta_of_diagonal: proved.then_some(delta),
+            truncated: within.is_finite(),
+            exactness_distance: within.is_finite().then_some(within),
         }
     }
 }
@@ -91,11 +107,11 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Counts the leaves of six roots with their labels.
+    /// Counts the leaves of the trees that grow from `cells`, with their labels.
     pub fn of(
         roots: &[Tree],
         labels: &[Label],
-        cube: &DomainCube,
+        cells: &[Cell],
         mesh: &TriangleMesh,
         frame: LocalFrame,
     ) -> Self {
@@ -106,7 +122,7 @@ impl Statistics {
             crossing_cells: labels.iter().filter(|l| matches!(l, Label::Crossing(_))).count(),
             ..Self::default()
         };
-        roots.iter().enumerate().for_each(|(root, tree)| s.add(tree, cube.root(root)));
+        roots.iter().zip(cells).for_each(|(tree, &cell)| s.add(tree, cell));
         let listed = s.domain_volume - s.far_volume;
         s.volume_weighted_list /= if listed > 0.0 { listed } else { 1.0 };
         let unit = frame.scale.powi(-3);

@@ -22,7 +22,8 @@ impl CellBounds {
     pub fn new(asset: &TeSdf) -> Self {
         let mut bounds = vec![0.0f32; asset.nodes.len()];
         // Children follow their parents: cells on the way down, bounds on the way up.
-        let mut stack: Vec<(u32, Cell)> = (0..6).map(|root| (root as u32, asset.cube.root(root))).collect();
+        let mut stack: Vec<(u32, Cell)> =
+            (0..asset.root_count()).map(|root| (root as u32, asset.root(root))).collect();
         while let Some((word, cell)) = stack.pop() {
             match Node::decode(asset.nodes[word as usize], &asset.lists) {
                 Node::Split(c) => stack.extend([(c, cell.child(0)), (c + 1, cell.child(1))]),

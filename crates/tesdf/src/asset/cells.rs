@@ -12,7 +12,7 @@ pub struct CellView {
     pub id: u32,
     /// Corners, in the mesh's unit.
     pub corners: [DVec3; 4],
-    /// Number of bisections from a sixth of the cube.
+    /// Number of bisections from a sixth of the cube, or from a tetrahedron of a conforming domain.
     pub depth: u32,
     /// Where it lies, and what answers for its points.
     pub kind: CellKind,
@@ -46,13 +46,25 @@ impl CellKind {
 }
 
 impl TeSdf {
+    /// The faces that a cell lists, ascending, by their ids in the source; none for a cell without a list. `cell` is its
+    /// [id](CellView::id); none for a word that is no cell.
+    pub fn list_of(&self, cell: u32) -> Vec<u32> {
+        let Some(&word) = self.nodes.get(cell as usize) else { return Vec::new() };
+        let Node::Listed(_, offset) = Node::decode(word, &self.lists) else { return Vec::new() };
+        let mut faces: Vec<u32> =
+            self.with_list(offset, |faces| faces.ids().iter().map(|&f| self.face_ids[f as usize]).collect());
+        faces.sort_unstable();
+        faces
+    }
+
     /// Shows every cell, depth first: always in the same order.
     ///
-    /// The cells fill a cube around the solid; together, without those of [`CellKind::NotOfDomain`], they are the domain.
+    /// The cells fill a cube around the solid, or the tetrahedra of a conforming domain; together, without those of
+    /// [`CellKind::NotOfDomain`], they are the domain.
     pub fn visit_cells(&self, mut visit: impl FnMut(&CellView)) {
         // Opening has checked that children follow their parents, so this ends.
         let mut stack: Vec<(u32, Cell)> =
-            (0..6).rev().map(|root| (root as u32, self.cube.root(root))).collect();
+            (0..self.root_count()).rev().map(|root| (root as u32, self.root(root))).collect();
         while let Some((word, cell)) = stack.pop() {
             let (kind, offset) = match Node::decode(self.nodes[word as usize], &self.lists) {
                 Node::Split(children) => {

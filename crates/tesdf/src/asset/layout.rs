@@ -12,7 +12,12 @@ pub const FACE_IDS: SectionSpec = SectionSpec::required("mesh.face_ids", Element
 pub const SIGN_HINTS: SectionSpec = SectionSpec::required("mesh.sign_hints", Element::U16, 1);
 /// `[8]` local frame and cube: offset x y z, scale, cube origin x y z, cube side.
 pub const FRAME: SectionSpec = SectionSpec::required("domain.frame", Element::F64, 1);
-/// `[N]` the bisection forest: see [`Node`]. Words 0–5 are the roots; children are neighbours.
+/// `[W, 3]` positions, in the mesh's unit, of the vertices of a conforming domain that are not of the mesh.
+pub const DOMAIN_VERTICES: SectionSpec = SectionSpec::optional("domain.vertices", Element::F64, 3);
+/// `[T, 4]` corners of the tetrahedra of a conforming domain: vertices of the mesh, then those of [`DOMAIN_VERTICES`]. A file
+/// without them has the bisection domain.
+pub const TETRAHEDRA: SectionSpec = SectionSpec::optional("domain.tetrahedra", Element::U32, 4);
+/// `[N]` the bisection forest: see [`Node`]. First the roots: 6, or one for each of [`TETRAHEDRA`]; children are neighbours.
 pub const NODES: SectionSpec = SectionSpec::required("domain.nodes", Element::U32, 1);
 /// Encoded faces of the cells: see [`List`].
 pub const LISTS: SectionSpec = SectionSpec::required("lists.bytes", Element::U8, 1);
@@ -28,12 +33,14 @@ pub const TREE_BOXES: SectionSpec = SectionSpec::required("tree.boxes", Element:
 pub const TREE_CHILDREN: SectionSpec = SectionSpec::required("tree.children", Element::U32, 2);
 
 /// All sections of a file.
-pub const SECTIONS: [SectionSpec; 12] = [
+pub const SECTIONS: [SectionSpec; 14] = [
     VERTICES,
     FACES,
     FACE_IDS,
     SIGN_HINTS,
     FRAME,
+    DOMAIN_VERTICES,
+    TETRAHEDRA,
     NODES,
     LISTS,
     PALETTE_STARTS,

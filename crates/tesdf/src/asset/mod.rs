@@ -16,6 +16,7 @@
 pub mod about;
 mod cell_bounds;
 mod cells;
+mod conforming;
 mod container;
 mod error;
 mod header;
@@ -25,6 +26,7 @@ mod section;
 mod te_sdf;
 
 pub use cells::{CellKind, CellView};
+pub(crate) use conforming::Conforming;
 pub use container::{Container, SharedSection, write_container};
 pub use error::AssetError;
 pub use save::save_atomic;

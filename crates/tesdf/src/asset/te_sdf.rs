@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use super::about::About;
 use super::cell_bounds::CellBounds;
+use super::conforming::Conforming;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
 use super::{AssetError, Container, SharedSection, save_atomic};
 use crate::domain::{DomainCube, MAX_DEPTH};
@@ -36,6 +37,8 @@ pub struct TeSdf {
     about: About,
     pub(crate) frame: LocalFrame,
     pub(crate) cube: DomainCube,
+    /// The tetrahedra that the forest grows from, unless they are those of the cube.
+    pub(crate) conforming: Option<Conforming>,
     pub(crate) vertices: SharedSection<[f64; 3]>,
     pub(crate) faces: SharedSection<[u32; 3]>,
     pub(crate) face_ids: SharedSection<u32>,
@@ -91,6 +94,7 @@ impl TeSdf {
             about,
             frame,
             cube,
+            conforming: None,
             vertices: container.shared_section(layout::VERTICES.name)?,
             faces: container.shared_section(layout::FACES.name)?,
             face_ids: container.shared_section(layout::FACE_IDS.name)?,
@@ -111,12 +115,15 @@ impl TeSdf {
             lowest_faces: OnceLock::new(),
         };
         asset.check_mesh()?;
+        asset.conforming = Conforming::open(&asset)?;
         asset.check_lists()?;
         asset.check_tree()?;
         let middle = asset.cube.middle();
         asset.bounds =
             (0..asset.faces.len()).map(|f| Aabb::of(&asset.face_corners(f))).fold(Aabb::EMPTY, Aabb::union);
-        asset.entries = Entries::new(&asset.nodes);
+        if asset.conforming.is_none() {
+            asset.entries = Entries::new(&asset.nodes);
+        }
         asset.records = (0..asset.faces.len())
             .map(|f| FaceRecord::new(&asset.local_triangle(f), middle, SignHints(asset.sign_hints[f])))
             .collect();
@@ -208,7 +215,8 @@ impl TeSdf {
 
     /// What opening made besides the file, in bytes: the faces in `f32`, and where descents begin.
     pub fn derived_bytes(&self) -> (usize, usize) {
-        (std::mem::size_of_val(self.records.as_slice()), self.entries.bytes())
+        let entries = self.conforming.as_ref().map_or(self.entries.bytes(), Conforming::derived_bytes);
+        (std::mem::size_of_val(self.records.as_slice()), entries)
     }
 
     /// The face at a position, in the local frame.
@@ -271,12 +279,12 @@ impl TeSdf {
             );
         }
         // Children follow their parents, so depths are known when a word is reached.
-        let n = self.nodes.len();
-        if n < 6 {
-            return wrong(layout::NODES, format!("{n} words; expected the 6 roots at least"));
+        let (n, roots) = (self.nodes.len(), self.root_count());
+        if n < roots {
+            return wrong(layout::NODES, format!("{n} words; expected the {roots} roots at least"));
         }
         let mut depth = vec![u8::MAX; n];
-        depth[..6].fill(0);
+        depth[..roots].fill(0);
         for (i, &word) in self.nodes.iter().enumerate() {
             let bad = |reason: String| wrong(layout::NODES, format!("word {i}: {reason}"));
             if depth[i] == u8::MAX {

@@ -1,13 +1,16 @@
 //! Middle phase: a face, clipped by every cell that it meets.
 //!
-//! The polygon goes down the bisection forest: each bisection is a plane through the cell, so what arrives at a leaf is the face
+//! The polygon goes down the bisection forest, from the six roots of the cube or from the tetrahedra of a conforming domain: each bisection is a plane through the cell, so what arrives at a leaf is the face
 //! clipped by that leaf, and no cell that the face does not meet is visited.
+use arrayvec::ArrayVec;
 use glam::DVec3;
 
-use super::polygon::{Parts, Polygon, Vertex};
+use super::polygon::{MOST_VERTICES, Parts, Polygon, Vertex};
 use crate::TeSdf;
+use crate::asset::Conforming;
 use crate::asset::layout::{Node, Side};
 use crate::domain::{Cell, ROOTS};
+use crate::geometry::{Aabb, barycentric};
 use crate::query::Place;
 
 /// A face, clipped by a cell.
@@ -26,6 +29,9 @@ pub struct ClippedPolygon {
 /// What lies beyond the band is left out unless `reach` is wider than the band; then it is what the face tree answers.
 pub fn clip(asset: &TeSdf, polygon: Polygon, reach: f64, visit: &mut impl FnMut(&ClippedPolygon)) {
     let clipping = Clipping { asset, reach, beyond: reach >= asset.band() };
+    if let Some(domain) = &asset.conforming {
+        return clipping.tetrahedra(domain, polygon, visit);
+    }
     let (origin, side) = (asset.cube.origin(), asset.cube.side());
     let mut inside = polygon;
     for axis in 0..3 {
@@ -61,6 +67,35 @@ struct Clipping<'a> {
 }
 
 impl Clipping<'_> {
+    /// Clips by the tetrahedra of a conforming domain; what none of them holds is what the face tree answers.
+    fn tetrahedra(&self, domain: &Conforming, polygon: Polygon, visit: &mut impl FnMut(&ClippedPolygon)) {
+        let mut rest = vec![polygon.clone()];
+        let points: ArrayVec<DVec3, MOST_VERTICES> = polygon.points().collect();
+        self.asset.visit_roots(domain, Aabb::of(&points), |root| {
+            let corners = self.asset.root(root).corners;
+            if let Some(held) = cut_by(&corners, polygon.clone(), |_| {}) {
+                self.below(root, held, visit);
+            }
+            if self.beyond {
+                for part in std::mem::take(&mut rest) {
+                    let bounds = Aabb::of(&part.points().collect::<ArrayVec<DVec3, MOST_VERTICES>>());
+                    if bounds.overlaps(Aabb::of(&corners)) {
+                        cut_by(&corners, part, |out| rest.push(out));
+                    } else {
+                        rest.push(part);
+                    }
+                }
+            }
+        });
+        if self.beyond {
+            // Between two tetrahedra rounding leaves slivers.
+            let outside = |part: &Polygon| matches!(self.asset.place(part.center()), Place::NotOfDomain);
+            for polygon in rest.into_iter().filter(outside) {
+                visit(&ClippedPolygon { polygon, place: Place::NotOfDomain, cell: None });
+            }
+        }
+    }
+
     /// Cuts by the planes between the roots, x_i = x_j, as sorting the three coordinates compares them: `axes` are in falling
     /// order after the comparisons of neighbours 0 1, 1 2, 0 1.
     fn order(
@@ -91,6 +126,7 @@ impl Clipping<'_> {
         }
     }
 
+    /// From a root of the cube.
     fn descend(&self, root: usize, mut polygon: Polygon, visit: &mut impl FnMut(&ClippedPolygon)) {
         let [i, j, k] = ROOTS[root];
         let (origin, inverse) = (self.asset.cube.origin(), 1.0 / self.asset.cube.side());
@@ -98,6 +134,11 @@ impl Clipping<'_> {
             let u: DVec3 = (v.point - origin) * inverse;
             v.lambda = [1.0 - u[i], u[i] - u[j], u[j] - u[k], u[k]];
         }
+        self.below(root, polygon, visit);
+    }
+
+    /// From any root; the vertices have their coordinates in it.
+    fn below(&self, root: usize, mut polygon: Polygon, visit: &mut impl FnMut(&ClippedPolygon)) {
         let bounds = self.asset.cell_bounds();
         let mut waiting: Vec<(u32, u32, Polygon)> = Vec::new();
         let (mut word, mut depth) = (root as u32, 0u32);
@@ -150,6 +191,25 @@ pub fn locate(asset: &TeSdf, point: DVec3, reach: f64, visit: &mut impl FnMut(&C
         return;
     }
     visit(&ClippedPolygon { polygon: Polygon::new(&[point]), place, cell });
+}
+
+/// The part of a polygon that a tetrahedron holds, with its coordinates there; the other parts go to `out`.
+fn cut_by(corners: &[DVec3; 4], mut polygon: Polygon, mut out: impl FnMut(Polygon)) -> Option<Polygon> {
+    polygon.vertices_mut().iter_mut().for_each(|v| v.lambda = barycentric(corners, v.point));
+    for k in 0..4 {
+        match polygon.cut(|v| v.lambda[k]) {
+            Parts::Above => {}
+            Parts::Below => {
+                out(polygon);
+                return None;
+            }
+            Parts::Across(above, below) => {
+                out(below);
+                polygon = above;
+            }
+        }
+    }
+    Some(polygon)
 }
 
 fn to_child(polygon: &mut Polygon, k: usize, side: usize) {

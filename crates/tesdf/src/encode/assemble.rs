@@ -1,6 +1,7 @@
 //! Turns refined trees into the sections of an asset.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use super::EncodeError;
 use super::refine::{Leaf, Tree};
@@ -21,29 +22,49 @@ pub struct Forest {
     pub palettes: Vec<u32>,
 }
 
-/// Lays out six roots. `labels` are of the leaves in depth-first order; `position` maps a face to its place in the asset; lists are sorted by it.
+/// Lays out the trees of all roots. `labels` are of the leaves in depth-first order; `position` maps a face to its place in the
+/// asset; lists are sorted by it. `order` names each root once, near ones after each other: such small trees share palettes.
 ///
 /// # Errors
 /// When the asset has more palettes or bytes of lists than its words can name.
-pub fn assemble(roots: &mut [Tree], labels: &[Label], position: &[u32]) -> Result<Forest, EncodeError> {
-    let mut leaves = Vec::new();
-    for root in roots {
+pub fn assemble(
+    roots: &mut [Tree],
+    labels: &[Label],
+    position: &[u32],
+    order: &[u32],
+) -> Result<Forest, EncodeError> {
+    let mut starts = vec![0];
+    for root in roots.iter_mut() {
+        let mut count = starts[starts.len() - 1];
         collect(root, &mut |leaf| {
+            count += 1;
             if let Leaf::Listed { faces, .. } = leaf {
                 faces.iter_mut().for_each(|f| *f = position[*f as usize]);
                 faces.sort_unstable();
             }
         });
-        leaves.push(root);
+        starts.push(count);
     }
-    let mut forest = Forest { nodes: vec![0; 6], palette_starts: vec![0], ..Default::default() };
-    let mut palette_of = Vec::with_capacity(labels.len());
-    for root in &leaves {
-        let start = palette_of.len();
-        if let Union::Small(faces) = forest.find_palettes(root, &mut palette_of) {
-            forest.add_palette(&faces, &mut palette_of[start..]);
+    let mut forest = Forest { nodes: vec![0; roots.len()], palette_starts: vec![0], ..Default::default() };
+    let mut palette_of = vec![None; labels.len()];
+    let (mut open, mut sharing): (Vec<u32>, Vec<Range<usize>>) = Default::default();
+    for &root in order {
+        let mut own = Vec::new();
+        let union = forest.find_palettes(&roots[root as usize], &mut own);
+        let range = starts[root as usize]..starts[root as usize + 1];
+        palette_of[range.clone()].copy_from_slice(&own);
+        if let Union::Small(faces) = union {
+            let all = united(&open, &faces);
+            if all.len() <= PALETTE_SIZE {
+                open = all;
+            } else {
+                forest.share_palette(&open, &mut sharing, &mut palette_of);
+                open = faces;
+            }
+            sharing.push(range);
         }
     }
+    forest.share_palette(&open, &mut sharing, &mut palette_of);
     if forest.palette_starts.len() > usize::from(NO_PALETTE) {
         return Err(EncodeError::TooLarge {
             what: "palettes",
@@ -52,7 +73,7 @@ pub fn assemble(roots: &mut [Tree], labels: &[Label], position: &[u32]) -> Resul
         });
     }
     let mut writer = Writer { forest, labels, palette_of: &palette_of, next: 0, seen: HashMap::new() };
-    for (word, root) in leaves.iter().enumerate() {
+    for (word, root) in roots.iter().enumerate() {
         writer.write(root, word)?;
     }
     Ok(writer.forest)
@@ -64,6 +85,14 @@ pub fn collect<'a>(tree: &'a mut Tree, visit: &mut impl FnMut(&'a mut Leaf)) {
         Tree::Leaf(leaf) => visit(leaf),
         Tree::Split(children) => children.iter_mut().for_each(|c| collect(c, visit)),
     }
+}
+
+/// Both, ascending.
+fn united(a: &[u32], b: &[u32]) -> Vec<u32> {
+    let mut all = [a, b].concat();
+    all.sort_unstable();
+    all.dedup();
+    all
 }
 
 /// The faces of a subtree, unless they are too many for one palette.
@@ -94,9 +123,7 @@ impl Forest {
                 let end = palette_of.len();
                 match (left, right) {
                     (Union::Small(a), Union::Small(b)) => {
-                        let mut all = [a.as_slice(), &b].concat();
-                        all.sort_unstable();
-                        all.dedup();
+                        let all = united(&a, &b);
                         if all.len() <= PALETTE_SIZE {
                             return Union::Small(all);
                         }
@@ -120,6 +147,19 @@ impl Forest {
         leaves.fill(Some((self.palette_starts.len() - 1).min(usize::from(NO_PALETTE)) as u16));
         self.palettes.extend(faces);
         self.palette_starts.push(self.palettes.len() as u32);
+    }
+
+    fn share_palette(
+        &mut self,
+        faces: &[u32],
+        sharing: &mut Vec<Range<usize>>,
+        palette_of: &mut [Option<u16>],
+    ) {
+        let number = self.palette_starts.len() - 1;
+        self.add_palette(faces, &mut []);
+        for range in sharing.drain(..) {
+            palette_of[range].fill(Some(number.min(usize::from(NO_PALETTE)) as u16));
+        }
     }
 
     fn palette(&self, palette: u16) -> &[u32] {

@@ -362,6 +362,7 @@ fn length<L: Doubles>(v: Vector<L>) -> L {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encode::surface::Touching;
     use crate::mesh::TriangleMesh;
     use crate::query::Isa;
     use proptest::prelude::*;
@@ -389,7 +390,7 @@ mod tests {
         ) {
             let vertices: Vec<DVec3> = corners.into_iter().map(DVec3::from).collect();
             let faces = (0..vertices.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
-            let mut surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0);
+            let mut surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0, Touching::Kept);
             let p = DVec3::from(p);
             let cell = Cell { corners: [p, p + DVec3::X, p + DVec3::Y, p + DVec3::Z], depth: 0 };
             let all: Vec<u32> = (0..surface.faces.len() as u32).collect();

@@ -3,7 +3,7 @@
 use super::candidates::{Candidates, Pool};
 use super::doubles::{Doubles, GROUP, dispatch};
 use super::plane_rule::{PlaneRule, Rivals, Verdict};
-use super::surface::{Requirement, Surface};
+use super::surface::{Requirement, Surface, Touching};
 use super::tighten::Settled;
 use crate::domain::Cell;
 use crate::geometry::{Feature, triangle_meets_tetrahedron};
@@ -50,7 +50,8 @@ pub struct Filtered {
 /// Buffers that one thread uses again from cell to cell.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    centroid: Vec<f64>,
+    /// What the centroid of the last cell sees of its candidates.
+    pub(super) centroid: Vec<f64>,
     alive: Vec<u8>,
     near: Vec<u8>,
     verdict: Verdict,
@@ -118,14 +119,19 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: 
         *near &= used;
     }
 
+    if surface.touching == Touching::Ignored {
+        scratch.near.fill(0);
+    }
+
     if n > MANY {
         // Shallow cells are bisected anyway, and rules B and C compare pairs. Whatever may come within the padding
         // of the cell stays.
+        let kept = surface.touching == Touching::Kept;
         visit_members(&scratch.alive, &scratch.near, |index, _| {
             let requirement = surface.requirement(candidates.faces[index], Feature::Face);
-            filtered.survivors.push(Survivor { index: index as u32, requirement, meets: true });
+            filtered.survivors.push(Survivor { index: index as u32, requirement, meets: kept });
         });
-        filtered.crossing = filtered.distance <= radius + PAD;
+        filtered.crossing = kept && filtered.distance <= radius + PAD;
         return filtered;
     }
 
@@ -141,6 +147,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: 
         let face = candidates.faces[index];
         let (low, beaten) = scratch.verdict.of(index);
         let meets = low <= PAD
+            && surface.touching == Touching::Kept
             && triangle_meets_tetrahedron(&surface.triangles[face as usize].corners, &cell.corners, PAD);
         filtered.crossing |= meets;
         let feature = if meets { Feature::Face } else { candidates.feature(index) };

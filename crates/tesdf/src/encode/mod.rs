@@ -1,23 +1,27 @@
 //! Which faces can be closest in each cell: from a solid mesh to an encoded asset.
 //!
-//! 1. [`refine`]: bisects the cube, hands the surviving faces of each cell to its children
+//! 1. [`roots`]: the tetrahedra to begin with, of the cube or of a conforming mesh.
+//! 2. [`refine`]: bisects them, hands the surviving faces of each cell to its children
 //!    ([`filter`]), and merges cells while unwinding where that costs less.
-//! 2. [`tighten`]: shortens the list of each cell that is kept.
-//! 3. labels each cell by its winding number.
+//! 3. [`lists`]: for each cell that is kept a label, and its list: certified ([`tighten`]) or [`sampled`], truncated by [`rank`].
 //! 4. [`assemble`]: lays the forest and its lists out as bytes.
 pub mod assemble;
 pub mod candidates;
-mod certified;
 mod doubles;
 pub mod filter;
 pub mod hints;
+pub mod lists;
 mod options;
+mod pipeline;
 mod plane_rule;
 mod progress;
+pub mod rank;
 pub mod refine;
+pub mod roots;
+pub mod sampled;
 pub mod surface;
 pub mod tighten;
 
-pub use certified::{EncodeError, Source, encode};
-pub use options::{EncodeOptions, Length, Preset};
+pub use options::{Deformation, EncodeOptions, Encoder, Length, Preset, Refinement, Sampling, Threshold};
+pub use pipeline::{Domain, EncodeError, Source, encode, encode_in};
 pub use progress::{EncodeProgress, Stage};

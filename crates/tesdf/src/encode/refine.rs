@@ -4,7 +4,7 @@ use super::EncodeProgress;
 use super::candidates::{Candidates, Pool};
 use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
-use crate::domain::{Cell, DomainCube, MAX_DEPTH};
+use crate::domain::Cell;
 use crate::geometry::Aabb;
 
 /// A refined tree of cells.
@@ -73,6 +73,8 @@ pub struct Refiner<'a> {
     pub regions: &'a [Aabb],
     /// Winding number at a point, local frame.
     pub inside: &'a (dyn Fn(glam::DVec3) -> bool + Sync),
+    /// Bisections from a root to the deepest cell, at most [`MAX_DEPTH`](crate::domain::MAX_DEPTH); 0 leaves the roots whole.
+    pub max_depth: u32,
     /// Told of the volume done, in units of 2^-40 of a root; asked whether to stop.
     pub progress: &'a EncodeProgress,
 }
@@ -85,11 +87,9 @@ struct Pruned {
 }
 
 impl Refiner<'_> {
-    /// Refines root `root` of the cube. `None` when cancelled.
-    pub fn root(&self, cube: &DomainCube, root: usize) -> Option<Tree> {
-        let cell = cube.root(root);
-        let all: Vec<u32> = (0..self.surface.faces.len() as u32).collect();
-        let pool = Pool::new(self.surface, &all, &cell);
+    /// Refines a root, whose lists can only name `faces`. `None` when cancelled.
+    pub fn root(&self, cell: Cell, faces: &[u32]) -> Option<Tree> {
+        let pool = Pool::new(self.surface, faces, &cell);
         self.refine(cell, &pool.candidates(), &mut Scratch::default()).map(|p| p.tree)
     }
 
@@ -118,7 +118,7 @@ impl Refiner<'_> {
         let w = &self.weights;
         let weight = cell.volume() * w.per_volume * w.near / (filtered.distance + w.near);
         let could_pay = weight * (n as f64 - w.floor) > w.byte * (LEAF_BYTES + w.floor);
-        let split = cell.depth < MAX_DEPTH && could_pay;
+        let split = cell.depth < self.max_depth && could_pay;
         let far = n >= w.far_list && nearest > w.far_distance && !filtered.crossing;
         let unlisted = match (beyond, far) {
             (true, _) => Some(Leaf::Outside),

@@ -31,6 +31,15 @@ pub enum Part {
     Vertex(u32),
 }
 
+/// What becomes of faces that come near to a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Touching {
+    /// They are listed whatever the rules say, as the sign of a crossing cell is counted over them.
+    Kept,
+    /// They are faces like others: the cells' borders are on the surface and tell the sign.
+    Ignored,
+}
+
 /// The mesh in the local frame, with what the encoder looks up: normals, edges, incident faces.
 #[derive(Debug)]
 pub struct Surface {
@@ -49,13 +58,15 @@ pub struct Surface {
     pub area: f64,
     /// What a distance must be less by to count as less: [`MARGIN`] times the size of the domain.
     pub margin: f64,
+    /// What becomes of faces that come near to a cell.
+    pub touching: Touching,
     /// What the filter computes with; the results are the same.
     pub isa: Isa,
 }
 
 impl Surface {
     /// Looks up what the encoder needs of a mesh that is in the local frame already, for a domain of this `side`.
-    pub fn new(mesh: &TriangleMesh, side: f64) -> Self {
+    pub fn new(mesh: &TriangleMesh, side: f64, touching: Touching) -> Self {
         let local = mesh.vertices();
         let faces = mesh.faces().to_vec();
         let triangles: Vec<Triangle> =
@@ -94,6 +105,7 @@ impl Surface {
             vertex_faces,
             area,
             margin: MARGIN * side.max(1.0),
+            touching,
             isa: Isa::detect(),
         }
     }
@@ -121,6 +133,11 @@ impl Surface {
             id if id < f + e => Part::Edge(id - f),
             id => Part::Vertex(id - f - e),
         }
+    }
+
+    /// Number of vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.vertex_faces.len()
     }
 
     /// The faces of an edge.

@@ -1,6 +1,7 @@
 //! Closest points, bounds, predicates, winding numbers.
 mod aabb;
 mod aabb_tree;
+mod barycentric;
 mod crossing;
 mod frame;
 mod meet;
@@ -12,6 +13,7 @@ mod winding;
 
 pub use aabb::Aabb;
 pub use aabb_tree::{AabbTree, Child};
+pub use barycentric::barycentric;
 pub use crossing::{normal_signs, orientation, perturbed_orientation, signed_crossing};
 pub use frame::LocalFrame;
 pub use meet::{segment_meets_triangle, triangles_meet};

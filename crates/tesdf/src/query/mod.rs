@@ -88,6 +88,8 @@ pub(crate) struct Found {
 const ON_SURFACE_F64: f64 = 5e-10;
 /// The same for `f32` storage, some ten times its rounding.
 const ON_SURFACE_F32: f64 = 1e-6;
+/// Faces that share an edge are this near to a point of it.
+const TOUCHING: f64 = 1e-12;
 
 impl TeSdf {
     /// Answers for any point; `point` is in the mesh's unit.
@@ -234,7 +236,8 @@ impl TeSdf {
         let on_surface = |d: f64| match place {
             _ if d >= ON_SURFACE_F32 => None,
             Place::Listed { .. } if triangle.normal == DVec3::ZERO => {
-                Some(self.pseudonormal(faces, found.face, closest.feature))
+                let closest = Closest { point: closest.point + self.cube.middle(), ..closest };
+                Some(self.pseudonormal(faces, found.face, &closest))
             }
             _ => Some(triangle.normal),
         };
@@ -255,7 +258,7 @@ impl TeSdf {
         };
         let on_surface = |d: f64| match place {
             _ if d >= ON_SURFACE_F64 => None,
-            Place::Listed { .. } => Some(self.pseudonormal(faces, position, closest.feature)),
+            Place::Listed { .. } => Some(self.pseudonormal(faces, position, &closest)),
             // A cell that no list was worth its bytes for may touch the surface.
             _ => Some(self.local_triangle(position as usize).normal),
         };
@@ -286,17 +289,28 @@ impl TeSdf {
     }
 
     /// The normal of a feature: of the face, the sum over an edge's faces, or the angle-weighted sum around a
-    /// vertex (Bærentzen and Aanæs 2005). The list names all of them when the feature is within the padding of the cell.
-    fn pseudonormal(&self, faces: &Faces, position: u32, feature: Feature) -> DVec3 {
+    /// vertex (Bærentzen and Aanæs 2005). The list names all of them when the feature is within the padding of the cell; the lists of
+    /// a conforming domain need not, and there the face tree is asked.
+    fn pseudonormal(&self, faces: &Faces, position: u32, closest: &Closest) -> DVec3 {
         let corners = self.faces[position as usize];
         let own = self.local_triangle(position as usize).normal;
-        let held: &[u32] = match feature {
+        let held: &[u32] = match closest.feature {
             Feature::Face => return own,
             Feature::Edge(k) => &[corners[k as usize], corners[(k as usize + 1) % 3]],
             Feature::Vertex(k) => &corners[k as usize..=k as usize],
         };
+        let mut around = Vec::new();
+        let holders = if self.conforming.is_some() {
+            self.near_in_tree(closest.point, 0.0, &mut |face| {
+                around.push(face);
+                self.local_triangle(face as usize).closest(closest.point).distance.max(TOUCHING)
+            });
+            &around
+        } else {
+            faces.ids()
+        };
         let mut sum = DVec3::ZERO;
-        for &face in faces.ids() {
+        for &face in holders {
             let ids = self.faces[face as usize];
             if !held.iter().all(|v| ids.contains(v)) {
                 continue;

@@ -2,6 +2,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::PointClass;
+use crate::asset::about::Certificate;
 use crate::mesh::TriangleMesh;
 use crate::query::{Answer, Precision};
 
@@ -16,12 +17,14 @@ pub struct Promise {
     pub gradient: f64,
     /// Gradients closer to the surface than this share of the diagonal are only promised to be unit vectors.
     pub gradient_from: f64,
+    /// Distances and gradients are promised nearer to the surface than this, in the mesh's unit; `None`: everywhere. Signs always are.
+    pub within: Option<f64>,
     diagonal: f64,
     largest_coordinate: f64,
 }
 
 impl Promise {
-    fn new(precision: Precision, mesh: &TriangleMesh) -> Self {
+    fn new(precision: Precision, mesh: &TriangleMesh, certificate: &Certificate) -> Self {
         let bounds = mesh.bounds();
         let largest_coordinate = bounds.min.abs().max(bounds.max.abs()).max_element();
         let (of_diagonal, ulps, gradient_from) = match precision {
@@ -29,7 +32,8 @@ impl Promise {
             Precision::F64 => (1e-12, 4.0, 1e-9),
         };
         let diagonal = mesh.diagonal();
-        Self { of_diagonal, ulps, gradient: 1e-3, gradient_from, diagonal, largest_coordinate }
+        let within = certificate.delta.map_or(Some(0.0), |_| certificate.exactness_distance);
+        Self { of_diagonal, ulps, gradient: 1e-3, gradient_from, within, diagonal, largest_coordinate }
     }
 
     /// Largest error of the distance at `p`, in the mesh's unit; also the distance up to which the sign is free.
@@ -92,7 +96,9 @@ pub struct PrecisionReport {
     pub largest_gradient_error: f64,
     /// Where that is.
     pub worst_gradient: Option<Worst>,
-    /// By where the points lie.
+    /// Largest error of a signed distance where none is promised; `None` when every point has a promise.
+    pub largest_error_beyond: Option<f64>,
+    /// By where the points lie, those without a promise left out.
     pub classes: Vec<ClassErrors>,
 }
 
@@ -123,6 +129,7 @@ pub(super) struct Comparison {
     precision: Precision,
     promise: Promise,
     classes: [(usize, f64); PointClass::ALL.len()],
+    beyond: f64,
     error: Largest,
     sign_mistakes: usize,
     sign: Largest,
@@ -131,11 +138,12 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    pub(super) fn new(precision: Precision, mesh: &TriangleMesh) -> Self {
+    pub(super) fn new(precision: Precision, mesh: &TriangleMesh, certificate: &Certificate) -> Self {
         Self {
             precision,
-            promise: Promise::new(precision, mesh),
+            promise: Promise::new(precision, mesh, certificate),
             classes: Default::default(),
+            beyond: 0.0,
             error: Largest::default(),
             sign_mistakes: 0,
             sign: Largest::default(),
@@ -168,14 +176,18 @@ impl Comparison {
         let clear = expected.abs() > bound;
         let error = if clear { (found - expected).abs() } else { (found.abs() - expected.abs()).abs() };
         let error = if error.is_nan() { f64::INFINITY } else { error };
-        let slot = &mut self.classes[class as usize];
-        *slot = (slot.0 + 1, slot.1.max(error));
-        self.error.add(error / bound, at);
         // Zero is on neither side.
         if clear && found * expected.signum() <= 0.0 {
             self.sign_mistakes += 1;
             self.sign.add(expected.abs(), at);
         }
+        if self.promise.within.is_some_and(|within| expected.abs() >= within) {
+            self.beyond = self.beyond.max(error);
+            return;
+        }
+        let slot = &mut self.classes[class as usize];
+        *slot = (slot.0 + 1, slot.1.max(error));
+        self.error.add(error / bound, at);
         match gradient_error(p, expected, answer, offset, &self.promise) {
             Some(angle) => {
                 let right = angle <= self.promise.gradient;
@@ -200,6 +212,7 @@ impl Comparison {
             precision: self.precision,
             promise: self.promise,
             classes: self.classes,
+            beyond: self.beyond.max(other.beyond),
             error: self.error.join(other.error),
             sign_mistakes: self.sign_mistakes + other.sign_mistakes,
             sign: self.sign.join(other.sign),
@@ -217,6 +230,7 @@ impl Comparison {
                 Precision::F64 => "f64",
             },
             passed: self.error.value <= 1.0 && self.sign_mistakes == 0 && self.gradient_mistakes == 0,
+            largest_error_beyond: self.promise.within.map(|_| self.beyond),
             promise: self.promise,
             largest_error,
             largest_error_of_diagonal: largest_error / self.promise.diagonal,

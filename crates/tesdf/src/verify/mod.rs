@@ -14,6 +14,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::TeSdf;
+use crate::asset::about::Certificate;
 use crate::geometry::WindingNumber;
 use crate::mesh::{MeshError, Topology, TriangleMesh};
 use crate::query::Precision;
@@ -98,6 +99,7 @@ pub fn verify(
     if !Topology::new(mesh.faces()).is_closed() {
         return Err(VerifyError::NotClosed);
     }
+    let certificate = &asset.about().certificate;
     let winding = WindingNumber::new(&mesh);
     let sampler = Sampler::new(asset, &mesh, &winding, options.seed);
     let mut place = vec![None; ids.len()];
@@ -108,7 +110,7 @@ pub fn verify(
     let found = (0..samples.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
-            let mut found = Found::new(&mesh);
+            let mut found = Found::new(&mesh, certificate);
             let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(samples);
             let count = (indices.end - indices.start) as usize;
             indices.for_each(|index| found.add(asset, &truth, index, sampler.point(index)));
@@ -116,7 +118,7 @@ pub fn verify(
             progress((before + count) as f64 / options.samples as f64);
             found
         })
-        .reduce(|| Found::new(&mesh), Found::join);
+        .reduce(|| Found::new(&mesh, certificate), Found::join);
     let precisions = found.comparisons.map(Comparison::report);
     Ok(VerifyReport {
         passed: precisions.iter().all(|p| p.passed) && found.disagreements == 0,
@@ -152,8 +154,8 @@ struct Found {
 }
 
 impl Found {
-    fn new(mesh: &TriangleMesh) -> Self {
-        let comparison = |precision| Comparison::new(precision, mesh);
+    fn new(mesh: &TriangleMesh, certificate: &Certificate) -> Self {
+        let comparison = |precision| Comparison::new(precision, mesh, certificate);
         Self {
             comparisons: [Precision::F32, Precision::F64].map(comparison),
             brute_force: 0,

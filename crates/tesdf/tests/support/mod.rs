@@ -10,4 +10,5 @@ pub mod points;
 pub mod random;
 pub mod reference;
 pub mod shapes;
+pub mod tetrahedra;
 pub mod well_formed;

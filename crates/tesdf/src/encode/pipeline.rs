@@ -1,15 +1,16 @@
 use rayon::prelude::*;
 
-use super::assemble::{assemble, collect};
-use super::filter::Scratch;
+use super::assemble::assemble;
 use super::hints::{Simplicity, sign_hints};
-use super::refine::{Leaf, ROOT_VOLUME, Refiner, Tree, Weights};
-use super::surface::Surface;
-use super::tighten::tighten;
-use super::{EncodeOptions, EncodeProgress, Stage};
-use crate::asset::layout::{self, Label, TREE_LEAF, TreeChild};
+use super::lists::Lists;
+use super::refine::{ROOT_VOLUME, Refiner, Tree, Weights};
+use super::roots::Roots;
+use super::sampled::lipschitz_candidates;
+use super::surface::{Surface, Touching};
+use super::{Deformation, EncodeOptions, EncodeProgress, Encoder, Refinement, Stage, Threshold};
+use crate::asset::layout::{self, TREE_LEAF, TreeChild};
 use crate::asset::{AssetError, Section, TeSdf, about, write_container};
-use crate::domain::{Cell, DomainCube};
+use crate::domain::{ConformingMesh, DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, Child, LocalFrame, WindingNumber};
 use crate::mesh::{MeshError, SolidMesh, TriangleMesh};
 
@@ -50,8 +51,17 @@ pub enum EncodeError {
 /// What is known of the file that a mesh came from.
 pub use about::Source;
 
-/// Encodes a solid with the certified encoder; the same mesh and options give the same bytes on any number
-/// of threads (it runs in the current rayon pool).
+/// The tetrahedra that an asset's cells come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Domain<'a> {
+    /// Six tetrahedra of a cube around the solid and its band, bisected where that pays.
+    Bisection,
+    /// Tetrahedra that conform to the surface, bisected or not ([`Refinement`]).
+    Conforming(&'a ConformingMesh),
+}
+
+/// Encodes a solid in the bisection domain; the same mesh and options give the same bytes on any number of threads (it
+/// runs in the current rayon pool).
 ///
 /// # Errors
 /// [`EncodeError`]; nothing is written anywhere.
@@ -61,10 +71,24 @@ pub fn encode(
     options: &EncodeOptions,
     progress: &EncodeProgress,
 ) -> Result<TeSdf, EncodeError> {
+    encode_in(solid, Domain::Bisection, source, options, progress)
+}
+
+/// As [`encode`], in a domain of choice.
+///
+/// # Errors
+/// [`EncodeError`]; nothing is written anywhere.
+pub fn encode_in(
+    solid: &SolidMesh,
+    domain: Domain,
+    source: &Source,
+    options: &EncodeOptions,
+    progress: &EncodeProgress,
+) -> Result<TeSdf, EncodeError> {
     let mesh = solid.mesh();
     let diagonal = mesh.diagonal();
     let frame = LocalFrame::of(mesh.bounds());
-    let band = validated(options, diagonal)? * frame.scale;
+    let band = validated(options, &domain, diagonal)? * frame.scale;
     if mesh.faces().len() > layout::MAX_FACES {
         return Err(EncodeError::TooLarge {
             what: "faces",
@@ -78,22 +102,19 @@ pub fn encode(
         .region_boxes()
         .map(|r| Aabb { min: frame.to_local(r.min), max: frame.to_local(r.max) })
         .collect();
-    let bounds = regions.iter().fold(local.bounds().grown(band), |b, &r| b.union(r));
-    let cube = DomainCube::around(bounds);
     let diagonal_local = diagonal * frame.scale;
-    let size = cube.side() / diagonal_local;
-    if size > MAX_SIZE {
-        return Err(EncodeError::Option {
-            option: "band or region",
-            found: format!("a domain {size:.1} times as wide as the mesh's diagonal"),
-            expected: "at most 8 times; points beyond the domain are answered exactly without",
-        });
-    }
-    let surface = Surface::new(&local, cube.side());
+    let roots = Roots::of(&domain, local.bounds().grown(band), &regions, frame, diagonal_local)?;
+    let touching = match domain {
+        Domain::Bisection => Touching::Kept,
+        Domain::Conforming(_) => Touching::Ignored,
+    };
+    let surface = Surface::new(&local, roots.cube.side(), touching);
+    let boxes: Vec<Aabb> = surface.triangles.iter().map(|t| Aabb::of(&t.corners)).collect();
+    let tree = AabbTree::build(&boxes, TREE_LEAF);
     let near = NEAR * diagonal_local;
 
-    progress.begin(Stage::Refine, 6 * ROOT_VOLUME);
-    let refiner = Refiner {
+    progress.begin(Stage::Refine, roots.cells.len() as u64 * ROOT_VOLUME);
+    let mut refiner = Refiner {
         surface: &surface,
         weights: Weights {
             byte: options.byte_worth / surface.faces.len() as f64,
@@ -108,36 +129,51 @@ pub fn encode(
         bounds: local.bounds(),
         regions: &regions,
         inside: &|p| winding.at(p) >= 1,
+        max_depth: MAX_DEPTH,
         progress,
     };
-    let mut roots = (0..6)
-        .into_par_iter()
-        .map(|root| refiner.root(&cube, root))
+    if let Domain::Conforming(_) = domain {
+        // All of it is the domain, and every cell gets a list.
+        refiner.band = f64::INFINITY;
+        refiner.weights.far_list = usize::MAX;
+        if options.refinement == Refinement::None {
+            refiner.max_depth = 0;
+        }
+    }
+    let mut trees = roots
+        .cells
+        .par_iter()
+        .map(|&cell| {
+            let candidates = match domain {
+                Domain::Bisection => (0..surface.faces.len() as u32).collect(),
+                Domain::Conforming(_) => lipschitz_candidates(&surface, &tree, &cell),
+            };
+            refiner.root(cell, &candidates)
+        })
         .collect::<Option<Vec<Tree>>>()
         .ok_or(EncodeError::Cancelled)?;
 
-    let labels = finish(&mut roots, &surface, &winding, &cube, options, progress)?;
+    let lists = Lists { surface: &surface, tree: &tree, winding: &winding, options, scale: frame.scale };
+    let (labels, exact_within) = lists.finish(&mut trees, &roots, progress)?;
 
     progress.begin(Stage::Assemble, 1);
-    let boxes: Vec<Aabb> = surface.triangles.iter().map(|t| Aabb::of(&t.corners)).collect();
-    let tree = AabbTree::build(&boxes, TREE_LEAF);
     let simplicity = if solid.is_simple() { Simplicity::Simple } else { Simplicity::Involved };
     let hints = sign_hints(&surface, &tree, simplicity);
     let mut position = vec![0u32; tree.order().len()];
     for (at, &face) in tree.order().iter().enumerate() {
         position[face as usize] = at as u32;
     }
-    let forest = assemble(&mut roots, &labels, &position)?;
+    let forest = assemble(&mut trees, &labels, &position, &roots.order())?;
 
     let in_order = |face: &u32| *face as usize;
     let faces: Vec<[u32; 3]> = tree.order().iter().map(|f| mesh.faces()[in_order(f)]).collect();
     let hints: Vec<u16> = tree.order().iter().map(|f| hints[in_order(f)].0).collect();
     let vertices: Vec<[f64; 3]> = mesh.vertices().iter().map(|v| v.to_array()).collect();
-    let (offset, origin) = (frame.offset, cube.origin());
-    let placed = [offset.x, offset.y, offset.z, frame.scale, origin.x, origin.y, origin.z, cube.side()];
+    let (offset, origin) = (frame.offset, roots.cube.origin());
+    let placed = [offset.x, offset.y, offset.z, frame.scale, origin.x, origin.y, origin.z, roots.cube.side()];
     let low: Vec<u16> = forest.palettes.iter().map(|&f| f as u16).collect();
     let high: Vec<u8> = forest.palettes.iter().map(|&f| (f >> 16) as u8).collect();
-    let (tree_boxes, tree_children) = face_tree(&tree, &cube);
+    let (tree_boxes, tree_children) = face_tree(&tree, &roots.cube);
     let mut sections = vec![
         Section::new(layout::VERTICES, &vertices),
         Section::new(layout::FACES, &faces),
@@ -151,14 +187,26 @@ pub fn encode(
         Section::new(layout::TREE_BOXES, &tree_boxes),
         Section::new(layout::TREE_CHILDREN, &tree_children),
     ];
+    let own: Vec<[f64; 3]> = match domain {
+        Domain::Bisection => Vec::new(),
+        Domain::Conforming(domain) => {
+            domain.vertices()[vertices.len()..].iter().map(|v| v.to_array()).collect()
+        }
+    };
+    if !roots.tetrahedra.is_empty() {
+        sections.push(Section::new(layout::DOMAIN_VERTICES, &own));
+        sections.push(Section::new(layout::TETRAHEDRA, &roots.tetrahedra));
+    }
     if faces.len() > 1 << 16 {
         sections.push(Section::new(layout::PALETTES_HIGH, &high));
     }
+    let certificate =
+        about::Certificate::of(options, &domain, diagonal, &roots.cube, exact_within / frame.scale);
     let about = about::About {
         source: source.clone(),
         options: options.clone(),
-        certificate: about::Certificate::exact(diagonal, cube.side()),
-        statistics: about::Statistics::of(&roots, &labels, &cube, mesh, frame),
+        certificate,
+        statistics: about::Statistics::of(&trees, &labels, &roots.cells, mesh, frame),
     };
     let bytes = write_container(&sections, &about.to_metadata())?;
     Ok(TeSdf::from_bytes(&bytes)?)
@@ -175,7 +223,7 @@ const FAR_DISTANCE: f64 = 0.025;
 /// Refinement is not expected to make lists shorter than this.
 const FLOOR: f64 = 6.0;
 
-fn validated(options: &EncodeOptions, diagonal: f64) -> Result<f64, EncodeError> {
+fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<f64, EncodeError> {
     let band = options.band.resolve(diagonal);
     let wrong = |option, found: String, expected| Err(EncodeError::Option { option, found, expected });
     if !(0.0..=MAX_SIZE * diagonal).contains(&band) {
@@ -196,74 +244,49 @@ fn validated(options: &EncodeOptions, diagonal: f64) -> Result<f64, EncodeError>
             );
         }
     }
+    if options.max_entries == Some(0) {
+        return wrong("max_entries", "0".into(), "1 or more faces");
+    }
+    if let Encoder::Sampled(sampling) = options.encoder {
+        if !(1..=MAX_RESOLUTION).contains(&sampling.resolution) {
+            return wrong("resolution", format!("{}", sampling.resolution), "1 to 1024");
+        }
+        if !(sampling.shrink > 0.0 && sampling.shrink <= 1.0) {
+            return wrong("shrink", format!("{}", sampling.shrink), "above 0, at most 1");
+        }
+        if let Threshold::Absolute(e) = sampling.threshold
+            && !(e >= 0.0 && e.is_finite())
+        {
+            return wrong("threshold", format!("{e}"), "a length of 0 or more");
+        }
+    }
+    if let Domain::Bisection = domain {
+        if options.deformation == Deformation::Expected {
+            return wrong(
+                "deformation",
+                "lists for deformation in the bisection domain, whose cells do not follow the surface".into(),
+                "a conforming domain for it",
+            );
+        }
+        if options.refinement == Refinement::None {
+            return wrong(
+                "refinement",
+                "none in the bisection domain, which would be six cells".into(),
+                "a conforming domain for it",
+            );
+        }
+    }
     Ok(band)
 }
 
 /// Widest domain, in diagonals of the mesh: rounding, and with it the certificate's delta, grows with it.
-const MAX_SIZE: f64 = 8.0;
+pub(super) const MAX_SIZE: f64 = 8.0;
 const MAX_TIGHTEN: u32 = 30;
+const MAX_RESOLUTION: u32 = 1024;
 
 fn local_mesh(mesh: &TriangleMesh, frame: LocalFrame) -> Result<TriangleMesh, MeshError> {
     let vertices = mesh.vertices().iter().map(|&v| frame.to_local(v)).collect();
     TriangleMesh::new(vertices, mesh.faces().to_vec())
-}
-
-/// Tightens the lists and labels the cells, in depth-first order.
-fn finish(
-    roots: &mut [Tree],
-    surface: &Surface,
-    winding: &WindingNumber,
-    cube: &DomainCube,
-    options: &EncodeOptions,
-    progress: &EncodeProgress,
-) -> Result<Vec<Label>, EncodeError> {
-    let mut cells = Vec::new();
-    for (root, tree) in roots.iter_mut().enumerate() {
-        place(tree, cube.root(root), &mut cells);
-    }
-    let mut leaves = Vec::with_capacity(cells.len());
-    for tree in roots.iter_mut() {
-        collect(tree, &mut |leaf| leaves.push(leaf));
-    }
-    progress.begin(Stage::Tighten, leaves.len() as u64);
-    let labels: Option<Vec<Label>> = leaves
-        .into_par_iter()
-        .zip(cells)
-        .map_init(Scratch::default, |scratch, (leaf, cell)| {
-            progress.advance(1);
-            if progress.is_cancelled() {
-                return None;
-            }
-            let at_centroid = winding.at_perturbed(cell.centroid());
-            let label = |crossing: bool| match (crossing, at_centroid) {
-                // Read back as i32: folds thinner than the check sees may be negative.
-                (true, w) => Label::Crossing(w as u32),
-                (false, w) if w >= 1 => Label::Inside,
-                _ => Label::Outside,
-            };
-            Some(match leaf {
-                Leaf::Listed { faces, crossing } => {
-                    if options.tighten_levels > 0 {
-                        *faces = tighten(surface, &cell, faces, options.tighten_levels, scratch);
-                    }
-                    label(*crossing)
-                }
-                Leaf::Far => label(false),
-                Leaf::Outside => Label::Outside,
-            })
-        })
-        .collect();
-    labels.ok_or(EncodeError::Cancelled)
-}
-
-/// The cells of the leaves in depth-first order.
-fn place(tree: &Tree, cell: Cell, cells: &mut Vec<Cell>) {
-    match tree {
-        Tree::Leaf(_) => cells.push(cell),
-        Tree::Split(children) => {
-            children.iter().enumerate().for_each(|(side, child)| place(child, cell.child(side), cells))
-        }
-    }
 }
 
 /// The face tree in `f32`, relative to the middle of the cube, boxes rounded outward.

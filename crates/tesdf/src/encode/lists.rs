@@ -1,0 +1,162 @@
+//! From refined trees to the final lists: tightened or sampled, made ready for deformation, truncated; and the labels.
+use rayon::prelude::*;
+
+use super::assemble::collect;
+use super::filter::{PAD, Scratch};
+use super::rank::{Ranked, rank};
+use super::refine::{Leaf, Tree};
+use super::roots::Roots;
+use super::sampled::{lipschitz_candidates, sample};
+use super::surface::Surface;
+use super::tighten::tighten;
+use super::{Deformation, EncodeError, EncodeOptions, EncodeProgress, Encoder, Stage};
+use crate::asset::layout::{Label, Side};
+use crate::domain::Cell;
+use crate::geometry::{AabbTree, WindingNumber, triangle_meets_tetrahedron};
+
+/// What the lists are made from.
+pub struct Lists<'a> {
+    /// The surface.
+    pub surface: &'a Surface,
+    /// A tree over its faces.
+    pub tree: &'a AabbTree,
+    /// Labels of the bisection domain.
+    pub winding: &'a WindingNumber,
+    /// Encoder, tightening, truncation, deformation.
+    pub options: &'a EncodeOptions,
+    /// Local frame over the mesh's unit.
+    pub scale: f64,
+}
+
+impl Lists<'_> {
+    /// Finishes the lists and labels the cells, in depth-first order. Also the distance from the surface within which
+    /// every list is exact (local frame): infinite unless lists were truncated.
+    pub fn finish(
+        &self,
+        trees: &mut [Tree],
+        roots: &Roots,
+        progress: &EncodeProgress,
+    ) -> Result<(Vec<Label>, f64), EncodeError> {
+        let mut cells = Vec::new();
+        for (root, tree) in trees.iter_mut().enumerate() {
+            place(tree, roots.cells[root], root, &mut cells);
+        }
+        let mut leaves = Vec::with_capacity(cells.len());
+        for tree in trees.iter_mut() {
+            collect(tree, &mut |leaf| leaves.push(leaf));
+        }
+        progress.begin(Stage::Tighten, leaves.len() as u64);
+        let finished: Option<Vec<(Label, f64)>> = leaves
+            .into_par_iter()
+            .zip(cells)
+            .map_init(Scratch::default, |scratch, (leaf, (cell, root))| {
+                progress.advance(1);
+                if progress.is_cancelled() {
+                    return None;
+                }
+                let mut exact_within = f64::INFINITY;
+                let mut crosses = false;
+                if let Leaf::Listed { faces, crossing } = leaf {
+                    crosses = *crossing;
+                    let ranked = self.ranked(&cell, roots.tetrahedra.get(root), faces, crosses, scratch);
+                    (*faces, exact_within) = truncated(ranked, self.options.max_entries);
+                }
+                let label = match (&leaf, roots.sides.get(root)) {
+                    (Leaf::Outside, _) | (_, Some(Side::Outside)) => Label::Outside,
+                    (_, Some(Side::Inside)) => Label::Inside,
+                    (_, None) => match (crosses, self.winding.at_perturbed(cell.centroid())) {
+                        // Read back as i32: folds thinner than the check sees may be negative.
+                        (true, w) => Label::Crossing(w as u32),
+                        (false, w) if w >= 1 => Label::Inside,
+                        _ => Label::Outside,
+                    },
+                };
+                Some((label, exact_within))
+            })
+            .collect();
+        let finished = finished.ok_or(EncodeError::Cancelled)?;
+        let exact_within = finished.iter().map(|f| f.1).fold(f64::INFINITY, f64::min);
+        Ok((finished.into_iter().map(|f| f.0).collect(), exact_within))
+    }
+
+    fn ranked(
+        &self,
+        cell: &Cell,
+        tetrahedron: Option<&[u32; 4]>,
+        faces: &[u32],
+        crossing: bool,
+        scratch: &mut Scratch,
+    ) -> Vec<Ranked> {
+        let mut ranked = match &self.options.encoder {
+            Encoder::Certified => {
+                let levels = self.options.tighten_levels;
+                let tight = match levels {
+                    0 => faces.to_vec(),
+                    _ => tighten(self.surface, cell, faces, levels, scratch),
+                };
+                match self.options.max_entries {
+                    Some(most) if tight.len() > most as usize => rank(self.surface, cell, &tight, scratch),
+                    _ => tight.into_iter().map(|face| Ranked { face, order: 0.0, distance: 0.0 }).collect(),
+                }
+            }
+            Encoder::Sampled(sampling) => {
+                let candidates = lipschitz_candidates(self.surface, self.tree, cell);
+                sample(self.surface, cell, &candidates, sampling, self.scale, scratch)
+            }
+        };
+        if crossing {
+            // The sign of a point is counted over these.
+            let corners = |&face: &u32| self.surface.triangles[face as usize].corners;
+            let meets = |face: &u32| triangle_meets_tetrahedron(&corners(face), &cell.corners, PAD);
+            raise(&mut ranked, faces.iter().copied().filter(meets), f64::NEG_INFINITY);
+        }
+        if let (Deformation::Expected, Some(tetrahedron)) = (self.options.deformation, tetrahedron) {
+            let of_surface = |v: &u32| (*v as usize) < self.surface.vertex_count();
+            let around = tetrahedron.iter().copied().filter(of_surface);
+            let faces: Vec<u32> = around.flat_map(|v| self.surface.vertex_faces(v).iter().copied()).collect();
+            raise(&mut ranked, faces.into_iter(), 0.0);
+        }
+        ranked
+    }
+}
+
+/// Gives some faces an order, and a place in the list.
+fn raise(ranked: &mut Vec<Ranked>, faces: impl Iterator<Item = u32>, order: f64) {
+    ranked.sort_unstable_by_key(|r| r.face);
+    let known = ranked.len();
+    for face in faces {
+        match ranked[..known].binary_search_by_key(&face, |r| r.face) {
+            Ok(at) => ranked[at].order = ranked[at].order.min(order),
+            Err(_) => ranked.push(Ranked { face, order, distance: f64::INFINITY }),
+        }
+    }
+    ranked.sort_by_key(|r| r.face);
+    ranked.dedup_by_key(|r| r.face);
+}
+
+/// The first `most` faces by order, ascending by id; and the least distance that a dropped one may be needed at.
+///
+/// Distance-ordered truncation (Sec. V-C). Faces of order −∞ are never dropped.
+fn truncated(mut ranked: Vec<Ranked>, most: Option<u32>) -> (Vec<u32>, f64) {
+    let most = most.map_or(ranked.len(), |most| most as usize);
+    let mut exact_within = f64::INFINITY;
+    if ranked.len() > most {
+        ranked.sort_by(|a, b| a.order.total_cmp(&b.order).then(a.face.cmp(&b.face)));
+        let held = ranked.partition_point(|r| r.order == f64::NEG_INFINITY);
+        exact_within = ranked[most.max(held)..].iter().map(|r| r.distance).fold(exact_within, f64::min);
+        ranked.truncate(most.max(held));
+    }
+    let mut faces: Vec<u32> = ranked.into_iter().map(|r| r.face).collect();
+    faces.sort_unstable();
+    (faces, exact_within)
+}
+
+/// The cells of the leaves in depth-first order, with their root.
+fn place(tree: &Tree, cell: Cell, root: usize, cells: &mut Vec<(Cell, usize)>) {
+    match tree {
+        Tree::Leaf(_) => cells.push((cell, root)),
+        Tree::Split(children) => {
+            children.iter().enumerate().for_each(|(side, child)| place(child, cell.child(side), root, cells));
+        }
+    }
+}

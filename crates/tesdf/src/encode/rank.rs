@@ -1,0 +1,71 @@
+//! From what distance on a cell needs each face of its list: Eq. (7), by bounds.
+use super::candidates::{Candidates, GRADIENT};
+use super::filter::{Scratch, filter};
+use super::surface::{Requirement, Surface};
+use crate::domain::Cell;
+
+/// A face of a list, with what truncation asks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ranked {
+    /// The face.
+    pub face: u32,
+    /// Less comes first.
+    pub order: f64,
+    /// At points nearer to the surface than this the cell does not need the face (local frame).
+    pub distance: f64,
+}
+
+/// Bisections below a cell that tell from what distance on it needs a face.
+const LEVELS: u32 = 8;
+/// Sub-cells this small against their distance from the surface are not bisected on: their bounds are as sharp as they need be.
+const SMALL: f64 = 0.02;
+
+/// For each face of a list a lower bound of d_f, Eq. (7): the least distance over the sub-cells in which the face, or an edge or
+/// vertex of it, survives the filter. Infinite for a face that no sub-cell needs.
+pub fn rank(surface: &Surface, cell: &Cell, list: &[u32], scratch: &mut Scratch) -> Vec<Ranked> {
+    let mut needs = Vec::new();
+    let mut pool = scratch.pool();
+    pool.fill(surface, list, cell);
+    descend(surface, cell, &pool.candidates(), LEVELS, &mut needs, scratch);
+    scratch.give_back(pool);
+    needs.sort_by(|a: &(Requirement, f64), b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    needs.dedup_by_key(|need| need.0);
+    let of_face = |&face: &u32| {
+        let held = needs.iter().filter(|need| surface.holds(face, need.0));
+        let distance = held.map(|need| need.1).fold(f64::INFINITY, f64::min);
+        Ranked { face, order: distance, distance }
+    };
+    list.iter().map(of_face).collect()
+}
+
+fn descend(
+    surface: &Surface,
+    cell: &Cell,
+    candidates: &Candidates,
+    levels: u32,
+    needs: &mut Vec<(Requirement, f64)>,
+    scratch: &mut Scratch,
+) {
+    let filtered = filter(surface, cell, candidates, scratch);
+    if levels == 0 || filtered.radius < SMALL * filtered.distance || filtered.survivors.len() == 1 {
+        let center = cell.centroid();
+        for s in &filtered.survivors {
+            let at = |row: usize| scratch.centroid[row * candidates.stride + s.index as usize];
+            let gradient = glam::DVec3::new(at(GRADIENT), at(GRADIENT + 1), at(GRADIENT + 2));
+            // The distance is convex: its tangent is below it. No tangent (NaN) on the face itself.
+            let below = cell.corners.iter().map(|c| gradient.dot(*c - center)).fold(f64::INFINITY, f64::min);
+            let least = if s.meets { 0.0 } else { (at(0) + below - surface.margin).max(0.0) };
+            needs.push((s.requirement, least));
+        }
+        scratch.reuse(filtered);
+        return;
+    }
+    let mut pool = scratch.pool();
+    pool.narrow(surface, cell, candidates, &filtered.survivors);
+    scratch.reuse(filtered);
+    for side in 0..2 {
+        let below = pool.of_child(candidates, cell.child_corners(side));
+        descend(surface, &cell.child(side), &below, levels - 1, needs, scratch);
+    }
+    scratch.give_back(pool);
+}

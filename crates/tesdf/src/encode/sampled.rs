@@ -1,0 +1,136 @@
+//! Algorithm 1: which faces are closest at the points of a grid. It can miss those that are closest only between them, unless the
+//! threshold is as wide as the grid ([`Threshold::CoveringRadius`]).
+use glam::DVec3;
+
+use super::filter::Scratch;
+use super::rank::Ranked;
+use super::surface::Surface;
+use super::{Sampling, Threshold};
+use crate::domain::Cell;
+use crate::geometry::AabbTree;
+
+/// The faces that Lemma 1, Eq. (6), does not drop: those with a gap below twice the cell's radius at its centroid, ascending.
+pub fn lipschitz_candidates(surface: &Surface, tree: &AabbTree, cell: &Cell) -> Vec<u32> {
+    let center = cell.centroid();
+    let distance = |face: u32| surface.triangles[face as usize].closest(center).distance;
+    let nearest = tree.nearest(center, |face| distance(face).powi(2)).map_or(0.0, |(d, _)| d.sqrt());
+    let limit = nearest + 2.0 * radius(cell);
+    let mut faces = Vec::new();
+    tree.visit(
+        |bounds| bounds.distance_squared(center) <= limit * limit,
+        |leaf| faces.extend(leaf.iter().copied().filter(|&face| distance(face) < limit)),
+    );
+    faces.sort_unstable();
+    faces
+}
+
+/// Greatest distance of a corner from the centroid: the ball of Lemma 1.
+fn radius(cell: &Cell) -> f64 {
+    let center = cell.centroid();
+    cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max)
+}
+
+/// No point of the cell is farther than this from a point of the grid (docs/math.md, 15).
+pub fn covering_radius(cell: &Cell, sampling: &Sampling) -> f64 {
+    let grid = 0.75f64.sqrt() * sampling.shrink * cell.width() / f64::from(sampling.resolution);
+    grid + (1.0 - sampling.shrink) * radius(cell)
+}
+
+/// Lines 9 to 19 of Alg. 1: faces within the threshold of the least distance at a sample, with d_f of Eq. (8).
+///
+/// `scale` is that of the local frame, in which the cell is; a threshold is in the mesh's unit.
+pub fn sample(
+    surface: &Surface,
+    cell: &Cell,
+    faces: &[u32],
+    sampling: &Sampling,
+    scale: f64,
+    scratch: &mut Scratch,
+) -> Vec<Ranked> {
+    let threshold = match sampling.threshold {
+        Threshold::Absolute(length) => length * scale,
+        // The margin is for what rounding does to a gap.
+        Threshold::CoveringRadius => 2.0 * covering_radius(cell, sampling) + surface.margin,
+    };
+    let mut least = vec![f64::INFINITY; faces.len()];
+    let mut pool = scratch.pool();
+    pool.fill(surface, faces, cell);
+    let candidates = pool.candidates();
+    for point in grid(cell, sampling) {
+        let nearest = candidates.look_from(surface, point, &mut scratch.centroid);
+        for (least, &distance) in least.iter_mut().zip(&scratch.centroid) {
+            if distance - nearest.distance <= threshold {
+                *least = least.min(distance);
+            }
+        }
+    }
+    scratch.give_back(pool);
+    let found = faces.iter().zip(least).filter(|(_, least)| *least < f64::INFINITY);
+    found.map(|(&face, distance)| Ranked { face, order: distance, distance }).collect()
+}
+
+/// The points with barycentric coordinates i/Q, j/Q, k/Q, l/Q in the cell shrunk towards its centroid.
+fn grid(cell: &Cell, sampling: &Sampling) -> impl Iterator<Item = DVec3> {
+    let center = cell.centroid();
+    let [a, b, c, d] = cell.corners.map(|p| center + sampling.shrink * (p - center));
+    let q = sampling.resolution;
+    let step = 1.0 / f64::from(q);
+    (0..=q).flat_map(move |i| {
+        (0..=q - i).flat_map(move |j| {
+            (0..=q - i - j).map(move |k| {
+                let at = |n: u32| f64::from(n) * step;
+                at(i) * a + at(j) * b + at(k) * c + at(q - i - j - k) * d
+            })
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::surface::Touching;
+    use crate::geometry::Aabb;
+    use crate::mesh::TriangleMesh;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        (-1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+    }
+
+    proptest! {
+        #[test]
+        fn candidates_are_those_of_the_loop_over_all_faces(
+            vertices in proptest::collection::vec(point(), 12..60),
+            corners in [point(), point(), point(), point()],
+        ) {
+            let faces = (0..vertices.len() as u32 - 2).map(|i| [i, i + 1, i + 2]).collect();
+            let surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0, Touching::Ignored);
+            let boxes: Vec<Aabb> = surface.triangles.iter().map(|t| Aabb::of(&t.corners)).collect();
+            let cell = Cell { corners: corners.map(|c| 0.2 * c), depth: 0 };
+            let center = cell.centroid();
+            let distances: Vec<f64> = surface.triangles.iter().map(|t| t.closest(center).distance).collect();
+            let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
+            let all: Vec<u32> = (0..distances.len() as u32)
+                .filter(|&f| distances[f as usize] < nearest + 2.0 * radius(&cell))
+                .collect();
+            prop_assert_eq!(lipschitz_candidates(&surface, &AabbTree::build(&boxes, 4), &cell), all);
+        }
+
+        #[test]
+        fn the_grid_covers_the_cell(
+            corners in [point(), point(), point(), point()],
+            weights in [0.0..1.0f64, 0.0..1.0, 0.0..1.0, 0.0..1.0],
+            resolution in 1u32..7,
+            shrink in 0.5..1.0f64,
+        ) {
+            let cell = Cell { corners, depth: 0 };
+            let sampling = Sampling { resolution, shrink, threshold: Threshold::CoveringRadius };
+            let sum: f64 = weights.iter().sum::<f64>().max(1e-9);
+            let p: DVec3 = (0..4).map(|k| weights[k] / sum * corners[k]).sum();
+            let nearest = grid(&cell, &sampling).map(|g| g.distance(p)).fold(f64::INFINITY, f64::min);
+            prop_assert!(nearest <= covering_radius(&cell, &sampling));
+            let count = grid(&cell, &sampling).count() as u32;
+            prop_assert_eq!(count, (resolution + 1) * (resolution + 2) * (resolution + 3) / 6);
+        }
+    }
+}

@@ -1,0 +1,59 @@
+use std::collections::HashMap;
+
+use tesdf::domain::TetMesh;
+use tesdf::glam::DVec3;
+use tesdf::mesh::{SolidMesh, TriangleMesh};
+
+use super::random::Random;
+
+/// The six Kuhn tetrahedra of a cube, by bits of the corners, positively oriented.
+const KUHN: [[usize; 4]; 6] =
+    [[0, 1, 3, 7], [0, 5, 1, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 6, 4, 7]];
+
+/// A jittered grid of `n`³ unit cubes in six tetrahedra each, of which those that `inside` picks are the solid.
+pub fn grid(n: usize, jitter: f64, inside: impl Fn(usize, usize, usize) -> bool) -> (SolidMesh, TetMesh) {
+    let mut random = Random(n as u64);
+    let side = n + 1;
+    let id = |x: usize, y: usize, z: usize| x + side * (y + side * z);
+    let mut points = Vec::new();
+    for k in 0..side.pow(3) {
+        let p = DVec3::new((k % side) as f64, (k / side % side) as f64, (k / side / side) as f64);
+        points.push(p + jitter * random.in_cube());
+    }
+    let mut tetrahedra = Vec::new();
+    let mut owners: HashMap<[usize; 3], ([usize; 3], i32)> = HashMap::new();
+    for cube in 0..n.pow(3) {
+        let (x, y, z) = (cube % n, cube / n % n, cube / n / n);
+        let corner = |bits: usize| id(x + (bits & 1), y + (bits >> 1 & 1), z + (bits >> 2));
+        for t in KUHN {
+            let t = t.map(corner);
+            tetrahedra.push(t.map(|v| v as u32));
+            if inside(x, y, z) {
+                for f in [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] {
+                    let face = f.map(|k| t[k]);
+                    let mut key = face;
+                    key.sort_unstable();
+                    owners.entry(key).or_insert((face, 0)).1 += 1;
+                }
+            }
+        }
+    }
+    let mut faces: Vec<[usize; 3]> = owners.into_values().filter(|o| o.1 == 1).map(|o| o.0).collect();
+    faces.sort_unstable();
+    let mut used = HashMap::new();
+    let mut vertices = Vec::new();
+    let faces = faces
+        .into_iter()
+        .map(|f| {
+            f.map(|v| {
+                *used.entry(v).or_insert_with(|| {
+                    vertices.push(points[v]);
+                    vertices.len() as u32 - 1
+                })
+            })
+        })
+        .collect();
+    let mesh = TriangleMesh::new(vertices, faces).expect("valid ids");
+    let solid = SolidMesh::new(mesh).expect("a closed surface");
+    (solid, TetMesh::new(points, tetrahedra).expect("valid tetrahedra"))
+}
