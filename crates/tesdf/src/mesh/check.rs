@@ -14,7 +14,7 @@ mod winding;
 
 pub(crate) use faces::face_flaws;
 pub(crate) use intersections::self_intersections;
-pub(crate) use range::out_of_range;
+pub(crate) use range::{coordinate_in_range, out_of_range};
 pub(crate) use t_junctions::{TJunctions, t_junctions};
 pub(crate) use winding::height;
 

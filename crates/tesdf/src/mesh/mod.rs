@@ -11,6 +11,7 @@ mod triangle_mesh;
 mod weld;
 mod write;
 
+pub(crate) use check::coordinate_in_range;
 pub use check::{BoundaryLoop, CheckReport, check};
 pub use defect::{Defect, DefectKind, Severity};
 pub use read::{LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, read, read_bytes};

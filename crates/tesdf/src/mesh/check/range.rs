@@ -9,15 +9,19 @@ const DIAGONAL: [f64; 2] = [1e-50, 1e50];
 /// predicates stay exact.
 const COORDINATE: [f64; 2] = [1e-90, 1e50];
 
+/// Whether a coordinate is in the range in which predicates are exact.
+pub(crate) fn coordinate_in_range(c: f64) -> bool {
+    c == 0.0 || (COORDINATE[0]..=COORDINATE[1]).contains(&c.abs())
+}
+
 /// Values outside of the accepted range.
 pub(crate) fn out_of_range(mesh: &TriangleMesh) -> Vec<Defect> {
     let mut used = vec![false; mesh.vertices().len()];
     mesh.faces().iter().flatten().for_each(|&v| used[v as usize] = true);
     let mut defects = Vec::new();
     for (v, p) in mesh.vertices().iter().enumerate().filter(|(v, _)| used[*v]) {
-        let outside = |c: f64| c != 0.0 && !(COORDINATE[0]..=COORDINATE[1]).contains(&c.abs());
-        if let Some((axis, value)) = ['x', 'y', 'z'].into_iter().zip(p.to_array()).find(|(_, c)| outside(*c))
-        {
+        let axes = ['x', 'y', 'z'].into_iter().zip(p.to_array());
+        if let Some((axis, value)) = axes.into_iter().find(|(_, c)| !coordinate_in_range(*c)) {
             let message = format!(
                 "vertex {v} has {axis} = {value:e}, out of range: expected 0 or an absolute value from {:e} to {:e}; \
                  change the unit",

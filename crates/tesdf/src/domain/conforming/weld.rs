@@ -1,0 +1,78 @@
+//! Which vertices of the tetrahedra are which of the surface.
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::{ConformingError, TetMesh};
+use crate::mesh::{SolidMesh, coordinate_in_range};
+
+/// Tetrahedra over the vertices of a surface and those of their own.
+pub(super) struct Welded {
+    /// The surface's, then those that only tetrahedra use.
+    pub vertices: Vec<DVec3>,
+    pub tetrahedra: Vec<[u32; 4]>,
+    /// For each vertex of the surface the first one at its position.
+    pub surface: Vec<u32>,
+    /// For each vertex after the surface's, its id in the [`TetMesh`].
+    pub origin: Vec<u32>,
+}
+
+/// The position's bits, where -0 is 0.
+fn key(p: DVec3) -> [u64; 3] {
+    (p + DVec3::ZERO).to_array().map(f64::to_bits)
+}
+
+pub(super) fn weld(solid: &SolidMesh, tets: &TetMesh) -> Result<Welded, ConformingError> {
+    let mut vertices = solid.mesh().vertices().to_vec();
+    let mut ids: HashMap<[u64; 3], u32> = HashMap::with_capacity(vertices.len() + tets.vertices().len());
+    let surface: Vec<u32> =
+        (0u32..).zip(&vertices).map(|(id, &p)| *ids.entry(key(p)).or_insert(id)).collect();
+
+    let mut used = vec![false; tets.vertices().len()];
+    tets.tetrahedra().iter().flatten().for_each(|&v| used[v as usize] = true);
+    let mut origin = Vec::new();
+    let mut welded = vec![u32::MAX; tets.vertices().len()];
+    for (vertex, &p) in tets.vertices().iter().enumerate().filter(|(v, _)| used[*v]) {
+        let axes = ['x', 'y', 'z'].into_iter().zip(p.to_array());
+        if let Some((axis, value)) = axes.into_iter().find(|&(_, value)| !coordinate_in_range(value)) {
+            return Err(ConformingError::OutOfRange { vertex, axis, value });
+        }
+        welded[vertex] = *ids.entry(key(p)).or_insert_with(|| {
+            origin.push(vertex as u32);
+            vertices.push(p);
+            vertices.len() as u32 - 1
+        });
+    }
+    let tetrahedra: Vec<_> =
+        tets.tetrahedra().iter().map(|corners| corners.map(|v| welded[v as usize])).collect();
+    let welded = Welded { vertices, tetrahedra, surface, origin };
+    welded.has_all_of(solid)?;
+    Ok(welded)
+}
+
+impl Welded {
+    /// Whether each vertex that a face uses is a corner of a tetrahedron.
+    fn has_all_of(&self, solid: &SolidMesh) -> Result<(), ConformingError> {
+        let positions = solid.mesh().vertices();
+        let mut on_face = vec![false; positions.len()];
+        solid.mesh().faces().iter().flatten().for_each(|&v| on_face[v as usize] = true);
+        let mut is_corner = vec![false; self.vertices.len()];
+        self.tetrahedra.iter().flatten().for_each(|&v| is_corner[v as usize] = true);
+        let mut first = None;
+        let (mut missing, mut of) = (0, 0);
+        for vertex in (0..positions.len()).filter(|&v| on_face[v]) {
+            of += 1;
+            if !is_corner[self.surface[vertex] as usize] {
+                missing += 1;
+                first.get_or_insert(vertex);
+            }
+        }
+        let Some(vertex) = first else { return Ok(()) };
+        let position = positions[vertex];
+        let distance = (0..self.vertices.len())
+            .filter(|&v| is_corner[v])
+            .map(|v| self.vertices[v].distance(position))
+            .fold(f64::INFINITY, f64::min);
+        Err(ConformingError::VertexMissing { missing, of, vertex, position, distance })
+    }
+}
