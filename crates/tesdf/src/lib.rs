@@ -33,6 +33,7 @@
 
 pub mod asset;
 pub mod collide;
+pub mod deform;
 pub mod domain;
 pub mod encode;
 pub mod geometry;

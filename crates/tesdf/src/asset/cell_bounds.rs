@@ -8,7 +8,7 @@ use crate::query::Place;
 /// For every word of the forest a lower bound of the signed distances in its cell, made when a detection first wants it.
 ///
 /// A byte each: the square root of the bound, as a share of that of the greatest one, rounded down.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct CellBounds {
     bytes: Vec<u8>,
     /// Squared steps to lengths of the local frame.
@@ -18,6 +18,11 @@ pub(crate) struct CellBounds {
 const STEPS: f64 = 255.0;
 
 impl CellBounds {
+    /// That of no cell is known.
+    pub fn none() -> Self {
+        Self { bytes: Vec::new(), unit: 0.0 }
+    }
+
     /// For the cells of an asset.
     pub fn new(asset: &TeSdf) -> Self {
         let mut bounds = vec![0.0f32; asset.nodes.len()];
@@ -50,7 +55,7 @@ impl CellBounds {
     /// No point of the cell has a signed distance below this (local frame); 0 where the solid may be.
     #[inline]
     pub fn least(&self, word: u32) -> f64 {
-        let step = f64::from(self.bytes[word as usize]);
+        let step = f64::from(self.bytes.get(word as usize).copied().unwrap_or(0));
         step * step * self.unit
     }
 }

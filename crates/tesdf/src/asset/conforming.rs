@@ -2,15 +2,16 @@ use glam::DVec3;
 
 use super::layout::{DOMAIN_VERTICES, TETRAHEDRA};
 use super::{AssetError, SharedSection, TeSdf};
+use crate::deform::Incidence;
 use crate::domain::Cell;
 use crate::geometry::{Aabb, AabbTree, barycentric};
 
 /// The tetrahedra of a conforming domain, each the root of a bisection tree, and a tree of boxes that finds them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Conforming {
     tetrahedra: SharedSection<[u32; 4]>,
     /// Of the domain and not of the mesh.
-    vertices: Option<SharedSection<[f64; 3]>>,
+    vertices: SharedSection<[f64; 3]>,
     tree: AabbTree,
 }
 
@@ -29,17 +30,15 @@ impl Conforming {
             return Ok(None);
         }
         let tetrahedra: SharedSection<[u32; 4]> = container.shared_section(TETRAHEDRA.name)?;
-        let vertices: Option<SharedSection<[f64; 3]>> = container
-            .section::<[f64; 3]>(DOMAIN_VERTICES.name)?
-            .is_some()
-            .then(|| container.shared_section(DOMAIN_VERTICES.name))
-            .transpose()?;
+        let vertices: SharedSection<[f64; 3]> = match container.section::<[f64; 3]>(DOMAIN_VERTICES.name)? {
+            Some(_) => container.shared_section(DOMAIN_VERTICES.name)?,
+            None => SharedSection::of_rows(&[]),
+        };
         let wrong = |name: &'static str, reason| Err(AssetError::section(name, reason));
-        let own = vertices.as_deref().unwrap_or(&[]);
-        if let Some(i) = own.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
+        if let Some(i) = vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
             return wrong(DOMAIN_VERTICES.name, format!("vertex {i} is not finite"));
         }
-        let count = asset.vertices.len() + own.len();
+        let count = asset.vertices.len() + vertices.len();
         let bad = |t: &[u32; 4]| t.iter().any(|&v| v as usize >= count);
         if let Some(i) = tetrahedra.iter().position(bad) {
             return wrong(
@@ -57,22 +56,54 @@ impl Conforming {
 
     /// Makes the tree of boxes for where the vertices are.
     fn fit(&mut self, asset: &TeSdf) {
-        let boxes: Vec<Aabb> =
-            (0..self.tetrahedra.len()).map(|t| Aabb::of(&self.corners(asset, t)).grown(PAD)).collect();
+        let boxes: Vec<Aabb> = (0..self.tetrahedra.len()).map(|t| self.bounds(asset, t)).collect();
         self.tree = AabbTree::build(&boxes, LEAF);
     }
 
+    /// The same for where some tetrahedra are now.
+    pub fn refit(&mut self, asset: &TeSdf, tetrahedra: &[u32], incidence: &Incidence) {
+        let mut tree = std::mem::replace(&mut self.tree, AabbTree::build(&[], LEAF));
+        let places = tetrahedra.iter().map(|&t| incidence.place[t as usize]);
+        incidence.tetrahedron_tree.climb(places, |slot| tree.refit(slot, |t| self.bounds(asset, t as usize)));
+        tree.refit_root(|t| self.bounds(asset, t as usize));
+        self.tree = tree;
+    }
+
+    fn bounds(&self, asset: &TeSdf, tetrahedron: usize) -> Aabb {
+        Aabb::of(&self.corners(asset, tetrahedron)).grown(PAD)
+    }
+
     fn corners(&self, asset: &TeSdf, tetrahedron: usize) -> [DVec3; 4] {
-        let own = self.vertices.as_deref().unwrap_or(&[]);
+        self.corners_in_unit(asset, tetrahedron).map(|p| asset.frame.to_local(p))
+    }
+
+    /// Corners of a tetrahedron, in the mesh's unit.
+    pub fn corners_in_unit(&self, asset: &TeSdf, tetrahedron: usize) -> [DVec3; 4] {
+        let mesh = &asset.vertices;
         self.tetrahedra[tetrahedron].map(|v| {
             let v = v as usize;
-            let mesh = &asset.vertices;
-            asset.frame.to_local(DVec3::from_array(if v < mesh.len() {
-                mesh[v]
-            } else {
-                own[v - mesh.len()]
-            }))
+            DVec3::from_array(if v < mesh.len() { mesh[v] } else { self.vertices[v - mesh.len()] })
         })
+    }
+
+    /// Corner ids of the tetrahedra.
+    pub fn tetrahedra(&self) -> &[[u32; 4]] {
+        &self.tetrahedra
+    }
+
+    /// The vertices that are not of the mesh, in its unit.
+    pub fn vertices(&self) -> &[[f64; 3]] {
+        &self.vertices
+    }
+
+    /// Replaces them; [`refit`](Self::refit) is next.
+    pub fn set_vertices(&mut self, vertices: &[[f64; 3]]) {
+        self.vertices = SharedSection::of_rows(vertices);
+    }
+
+    /// What each vertex moves.
+    pub fn incidence(&self, asset: &TeSdf) -> Incidence {
+        Incidence::new(asset, &self.tetrahedra, asset.vertices.len() + self.vertices.len(), &self.tree)
     }
 
     /// Size in bytes of what opening made.

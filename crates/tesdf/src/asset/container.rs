@@ -304,6 +304,18 @@ pub struct SharedSection<T> {
     element: PhantomData<T>,
 }
 
+impl<T: bytemuck::Pod> SharedSection<T> {
+    /// A copy of rows that are of no file.
+    pub(crate) fn of_rows(rows: &[T]) -> Self {
+        let bytes: &[u8] = bytemuck::cast_slice(rows);
+        let mut words = vec![0u64; bytes.len().div_ceil(8)];
+        bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
+        let start = words.as_ptr().cast();
+        let storage = Arc::new(Storage::Owned { words, length: bytes.len() });
+        Self { storage, start, length: rows.len(), element: PhantomData }
+    }
+}
+
 // SAFETY: the bytes are immutable and owned by `storage`, itself `Send + Sync`; `start` is only read.
 unsafe impl<T: bytemuck::Pod + Send + Sync> Send for SharedSection<T> {}
 // SAFETY: as above.

@@ -7,7 +7,8 @@ use super::about::About;
 use super::cell_bounds::CellBounds;
 use super::conforming::Conforming;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
-use super::{AssetError, Container, SharedSection, save_atomic};
+use super::{AssetError, Container, Section, SharedSection, save_atomic, write_container};
+use crate::deform::Motion;
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
 use crate::query::{Entries, FaceRecord, Isa};
@@ -31,7 +32,7 @@ use crate::query::{Entries, FaceRecord, Isa};
 /// its faces by one byte each, as slots of a palette of up to 256 faces that a subtree shares.
 ///
 /// All lengths are in the mesh's own unit. The type is `Send + Sync` and cheap to share by `Arc`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct TeSdf {
     container: Container,
     about: About,
@@ -58,6 +59,8 @@ pub struct TeSdf {
     /// Of the faces' corners, in the mesh's unit; made on opening.
     bounds: Aabb,
     cell_bounds: OnceLock<CellBounds>,
+    /// What has moved since it was opened, if anything has.
+    pub(crate) motion: Option<Motion>,
     lowest_faces: OnceLock<Vec<u32>>,
 }
 
@@ -112,6 +115,7 @@ impl TeSdf {
             isa: Isa::detect(),
             bounds: Aabb::EMPTY,
             cell_bounds: OnceLock::new(),
+            motion: None,
             lowest_faces: OnceLock::new(),
         };
         asset.check_mesh()?;
@@ -119,8 +123,7 @@ impl TeSdf {
         asset.check_lists()?;
         asset.check_tree()?;
         let middle = asset.cube.middle();
-        asset.bounds =
-            (0..asset.faces.len()).map(|f| Aabb::of(&asset.face_corners(f))).fold(Aabb::EMPTY, Aabb::union);
+        asset.bounds = asset.bounds_of_faces();
         if asset.conforming.is_none() {
             asset.entries = Entries::new(&asset.nodes);
         }
@@ -135,7 +138,27 @@ impl TeSdf {
         &self.about
     }
 
-    /// The whole file.
+    pub(crate) fn about_mut(&mut self) -> &mut About {
+        &mut self.about
+    }
+
+    /// Forgets what depends on where vertices are, but for what is refitted.
+    pub(crate) fn shape_changed(&mut self) {
+        self.bounds = self.bounds_of_faces();
+        self.cell_bounds = OnceLock::from(CellBounds::none());
+    }
+
+    fn bounds_of_faces(&self) -> Aabb {
+        (0..self.faces.len()).map(|f| Aabb::of(&self.face_corners(f))).fold(Aabb::EMPTY, Aabb::union)
+    }
+
+    /// Whether every list is proved to be exact where the vertices are now.
+    pub(crate) fn has_exact_lists(&self) -> bool {
+        let certificate = &self.about.certificate;
+        certificate.delta.is_some() && certificate.exactness_distance.is_none()
+    }
+
+    /// The whole file as it was opened, whatever has moved since.
     pub fn as_bytes(&self) -> &[u8] {
         self.container.as_bytes()
     }
@@ -145,12 +168,33 @@ impl TeSdf {
         &self.container
     }
 
-    /// Writes the file, replacing one at `path` atomically.
+    /// Writes the file, replacing one at `path` atomically; with vertices and lists as they are now.
     ///
     /// # Errors
     /// What the operating system refused; no half file is left.
     pub fn save(&self, path: &Path) -> Result<(), AssetError> {
-        save_atomic(path, self.as_bytes())
+        if self.motion.is_none() {
+            return save_atomic(path, self.as_bytes());
+        }
+        // What told the sign at rest need not tell it now.
+        let no_hints = vec![0u16; self.sign_hints.len()];
+        let now = |section| {
+            let Section { spec, bytes } = section;
+            let bytes: &[u8] = match spec {
+                layout::VERTICES => bytemuck::cast_slice(&self.vertices),
+                layout::SIGN_HINTS => bytemuck::cast_slice(&no_hints),
+                layout::NODES => bytemuck::cast_slice(&self.nodes),
+                layout::LISTS => &self.lists,
+                layout::TREE_BOXES => bytemuck::cast_slice(&self.tree_boxes),
+                layout::DOMAIN_VERTICES => {
+                    bytemuck::cast_slice(self.conforming.as_ref().map_or(&[], Conforming::vertices))
+                }
+                _ => bytes,
+            };
+            Section { spec, bytes }
+        };
+        let sections: Vec<Section> = self.container.sections().map(now).collect();
+        save_atomic(path, &write_container(&sections, &self.about.to_metadata())?)
     }
 
     /// Compares every byte with the checksums.
@@ -187,8 +231,11 @@ impl TeSdf {
         })
     }
 
-    /// Width of the outer band (local frame).
+    /// How far around the solid the domain is sure to reach (local frame): the width of the outer band.
     pub(crate) fn band(&self) -> f64 {
+        if self.conforming.is_some() {
+            return 0.0;
+        }
         let diagonal = self.bounds.extent().length();
         self.about.options.band.resolve(diagonal) * self.frame.scale
     }

@@ -115,7 +115,8 @@ impl<'a> FieldBody<'a> {
     pub fn rough(&self, p: DVec3) -> (f64, f64) {
         match self.field {
             Field::Mesh(asset) => {
-                let distance = asset.found_at(p, asset.place(p)).signed_distance;
+                // Between listed distances and true ones no ball can be ruled out.
+                let distance = asset.found_exactly(p).signed_distance;
                 (distance, ROUNDING + FAR * distance.abs())
             }
             // Rounding of a formula, relative to the size of its numbers.

@@ -30,7 +30,8 @@ pub struct ClippedPolygon {
 pub fn clip(asset: &TeSdf, polygon: Polygon, reach: f64, visit: &mut impl FnMut(&ClippedPolygon)) {
     let clipping = Clipping { asset, reach, beyond: reach >= asset.band() };
     if let Some(domain) = &asset.conforming {
-        return clipping.tetrahedra(domain, polygon, visit);
+        // The solid itself is all of the domain.
+        return Clipping { beyond: reach > 0.0, ..clipping }.tetrahedra(domain, polygon, visit);
     }
     let (origin, side) = (asset.cube.origin(), asset.cube.side());
     let mut inside = polygon;

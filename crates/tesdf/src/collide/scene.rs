@@ -1,10 +1,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
+use std::sync::Arc;
 
 use glam::DVec3;
 use serde::Serialize;
 
 use super::{CollideError, Placement, Pose, Shape};
+use crate::TeSdf;
 use crate::geometry::Aabb;
 
 /// Names a shape of a scene; never used again after the shape is removed.
@@ -107,6 +109,18 @@ impl Scene {
         self.next_shape += 1;
         self.shapes.insert(id, shape);
         Ok(id)
+    }
+
+    /// An encoded mesh, to move its vertices ([`TeSdf::move_vertices`]): all of its instances deform alike. One that is shared with
+    /// others than this scene is copied first.
+    ///
+    /// # Errors
+    /// [`CollideError::NoShape`] when there is no such shape, or it is no mesh.
+    pub fn mesh_mut(&mut self, shape: ShapeId) -> Result<&mut TeSdf, CollideError> {
+        match self.shapes.get_mut(&shape) {
+            Some(Shape::Mesh(asset)) => Ok(Arc::make_mut(asset)),
+            _ => Err(CollideError::NoShape(shape)),
+        }
     }
 
     /// Removes a shape that no instance uses.

@@ -20,8 +20,6 @@ pub struct Lists<'a> {
     pub surface: &'a Surface,
     /// A tree over its faces.
     pub tree: &'a AabbTree,
-    /// Labels of the bisection domain.
-    pub winding: &'a WindingNumber,
     /// Encoder, tightening, truncation, deformation.
     pub options: &'a EncodeOptions,
     /// Local frame over the mesh's unit.
@@ -30,11 +28,12 @@ pub struct Lists<'a> {
 
 impl Lists<'_> {
     /// Finishes the lists and labels the cells, in depth-first order. Also the distance from the surface within which
-    /// every list is exact (local frame): infinite unless lists were truncated.
+    /// every list is exact (local frame): infinite unless lists were truncated. `winding` labels the bisection domain.
     pub fn finish(
         &self,
         trees: &mut [Tree],
         roots: &Roots,
+        winding: &WindingNumber,
         progress: &EncodeProgress,
     ) -> Result<(Vec<Label>, f64), EncodeError> {
         let mut cells = Vec::new();
@@ -58,13 +57,13 @@ impl Lists<'_> {
                 let mut crosses = false;
                 if let Leaf::Listed { faces, crossing } = leaf {
                     crosses = *crossing;
-                    let ranked = self.ranked(&cell, roots.tetrahedra.get(root), faces, crosses, scratch);
-                    (*faces, exact_within) = truncated(ranked, self.options.max_entries);
+                    let tetrahedron = roots.tetrahedra.get(root);
+                    (*faces, exact_within) = self.of_cell(&cell, tetrahedron, faces, crosses, scratch);
                 }
                 let label = match (&leaf, roots.sides.get(root)) {
                     (Leaf::Outside, _) | (_, Some(Side::Outside)) => Label::Outside,
                     (_, Some(Side::Inside)) => Label::Inside,
-                    (_, None) => match (crosses, self.winding.at_perturbed(cell.centroid())) {
+                    (_, None) => match (crosses, winding.at_perturbed(cell.centroid())) {
                         // Read back as i32: folds thinner than the check sees may be negative.
                         (true, w) => Label::Crossing(w as u32),
                         (false, w) if w >= 1 => Label::Inside,
@@ -77,6 +76,19 @@ impl Lists<'_> {
         let finished = finished.ok_or(EncodeError::Cancelled)?;
         let exact_within = finished.iter().map(|f| f.1).fold(f64::INFINITY, f64::min);
         Ok((finished.into_iter().map(|f| f.0).collect(), exact_within))
+    }
+
+    /// The list of a cell of a conforming domain's `tetrahedron`, or of no tetrahedron, from `faces`, among which are all that it
+    /// needs; and the distance within which it is exact (local frame).
+    pub fn of_cell(
+        &self,
+        cell: &Cell,
+        tetrahedron: Option<&[u32; 4]>,
+        faces: &[u32],
+        crossing: bool,
+        scratch: &mut Scratch,
+    ) -> (Vec<u32>, f64) {
+        truncated(self.ranked(cell, tetrahedron, faces, crossing, scratch), self.options.max_entries)
     }
 
     fn ranked(

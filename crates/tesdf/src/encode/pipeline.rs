@@ -153,8 +153,8 @@ pub fn encode_in(
         .collect::<Option<Vec<Tree>>>()
         .ok_or(EncodeError::Cancelled)?;
 
-    let lists = Lists { surface: &surface, tree: &tree, winding: &winding, options, scale: frame.scale };
-    let (labels, exact_within) = lists.finish(&mut trees, &roots, progress)?;
+    let lists = Lists { surface: &surface, tree: &tree, options, scale: frame.scale };
+    let (labels, exact_within) = lists.finish(&mut trees, &roots, &winding, progress)?;
 
     progress.begin(Stage::Assemble, 1);
     let simplicity = if solid.is_simple() { Simplicity::Simple } else { Simplicity::Involved };
@@ -303,14 +303,8 @@ fn face_tree(tree: &AabbTree, cube: &DomainCube) -> (Vec<[f32; 12]>, Vec<[u32; 2
         nodes.push([(bounds, Child::Leaf { start, end: half }), (bounds, Child::Leaf { start: half, end })]);
     }
     let boxes = nodes.iter().map(|node| {
-        let mut out = [0.0; 12];
-        for (side, (b, _)) in node.iter().enumerate() {
-            for a in 0..3 {
-                out[6 * side + a] = ((b.min[a] - middle[a]) as f32).next_down();
-                out[6 * side + 3 + a] = ((b.max[a] - middle[a]) as f32).next_up();
-            }
-        }
-        out
+        let [a, b] = [0, 1].map(|side| node[side].0.rounded_from(middle));
+        std::array::from_fn(|k| if k < 6 { a[k] } else { b[k - 6] })
     });
     let children = nodes.iter().map(|n| [child(n[0].1).encode(), child(n[1].1).encode()]);
     (boxes.collect(), children.collect())

@@ -38,6 +38,15 @@ impl Aabb {
         0.5 * (self.min + self.max)
     }
 
+    /// The box in `f32`, relative to `middle`, rounded outward: least corner, greatest corner.
+    pub fn rounded_from(self, middle: DVec3) -> [f32; 6] {
+        let (low, high) = (self.min - middle, self.max - middle);
+        std::array::from_fn(|k| match k {
+            0..3 => (low[k] as f32).next_down(),
+            _ => (high[k - 3] as f32).next_up(),
+        })
+    }
+
     /// Whether the closed boxes share a point.
     pub fn overlaps(self, other: Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()

@@ -66,6 +66,29 @@ impl AabbTree {
         self.root
     }
 
+    /// Fits the box of one child, 2 · node + side, to items and boxes below; tells whether it has changed.
+    pub fn refit(&mut self, slot: u32, box_of: impl Fn(u32) -> Aabb) -> bool {
+        let (node, side) = (slot as usize / 2, slot as usize % 2);
+        let fitted = self.fitted(self.nodes[node][side].1, box_of);
+        let changed = self.nodes[node][side].0 != fitted;
+        self.nodes[node][side].0 = fitted;
+        changed
+    }
+
+    /// Fits the box of the whole tree, when all below is fitted.
+    pub fn refit_root(&mut self, box_of: impl Fn(u32) -> Aabb) {
+        self.root.0 = self.fitted(self.root.1, box_of);
+    }
+
+    fn fitted(&self, child: Child, box_of: impl Fn(u32) -> Aabb) -> Aabb {
+        match child {
+            Child::Node(below) => self.nodes[below as usize][0].0.union(self.nodes[below as usize][1].0),
+            Child::Leaf { start, end } => self.order[start as usize..end as usize]
+                .iter()
+                .fold(Aabb::EMPTY, |bounds, &item| bounds.union(box_of(item))),
+        }
+    }
+
     /// Calls `leaf` with the items of each leaf whose box, and whose ancestors' boxes, `enter` accepts.
     pub fn visit(&self, mut enter: impl FnMut(Aabb) -> bool, mut leaf: impl FnMut(&[u32])) {
         let mut stack = vec![self.root];

@@ -55,6 +55,11 @@ impl FaceRecord {
         Triangle::with_normal([v(0), v(0) + v(1), v(0) + v(2)], normal)
     }
 
+    /// From now on only the winding number tells the sign.
+    pub fn forget_hints(&mut self) {
+        self.0[HINTS] = f32::from_bits(SignHints::default().0.into());
+    }
+
     /// How the sign follows from the closest feature.
     #[inline]
     pub fn hints(&self) -> SignHints {

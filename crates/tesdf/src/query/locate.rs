@@ -30,7 +30,7 @@ pub enum Place {
 /// Where the descents of an asset begin: the words of all cells of one depth, made on opening.
 ///
 /// The upper levels of the forest are nearly all bisected; a grid that holds them saves half of the way.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Entries {
     level: u32,
     words: Vec<u32>,

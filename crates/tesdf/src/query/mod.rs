@@ -174,6 +174,22 @@ impl TeSdf {
         }
     }
 
+    /// As [`found_at`](Self::found_at), with the exact distance also where lists are not known to be exact.
+    pub(crate) fn found_exactly(&self, local: DVec3) -> Found {
+        let place = self.place(local);
+        match place {
+            Place::Listed { label, .. } if !self.has_exact_lists() => {
+                let inside = match label {
+                    Label::Inside => true,
+                    Label::Outside => false,
+                    Label::Crossing(_) => self.winding_in_cell(local) >= 1,
+                };
+                self.found_at(local, Place::Far(if inside { Side::Inside } else { Side::Outside }))
+            }
+            _ => self.found_at(local, place),
+        }
+    }
+
     /// `faces` are those of the place's list, if it has one.
     #[inline]
     fn answer(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Answer {

@@ -1,0 +1,115 @@
+use std::collections::BTreeSet;
+
+use crate::TeSdf;
+use crate::asset::layout::TreeChild;
+use crate::geometry::{AabbTree, Child};
+
+/// What a vertex moves: made when the first one does.
+#[derive(Debug)]
+pub struct Incidence {
+    /// Faces of each vertex of the mesh, by position.
+    pub faces: Rows,
+    /// Tetrahedra of each vertex of the domain.
+    pub tetrahedra: Rows,
+    /// Of the face tree; its leaves are runs of faces.
+    pub face_tree: Parents,
+    /// Of the tree over tetrahedra; its leaves are runs of its order.
+    pub tetrahedron_tree: Parents,
+    /// Where each tetrahedron is in that order.
+    pub place: Vec<u32>,
+}
+
+impl Incidence {
+    /// Of an asset whose domain is made of `tetrahedra`, found by `tree`.
+    pub fn new(asset: &TeSdf, tetrahedra: &[[u32; 4]], vertices: usize, tree: &AabbTree) -> Self {
+        let face_children = |node: &[u32; 2]| {
+            node.map(|word| match TreeChild::decode(word) {
+                TreeChild::Node(n) => Child::Node(n),
+                TreeChild::Leaf(start, count) => Child::Leaf { start, end: start + count },
+            })
+        };
+        let mut place = vec![0; tetrahedra.len()];
+        tree.order().iter().enumerate().for_each(|(at, &t)| place[t as usize] = at as u32);
+        Self {
+            faces: Rows::new(&asset.faces, asset.vertices.len()),
+            tetrahedra: Rows::new(tetrahedra, vertices),
+            face_tree: Parents::new(asset.tree_children.iter().map(face_children), asset.faces.len()),
+            tetrahedron_tree: Parents::new(
+                tree.nodes().iter().map(|node| [node[0].1, node[1].1]),
+                tetrahedra.len(),
+            ),
+            place,
+        }
+    }
+}
+
+/// For each key a list of items, one after the other.
+#[derive(Debug)]
+pub struct Rows {
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Rows {
+    fn new<const N: usize>(keys: &[[u32; N]], count: usize) -> Self {
+        let mut starts = vec![0u32; count + 1];
+        keys.as_flattened().iter().for_each(|&k| starts[k as usize + 1] += 1);
+        for k in 0..count {
+            starts[k + 1] += starts[k];
+        }
+        let mut next = starts.clone();
+        let mut items = vec![0; keys.len() * N];
+        for (item, keys) in (0u32..).zip(keys) {
+            for &k in keys {
+                items[next[k as usize] as usize] = item;
+                next[k as usize] += 1;
+            }
+        }
+        Self { starts, items }
+    }
+
+    /// The items of a key.
+    pub fn of(&self, key: u32) -> &[u32] {
+        &self.items[self.starts[key as usize] as usize..self.starts[key as usize + 1] as usize]
+    }
+}
+
+/// The way up in a tree whose nodes have two children each. A *slot* is a child of a node: 2 · node + side.
+#[derive(Debug)]
+pub struct Parents {
+    /// The slot that holds each position of the leaves' runs; [`NONE`] when the tree is a single leaf.
+    leaf: Vec<u32>,
+    /// The slot that holds each node.
+    node: Vec<u32>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Parents {
+    fn new(nodes: impl ExactSizeIterator<Item = [Child; 2]>, positions: usize) -> Self {
+        let mut parents = Self { leaf: vec![NONE; positions], node: vec![NONE; nodes.len()] };
+        for (n, children) in nodes.enumerate() {
+            for (side, child) in children.into_iter().enumerate() {
+                let slot = (2 * n + side) as u32;
+                match child {
+                    Child::Node(below) => parents.node[below as usize] = slot,
+                    Child::Leaf { start, end } => parents.leaf[start as usize..end as usize].fill(slot),
+                }
+            }
+        }
+        parents
+    }
+
+    /// Calls `refit` with each slot whose box may change, a node's before that of its parent; `refit` tells whether it did.
+    pub fn climb(&self, positions: impl Iterator<Item = u32>, mut refit: impl FnMut(u32) -> bool) {
+        let leaves = positions.map(|p| self.leaf[p as usize]).filter(|&slot| slot != NONE);
+        let mut open: BTreeSet<u32> = leaves.collect();
+        // Children have greater numbers than their parents.
+        while let Some(slot) = open.pop_last() {
+            let above = self.node[slot as usize / 2];
+            if refit(slot) && above != NONE {
+                open.insert(above);
+            }
+        }
+    }
+}

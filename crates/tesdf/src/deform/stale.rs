@@ -1,0 +1,210 @@
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::TeSdf;
+use crate::asset::SharedSection;
+use crate::asset::about::About;
+use crate::asset::layout::{Label, List, MAX_LIST_OFFSET, Node, TREE_LEAF};
+use crate::domain::Cell;
+use crate::encode::EncodeError;
+use crate::encode::candidates::Pool;
+use crate::encode::filter::{Scratch, filter};
+use crate::encode::lists::Lists;
+use crate::encode::sampled::lipschitz_candidates;
+use crate::encode::surface::{Surface, Touching};
+use crate::geometry::{Aabb, AabbTree};
+use crate::mesh::TriangleMesh;
+
+use super::Motion;
+
+/// What [`TeSdf::reencode_stale`] has done.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Reencoded {
+    /// Cells with a list.
+    pub cells: usize,
+    /// Those of them that a moved face is, or may come, near enough to matter to: only they cost more than a look.
+    pub checked: usize,
+    /// Those whose list was made anew, by their [id](crate::asset::CellView::id), ascending.
+    pub stale: Vec<u32>,
+}
+
+/// A cell with a list.
+struct Listed {
+    word: u32,
+    root: usize,
+    cell: Cell,
+    label: Label,
+    offset: u32,
+}
+
+/// A list that no longer holds, with what is to take its place: positions of faces, and the distance that they are exact within.
+struct Stale {
+    word: u32,
+    label: Label,
+    faces: Vec<u32>,
+    exact_within: f64,
+}
+
+impl TeSdf {
+    /// The cells whose lists may not hold where the vertices are now, by their [id](crate::asset::CellView::id), ascending.
+    ///
+    /// A cell is left out only with a proof: nothing that moved can matter to it, or the certified filter, run where the vertices
+    /// are now, asks for nothing that its list does not have.
+    ///
+    /// # Errors
+    /// [`EncodeError::Mesh`] when the moved mesh cannot be looked at.
+    pub fn stale_cells(&self) -> Result<Vec<u32>, EncodeError> {
+        let Some(motion) = &self.motion else { return Ok(Vec::new()) };
+        let (_, _, stale) = self.stale(motion)?;
+        Ok(stale.into_iter().map(|s| s.word).collect())
+    }
+
+    /// Makes the lists of stale cells anew, with the options that the asset was encoded with, and leaves the others alone. The
+    /// certificate then holds for the shape as it is.
+    ///
+    /// # Errors
+    /// [`EncodeError`] when the moved mesh cannot be looked at, or the lists outgrow what a file can name; nothing has changed then.
+    pub fn reencode_stale(&mut self) -> Result<Reencoded, EncodeError> {
+        let Some(mut motion) = self.motion.take() else { return Ok(Reencoded::default()) };
+        let reencoded = self.stale(&motion).and_then(|(cells, checked, stale)| {
+            let exact_within = self.replace_lists(&stale)?;
+            Ok((Reencoded { cells, checked, stale: stale.iter().map(|s| s.word).collect() }, exact_within))
+        });
+        if let Ok((_, exact_within)) = &reencoded {
+            motion.faces.fill(false);
+            motion.tetrahedra.fill(false);
+            self.prove_again(*exact_within);
+        }
+        self.motion = Some(motion);
+        reencoded.map(|(reencoded, _)| reencoded)
+    }
+
+    fn stale(&self, motion: &Motion) -> Result<(usize, usize, Vec<Stale>), EncodeError> {
+        let Some(domain) = &self.conforming else { return Ok((0, 0, Vec::new())) };
+        let local = |v: &[f64; 3]| self.frame.to_local(DVec3::from_array(*v));
+        let mesh = TriangleMesh::new(self.vertices.iter().map(local).collect(), self.faces.to_vec())?;
+        let surface = Surface::new(&mesh, self.cube.side(), Touching::Ignored);
+        let boxes: Vec<Aabb> = surface.triangles.iter().map(|t| Aabb::of(&t.corners)).collect();
+        let tree = AabbTree::build(&boxes, TREE_LEAF);
+        let moved: Vec<u32> = (0..self.faces.len() as u32).filter(|&f| motion.faces[f as usize]).collect();
+        let moved_boxes: Vec<Aabb> = moved.iter().map(|&f| boxes[f as usize]).collect();
+        let search = Search {
+            asset: self,
+            motion,
+            lists: Lists {
+                surface: &surface,
+                tree: &tree,
+                options: &self.about().options,
+                scale: self.frame.scale,
+            },
+            tetrahedra: domain.tetrahedra(),
+            moved_tree: AabbTree::build(&moved_boxes, TREE_LEAF),
+            moved,
+        };
+        let cells = self.listed_cells();
+        let found: Vec<Option<Option<Stale>>> = cells
+            .par_iter()
+            .map_init(Scratch::default, |scratch, cell| search.check(cell, scratch))
+            .collect();
+        let checked = found.iter().filter(|f| f.is_some()).count();
+        let mut stale: Vec<Stale> = found.into_iter().flatten().flatten().collect();
+        stale.sort_by_key(|s| s.word);
+        Ok((cells.len(), checked, stale))
+    }
+
+    fn listed_cells(&self) -> Vec<Listed> {
+        let mut cells = Vec::new();
+        let mut stack: Vec<(u32, usize, Cell)> =
+            (0..self.root_count()).map(|root| (root as u32, root, self.root(root))).collect();
+        while let Some((word, root, cell)) = stack.pop() {
+            match Node::decode(self.nodes[word as usize], &self.lists) {
+                Node::Split(c) => stack.extend([(c, root, cell.child(0)), (c + 1, root, cell.child(1))]),
+                Node::Listed(label, offset) => cells.push(Listed { word, root, cell, label, offset }),
+                Node::Far(_) | Node::NotOfDomain => {}
+            }
+        }
+        cells
+    }
+
+    fn replace_lists(&mut self, stale: &[Stale]) -> Result<f64, EncodeError> {
+        let (mut nodes, mut lists) = (self.nodes.to_vec(), self.lists.to_vec());
+        for s in stale {
+            let raw: Vec<u8> = s.faces.iter().flat_map(|f| f.to_le_bytes()).collect();
+            nodes[s.word as usize] = Node::Listed(s.label, lists.len() as u32).encode();
+            List::Faces(&raw).encode(&mut lists);
+            if lists.len() > MAX_LIST_OFFSET as usize {
+                return Err(EncodeError::TooLarge {
+                    what: "bytes of lists",
+                    found: lists.len(),
+                    limit: MAX_LIST_OFFSET as usize,
+                });
+            }
+        }
+        self.nodes = SharedSection::of_rows(&nodes);
+        self.lists = SharedSection::of_rows(&lists);
+        Ok(stale.iter().map(|s| s.exact_within).fold(f64::INFINITY, f64::min))
+    }
+
+    /// The certificate at rest, with the exactness distance of the new lists (local frame).
+    fn prove_again(&mut self, exact_within: f64) {
+        // Opening has read it.
+        let Ok(rest) = About::from_metadata(self.container().metadata()) else { return };
+        let mut certificate = rest.certificate;
+        let within = exact_within * self.frame.inverse_scale();
+        let least = certificate.exactness_distance.unwrap_or(f64::INFINITY).min(within);
+        certificate.exactness_distance = least.is_finite().then_some(least);
+        certificate.truncated |= least.is_finite();
+        self.about_mut().certificate = certificate;
+    }
+}
+
+/// All that the check of a cell reads.
+struct Search<'a> {
+    asset: &'a TeSdf,
+    motion: &'a Motion,
+    lists: Lists<'a>,
+    tetrahedra: &'a [[u32; 4]],
+    /// Faces that moved, and a tree over them.
+    moved: Vec<u32>,
+    moved_tree: AabbTree,
+}
+
+impl Search<'_> {
+    /// `None`: nothing that moved matters to the cell; `Some(None)`: its list holds all the same.
+    fn check(&self, listed: &Listed, scratch: &mut Scratch) -> Option<Option<Stale>> {
+        let mut list: Vec<u32> = self.asset.with_list(listed.offset, |faces| faces.ids().to_vec());
+        list.sort_unstable();
+        if !self.is_touched(listed, &list) {
+            return None;
+        }
+        let Lists { surface, tree, .. } = self.lists;
+        let candidates = lipschitz_candidates(surface, tree, &listed.cell);
+        let pool = Pool::new(surface, &candidates, &listed.cell);
+        let filtered = filter(surface, &listed.cell, &pool.candidates(), scratch);
+        let has = |r| list.iter().any(|&face| surface.holds(face, r));
+        if filtered.survivors.iter().all(|s| has(s.requirement)) {
+            return Some(None);
+        }
+        let tetrahedron = self.tetrahedra.get(listed.root);
+        let (faces, exact_within) =
+            self.lists.of_cell(&listed.cell, tetrahedron, &candidates, false, scratch);
+        let holds = faces.iter().all(|face| list.binary_search(face).is_ok());
+        let stale = Stale { word: listed.word, label: listed.label, faces, exact_within };
+        Some((!holds).then_some(stale))
+    }
+
+    /// Whether the cell, a face of its list, or a face that can now be among the closest has moved (Lemma 1).
+    fn is_touched(&self, listed: &Listed, list: &[u32]) -> bool {
+        if self.motion.tetrahedra[listed.root] || list.iter().any(|&f| self.motion.faces[f as usize]) {
+            return true;
+        }
+        let center = listed.cell.centroid();
+        let triangles = &self.lists.surface.triangles;
+        let distance = |&face: &u32| triangles[face as usize].closest(center).distance;
+        let radius = listed.cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max);
+        // What is listed and did not move is where it was.
+        let limit = list.iter().map(distance).fold(f64::INFINITY, f64::min) + 2.0 * radius;
+        let nearest = self.moved_tree.nearest(center, |at| distance(&self.moved[at as usize]).powi(2));
+        nearest.is_some_and(|(squared, _)| squared.sqrt() < limit)
+    }
+}
