@@ -9,9 +9,12 @@
 mod bisection;
 mod conforming;
 mod cube;
+pub mod gmsh;
+mod read;
 mod tet_mesh;
 
 pub use bisection::{Barycentric, Cell, MAX_DEPTH, ROOTS};
 pub use conforming::{Classes, ConformingError, ConformingMesh, MissingFace};
 pub use cube::DomainCube;
+pub use read::{LoadedTetrahedra, ReadTetrahedraError, Skipped, TetFormat, load_tetrahedra, read_tetrahedra};
 pub use tet_mesh::{TetMesh, TetMeshError};

@@ -14,6 +14,7 @@ mod write;
 pub(crate) use check::coordinate_in_range;
 pub use check::{BoundaryLoop, CheckReport, check};
 pub use defect::{Defect, DefectKind, Severity};
+pub(crate) use read::text;
 pub use read::{LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, read, read_bytes};
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, repair};
 pub use solid::{NotSolid, SolidMesh};

@@ -18,7 +18,7 @@ mod off;
 mod ply;
 mod sniff;
 mod stl;
-mod text;
+pub(crate) mod text;
 
 use std::path::Path;
 

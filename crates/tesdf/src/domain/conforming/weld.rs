@@ -22,11 +22,19 @@ fn key(p: DVec3) -> [u64; 3] {
     (p + DVec3::ZERO).to_array().map(f64::to_bits)
 }
 
+/// For each position the first one that is equal to it, bit for bit but for the sign of 0.
+pub(in crate::domain) fn first_at_position(positions: &[DVec3]) -> Vec<u32> {
+    let mut ids = HashMap::with_capacity(positions.len());
+    (0u32..).zip(positions).map(|(id, &p)| *ids.entry(key(p)).or_insert(id)).collect()
+}
+
 pub(super) fn weld(solid: &SolidMesh, tets: &TetMesh) -> Result<Welded, ConformingError> {
     let mut vertices = solid.mesh().vertices().to_vec();
     let mut ids: HashMap<[u64; 3], u32> = HashMap::with_capacity(vertices.len() + tets.vertices().len());
-    let surface: Vec<u32> =
-        (0u32..).zip(&vertices).map(|(id, &p)| *ids.entry(key(p)).or_insert(id)).collect();
+    let surface = first_at_position(&vertices);
+    (0u32..).zip(&surface).filter(|&(id, &first)| id == first).for_each(|(id, _)| {
+        ids.insert(key(vertices[id as usize]), id);
+    });
 
     let mut used = vec![false; tets.vertices().len()];
     tets.tetrahedra().iter().flatten().for_each(|&v| used[v as usize] = true);

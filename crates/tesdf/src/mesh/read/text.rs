@@ -3,7 +3,7 @@ use super::{MeshFormat, Place, ReadError};
 
 /// Lines with their 1-based numbers; ends are LF, CR LF or a lone CR. A UTF-8 byte-order mark at
 /// the start is skipped.
-pub(super) struct Lines<'a> {
+pub(crate) struct Lines<'a> {
     rest: &'a [u8],
     number: u64,
 }
@@ -45,23 +45,23 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-pub(super) fn without_bom(bytes: &[u8]) -> &[u8] {
+pub(crate) fn without_bom(bytes: &[u8]) -> &[u8] {
     bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
 }
 
 /// The words of a line.
-pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     // Vertical tab and form feed are white space to C's isspace, so exporters may write them.
     line.split(|b| b.is_ascii_whitespace() || *b == 0x0B).filter(|w| !w.is_empty())
 }
 
 /// The line up to a `#`.
-pub(super) fn without_comment(line: &[u8]) -> &[u8] {
+pub(crate) fn without_comment(line: &[u8]) -> &[u8] {
     line.split(|b| *b == b'#').next().unwrap_or(line)
 }
 
 /// A word as it is shown in a message: at most 40 characters, control characters escaped.
-pub(super) fn shown(word: &[u8]) -> String {
+pub(crate) fn shown(word: &[u8]) -> String {
     let cut = &word[..word.len().min(40)];
     let dots = if cut.len() < word.len() { "…" } else { "" };
     format!("'{}{dots}'", cut.escape_ascii())

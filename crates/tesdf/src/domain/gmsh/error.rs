@@ -1,0 +1,120 @@
+use std::{fmt, path::PathBuf};
+
+use glam::DVec3;
+
+use super::GmshSettings;
+use crate::domain::{ConformingError, ReadTetrahedraError, TetMeshError};
+
+/// Why Gmsh did not give tetrahedra.
+#[derive(Debug, thiserror::Error)]
+pub enum GmshError {
+    /// The program is not there, or does not start.
+    #[error(
+        "cannot run Gmsh as '{}': {source}. Install it with `pip install gmsh` or `apt install gmsh`, or set TESDF_GMSH to \
+         the path of the program",
+        executable.display()
+    )]
+    NotFound {
+        /// What was started.
+        executable: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The program starts and ends without doing anything.
+    #[error(
+        "Gmsh, run as '{}', does not work: {output}. Install it with `pip install gmsh` and the libraries that it names, or \
+         with `apt install gmsh`, or set TESDF_GMSH to the path of the program",
+        executable.display()
+    )]
+    Broken {
+        /// What was started.
+        executable: PathBuf,
+        /// The end of what it printed.
+        output: String,
+    },
+    /// Files cannot be written to or read from the temporary folder.
+    #[error("cannot use a temporary folder for Gmsh: {0}; set TMPDIR to a folder with space")]
+    Folder(std::io::Error),
+    /// The layer around the solid has no width.
+    #[error(
+        "the band of {width:e} is no layer around a solid with a diagonal of {diagonal:e}; expected a positive length, or no \
+         band"
+    )]
+    Band {
+        /// In the mesh's unit.
+        width: f64,
+        /// Of the solid, in the mesh's unit.
+        diagonal: f64,
+    },
+    /// A region is no box.
+    #[error(
+        "region {index} (0-based) from {min} to {max} is no box; expected finite corners, the lesser first"
+    )]
+    Region {
+        /// Which one.
+        index: usize,
+        /// First corner.
+        min: DVec3,
+        /// Second corner.
+        max: DVec3,
+    },
+    /// No settings gave tetrahedra that conform.
+    #[error("{}", describe(.0))]
+    AllRefused(
+        /// One for each of the settings.
+        Vec<Refused>,
+    ),
+}
+
+/// Settings that did not give tetrahedra that conform.
+#[derive(Debug)]
+pub struct Refused {
+    /// The settings.
+    pub settings: GmshSettings,
+    /// Why.
+    pub because: RefusedBecause,
+}
+
+/// What was wrong.
+#[derive(Debug, thiserror::Error)]
+pub enum RefusedBecause {
+    /// Gmsh gave up.
+    #[error("Gmsh gave no tetrahedra: {0}")]
+    Gmsh(
+        /// The end of what it printed.
+        String,
+    ),
+    /// Gmsh took too long.
+    #[error("Gmsh was stopped after {0:?}")]
+    TimeLimit(
+        /// The limit.
+        std::time::Duration,
+    ),
+    /// Its file cannot be read.
+    #[error(transparent)]
+    Read(ReadTetrahedraError),
+    /// Its tetrahedra are no mesh.
+    #[error(transparent)]
+    Mesh(#[from] TetMeshError),
+    /// Its tetrahedra do not conform to the surface.
+    #[error(transparent)]
+    Gate(#[from] ConformingError),
+}
+
+impl fmt::Display for Refused {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.settings, self.because)
+    }
+}
+
+fn describe(refused: &[Refused]) -> String {
+    if refused.is_empty() {
+        return "no settings for Gmsh to try; expected at least one".to_owned();
+    }
+    let mut text = "Gmsh gave no tetrahedra that conform to the surface:\n".to_owned();
+    for refused in refused {
+        text += &format!("  {refused}\n");
+    }
+    text + "Look at the surface with `tesdf check`, mesh it with another program and give the file, or use the bisection \
+            domain, which needs no mesher"
+}

@@ -1,0 +1,72 @@
+use std::path::PathBuf;
+
+use super::TetFormat;
+use crate::{domain::TetMeshError, mesh::Place};
+
+/// Why a file does not give tetrahedra.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadTetrahedraError {
+    /// A file cannot be read from disk.
+    #[error("cannot read {}: {source}", path.display())]
+    Open {
+        /// The path, for TetGen perhaps that of the other file of the pair.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The extension names no format.
+    #[error(
+        "{}: the extension names no format of tetrahedra that can be read; expected one of {}",
+        path.display(),
+        TetFormat::ALL.map(|f| format!(".{}", f.extension())).join(", ")
+    )]
+    UnknownExtension {
+        /// The path asked for.
+        path: PathBuf,
+    },
+    /// The bytes break the format's rules.
+    #[error("{format}, {place}: {found}; {help}")]
+    Malformed {
+        /// The format.
+        format: TetFormat,
+        /// Where.
+        place: Place,
+        /// What was found there.
+        found: String,
+        /// What is expected, or what to do.
+        help: String,
+    },
+    /// An element has a volume and is no tetrahedron with four corners.
+    #[error(
+        "{format}, {place}: element {element} is {kind}; expected tetrahedra of four vertices: save the mesh in first order, \
+         without hexahedra, prisms and pyramids"
+    )]
+    Element {
+        /// The format.
+        format: TetFormat,
+        /// Where.
+        place: Place,
+        /// The element's number in the file.
+        element: u64,
+        /// What it is, as `a hexahedron`.
+        kind: String,
+    },
+    /// Vertices and tetrahedra do not make a mesh; ids count as in the file's order.
+    #[error("{format}: {source}")]
+    Mesh {
+        /// The format.
+        format: TetFormat,
+        /// What is wrong.
+        source: TetMeshError,
+    },
+}
+
+/// An error about the bytes of one format.
+pub(super) fn malformed(
+    format: TetFormat,
+    place: Place,
+    found: impl Into<String>,
+    help: impl Into<String>,
+) -> ReadTetrahedraError {
+    ReadTetrahedraError::Malformed { format, place, found: found.into(), help: help.into() }
+}

@@ -1,0 +1,163 @@
+//! Arrays of a VTU file: their numbers, whichever way they are written.
+use std::str::FromStr;
+
+use roxmltree::Node;
+
+use super::bytes::{Block, Bytes};
+use super::{Appended, Result, at, child};
+use crate::mesh::text::{shown, words};
+
+/// The numbers of an array.
+pub(super) enum Values {
+    Float(Vec<f64>),
+    Whole(Vec<i64>),
+}
+
+/// What all arrays of a file have in common.
+pub(super) struct Arrays<'a> {
+    appended: Option<(Appended<'a>, Encoding)>,
+    block: Block,
+}
+
+#[derive(Clone, Copy)]
+enum Encoding {
+    Base64,
+    Raw,
+}
+
+impl<'a> Arrays<'a> {
+    pub fn new(root: &Node<'_, '_>, appended: Option<Appended<'a>>) -> Result<Self> {
+        let big_endian = match root.attribute("byte_order") {
+            None | Some("LittleEndian") => false,
+            Some("BigEndian") => true,
+            Some(other) => {
+                return Err(at(root, format!("byte_order '{other}'"), "expected LittleEndian or BigEndian"));
+            }
+        };
+        let word = match root.attribute("header_type") {
+            None | Some("UInt32") => 4,
+            Some("UInt64") => 8,
+            Some(other) => {
+                return Err(at(root, format!("header_type '{other}'"), "expected UInt32 or UInt64"));
+            }
+        };
+        let zlib = match root.attribute("compressor") {
+            None | Some("") => false,
+            Some("vtkZLibDataCompressor") => true,
+            Some(other) => {
+                let help = "expected vtkZLibDataCompressor: save with zlib, or not compressed";
+                return Err(at(root, format!("the compressor '{other}'"), help));
+            }
+        };
+        let appended = match appended {
+            None => None,
+            Some(data) => {
+                let tag = child(root, "AppendedData")?;
+                match tag.attribute("encoding") {
+                    Some("raw") => Some((data, Encoding::Raw)),
+                    None | Some("base64") => Some((data, Encoding::Base64)),
+                    Some(other) => {
+                        return Err(at(&tag, format!("encoding '{other}'"), "expected raw or base64"));
+                    }
+                }
+            }
+        };
+        Ok(Self { appended, block: Block { big_endian, word, zlib } })
+    }
+
+    pub fn read(&self, array: &Node<'_, '_>) -> Result<Values> {
+        let kind = array.attribute("type").unwrap_or_default();
+        let bytes = match array.attribute("format") {
+            Some("ascii") => return ascii(array, kind),
+            Some("binary") => {
+                let text = array.text().unwrap_or_default().as_bytes();
+                self.block.read(Bytes::base64(text), |found, help| at(array, found, help))?
+            }
+            Some("appended") => {
+                let Some((data, encoding)) = self.appended else {
+                    return Err(at(
+                        array,
+                        "an appended array, but no AppendedData",
+                        "is the file cut short?",
+                    ));
+                };
+                let offset = array.attribute("offset").unwrap_or_default();
+                let place = offset.trim().parse().ok().and_then(|n: usize| Some((n, data.bytes.get(n..)?)));
+                let Some((offset, rest)) = place else {
+                    let found = format!("offset=\"{offset}\"");
+                    let help = format!("expected at most {}: is the file cut short?", data.bytes.len());
+                    return Err(at(array, found, help));
+                };
+                let start = data.start + offset;
+                let bytes = match encoding {
+                    Encoding::Raw => Bytes::Raw(rest),
+                    Encoding::Base64 => Bytes::base64(rest),
+                };
+                let error = |found: String, help: &str| at(array, format!("at byte {start}: {found}"), help);
+                self.block.read(bytes, error)?
+            }
+            other => {
+                let found = format!("the format '{}'", other.unwrap_or_default());
+                return Err(at(array, found, "expected ascii, binary or appended"));
+            }
+        };
+        self.numbers(array, kind, bytes)
+    }
+
+    fn numbers(&self, array: &Node<'_, '_>, kind: &str, bytes: Vec<u8>) -> Result<Values> {
+        let big = self.block.big_endian;
+        macro_rules! numbers {
+            ($t:ty) => {{
+                const N: usize = size_of::<$t>();
+                if bytes.len() % N != 0 {
+                    let found = format!("{} bytes of {kind}", bytes.len());
+                    return Err(at(array, found, format!("expected a multiple of {N}")));
+                }
+                let number = |chunk: &[u8]| {
+                    let chunk: [u8; N] = std::array::from_fn(|i| chunk[i]);
+                    if big { <$t>::from_be_bytes(chunk) } else { <$t>::from_le_bytes(chunk) }
+                };
+                bytes.chunks_exact(N).map(number)
+            }};
+        }
+        Ok(match kind {
+            "Float32" => Values::Float(numbers!(f32).map(f64::from).collect()),
+            "Float64" => Values::Float(numbers!(f64).collect()),
+            "Int8" => Values::Whole(numbers!(i8).map(i64::from).collect()),
+            "UInt8" => Values::Whole(numbers!(u8).map(i64::from).collect()),
+            "Int16" => Values::Whole(numbers!(i16).map(i64::from).collect()),
+            "UInt16" => Values::Whole(numbers!(u16).map(i64::from).collect()),
+            "Int32" => Values::Whole(numbers!(i32).map(i64::from).collect()),
+            "UInt32" => Values::Whole(numbers!(u32).map(i64::from).collect()),
+            // Ids beyond 63 bits become negative, and are refused as ids.
+            "Int64" | "UInt64" => Values::Whole(numbers!(i64).collect()),
+            _ => return Err(unknown(array, kind)),
+        })
+    }
+}
+
+fn unknown(array: &Node<'_, '_>, kind: &str) -> super::ReadTetrahedraError {
+    at(array, format!("the type '{kind}'"), "expected Float32, Float64, or a type such as Int32")
+}
+
+fn ascii(array: &Node<'_, '_>, kind: &str) -> Result<Values> {
+    let text = array.text().unwrap_or_default();
+    if kind.starts_with("Float") {
+        Ok(Values::Float(parse(array, text)?))
+    } else if kind.starts_with("Int") || kind.starts_with("UInt") {
+        Ok(Values::Whole(parse(array, text)?))
+    } else {
+        Err(unknown(array, kind))
+    }
+}
+
+fn parse<T: FromStr>(array: &Node<'_, '_>, text: &str) -> Result<Vec<T>> {
+    let number = |word: &[u8]| {
+        let parsed = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
+        parsed.ok_or_else(|| {
+            let name = array.attribute("Name").unwrap_or("Points");
+            at(array, format!("{} in the array {name}", shown(word)), "expected numbers of its type")
+        })
+    };
+    words(text.as_bytes()).map(number).collect()
+}

@@ -1,0 +1,120 @@
+//! The bytes of an array: base64 or raw, with a header of sizes, perhaps compressed.
+use std::io::Read;
+
+use base64::{Engine, prelude::BASE64_STANDARD};
+use flate2::read::ZlibDecoder;
+
+use super::Result;
+use crate::domain::read::ReadTetrahedraError;
+
+/// Where bytes come from.
+pub(super) enum Bytes<'a> {
+    Raw(&'a [u8]),
+    /// Base64, in parts: what follows padding is a part of its own, as VTK encodes sizes and data apart.
+    Base64 {
+        text: &'a [u8],
+        decoded: Vec<u8>,
+    },
+}
+
+impl<'a> Bytes<'a> {
+    pub fn base64(text: &'a [u8]) -> Self {
+        Self::Base64 { text, decoded: Vec::new() }
+    }
+
+    /// The next `count` bytes, `None` when there are not so many or they are not base64.
+    fn take(&mut self, count: usize) -> Option<Vec<u8>> {
+        match self {
+            Self::Raw(rest) => {
+                let (taken, left) = rest.split_at_checked(count)?;
+                *rest = left;
+                Some(taken.to_vec())
+            }
+            Self::Base64 { text, decoded } => {
+                while decoded.len() < count {
+                    let part = next_part(text, count - decoded.len())?;
+                    decoded.extend(BASE64_STANDARD.decode(part).ok()?);
+                }
+                let left = decoded.split_off(count);
+                Some(std::mem::replace(decoded, left))
+            }
+        }
+    }
+}
+
+/// Characters that encode at least `count` bytes, or fewer up to padding or the end; whole groups of four.
+fn next_part(text: &mut &[u8], count: usize) -> Option<Vec<u8>> {
+    let wanted = count.div_ceil(3).checked_mul(4)?;
+    let mut part = Vec::new();
+    while let [first, rest @ ..] = *text {
+        if part.len() % 4 == 0 && (part.len() >= wanted || part.last() == Some(&b'=')) {
+            break;
+        }
+        *text = rest;
+        if !first.is_ascii_whitespace() {
+            part.push(*first);
+        }
+    }
+    (!part.is_empty()).then_some(part)
+}
+
+/// How arrays are stored in bytes.
+#[derive(Clone, Copy)]
+pub(super) struct Block {
+    pub big_endian: bool,
+    /// Bytes of a size: 4 or 8.
+    pub word: usize,
+    pub zlib: bool,
+}
+
+const CUT: &str = "is the file cut short?";
+
+impl Block {
+    /// The bytes of an array. `error` makes an error of what was found and a hint.
+    pub fn read(
+        &self,
+        mut bytes: Bytes<'_>,
+        error: impl Fn(String, &str) -> ReadTetrahedraError,
+    ) -> Result<Vec<u8>> {
+        let size = |bytes: &mut Bytes<'_>| -> Result<usize> {
+            let word = bytes
+                .take(self.word)
+                .ok_or_else(|| error("the size of an array is not there".into(), CUT))?;
+            let value = word.iter().enumerate().fold(0u64, |value, (i, &b)| {
+                let place = if self.big_endian { self.word - 1 - i } else { i };
+                value | u64::from(b) << (8 * place)
+            });
+            usize::try_from(value).map_err(|_| error(format!("an array of {value} bytes"), CUT))
+        };
+        let take = |bytes: &mut Bytes<'_>, count: usize| {
+            bytes
+                .take(count)
+                .ok_or_else(|| error(format!("an array of {count} bytes, but not so many are there"), CUT))
+        };
+        let first = size(&mut bytes)?;
+        if !self.zlib {
+            return take(&mut bytes, first);
+        }
+        let (whole, last) = (size(&mut bytes)?, size(&mut bytes)?);
+        let mut sizes = Vec::new();
+        for _ in 0..first {
+            sizes.push(size(&mut bytes)?);
+        }
+        let mut out = Vec::new();
+        for (block, &compressed) in sizes.iter().enumerate() {
+            let expected = if block + 1 == first && last != 0 { last } else { whole };
+            let before = out.len();
+            let packed = take(&mut bytes, compressed)?;
+            // One byte more than expected shows that there are too many, and no more are unpacked.
+            let mut unpacked = ZlibDecoder::new(packed.as_slice()).take((expected as u64).saturating_add(1));
+            unpacked
+                .read_to_end(&mut out)
+                .map_err(|e| error(format!("block {block} does not unpack: {e}"), CUT))?;
+            if out.len() - before != expected {
+                let found = format!("block {block} unpacks to {} bytes", out.len() - before);
+                return Err(error(found, "expected as many as the header says: is the file damaged?"));
+            }
+        }
+        Ok(out)
+    }
+}
