@@ -1,21 +1,24 @@
 //! `tesdf encode MESH -o FILE`
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use clap::ValueEnum;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::asset::about::{Certificate, Source, Statistics};
-use tesdf::encode::{EncodeError, EncodeOptions, EncodeProgress, Length, encode};
+use tesdf::encode::{Domain, EncodeError, EncodeOptions, EncodeProgress, Threshold, encode_in};
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 
 use crate::progress::{interrupt_flag, watched};
 use crate::report::{self, Failure, Outcome};
 use crate::{mesh_file, parse};
+
+mod choices;
+
+pub use choices::{DomainChoice, EncoderChoice, Preset};
 
 /// Arguments of `tesdf encode`.
 #[derive(clap::Args, Debug)]
@@ -25,15 +28,31 @@ pub struct Args {
     /// The file to write; an existing one is replaced
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// How the space in and around the solid is cut into tetrahedra
-    #[arg(long, value_enum, default_value_t = Domain::Bisection)]
-    pub domain: Domain,
-    /// How the closest faces of each tetrahedron are found
-    #[arg(long, value_enum, default_value_t = Encoder::Certified)]
-    pub encoder: Encoder,
-    /// A point on the curve of memory and speed; all are exact
+    /// How the space in and around the solid is cut into tetrahedra: `bisection` needs nothing else, `gmsh` runs Gmsh, a FILE (.msh, .node,
+    /// .ele, .vtu) has tetrahedra whose sides are the mesh's faces
+    #[arg(long, value_name = "bisection|gmsh|FILE", default_value = "bisection")]
+    pub domain: DomainChoice,
+    /// How the closest faces of each tetrahedron are found [default: certified, or that of the preset]
+    #[arg(long, value_enum)]
+    pub encoder: Option<EncoderChoice>,
+    /// A point on the curve of memory and speed
     #[arg(long, value_enum, default_value_t = Preset::Default)]
     pub preset: Preset,
+    /// Samples along an edge of a tetrahedron, less one [default: 32]
+    #[arg(long, value_name = "Q")]
+    pub resolution: Option<u32>,
+    /// How much farther than the closest face a listed one may be at a sample: a length, or `safe` for so much that nothing is missing
+    #[arg(long, value_name = "LENGTH|safe", value_parser = choices::threshold)]
+    pub threshold: Option<Threshold>,
+    /// Cut lists to this many faces, those that are needed nearest to the surface
+    #[arg(long, value_name = "N")]
+    pub e_max: Option<NonZeroU32>,
+    /// Make lists ready for moving vertices; needs a conforming domain
+    #[arg(long)]
+    pub deformable: bool,
+    /// Leave the tetrahedra of a conforming domain as they are, instead of bisecting them where that pays
+    #[arg(long)]
+    pub plain: bool,
     /// Width of the band around the mesh's box that is encoded too, mesh unit [default: 5 % of its diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = parse::length, allow_hyphen_values = true)]
     pub band: Option<f64>,
@@ -49,57 +68,6 @@ pub struct Args {
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
-}
-
-/// Ways to cut space into tetrahedra.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Domain {
-    /// Cubes and their halves, finer near the surface; no other program is needed
-    Bisection,
-}
-
-/// Ways to find the closest faces of a tetrahedron.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Encoder {
-    /// Proven: no face that can be closest is left out
-    Certified,
-}
-
-/// Points on the curve of memory and speed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Preset {
-    /// Fast queries
-    Default,
-    /// Quickest to encode
-    Fast,
-    /// Smallest
-    Compact,
-}
-
-impl From<Preset> for tesdf::encode::Preset {
-    fn from(preset: Preset) -> Self {
-        match preset {
-            Preset::Default => Self::Default,
-            Preset::Fast => Self::Fast,
-            Preset::Compact => Self::Compact,
-        }
-    }
-}
-
-impl Args {
-    /// What the library is asked for.
-    pub fn options(&self) -> EncodeOptions {
-        // The library has one of each so far; a second one makes these patterns an error.
-        let (Domain::Bisection, Encoder::Certified) = (self.domain, self.encoder);
-        let mut options = EncodeOptions::preset(self.preset.into());
-        if let Some(band) = self.band {
-            options.band = Length::Absolute(band);
-        }
-        let numbers = |r: &Aabb| [r.min.x, r.min.y, r.min.z, r.max.x, r.max.y, r.max.z];
-        options.regions = self.regions.iter().map(numbers).collect();
-        options.unit.clone_from(&self.unit);
-        options
-    }
 }
 
 fn exactness(certificate: &Certificate) -> String {
@@ -151,9 +119,12 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let source = Source { name, blake3: load.source_blake3.clone() };
     let interrupted = interrupt_flag()?;
     let progress = EncodeProgress::default();
-    let options = args.options();
-    let encoded =
-        watched(&progress, &interrupted, || pool.install(|| encode(&solid, &source, &options, &progress)));
+    let options = args.options().map_err(Failure::new)?;
+    let conforming = pool.install(|| args.domain.tetrahedra(&solid, args))?;
+    let domain = conforming.as_ref().map_or(Domain::Bisection, Domain::Conforming);
+    let encoded = watched(&progress, &interrupted, || {
+        pool.install(|| encode_in(&solid, domain, &source, &options, &progress))
+    });
     let asset: TeSdf = match encoded {
         Ok(asset) if !interrupted.load(Ordering::Relaxed) => asset,
         Ok(_) | Err(EncodeError::Cancelled) => {

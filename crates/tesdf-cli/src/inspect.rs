@@ -62,7 +62,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 
 fn rows(report: &Report) -> Vec<(String, String)> {
     let Report { source, options, certificate, statistics, .. } = report;
-    let Inspection { counts, lists, reads, memory } = report.found;
+    let Inspection { counts, classes, lists, reads, memory } = report.found;
     let unit = report.unit.map_or(String::new(), |unit| format!(" {unit}"));
     let percent = |share: f64| format!("{:.2} %", 100.0 * share);
     let yes_no = |b: bool| if b { "yes" } else { "no" };
@@ -104,6 +104,19 @@ fn rows(report: &Report) -> Vec<(String, String)> {
         ),
         ("", String::new()),
     ];
+    if let Some(c) = classes {
+        let [surface, inner, outer] = [c.surface_vertices, c.inner_vertices, c.outer_vertices];
+        let vertices = format!("{surface} of the surface, {inner} inside, {outer} outside");
+        let [bi, i, bo, o] = [
+            c.boundary_inner_tetrahedra,
+            c.inner_tetrahedra,
+            c.boundary_outer_tetrahedra,
+            c.outer_tetrahedra,
+        ];
+        let tetrahedra =
+            format!("inside {bi} at the boundary and {i} others, outside {bo} at the boundary and {o} others");
+        rows.extend([("domain's vertices", vertices), ("tetrahedra", tetrahedra), ("", String::new())]);
+    }
     let mut bytes: Vec<(&str, String)> =
         memory.parts.iter().map(|(name, bytes)| (name.as_str(), format!("{bytes:>12} B"))).collect();
     bytes.push(("file in all", format!("{:>12} B  {}", memory.file, size(memory.file))));

@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use crate::TeSdf;
 use crate::asset::CellView;
+use crate::domain::Classes;
 use crate::geometry::{Aabb, Triangle, tetrahedron_volume};
 use crate::sampling::{Random, Weighted};
 
@@ -28,6 +29,8 @@ impl Default for InspectOptions {
 pub struct Inspection {
     /// How many there are of what.
     pub counts: Counts,
+    /// Of a conforming domain: how many there are of each class.
+    pub classes: Option<Classes>,
     /// Lengths of the lists, each cell counted once.
     pub lists: ListLengths,
     /// What queries read.
@@ -152,7 +155,8 @@ pub fn inspect(asset: &TeSdf, options: &InspectOptions) -> Inspection {
         fallback,
         samples: options.samples,
     };
-    Inspection { memory: memory(asset, &counts), lists: list_lengths(lengths), reads, counts }
+    let classes = asset.classes();
+    Inspection { classes, memory: memory(asset, &counts), lists: list_lengths(lengths), reads, counts }
 }
 
 fn list_lengths(mut lengths: Vec<usize>) -> ListLengths {

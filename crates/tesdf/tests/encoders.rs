@@ -52,6 +52,7 @@ fn a_conforming_domain_is_exact_plain_or_bisected() {
         let plain = statistics.listed_cells == conforming.tetrahedra().len();
         assert_eq!(plain, refinement == Refinement::None);
         assert_eq!((statistics.far_cells, statistics.outside_cells, statistics.crossing_cells), (0, 0, 0));
+        assert_eq!(asset.classes(), Some(conforming.classes()));
         // All of the grid is the domain, and nothing else.
         assert!((statistics.domain_volume - 216.0).abs() < 20.0);
         assert!(asset.query_in_domain(DVec3::splat(-1.0), Precision::F64).is_none());

@@ -1,9 +1,9 @@
 use glam::DVec3;
 
-use super::layout::{DOMAIN_VERTICES, TETRAHEDRA};
+use super::layout::{DOMAIN_VERTICES, Label, Node, Side, TETRAHEDRA};
 use super::{AssetError, SharedSection, TeSdf};
 use crate::deform::Incidence;
-use crate::domain::Cell;
+use crate::domain::{Cell, Classes};
 use crate::geometry::{Aabb, AabbTree, barycentric};
 
 /// The tetrahedra of a conforming domain, each the root of a bisection tree, and a tree of boxes that finds them.
@@ -113,6 +113,44 @@ impl Conforming {
 }
 
 impl TeSdf {
+    /// How many vertices and tetrahedra of a conforming domain there are of each class (Sec. III-A); `None` for the bisection domain.
+    pub fn classes(&self) -> Option<Classes> {
+        let domain = self.conforming.as_ref()?;
+        let of_surface = |v: u32| (v as usize) < self.vertices.len();
+        let mut classes = Classes::default();
+        let mut counted = vec![false; self.vertices.len() + domain.vertices.len()];
+        for (root, corners) in domain.tetrahedra.iter().enumerate() {
+            let at_boundary = corners.iter().any(|&v| of_surface(v));
+            let (vertices, tetrahedra) = match (self.side_of_root(root), at_boundary) {
+                (Side::Inside, true) => (&mut classes.inner_vertices, &mut classes.boundary_inner_tetrahedra),
+                (Side::Inside, false) => (&mut classes.inner_vertices, &mut classes.inner_tetrahedra),
+                (Side::Outside, true) => {
+                    (&mut classes.outer_vertices, &mut classes.boundary_outer_tetrahedra)
+                }
+                (Side::Outside, false) => (&mut classes.outer_vertices, &mut classes.outer_tetrahedra),
+            };
+            *tetrahedra += 1;
+            for &v in corners {
+                if !std::mem::replace(&mut counted[v as usize], true) {
+                    *(if of_surface(v) { &mut classes.surface_vertices } else { &mut *vertices }) += 1;
+                }
+            }
+        }
+        Some(classes)
+    }
+
+    /// All cells of a root are on its side.
+    fn side_of_root(&self, root: usize) -> Side {
+        let mut word = self.nodes[root];
+        loop {
+            match Node::decode(word, &self.lists) {
+                Node::Split(children) => word = self.nodes[children as usize],
+                Node::Listed(Label::Inside, _) | Node::Far(Side::Inside) => return Side::Inside,
+                Node::Listed(..) | Node::Far(Side::Outside) | Node::NotOfDomain => return Side::Outside,
+            }
+        }
+    }
+
     /// Number of tetrahedra that the bisection forest grows from.
     pub(crate) fn root_count(&self) -> usize {
         self.conforming.as_ref().map_or(6, |domain| domain.tetrahedra.len())
