@@ -113,8 +113,9 @@ fn rows(report: &Report) -> Vec<(String, String)> {
             c.boundary_outer_tetrahedra,
             c.outer_tetrahedra,
         ];
-        let tetrahedra =
-            format!("inside {bi} at the boundary and {i} others, outside {bo} at the boundary and {o} others");
+        let tetrahedra = format!(
+            "inside {bi} at the boundary and {i} others, outside {bo} at the boundary and {o} others"
+        );
         rows.extend([("domain's vertices", vertices), ("tetrahedra", tetrahedra), ("", String::new())]);
     }
     let mut bytes: Vec<(&str, String)> =

@@ -111,7 +111,10 @@ impl Args {
         let sampled = Sampling { resolution: RESOLUTION, ..Sampling::PAPER };
         let sampling = match (self.encoder, of_preset) {
             (Some(EncoderChoice::Certified), Some(_)) => {
-                return Err("--encoder certified: the preset is one of the sampled encoder; leave one of them out".into());
+                return Err(
+                    "--encoder certified: the preset is one of the sampled encoder; leave one of them out"
+                        .into(),
+                );
             }
             (None, None) | (Some(EncoderChoice::Certified), None) => None,
             (Some(EncoderChoice::Sampled), None) => Some(sampled),
@@ -126,13 +129,18 @@ impl Args {
                 });
             }
             None if self.resolution.is_some() || self.threshold.is_some() => {
-                return Err("--resolution and --threshold are of the sampled encoder; add --encoder sampled".into());
+                return Err(
+                    "--resolution and --threshold are of the sampled encoder; add --encoder sampled".into()
+                );
             }
             None => {}
         }
         options.refinement = match (&self.domain, self.plain) {
             (DomainChoice::Bisection, true) => {
-                return Err("--plain: the bisection domain is nothing but bisections; give --domain gmsh or a FILE".into());
+                return Err(
+                    "--plain: the bisection domain is nothing but bisections; give --domain gmsh or a FILE"
+                        .into(),
+                );
             }
             (DomainChoice::Bisection, false) => Refinement::ByCost,
             (_, true) => Refinement::None,

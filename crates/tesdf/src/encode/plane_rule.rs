@@ -5,8 +5,11 @@ use glam::DVec3;
 use super::candidates::{Candidates, GRADIENT};
 use super::doubles::{Doubles, GROUP, Vector, dispatch};
 use super::filter::visit_members;
-use super::surface::Surface;
+use super::surface::{Surface, Touching};
 use crate::domain::Cell;
+
+/// Share of the margin within which a corner is on a face: rounding of the distance to a face that it is on.
+const TIE: f64 = 0.25;
 
 /// At most this many faces stand against each candidate; the nearest ones.
 const MAX_RIVALS: usize = 96;
@@ -79,6 +82,8 @@ pub struct PlaneRule<'a> {
     margin: f64,
     /// The margin times the width of the cell.
     turn: f64,
+    /// Faces this near to a corner share it; negative where ties are left alone.
+    tie: f64,
     rivals: Chords<'a>,
 }
 
@@ -99,6 +104,11 @@ impl<'a> PlaneRule<'a> {
             offsets: [cell.centroid(), a, b, c, d].map(|at| cell.corners.map(|c| c - at)),
             margin: surface.margin,
             turn: surface.margin * cell.width(),
+            tie: match surface.touching {
+                // Faces that touch the cell are listed whatever this rule says.
+                Touching::Kept => -1.0,
+                Touching::Ignored => TIE * surface.margin,
+            },
             rivals,
         }
     }
@@ -109,6 +119,9 @@ impl<'a> PlaneRule<'a> {
     /// rounding of the closest point over the distance, so the bound is lowered by as much times the width of the cell,
     /// and once more by the margin that the rule asks for. A candidate is beaten when some rival's chord lies below one
     /// of its tangents at all four corners.
+    ///
+    /// Where a corner of the cell is on both faces, both distances are 0 there and no margin is to be had. The margin at the
+    /// other corners is enough: the tangent may pass the shared corner at 0 (docs/math.md, 4).
     pub fn judge(&self, isa: crate::query::Isa, alive: &[u8], near: &[u8], verdict: &mut Verdict) {
         if verdict.low.len() < self.stride {
             verdict.low.resize(self.stride, 0.0);
@@ -158,6 +171,11 @@ fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut 
         let c = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_c))));
         let d = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_d))));
         highest = highest.max(a.min(b).min(c.min(d)));
+        let raised = margin.add(L::splat(rule.turn).div(distance));
+        let a = at_tie(rule, at, 1, a, raised);
+        let b = at_tie(rule, at, 2, b, raised);
+        let c = at_tie(rule, at, 3, c, raised);
+        let d = at_tie(rule, at, 4, d, raised);
         let first = L::both(a.at_least(L::splat(least[0])), b.at_least(L::splat(least[1])));
         let second = L::both(c.at_least(L::splat(least[2])), d.at_least(L::splat(least[3])));
         let mut open = L::bits(L::both(first, second)) & in_question & !beaten;
@@ -171,12 +189,23 @@ fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut 
                 let lane = open.trailing_zeros() as usize;
                 open &= open - 1;
                 let t = [values[0][lane], values[1][lane], values[2][lane], values[3][lane]];
-                beaten |= u8::from(any_below::<L>(&rule.rivals.rows, t)) << lane;
+                // A cell that is no thicker than the tie tells nothing apart.
+                let tied = t[0] == rule.tie && t[1] == rule.tie && t[2] == rule.tie && t[3] == rule.tie;
+                beaten |= u8::from(!tied && any_below::<L>(&rule.rivals.rows, t)) << lane;
             }
         }
     }
     highest.store(low, at);
     beaten
+}
+
+/// The value of a tangent at a corner that the candidates may be on: not below 0 there, before it was lowered, is enough.
+#[inline(always)]
+fn at_tie<L: Doubles>(rule: &PlaneRule, at: usize, corner: usize, value: L, lowered_by: L) -> L {
+    let tie = L::splat(rule.tie);
+    let shares = tie.at_least(L::load(rule.seen[corner], at));
+    let passes = value.add(lowered_by).at_least(L::splat(-rule.margin));
+    L::select(L::both(shares, passes), tie, value)
 }
 
 /// Whether some chord lies below all four values.

@@ -30,7 +30,7 @@ fn radius(cell: &Cell) -> f64 {
     cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max)
 }
 
-/// No point of the cell is farther than this from a point of the grid (docs/math.md, 15).
+/// No point of the cell is farther than this from a point of the grid (docs/math.md, 3).
 pub fn covering_radius(cell: &Cell, sampling: &Sampling) -> f64 {
     let grid = 0.75f64.sqrt() * sampling.shrink * cell.width() / f64::from(sampling.resolution);
     grid + (1.0 - sampling.shrink) * radius(cell)
