@@ -109,15 +109,15 @@ impl<'a> Arrays<'a> {
         macro_rules! numbers {
             ($t:ty) => {{
                 const N: usize = size_of::<$t>();
-                if bytes.len() % N != 0 {
+                let (chunks, left) = bytes.as_chunks::<N>();
+                if !left.is_empty() {
                     let found = format!("{} bytes of {kind}", bytes.len());
                     return Err(at(array, found, format!("expected a multiple of {N}")));
                 }
-                let number = |chunk: &[u8]| {
-                    let chunk: [u8; N] = std::array::from_fn(|i| chunk[i]);
+                let number = |&chunk: &[u8; N]| {
                     if big { <$t>::from_be_bytes(chunk) } else { <$t>::from_le_bytes(chunk) }
                 };
-                bytes.chunks_exact(N).map(number)
+                chunks.iter().map(number)
             }};
         }
         Ok(match kind {
