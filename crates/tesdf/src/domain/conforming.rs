@@ -12,7 +12,7 @@ use crate::{asset::layout::Side, geometry::orientation, mesh::SolidMesh};
 pub use error::{ConformingError, MissingFace};
 use triangles::Triangle;
 use weld::Welded;
-pub(super) use weld::first_at_position;
+pub(super) use {triangles::sides_of, weld::first_at_position};
 
 /// A tetrahedralisation that conforms to a solid's surface: each face is a side of tetrahedra, and none passes through one.
 ///

@@ -183,7 +183,8 @@ impl Layers {
         let mut boxes = Vec::new();
         for (index, &[a, b, c, d, e, f]) in options.regions.iter().enumerate() {
             let region = Aabb { min: DVec3::new(a, b, c), max: DVec3::new(d, e, f) };
-            if !region.min.cmplt(region.max).all() || !(region.min.is_finite() && region.max.is_finite()) {
+            let is_finite = region.min.is_finite() && region.max.is_finite();
+            if !(is_finite && region.min.cmplt(region.max).all()) {
                 return Err(GmshError::Region { index, min: region.min, max: region.max });
             }
             boxes.push(region);

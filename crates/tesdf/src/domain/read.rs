@@ -137,3 +137,127 @@ fn beside(path: &Path, format: TetFormat) -> PathBuf {
     let extension = format.extension();
     path.with_extension(if upper { extension.to_uppercase() } else { extension.to_owned() })
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    macro_rules! golden {
+        ($parse:expr, $($name:literal),*) => {
+            vec![$(($name, &include_bytes!(concat!("../../tests/data/tetrahedra/", $name))[..], $parse)),*]
+        };
+    }
+
+    type Parse = fn(&[u8]) -> Result<Parsed, ReadTetrahedraError>;
+
+    const NODE: &[u8] = b"# a comment\n5 3 1 1\n1 0 0 0 9 1\n2 1 0 0 9 1\n3 0 1 0 9 1 # another\n\n4 0 0 1 9 1\n5 1 1 1 9 0\n";
+    const ELE: &[u8] = b"2 4 1\n1 1 2 3 4 7\n2 2 3 4 5 7\n";
+
+    fn samples() -> Vec<(&'static str, &'static [u8], Parse)> {
+        let mut all = golden!(
+            gmsh::parse as Parse,
+            "v22.msh",
+            "v22_binary.msh",
+            "v41.msh",
+            "v41_binary.msh",
+            "v41_parametric.msh",
+            "v41_binary_parametric.msh"
+        );
+        all.extend(golden!(
+            vtu::parse as Parse,
+            "ascii.vtu",
+            "base64.vtu",
+            "base64_zlib.vtu",
+            "base64_u64_big_endian.vtu",
+            "appended_base64.vtu",
+            "appended_base64_zlib.vtu",
+            "appended_raw.vtu",
+            "appended_raw_zlib.vtu",
+            "meshio.vtu"
+        ));
+        all.push(("node", NODE, |bytes| tetgen::parse(bytes, ELE)));
+        all.push(("ele", ELE, |bytes| tetgen::parse(NODE, bytes)));
+        all
+    }
+
+    /// What a parser gives is sound whatever it read.
+    fn assert_sound(name: &str, bytes: &[u8], result: &Result<Parsed, ReadTetrahedraError>) {
+        match result {
+            Ok(parsed) => {
+                // Deflate packs at most 1032 to 1.
+                assert!(parsed.vertices.len() + parsed.tetrahedra.len() <= 1032 * bytes.len(), "{name}");
+                let corners = parsed.tetrahedra.iter().flatten();
+                assert!(corners.into_iter().all(|&v| (v as usize) < parsed.vertices.len()), "{name}");
+                assert!(parsed.vertices.iter().all(|p| p.is_finite()), "{name}");
+            }
+            Err(error) => assert!(error.to_string().len() > 20, "{name}: {error}"),
+        }
+    }
+
+    /// A file that is cut short is refused, or all of it is there but for what has no numbers.
+    #[test]
+    fn prefixes_are_refused() {
+        for (name, bytes, parse) in samples() {
+            let whole = parse(bytes).unwrap();
+            let is_text = matches!(name, "node" | "ele");
+            // Of a number at the end of a text any beginning is a number.
+            for end in (0..bytes.len()).filter(|&end| !is_text || bytes[end] == b'\n') {
+                let result = parse(&bytes[..end]);
+                assert_sound(name, bytes, &result);
+                if let Ok(part) = result {
+                    assert_eq!(part.tetrahedra, whole.tetrahedra, "{name}: the first {end} bytes");
+                    assert_eq!(part.vertices, whole.vertices, "{name}: the first {end} bytes");
+                    assert!(end + 40 > bytes.len(), "{name}: the first {end} bytes");
+                }
+            }
+        }
+    }
+
+    /// Any count may be anything: nothing is allocated for it.
+    #[test]
+    fn counts_allocate_nothing() {
+        for (name, bytes, parse) in samples() {
+            for huge in ["4294967295", "18446744073709551615", "-1"] {
+                // Every whole number of a text, one at a time.
+                let is_digit = |i: usize| bytes.get(i).is_some_and(u8::is_ascii_digit);
+                let starts =
+                    (0..bytes.len().min(700)).filter(|&i| is_digit(i) && (i == 0 || !is_digit(i - 1)));
+                for start in starts {
+                    let length = bytes[start..].iter().take_while(|b| b.is_ascii_digit()).count();
+                    let changed = [&bytes[..start], huge.as_bytes(), &bytes[start + length..]].concat();
+                    assert_sound(name, &changed, &parse(&changed));
+                }
+            }
+            // Every byte of a binary number.
+            for at in 0..bytes.len().saturating_sub(8).min(800) {
+                let mut changed = bytes.to_vec();
+                changed[at..at + 8].fill(0x7f);
+                assert_sound(name, &changed, &parse(&changed));
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(1000))]
+        #[test]
+        fn flipped_bytes_never_panic(
+            sample in 0..17usize,
+            changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..4u8), 1..6),
+        ) {
+            let (name, bytes, parse) = samples()[sample];
+            let mut changed = bytes.to_vec();
+            for (at, byte, kind) in changes {
+                let at = at.index(changed.len());
+                match kind {
+                    0 => changed[at] = byte,
+                    1 => changed[at] ^= 1 << (byte % 8),
+                    2 => changed.insert(at, byte),
+                    _ => drop(changed.remove(at)),
+                }
+            }
+            assert_sound(name, &changed, &parse(&changed));
+        }
+    }
+}

@@ -1,4 +1,12 @@
+use std::collections::HashMap;
+
 use glam::DVec3;
+
+use super::conforming::sides_of;
+use crate::{
+    geometry::orientation,
+    mesh::{MeshError, TriangleMesh},
+};
 
 /// Tetrahedra as they come from a mesher: positions and corner ids.
 ///
@@ -91,6 +99,42 @@ impl TetMesh {
         &self.tetrahedra
     }
 
+    /// The outer boundary: sides that one tetrahedron alone has, outward, in the order of the tetrahedra.
+    ///
+    /// For tetrahedra that fill a solid, as those of a finite-element mesh, this is the surface that they conform to. Its
+    /// vertices are those that it uses, in the order of this mesh.
+    ///
+    /// # Errors
+    /// [`MeshError::Empty`] when no side is on a boundary.
+    pub fn surface(&self) -> Result<TriangleMesh, MeshError> {
+        let outward = |t: usize| {
+            let [a, b, c, d] = self.tetrahedra[t];
+            let [p, q, r, s] = self.corners(t);
+            sides_of(if orientation(p, q, r, s) > 0 { [a, b, d, c] } else { [a, b, c, d] })
+        };
+        let ascending = |mut side: [u32; 3]| {
+            side.sort_unstable();
+            side
+        };
+        let mut users: HashMap<[u32; 3], u32> = HashMap::new();
+        for side in (0..self.tetrahedra.len()).flat_map(outward) {
+            *users.entry(ascending(side)).or_default() += 1;
+        }
+        let mut faces: Vec<[u32; 3]> = (0..self.tetrahedra.len())
+            .flat_map(outward)
+            .filter(|&side| users[&ascending(side)] == 1)
+            .collect();
+        let mut ids = vec![u32::MAX; self.vertices.len()];
+        faces.iter().flatten().for_each(|&v| ids[v as usize] = 0);
+        let mut vertices = Vec::new();
+        for (id, &p) in ids.iter_mut().zip(&self.vertices).filter(|(id, _)| **id == 0) {
+            *id = vertices.len() as u32;
+            vertices.push(p);
+        }
+        faces.iter_mut().flatten().for_each(|v| *v = ids[*v as usize]);
+        TriangleMesh::new(vertices, faces)
+    }
+
     /// Corner positions of a tetrahedron.
     ///
     /// # Panics
@@ -103,6 +147,22 @@ impl TetMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Two tetrahedra, one of them in negative order: six sides, outward.
+    #[test]
+    fn the_surface_is_outward() {
+        let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::splat(9.0), DVec3::Y, DVec3::Z, DVec3::ONE];
+        let mesh = TetMesh::new(vertices, vec![[0, 1, 3, 4], [1, 3, 5, 4]]).unwrap();
+        let surface = mesh.surface().unwrap();
+        assert_eq!((surface.vertices().len(), surface.faces().len()), (5, 6));
+        let center = 0.25 * (DVec3::X + DVec3::Y + DVec3::Z + DVec3::splat(0.3));
+        for face in 0..6 {
+            let [a, b, c] = surface.triangle(face);
+            assert!((b - a).cross(c - a).dot(a - center) > 0.0);
+        }
+        let report = crate::mesh::check(&surface);
+        assert!(report.is_simple(), "{report}");
+    }
 
     #[test]
     fn errors_name_what_is_at_fault() {

@@ -183,11 +183,11 @@ impl MissingFace {
         match self {
             Self::Split { .. } => {
                 "Faces cut into coplanar parts are not supported: keep the mesher from adding vertices to the surface \
-                 (TetGen: -Y), or encode the surface of the tetrahedra instead"
+                 (TetGen: -Y), or encode the surface of the tetrahedra, `TetMesh::surface`"
             }
             Self::Recut => {
                 "Keep the mesher from changing the surface (TetGen: -Y), remove self-intersections, or encode the surface \
-                 of the tetrahedra instead"
+                 of the tetrahedra, `TetMesh::surface`"
             }
         }
     }

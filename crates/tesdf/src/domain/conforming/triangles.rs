@@ -11,6 +11,11 @@ use crate::{
 /// to corner `k`.
 const SIDES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
+/// The sides of a positively oriented tetrahedron, outward.
+pub(in crate::domain) fn sides_of(corners: [u32; 4]) -> [[u32; 3]; 4] {
+    SIDES.map(|side| side.map(|k| corners[k]))
+}
+
 /// A vertex farther than this from a missing face, relative to the diagonal, does not lie on it.
 const ON_FACE: f64 = 1e-9;
 
@@ -67,10 +72,10 @@ impl Triangle {
 /// All triangles, by ascending corners. The tetrahedra must be positively oriented.
 pub(super) fn triangles(welded: &Welded) -> Result<Vec<Triangle>, ConformingError> {
     let mut uses: Vec<([u32; 3], u32, usize)> = Vec::with_capacity(4 * welded.tetrahedra.len());
-    for (t, corners) in (0u32..).zip(&welded.tetrahedra) {
-        for side in SIDES {
+    for (t, &corners) in (0u32..).zip(&welded.tetrahedra) {
+        for side in sides_of(corners) {
             // Outward is ahead of the tetrahedron: it is behind the triangle, unless sorting turned it over.
-            let (key, odd) = sorted(side.map(|k| corners[k]));
+            let (key, odd) = sorted(side);
             uses.push((key, t, if odd { FRONT } else { BEHIND }));
         }
     }

@@ -70,8 +70,8 @@ impl<'a> Arrays<'a> {
         let bytes = match array.attribute("format") {
             Some("ascii") => return ascii(array, kind),
             Some("binary") => {
-                let text = array.text().unwrap_or_default().as_bytes();
-                self.block.read(Bytes::base64(text), |found, help| at(array, found, help))?
+                let text = text_of(array);
+                self.block.read(Bytes::base64(text.as_bytes()), |found, help| at(array, found, help))?
             }
             Some("appended") => {
                 let Some((data, encoding)) = self.appended else {
@@ -109,15 +109,15 @@ impl<'a> Arrays<'a> {
         macro_rules! numbers {
             ($t:ty) => {{
                 const N: usize = size_of::<$t>();
-                if bytes.len() % N != 0 {
+                let (chunks, left) = bytes.as_chunks::<N>();
+                if !left.is_empty() {
                     let found = format!("{} bytes of {kind}", bytes.len());
                     return Err(at(array, found, format!("expected a multiple of {N}")));
                 }
-                let number = |chunk: &[u8]| {
-                    let chunk: [u8; N] = std::array::from_fn(|i| chunk[i]);
+                let number = |&chunk: &[u8; N]| {
                     if big { <$t>::from_be_bytes(chunk) } else { <$t>::from_le_bytes(chunk) }
                 };
-                bytes.chunks_exact(N).map(number)
+                chunks.iter().map(number)
             }};
         }
         Ok(match kind {
@@ -140,12 +140,17 @@ fn unknown(array: &Node<'_, '_>, kind: &str) -> super::ReadTetrahedraError {
     at(array, format!("the type '{kind}'"), "expected Float32, Float64, or a type such as Int32")
 }
 
+/// The text of an array, without that of the elements in it: VTK puts ranges there.
+fn text_of(array: &Node<'_, '_>) -> String {
+    array.children().filter(Node::is_text).filter_map(|n| n.text()).collect()
+}
+
 fn ascii(array: &Node<'_, '_>, kind: &str) -> Result<Values> {
-    let text = array.text().unwrap_or_default();
+    let text = text_of(array);
     if kind.starts_with("Float") {
-        Ok(Values::Float(parse(array, text)?))
+        Ok(Values::Float(parse(array, &text)?))
     } else if kind.starts_with("Int") || kind.starts_with("UInt") {
-        Ok(Values::Whole(parse(array, text)?))
+        Ok(Values::Whole(parse(array, &text)?))
     } else {
         Err(unknown(array, kind))
     }
