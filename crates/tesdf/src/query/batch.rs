@@ -7,6 +7,29 @@ use crate::TeSdf;
 
 /// Points that one task takes.
 const TASK: usize = 1 << 12;
+
+/// Which points a batch answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// All finite points.
+    Everywhere,
+    /// Points of the domain, as [`TeSdf::query_in_domain`] has it; others get NaN and [`Answer::NO_FACE`].
+    Domain,
+}
+
+/// Where a batch puts its answers, one array per field of [`Answer`], as numpy and GPUs want them.
+#[derive(Debug)]
+pub struct AnswerColumns<'a> {
+    /// Distances to the nearest face, negative inside.
+    pub signed_distance: &'a mut [f64],
+    /// Unit gradients.
+    pub gradient: &'a mut [[f64; 3]],
+    /// Nearest points of the surface.
+    pub closest_point: &'a mut [[f64; 3]],
+    /// Nearest faces, by their ids in the source mesh.
+    pub face: &'a mut [u32],
+}
+
 impl TeSdf {
     /// Answers for many points, in order, on all threads of the current rayon pool.
     ///
@@ -14,19 +37,81 @@ impl TeSdf {
     /// (cell, list, faces), and what the next stage needs is fetched ahead for all of them.
     pub fn query_batch(&self, points: &[DVec3], precision: Precision) -> Vec<Answer> {
         let mut answers = vec![Answer::NONE; points.len()];
-        answers.par_chunks_mut(TASK).zip(points.par_chunks(TASK)).for_each(|(answers, points)| {
-            let mut faces: [Faces; FLIGHT] = std::array::from_fn(|_| Faces::default());
-            for (answers, points) in answers.chunks_mut(FLIGHT).zip(points.chunks(FLIGHT)) {
-                self.query_flight(points, precision, &mut faces, answers);
+        self.each_flight(
+            points,
+            precision,
+            Extent::Everywhere,
+            answers.par_chunks_mut(TASK),
+            |answers, at, flight| {
+                answers[at..at + flight.len()].copy_from_slice(flight);
+            },
+        );
+        answers
+    }
+
+    /// As [`query_batch`](Self::query_batch), into arrays that are there. Answers as many points as the shortest of
+    /// `points` and the columns has rows; what is beyond stays as it is.
+    pub fn query_batch_into(
+        &self,
+        points: &[DVec3],
+        precision: Precision,
+        extent: Extent,
+        columns: AnswerColumns<'_>,
+    ) {
+        let AnswerColumns { signed_distance, gradient, closest_point, face } = columns;
+        let rows = points.len().min(signed_distance.len()).min(gradient.len());
+        let rows = rows.min(closest_point.len()).min(face.len());
+        let tasks = signed_distance[..rows]
+            .par_chunks_mut(TASK)
+            .zip(gradient[..rows].par_chunks_mut(TASK))
+            .zip(closest_point[..rows].par_chunks_mut(TASK))
+            .zip(face[..rows].par_chunks_mut(TASK));
+        self.each_flight(&points[..rows], precision, extent, tasks, |(((d, g), c), f), at, flight| {
+            for (i, answer) in flight.iter().enumerate() {
+                d[at + i] = answer.signed_distance;
+                g[at + i] = answer.gradient.to_array();
+                c[at + i] = answer.closest_point.to_array();
+                f[at + i] = answer.face;
             }
         });
-        answers
+    }
+
+    /// As [`query_batch_into`](Self::query_batch_into), signed distances alone.
+    pub fn signed_distances_into(&self, points: &[DVec3], precision: Precision, distances: &mut [f64]) {
+        let rows = points.len().min(distances.len());
+        let tasks = distances[..rows].par_chunks_mut(TASK);
+        self.each_flight(&points[..rows], precision, Extent::Everywhere, tasks, |distances, at, flight| {
+            let distances = distances[at..].iter_mut();
+            distances.zip(flight).for_each(|(distance, answer)| *distance = answer.signed_distance);
+        });
+    }
+
+    /// Answers flight by flight; `tasks` are the places of [`TASK`] answers each, and `put` has the place, the number of
+    /// answers of the task before the flight, and the flight.
+    fn each_flight<T: Send>(
+        &self,
+        points: &[DVec3],
+        precision: Precision,
+        extent: Extent,
+        tasks: impl IndexedParallelIterator<Item = T>,
+        put: impl Fn(&mut T, usize, &[Answer]) + Sync,
+    ) {
+        tasks.zip(points.par_chunks(TASK)).for_each(|(mut task, points)| {
+            let mut faces: [Faces; FLIGHT] = std::array::from_fn(|_| Faces::default());
+            let mut answers = [Answer::NONE; FLIGHT];
+            for (flight, points) in points.chunks(FLIGHT).enumerate() {
+                let answers = &mut answers[..points.len()];
+                self.query_flight(points, precision, extent, &mut faces, answers);
+                put(&mut task, flight * FLIGHT, answers);
+            }
+        });
     }
 
     fn query_flight(
         &self,
         points: &[DVec3],
         precision: Precision,
+        extent: Extent,
         faces: &mut [Faces; FLIGHT],
         answers: &mut [Answer],
     ) {
@@ -46,7 +131,10 @@ impl TeSdf {
             }
         }
         for (i, answer) in answers.iter_mut().enumerate() {
-            *answer = self.answer(locals[i], places[i], &faces[i], precision);
+            *answer = match (extent, places[i]) {
+                (Extent::Domain, Place::NotOfDomain) => Answer::NONE,
+                (_, place) => self.answer(locals[i], place, &faces[i], precision),
+            };
         }
     }
 }

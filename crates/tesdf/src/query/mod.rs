@@ -16,6 +16,7 @@ use std::cell::RefCell;
 
 use glam::DVec3;
 
+pub use batch::{AnswerColumns, Extent};
 pub use kernel::{FaceRecord, Isa};
 pub use locate::Entries;
 pub(crate) use locate::{Faces, Place};

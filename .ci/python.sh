@@ -1,0 +1,28 @@
+#!/usr/bin/env bash
+# Builds the wheel of the Python package and tests it in a clean virtual environment; needs the network, or pip's cache.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. .ci/toolchain.sh
+
+python=${PYTHON:-python3}
+if ! "$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))' 2>/dev/null; then
+    echo "error: $python with venv, 3.9 or newer, was not found" >&2
+    echo "hint: on Debian or Ubuntu: apt-get install python3 python3-venv; another one by PYTHON=…" >&2
+    exit 2
+fi
+
+tools=target/python/tools env=target/python/env wheels=target/python/wheels
+maturin=$(sed -n 's/^requires = \["\(maturin==.*\)"\]$/\1/p' python/pyproject.toml)
+pip=(-m pip --disable-pip-version-check install --quiet)
+if ! "$tools/bin/python" -m pip --disable-pip-version-check freeze 2>/dev/null | grep -qx "$maturin"; then
+    step "$python" -m venv --clear "$tools"
+    step "$tools/bin/python" "${pip[@]}" "$maturin"
+fi
+rm -rf "$wheels"
+# Optimised as the tests are, so that the crates below are compiled once.
+CARGO_PROFILE_DEV_OPT_LEVEL=2 step "$tools/bin/maturin" build --quiet --profile dev --locked -m python/Cargo.toml --out "$wheels"
+step "$python" -m venv --clear "$env"
+step "$env/bin/python" "${pip[@]}" "$wheels"/*.whl -r python/tests/requirements.txt
+step "$env/bin/python" -m pytest python/tests
+# The stubs say what the module has; the tests use it as they say.
+step "$env/bin/python" -m mypy.stubtest tesdf

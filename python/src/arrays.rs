@@ -1,0 +1,68 @@
+//! Between numpy's arrays and the library's slices, without copies where that can be.
+use bytemuck::Pod;
+use numpy::ndarray::ArrayView;
+use numpy::{
+    Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use tesdf::glam::DVec3;
+
+use crate::errors::argument;
+
+/// Rows of three `f64`: an array as it is, if it is contiguous and aligned, otherwise a copy.
+pub struct Rows<'py>(PyReadonlyArray2<'py, f64>);
+
+impl<'py> Rows<'py> {
+    /// Of shape `[N, 3]`; anything that numpy makes an array of `float64` of.
+    ///
+    /// # Errors
+    /// `ValueError` names the argument and the shape found.
+    pub fn new(name: &str, any: &Bound<'py, PyAny>) -> PyResult<Self> {
+        let py = any.py();
+        static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+        let require = REQUIRE.import(py, "numpy", "require")?;
+        let array = require.call1((any, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))?;
+        match array.extract::<PyReadonlyArray2<'py, f64>>() {
+            Ok(rows) if rows.shape()[1] == 3 => Ok(Self(rows)),
+            _ => {
+                let shape = array.getattr("shape")?;
+                Err(argument(name, format!("an array of shape {shape}"), "shape (N, 3)"))
+            }
+        }
+    }
+
+    /// The rows.
+    pub fn as_slice(&self) -> PyResult<&[DVec3]> {
+        Ok(bytemuck::cast_slice(self.0.as_slice()?))
+    }
+}
+
+/// A row for each of `vectors`, as an array of shape `[N, 3]`.
+pub fn of_rows<'py>(py: Python<'py>, vectors: &[DVec3]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    PyArray1::from_slice(py, bytemuck::cast_slice(vectors)).reshape([vectors.len(), 3])
+}
+
+/// A row for each of `faces`, as an array of shape `[F, 3]`.
+pub fn of_faces<'py>(py: Python<'py>, faces: &[[u32; 3]]) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    faces.as_flattened().to_vec().into_pyarray(py).reshape([faces.len(), 3])
+}
+
+/// A read-only array of shape `[N]`, or `[N, columns]` for more than one, over memory that `owner` holds; it keeps `owner` alive.
+///
+/// # Safety
+/// `numbers` must stay where it is, unchanged, as long as `owner` lives.
+pub unsafe fn view<'py, T: Element + Pod>(
+    owner: &Bound<'py, PyAny>,
+    numbers: &[T],
+    columns: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    let flat = ArrayView::from(numbers);
+    // SAFETY: by the caller's word the memory lives as long as the owner, which becomes the array's base.
+    let array = unsafe { PyArray1::borrow_from_array(&flat, owner.clone()) };
+    let array = array.try_readwrite()?.make_nonwriteable();
+    match columns {
+        1 => Ok(array.as_any().clone()),
+        _ => Ok(array.reshape([numbers.len() / columns, columns])?.into_any()),
+    }
+}

@@ -1,0 +1,328 @@
+//! `tesdf.Asset`
+use std::path::PathBuf;
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use rayon::prelude::*;
+use tesdf::TeSdf;
+use tesdf::asset::{Element, layout};
+use tesdf::glam::DVec3;
+use tesdf::inspect::{InspectOptions, inspect};
+use tesdf::query::{Answer, AnswerColumns, Extent, Precision};
+use tesdf::verify::{VerifyOptions, verify};
+
+use crate::arrays::{self, Rows};
+use crate::errors::{Error, argument};
+use crate::{classes, pool};
+
+/// Points between two looks at Python's signals: under a second of work.
+const CHUNK: usize = 1 << 19;
+
+/// An encoded mesh: exact signed distances, closest points and gradients. Immutable; made by encode, or opened from a file.
+///
+/// All lengths are in the mesh's unit. Points are arrays [N, 3]; float64, contiguous ones are read in place. Queries run
+/// on all cores (RAYON_NUM_THREADS says on how many) with the interpreter's lock free.
+#[pyclass(frozen, module = "tesdf")]
+pub struct Asset {
+    inner: TeSdf,
+}
+
+impl Asset {
+    pub fn new(inner: TeSdf) -> Self {
+        Self { inner }
+    }
+
+    /// Calls `fill` for runs of rows, with the lock free, and lets Python handle signals between them.
+    fn in_chunks(
+        py: Python<'_>,
+        rows: usize,
+        mut fill: impl FnMut(std::ops::Range<usize>) + Send,
+    ) -> PyResult<()> {
+        let pool = pool::shared().map_err(|e| e.raise(py))?;
+        for start in (0..rows).step_by(CHUNK) {
+            py.detach(|| pool.install(|| fill(start..rows.min(start + CHUNK))));
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    fn answers<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        precision: &str,
+        extent: Extent,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = points.py();
+        let precision = named(precision)?;
+        let points = Rows::new("points", points)?;
+        let points = points.as_slice()?;
+        let rows = points.len();
+        let distance = PyArray1::<f64>::zeros(py, rows, false);
+        let [gradient, closest] = [(); 2].map(|()| PyArray2::<f64>::zeros(py, [rows, 3], false));
+        let face = PyArray1::<u32>::zeros(py, rows, false);
+        {
+            let (mut d, mut g) = (distance.try_readwrite()?, gradient.try_readwrite()?);
+            let (mut c, mut f) = (closest.try_readwrite()?, face.try_readwrite()?);
+            let (d, f) = (d.as_slice_mut()?, f.as_slice_mut()?);
+            let (g, c) = (g.as_slice_mut()?.as_chunks_mut().0, c.as_slice_mut()?.as_chunks_mut().0);
+            Self::in_chunks(py, rows, |at| {
+                let columns = AnswerColumns {
+                    signed_distance: &mut d[at.clone()],
+                    gradient: &mut g[at.clone()],
+                    closest_point: &mut c[at.clone()],
+                    face: &mut f[at.clone()],
+                };
+                self.inner.query_batch_into(&points[at], precision, extent, columns);
+            })?;
+        }
+        classes::answers(py)?.call1((distance, gradient, closest, face))
+    }
+
+    fn section<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        Self::sections(slf)?.get_item(name)?.ok_or_else(|| {
+            argument("section", format!("'{name}' is not in the asset"), "one of those of `sections`")
+        })
+    }
+}
+
+fn named(precision: &str) -> PyResult<Precision> {
+    match precision {
+        "f64" => Ok(Precision::F64),
+        "f32" => Ok(Precision::F32),
+        _ => Err(argument("precision", format!("'{precision}'"), "'f64' or 'f32'")),
+    }
+}
+
+#[pymethods]
+impl Asset {
+    /// Maps the file and checks all that a query relies on; verify also reads every byte.
+    ///
+    /// The file must not be changed in place while the asset lives; replacing it, as save does, is safe.
+    /// Raises OSError when it cannot be read, AssetError when it is not an asset.
+    #[staticmethod]
+    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let opened = py.detach(|| TeSdf::open(&path));
+        opened.map(Self::new).map_err(|e| Error::Asset(Some(path), e).raise(py))
+    }
+
+    /// As open, from the bytes of a file.
+    #[staticmethod]
+    fn from_bytes(py: Python<'_>, data: &[u8]) -> PyResult<Self> {
+        TeSdf::from_bytes(data).map(Self::new).map_err(|e| Error::Asset(None, e).raise(py))
+    }
+
+    /// The whole file.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, self.inner.as_bytes())
+    }
+
+    /// Writes the file; one that is there is replaced in one step.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| self.inner.save(&path)).map_err(|e| Error::Asset(Some(path), e).raise(py))
+    }
+
+    /// Signed distance, gradient, closest point and face for each of points [N, 3].
+    ///
+    /// precision: "f64" reads the mesh as given and decides signs by exact predicates; "f32" is several times quicker and
+    /// right to 1e-6 of the diagonal. A point that is not finite gets NaN and NO_FACE.
+    #[pyo3(signature = (points, precision = "f64"))]
+    fn query<'py>(&self, points: &Bound<'py, PyAny>, precision: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.answers(points, precision, Extent::Everywhere)
+    }
+
+    /// As query, but NaN and NO_FACE outside of the encoded domain: more than the band from the solid, give or take a cell.
+    #[pyo3(signature = (points, precision = "f64"))]
+    fn query_in_domain<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        precision: &str,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.answers(points, precision, Extent::Domain)
+    }
+
+    /// Signed distances [N] alone, negative inside.
+    #[pyo3(signature = (points, precision = "f64"))]
+    fn signed_distance<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        precision: &str,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let precision = named(precision)?;
+        let points = Rows::new("points", points)?;
+        let points = points.as_slice()?;
+        let found = PyArray1::zeros(py, points.len(), false);
+        {
+            let mut found = found.try_readwrite()?;
+            let found = found.as_slice_mut()?;
+            Self::in_chunks(py, points.len(), |at| {
+                self.inner.signed_distances_into(&points[at.clone()], precision, &mut found[at]);
+            })?;
+        }
+        Ok(found)
+    }
+
+    /// Whether each of points [N, 3] is inside, by exact predicates; points on the surface may go either way.
+    fn is_inside<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let points = Rows::new("points", points)?;
+        let points = points.as_slice()?;
+        let found = PyArray1::zeros(py, points.len(), false);
+        {
+            let mut found = found.try_readwrite()?;
+            let found = found.as_slice_mut()?;
+            Self::in_chunks(py, points.len(), |at| {
+                let inside = |(inside, &p): (&mut bool, &DVec3)| *inside = self.inner.is_inside(p);
+                found[at.clone()].par_iter_mut().zip(&points[at]).for_each(inside);
+            })?;
+        }
+        Ok(found)
+    }
+
+    /// The first face that each ray meets, from either side: RayHits(t, point, face, normal).
+    ///
+    /// origins, directions: [N, 3], or [3] for one that all rays share. t counts lengths of the direction, up to limit.
+    /// A ray that meets nothing has t = inf, NaN and NO_FACE.
+    #[pyo3(signature = (origins, directions, limit = f64::INFINITY))]
+    fn ray_cast<'py>(
+        &self,
+        py: Python<'py>,
+        origins: &Bound<'py, PyAny>,
+        directions: &Bound<'py, PyAny>,
+        limit: f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let both = py.import("numpy")?.call_method1("broadcast_arrays", (origins, directions))?;
+        let (origins, directions) =
+            (Rows::new("origins", &both.get_item(0)?)?, Rows::new("directions", &both.get_item(1)?)?);
+        let (origins, directions) = (origins.as_slice()?, directions.as_slice()?);
+        let mut hits = vec![None; origins.len()];
+        Self::in_chunks(py, origins.len(), |at| {
+            let rays = origins[at.clone()].par_iter().zip(&directions[at.clone()]);
+            let cast = |(hit, (&origin, &direction)): (&mut Option<_>, (&DVec3, &DVec3))| {
+                *hit = self.inner.ray_cast(origin, direction, limit);
+            };
+            hits[at].par_iter_mut().zip(rays).for_each(cast);
+        })?;
+        let t: Vec<f64> = hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.t)).collect();
+        let point: Vec<DVec3> = hits.iter().map(|hit| hit.map_or(DVec3::NAN, |hit| hit.point)).collect();
+        let face: Vec<u32> = hits.iter().map(|hit| hit.map_or(Answer::NO_FACE, |hit| hit.face)).collect();
+        let normal: Vec<DVec3> = hits.iter().map(|hit| hit.map_or(DVec3::NAN, |hit| hit.normal)).collect();
+        classes::ray_hits(py)?.call1((
+            PyArray1::from_vec(py, t),
+            arrays::of_rows(py, &point)?,
+            PyArray1::from_vec(py, face),
+            arrays::of_rows(py, &normal)?,
+        ))
+    }
+
+    /// What the asset costs and what a query reads: counts, list lengths, reads, bytes by section.
+    fn inspect<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let pool = pool::shared().map_err(|e| e.raise(py))?;
+        let found = py.detach(|| pool.install(|| inspect(&self.inner, &InspectOptions::default())));
+        classes::report(py, "Inspection", &found)
+    }
+
+    /// Reads every byte and compares it with the checksums, then answers at samples points with brute force over all faces.
+    ///
+    /// Raises AssetError when the file was damaged. Wrong answers are in the report.
+    #[pyo3(signature = (samples = 10_000))]
+    fn verify<'py>(&self, py: Python<'py>, samples: u32) -> PyResult<Bound<'py, PyAny>> {
+        let pool = pool::shared().map_err(|e| e.raise(py))?;
+        let options = VerifyOptions { samples: samples as usize, ..VerifyOptions::default() };
+        let found = py.detach(|| {
+            self.inner.verify_checksums().map_err(|e| Error::Asset(None, e))?;
+            pool.install(|| verify(&self.inner, &options, |_| ())).map_err(Error::Verify)
+        });
+        classes::report(py, "VerifyReport", &found.map_err(|e| e.raise(py))?)
+    }
+
+    /// What the encoder proved.
+    #[getter]
+    fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        classes::report(py, "Certificate", &self.inner.about().certificate)
+    }
+
+    /// Counts taken while encoding.
+    #[getter]
+    fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        classes::report(py, "Statistics", &self.inner.about().statistics)
+    }
+
+    /// The file that the mesh came from.
+    #[getter]
+    fn source<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        classes::report(py, "Source", &self.inner.about().source)
+    }
+
+    /// Name of the mesh's unit, if one was given.
+    #[getter]
+    fn unit(&self) -> Option<&str> {
+        self.inner.about().options.unit.as_deref()
+    }
+
+    /// Bounds of the mesh [2, 3]: least and greatest corner.
+    #[getter]
+    fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let bounds = self.inner.bounds();
+        arrays::of_rows(py, &[bounds.min, bounds.max])
+    }
+
+    /// Positions [V, 3] in the source's order: a read-only view.
+    #[getter]
+    fn vertices<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::section(slf, layout::VERTICES.name)
+    }
+
+    /// Corners [F, 3] of the faces, uint32, in the order of the file: a read-only view. Row i is face face_ids[i].
+    #[getter]
+    fn faces<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::section(slf, layout::FACES.name)
+    }
+
+    /// Id [F] in the source mesh of each row of faces, uint32: a read-only view. Answers name faces by these.
+    #[getter]
+    fn face_ids<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::section(slf, layout::FACE_IDS.name)
+    }
+
+    /// All arrays of the file by name, as read-only views without a copy; each keeps the asset alive.
+    #[getter]
+    fn sections<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        let found = PyDict::new(slf.py());
+        for section in slf.get().inner.container().sections() {
+            let (owner, columns) = (slf.as_any(), section.spec.columns);
+            let bytes = section.bytes;
+            // SAFETY: an asset never changes, its bytes (a mapping or a heap block) do not move, and it is the owner.
+            let array = unsafe {
+                match section.spec.element {
+                    Element::U8 => arrays::view::<u8>(owner, bytes, columns),
+                    Element::U16 => arrays::view::<u16>(owner, bytemuck::cast_slice(bytes), columns),
+                    Element::U32 => arrays::view::<u32>(owner, bytemuck::cast_slice(bytes), columns),
+                    Element::F32 => arrays::view::<f32>(owner, bytemuck::cast_slice(bytes), columns),
+                    Element::F64 => arrays::view::<f64>(owner, bytemuck::cast_slice(bytes), columns),
+                }
+            }?;
+            found.set_item(section.spec.name, array)?;
+        }
+        Ok(found)
+    }
+
+    fn __repr__(&self) -> String {
+        let about = self.inner.about();
+        let source = if about.source.name.is_empty() { "made in memory" } else { &about.source.name };
+        format!(
+            "<tesdf.Asset {source}: {} faces, {} bytes>",
+            self.inner.face_count(),
+            self.inner.as_bytes().len()
+        )
+    }
+
+    /// Assets can be pickled.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((slf.getattr("from_bytes")?, (slf.get().to_bytes(slf.py()),)))
+    }
+}

@@ -1,0 +1,32 @@
+//! Classes of the package that are written in Python, and their objects made of what the library found.
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
+use serde::Serialize;
+
+use crate::errors::Error;
+
+/// `Answers` of `tesdf.results`.
+pub fn answers(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    CLASS.import(py, "tesdf.results", "Answers")
+}
+
+/// `RayHits` of `tesdf.results`.
+pub fn ray_hits(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    CLASS.import(py, "tesdf.results", "RayHits")
+}
+
+/// `Repaired` of `tesdf.results`.
+pub fn repaired(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    CLASS.import(py, "tesdf.results", "Repaired")
+}
+
+/// An object of class `name` of `tesdf.reports`, whose fields are those of `found`.
+pub fn report<'py>(py: Python<'py>, name: &str, found: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+    static FROM_JSON: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let text = serde_json::to_string(found).map_err(|e| Error::Report(e).raise(py))?;
+    FROM_JSON.import(py, "tesdf.reports", "from_json")?.call1((name, text))
+}

@@ -1,0 +1,93 @@
+//! Errors of the library as Python's: its own text, in classes of `tesdf.errors`.
+use std::io;
+use std::path::PathBuf;
+
+use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+use tesdf::asset::AssetError;
+use tesdf::encode::EncodeError;
+use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
+use tesdf::verify::VerifyError;
+
+use crate::classes;
+use crate::mesh::Checked;
+
+/// What can go wrong while no Python object may be touched.
+#[derive(Debug)]
+pub enum Error {
+    Read(PathBuf, ReadError),
+    Mesh(MeshError),
+    /// The file, if the mesh is of one.
+    NotSolid(Option<PathBuf>, NotSolid),
+    Repair(Option<PathBuf>, RepairError),
+    Encode(Option<PathBuf>, EncodeError),
+    /// The file, if the asset is of one.
+    Asset(Option<PathBuf>, AssetError),
+    Verify(VerifyError),
+    Report(serde_json::Error),
+    Threads(rayon::ThreadPoolBuildError),
+}
+
+impl Error {
+    /// The exception to be raised.
+    pub fn raise(self, py: Python<'_>) -> PyErr {
+        match self {
+            Self::Read(_, ReadError::Open { ref source, .. }) => system(source, self.text()),
+            Self::Asset(_, AssetError::Io { ref source, .. }) => system(source, self.text()),
+            Self::Read(..) | Self::Mesh(_) | Self::Repair(..) => new(py, "MeshError", self.text()),
+            Self::NotSolid(_, ref found) => {
+                match classes::report(py, "CheckReport", &Checked::of(found.report(), &[])) {
+                    Ok(report) => new(py, "NotSolidError", (self.text(), report.unbind())),
+                    Err(e) => e,
+                }
+            }
+            Self::Encode(..) => new(py, "EncodeError", self.text()),
+            Self::Asset(..) | Self::Verify(_) => new(py, "AssetError", self.text()),
+            Self::Report(_) => PyValueError::new_err(self.text()),
+            Self::Threads(_) => PyOSError::new_err(self.text()),
+        }
+    }
+
+    /// What the library says, after the file's name where it does not say it itself.
+    fn text(&self) -> String {
+        let at = |path: &Option<PathBuf>, e: &dyn std::fmt::Display| match path {
+            Some(path) => format!("{}: {e}", path.display()),
+            None => e.to_string(),
+        };
+        match self {
+            Self::Read(_, e @ (ReadError::Open { .. } | ReadError::UnknownExtension { .. })) => e.to_string(),
+            Self::Read(path, e) => format!("{}: {e}", path.display()),
+            Self::Mesh(e) => e.to_string(),
+            Self::NotSolid(path, e) => at(path, e),
+            Self::Repair(path, e) => at(path, e),
+            Self::Encode(path, e) => at(path, e),
+            Self::Asset(_, e @ AssetError::Io { .. }) => e.to_string(),
+            Self::Asset(path, e) => at(path, e),
+            Self::Verify(e) => e.to_string(),
+            Self::Report(e) => format!("the report cannot be handed to Python: {e}"),
+            Self::Threads(e) => format!("cannot start threads: {e}"),
+        }
+    }
+}
+
+/// An `OSError`; with a number of the system Python makes it `FileNotFoundError` and the like.
+fn system(source: &io::Error, text: String) -> PyErr {
+    match source.raw_os_error() {
+        Some(number) => PyOSError::new_err((number, text)),
+        None => PyOSError::new_err(text),
+    }
+}
+
+fn new(py: Python<'_>, class: &str, arguments: impl pyo3::PyErrArguments + 'static) -> PyErr {
+    let class = py.import("tesdf.errors").and_then(|module| module.getattr(class));
+    match class.and_then(|class| Ok(class.cast_into::<PyType>()?)) {
+        Ok(class) => PyErr::from_type(class, arguments),
+        Err(e) => e,
+    }
+}
+
+/// An argument that has no meaning: what it is, what was expected.
+pub fn argument(name: &str, found: impl std::fmt::Display, expected: &str) -> PyErr {
+    PyValueError::new_err(format!("{name}: {found}; expected {expected}"))
+}

@@ -1,0 +1,179 @@
+//! Meshes: from files, arrays or objects with `vertices` and `faces`; `check` and `repair`.
+use std::path::PathBuf;
+
+use numpy::{PyArrayDescrMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+use serde::Serialize;
+use tesdf::asset::about::Source;
+use tesdf::mesh::{CheckReport, RepairOptions, RepairReport, SolidMesh, TriangleMesh, read};
+
+use crate::arrays::{self, Rows};
+use crate::errors::{Error, argument};
+use crate::{classes, pool};
+
+/// A mesh as a caller gives it.
+pub enum MeshInput {
+    /// A file that is read when the mesh is needed.
+    File(PathBuf),
+    Arrays(TriangleMesh),
+}
+
+/// A mesh and what is known of its file.
+pub struct Loaded {
+    pub mesh: TriangleMesh,
+    pub path: Option<PathBuf>,
+    pub source: Source,
+    pub notes: Vec<String>,
+}
+
+impl MeshInput {
+    /// A path, an object with `vertices` and `faces`, or a pair of these.
+    ///
+    /// # Errors
+    /// `TypeError` or `ValueError` says what was found; `MeshError` which face or vertex is at fault.
+    pub fn new(any: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if any.is_instance_of::<PyString>() || any.hasattr("__fspath__")? {
+            return Ok(Self::File(any.extract()?));
+        }
+        let (vertices, faces) = if any.hasattr("vertices")? && any.hasattr("faces")? {
+            (any.getattr("vertices")?, any.getattr("faces")?)
+        } else {
+            any.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>().map_err(|_| {
+                let found = any.get_type().name().map_or("an object".into(), |name| name.to_string());
+                argument("mesh", found, "a path, a pair (vertices, faces), or an object that has both")
+            })?
+        };
+        let vertices = Rows::new("vertices", &vertices)?.as_slice()?.to_vec();
+        let faces = corner_ids(&faces)?;
+        TriangleMesh::new(vertices, faces).map(Self::Arrays).map_err(|e| Error::Mesh(e).raise(any.py()))
+    }
+
+    /// Reads the file, if it is one.
+    pub fn load(self) -> Result<Loaded, Error> {
+        match self {
+            Self::Arrays(mesh) => {
+                Ok(Loaded { mesh, path: None, source: Source::default(), notes: Vec::new() })
+            }
+            Self::File(path) => match read(&path) {
+                Err(e) => Err(Error::Read(path, e)),
+                Ok(loaded) => {
+                    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                    let source = Source { name, blake3: loaded.report.source_blake3 };
+                    Ok(Loaded { mesh: loaded.mesh, path: Some(path), source, notes: loaded.report.notes })
+                }
+            },
+        }
+    }
+}
+
+impl Loaded {
+    /// The mesh as a solid, and the rest.
+    pub fn solid(self) -> Result<(SolidMesh, Option<PathBuf>, Source), Error> {
+        match SolidMesh::new(self.mesh) {
+            Ok(solid) => Ok((solid, self.path, self.source)),
+            Err(e) => Err(Error::NotSolid(self.path, e)),
+        }
+    }
+}
+
+/// Corner ids of faces, of shape `[F, 3]` and any type of integers.
+fn corner_ids(any: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
+    let py = any.py();
+    let array = py.import("numpy")?.call_method1("asarray", (any,))?;
+    let untyped = array.cast::<PyUntypedArray>()?;
+    let (kind, shape) = (untyped.dtype().kind(), untyped.shape());
+    if !matches!(shape, [_, 3]) {
+        return Err(argument(
+            "faces",
+            format!("an array of shape {}", array.getattr("shape")?),
+            "shape (F, 3)",
+        ));
+    }
+    if !matches!(kind, b'i' | b'u') {
+        return Err(argument("faces", format!("an array of {}", untyped.dtype()), "integers"));
+    }
+    let array = array.call_method1("astype", (numpy::dtype::<i64>(py), "C"))?;
+    let ids: PyReadonlyArray2<'_, i64> = array.extract()?;
+    let ids = ids.as_slice()?.as_chunks::<3>().0;
+    let corners = |(face, ids): (usize, &[i64; 3])| -> PyResult<[u32; 3]> {
+        let mut corners = [0; 3];
+        for (corner, &id) in corners.iter_mut().zip(ids) {
+            *corner = u32::try_from(id).map_err(|_| {
+                argument("faces", format!("face {face} uses vertex {id}"), "ids from 0 to 2^32 - 1 (0-based)")
+            })?;
+        }
+        Ok(corners)
+    };
+    ids.iter().enumerate().map(corners).collect()
+}
+
+/// Fields of `tesdf.CheckReport`.
+#[derive(Serialize)]
+pub struct Checked<'a> {
+    #[serde(flatten)]
+    report: &'a CheckReport,
+    notes: &'a [String],
+    text: String,
+}
+
+impl<'a> Checked<'a> {
+    /// With what reading the file had to say.
+    pub fn of(report: &'a CheckReport, notes: &'a [String]) -> Self {
+        Self { report, notes, text: report.to_string() }
+    }
+}
+
+/// Fields of `tesdf.RepairReport`.
+#[derive(Serialize)]
+struct Mended<'a> {
+    #[serde(flatten)]
+    report: &'a RepairReport,
+    notes: &'a [String],
+    text: String,
+}
+
+/// Looks for everything that keeps a mesh from having a well-defined inside, or is worth a look.
+///
+/// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an object that has both.
+///
+/// Raises OSError or MeshError when there is no mesh to look at. Defects are no error: they are in the report.
+#[pyfunction]
+pub fn check<'py>(py: Python<'py>, mesh: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let input = MeshInput::new(mesh)?;
+    let found = py.detach(|| {
+        let loaded = input.load()?;
+        let report = pool::shared()?.install(|| tesdf::mesh::check(&loaded.mesh));
+        Ok((report, loaded.notes))
+    });
+    let (report, notes) = found.map_err(|e: Error| e.raise(py))?;
+    classes::report(py, "CheckReport", &Checked::of(&report, &notes))
+}
+
+/// Makes a mesh encodable where that needs no guess, and says what it did.
+///
+/// mesh: as for check. weld_tolerance: vertices up to this far apart are merged, in the mesh's unit; None merges none.
+///
+/// Returns Repaired(vertices, faces, report). A mesh that is still not encodable is no error: the report says why.
+/// Raises OSError or MeshError when there is no mesh to repair or nothing is left of it.
+#[pyfunction]
+#[pyo3(signature = (mesh, *, weld_tolerance = None))]
+pub fn repair<'py>(
+    py: Python<'py>,
+    mesh: &Bound<'py, PyAny>,
+    weld_tolerance: Option<f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let input = MeshInput::new(mesh)?;
+    let options = RepairOptions { weld_tolerance, ..RepairOptions::DEFAULT };
+    let found = py.detach(|| {
+        let Loaded { mesh, path, notes, .. } = input.load()?;
+        let repaired = pool::shared()?.install(|| tesdf::mesh::repair(&mesh, &options));
+        Ok((repaired.map_err(|e| Error::Repair(path, e))?, notes))
+    });
+    let (repaired, notes) = found.map_err(|e: Error| e.raise(py))?;
+    let text = repaired.report.to_string();
+    let report =
+        classes::report(py, "RepairReport", &Mended { report: &repaired.report, notes: &notes, text })?;
+    let vertices = arrays::of_rows(py, repaired.mesh.vertices())?;
+    classes::repaired(py)?.call1((vertices, arrays::of_faces(py, repaired.mesh.faces())?, report))
+}

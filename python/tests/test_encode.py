@@ -1,0 +1,129 @@
+"""Ways to give a mesh, options, progress, Ctrl-C."""
+
+import signal
+import subprocess
+import sys
+import types
+
+import numpy as np
+import pytest
+import tesdf
+from conftest import DATA, TETRAHEDRON
+
+CUBE = DATA / "procedural" / "cube.obj"
+
+
+def test_a_file(tmp_path):
+    asset = tesdf.encode(CUBE)
+    assert asset.source.name == "cube.obj" and len(asset.source.blake3) == 64
+    assert asset.to_bytes() == tesdf.encode(str(CUBE), "default").to_bytes()
+
+
+def test_arrays_of_any_kind():
+    vertices, faces = TETRAHEDRON
+    expected = tesdf.encode(TETRAHEDRON).to_bytes()
+    for mesh in (
+        [vertices, faces],
+        (vertices.tolist(), faces.tolist()),
+        (vertices.astype(np.float32), faces.astype(np.uint8)),
+        (np.asfortranarray(vertices), np.asfortranarray(faces)),
+        types.SimpleNamespace(vertices=vertices, faces=faces),
+        tesdf.repair(TETRAHEDRON),
+    ):
+        assert tesdf.encode(mesh).to_bytes() == expected
+    # A quarter inside of the side x = 0; brute force is in test_query.
+    assert tesdf.encode(TETRAHEDRON).signed_distance([[0.1, 0.3, 0.3]])[0] == pytest.approx(-0.1, abs=1e-12)
+
+
+def test_options(torus):
+    sizes = {preset: len(tesdf.encode(torus, preset).to_bytes()) for preset in ("default", "fast", "compact")}
+    assert sizes["compact"] < sizes["default"]
+    plain, wide = tesdf.encode(torus, "fast"), tesdf.encode(torus, "fast", band=1.0, regions=[[3, 3, 3, 3.5, 3.5, 3.5]])
+    in_band, in_region = [[0, 0, 1.2]], [[3.2, 3.2, 3.2]]
+    assert np.isnan(plain.query_in_domain(in_region).signed_distance[0])
+    for point in (in_band, in_region):
+        assert wide.query_in_domain(point).signed_distance[0] == plain.signed_distance(point)[0]
+    assert plain.unit is None
+
+
+def test_threads_change_nothing(torus):
+    assert tesdf.encode(torus, threads=1).to_bytes() == tesdf.encode(torus, threads=3).to_bytes()
+
+
+@pytest.mark.parametrize("mesh, error, text", [
+    ((TETRAHEDRON[0], TETRAHEDRON[1] + 1), tesdf.MeshError, "face 2 uses vertex 4, but there are 4 vertices"),
+    ((TETRAHEDRON[0], TETRAHEDRON[1] - 1), ValueError, "faces: face 0 uses vertex -1; expected ids from 0"),
+    ((TETRAHEDRON[0], TETRAHEDRON[1].astype(float)), ValueError, "faces: an array of float64; expected integers"),
+    ((TETRAHEDRON[0], np.zeros((3, 4), int)), ValueError, r"faces: an array of shape \(3, 4\); expected shape \(F, 3\)"),
+    ((TETRAHEDRON[0][:, :2], TETRAHEDRON[1]), ValueError, r"vertices: an array of shape \(4, 2\)"),
+    ((TETRAHEDRON[0] * np.nan, TETRAHEDRON[1]), tesdf.MeshError, "vertex 0 has the coordinate x = NaN"),
+    ((TETRAHEDRON[0], np.zeros((0, 3), int)), tesdf.MeshError, "no faces"),
+    (17, ValueError, "mesh: int; expected a path, a pair"),
+    ("none.stl", FileNotFoundError, "cannot read none.stl"),
+    ("mesh.txt", tesdf.MeshError, "mesh.txt: the extension names no mesh format"),
+])
+def test_what_is_no_mesh(mesh, error, text):
+    for function in (tesdf.encode, tesdf.check, tesdf.repair):
+        with pytest.raises(error, match=text):
+            function(mesh)
+
+
+def test_what_has_no_inside():
+    vertices, faces = TETRAHEDRON
+    with pytest.raises(tesdf.NotSolidError, match="no well-defined inside.*open edge") as caught:
+        tesdf.encode((vertices, faces[:3]))
+    report = caught.value.report
+    assert not report.encodable and [d.kind for d in report.defects].count("open-edge") == 3
+    assert report == tesdf.check((vertices, faces[:3]))
+
+
+def test_options_without_meaning(torus):
+    with pytest.raises(tesdf.EncodeError, match="band"):
+        tesdf.encode(torus, band=-1.0)
+    with pytest.raises(ValueError, match="preset: 'best'; expected 'default', 'fast' or 'compact'"):
+        tesdf.encode(torus, "best")
+    with pytest.raises(ValueError):
+        tesdf.encode(torus, threads=0)
+
+
+def test_progress(torus):
+    seen = []
+    tesdf.encode(torus, progress=lambda stage, share: seen.append((stage, share)))
+    stages = ["refine", "tighten", "assemble"]
+    assert seen[-1][0] == "assemble" and all(0 <= share <= 1 for _, share in seen)
+    assert sorted(seen, key=lambda s: stages.index(s[0])) == seen
+
+
+def test_progress_ends_it():
+    seen = []
+
+    def stop(stage, share):
+        seen.append(share)
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        tesdf.encode(DATA / "procedural" / "iso_m16_bolt_24k.obj", progress=stop)
+    assert len(seen) == 1 and seen[0] < 1
+
+
+def test_ctrl_c():
+    program = (
+        "import sys, tesdf\n"
+        "said = []\n"
+        "def progress(stage, share):\n"
+        "    if not said: said.append(1); print('started', flush=True)\n"
+        "try:\n"
+        "    tesdf.encode(sys.argv[1], progress=progress)\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted', flush=True)\n"
+        "    sys.exit(3)\n"
+    )
+    mesh = DATA / "procedural" / "iso_m16_bolt_24k.obj"
+    child = subprocess.Popen([sys.executable, "-c", program, str(mesh)], stdout=subprocess.PIPE, text=True)
+    try:
+        assert child.stdout.readline() == "started\n"
+        child.send_signal(signal.SIGINT)
+        out, _ = child.communicate(timeout=120)
+    finally:
+        child.kill()
+    assert (out, child.returncode) == ("interrupted\n", 3)
