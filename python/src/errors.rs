@@ -71,11 +71,11 @@ impl Error {
     }
 }
 
-/// An `OSError`; with a number of the system Python makes it `FileNotFoundError` and the like.
+/// An `OSError`: Python makes it `FileNotFoundError` and the like by the system's number, PyO3 by the kind.
 fn system(source: &io::Error, text: String) -> PyErr {
     match source.raw_os_error() {
         Some(number) => PyOSError::new_err((number, text)),
-        None => PyOSError::new_err(text),
+        None => io::Error::new(source.kind(), text).into(),
     }
 }
 

@@ -36,10 +36,10 @@ impl MeshInput {
         if any.is_instance_of::<PyString>() || any.hasattr("__fspath__")? {
             return Ok(Self::File(any.extract()?));
         }
-        let (vertices, faces) = if any.hasattr("vertices")? && any.hasattr("faces")? {
-            (any.getattr("vertices")?, any.getattr("faces")?)
+        let [vertices, faces] = if any.hasattr("vertices")? && any.hasattr("faces")? {
+            [any.getattr("vertices")?, any.getattr("faces")?]
         } else {
-            any.extract::<(Bound<'_, PyAny>, Bound<'_, PyAny>)>().map_err(|_| {
+            any.extract::<[Bound<'_, PyAny>; 2]>().map_err(|_| {
                 let found = any.get_type().name().map_or("an object".into(), |name| name.to_string());
                 argument("mesh", found, "a path, a pair (vertices, faces), or an object that has both")
             })?

@@ -18,6 +18,8 @@ _Path = Union[str, PathLike[str]]
 _Mesh = Union[_Path, tuple[npt.ArrayLike, npt.ArrayLike], _HasMesh]
 _Precision = Literal["f64", "f32"]
 
+__all__ = ["NO_FACE", "Asset", "__version__", "check", "encode", "repair"]
+
 NO_FACE: int
 __version__: str
 

@@ -51,7 +51,7 @@ def test_threads_change_nothing(torus):
 
 
 @pytest.mark.parametrize("mesh, error, text", [
-    ((TETRAHEDRON[0], TETRAHEDRON[1] + 1), tesdf.MeshError, "face 2 uses vertex 4, but there are 4 vertices"),
+    ((TETRAHEDRON[0], TETRAHEDRON[1] + 1), tesdf.MeshError, "face 1 uses vertex 4, but there are 4 vertices"),
     ((TETRAHEDRON[0], TETRAHEDRON[1] - 1), ValueError, "faces: face 0 uses vertex -1; expected ids from 0"),
     ((TETRAHEDRON[0], TETRAHEDRON[1].astype(float)), ValueError, "faces: an array of float64; expected integers"),
     ((TETRAHEDRON[0], np.zeros((3, 4), int)), ValueError, r"faces: an array of shape \(3, 4\); expected shape \(F, 3\)"),
