@@ -1,10 +1,11 @@
-//! `tesdf-bench`: the tables of `docs/benchmarks.md`, each one command, as Markdown on stdout (`collide-peers`: JSON).
+//! `tesdf-bench`: the tables of `docs/benchmarks.md`, each one command, as Markdown on stdout (`batch`, `collide-peers`: JSON).
 //!
 //! Every table says on which processor, when and by which command it was made. Speeds are meant as ratios within one run.
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod batch;
 mod clearance;
 mod collide_peers;
 mod curve;
@@ -39,6 +40,8 @@ struct Cli {
 enum Command {
     /// Time of a signed distance with closest point and gradient, against parry3d and a face tree
     Query(query::Args),
+    /// Time of one batch over points of a file, as JSON for `scripts/python_batch.py`
+    Batch(batch::Args),
     /// Bytes, and faces read per query, by preset
     Memory(memory::Args),
     /// Time, peak memory and hash of one encode
@@ -60,6 +63,7 @@ enum Command {
 fn main() -> ExitCode {
     let result = match &Cli::parse().command {
         Command::Query(args) => query::run(args),
+        Command::Batch(args) => batch::run(args),
         Command::Memory(args) => memory::run(args),
         Command::Encode(args) => encode::run(args),
         Command::Curve(args) => curve::run(args),
