@@ -15,23 +15,18 @@ import os
 import signal
 import statistics
 import subprocess
-import sys
 import time
 from dataclasses import dataclass, field
-from datetime import datetime, timezone
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
 os.environ.update(OMP_NUM_THREADS="1", OPENBLAS_NUM_THREADS="1")
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "data"))
-
 import numpy as np  # noqa: E402
+from measured import ROOT, SCALE, head, heading, row, why  # noqa: E402
 from meshtools import read_obj  # noqa: E402
 
-SCALE = 1000.0
 MANY = 10**6  # more contacts than any pose gives
 
 
@@ -345,19 +340,19 @@ def rows(s, args):
         try:
             import_module(module)
             start = time.process_time()
-            found = operations(s)
+            all_operations = operations(s)
             build = time.process_time() - start
             contender = f"{name} {version(distribution)}"
         except Exception as e:  # whatever a peer raises is its row
             yield Row(name, "", cannot=f"{type(e).__name__}: {e}")
             continue
-        for operation in found:
-            row = Row(contender, operation.name, operation.exact, build)
+        for operation in all_operations:
+            found = Row(contender, operation.name, operation.exact, build)
             try:
-                row.poses = measure(operation, s.poses, args.budget)
+                found.poses = measure(operation, s.poses, args.budget)
             except Exception as e:
-                row.cannot = f"{type(e).__name__}: {e}"
-            yield row
+                found.cannot = f"{type(e).__name__}: {e}"
+            yield found
 
 
 # ------------------------------------------------------------------ output
@@ -365,14 +360,14 @@ COLUMNS = ["contender", "operation", "ms per pose", "slowest", "poses", "contact
            "distance error", "depth error", "exact", "build, s"]
 
 
-def cells(row, truth, diagonal):
-    if row.cannot:
-        return [row.contender, row.operation, f"cannot: {row.cannot}".replace("\n", " ").replace("|", "/")] + [""] * 8
-    times = [p["seconds"] * 1e3 for p in row.poses]
-    contacts = [p["contacts"] for p in row.poses if p["contacts"] is not None]
+def cells(found, truth, diagonal):
+    if found.cannot:
+        return [found.contender, found.operation, why(found.cannot)] + [""] * 8
+    times = [p["seconds"] * 1e3 for p in found.poses]
+    contacts = [p["contacts"] for p in found.poses if p["contacts"] is not None]
     wrong = apart = deep = ""
     if truth:
-        pairs = list(zip(row.poses, truth))
+        pairs = list(zip(found.poses, truth))
         known = [p["overlap"] == (t < 0) for p, t in pairs if p["overlap"] is not None]
         wrong = str(known.count(False)) if known else ""
 
@@ -382,8 +377,8 @@ def cells(row, truth, diagonal):
             return f"{max(errors):.1e}" if errors else ""
 
         apart, deep = worst(False), worst(True)
-    return [row.contender, row.operation, f"{statistics.median(times):.3g}", f"{max(times):.3g}", str(len(times)),
-            f"{statistics.median(contacts):g}" if contacts else "", wrong, apart, deep, row.exact, f"{row.build:.2f}"]
+    return [found.contender, found.operation, f"{statistics.median(times):.3g}", f"{max(times):.3g}", str(len(times)),
+            f"{statistics.median(contacts):g}" if contacts else "", wrong, apart, deep, found.exact, f"{found.build:.2f}"]
 
 
 def table(s, all_rows, truth):
@@ -392,18 +387,11 @@ def table(s, all_rows, truth):
     if truth:
         overlapping = sum(t < 0 for t in truth)
         print(f"; clearance {min(truth):.3g} to {max(truth):.3g}, {overlapping} of {len(truth)} poses overlap", end="")
-    print(".\n\n| " + " | ".join(COLUMNS) + " |")
-    print("|" + "|".join("---" if c in ("contender", "operation", "exact") else "---:" for c in COLUMNS) + "|")
-    for row in all_rows:
-        print("| " + " | ".join(cells(row, truth, s.diagonal)) + " |")
+    print(".\n")
+    head(COLUMNS, ("contender", "operation", "exact"))
+    for found in all_rows:
+        row(cells(found, truth, s.diagonal))
     print(flush=True)
-
-
-def heading():
-    cpu = next((line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), "unknown")
-    print(f"`scripts/peers.py {' '.join(sys.argv[1:])}`\n")
-    print(f"- {datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC, Python {sys.version.split()[0]}")
-    print(f"- {cpu}; load at the start {os.getloadavg()[0]:.2f}\n", flush=True)
 
 
 def main():

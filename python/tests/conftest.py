@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -5,6 +6,7 @@ import pytest
 import tesdf
 
 DATA = Path(__file__).resolve().parents[2] / "data"
+sys.path[:0] = [str(DATA), str(DATA / "reference")]
 
 TETRAHEDRON = (
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float),

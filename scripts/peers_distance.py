@@ -1,0 +1,197 @@
+#!/usr/bin/env python3
+"""Signed distances against peers: the same meshes and points, in one run.
+
+    python -m venv VENV && VENV/bin/pip install -r scripts/peers-requirements.txt ./python
+    VENV/bin/python scripts/peers_distance.py [--points N] [--checked N] [MESH.obj ...] > table.md
+
+Every contender runs in a process of its own, on one core and then on all. Errors are against numpy's brute force over all
+faces and the sum of their solid angles (`data/reference/make_reference.py`), which share nothing with any contender, at the
+first points of each kind. A contender that is missing, fails or takes too long gets a row `cannot: why`. Peers get millimetres.
+"""
+import argparse
+import atexit
+import multiprocessing
+import os
+import shutil
+import tempfile
+import time
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import tesdf
+from measured import ROOT, SCALE, head, heading, row, why
+
+from make_reference import sdf  # of data, which `measured` adds to the path
+from meshtools import read_obj
+
+MESHES = ["iso_m16_bolt_24k", "iso_m16_nut_c100", "spur_gear_m2_z20", "lobed_hole_c100", "shaft_keyway", "spoon", "cup_thin"]
+NEAR = 0.02  # half width of the layer near the surface, of the diagonal
+SIGN_FROM = 1e-6  # signs count from this distance on, of the diagonal
+PASSES = 3
+
+
+# ------------------------------------------------------------------ contenders: (vertices, faces, .tesdf) -> points -> signed distances
+def ours(precision):
+    def build(vertices, faces, file):
+        asset = tesdf.Asset.open(file)
+        return lambda points: asset.query(points, precision).signed_distance
+
+    return build
+
+
+def open3d(vertices, faces, _):
+    import open3d
+
+    tensor, cores = open3d.core.Tensor, len(os.sched_getaffinity(0))
+    scene = open3d.t.geometry.RaycastingScene(nthreads=cores)
+    scene.add_triangles(tensor(vertices.astype(np.float32)), tensor(faces.astype(np.uint32)))
+
+    def query(points):
+        return scene.compute_signed_distance(tensor(points.astype(np.float32)), nthreads=cores).numpy()
+
+    return query
+
+
+def libigl(sign):
+    def build(vertices, faces, _):
+        import igl
+
+        kind = getattr(igl, f"SIGNED_DISTANCE_TYPE_{sign}")
+        return lambda points: igl.signed_distance(points, vertices, faces, kind)[0]
+
+    return build
+
+
+def trimesh(vertices, faces, _):
+    import trimesh
+
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    return lambda points: -trimesh.proximity.signed_distance(mesh, points)
+
+
+# Name, distribution, what it gives, and whether every call builds its trees anew.
+CONTENDERS = [
+    ("tesdf f64", "tesdf", "distance, gradient, point, face; f64", ours("f64"), False),
+    ("tesdf f32", "tesdf", "distance, gradient, point, face; f32", ours("f32"), False),
+    ("Open3D RaycastingScene", "open3d", "distance; f32, one ray for the sign", open3d, False),
+    ("libigl pseudonormal", "libigl", "distance, point, normal, face; f64", libigl("PSEUDONORMAL"), True),
+    ("libigl winding number", "libigl", "distance, point, face; f64", libigl("WINDING_NUMBER"), True),
+    ("libigl fast winding number", "libigl", "distance, point, face; f64", libigl("FAST_WINDING_NUMBER"), True),
+    ("trimesh", "trimesh", "distance; f64", trimesh, False),
+]
+
+
+# ------------------------------------------------------------------ measuring
+def seconds(query, points):
+    start = time.perf_counter()
+    query(points)
+    return time.perf_counter() - start
+
+
+def work(build, rebuilds, cores, mesh, kinds, checked, budget, answer):
+    """in a process of its own: seconds to build, and for each kind of points seconds per query and the first distances"""
+    try:
+        os.sched_setaffinity(0, cores)
+        start = time.perf_counter()
+        query = build(*mesh)
+        found = [time.perf_counter() - start]
+        for points in kinds:
+            query(points[:1])  # what is built on first use
+            again = min(seconds(query, points[:1]) for _ in range(PASSES)) if rebuilds else 0.0
+            if rebuilds:
+                found[0] = again
+            first = points[:checked]
+            start = time.perf_counter()
+            distances = np.asarray(query(first), float)
+            each = (time.perf_counter() - start - again) / len(first)
+            count = int(min(len(points), budget / max(each, 1e-9) / PASSES))
+            if count > len(first):
+                each = min((seconds(query, points[:count]) - again) / count for _ in range(PASSES))
+            found.append((each, distances))
+        answer.send(found)
+    except Exception as e:  # whatever a peer raises is its row
+        answer.send(why(e))
+
+
+def measure(*arguments, limit):
+    context = multiprocessing.get_context("spawn")
+    receive, send = context.Pipe(duplex=False)
+    child = context.Process(target=work, args=(*arguments, send))
+    child.start()
+    send.close()
+    try:
+        found = receive.recv() if receive.poll(limit) else why(f"takes more than {limit:g} s")
+    except EOFError:
+        child.join()
+        found = why(f"its process ended with {child.exitcode}")
+    child.kill()
+    child.join()
+    return found
+
+
+def kinds_of_points(vertices, faces, count):
+    """near the surface, and uniform in the box"""
+    random = np.random.default_rng(1)
+    corners = vertices[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    face = random.choice(len(faces), count, p=area / area.sum())
+    on = (random.dirichlet([1, 1, 1], count)[:, :, None] * corners[face]).sum(1)
+    low, high = vertices.min(0), vertices.max(0)
+    offset = random.uniform(-NEAR, NEAR, (count, 1)) * np.linalg.norm(high - low)
+    return on + offset * normal[face] / area[face, None], random.uniform(low, high, (count, 3))
+
+
+def errors(distances, truth, diagonal):
+    """largest error of an unsigned distance over the diagonal, and wrong signs"""
+    worst = np.abs(np.abs(distances) - np.abs(truth)).max() / diagonal
+    wrong = (np.signbit(distances) != np.signbit(truth)) & (np.abs(truth) > SIGN_FROM * diagonal)
+    return "NaN" if np.isnan(worst) else f"{worst:.1e}", str(wrong.sum())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("meshes", nargs="*", type=Path, help="default: those of docs/benchmarks.md")
+    parser.add_argument("--points", type=int, default=100_000, help="of each kind, at most; default 100000")
+    parser.add_argument("--checked", type=int, default=1000, help="of them compared with brute force; default 1000")
+    parser.add_argument("--budget", type=float, default=3, help="seconds for the passes of a contender over one kind; default 3")
+    parser.add_argument("--limit", type=float, default=120, help="seconds after which a contender is given up; default 120")
+    args = parser.parse_args()
+    spot = ROOT / "data/public/spot.obj"
+    paths = args.meshes or [*(ROOT / f"data/procedural/{name}.obj" for name in MESHES), spot]
+    everything, folder = os.sched_getaffinity(0), Path(tempfile.mkdtemp(prefix="tesdf-"))
+    atexit.register(shutil.rmtree, folder)
+    heading(", ".join(f"{name} {version(name)}" for name in dict.fromkeys(c[1] for c in CONTENDERS)))
+    columns = ["mesh", "points", "contender", "gives", "ns, 1 core", f"ns, {len(everything)} cores", "/ tesdf f64", "largest error / diagonal",
+               "sign mistakes", "build, s"]
+    head(columns, columns[:4])
+    for path in paths:
+        vertices, faces = read_obj(path.read_bytes())
+        vertices *= SCALE
+        diagonal = np.linalg.norm(np.ptp(vertices, axis=0))
+        kinds = kinds_of_points(vertices, faces, args.points)
+        truths = [sdf(vertices, faces, points[: args.checked])[0] for points in kinds]
+        file, encoding = folder / f"{path.stem}.tesdf", time.perf_counter()
+        tesdf.encode((vertices, faces)).save(file)
+        encoding = time.perf_counter() - encoding
+        first = None
+        for name, _, gives, build, rebuilds in CONTENDERS:
+            one, all_cores = (
+                measure(build, rebuilds, cores, (vertices, faces, file), kinds, args.checked, args.budget, limit=args.limit)
+                for cores in ({min(everything)}, everything)
+            )
+            if isinstance(one, str):
+                row([path.stem, "", name, gives, one] + [""] * 5)
+                continue
+            first = first or one
+            building = encoding if name.startswith("tesdf") else one[0]
+            for i, kind in enumerate(("near", "box"), 1):
+                each, distances = one[i]
+                on_all = f"{all_cores[i][0] * 1e9:.0f}" if not isinstance(all_cores, str) else all_cores
+                row([path.stem, kind, name, gives, f"{each * 1e9:.0f}", on_all, f"{each / first[i][0]:.3g}",
+                     *errors(distances, truths[i - 1], diagonal), f"{building:.2f}"])
+
+
+if __name__ == "__main__":
+    main()
