@@ -4,7 +4,7 @@
     python -m venv VENV && VENV/bin/pip install -r scripts/peers-requirements.txt ./python
     VENV/bin/python scripts/peers_distance.py [--points N] [--checked N] [MESH.obj ...] > table.md
 
-Every contender runs in a process of its own, on one core and then on all. Errors are against numpy's brute force over all
+Every contender runs in a process of its own: on one core, in processor time, then on all, by the clock. Errors are against numpy's brute force over all
 faces and the sum of their solid angles (`data/reference/make_reference.py`), which share nothing with any contender, at the
 first points of each kind. A contender that is missing, fails or takes too long gets a row `cannot: why`. Peers get millimetres.
 """
@@ -15,6 +15,7 @@ import os
 import shutil
 import tempfile
 import time
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
@@ -70,44 +71,47 @@ def trimesh(vertices, faces, _):
     return lambda points: -trimesh.proximity.signed_distance(mesh, points)
 
 
-# Name, distribution, what it gives, and whether every call builds its trees anew.
+# Name, distribution, module, what it gives, and whether every call builds its trees anew.
 CONTENDERS = [
-    ("tesdf f64", "tesdf", "distance, gradient, point, face; f64", ours("f64"), False),
-    ("tesdf f32", "tesdf", "distance, gradient, point, face; f32", ours("f32"), False),
-    ("Open3D RaycastingScene", "open3d", "distance; f32, one ray for the sign", open3d, False),
-    ("libigl pseudonormal", "libigl", "distance, point, normal, face; f64", libigl("PSEUDONORMAL"), True),
-    ("libigl winding number", "libigl", "distance, point, face; f64", libigl("WINDING_NUMBER"), True),
-    ("libigl fast winding number", "libigl", "distance, point, face; f64", libigl("FAST_WINDING_NUMBER"), True),
-    ("trimesh", "trimesh", "distance; f64", trimesh, False),
+    ("tesdf f64", "tesdf", "tesdf", "distance, gradient, point, face; f64", ours("f64"), False),
+    ("tesdf f32", "tesdf", "tesdf", "distance, gradient, point, face; f32", ours("f32"), False),
+    ("Open3D RaycastingScene", "open3d", "open3d", "distance; f32, one ray for the sign", open3d, False),
+    ("libigl pseudonormal", "libigl", "igl", "distance, point, normal, face; f64", libigl("PSEUDONORMAL"), True),
+    ("libigl winding number", "libigl", "igl", "distance, point, face; f64", libigl("WINDING_NUMBER"), True),
+    ("libigl fast winding number", "libigl", "igl", "distance, point, face; f64", libigl("FAST_WINDING_NUMBER"), True),
+    ("trimesh", "trimesh", "trimesh", "distance; f64", trimesh, False),
 ]
 
 
 # ------------------------------------------------------------------ measuring
-def seconds(query, points):
-    start = time.perf_counter()
+def seconds(clock, query, points):
+    start = clock()
     query(points)
-    return time.perf_counter() - start
+    return clock() - start
 
 
-def work(build, rebuilds, cores, mesh, kinds, checked, budget, answer):
+def work(name, cores, mesh, kinds, checked, budget, answer):
     """in a process of its own: seconds to build, and for each kind of points seconds per query and the first distances"""
+    _, _, module, _, build, rebuilds = next(contender for contender in CONTENDERS if contender[0] == name)
     try:
         os.sched_setaffinity(0, cores)
-        start = time.perf_counter()
+        import_module(module)
+        clock = time.process_time if len(cores) == 1 else time.perf_counter
+        start = clock()
         query = build(*mesh)
-        found = [time.perf_counter() - start]
+        query(kinds[0][:1])  # some build on first use
+        found = [clock() - start]
         for points in kinds:
-            query(points[:1])  # what is built on first use
-            again = min(seconds(query, points[:1]) for _ in range(PASSES)) if rebuilds else 0.0
+            again = min(seconds(clock, query, points[:1]) for _ in range(PASSES)) if rebuilds else 0.0
             if rebuilds:
                 found[0] = again
             first = points[:checked]
-            start = time.perf_counter()
+            start = clock()
             distances = np.asarray(query(first), float)
-            each = (time.perf_counter() - start - again) / len(first)
+            each = (clock() - start - again) / len(first)
             count = int(min(len(points), budget / max(each, 1e-9) / PASSES))
             if count > len(first):
-                each = min((seconds(query, points[:count]) - again) / count for _ in range(PASSES))
+                each = min((seconds(clock, query, points[:count]) - again) / count for _ in range(PASSES))
             found.append((each, distances))
         answer.send(found)
     except Exception as e:  # whatever a peer raises is its row
@@ -176,9 +180,9 @@ def main():
         tesdf.encode((vertices, faces)).save(file)
         encoding = time.perf_counter() - encoding
         first = None
-        for name, _, gives, build, rebuilds in CONTENDERS:
+        for name, _, _, gives, _, _ in CONTENDERS:
             one, all_cores = (
-                measure(build, rebuilds, cores, (vertices, faces, file), kinds, args.checked, args.budget, limit=args.limit)
+                measure(name, cores, (vertices, faces, file), kinds, args.checked, args.budget, limit=args.limit)
                 for cores in ({min(everything)}, everything)
             )
             if isinstance(one, str):
