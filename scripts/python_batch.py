@@ -3,7 +3,7 @@
 
     cargo build --release -p tesdf-bench
     python -m venv VENV && VENV/bin/pip install ./python
-    VENV/bin/python scripts/python_batch.py --rust target/release/tesdf-bench [--points N] [MESH.obj ...] > table.md
+    VENV/bin/python scripts/python_batch.py --rust target/release/tesdf-bench [--points N] [MESH.obj or .tesdf ...] > table.md
 
 Rust: `query_batch` over points in memory, by `tesdf-bench batch`. Python: `Asset.query` of an array [N, 3] into four new ones.
 """
@@ -55,7 +55,7 @@ def main():
     for mesh in args.meshes:
         with tempfile.TemporaryDirectory() as folder:
             file, points = Path(folder, "a.tesdf"), Path(folder, "points.f64")
-            asset = tesdf.encode(mesh)
+            asset = tesdf.Asset.open(mesh) if mesh.suffix == ".tesdf" else tesdf.encode(mesh)
             asset.save(file)
             random, (low, high) = np.random.default_rng(1), asset.bounds
             box = random.uniform(low, high, (args.points, 3))
