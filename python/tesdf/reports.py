@@ -120,8 +120,9 @@ class Certificate:
 
     encoder: str
     domain: str
-    delta: float
-    delta_of_diagonal: float
+    delta: Optional[float]
+    """None: nothing is proved"""
+    delta_of_diagonal: Optional[float]
     truncated: bool
     """whether lists were cut to a largest length"""
     exactness_distance: Optional[float]
@@ -207,10 +208,25 @@ class Memory:
 
 
 @dataclass(frozen=True)
+class Classes:
+    """Vertices and tetrahedra of a conforming domain by class; "boundary" tetrahedra have a vertex on the surface."""
+
+    surface_vertices: int
+    inner_vertices: int
+    outer_vertices: int
+    boundary_inner_tetrahedra: int
+    inner_tetrahedra: int
+    boundary_outer_tetrahedra: int
+    outer_tetrahedra: int
+
+
+@dataclass(frozen=True)
 class Inspection:
     """What `Asset.inspect` found."""
 
     counts: Counts
+    classes: Optional[Classes]
+    """of a conforming domain"""
     lists: ListLengths
     reads: MeanReads
     memory: Memory
@@ -224,6 +240,8 @@ class Promise:
     ulps: float
     gradient: float
     gradient_from: float
+    within: Optional[float]
+    """distances and gradients are promised nearer to the surface than this; None: everywhere"""
     diagonal: float
     largest_coordinate: float
 
@@ -265,6 +283,8 @@ class PrecisionReport:
     gradient_mistakes: int
     largest_gradient_error: float
     worst_gradient: Optional[Worst]
+    largest_error_beyond: Optional[float]
+    """where none is promised; None when every point has a promise"""
     classes: tuple[ClassErrors, ...]
 
 

@@ -72,7 +72,8 @@ def test_what_it_says_of_itself(asset, torus):
     vertices, faces = torus
     assert asset.unit == "m"
     assert asset.source.name == "" and repr(asset).startswith("<tesdf.Asset made in memory: 600 faces, ")
-    assert asset.certificate.encoder == "certified" and asset.certificate.truncated is False
+    certificate = asset.certificate
+    assert (certificate.encoder, certificate.domain, certificate.truncated) == ("certified", "bisection", False)
     assert asset.certificate.delta == pytest.approx(asset.certificate.delta_of_diagonal * asset.statistics.diagonal)
     assert (asset.statistics.faces, asset.statistics.vertices) == (len(faces), len(vertices))
     found = asset.inspect()
