@@ -3,6 +3,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 
 use clap::{CommandFactory, Parser};
+use tesdf::encode::{Deformation, EncodeOptions, Encoder, Refinement, Sampling, Threshold};
 use tesdf_cli::{Cli, Command as Parsed, encode, slice};
 
 fn tesdf(args: &[&str]) -> Output {
@@ -40,7 +41,10 @@ fn bad_usage_is_2_and_says_why_on_stderr() {
         (&["frobnicate"], "error: unrecognized subcommand 'frobnicate'"),
         (&["encode", "m.stl"], "--output <FILE>"),
         (&["encode", "m.stl", "-o", "f", "--quality", "9"], "error: unexpected argument '--quality' found"),
-        (&["encode", "m.stl", "-o", "f", "--preset", "huge"], "[possible values: default, fast, compact]"),
+        (
+            &["encode", "m.stl", "-o", "f", "--preset", "huge"],
+            "[possible values: default, fast, compact, paper, sampled-safe]",
+        ),
         (&["encode", "m.stl", "-o", "f", "--band", "-1"], "-1 is negative; expected a length"),
         (&["encode", "m.stl", "-o", "f", "--region", "0 0 0 1 1"], "5 numbers; expected six"),
         (&["encode", "m.stl", "-o", "f", "--threads", "0"], "--threads <N>"),
@@ -108,9 +112,46 @@ fn defaults_are_the_documented_ones() {
     assert_eq!((args.file, args.samples, args.json), (PathBuf::from("f.tesdf"), 10_000, false));
     let Parsed::Encode(args) = parse(&["encode", "m", "-o", "f"]).unwrap() else { panic!() };
     assert_eq!(
-        (args.domain, args.encoder, args.preset),
-        (encode::Domain::Bisection, encode::Encoder::Certified, encode::Preset::Default)
+        (&args.domain, args.encoder, args.preset),
+        (&encode::DomainChoice::Bisection, None, encode::Preset::Default)
     );
+    assert_eq!(args.options().unwrap(), EncodeOptions::default());
+}
+
+#[test]
+fn options_of_the_encoders() {
+    let options = |more: &[&str]| {
+        let Parsed::Encode(args) = parse(&[&["encode", "m", "-o", "f"], more].concat()).unwrap() else {
+            panic!()
+        };
+        (args.domain.clone(), args.options())
+    };
+    let (domain, paper) = options(&["--preset", "paper", "--domain", "gmsh", "--plain", "--e-max", "32"]);
+    assert_eq!(domain, encode::DomainChoice::Gmsh);
+    assert_eq!(paper.unwrap(), EncodeOptions { max_entries: Some(32), ..EncodeOptions::PAPER });
+    let (domain, sampled) = options(&[
+        "--encoder",
+        "sampled",
+        "--resolution",
+        "8",
+        "--threshold",
+        "safe",
+        "--domain",
+        "x.msh",
+        "--deformable",
+    ]);
+    assert_eq!(domain, encode::DomainChoice::File("x.msh".into()));
+    let sampled = sampled.unwrap();
+    let sampling = Sampling { resolution: 8, threshold: Threshold::CoveringRadius, ..Sampling::PAPER };
+    assert_eq!(sampled.encoder, Encoder::Sampled(sampling));
+    assert_eq!((sampled.deformation, sampled.refinement), (Deformation::Expected, Refinement::ByCost));
+    for (wrong, named) in [
+        (&["--plain"][..], "--plain"),
+        (&["--resolution", "8"], "--encoder sampled"),
+        (&["--encoder", "certified", "--preset", "paper"], "--encoder certified"),
+    ] {
+        assert!(options(wrong).1.unwrap_err().contains(named));
+    }
 }
 
 #[test]
