@@ -20,6 +20,7 @@ mod parry;
 mod points;
 mod poses;
 mod query;
+mod reencode;
 mod reference;
 mod scaling;
 mod screw;
@@ -54,6 +55,8 @@ enum Command {
     Screw(screw::Args),
     /// Time of a detection as a scene grows: instances in a row, worlds side by side
     Scaling(scaling::Args),
+    /// What a deformed mesh costs, by the share that has moved: cells looked at, stale, and time against encoding anew
+    Reencode(reencode::Args),
     /// How far Frank-Wolfe iterations are off the exact minimum, on two bodies in contact
     FrankWolfe(frank_wolfe::Args),
     /// Contacts of two posed meshes, ours and parry3d's, with the true clearances, as JSON for `scripts/peers.py`
@@ -70,6 +73,7 @@ fn main() -> ExitCode {
         Command::Exactness(args) => exactness::run(args),
         Command::Screw(args) => screw::run(args),
         Command::Scaling(args) => scaling::run(args),
+        Command::Reencode(args) => reencode::run(args),
         Command::FrankWolfe(args) => frank_wolfe::run(args),
         Command::CollidePeers(args) => collide_peers::run(args),
     };
