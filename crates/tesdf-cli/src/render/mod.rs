@@ -54,13 +54,13 @@ pub struct Args {
     #[arg(long, value_name = "RUN", conflicts_with_all = ["bodies", "poses"])]
     pub run: Option<PathBuf>,
     /// Time of the run, s; the nearest step is drawn [default: its end]
-    #[arg(long, value_name = "SECONDS", value_parser = parse::number, requires = "run", allow_hyphen_values = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = parse::number, allow_hyphen_values = true)]
     pub time: Option<f64>,
     /// Draw the run's contacts too, gaps up to its contact distance included, at the nearest step whose contacts are recorded
-    #[arg(long, requires = "run")]
+    #[arg(long)]
     pub contacts: bool,
     /// Instead of the geometry of a body of the run: a .tesdf file, or a mesh that is encoded; may be given several times
-    #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry, requires = "run")]
+    #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry)]
     pub geometries: Vec<(String, PathBuf)>,
     /// The PNG file to write; an existing one is replaced
     #[arg(short, long, value_name = "PNG")]
@@ -128,9 +128,19 @@ impl Args {
 /// # Errors
 /// A file cannot be opened, the options do not fit each other, nothing can be drawn, or the file cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let of_run = [
+        ("--time", args.time.is_some()),
+        ("--contacts", args.contacts),
+        ("--geometry", !args.geometries.is_empty()),
+    ];
     let Posed { shapes, placements, contacts } = match &args.run {
         Some(run) => run_file::posed(args, run)?,
-        None => named(args)?,
+        None => match of_run.iter().find(|(_, given)| *given) {
+            Some((name, _)) => {
+                return Err(Failure::new(format!("{name} is of a recorded run; add --run <RUN>")));
+            }
+            None => named(args)?,
+        },
     };
     let exposures = args.exposures(&shapes)?;
     // Planes are grey and take no colour from the others.
