@@ -1,13 +1,15 @@
 //! Bands and largest errors against a direct loop over all points of the grid and all faces.
+mod support;
+
+use support::tetrahedra::grid;
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::domain::{ConformingMesh, TetMesh};
+use tesdf::domain::ConformingMesh;
 use tesdf::encode::{
     Domain, EncodeOptions, EncodeProgress, Encoder, Refinement, Sampling, Threshold, encode_in,
 };
 use tesdf::evaluate::{BandReport, EvaluateError, EvaluateOptions, Grid, evaluate};
 use tesdf::geometry::{Triangle, WindingNumber};
-use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 use tesdf::query::Precision;
 
@@ -23,18 +25,13 @@ fn encoded(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf 
     encode_in(solid, domain, &Source::default(), options, &EncodeProgress::default()).unwrap()
 }
 
-/// The tetrahedra of the beam.
-fn beam() -> (SolidMesh, ConformingMesh) {
-    let numbers = |name: &str| -> Vec<Vec<f64>> {
-        let text = std::fs::read_to_string(data(name)).unwrap();
-        let rows = text.lines().filter(|l| !l.trim_start().starts_with('#') && !l.trim().is_empty());
-        rows.skip(1).map(|l| l.split_whitespace().map(|w| w.parse().unwrap()).collect()).collect()
-    };
-    let vertices = numbers("beam.node").iter().map(|r| DVec3::new(r[1], r[2], r[3])).collect();
-    let tetrahedra = numbers("beam.ele").iter().map(|r| [1, 2, 3, 4].map(|k| r[k] as u32)).collect();
-    let solid = solid("beam.obj");
-    let domain = ConformingMesh::new(&solid, &TetMesh::new(vertices, tetrahedra).unwrap()).unwrap();
-    (solid, domain)
+/// An L of cubes, each of six tetrahedra, with a layer around it.
+fn block() -> (SolidMesh, ConformingMesh) {
+    let l =
+        |x, y, z| (1..5).contains(&x) && (1..3).contains(&z) && ((1..3).contains(&y) || (x < 3 && y == 3));
+    let (solid, tetrahedra) = grid(6, 0.15, l);
+    let conforming = ConformingMesh::new(&solid, &tetrahedra).unwrap();
+    (solid, conforming)
 }
 
 /// Distance from the surface and error at each point of the domain, by all faces.
@@ -84,10 +81,10 @@ fn full_lists_have_no_error_and_truncated_ones_that_of_a_direct_loop() {
     let options = EncodeOptions { byte_worth: 2.0, tighten_levels: 2, ..EncodeOptions::default() };
     let cut = EncodeOptions { max_entries: Some(3), ..options.clone() };
     let [full, cut] = [options, cut].map(|o| encoded(&solid, Domain::Bisection, &o));
-    let options = EvaluateOptions { fineness: 40, ..EvaluateOptions::default() };
+    let options = EvaluateOptions { fineness: 24, ..EvaluateOptions::default() };
     let reports = evaluate(&[&full, &cut], &options, |_| {}).unwrap();
-    let grid = Grid::of(&[&full, &cut], 40).unwrap();
-    assert!((grid.voxel - solid.mesh().diagonal() / 40.0).abs() < 1e-15);
+    let grid = Grid::of(&[&full, &cut], 24).unwrap();
+    assert!((grid.voxel - solid.mesh().diagonal() / 24.0).abs() < 1e-15);
     agrees(&reports[0], &solid, &full, &grid);
     agrees(&reports[1], &solid, &cut, &grid);
     assert_eq!((reports[0].exactness_band, reports[0].one_percent_band), (Some(1.0), Some(1.0)));
@@ -103,17 +100,17 @@ fn full_lists_have_no_error_and_truncated_ones_that_of_a_direct_loop() {
 
 #[test]
 fn a_sampled_encoder_in_a_conforming_domain_misses_what_a_direct_loop_finds() {
-    let (solid, domain) = beam();
+    let (solid, domain) = block();
     let coarse = Sampling { resolution: 1, shrink: 0.5, threshold: Threshold::Absolute(0.0) };
     let sampled = EncodeOptions { encoder: Encoder::Sampled(coarse), ..EncodeOptions::PAPER };
     let certified = EncodeOptions { refinement: Refinement::None, ..EncodeOptions::default() };
     let cut = EncodeOptions { max_entries: Some(8), ..certified.clone() };
     let assets = [sampled, certified, cut].map(|o| encoded(&solid, Domain::Conforming(&domain), &o));
-    let options = EvaluateOptions { fineness: 60, ..EvaluateOptions::default() };
+    let options = EvaluateOptions { fineness: 24, ..EvaluateOptions::default() };
     let all: Vec<&TeSdf> = assets.iter().collect();
     let reports = evaluate(&all, &options, |_| {}).unwrap();
-    let grid = Grid::of(&all, 60).unwrap();
-    reports.iter().zip(&assets).for_each(|(report, asset)| agrees(report, &solid, asset, &grid));
+    let points = Grid::of(&all, 24).unwrap();
+    reports.iter().zip(&assets).for_each(|(report, asset)| agrees(report, &solid, asset, &points));
     assert!(reports[0].cells_inexact > 10, "{:?}", reports[0]);
     assert_eq!((reports[1].cells_inexact, reports[1].exactness_band), (0, Some(1.0)));
     assert!(reports[2].exactness_band < Some(1.0), "{:?}", reports[2]);
