@@ -11,6 +11,7 @@ use tesdf::evaluate::{BandReport, EvaluateOptions, evaluate};
 use tesdf::inspect::{InspectOptions, inspect};
 
 use super::domains::Place;
+use super::output;
 use crate::progress::{Progress, watched};
 use crate::report::Failure;
 
@@ -52,7 +53,7 @@ impl Way {
         let certified = Self::certified(place, Cells::Plain, deformation);
         let sampling = Sampling { resolution, threshold: Threshold::Absolute(threshold), ..Sampling::PAPER };
         Self {
-            encoder: format!("{resolution} / {threshold:e}"),
+            encoder: format!("{resolution} / {}", output::threshold(threshold)),
             options: EncodeOptions { encoder: Encoder::Sampled(sampling), ..certified.options.clone() },
             ..certified
         }

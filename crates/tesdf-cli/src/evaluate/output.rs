@@ -79,6 +79,11 @@ pub fn error(report: &BandReport) -> Option<String> {
     }
 }
 
+/// ε of the sampled encoder.
+pub fn threshold(epsilon: f64) -> String {
+    if epsilon == 0.0 { "0".into() } else { format!("{epsilon:e}") }
+}
+
 /// A figure that may be missing.
 pub fn or_dash(value: Option<String>) -> String {
     value.unwrap_or_else(|| "–".into())

@@ -6,11 +6,12 @@ use tesdf::TeSdf;
 use tesdf::encode::Deformation;
 use tesdf::evaluate::{BandReport, EvaluateOptions};
 
+use super::deformed::Bend;
 use super::domains::{Place, open};
 use super::measure::{Cells, Cost, Way, compare};
 use super::meshes::{Deforms, MESHES, Mesh, Quick};
-use super::output::{Text, band, error, or_dash, print, short};
-use super::{TableArgs, deformed, heading, paper};
+use super::output::{Text, band, error, or_dash, print, short, threshold};
+use super::{TableArgs, heading, paper};
 use crate::report::{Failure, note};
 
 /// E_max of the truncated lists.
@@ -44,6 +45,9 @@ struct Row {
     /// Of full lists; for a re-encoded asset, of the stale cells alone.
     encode_seconds: Option<f64>,
     reencoded: Option<Reencoded>,
+    /// Of a deformed body.
+    bend_degrees: Option<f64>,
+    twist_degrees: Option<f64>,
 }
 
 /// What re-encoding looked at.
@@ -108,13 +112,15 @@ fn paper_row(row: &paper::Table1) -> Row {
         from: "paper",
         mesh: None,
         domain: "Gmsh".into(),
-        encoder: or_dash(row.sampling.map(|(q, epsilon)| format!("{q} / {epsilon:e}"))),
+        encoder: or_dash(row.sampling.map(|(q, epsilon)| format!("{q} / {}", threshold(epsilon)))),
         vertices: row.vertices,
         faces: row.faces,
         full: figures(0),
         truncated: figures(1),
         encode_seconds: None,
         reencoded: None,
+        bend_degrees: None,
+        twist_degrees: None,
     }
 }
 
@@ -145,13 +151,7 @@ impl Made {
 }
 
 /// Rows of what was made, compared with exact distances all at once.
-fn rows(
-    name: &str,
-    mesh: &Mesh,
-    place: &Place,
-    made: &[Made],
-    options: &EvaluateOptions,
-) -> Result<Vec<Row>, Failure> {
+fn rows(mesh: &Mesh, place: &Place, made: &[Made], options: &EvaluateOptions) -> Result<Vec<Row>, Failure> {
     let assets: Vec<&TeSdf> = made.iter().flat_map(Made::assets).collect();
     let mut reports = compare(&assets, options)?.into_iter();
     let mut figures = |asset: &TeSdf| reports.next().map(|report| Figures::of(Cost::of(asset), report));
@@ -161,7 +161,7 @@ fn rows(
         let truncated = made.truncated.as_ref().and_then(&mut figures).unwrap_or_else(|| full.clone());
         let solid = place.solid.mesh();
         rows.push(Row {
-            name: name.into(),
+            name: mesh.name.into(),
             from: "tesdf",
             mesh: Some(mesh.path.into()),
             domain: made.way.domain.clone(),
@@ -172,6 +172,8 @@ fn rows(
             truncated,
             encode_seconds: Some(made.seconds),
             reencoded: None,
+            bend_degrees: None,
+            twist_degrees: None,
         });
     }
     Ok(rows)
@@ -228,20 +230,26 @@ fn measure(
     if place.conforming.is_some() {
         made.push(Made::new(Way::certified(place, Cells::Bisected, deformation), place)?);
     }
-    table.extend(rows(mesh.name, mesh, place, &made, options)?);
+    table.extend(rows(mesh, place, &made, options)?);
     let Some(domain) = place.conforming.as_ref().filter(|_| deforms) else { return Ok(()) };
 
     if mesh.paper == Some("Gripper") {
         table.extend(paper::table_1(paper::DEFORMED_GRIPPER).map(paper_row));
     }
+    let bend = Bend::of(domain);
     for asset in made.iter_mut().flat_map(Made::assets_mut) {
-        let moved = deformed::bend(asset, domain)?;
-        if !moved.inverted.is_empty() {
-            return Err(Failure::new(format!("bending {} inverts {:?}", mesh.name, moved.inverted)));
-        }
+        bend.move_vertices(asset, domain)?;
     }
-    let mut bent = rows(&format!("deformed {}", mesh.name), mesh, place, &made, options)?;
-    bent.iter_mut().for_each(|row| row.encode_seconds = None);
+    let moved = |row: &mut Row, name: &str| {
+        row.bend_degrees = Some(bend.bend.to_degrees());
+        row.twist_degrees = Some(bend.twist.to_degrees());
+        row.name = format!("{name}, bent {:.0}°", bend.bend.to_degrees());
+    };
+    let mut bent = rows(mesh, place, &made, options)?;
+    for row in &mut bent {
+        row.encode_seconds = None;
+        moved(row, &format!("deformed {}", mesh.name));
+    }
     table.extend(bent);
 
     let mut reencoded = Vec::new();
@@ -254,8 +262,11 @@ fn measure(
             truncated.reencode_stale().map_err(Failure::new)?;
         }
     }
-    let mut again = rows(&format!("deformed {}, re-encoded", mesh.name), mesh, place, &made, options)?;
-    again.iter_mut().zip(reencoded).for_each(|(row, r)| row.reencoded = Some(r));
+    let mut again = rows(mesh, place, &made, options)?;
+    for (row, reencoded) in again.iter_mut().zip(reencoded) {
+        row.reencoded = Some(reencoded);
+        moved(row, &format!("deformed {}, re-encoded", mesh.name));
+    }
     table.extend(again);
     Ok(())
 }
