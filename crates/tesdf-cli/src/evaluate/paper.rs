@@ -98,7 +98,7 @@ pub const TABLE_1: [Table1; 7] = [
         one_percent_band: [1.0, 1.0],
     },
     Table1 {
-        name: DEFORMED_GRIPPER,
+        name: "Deformed gripper",
         vertices: 3353,
         faces: 5176,
         tetrahedra: 11429,
@@ -111,9 +111,6 @@ pub const TABLE_1: [Table1; 7] = [
         one_percent_band: [0.303, 0.303],
     },
 ];
-
-/// Name of the last row of Table I.
-pub const DEFORMED_GRIPPER: &str = "Deformed gripper";
 
 /// The row of Table I with this name.
 pub fn table_1(name: &str) -> Option<&'static Table1> {

@@ -191,7 +191,7 @@ pub fn run(args: &TableArgs) -> Result<(), Failure> {
         if mesh.path.ends_with(".ele") {
             domains.truncate(1);
         }
-        table.rows.extend(mesh.paper.and_then(paper::table_1).map(paper_row));
+        table.rows.extend(mesh.paper.iter().filter_map(|name| paper::table_1(name)).map(paper_row));
         for domain in domains {
             note(&format!("{}, {domain:?}", mesh.name));
             let place = open(mesh, &args.data, domain)?;
@@ -233,9 +233,6 @@ fn measure(
     table.extend(rows(mesh, place, &made, options)?);
     let Some(domain) = place.conforming.as_ref().filter(|_| deforms) else { return Ok(()) };
 
-    if mesh.paper == Some("Gripper") {
-        table.extend(paper::table_1(paper::DEFORMED_GRIPPER).map(paper_row));
-    }
     let bend = Bend::of(domain);
     for asset in made.iter_mut().flat_map(Made::assets_mut) {
         bend.move_vertices(asset, domain)?;
