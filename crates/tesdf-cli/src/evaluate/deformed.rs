@@ -2,7 +2,7 @@
 use tesdf::TeSdf;
 use tesdf::deform::Moved;
 use tesdf::domain::ConformingMesh;
-use tesdf::geometry::{Aabb, tetrahedron_volume};
+use tesdf::geometry::{Aabb, orientation};
 use tesdf::glam::{DQuat, DVec3};
 
 use crate::report::Failure;
@@ -27,8 +27,10 @@ impl Bend {
         let bounds = Aabb::of(domain.vertices());
         let mut bend = STRONG;
         for _ in 0..40 {
-            let stays =
-                |t: usize| tetrahedron_volume(&domain.corners(t).map(|p| bend.apply(bounds, p))) > 0.0;
+            let stays = |t: usize| {
+                let [a, b, c, d] = domain.corners(t).map(|p| bend.apply(bounds, p));
+                orientation(a, b, c, d) < 0
+            };
             if (0..domain.tetrahedra().len()).all(stays) {
                 break;
             }

@@ -6,7 +6,7 @@ use tesdf::asset::about::Source;
 use tesdf::domain::gmsh::{GmshError, GmshOptions, tetrahedralise_and_report};
 use tesdf::domain::{ConformingMesh, TetMesh, read_tetrahedra};
 use tesdf::encode::Domain;
-use tesdf::geometry::tetrahedron_volume;
+use tesdf::geometry::orientation;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 
 use super::DomainName;
@@ -69,7 +69,8 @@ pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Place, Failu
 fn boundary(tetrahedra: &TetMesh) -> Result<TriangleMesh, tesdf::mesh::MeshError> {
     let mut sides: BTreeMap<[u32; 3], Option<[u32; 3]>> = BTreeMap::new();
     for (t, &[a, b, c, d]) in tetrahedra.tetrahedra().iter().enumerate() {
-        let [c, d] = if tetrahedron_volume(&tetrahedra.corners(t)) > 0.0 { [c, d] } else { [d, c] };
+        let [p, q, r, s] = tetrahedra.corners(t);
+        let [c, d] = if orientation(p, q, r, s) < 0 { [c, d] } else { [d, c] };
         for side in [[a, c, b], [a, b, d], [b, c, d], [c, a, d]] {
             let mut key = side;
             key.sort_unstable();
@@ -88,6 +89,7 @@ fn boundary(tetrahedra: &TetMesh) -> Result<TriangleMesh, tesdf::mesh::MeshError
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tesdf::geometry::tetrahedron_volume;
 
     #[test]
     fn the_boundary_of_the_beam_is_closed_and_holds_its_volume() {

@@ -60,6 +60,9 @@ pub struct TableArgs {
     /// Form of the result
     #[arg(long, value_enum, default_value_t = Format::Md)]
     pub format: Format,
+    /// Write the result in every form to this folder, instead of printing it
+    #[arg(short, long, value_name = "FOLDER", conflicts_with = "format")]
+    pub output: Option<PathBuf>,
 }
 
 /// Ways to cut space into tetrahedra.

@@ -1,8 +1,9 @@
 //! Tables as text.
 use serde::Serialize;
+use tesdf::asset::save_atomic;
 use tesdf::evaluate::BandReport;
 
-use super::Format;
+use super::{Format, TableArgs};
 use crate::report::{self, Failure};
 
 /// A table: the names of its columns, and its rows as text.
@@ -32,21 +33,32 @@ impl Text {
     }
 }
 
-/// Prints a table in the form that was asked for: Markdown as given, CSV and JSON with all figures.
+/// Prints a table in the form that was asked for, or writes it to the folder in all of them. Markdown is as given, CSV and JSON have
+/// all figures.
 ///
 /// # Errors
-/// stdout cannot be written.
+/// stdout or a file cannot be written.
 pub fn print<T: Serialize>(
-    format: Format,
+    args: &TableArgs,
+    name: &str,
     json: &T,
-    csv: impl FnOnce() -> Text,
-    markdown: impl FnOnce() -> String,
+    csv: &Text,
+    markdown: &str,
 ) -> Result<(), Failure> {
-    match format {
-        Format::Json => report::json(json),
-        Format::Csv => report::result(&csv().csv()?),
-        Format::Md => report::result(markdown().as_bytes()),
+    let Some(folder) = &args.output else {
+        return match args.format {
+            Format::Json => report::json(json),
+            Format::Csv => report::result(&csv.csv()?),
+            Format::Md => report::result(markdown.as_bytes()),
+        };
+    };
+    let mut text =
+        serde_json::to_vec_pretty(json).map_err(|e| Failure::new(format!("cannot write JSON: {e}")))?;
+    text.push(b'\n');
+    for (extension, bytes) in [("json", text), ("csv", csv.csv()?), ("md", markdown.as_bytes().to_vec())] {
+        save_atomic(&folder.join(format!("{name}.{extension}")), &bytes).map_err(Failure::new)?;
     }
+    Ok(())
 }
 
 /// At most three significant digits.

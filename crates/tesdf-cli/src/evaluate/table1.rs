@@ -198,7 +198,7 @@ pub fn run(args: &TableArgs) -> Result<(), Failure> {
             measure(mesh, &place, args, &options, &mut table.rows)?;
         }
     }
-    print(args.format, &table, || csv(&table.rows), || markdown(&table))
+    print(args, "table1", &table, &csv(&table.rows), &markdown(&table))
 }
 
 fn chosen(args: &TableArgs) -> Result<Vec<&'static Mesh>, Failure> {

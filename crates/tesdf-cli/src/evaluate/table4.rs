@@ -124,7 +124,7 @@ pub fn run(args: &TableArgs) -> Result<(), Failure> {
             table.rows.push(Row { from: "tesdf", domain: way.domain, encoder: way.encoder, columns });
         }
     }
-    print(args.format, &table, || csv(&table.rows), || markdown(&table))
+    print(args, "table4", &table, &csv(&table.rows), &markdown(&table))
 }
 
 fn csv(rows: &[Row]) -> Text {
