@@ -119,22 +119,25 @@ fn encoded_faces(
     let corners = domain.corners(cell as usize);
     let faces: Vec<[DVec3; 3]> =
         asset.list_of(cell).iter().map(|&face| solid.mesh().triangle(face as usize)).collect();
+    let centre = 0.25 * corners.iter().sum::<DVec3>();
     let diagonal = solid.mesh().diagonal();
     let (body, plates) = (
         shape((solid.mesh().vertices().to_vec(), solid.mesh().faces().to_vec()))?,
         plates(&faces, 0.006 * diagonal)?,
     );
     let tetrahedron = apart(&[corners])?;
-    // The body is cut away around the tetrahedron, towards the camera.
-    let centre = 0.25 * corners.iter().sum::<DVec3>();
-    let towards = DVec3::new(view.azimuth.to_radians().cos(), view.azimuth.to_radians().sin(), 0.0);
-    let half = HalfSpace::new(towards, towards.dot(centre) + 0.0 * diagonal).ok_or("no direction")?;
+    // Across the tube, just behind the tetrahedron: it stands before the section, within its faces.
+    let from = centre - solid.mesh().bounds().center();
+    let along = DVec3::new(-from.y, from.x, 0.0);
+    let least = corners.iter().map(|p| along.dot(*p)).fold(f64::INFINITY, f64::min);
+    let half = HalfSpace::new(along, least).ok_or("no direction")?;
     let bodies = [
         drawn(&body, [205, 208, 214], Exposure::Cut),
         drawn(&tetrahedron, COLOURS[3], Exposure::Whole),
         drawn(&plates, COLOURS[0], Exposure::Whole),
     ];
     println!("{} encoded faces", faces.len());
-    let near = View { zoom: 2.2, target: Some(centre), ..*view };
+    let azimuth = along.y.atan2(along.x).to_degrees() + 20.0;
+    let near = View { azimuth, elevation: 18.0, zoom: 2.4, target: Some(centre), ..*view };
     picture(&bodies, &Cut(vec![half]), &near, "encoded-faces.png")
 }

@@ -139,13 +139,14 @@ fn paint_words(map: &mut Pixmap, frame: &Frame, field: &Field, view: &View, lett
     let title = lettering.fit(&view.title, 26.0 * k, room);
     lettering.draw(map, &title, 26.0 * k, [left, 44.0 * k], Anchor::Start, solid(INK, 1.0));
     let band = |width: f64| match width < field.max_inside {
-        true => format!("{}{unit} ({:.3})", ticks::short(width), width / field.max_inside),
-        false => "everywhere inside".into(),
+        true => format!("{:.3}", width / field.max_inside),
+        false => "1".into(),
     };
     let text = format!(
-        "error · {} = {}{unit} · exact up to {} from the surface · within 1 % up to {}",
+        "{} = {}{unit} · exact up to {}{unit}, band {} · 1 % band {}",
         view.axis,
         ticks::short(view.offset),
+        ticks::short(field.widths[0].min(field.max_inside)),
         band(field.widths[0]),
         band(field.widths[1]),
     );
