@@ -15,6 +15,7 @@ pub mod clearance;
 pub mod collide;
 pub mod completions;
 pub mod encode;
+pub mod evaluate;
 pub mod inspect;
 pub mod mesh_file;
 pub mod parse;
@@ -68,6 +69,8 @@ pub enum Command {
     Simulate(simulate::Args),
     /// Draw a scene of one or more bodies as a PNG picture
     Render(render::Args),
+    /// Measure Table I or IV of the paper, beside the paper's figures
+    Evaluate(evaluate::Args),
     /// Print a completion script for a shell
     Completions(completions::Args),
 }
@@ -111,6 +114,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),
+        Command::Evaluate(args) => evaluate::run(args),
         Command::Completions(args) => completions::run(args),
     }
 }

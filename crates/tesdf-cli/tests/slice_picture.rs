@@ -1,6 +1,8 @@
 //! The slice picture on solids whose distance is a formula.
 use tesdf::glam::{DVec2, DVec3};
-use tesdf_cli::slice::{Axis, CellLabel, CellOutline, Overlay, View, cut_tetrahedron, cut_triangle, draw};
+use tesdf_cli::slice::{
+    Axis, CellLabel, CellOutline, Deviation, Overlay, View, cut_tetrahedron, cut_triangle, draw, draw_error,
+};
 
 const MAJOR: f64 = 10.0;
 const MINOR: f64 = 4.0;
@@ -110,4 +112,30 @@ fn what_cannot_be_drawn_is_an_error() {
 fn distances_that_are_not_finite_stay_grey() {
     let png = draw(&view(Axis::Z), &Overlay::default(), 300, |p| if p.x > 0.0 { f64::NAN } else { torus(p) });
     assert!(decoded(&png.unwrap()).pixels().iter().any(|p| [p.red(), p.green(), p.blue()] == [200; 3]));
+}
+
+#[test]
+fn errors_are_red_where_they_are_and_nowhere_else() {
+    let view = view(Axis::Z);
+    // Off by 1 in the half with x > 0, from 2 below the surface on.
+    let is_off = |p: DVec3| p.x > 0.0 && torus(p) < -2.0;
+    let deviation = |p: DVec3| {
+        let error = if is_off(p) { 1.0 } else { 1e-9 };
+        (p.y.abs() < MAJOR).then_some(Deviation { exact: torus(p), error })
+    };
+    let map = decoded(&draw_error(&view, &Overlay::default(), 600, 1e-6, deviation).unwrap());
+    let count = |pick: &dyn Fn([i32; 3]) -> bool| {
+        let of = |p: &tiny_skia::PremultipliedColorU8| [p.red(), p.green(), p.blue()].map(i32::from);
+        map.pixels().iter().filter(|p| pick(of(p))).count() as f64
+    };
+    let (red, green) = (count(&|[r, _, b]| r == 142 && b == 32), count(&|rgb| rgb == [214, 232, 220]));
+    // The pixels of each, by sampling the plot.
+    let extent = view.max - view.min;
+    let points = (0..400 * 400).map(|i| {
+        let share = DVec2::new(f64::from(i % 400) + 0.5, f64::from(i / 400) + 0.5) / 400.0;
+        view.axis.point(view.offset, view.min + share * extent)
+    });
+    let off = points.clone().filter(|&p| p.y.abs() < MAJOR && is_off(p)).count() as f64;
+    let exact = points.filter(|&p| p.y.abs() < MAJOR && !is_off(p)).count() as f64;
+    assert!((red / green / (off / exact) - 1.0).abs() < 0.1, "{red} {green} {off} {exact}");
 }

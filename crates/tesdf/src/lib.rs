@@ -36,6 +36,7 @@ pub mod collide;
 pub mod deform;
 pub mod domain;
 pub mod encode;
+pub mod evaluate;
 pub mod geometry;
 pub mod inspect;
 pub mod mesh;

@@ -1,9 +1,12 @@
 //! `tesdf slice FILE -o out.png`: the signed distance on an axis-aligned plane, with contours, cells and the surface.
 //!
+//! With `--error` it is where the asset is exact instead ([`draw_error`]).
+//!
 //! In go a [`View`], a function that gives the signed distance and the [`Overlay`] of what the plane cuts; out comes a
 //! PNG. Nothing here knows what an asset is.
 mod colour;
 mod cut;
+mod error;
 mod picture;
 mod text;
 pub(crate) mod ticks;
@@ -11,11 +14,13 @@ pub(crate) mod ticks;
 use std::path::PathBuf;
 
 use tesdf::asset::{CellKind, save_atomic};
+use tesdf::evaluate::EvaluateOptions;
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;
 
 pub use cut::{Axis, View, cut_tetrahedron, cut_triangle};
+pub use error::{Deviation, draw_error};
 pub use picture::{PictureError, draw};
 
 use crate::report::{Failure, Outcome};
@@ -38,6 +43,9 @@ pub struct Args {
     /// Coordinate of the plane along the axis, mesh unit
     #[arg(long, value_name = "LENGTH", value_parser = parse::number, allow_hyphen_values = true)]
     pub offset: Option<f64>,
+    /// Draw where the signed distance is exact, in the domain, and how far it is off elsewhere: for lists that are truncated or sampled
+    #[arg(long)]
+    pub error: bool,
     /// Pixels of the picture's longer side
     #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
     pub size: u32,
@@ -77,8 +85,20 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             overlay.cells.push(CellOutline { polygon, label });
         }
     });
-    let png = draw(&view, &overlay, args.size, |p| asset.signed_distance(p, Precision::F32))
-        .map_err(Failure::new)?;
+    let png = if args.error {
+        // Cells would hide the borders of the bands.
+        overlay.cells.clear();
+        let deviation = |p: DVec3| {
+            let found = asset.query_in_domain(p, Precision::F64)?.signed_distance;
+            let exact = asset.query_by_tree(p, Precision::F64).signed_distance;
+            Some(Deviation { exact, error: (found - exact).abs() })
+        };
+        let tolerance = EvaluateOptions::default().exact * asset.bounds().extent().length();
+        draw_error(&view, &overlay, args.size, tolerance, deviation)
+    } else {
+        draw(&view, &overlay, args.size, |p| asset.signed_distance(p, Precision::F32))
+    }
+    .map_err(Failure::new)?;
     save_atomic(&args.output, &png).map_err(Failure::new)?;
     Ok(Outcome::Good)
 }

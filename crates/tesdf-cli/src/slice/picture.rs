@@ -37,10 +37,10 @@ const BOTTOM: f32 = 32.0;
 /// Contours on the side of the surface that goes farther.
 const CONTOURS: f64 = 8.0;
 
-const INK: [u8; 3] = [24, 30, 40];
-const QUIET: [u8; 3] = [92, 102, 116];
+pub(super) const INK: [u8; 3] = [24, 30, 40];
+pub(super) const QUIET: [u8; 3] = [92, 102, 116];
 
-fn solid(rgb: [u8; 3], alpha: f32) -> Color {
+pub(super) fn solid(rgb: [u8; 3], alpha: f32) -> Color {
     let mut c = Color::from_rgba8(rgb[0], rgb[1], rgb[2], 255);
     c.set_alpha(alpha);
     c
@@ -58,9 +58,6 @@ pub fn draw(
     size: u32,
     signed_distance: impl Fn(DVec3) -> f64 + Sync,
 ) -> Result<Vec<u8>, PictureError> {
-    if !SIZES.contains(&size) {
-        return Err(PictureError::Size(size));
-    }
     let lettering =
         Lettering::new().ok_or_else(|| PictureError::Encode("the built-in font is damaged".into()))?;
     let frame = Frame::of(view, size)?;
@@ -75,22 +72,25 @@ pub fn draw(
 }
 
 /// Where everything lies, in pixels from the upper left corner.
-struct Frame {
-    picture: [u32; 2],
+pub(super) struct Frame {
+    pub picture: [u32; 2],
     /// Left and upper border of the plot.
-    origin: [u32; 2],
+    pub origin: [u32; 2],
     /// Width and height of the plot.
-    plot: [u32; 2],
+    pub plot: [u32; 2],
     /// Upper left corner of the plot, mesh unit.
     corner: DVec2,
     /// Mesh units per pixel.
     pixel: f64,
     /// Size of the picture over [`REFERENCE`].
-    scale: f32,
+    pub scale: f32,
 }
 
 impl Frame {
-    fn of(view: &View, size: u32) -> Result<Self, PictureError> {
+    pub(super) fn of(view: &View, size: u32) -> Result<Self, PictureError> {
+        if !SIZES.contains(&size) {
+            return Err(PictureError::Size(size));
+        }
         let extent = view.max - view.min;
         let bad = || PictureError::View { min: view.min.into(), max: view.max.into() };
         if !(extent.is_finite() && extent.min_element() > 0.0) {
@@ -110,7 +110,7 @@ impl Frame {
     }
 
     /// Centre of a pixel of the plot, mesh unit.
-    fn place(&self, column: u32, row: u32) -> DVec2 {
+    pub(super) fn place(&self, column: u32, row: u32) -> DVec2 {
         self.corner + self.pixel * DVec2::new(f64::from(column) + 0.5, -(f64::from(row) + 0.5))
     }
 
@@ -121,7 +121,7 @@ impl Frame {
         ]
     }
 
-    fn rect(&self) -> Option<Rect> {
+    pub(super) fn rect(&self) -> Option<Rect> {
         let [x, y] = self.origin.map(|v| v as f32);
         Rect::from_xywh(x, y, self.plot[0] as f32, self.plot[1] as f32)
     }
@@ -210,7 +210,7 @@ impl Field {
     }
 }
 
-fn paint_overlay(map: &mut Pixmap, frame: &Frame, overlay: &Overlay) -> Result<(), PictureError> {
+pub(super) fn paint_overlay(map: &mut Pixmap, frame: &Frame, overlay: &Overlay) -> Result<(), PictureError> {
     let mut mask = Mask::new(frame.picture[0], frame.picture[1])
         .ok_or_else(|| PictureError::Encode("out of memory".into()))?;
     if let Some(rect) = frame.rect() {
@@ -248,7 +248,7 @@ fn paint_overlay(map: &mut Pixmap, frame: &Frame, overlay: &Overlay) -> Result<(
     Ok(())
 }
 
-fn line(map: &mut Pixmap, path: &Path, colour: Color, width: f32, mask: Option<&Mask>) {
+pub(super) fn line(map: &mut Pixmap, path: &Path, colour: Color, width: f32, mask: Option<&Mask>) {
     let mut paint = Paint::default();
     paint.set_color(colour);
     let stroke = Stroke { width, line_cap: LineCap::Round, line_join: LineJoin::Round, ..Stroke::default() };
@@ -348,7 +348,7 @@ fn paint_colour_bar(
     }
 }
 
-fn paint_scale_bar(map: &mut Pixmap, frame: &Frame, unit: &str, lettering: &Lettering) {
+pub(super) fn paint_scale_bar(map: &mut Pixmap, frame: &Frame, unit: &str, lettering: &Lettering) {
     let k = frame.scale;
     let length = ticks::round_step(frame.pixel * f64::from(frame.plot[0]), 4.0);
     let pixels = (length / frame.pixel) as f32;

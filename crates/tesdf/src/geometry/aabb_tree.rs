@@ -106,11 +106,21 @@ impl AabbTree {
     /// The least `distance_squared(item)`, with its item; on ties the lowest item.
     ///
     /// `distance_squared` must be at least the squared distance from `p` to the item's box.
-    pub fn nearest(&self, p: DVec3, mut distance_squared: impl FnMut(u32) -> f64) -> Option<(f64, u32)> {
+    pub fn nearest(&self, p: DVec3, distance_squared: impl FnMut(u32) -> f64) -> Option<(f64, u32)> {
+        self.nearest_within(p, f64::INFINITY, distance_squared)
+    }
+
+    /// As [`nearest`](Self::nearest), of items whose squared distance is at most `limit`: quicker when that is known to be close.
+    pub fn nearest_within(
+        &self,
+        p: DVec3,
+        limit: f64,
+        mut distance_squared: impl FnMut(u32) -> f64,
+    ) -> Option<(f64, u32)> {
         let mut best: Option<(f64, u32)> = None;
         let mut stack = vec![(self.root.0.distance_squared(p), self.root.1)];
         while let Some((bound, child)) = stack.pop() {
-            if best.is_some_and(|(d, _)| bound > d) {
+            if bound > best.map_or(limit, |(d, _)| d) {
                 continue;
             }
             match child {
@@ -124,7 +134,7 @@ impl AabbTree {
                 Child::Leaf { start, end } => {
                     for &item in &self.order[start as usize..end as usize] {
                         let d = distance_squared(item);
-                        if best.is_none_or(|(b, i)| d < b || (d == b && item < i)) {
+                        if d <= limit && best.is_none_or(|(b, i)| d < b || (d == b && item < i)) {
                             best = Some((d, item));
                         }
                     }
@@ -244,6 +254,8 @@ mod tests {
             let d = |i: u32| items[i as usize].distance_squared(q);
             let brute = (0..500).map(|i| (d(i), i)).min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
             assert_eq!(tree.nearest(q, d), Some(brute));
+            assert_eq!(tree.nearest_within(q, brute.0, d), Some(brute));
+            assert_eq!(tree.nearest_within(q, brute.0.next_down(), d), None);
         }
     }
 

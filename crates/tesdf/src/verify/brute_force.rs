@@ -6,7 +6,7 @@ use crate::mesh::TriangleMesh;
 ///
 /// Written apart from [`Triangle`](crate::geometry::Triangle), which queries use, so that an error in one shows against
 /// the other. Lengths are scaled by a power of two, so that no product leaves the range of `f64`.
-pub(super) struct BruteForce {
+pub(crate) struct BruteForce {
     facets: Vec<Facet>,
     scale: f64,
 }
@@ -24,21 +24,21 @@ struct Facet {
 
 impl BruteForce {
     /// `diagonal` is that of the mesh: finite and positive.
-    pub(super) fn new(mesh: &TriangleMesh, diagonal: f64) -> Self {
+    pub(crate) fn new(mesh: &TriangleMesh, diagonal: f64) -> Self {
         let scale = (-diagonal.log2().floor()).clamp(-1000.0, 1000.0).exp2();
         let facets = (0..mesh.faces().len()).map(|f| Facet::new(mesh.triangle(f).map(|p| p * scale)));
         Self { facets: facets.collect(), scale }
     }
 
     /// Distance from `p` to the nearest of all faces, mesh unit.
-    pub(super) fn distance(&self, p: DVec3) -> f64 {
+    pub(crate) fn distance(&self, p: DVec3) -> f64 {
         let p = p * self.scale;
         let least = self.facets.iter().map(|f| f.offset(p).length_squared()).fold(f64::INFINITY, f64::min);
         least.sqrt() / self.scale
     }
 
     /// From the closest point of one face to `p`, mesh unit.
-    pub(super) fn offset(&self, face: usize, p: DVec3) -> DVec3 {
+    pub(crate) fn offset(&self, face: usize, p: DVec3) -> DVec3 {
         self.facets[face].offset(p * self.scale) / self.scale
     }
 }

@@ -3,7 +3,7 @@
 //! Comes in: an opened asset. Goes out: for each [`Precision`] the largest error, wrong signs and wrong gradients, each with
 //! the point where it is. Nothing of the lists, the forest or the face tree is used for the comparison, only the mesh that
 //! the asset holds.
-mod brute_force;
+pub(crate) mod brute_force;
 mod compare;
 mod samples;
 
@@ -133,7 +133,7 @@ pub fn verify(
 }
 
 /// The mesh in the order of the asset's faces, and their ids in the source.
-fn mesh_of(asset: &TeSdf) -> Result<(TriangleMesh, Vec<u32>), MeshError> {
+pub(crate) fn mesh_of(asset: &TeSdf) -> Result<(TriangleMesh, Vec<u32>), MeshError> {
     let vertices = asset.vertices.iter().map(|&v| DVec3::from_array(v)).collect();
     Ok((TriangleMesh::new(vertices, asset.faces.to_vec())?, asset.face_ids.to_vec()))
 }

@@ -1,0 +1,114 @@
+//! Tables as text.
+use serde::Serialize;
+use tesdf::asset::save_atomic;
+use tesdf::evaluate::BandReport;
+
+use super::{Format, TableArgs};
+use crate::report::{self, Failure};
+
+/// A table: the names of its columns, and its rows as text.
+pub struct Text {
+    pub columns: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Text {
+    /// Markdown; the first `left` columns are aligned left.
+    pub fn markdown(&self, left: usize) -> String {
+        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+        let rules: Vec<&str> =
+            (0..self.columns.len()).map(|i| if i < left { "---" } else { "---:" }).collect();
+        let rows: String = self.rows.iter().map(|row| line(row)).collect();
+        format!("{}|{}|\n{rows}", line(&self.columns), rules.join("|"))
+    }
+
+    fn csv(&self) -> Result<Vec<u8>, Failure> {
+        let failed = |e: &dyn std::fmt::Display| Failure::new(format!("cannot write CSV: {e}"));
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.columns).map_err(|e| failed(&e))?;
+        for row in &self.rows {
+            writer.write_record(row).map_err(|e| failed(&e))?;
+        }
+        writer.into_inner().map_err(|e| failed(&e))
+    }
+}
+
+/// Prints a table in the form that was asked for, or writes it to the folder in all of them. Markdown is as given, CSV and JSON have
+/// all figures.
+///
+/// # Errors
+/// stdout or a file cannot be written.
+pub fn print<T: Serialize>(
+    args: &TableArgs,
+    name: &str,
+    json: &T,
+    csv: &Text,
+    markdown: &str,
+) -> Result<(), Failure> {
+    let Some(folder) = &args.output else {
+        return match args.format {
+            Format::Json => report::json(json),
+            Format::Csv => report::result(&csv.csv()?),
+            Format::Md => report::result(markdown.as_bytes()),
+        };
+    };
+    let mut text =
+        serde_json::to_vec_pretty(json).map_err(|e| Failure::new(format!("cannot write JSON: {e}")))?;
+    text.push(b'\n');
+    for (extension, bytes) in [("json", text), ("csv", csv.csv()?), ("md", markdown.as_bytes().to_vec())] {
+        save_atomic(&folder.join(format!("{name}.{extension}")), &bytes).map_err(Failure::new)?;
+    }
+    Ok(())
+}
+
+/// At most three significant digits.
+pub fn short(value: f64) -> String {
+    let magnitude = value.abs().log10().floor();
+    match magnitude {
+        _ if value == 0.0 => "0".into(),
+        m if (-3.0..3.0).contains(&m) => {
+            let decimals = (2.0 - m).max(0.0) as usize;
+            let text = format!("{value:.decimals$}");
+            match text.contains('.') {
+                true => text.trim_end_matches('0').trim_end_matches('.').into(),
+                false => text,
+            }
+        }
+        _ => format!("{value:.1e}"),
+    }
+}
+
+/// A band, rounded down: only one that is the whole of the solid is 1.
+pub fn band(value: f64) -> String {
+    short((value * 1e3).floor() / 1e3)
+}
+
+/// The largest error in percent; `0` when it counts as none.
+pub fn error(report: &BandReport) -> Option<String> {
+    match report.max_error <= report.exact {
+        true => Some("0".into()),
+        false => report.max_error_percent.map(short),
+    }
+}
+
+/// ε of the sampled encoder.
+pub fn threshold(epsilon: f64) -> String {
+    if epsilon == 0.0 { "0".into() } else { format!("{epsilon:e}") }
+}
+
+/// A figure that may be missing.
+pub fn or_dash(value: Option<String>) -> String {
+    value.unwrap_or_else(|| "–".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_short() {
+        let texts = [0.0, 1.0, 0.105, 35.71, 123.0, 0.007, 1.23456e-9, 8.9].map(short);
+        assert_eq!([0.9999, 1.0, 0.1059].map(band), ["0.999", "1", "0.105"]);
+        assert_eq!(texts, ["0", "1", "0.105", "35.7", "123", "0.007", "1.2e-9", "8.9"]);
+    }
+}

@@ -1,0 +1,148 @@
+//! The paper's figures: H. Ji, Y. Lee, D. Lee, *TE-SDF: Tetra-Encoded Signed Distance Field for Memory-Efficient and Accurate
+//! Collision Detection*, Tables I and IV. Memory is in MiB (`docs/paper-map.md` says why).
+
+/// A row of Table I; pairs are of full lists and of E_max = 32.
+pub struct Table1 {
+    pub name: &'static str,
+    pub vertices: usize,
+    pub faces: usize,
+    pub tetrahedra: usize,
+    /// Q, and ε as printed.
+    pub sampling: Option<(u32, f64)>,
+    pub list_mean: f64,
+    pub longest_list: usize,
+    pub memory: [f64; 2],
+    pub max_error_percent: [f64; 2],
+    pub exactness_band: [f64; 2],
+    pub one_percent_band: [f64; 2],
+}
+
+/// Table I.
+pub const TABLE_1: [Table1; 7] = [
+    Table1 {
+        name: "M16 bolt",
+        vertices: 13695,
+        faces: 23418,
+        tetrahedra: 63164,
+        sampling: Some((128, 0.0)),
+        list_mean: 10.7,
+        longest_list: 437,
+        memory: [3.580, 3.260],
+        max_error_percent: [0.0, 35.7],
+        exactness_band: [1.0, 0.121],
+        one_percent_band: [1.0, 0.373],
+    },
+    Table1 {
+        name: "M16 Nut",
+        vertices: 3147,
+        faces: 5968,
+        tetrahedra: 9142,
+        sampling: Some((128, 0.0)),
+        list_mean: 8.4,
+        longest_list: 59,
+        memory: [0.436, 0.433],
+        max_error_percent: [0.0, 52.6],
+        exactness_band: [1.0, 0.406],
+        one_percent_band: [1.0, 0.489],
+    },
+    Table1 {
+        name: "Hole",
+        vertices: 4559,
+        faces: 8448,
+        tetrahedra: 22405,
+        sampling: Some((128, 0.0)),
+        list_mean: 7.36,
+        longest_list: 30,
+        memory: [0.975, 0.975],
+        max_error_percent: [0.0, 0.0],
+        exactness_band: [1.0, 1.0],
+        one_percent_band: [1.0, 1.0],
+    },
+    Table1 {
+        name: "Shaft",
+        vertices: 1881,
+        faces: 3334,
+        tetrahedra: 6111,
+        sampling: Some((256, 1e-7)),
+        list_mean: 29.4,
+        longest_list: 280,
+        memory: [0.782, 0.598],
+        max_error_percent: [0.0, 28.4],
+        exactness_band: [1.0, 0.105],
+        one_percent_band: [1.0, 0.114],
+    },
+    Table1 {
+        name: "Spoon",
+        vertices: 2588,
+        faces: 3138,
+        tetrahedra: 12301,
+        sampling: Some((128, 1e-9)),
+        list_mean: 15.8,
+        longest_list: 35,
+        memory: [0.941, 0.941],
+        max_error_percent: [0.0, 0.73],
+        exactness_band: [1.0, 0.158],
+        one_percent_band: [1.0, 1.0],
+    },
+    Table1 {
+        name: "Gripper",
+        vertices: 3353,
+        faces: 5176,
+        tetrahedra: 11429,
+        sampling: Some((64, 0.0)),
+        list_mean: 16.1,
+        longest_list: 33,
+        memory: [0.888, 0.888],
+        max_error_percent: [0.0, 7e-3],
+        exactness_band: [1.0, 0.97],
+        one_percent_band: [1.0, 1.0],
+    },
+    Table1 {
+        name: "Deformed gripper",
+        vertices: 3353,
+        faces: 5176,
+        tetrahedra: 11429,
+        sampling: None,
+        list_mean: 16.1,
+        longest_list: 33,
+        memory: [0.888, 0.888],
+        max_error_percent: [8.9, 8.9],
+        exactness_band: [0.151, 0.151],
+        one_percent_band: [0.303, 0.303],
+    },
+];
+
+/// The row of Table I with this name.
+pub fn table_1(name: &str) -> Option<&'static Table1> {
+    TABLE_1.iter().find(|row| row.name == name)
+}
+
+/// A column of Table IV.
+pub struct Table4 {
+    /// E_max.
+    pub max_entries: u32,
+    pub memory: f64,
+    pub max_error_percent: f64,
+    pub exactness_band: f64,
+    pub one_percent_band: f64,
+}
+
+const fn column(
+    max_entries: u32,
+    [memory, max_error_percent, exactness_band, one_percent_band]: [f64; 4],
+) -> Table4 {
+    Table4 { max_entries, memory, max_error_percent, exactness_band, one_percent_band }
+}
+
+/// Table IV; the first and the last column are those of the shaft in Table I, as its caption says.
+pub const TABLE_4: [Table4; 9] = [
+    column(32, [0.598, 28.4, 0.105, 0.114]),
+    column(64, [0.709, 22.74, 0.215, 0.282]),
+    column(96, [0.750, 18.28, 0.307, 0.395]),
+    column(128, [0.770, 16.57, 0.399, 0.536]),
+    column(160, [0.778, 14.07, 0.505, 0.555]),
+    column(192, [0.781, 3.38, 0.545, 0.555]),
+    column(224, [0.782, 0.02, 0.601, 1.0]),
+    column(256, [0.782, 0.0, 1.0, 1.0]),
+    column(288, [0.782, 0.0, 1.0, 1.0]),
+];

@@ -1,0 +1,106 @@
+//! `tesdf evaluate`: the figures of a quick Table I, and the forms of the result.
+mod folder;
+
+use folder::Folder;
+use serde_json::Value;
+
+fn meshes() -> String {
+    std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data").display().to_string()
+}
+
+fn evaluated(args: &[&str]) -> String {
+    let data = meshes();
+    Folder::new().good(&[&["evaluate"], args, &["--data", &data]].concat())
+}
+
+fn is_exact(figures: &Value) -> bool {
+    let on_grid = &figures["on_grid"];
+    on_grid["max_error"].as_f64().unwrap() <= on_grid["exact"].as_f64().unwrap()
+        && on_grid["cells_inexact"] == 0
+        && figures["exactness_band"] == 1.0
+        && figures["one_percent_band"] == 1.0
+}
+
+#[test]
+fn the_quick_table_1_has_full_lists_without_error_beside_the_paper() {
+    let table: Value = serde_json::from_str(&evaluated(&["table1", "--quick", "--format", "json"])).unwrap();
+    let rows = table["rows"].as_array().unwrap();
+    let paper: Vec<&Value> = rows.iter().filter(|r| r["from"] == "paper").collect();
+    assert_eq!(paper.len(), 3, "shaft, gripper and deformed gripper");
+    assert_eq!(paper[0]["truncated"]["exactness_band"], 0.105);
+    let mut seen = [0; 4];
+    for row in rows.iter().filter(|r| r["from"] == "tesdf") {
+        let (full, truncated) = (&row["full"], &row["truncated"]);
+        assert!(full["on_grid"]["points_inside"].as_u64().unwrap() > 1000, "{row:#}");
+        let band = |f: &Value| f["exactness_band"].as_f64().unwrap();
+        let one_percent = |f: &Value| f["one_percent_band"].as_f64().unwrap();
+        for figures in [full, truncated] {
+            assert!((0.0..=1.0).contains(&band(figures)) && band(figures) <= one_percent(figures), "{row:#}");
+            assert!(figures["max_error_percent"].as_f64().unwrap() < 100.0, "{row:#}");
+        }
+        assert!(truncated["longest_list"].as_u64() <= full["longest_list"].as_u64());
+        let (deformed, reencoded) = (row["bend_degrees"].is_f64(), row["reencoded"].is_object());
+        match (row["encoder"] == "certified", deformed, reencoded) {
+            (true, false, _) => {
+                seen[0] += 1;
+                assert!(is_exact(full), "{row:#}");
+                if full["longest_list"].as_u64() > Some(32) {
+                    seen[1] += 1;
+                    assert!(!is_exact(truncated) && band(truncated) > 0.0, "{row:#}");
+                }
+            }
+            (true, true, false) => {
+                seen[2] += 1;
+                assert!(!is_exact(full) && band(full) > 0.151, "{row:#}");
+            }
+            (true, true, true) => {
+                seen[3] += 1;
+                assert!(is_exact(full), "{row:#}");
+                assert!(row["reencoded"]["stale"].as_u64() < row["reencoded"]["cells"].as_u64());
+            }
+            _ => {}
+        }
+    }
+    assert!(seen.iter().all(|&n| n > 0), "{seen:?}");
+}
+
+#[test]
+fn table_4_gets_better_with_longer_lists() {
+    let options = ["table4", "--quick", "--resolution", "2"];
+    let table: Value =
+        serde_json::from_str(&evaluated(&[&options[..], &["--format", "json"]].concat())).unwrap();
+    let certified = table["rows"].as_array().unwrap().iter().find(|r| r["encoder"] == "certified").unwrap();
+    let columns = certified["columns"].as_array().unwrap();
+    assert_eq!(columns.len(), 9);
+    assert!(!is_exact(&columns[0]) && is_exact(&columns[8]), "{certified:#}");
+    let bands = columns.iter().map(|c| c["exactness_band"].as_f64().unwrap());
+    assert!(bands.is_sorted(), "{certified:#}");
+}
+
+#[test]
+fn forms_of_a_table() {
+    let options = ["table1", "--meshes", "beam", "--grid", "20", "--resolution", "2"];
+    let csv = evaluated(&[&options[..], &["--format", "csv"]].concat());
+    let mut reader = csv::Reader::from_reader(csv.as_bytes());
+    let column = reader.headers().unwrap().iter().position(|c| c == "exactness_band").unwrap();
+    let bands: Vec<f64> = reader.records().map(|r| r.unwrap()[column].parse().unwrap()).collect();
+    assert_eq!(bands.len(), 18, "three encodings, three shapes, full and truncated");
+    assert_eq!(bands[0], 1.0);
+    let md = evaluated(&options);
+    for text in
+        ["`tesdf evaluate table1 --meshes beam", "Grid: 20 voxels", "| deformed beam, bent 29° | file |"]
+    {
+        assert!(md.contains(text), "{md}");
+    }
+}
+
+#[test]
+fn what_is_not_there_is_an_error() {
+    let folder = Folder::new();
+    let (code, _, err) = folder.tesdf(&["evaluate", "table1", "--quick"]);
+    assert_eq!(code, Some(2));
+    assert!(err.contains("there is no mesh") && err.contains("--data"), "{err}");
+    let (code, _, err) = folder.tesdf(&["evaluate", "table1", "--meshes", "bolt,washer"]);
+    assert_eq!(code, Some(2));
+    assert!(err.contains("no mesh washer") && err.contains("bolt, nut"), "{err}");
+}
