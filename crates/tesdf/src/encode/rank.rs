@@ -21,7 +21,10 @@ const LEVELS: u32 = 8;
 const SMALL: f64 = 0.02;
 
 /// For each face of a list a lower bound of d_f, Eq. (7): the least distance over the sub-cells in which the face, or an edge or
-/// vertex of it, survives the filter. Infinite for a face that no sub-cell needs.
+/// vertex that it stands in for, survives the filter. Infinite for a face that no sub-cell needs.
+///
+/// A point that is nearer to the surface than the bounds of all faces that are left out has its closest feature in the list: the
+/// feature survives in its sub-cell, so the face that has it, or stands in for it, has a bound of at most its distance.
 pub fn rank(surface: &Surface, cell: &Cell, list: &[u32], scratch: &mut Scratch) -> Vec<Ranked> {
     let mut needs = Vec::new();
     let mut pool = scratch.pool();
@@ -30,12 +33,27 @@ pub fn rank(surface: &Surface, cell: &Cell, list: &[u32], scratch: &mut Scratch)
     scratch.give_back(pool);
     needs.sort_by(|a: &(Requirement, f64), b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     needs.dedup_by_key(|need| need.0);
-    let of_face = |&face: &u32| {
-        let held = needs.iter().filter(|need| surface.holds(face, need.0));
-        let distance = held.map(|need| need.1).fold(f64::INFINITY, f64::min);
-        Ranked { face, order: distance, distance }
-    };
-    list.iter().map(of_face).collect()
+    let mut distances = vec![f64::INFINITY; list.len()];
+    let (faces, parts): (Vec<_>, Vec<_>) = needs.into_iter().partition(|need| surface.is_face(need.0));
+    for (distance, &face) in distances.iter_mut().zip(list) {
+        let own = faces.iter().filter(|need| surface.holds(face, need.0));
+        *distance = own.map(|need| need.1).fold(f64::INFINITY, f64::min);
+    }
+    stand_in(surface, list, parts, &mut distances);
+    let ranked = |(&face, distance)| Ranked { face, order: distance, distance };
+    list.iter().zip(distances).map(ranked).collect()
+}
+
+/// Lets one face stand in for each edge or vertex: of those that have it the one that is needed nearest to the surface anyway. Were it all of
+/// them, the faces around every vertex of the cell would be needed at distance 0.
+fn stand_in(surface: &Surface, list: &[u32], mut parts: Vec<(Requirement, f64)>, distances: &mut [f64]) {
+    parts.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
+    for (part, distance) in parts {
+        let holders = (0..list.len()).filter(|&at| surface.holds(list[at], part));
+        if let Some(at) = holders.min_by(|&a, &b| distances[a].total_cmp(&distances[b])) {
+            distances[at] = distances[at].min(distance);
+        }
+    }
 }
 
 fn descend(
