@@ -1,7 +1,7 @@
 //! `tesdf evaluate table1|table4`: Tables I and IV of the paper, measured, beside the paper's figures.
 //!
-//! In go the meshes of the repository ([`meshes`]); each is encoded in a domain with both encoders, with full lists and with
-//! truncated ones ([`measure`]), and compared with exact distances on a grid. Out come rows ([`table1`], [`table4`])
+//! In go the meshes of the repository (`meshes`); each is encoded in a domain with both encoders, with full lists and with
+//! truncated ones (`measure`), and compared with exact distances on a grid. Out come rows (`table1`, `table4`)
 //! as Markdown, CSV or JSON.
 mod deformed;
 mod domains;
