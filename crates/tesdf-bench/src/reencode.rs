@@ -22,7 +22,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', default_values_t = [0.02, 0.05, 0.1, 0.2, 0.5, 1.0])]
     shares: Vec<f64>,
     /// How far the end is bent, degrees per length of the mesh
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long, default_value_t = 5.0)]
     bend: f64,
     /// Points at which the re-encoded asset is compared with brute force
     #[arg(long, default_value_t = 5000)]

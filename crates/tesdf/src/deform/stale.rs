@@ -174,11 +174,19 @@ impl Search<'_> {
     fn check(&self, listed: &Listed, scratch: &mut Scratch) -> Option<Option<Stale>> {
         let mut list: Vec<u32> = self.asset.with_list(listed.offset, |faces| faces.ids().to_vec());
         list.sort_unstable();
-        if !self.is_touched(listed, &list) {
-            return None;
-        }
         let Lists { surface, tree, .. } = self.lists;
-        let candidates = lipschitz_candidates(surface, tree, &listed.cell);
+        let candidates = if self.is_where_it_was(listed, &list) {
+            let mut all = self.newcomers(&listed.cell, &list);
+            if all.is_empty() {
+                return None;
+            }
+            // What is listed beats what is not, and has not moved.
+            all.extend(&list);
+            all.sort_unstable();
+            all
+        } else {
+            lipschitz_candidates(surface, tree, &listed.cell)
+        };
         let pool = Pool::new(surface, &candidates, &listed.cell);
         let filtered = filter(surface, &listed.cell, &pool.candidates(), scratch);
         let has = |r| list.iter().any(|&face| surface.holds(face, r));
@@ -193,18 +201,43 @@ impl Search<'_> {
         Some((!holds).then_some(stale))
     }
 
-    /// Whether the cell, a face of its list, or a face that can now be among the closest has moved (Lemma 1).
-    fn is_touched(&self, listed: &Listed, list: &[u32]) -> bool {
-        if self.motion.tetrahedra[listed.root] || list.iter().any(|&f| self.motion.faces[f as usize]) {
-            return true;
-        }
-        let center = listed.cell.centroid();
-        let triangles = &self.lists.surface.triangles;
-        let distance = |&face: &u32| triangles[face as usize].closest(center).distance;
-        let radius = listed.cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max);
-        // What is listed and did not move is where it was.
-        let limit = list.iter().map(distance).fold(f64::INFINITY, f64::min) + 2.0 * radius;
-        let nearest = self.moved_tree.nearest(center, |at| distance(&self.moved[at as usize]).powi(2));
-        nearest.is_some_and(|(squared, _)| squared.sqrt() < limit)
+    /// Whether neither the cell nor a face of its list has moved, and the list is a whole one.
+    fn is_where_it_was(&self, listed: &Listed, list: &[u32]) -> bool {
+        self.lists.options.max_entries.is_none()
+            && !self.motion.tetrahedra[listed.root]
+            && !list.iter().any(|&f| self.motion.faces[f as usize])
+    }
+
+    /// The moved faces that may now be closest somewhere in a cell that is where it was: those that neither Lemma 1 nor rule A drops, as
+    /// seen from what is listed.
+    fn newcomers(&self, cell: &Cell, list: &[u32]) -> Vec<u32> {
+        let surface = self.lists.surface;
+        let center = cell.centroid();
+        let closest = |face: u32, p: DVec3| surface.triangles[face as usize].closest(p);
+        let [a, b, c, d] = cell.corners;
+        let rivals = [center, a, b, c, d].map(|p| {
+            let found = list.iter().map(|&face| closest(face, p));
+            found
+                .min_by(|x, y| x.distance.total_cmp(&y.distance))
+                .map_or(DVec3::INFINITY, |found| found.point)
+        });
+        let radius = cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max);
+        let limit = rivals[0].distance(center) + 2.0 * radius;
+        let reach = rivals.map(|q| cell.corners.map(|c| c.distance(q) + surface.margin));
+        let mut newcomers = Vec::new();
+        self.moved_tree.visit(
+            |bounds| bounds.distance_squared(center) <= limit * limit,
+            |leaf| {
+                for &at in leaf {
+                    let face = self.moved[at as usize];
+                    let seen = cell.corners.map(|corner| closest(face, corner).distance);
+                    let dropped = |reach: &[f64; 4]| seen.iter().zip(reach).all(|(d, r)| d >= r);
+                    if !reach.iter().any(dropped) && closest(face, center).distance < limit {
+                        newcomers.push(face);
+                    }
+                }
+            },
+        );
+        newcomers
     }
 }
