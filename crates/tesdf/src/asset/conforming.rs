@@ -4,7 +4,7 @@ use super::layout::{DOMAIN_VERTICES, Label, Node, Side, TETRAHEDRA};
 use super::{AssetError, SharedSection, TeSdf};
 use crate::deform::Incidence;
 use crate::domain::{Cell, Classes};
-use crate::geometry::{Aabb, AabbTree, barycentric};
+use crate::geometry::{Aabb, AabbTree, Child, barycentric};
 
 /// The tetrahedra of a conforming domain, each the root of a bisection tree, and a tree of boxes that finds them.
 #[derive(Clone, Debug)]
@@ -19,6 +19,18 @@ pub(crate) struct Conforming {
 const LEAF: usize = 4;
 /// A point of the border may be out of all tetrahedra by rounding: by less than this, in barycentric coordinates.
 const OUTSIDE: f64 = -1e-12;
+/// Whether a point is in front of a side by more than rounding: most tetrahedra whose boxes hold it.
+fn is_clearly_outside([a, b, c, d]: &[DVec3; 4], p: DVec3) -> bool {
+    let (ab, ac, ad, ap) = (*b - *a, *c - *a, *d - *a, p - *a);
+    // Six times the volumes that the point has with three of the sides.
+    let across = [ac.cross(ad), ad.cross(ab), ab.cross(ac)];
+    let whole = ab.dot(across[0]);
+    let parts = across.map(|side| ap.dot(side) * whole.signum());
+    // The second part is what slivers need: the rounding of volumes of edges up to 4.
+    let slack = 1e-9 * whole.abs() + 1e-13;
+    parts.iter().any(|&part| part < -slack) || parts.iter().sum::<f64>() > whole.abs() + slack
+}
+
 /// What boxes are grown by, in the local frame, to hold such points.
 const PAD: f64 = 1e-14;
 
@@ -164,22 +176,40 @@ impl TeSdf {
         }
     }
 
-    /// The tetrahedron of a conforming domain that holds a point of the local frame, with the point's coordinates in it;
-    /// on a border the one that it is deepest in.
+    /// The tetrahedron of a conforming domain that holds a point of the local frame, with the point's coordinates in it. On a border the
+    /// first one found; by rounding a point may be a little out of all, and then the one that it is the least out of.
     pub(crate) fn locate_root(&self, domain: &Conforming, p: DVec3) -> Option<(usize, [f64; 4])> {
         let mut best: Option<(f64, usize, [f64; 4])> = None;
-        domain.tree.visit(
-            |bounds| bounds.contains(p),
-            |leaf| {
-                for &t in leaf {
-                    let lambda = barycentric(&domain.corners(self, t as usize), p);
-                    let least = lambda.into_iter().fold(f64::INFINITY, f64::min);
-                    if least >= OUTSIDE && best.is_none_or(|(b, ..)| least > b) {
-                        best = Some((least, t as usize, lambda));
+        let (bounds, root) = domain.tree.root();
+        let mut stack = [root; AabbTree::MAX_DEPTH + 2];
+        let mut top = usize::from(bounds.contains(p));
+        while top > 0 {
+            top -= 1;
+            let (start, end) = match stack[top] {
+                Child::Leaf { start, end } => (start as usize, end as usize),
+                Child::Node(node) => {
+                    for (bounds, child) in domain.tree.nodes()[node as usize] {
+                        stack[top] = child;
+                        top += usize::from(bounds.contains(p));
                     }
+                    continue;
                 }
-            },
-        );
+            };
+            for &t in &domain.tree.order()[start..end] {
+                let corners = domain.corners(self, t as usize);
+                if is_clearly_outside(&corners, p) {
+                    continue;
+                }
+                let lambda = barycentric(&corners, p);
+                let least = lambda.into_iter().fold(f64::INFINITY, f64::min);
+                if least >= 0.0 {
+                    return Some((t as usize, lambda));
+                }
+                if least >= OUTSIDE && best.is_none_or(|(b, ..)| least > b) {
+                    best = Some((least, t as usize, lambda));
+                }
+            }
+        }
         best.map(|(_, root, lambda)| (root, lambda))
     }
 
