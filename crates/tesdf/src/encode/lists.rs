@@ -154,7 +154,8 @@ fn truncated(mut ranked: Vec<Ranked>, most: Option<u32>) -> (Vec<u32>, f64) {
     let mut exact_within = f64::INFINITY;
     if ranked.len() > most {
         // Of those for deformation, whose order is 0, first what is needed nearest to the surface at rest.
-        let key = |a: &Ranked, b: &Ranked| a.order.total_cmp(&b.order).then(a.distance.total_cmp(&b.distance));
+        let key =
+            |a: &Ranked, b: &Ranked| a.order.total_cmp(&b.order).then(a.distance.total_cmp(&b.distance));
         ranked.sort_by(|a, b| key(a, b).then(a.face.cmp(&b.face)));
         let held = ranked.partition_point(|r| r.order == f64::NEG_INFINITY);
         exact_within = ranked[most.max(held)..].iter().map(|r| r.distance).fold(exact_within, f64::min);
