@@ -8,6 +8,7 @@ use support::shapes::Shape;
 use support::tetrahedra::grid;
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
+use tesdf::asset::layout::Side;
 use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Scene, detect};
 use tesdf::deform::DeformError;
 use tesdf::domain::{ConformingMesh, TetMesh};
@@ -39,13 +40,9 @@ fn beam() -> (SolidMesh, ConformingMesh) {
 /// The same without anything around it.
 fn bare_beam() -> (SolidMesh, ConformingMesh) {
     let (solid, domain) = beam();
-    let inside = |t: &&[u32; 4]| {
-        let middle = 0.25 * t.iter().map(|&v| domain.vertices()[v as usize]).sum::<DVec3>();
-        domain.sides()[domain.tetrahedra().iter().position(|u| u == *t).expect("its own")]
-            == tesdf::asset::layout::Side::Inside
-            && middle.is_finite()
-    };
-    let tetrahedra: Vec<[u32; 4]> = domain.tetrahedra().iter().filter(inside).copied().collect();
+    let cells = domain.tetrahedra().iter().zip(domain.sides());
+    let tetrahedra: Vec<[u32; 4]> =
+        cells.filter(|(_, side)| **side == Side::Inside).map(|(t, _)| *t).collect();
     let bare = TetMesh::new(domain.vertices().to_vec(), tetrahedra).expect("tetrahedra");
     let bare = ConformingMesh::new(&solid, &bare).expect("the inside conforms, too");
     (solid, bare)
