@@ -148,6 +148,7 @@ fn options_of_the_encoders() {
     for (wrong, named) in [
         (&["--plain"][..], "--plain"),
         (&["--resolution", "8"], "--encoder sampled"),
+        (&["--domain", "x.msh", "--band", "1"], "--band"),
         (&["--encoder", "certified", "--preset", "paper"], "--encoder certified"),
     ] {
         assert!(options(wrong).1.unwrap_err().contains(named));

@@ -135,6 +135,13 @@ impl Args {
             }
             None => {}
         }
+        if let (DomainChoice::File(_), true) = (&self.domain, self.band.is_some() || !self.regions.is_empty())
+        {
+            return Err(
+                "--band and --region: the tetrahedra of the file are the domain; leave these options out"
+                    .into(),
+            );
+        }
         options.refinement = match (&self.domain, self.plain) {
             (DomainChoice::Bisection, true) => {
                 return Err(

@@ -98,9 +98,9 @@ pub enum Deformation {
 /// What to encode, and for how much memory. Every field is used.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EncodeOptions {
-    /// Width of the layer outside of the surface that belongs to the domain.
+    /// Width of the layer outside of the surface that belongs to the bisection domain; a conforming domain is what its tetrahedra fill.
     pub band: Length,
-    /// Further boxes that belong to the domain, in the mesh's unit: `[min x y z, max x y z]`.
+    /// Further boxes that belong to the bisection domain, in the mesh's unit: `[min x y z, max x y z]`.
     pub regions: Vec<[f64; 6]>,
     /// How many faces less per query near the surface one more byte per face of the mesh is worth.
     /// Smaller makes more cells with shorter lists.
