@@ -52,6 +52,11 @@ impl CellBounds {
         Self { bytes: bounds.iter().map(byte).collect(), unit }
     }
 
+    /// The bytes, and what a squared one is worth.
+    pub fn bytes(&self) -> (&[u8], f64) {
+        (&self.bytes, self.unit)
+    }
+
     /// No point of the cell has a signed distance below this (local frame); 0 where the solid may be.
     #[inline]
     pub fn least(&self, word: u32) -> f64 {

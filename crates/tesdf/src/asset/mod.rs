@@ -14,6 +14,7 @@
 //! `checksum` is BLAKE3 of the first 8 + n bytes with its own 64 digits set to `0`; `checksum.NAME` is BLAKE3 of section
 //! NAME. Together they cover every byte of the file.
 pub mod about;
+mod arrays;
 mod cell_bounds;
 mod cells;
 mod conforming;
@@ -25,6 +26,7 @@ mod save;
 mod section;
 mod te_sdf;
 
+pub use arrays::Arrays;
 pub use cells::{CellKind, CellView};
 pub(crate) use conforming::Conforming;
 pub use container::{Container, SharedSection, write_container};

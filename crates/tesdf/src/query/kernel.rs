@@ -46,6 +46,11 @@ impl FaceRecord {
         Self(record)
     }
 
+    /// The numbers, in the order of the type's documentation.
+    pub fn as_array(&self) -> &[f32; 16] {
+        &self.0
+    }
+
     /// The face in `f64`, relative to the middle of the cube.
     #[inline]
     pub fn triangle(&self) -> Triangle {

@@ -1,0 +1,229 @@
+//! The one place that knows on what kernels run.
+use std::fmt;
+
+use bytemuck::{NoUninit, Pod};
+use cubecl::client::Client;
+use cubecl::features::Plane;
+use cubecl::prelude::*;
+use cubecl::server::Handle;
+use cubecl::wgpu::{WgpuDevice, WgpuDeviceKind, WgpuRuntime};
+use cubecl_common::device::{Device as _, DeviceId};
+use cubecl_runtime::runtime::Runtime;
+
+use crate::GpuError;
+
+/// The environment variable that chooses a device when the program does not.
+pub const DEVICE_VARIABLE: &str = "TESDF_DEVICE";
+
+/// What a device is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeviceKind {
+    /// A graphics card.
+    Discrete,
+    /// Part of the processor.
+    Integrated,
+    /// Of a virtual machine.
+    Virtual,
+    /// A driver that computes on the processor.
+    Software,
+    /// Not told.
+    Other,
+}
+
+impl fmt::Display for DeviceKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Discrete => "discrete GPU",
+            Self::Integrated => "integrated GPU",
+            Self::Virtual => "virtual GPU",
+            Self::Software => "software",
+            Self::Other => "other",
+        })
+    }
+}
+
+/// A device of this machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DeviceInfo {
+    /// Its name, as the driver tells it.
+    pub name: String,
+    /// What it is.
+    pub kind: DeviceKind,
+    /// Threads that run in lockstep, least and most.
+    pub plane: (u32, u32),
+    /// Whether kernels exchange values within those threads, or through shared memory.
+    pub has_plane_operations: bool,
+    /// Most bytes of a buffer that a kernel can bind.
+    pub most_bytes: u64,
+    /// Whether stages are timed by the device's own clock.
+    pub has_timestamps: bool,
+}
+
+/// A device, ready to run kernels. Cheap to clone.
+#[derive(Clone)]
+pub struct Device {
+    client: Client,
+    info: DeviceInfo,
+}
+
+impl fmt::Debug for Device {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Device").field(&self.info).finish()
+    }
+}
+
+/// The devices of this machine, the best first: graphics cards, then what is part of the processor, then software.
+pub fn devices() -> Vec<DeviceInfo> {
+    ids().into_iter().map(|id| Device::open(id).info).collect()
+}
+
+fn ids() -> Vec<DeviceId> {
+    let mut ids = <WgpuRuntime>::enumerate_all_devices();
+    ids.sort_by_key(|id| match kind(*id) {
+        DeviceKind::Discrete => 0,
+        DeviceKind::Integrated => 1,
+        DeviceKind::Virtual => 2,
+        DeviceKind::Other => 3,
+        DeviceKind::Software => 4,
+    });
+    ids
+}
+
+fn kind(id: DeviceId) -> DeviceKind {
+    match WgpuDevice::from_id(id).kind {
+        WgpuDeviceKind::DiscreteGpu(_) => DeviceKind::Discrete,
+        WgpuDeviceKind::IntegratedGpu(_) => DeviceKind::Integrated,
+        WgpuDeviceKind::VirtualGpu(_) => DeviceKind::Virtual,
+        WgpuDeviceKind::Cpu => DeviceKind::Software,
+        _ => DeviceKind::Other,
+    }
+}
+
+impl Device {
+    /// The device that `asked` means: its number in [`devices`], or a part of its name in any case. Without one, what the environment
+    /// variable `TESDF_DEVICE` says, else the best there is.
+    ///
+    /// # Errors
+    /// [`GpuError::NoDevice`], [`GpuError::NoSuchDevice`].
+    pub fn choose(asked: Option<&str>) -> Result<Self, GpuError> {
+        let variable = std::env::var(DEVICE_VARIABLE).ok().filter(|v| !v.is_empty());
+        let ids = ids();
+        let Some(&best) = ids.first() else { return Err(GpuError::NoDevice) };
+        let Some(asked) = asked.map(str::to_owned).or(variable) else { return Ok(Self::open(best)) };
+        if let Some(&id) = asked.parse().ok().and_then(|i: usize| ids.get(i)) {
+            return Ok(Self::open(id));
+        }
+        let devices: Vec<Self> = ids.into_iter().map(Self::open).collect();
+        let is_meant = |d: &&Self| d.info.name.to_lowercase().contains(&asked.to_lowercase());
+        match devices.iter().find(is_meant) {
+            Some(device) => Ok(device.clone()),
+            None => {
+                let found = devices.into_iter().map(|d| d.info.name).collect();
+                Err(GpuError::NoSuchDevice { asked, found })
+            }
+        }
+    }
+
+    fn open(id: DeviceId) -> Self {
+        let client = <WgpuRuntime>::client(&WgpuDevice::from_id(id));
+        let properties = client.properties();
+        let hardware = &properties.hardware;
+        let info = DeviceInfo {
+            name: properties.identity.name.clone(),
+            kind: kind(id),
+            plane: (hardware.plane_size_min, hardware.plane_size_max),
+            has_plane_operations: properties.features.plane.contains(Plane::Ops),
+            most_bytes: properties.memory.max_page_size,
+            has_timestamps: properties.timing_method == cubecl::profile::TimingMethod::Device,
+        };
+        Self { client, info }
+    }
+
+    /// What the device is.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    /// Launches kernels.
+    pub(crate) fn client(&self) -> &Client {
+        &self.client
+    }
+
+    /// Whether 32 threads can exchange values without shared memory.
+    pub(crate) fn has_planes_of_32(&self) -> bool {
+        self.info.has_plane_operations && self.info.plane == (32, 32)
+    }
+
+    /// A buffer that holds `data`; one element at least, as nothing binds an empty buffer.
+    pub(crate) fn upload<T: NoUninit>(&self, name: &'static str, data: &[T]) -> Result<Buffer, GpuError> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        self.fits(name, bytes.len())?;
+        let handle = if bytes.is_empty() {
+            self.client.create_from_slice(&[0; 16])
+        } else {
+            self.client.create_from_slice(bytes)
+        };
+        Ok(Buffer { name, handle, bytes: bytes.len().max(16) })
+    }
+
+    /// A buffer of any contents.
+    pub(crate) fn empty(&self, name: &'static str, bytes: usize) -> Result<Buffer, GpuError> {
+        self.fits(name, bytes)?;
+        Ok(Buffer { name, handle: self.client.empty(bytes.max(16)), bytes: bytes.max(16) })
+    }
+
+    fn fits(&self, buffer: &'static str, bytes: usize) -> Result<(), GpuError> {
+        let (needed, limit) = (bytes as u64, self.info.most_bytes);
+        if needed > limit {
+            return Err(GpuError::TooLarge { device: self.info.name.clone(), buffer, needed, limit });
+        }
+        Ok(())
+    }
+
+    /// Waits for all that was launched, and reads the first `count` elements of a buffer.
+    pub(crate) fn read<T: Pod>(&self, buffer: &Buffer, count: usize) -> Result<Vec<T>, GpuError> {
+        let bytes = count * size_of::<T>();
+        if bytes == 0 {
+            return Ok(Vec::new());
+        }
+        let unread = buffer.bytes.saturating_sub(bytes) as u64;
+        let handle = buffer.handle.clone().offset_end(unread);
+        let read = self.client.read_one(handle).map_err(|e| GpuError::Device {
+            device: self.info.name.clone(),
+            doing: buffer.name,
+            reason: e.to_string(),
+        })?;
+        Ok(bytemuck::pod_collect_to_vec(&read[..bytes]))
+    }
+}
+
+/// Memory of a device.
+#[derive(Clone)]
+pub(crate) struct Buffer {
+    name: &'static str,
+    handle: Handle,
+    bytes: usize,
+}
+
+impl Buffer {
+    /// For a kernel, as elements of `size` bytes.
+    pub fn argument(&self, size: usize) -> BufferArg {
+        // SAFETY: the buffer has that many elements, of plain numbers.
+        unsafe { BufferArg::from_raw_parts(self.handle.clone(), self.bytes / size) }
+    }
+
+    /// For a kernel that takes words or `f32`.
+    pub fn words(&self) -> BufferArg {
+        self.argument(4)
+    }
+
+    /// For a kernel that takes rows of four `f32`.
+    pub fn rows(&self) -> BufferArg {
+        self.argument(16)
+    }
+
+    /// Size in bytes.
+    pub fn bytes(&self) -> usize {
+        self.bytes
+    }
+}

@@ -1,0 +1,47 @@
+/// Why something could not be done on a device.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GpuError {
+    /// This machine has no device that kernels can run on.
+    #[error(
+        "no GPU device was found; expected a Vulkan, Metal or DirectX 12 driver. On Debian and Ubuntu: `apt install libvulkan1 \
+         mesa-vulkan-drivers` for AMD, Intel and the software device, the package nvidia-driver for NVIDIA"
+    )]
+    NoDevice,
+    /// No device of this machine is meant by a name or number.
+    #[error("no device is named {asked:?}; this machine has {}", list(.found))]
+    NoSuchDevice {
+        /// What was asked for.
+        asked: String,
+        /// Names of the devices there are.
+        found: Vec<String>,
+    },
+    /// The device refused a buffer, a kernel or a read.
+    #[error("{device}: {doing}: {reason}")]
+    Device {
+        /// Name of the device.
+        device: String,
+        /// What was being done.
+        doing: &'static str,
+        /// What the driver said.
+        reason: String,
+    },
+    /// A buffer is larger than the device can bind.
+    #[error(
+        "{device}: buffer {buffer:?} needs {needed} bytes; the device binds {limit} at most. Split the scene, or raise the limit of the driver"
+    )]
+    TooLarge {
+        /// Name of the device.
+        device: String,
+        /// Which buffer.
+        buffer: &'static str,
+        /// Bytes that are needed.
+        needed: u64,
+        /// Bytes that there can be.
+        limit: u64,
+    },
+}
+
+fn list(names: &[String]) -> String {
+    let numbered: Vec<String> = names.iter().enumerate().map(|(i, name)| format!("{i}: {name}")).collect();
+    numbered.join(", ")
+}

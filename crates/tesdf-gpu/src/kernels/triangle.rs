@@ -1,0 +1,111 @@
+//! The distance from a point to a face, as `tesdf`'s `f32` kernel computes it: the same record, the same formulas.
+use cubecl::prelude::*;
+
+use super::vector::{V3, cross, dot, minus, pick, plus, plus_scaled, scaled, v3};
+
+/// Rows of four `f32` that a face takes: corner a, b − a, c − a, unit normal (zero when the face is no more than its edges), inverse
+/// squared lengths of b − a, c − a, c − b, and the bits of its hints. [`Images`](crate::Images) writes them.
+pub const ROWS: usize = 4;
+
+/// The low bits of a squared distance say which part of the face it is to: 0 the plane, 1 the edge a–b, 2 b–c, 3 c–a.
+pub const PART: u32 = 3;
+
+/// A face in the local frame, relative to the middle of the cube.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Face {
+    pub a: V3,
+    pub ab: V3,
+    pub ac: V3,
+    pub normal: V3,
+    /// 1 / |ab|², 1 / |ac|², 1 / |bc|²; 0 for a length of zero.
+    pub inverse: V3,
+    pub hints: u32,
+}
+
+/// Reads a face; `at` is its first row.
+#[cube]
+pub fn face(rows: &[Vector<f32, Const<4>>], at: usize) -> Face {
+    let (p, q, r, s) = (rows[at], rows[at + 1], rows[at + 2], rows[at + 3]);
+    Face {
+        a: v3(p.extract(0usize), p.extract(1usize), p.extract(2usize)),
+        ab: v3(p.extract(3usize), q.extract(0usize), q.extract(1usize)),
+        ac: v3(q.extract(2usize), q.extract(3usize), r.extract(0usize)),
+        normal: v3(r.extract(1usize), r.extract(2usize), r.extract(3usize)),
+        inverse: v3(s.extract(0usize), s.extract(1usize), s.extract(2usize)),
+        hints: u32::reinterpret(s.extract(3usize)),
+    }
+}
+
+/// Squared distance to the segment from the origin of `from` to `along`.
+#[cube]
+fn to_edge(from: V3, along: V3, inverse: f32) -> f32 {
+    let t = (dot(along, from) * inverse).clamp(0.0f32, 1.0f32);
+    let to = plus_scaled(from, -t, along);
+    dot(to, to)
+}
+
+#[cube]
+fn with_part(squared: f32, part: u32) -> f32 {
+    f32::reinterpret((u32::reinterpret(squared) & 4294967292u32) | part)
+}
+
+/// The squared distance, with the part of the face in its low bits.
+#[cube]
+pub fn distance_squared(f: Face, p: V3) -> f32 {
+    let ap = minus(p, f.a);
+    let bp = minus(ap, f.ab);
+    let bc = minus(f.ac, f.ab);
+    let turned = cross(ap, f.normal);
+    let inside = dot(f.ab, turned) >= 0.0f32
+        && dot(f.ac, turned) <= 0.0f32
+        && dot(bc, cross(bp, f.normal)) >= 0.0f32
+        && dot(f.normal, f.normal) > 0.5f32;
+    let height = dot(f.normal, ap);
+    let to_ab = with_part(to_edge(ap, f.ab, f.inverse.x), 1u32);
+    let to_bc = with_part(to_edge(bp, bc, f.inverse.z), 2u32);
+    let to_ca = with_part(to_edge(ap, f.ac, f.inverse.y), 3u32);
+    let to_edges = to_ab.min(to_bc).min(to_ca);
+    select(inside, with_part(height * height, 0u32), to_edges)
+}
+
+/// Where a face is nearest to a point.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Closest {
+    /// The nearest point.
+    pub point: V3,
+    /// From it to the query point.
+    pub outward: V3,
+    /// 0 the face, 1–3 its edges, 4–6 its corners.
+    pub feature: u32,
+    /// Height of the query point over the plane of the face.
+    pub height: f32,
+}
+
+/// The nearest point of the part that [`distance_squared`] named.
+#[cube]
+pub fn closest(f: Face, p: V3, part: u32) -> Closest {
+    let ap = minus(p, f.a);
+    let height = dot(f.normal, ap);
+    // Edge c–a runs from c, as its name says.
+    let from = pick(part == 2u32, minus(ap, f.ab), pick(part == 3u32, minus(ap, f.ac), ap));
+    let along = pick(part == 2u32, minus(f.ac, f.ab), pick(part == 3u32, scaled(-1.0f32, f.ac), f.ab));
+    let inverse = select(part == 2u32, f.inverse.z, select(part == 3u32, f.inverse.y, f.inverse.x));
+    let t = dot(along, from) * inverse;
+    let next = select(part == 3u32, 4u32, part + 4u32);
+    let of_edge = select(t <= 0.0f32, part + 3u32, select(t >= 1.0f32, next, part));
+    let in_plane = part == 0u32;
+    let outward = pick(
+        in_plane,
+        scaled(height, f.normal),
+        plus_scaled(from, -t.clamp(0.0f32, 1.0f32), along),
+    );
+    Closest { point: minus(p, outward), outward, feature: select(in_plane, 0u32, of_edge), height }
+}
+
+/// Corner `k` of a face.
+#[cube]
+pub fn corner(f: Face, k: u32) -> V3 {
+    pick(k == 1u32, plus(f.a, f.ab), pick(k == 2u32, plus(f.a, f.ac), f.a))
+}

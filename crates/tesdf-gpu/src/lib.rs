@@ -1,0 +1,17 @@
+//! Signed distances, contacts and encoding on the GPU.
+//!
+//! ```text
+//! TeSdf ──Images──▶ buffers ──SignedDistances──▶ answers of many points
+//! Scene ──Detector──▶ contacts, in the form and order of `tesdf::collide::detect`
+//! ```
+//!
+//! Kernels are written once, with [CubeCL](https://github.com/tracel-ai/cubecl), and run through wgpu on Vulkan, Metal and
+//! DirectX 12. Everything is computed in `f32`, in the local frame of the field; `docs/gpu.md` has stages, layouts and limits.
+#![warn(missing_docs)]
+
+mod device;
+mod error;
+mod kernels;
+
+pub use device::{Device, DeviceInfo, DeviceKind, devices};
+pub use error::GpuError;

@@ -1,0 +1,74 @@
+use super::{Conforming, TeSdf};
+use crate::domain::DomainCube;
+use crate::geometry::{Aabb, LocalFrame};
+use crate::query::FaceRecord;
+
+/// The arrays of an asset, as kernels of other devices read them. [`layout`](super::layout) explains the words.
+///
+/// Lengths are in the local frame; `f32` positions are relative to the middle of the cube.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrays<'a> {
+    /// From the mesh's unit to the local frame.
+    pub frame: LocalFrame,
+    /// The cube of the bisection forest.
+    pub cube: DomainCube,
+    /// The forest: see [`Node`](super::layout::Node). The first words are its roots.
+    pub nodes: &'a [u32],
+    /// The lists: see [`List`](super::layout::List).
+    pub lists: &'a [u8],
+    /// Where each palette begins, and where the last one ends.
+    pub palette_starts: &'a [u32],
+    /// Low 16 bits of the palette faces.
+    pub palettes: &'a [u16],
+    /// The eight bits above them.
+    pub palettes_high: Option<&'a [u8]>,
+    /// Boxes of the two children of each node of the face tree.
+    pub tree_boxes: &'a [[f32; 12]],
+    /// The children: see [`TreeChild`](super::layout::TreeChild).
+    pub tree_children: &'a [[u32; 2]],
+    /// Corner vertices of the faces.
+    pub faces: &'a [[u32; 3]],
+    /// Ids of the faces in the source mesh.
+    pub face_ids: &'a [u32],
+    /// The faces in `f32`, with their sign hints.
+    pub records: &'a [FaceRecord],
+    /// For every word of the forest the square root of a lower bound of the signed distances in its cell.
+    pub cell_bounds: &'a [u8],
+    /// What a squared entry of [`cell_bounds`](Self::cell_bounds) is worth.
+    pub cell_bound_unit: f64,
+    /// Bounds of the mesh.
+    pub bounds: Aabb,
+    /// How far around the solid the domain is sure to reach.
+    pub band: f64,
+    /// Whether every list is proved to be exact where the vertices are now.
+    pub has_exact_lists: bool,
+    /// Tetrahedra of a conforming domain; 0 for the bisection domain, whose roots are the six of the cube.
+    pub tetrahedra: usize,
+}
+
+impl TeSdf {
+    /// What kernels of other devices read. Makes the bounds of the cells when nothing has made them yet.
+    pub fn arrays(&self) -> Arrays<'_> {
+        let (cell_bounds, cell_bound_unit) = self.cell_bounds().bytes();
+        Arrays {
+            frame: self.frame,
+            cube: self.cube,
+            nodes: &self.nodes,
+            lists: &self.lists,
+            palette_starts: &self.palette_starts,
+            palettes: &self.palettes,
+            palettes_high: self.palettes_high.as_deref(),
+            tree_boxes: &self.tree_boxes,
+            tree_children: &self.tree_children,
+            faces: &self.faces,
+            face_ids: &self.face_ids,
+            records: &self.records,
+            cell_bounds,
+            cell_bound_unit,
+            bounds: self.local_bounds(),
+            band: self.band(),
+            has_exact_lists: self.has_exact_lists(),
+            tetrahedra: self.conforming.as_ref().map_or(0, |c: &Conforming| c.tetrahedra().len()),
+        }
+    }
+}
