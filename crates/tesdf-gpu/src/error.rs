@@ -25,6 +25,22 @@ pub enum GpuError {
         /// What the driver said.
         reason: String,
     },
+    /// A shape that kernels cannot read.
+    #[error("shape {number}: {reason}")]
+    Shape {
+        /// Its place in the list that was to be uploaded.
+        number: usize,
+        /// What was found, and what was expected.
+        reason: String,
+    },
+    /// An instance that cannot be.
+    #[error("instance {instance}: {reason}")]
+    Instance {
+        /// Its place in the list.
+        instance: usize,
+        /// What was found, and what was expected.
+        reason: String,
+    },
     /// A buffer is larger than the device can bind.
     #[error(
         "{device}: buffer {buffer:?} needs {needed} bytes; the device binds {limit} at most. Split the scene, or raise the limit of the driver"

@@ -11,7 +11,12 @@
 
 mod device;
 mod error;
+mod images;
 mod kernels;
+mod placed;
+mod query;
 
 pub use device::{Device, DeviceInfo, DeviceKind, devices};
 pub use error::GpuError;
+pub use images::{ImageBytes, Images};
+pub use query::{WorldAnswer, query};

@@ -1,0 +1,271 @@
+//! Shapes as the device holds them: each once, whatever the number of its instances.
+use glam::{DVec3, Vec3};
+use tesdf::asset::Arrays;
+use tesdf::asset::layout::TreeChild;
+use tesdf::collide::Shape;
+
+use crate::GpuError;
+use crate::device::{Buffer, Device};
+use crate::kernels::assets::{self, AssetsLaunch, STRIDE};
+use crate::kernels::nearest::TREE_DEPTH;
+
+/// Most faces of a meshlet: one for each thread of a group.
+pub const MESHLET: u32 = 32;
+
+/// What a ball is grown by, of its radius and of the cube: more than rounding to `f32` takes away.
+const GROWN: f64 = 1e-6;
+
+/// Shapes on a device.
+#[derive(Clone)]
+pub struct Images {
+    table: Buffer,
+    words: Buffer,
+    rows: Buffer,
+    kinds: Vec<u32>,
+    meshlets: Vec<u32>,
+}
+
+/// Bytes of an asset's arrays on the device, by what they are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ImageBytes {
+    /// What the shapes are and where their arrays begin.
+    pub table: usize,
+    /// Forests, lists, palettes, cell bounds, children of the face trees.
+    pub words: usize,
+    /// Faces, boxes of the face trees, balls of the meshlets.
+    pub rows: usize,
+}
+
+#[derive(Default)]
+struct Packed {
+    table: Vec<u32>,
+    words: Vec<u32>,
+    rows: Vec<[f32; 4]>,
+}
+
+impl Images {
+    /// Uploads shapes; the number of a shape is its place in `shapes`.
+    ///
+    /// # Errors
+    /// A shape that the device cannot hold, by its place.
+    pub fn new(device: &Device, shapes: &[&Shape]) -> Result<Self, GpuError> {
+        let mut packed = Packed::default();
+        let (mut kinds, mut meshlets) = (Vec::new(), Vec::new());
+        for (number, shape) in shapes.iter().enumerate() {
+            let row = packed.add(shape).map_err(|reason| GpuError::Shape { number, reason })?;
+            kinds.push(row[assets::KIND as usize]);
+            meshlets.push(row[assets::MESHLET_COUNT as usize]);
+            packed.table.extend(row);
+        }
+        Ok(Self {
+            table: device.upload("shapes", &packed.table)?,
+            words: device.upload("words of shapes", &packed.words)?,
+            rows: device.upload("rows of shapes", &packed.rows)?,
+            kinds,
+            meshlets,
+        })
+    }
+
+    /// For a kernel.
+    pub(crate) fn argument(&self) -> AssetsLaunch {
+        AssetsLaunch::new(self.table.words(), self.words.words(), self.rows.rows())
+    }
+
+    /// Number of shapes.
+    pub fn len(&self) -> usize {
+        self.kinds.len()
+    }
+
+    /// Whether there is no shape.
+    pub fn is_empty(&self) -> bool {
+        self.kinds.is_empty()
+    }
+
+    /// Groups of up to 32 faces that a shape's surface is cut into.
+    pub(crate) fn meshlets(&self, shape: usize) -> u32 {
+        self.meshlets[shape]
+    }
+
+    /// Size on the device.
+    pub fn bytes(&self) -> ImageBytes {
+        ImageBytes { table: self.table.bytes(), words: self.words.bytes(), rows: self.rows.bytes() }
+    }
+}
+
+impl Packed {
+    fn add(&mut self, shape: &Shape) -> Result<[u32; STRIDE as usize], String> {
+        let mut row = [0u32; STRIDE as usize];
+        let mut sizes = |kind: u32, sizes: DVec3| {
+            row[assets::KIND as usize] = kind;
+            let at = assets::SIZES as usize;
+            row[at..at + 3].copy_from_slice(&sizes.as_vec3().to_array().map(f32::to_bits));
+        };
+        match shape {
+            Shape::Mesh(asset) => return self.add_mesh(&asset.arrays()),
+            Shape::Plane => sizes(assets::PLANE, DVec3::ZERO),
+            Shape::Box { half_extents } => sizes(assets::BOX, *half_extents),
+            Shape::Sphere { radius } => sizes(assets::ROUND, DVec3::new(0.0, *radius, 0.0)),
+            Shape::Capsule { half_height, radius } => {
+                sizes(assets::ROUND, DVec3::new(*half_height, *radius, 0.0));
+            }
+        }
+        // Its parts: two triangles of a plane, twelve of a box, the core of what is round.
+        row[assets::FACE_COUNT as usize] = match shape {
+            Shape::Plane => 2,
+            Shape::Box { .. } => 12,
+            _ => 1,
+        };
+        row[assets::MESHLET_COUNT as usize] = 1;
+        Ok(row)
+    }
+
+    fn add_mesh(&mut self, mesh: &Arrays) -> Result<[u32; STRIDE as usize], String> {
+        if mesh.tetrahedra > 0 {
+            return Err(format!(
+                "a conforming domain of {} tetrahedra; expected the bisection domain. Encode the mesh without `--domain`",
+                mesh.tetrahedra
+            ));
+        }
+        let depth = depth(mesh);
+        // A node's children are pushed at its own level.
+        if depth + 2 > TREE_DEPTH {
+            return Err(format!("a face tree of {depth} levels; expected {} at most", TREE_DEPTH - 2));
+        }
+        let mut row = [0u32; STRIDE as usize];
+        let mut set = |at: u32, value: u32| row[at as usize] = value;
+        set(assets::KIND, assets::MESH);
+        set(assets::NODES, self.words_at(mesh.nodes.iter().copied())?);
+        set(assets::LISTS, self.bytes_at(mesh.lists)?);
+        set(assets::PALETTE_STARTS, self.words_at(mesh.palette_starts.iter().copied())?);
+        let halves = mesh.palettes.chunks(2).map(|c| u32::from(c[0]) | u32::from(*c.get(1).unwrap_or(&0)) << 16);
+        set(assets::PALETTES, self.words_at(halves)?);
+        set(
+            assets::PALETTES_HIGH,
+            mesh.palettes_high.map_or(Ok(assets::NONE), |high| self.bytes_at(high))?,
+        );
+        set(assets::BOUNDS, self.bytes_at(mesh.cell_bounds)?);
+        set(assets::CHILDREN, self.words_at(mesh.tree_children.as_flattened().iter().copied())?);
+        set(assets::RECORDS, self.rows_at(records(mesh).into_iter().flat_map(four))?);
+        set(assets::BOXES, self.rows_at(mesh.tree_boxes.iter().flat_map(|b| {
+            let (rows, _) = b.as_chunks::<4>();
+            rows.to_vec()
+        }))?);
+        let meshlets = meshlets(mesh);
+        set(assets::MESHLETS, self.rows_at(meshlets.iter().map(|&(start, count)| ball(mesh, start, count)))?);
+        set(
+            assets::MESHLET_FACES,
+            self.words_at(meshlets.iter().flat_map(|&(start, count)| [start, count]))?,
+        );
+        set(assets::MESHLET_COUNT, meshlets.len() as u32);
+        set(assets::FACE_COUNT, mesh.faces.len() as u32);
+        set(assets::EXACT_LISTS, u32::from(mesh.has_exact_lists));
+        let mut set = |at: u32, value: f64| set(at, (value as f32).to_bits());
+        set(assets::SIDE, mesh.cube.side());
+        set(assets::INVERSE_SIDE, 1.0 / mesh.cube.side());
+        set(assets::BOUND_UNIT, mesh.cell_bound_unit);
+        set(assets::BAND, mesh.band);
+        for axis in 0..3 {
+            set(assets::LOW + axis as u32, (mesh.bounds.min - mesh.cube.middle())[axis]);
+            set(assets::HIGH + axis as u32, (mesh.bounds.max - mesh.cube.middle())[axis]);
+        }
+        Ok(row)
+    }
+
+    fn words_at(&mut self, words: impl Iterator<Item = u32>) -> Result<u32, String> {
+        let at = self.words.len();
+        self.words.extend(words);
+        u32::try_from(at).map_err(|_| "more than 2^32 words of arrays".to_owned())
+    }
+
+    fn bytes_at(&mut self, bytes: &[u8]) -> Result<u32, String> {
+        let word = |chunk: &[u8]| {
+            let mut word = [0; 4];
+            word[..chunk.len()].copy_from_slice(chunk);
+            u32::from_le_bytes(word)
+        };
+        // A byte of room: half words are read a byte at a time, but a list may end with the section.
+        self.words_at(bytes.chunks(4).map(word).chain([0]))
+    }
+
+    fn rows_at(&mut self, rows: impl Iterator<Item = [f32; 4]>) -> Result<u32, String> {
+        let at = self.rows.len();
+        self.rows.extend(rows);
+        u32::try_from(at).map_err(|_| "more than 2^32 rows of arrays".to_owned())
+    }
+}
+
+fn four(record: [f32; 16]) -> [[f32; 4]; 4] {
+    std::array::from_fn(|i| std::array::from_fn(|k| record[4 * i + k]))
+}
+
+/// The faces as kernels read them: no NaN for a face without a plane, as shaders may assume that there is none, and with the corners that no
+/// face before has.
+fn records(mesh: &Arrays) -> Vec<[f32; 16]> {
+    let vertices = mesh.faces.as_flattened().iter().max().map_or(0, |&v| v as usize + 1);
+    let mut seen = vec![false; vertices];
+    let record = |(record, corners): (&tesdf::query::FaceRecord, &[u32; 3])| {
+        let mut record = *record.as_array();
+        if record[9].is_nan() {
+            record[9..12].fill(0.0);
+        }
+        let mut hints = record[15].to_bits() & 0xFFFF;
+        for (k, &v) in corners.iter().enumerate() {
+            if !std::mem::replace(&mut seen[v as usize], true) {
+                hints |= 1 << (assets::OWNED_CORNERS + k as u32);
+            }
+        }
+        record[15] = f32::from_bits(assets::HINTS | hints);
+        record
+    };
+    mesh.records.iter().zip(mesh.faces).map(record).collect()
+}
+
+/// Levels of the face tree.
+fn depth(mesh: &Arrays) -> usize {
+    let mut levels = vec![1usize; mesh.tree_children.len()];
+    for node in (0..levels.len()).rev() {
+        for child in mesh.tree_children[node] {
+            if let TreeChild::Node(c) = TreeChild::decode(child) {
+                levels[node] = levels[node].max(levels[c as usize] + 1);
+            }
+        }
+    }
+    levels.first().copied().unwrap_or(0)
+}
+
+/// First face and number of faces of the largest parts of the face tree that have at most [`MESHLET`] faces, in order.
+fn meshlets(mesh: &Arrays) -> Vec<(u32, u32)> {
+    let mut ranges = vec![(u32::MAX, 0u32); mesh.tree_children.len()];
+    let range = |ranges: &[(u32, u32)], word| match TreeChild::decode(word) {
+        TreeChild::Node(c) => ranges[c as usize],
+        TreeChild::Leaf(start, count) => (start, count),
+    };
+    for node in (0..ranges.len()).rev() {
+        let [a, b] = mesh.tree_children[node].map(|word| range(&ranges, word));
+        ranges[node] = (a.0.min(b.0), a.1 + b.1);
+    }
+    let mut stack = vec![TreeChild::Node(0).encode()];
+    let mut meshlets = Vec::new();
+    while let Some(word) = stack.pop() {
+        let (start, count) = range(&ranges, word);
+        match TreeChild::decode(word) {
+            TreeChild::Node(node) if count > MESHLET => stack.extend(mesh.tree_children[node as usize]),
+            _ => meshlets.push((start, count)),
+        }
+    }
+    meshlets.sort_unstable();
+    meshlets
+}
+
+/// A ball around some faces, relative to the middle of the cube.
+fn ball(mesh: &Arrays, start: u32, count: u32) -> [f32; 4] {
+    let faces = &mesh.records[start as usize..(start + count) as usize];
+    let corners = faces.iter().flat_map(|r| r.triangle().corners);
+    let (low, high) = corners
+        .clone()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+    let center: Vec3 = (0.5 * (low + high)).as_vec3();
+    let radius = corners.map(|c| c.distance(center.as_dvec3())).fold(0.0, f64::max);
+    let radius = radius * (1.0 + GROWN) + GROWN * mesh.cube.side();
+    [center.x, center.y, center.z, radius as f32]
+}

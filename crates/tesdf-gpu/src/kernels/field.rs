@@ -1,0 +1,294 @@
+//! Eq. (4): the signed distance of a shape at a point, with its gradient; formulas for planes, boxes and what is round.
+//!
+//! Points are in the frame of the field: for a mesh its local frame relative to the middle of the cube, for a simple shape its own.
+use cubecl::prelude::*;
+
+use super::assets::{Assets, BOX, EXACT_LISTS, KIND, LISTS, MESH, NODES, PLANE, RECORDS, SIDE, SIZES, byte, entry, number, vector};
+use super::list::{list, list_face};
+use super::locate::{Lambda, Place, code, in_child, in_cube, in_root, is_split, lambda_at, next_k, offset, place, root};
+use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
+use super::triangle::{PART, ROWS, closest, corner, face};
+use super::vector::{V3, cross, dot, length, minus, pick, plus, scaled, v3};
+
+/// What a field says at a point.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Value {
+    /// Signed distance.
+    pub distance: f32,
+    /// Its gradient, unit.
+    pub gradient: V3,
+    /// The nearest point of the surface.
+    pub point: V3,
+    /// Position of the nearest face; of a box the number of its side.
+    pub face: u32,
+    /// 0 that face, 1–3 its edges, 4–6 its corners.
+    pub feature: u32,
+}
+
+/// Below this distance the gradient is the normal of the nearest face.
+const ON_SURFACE: f32 = 1e-6;
+
+/// Whether a cell has a list.
+#[cube]
+pub fn is_listed(word: u32) -> bool {
+    code(word) <= 5u32
+}
+
+/// The nearest face to a point of a cell.
+#[cube]
+pub fn nearest(assets: &Assets, shape: u32, word: u32, p: V3) -> Nearest {
+    let mut squared = FAR.runtime();
+    let mut position = u32::MAX.runtime();
+    if is_listed(word) {
+        let faces = list(assets, shape, offset(word));
+        let found = nearest_in_list(assets, shape, faces, 0u32, 1u32, p);
+        squared = found.squared;
+        position = found.face;
+    } else {
+        let found = nearest_in_tree(assets, shape, p, FAR);
+        squared = found.squared;
+        position = found.face;
+    }
+    Nearest { squared, face: position }
+}
+
+/// The value at a point whose nearest face is known.
+#[cube]
+pub fn value_of(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest) -> Value {
+    let at = (entry(assets, shape, RECORDS) + nearest.face * comptime!(ROWS as u32)) as usize;
+    let f = face(&assets.rows, at);
+    let c = closest(f, p, u32::reinterpret(nearest.squared) & PART);
+    let distance = length(c.outward);
+    let kind = code(word);
+    let far_inside = kind == 6u32 && offset(word) == 1u32;
+    let mut inside = kind == 1u32 || far_inside;
+    if kind >= 2u32 && kind <= 5u32 {
+        let hint = (f.hints >> (2u32 * c.feature)) & 3u32;
+        inside = hint == 3u32 || (hint == 1u32 && c.height < 0.0f32);
+        if hint == 0u32 {
+            inside = winding(assets, shape, word, p) >= 1i32;
+        }
+    }
+    let sign = select(inside, -1.0f32, 1.0f32);
+    // Without a normal the face is an edge, and there is no better direction.
+    let along = scaled(sign / distance.max(1e-30f32), c.outward);
+    // In the plane of a face the height knows the direction better than the difference of two points.
+    let normal = scaled(select(c.feature == 0u32 && (c.height < 0.0f32) != inside, -1.0f32, 1.0f32), f.normal);
+    let flat = dot(f.normal, f.normal) < 0.5f32;
+    let by_normal = !flat && (distance < ON_SURFACE || c.feature == 0u32);
+    let on_surface = pick(distance < ON_SURFACE, f.normal, normal);
+    let gradient = pick(by_normal, on_surface, along);
+    Value { distance: sign * distance, gradient, point: c.point, face: nearest.face, feature: c.feature }
+}
+
+/// Winding number of a point of a crossing cell: that at the centroid of the cell, and the faces on the way there.
+#[cube]
+fn winding(assets: &Assets, shape: u32, word: u32, p: V3) -> i32 {
+    let at = offset(word);
+    let lists = entry(assets, shape, LISTS);
+    let mut sum = (code(word) - 2u32) as i32;
+    if code(word) == 5u32 {
+        let mut k = 0u32;
+        let mut long = 0u32;
+        while k < 4u32 {
+            long |= byte(&assets.words, lists, at - 4u32 + k) << (8u32 * k);
+            k += 1u32;
+        }
+        sum = long as i32;
+    }
+    let center = centroid(assets, shape, p);
+    let faces = list(assets, shape, at);
+    let mut i = 0u32;
+    while i < faces.count {
+        let position = list_face(assets, shape, faces, i);
+        let row = (entry(assets, shape, RECORDS) + position * comptime!(ROWS as u32)) as usize;
+        let f = face(&assets.rows, row);
+        sum += crossing(p, center, corner(f, 0u32), corner(f, 1u32), corner(f, 2u32));
+        i += 1u32;
+    }
+    sum
+}
+
+/// 1 where the segment from `p` to `q` leaves the solid through the triangle, −1 where it enters, else 0.
+#[cube]
+pub fn crossing(p: V3, q: V3, a: V3, b: V3, c: V3) -> i32 {
+    let normal = cross(minus(b, a), minus(c, a));
+    let p_over = dot(normal, minus(p, a)) >= 0.0f32;
+    let q_over = dot(normal, minus(q, a)) >= 0.0f32;
+    let way = minus(q, p);
+    let (pa, pb, pc) = (minus(a, p), minus(b, p), minus(c, p));
+    let ab = dot(way, cross(pa, pb)) >= 0.0f32;
+    let bc = dot(way, cross(pb, pc)) >= 0.0f32;
+    let ca = dot(way, cross(pc, pa)) >= 0.0f32;
+    let through = p_over != q_over && ab == bc && bc == ca;
+    select(through, select(p_over, -1i32, 1i32), 0i32)
+}
+
+/// Centroid of the cell that holds a point, found as [`place`] finds the cell.
+#[cube]
+fn centroid(assets: &Assets, shape: u32, p: V3) -> V3 {
+    let u = in_cube(assets, shape, p);
+    let nodes = entry(assets, shape, NODES);
+    let first = root(u);
+    let l = in_root(u, first);
+    let mut l0 = l.l0;
+    let mut l1 = l.l1;
+    let mut l2 = l.l2;
+    let mut l3 = l.l3;
+    // Corners 0, e_i, e_i + e_j, (1, 1, 1) of the unit cube.
+    let i = first / 2u32;
+    let low = select(i == 0u32, 1u32, 0u32);
+    let high = select(i == 2u32, 1u32, 2u32);
+    let j = select(first % 2u32 == 0u32, low, high);
+    let mut corners = Array::<f32>::new(12usize);
+    let mut axis = 0u32;
+    while axis < 3u32 {
+        corners[axis as usize] = 0.0f32;
+        corners[(3u32 + axis) as usize] = select(axis == i, 1.0f32, 0.0f32);
+        corners[(6u32 + axis) as usize] = select(axis == i || axis == j, 1.0f32, 0.0f32);
+        corners[(9u32 + axis) as usize] = 1.0f32;
+        axis += 1u32;
+    }
+    let mut k = 3u32;
+    let mut word = assets.words[(nodes + first) as usize];
+    while is_split(word) {
+        let here = Lambda { l0, l1, l2, l3 };
+        let second = l0 < lambda_at(here, k);
+        let below = in_child(here, k, second);
+        l0 = below.l0;
+        l1 = below.l1;
+        l2 = below.l2;
+        l3 = below.l3;
+        let mut axis = 0u32;
+        while axis < 3u32 {
+            let c0 = corners[axis as usize];
+            let c1 = corners[(3u32 + axis) as usize];
+            let c2 = corners[(6u32 + axis) as usize];
+            let c3 = corners[(9u32 + axis) as usize];
+            let end = select(k == 3u32, c3, select(k == 2u32, c2, c1));
+            let m = 0.5f32 * (c0 + end);
+            // The corners of the child, as `Cell::child_corners` orders them.
+            let shifted = second && k > 1u32;
+            let n0 = select(second, c1, c0);
+            let n1 = select(k == 1u32, m, select(shifted, c2, c1));
+            let n2 = select(k == 2u32, m, select(k == 3u32 && second, c3, c2));
+            let n3 = select(k == 3u32, m, c3);
+            corners[axis as usize] = n0;
+            corners[(3u32 + axis) as usize] = n1;
+            corners[(6u32 + axis) as usize] = n2;
+            corners[(9u32 + axis) as usize] = n3;
+            axis += 1u32;
+        }
+        let at = word + select(second, 1u32, 0u32);
+        k = next_k(k);
+        word = assets.words[(nodes + at) as usize];
+    }
+    let side = 0.25f32 * number(assets, shape, SIDE);
+    let half = 0.5f32 * number(assets, shape, SIDE);
+    v3(
+        side * (corners[0] + corners[3] + corners[6] + corners[9]) - half,
+        side * (corners[1] + corners[4] + corners[7] + corners[10]) - half,
+        side * (corners[2] + corners[5] + corners[8] + corners[11]) - half,
+    )
+}
+
+/// The value of a simple shape.
+#[cube]
+pub fn simple_value(assets: &Assets, shape: u32, p: V3) -> Value {
+    let kind = entry(assets, shape, KIND);
+    let sizes = vector(assets, shape, SIZES);
+    // What is round: all within the radius of a segment on the z axis.
+    let core = v3(0.0f32, 0.0f32, p.z.clamp(-sizes.x, sizes.x));
+    let from_core = minus(p, core);
+    let reach = length(from_core);
+    let on_core = reach <= 0.0f32;
+    let round_gradient = pick(on_core, v3(1.0f32, 0.0f32, 0.0f32), scaled(1.0f32 / reach.max(1e-30f32), from_core));
+    let mut distance = reach - sizes.y;
+    let mut gx = round_gradient.x;
+    let mut gy = round_gradient.y;
+    let mut gz = round_gradient.z;
+    let mut side = 0u32;
+    if kind == PLANE {
+        distance = p.z;
+        gx = 0.0f32;
+        gy = 0.0f32;
+        gz = 1.0f32;
+    }
+    if kind == BOX {
+        let clamped = v3(p.x.clamp(-sizes.x, sizes.x), p.y.clamp(-sizes.y, sizes.y), p.z.clamp(-sizes.z, sizes.z));
+        let outward = minus(p, clamped);
+        let depth = minus(sizes, v3(p.x.abs(), p.y.abs(), p.z.abs()));
+        let x_least = depth.x <= depth.y && depth.x <= depth.z;
+        let axis = select(x_least, 0u32, select(depth.y <= depth.z, 1u32, 2u32));
+        let along = select(axis == 0u32, p.x, select(axis == 1u32, p.y, p.z));
+        let least = select(axis == 0u32, depth.x, select(axis == 1u32, depth.y, depth.z));
+        let sign = select(along < 0.0f32, -1.0f32, 1.0f32);
+        side = 2u32 * axis + select(sign > 0.0f32, 1u32, 0u32);
+        let out = length(outward);
+        let inverse = 1.0f32 / out.max(1e-30f32);
+        let is_out = out > 0.0f32;
+        distance = select(is_out, out, -least);
+        gx = select(is_out, inverse * outward.x, select(axis == 0u32, sign, 0.0f32));
+        gy = select(is_out, inverse * outward.y, select(axis == 1u32, sign, 0.0f32));
+        gz = select(is_out, inverse * outward.z, select(axis == 2u32, sign, 0.0f32));
+    }
+    let gradient = v3(gx, gy, gz);
+    Value { distance, gradient, point: plus(p, scaled(-distance, gradient)), face: side, feature: 0u32 }
+}
+
+/// The value at any point of any shape, and the cell that answered.
+#[cube]
+pub fn value(assets: &Assets, shape: u32, p: V3) -> Value {
+    let mut distance = 0.0f32;
+    let mut gx = 0.0f32;
+    let mut gy = 0.0f32;
+    let mut gz = 0.0f32;
+    let mut px = 0.0f32;
+    let mut py = 0.0f32;
+    let mut pz = 0.0f32;
+    let mut position = 0u32;
+    let mut feature = 0u32;
+    if entry(assets, shape, KIND) == MESH {
+        let held: Place = place(assets, shape, p);
+        let v = value_of(assets, shape, held.word, p, nearest(assets, shape, held.word, p));
+        distance = v.distance;
+        gx = v.gradient.x;
+        gy = v.gradient.y;
+        gz = v.gradient.z;
+        px = v.point.x;
+        py = v.point.y;
+        pz = v.point.z;
+        position = v.face;
+        feature = v.feature;
+    } else {
+        let v = simple_value(assets, shape, p);
+        distance = v.distance;
+        gx = v.gradient.x;
+        gy = v.gradient.y;
+        gz = v.gradient.z;
+        px = v.point.x;
+        py = v.point.y;
+        pz = v.point.z;
+        position = v.face;
+    }
+    Value { distance, gradient: v3(gx, gy, gz), point: v3(px, py, pz), face: position, feature }
+}
+
+/// The true distance at a point, negative inside, also where lists are not known to be exact; for leaving out what is beyond reach.
+#[cube]
+pub fn rough(assets: &Assets, shape: u32, p: V3) -> f32 {
+    let mut distance = 0.0f32;
+    if entry(assets, shape, KIND) == MESH {
+        let held = place(assets, shape, p);
+        let found = nearest(assets, shape, held.word, p);
+        distance = value_of(assets, shape, held.word, p, found).distance;
+        if is_listed(held.word) && entry(assets, shape, EXACT_LISTS) == 0u32 {
+            let sign = select(distance < 0.0f32, -1.0f32, 1.0f32);
+            distance = sign * nearest_in_tree(assets, shape, p, FAR).squared.sqrt();
+        }
+    } else {
+        distance = simple_value(assets, shape, p).distance;
+    }
+    distance
+}

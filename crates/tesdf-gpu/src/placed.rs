@@ -1,0 +1,73 @@
+//! Where instances are, as kernels read it.
+use glam::{DQuat, DVec3, Vec3};
+use tesdf::collide::{Placement, Shape};
+
+/// The frame that a shape's field is computed in: the local frame of a mesh relative to the middle of its cube, the shape's own frame
+/// of all others.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldFrame {
+    /// Where its origin is, in the shape's frame.
+    origin: DVec3,
+    /// The shape's unit per unit of the field's.
+    unit: f64,
+}
+
+impl FieldFrame {
+    pub fn new(shape: &Shape) -> Self {
+        match shape {
+            Shape::Mesh(asset) => {
+                let arrays = asset.arrays();
+                Self { origin: arrays.frame.to_world(arrays.cube.middle()), unit: arrays.frame.inverse_scale() }
+            }
+            _ => Self { origin: DVec3::ZERO, unit: 1.0 },
+        }
+    }
+}
+
+/// A field's frame, placed in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    /// Where its origin is.
+    pub origin: DVec3,
+    /// How it is turned.
+    pub rotation: DQuat,
+    /// World units per unit of the field.
+    pub unit: f64,
+}
+
+impl Placed {
+    pub fn new(frame: FieldFrame, placement: Placement) -> Self {
+        Self {
+            origin: placement.to_world(frame.origin),
+            rotation: placement.pose.rotation,
+            unit: placement.scale * frame.unit,
+        }
+    }
+
+    /// From the field's frame to the world.
+    pub fn to_world(&self, p: Vec3) -> DVec3 {
+        self.rotation * (self.unit * p.as_dvec3()) + self.origin
+    }
+
+    /// Of a direction.
+    pub fn turn(&self, v: Vec3) -> DVec3 {
+        self.rotation * v.as_dvec3()
+    }
+
+    /// Rows for the device, as `kernels::pose` reads them: origin rounded to `f32` and the unit, what rounding left of the origin, the
+    /// quaternion x y z w.
+    pub fn rows(&self) -> [[f32; 4]; 3] {
+        let (high, low) = split(self.origin);
+        [
+            [high.x, high.y, high.z, self.unit as f32],
+            [low.x, low.y, low.z, 0.0],
+            self.rotation.as_quat().to_array(),
+        ]
+    }
+}
+
+/// A point as the sum of two of `f32`.
+pub fn split(p: DVec3) -> (Vec3, Vec3) {
+    let high = p.as_vec3();
+    (high, (p - high.as_dvec3()).as_vec3())
+}
