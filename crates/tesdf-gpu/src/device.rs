@@ -1,5 +1,6 @@
 //! The one place that knows on what kernels run.
 use std::fmt;
+use std::time::Duration;
 
 use bytemuck::{NoUninit, Pod};
 use cubecl::client::Client;
@@ -180,6 +181,21 @@ impl Device {
         Ok(())
     }
 
+    /// Device time of what `launch` launches, once all before it is done.
+    pub(crate) fn time(&self, launch: impl FnOnce()) -> Result<Duration, GpuError> {
+        let failed = |reason: String| GpuError::Device {
+            device: self.info.name.clone(),
+            doing: "timing a stage",
+            reason,
+        };
+        let window = self.client.profile_start().map_err(|e| failed(format!("{e:?}")))?;
+        launch();
+        let time = self.client.profile_end(window).map_err(|e| failed(format!("{e:?}")))?;
+        cubecl::future::block_on(time.resolve())
+            .map(|ticks| ticks.duration())
+            .ok_or_else(|| failed("the device gave no time".into()))
+    }
+
     /// Waits for all that was launched, and reads the first `count` elements of a buffer.
     pub(crate) fn read<T: Pod>(&self, buffer: &Buffer, count: usize) -> Result<Vec<T>, GpuError> {
         let bytes = count * size_of::<T>();
@@ -220,6 +236,11 @@ impl Buffer {
     /// For a kernel that takes rows of four `f32`.
     pub fn rows(&self) -> BufferArg {
         self.argument(16)
+    }
+
+    /// As the number of groups of a launch: x, y, z.
+    pub fn count(&self) -> CubeCount {
+        CubeCount::Dynamic(self.handle.clone().binding())
     }
 
     /// Size in bytes.

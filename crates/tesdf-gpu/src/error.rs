@@ -25,6 +25,29 @@ pub enum GpuError {
         /// What the driver said.
         reason: String,
     },
+    /// A scene or options that no detector takes.
+    #[error(transparent)]
+    Collide(#[from] tesdf::collide::CollideError),
+    /// What kernels cannot do.
+    #[error("{what} is not available on a device; {instead}")]
+    Unavailable {
+        /// What was asked for.
+        what: String,
+        /// What to do instead.
+        instead: &'static str,
+    },
+    /// Fixed memory that does not hold what a scene needs. Nothing was lost: there is no result.
+    #[error("{device}: buffer {buffer:?} holds {capacity} elements; the scene needs {needed}. Raise it, or let buffers grow")]
+    Full {
+        /// Name of the device.
+        device: String,
+        /// Which buffer.
+        buffer: &'static str,
+        /// Elements that it holds.
+        capacity: u32,
+        /// Elements that are needed.
+        needed: u32,
+    },
     /// A shape that kernels cannot read.
     #[error("shape {number}: {reason}")]
     Shape {

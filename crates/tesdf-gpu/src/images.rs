@@ -1,8 +1,10 @@
 //! Shapes as the device holds them: each once, whatever the number of its instances.
 use glam::{DVec3, Vec3};
 use tesdf::asset::Arrays;
-use tesdf::asset::layout::TreeChild;
+use tesdf::asset::layout::{SignHints, TreeChild};
 use tesdf::collide::Shape;
+use tesdf::geometry::Triangle;
+use tesdf::query::FaceRecord;
 
 use crate::GpuError;
 use crate::device::{Buffer, Device};
@@ -109,13 +111,14 @@ impl Packed {
                 sizes(assets::ROUND, DVec3::new(*half_height, *radius, 0.0));
             }
         }
-        // Its parts: two triangles of a plane, twelve of a box, the core of what is round.
-        row[assets::FACE_COUNT as usize] = match shape {
-            Shape::Plane => 2,
-            Shape::Box { .. } => 12,
-            _ => 1,
-        };
         row[assets::MESHLET_COUNT as usize] = 1;
+        // Two triangles of a plane depend on the field that they meet.
+        row[assets::FACE_COUNT as usize] = 2;
+        if !matches!(shape, Shape::Plane) {
+            let records = simple_records(shape);
+            row[assets::FACE_COUNT as usize] = records.len() as u32;
+            row[assets::RECORDS as usize] = self.rows_at(records.into_iter().flat_map(four))?;
+        }
         Ok(row)
     }
 
@@ -198,26 +201,37 @@ fn four(record: [f32; 16]) -> [[f32; 4]; 4] {
     std::array::from_fn(|i| std::array::from_fn(|k| record[4 * i + k]))
 }
 
-/// The faces as kernels read them: no NaN for a face without a plane, as shaders may assume that there is none, and with the corners that no
-/// face before has.
+/// The faces as kernels read them, with the corners that no face before has.
 fn records(mesh: &Arrays) -> Vec<[f32; 16]> {
-    let vertices = mesh.faces.as_flattened().iter().max().map_or(0, |&v| v as usize + 1);
-    let mut seen = vec![false; vertices];
-    let record = |(record, corners): (&tesdf::query::FaceRecord, &[u32; 3])| {
-        let mut record = *record.as_array();
-        if record[9].is_nan() {
-            record[9..12].fill(0.0);
-        }
-        let mut hints = record[15].to_bits() & 0xFFFF;
-        for (k, &v) in corners.iter().enumerate() {
-            if !std::mem::replace(&mut seen[v as usize], true) {
-                hints |= 1 << (assets::OWNED_CORNERS + k as u32);
-            }
-        }
-        record[15] = f32::from_bits(assets::HINTS | hints);
-        record
+    let mut seen = vec![false; mesh.lowest_faces.len()];
+    let record = |(record, corners): (&FaceRecord, &[u32; 3])| {
+        let owned = (0..3).filter(|&k| !std::mem::replace(&mut seen[corners[k] as usize], true));
+        with_owned(*record.as_array(), owned)
     };
     mesh.records.iter().zip(mesh.faces).map(record).collect()
+}
+
+/// The parts of a simple shape in the form of faces: a segment ends twice, a point three times in the same place.
+fn simple_records(shape: &Shape) -> Vec<[f32; 16]> {
+    let (parts, nodes) = (shape.parts().0, shape.nodes());
+    let record = |(number, points): (usize, &Vec<DVec3>)| {
+        let corners = std::array::from_fn(|k| points[k.min(points.len() - 1)]);
+        let record = FaceRecord::new(&Triangle::new(corners), DVec3::ZERO, SignHints::default());
+        let owned = (0..points.len()).filter(|&k| nodes.contains(&(points[k], number as u32)));
+        with_owned(*record.as_array(), owned)
+    };
+    parts.iter().enumerate().map(record).collect()
+}
+
+/// Without NaN, as shaders may assume that there is none, and with the corners that are the record's own.
+fn with_owned(mut record: [f32; 16], owned: impl Iterator<Item = usize>) -> [f32; 16] {
+    if record[9].is_nan() {
+        record[9..12].fill(0.0);
+    }
+    let hints = record[15].to_bits() & 0xFFFF;
+    let owned: u32 = owned.map(|k| 1 << (assets::OWNED_CORNERS + k as u32)).sum();
+    record[15] = f32::from_bits(assets::HINTS | hints | owned);
+    record
 }
 
 /// Levels of the face tree.

@@ -9,13 +9,19 @@
 //! DirectX 12. Everything is computed in `f32`, in the local frame of the field; `docs/gpu.md` has stages, layouts and limits.
 #![warn(missing_docs)]
 
+mod contacts;
+mod detector;
 mod device;
 mod error;
 mod images;
+mod instances;
 mod kernels;
 mod placed;
 mod query;
 
+pub use detector::{
+    Capacities, Detector, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory,
+};
 pub use device::{Device, DeviceInfo, DeviceKind, devices};
 pub use error::GpuError;
 pub use images::{ImageBytes, Images};

@@ -30,6 +30,8 @@ pub struct Arrays<'a> {
     pub faces: &'a [[u32; 3]],
     /// Ids of the faces in the source mesh.
     pub face_ids: &'a [u32],
+    /// For each vertex the lowest id of a face that has it; [`u32::MAX`] for one that no face has.
+    pub lowest_faces: &'a [u32],
     /// The faces in `f32`, with their sign hints.
     pub records: &'a [FaceRecord],
     /// For every word of the forest the square root of a lower bound of the signed distances in its cell.
@@ -62,6 +64,7 @@ impl TeSdf {
             tree_children: &self.tree_children,
             faces: &self.faces,
             face_ids: &self.face_ids,
+            lowest_faces: self.lowest_faces(),
             records: &self.records,
             cell_bounds,
             cell_bound_unit,

@@ -44,7 +44,7 @@ pub fn instance_pairs(
             .shape(instance.shape)
             .map_err(|e| CollideError::Instance { instance: id.0, reason: e.to_string() })?;
         let is_plane = matches!(shape, Shape::Plane);
-        let motion = motion_ahead(shape, instance, speculative_time);
+        let motion = instance.motion_ahead(shape, speculative_time);
         let bounds = scene.bounds(id)?;
         // Bounds that touch would lose each other by rounding.
         let rounding = ULPS * f64::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
@@ -88,14 +88,16 @@ pub fn instance_pairs(
     Ok(pairs)
 }
 
-/// How far an instance's velocity can take a point of it in a time.
-pub fn motion_ahead(shape: &Shape, instance: &Instance, time: f64) -> f64 {
-    if time > 0.0 {
-        let arm = if matches!(shape, Shape::Plane) { 0.0 } else { reach(shape.bounds()) * instance.scale };
-        let Velocity { linear, angular } = instance.velocity;
-        time * (linear.length() + angular.length() * arm)
-    } else {
-        0.0
+impl Instance {
+    /// How far the velocity can take a point of the instance in a time; `shape` is its shape.
+    pub fn motion_ahead(&self, shape: &Shape, time: f64) -> f64 {
+        if time > 0.0 {
+            let arm = if matches!(shape, Shape::Plane) { 0.0 } else { reach(shape.bounds()) * self.scale };
+            let Velocity { linear, angular } = self.velocity;
+            time * (linear.length() + angular.length() * arm)
+        } else {
+            0.0
+        }
     }
 }
 

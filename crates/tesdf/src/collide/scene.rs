@@ -255,6 +255,11 @@ impl Scene {
         !self.excluded.is_empty() && self.excluded.contains(&(a.min(b), a.max(b)))
     }
 
+    /// The pairs of instances that were told never to meet, the lower id first, sorted.
+    pub fn excluded(&self) -> impl ExactSizeIterator<Item = (InstanceId, InstanceId)> {
+        self.excluded.iter().copied()
+    }
+
     /// Bounds of an instance in the world.
     ///
     /// # Errors

@@ -3,6 +3,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::CollideError;
+use super::simple::Simple;
 use crate::TeSdf;
 use crate::geometry::Aabb;
 
@@ -70,6 +71,23 @@ impl Shape {
             Self::Capsule { half_height, radius } => {
                 symmetric(DVec3::new(*radius, *radius, half_height + radius))
             }
+        }
+    }
+
+    /// What is tested of a simple shape as a surface: convex polygons of one to three points, and the radius that all of the surface is
+    /// within of them. A box has twelve triangles, a capsule its segment, a sphere its centre; meshes and planes have faces of their own.
+    pub fn parts(&self) -> (Vec<Vec<DVec3>>, f64) {
+        match self {
+            Self::Mesh(_) | Self::Plane => (Vec::new(), 0.0),
+            simple => Simple::new(simple).parts(),
+        }
+    }
+
+    /// The nodes among the points of the [`parts`](Self::parts), each with the lowest part that has it.
+    pub fn nodes(&self) -> Vec<(DVec3, u32)> {
+        match self {
+            Self::Mesh(_) | Self::Plane => Vec::new(),
+            simple => Simple::new(simple).nodes().0,
         }
     }
 

@@ -3,7 +3,6 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::detect::Direction;
-use super::instance_pairs::motion_ahead;
 use super::middle::ClippedPolygon;
 use super::{CollideError, CollideOptions, InstanceId, Mode, Scene, Shape};
 
@@ -139,8 +138,8 @@ pub fn why(
     let (of_a, of_b) = (scene.instance(a)?, scene.instance(b)?);
     let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
     let contact_distance = options.contact_distance
-        + motion_ahead(shape_a, of_a, options.speculative_time)
-        + motion_ahead(shape_b, of_b, options.speculative_time);
+        + of_a.motion_ahead(shape_a, options.speculative_time)
+        + of_b.motion_ahead(shape_b, options.speculative_time);
     let (bounds_a, bounds_b) = (scene.bounds(a)?, scene.bounds(b)?);
     let bounds_gap = (bounds_a.min - bounds_b.max).max(bounds_b.min - bounds_a.max).max_element().max(0.0);
     let pair = match () {

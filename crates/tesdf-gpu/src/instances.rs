@@ -1,0 +1,89 @@
+//! The instances of a scene as the device holds them.
+use glam::DVec3;
+use tesdf::collide::{CollideOptions, InstanceId, Scene, Shape, ShapeId};
+
+use crate::placed::{FieldFrame, Placed, split};
+use crate::GpuError;
+
+/// All instances, those of a world side by side, by id within it.
+pub struct Instances {
+    /// Their ids.
+    pub ids: Vec<InstanceId>,
+    /// Where they are.
+    pub placed: Vec<Placed>,
+    /// Number of each one's shape.
+    pub shapes: Vec<usize>,
+    /// [`INSTANCE_ROWS`](crate::kernels::pairs::INSTANCE_ROWS) each.
+    pub rows: Vec<[f32; 4]>,
+    /// [`INSTANCE_WORDS`](crate::kernels::pairs::INSTANCE_WORDS) each.
+    pub words: Vec<u32>,
+    /// Pairs that never meet, by place, sorted.
+    pub excluded: Vec<u32>,
+}
+
+/// What half an extent is grown by, relative to it and to the distance from the world's origin: more than rounding takes away.
+const GROWN: f64 = 1e-6;
+/// Half the extent of what has no end.
+const ENDLESS: f64 = 1e30;
+
+impl Instances {
+    /// `shape_ids` and `frames` are those of the uploaded shapes, sorted by id.
+    pub fn new(
+        scene: &Scene,
+        options: &CollideOptions,
+        shape_ids: &[ShapeId],
+        frames: &[FieldFrame],
+    ) -> Result<Self, GpuError> {
+        let mut order: Vec<(u32, InstanceId)> = scene.instances().map(|(id, i)| (i.world, id)).collect();
+        order.sort_unstable();
+        let mut all = Self {
+            ids: order.iter().map(|&(_, id)| id).collect(),
+            placed: Vec::with_capacity(order.len()),
+            shapes: Vec::with_capacity(order.len()),
+            rows: Vec::with_capacity(6 * order.len()),
+            words: Vec::with_capacity(4 * order.len()),
+            excluded: Vec::new(),
+        };
+        let mut end = 0;
+        for (k, &(world, id)) in order.iter().enumerate() {
+            if k >= end {
+                end = k + order[k..].partition_point(|&(w, _)| w == world);
+            }
+            let instance = scene.instance(id)?;
+            let shape = scene.shape(instance.shape)?;
+            let number = shape_ids.binary_search(&instance.shape).map_err(|_| GpuError::Instance {
+                instance: id.0 as usize,
+                reason: format!("shape {} is not on the device; upload the scene again", instance.shape.0),
+            })?;
+            let placed = Placed::new(frames[number], instance.placement());
+            let bounds = scene.bounds(id)?;
+            let motion = instance.motion_ahead(shape, options.speculative_time);
+            let (center, half) = if matches!(shape, Shape::Plane) {
+                (DVec3::ZERO, DVec3::splat(ENDLESS))
+            } else {
+                let (center, half) = (bounds.center(), 0.5 * bounds.extent());
+                let rounding = GROWN * (half.max_element() + 1e-6 * center.abs().max_element());
+                (center, half + rounding + 0.5 * options.contact_distance + motion)
+            };
+            let (high, low) = split(center);
+            all.rows.extend(placed.rows());
+            all.rows.push(high.extend(motion as f32).to_array());
+            all.rows.push(low.extend(0.0).to_array());
+            all.rows.push(half.as_vec3().extend(0.0).to_array());
+            let groups = instance.groups;
+            all.words.extend([number as u32, end as u32, groups.memberships, groups.filter]);
+            all.placed.push(placed);
+            all.shapes.push(number);
+        }
+        let mut place = vec![0u32; order.iter().map(|&(_, id)| id.0 as usize + 1).max().unwrap_or(0)];
+        all.ids.iter().enumerate().for_each(|(k, id)| place[id.0 as usize] = k as u32);
+        let mut excluded: Vec<[u32; 2]> = scene
+            .excluded()
+            .map(|(a, b)| [place[a.0 as usize], place[b.0 as usize]])
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .collect();
+        excluded.sort_unstable();
+        all.excluded = excluded.into_flattened();
+        Ok(all)
+    }
+}

@@ -1,0 +1,364 @@
+//! Narrow phase: the least signed distance over a node (Node-TES) or a clipped polygon (Face-TES, Eq. 9), and the cosine filter (Eq. 10).
+use cubecl::prelude::*;
+
+use super::assets::{Assets, KIND, MESH, NODES, NONE, RECORDS, entry};
+use super::broad::ROUNDING;
+use super::field::{Value, is_listed, nearest, simple_value, value_of};
+use super::list::{List, list, list_face};
+use super::locate::{NOT_OF_DOMAIN, offset};
+use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
+use super::pairs::four;
+use super::products::{self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_ROWS, POLYGON_WORDS, append};
+use super::surface::{Direction, Part, at_weights, direction, normal, part};
+use super::triangle::{Face, ROWS, distance_squared, face};
+use super::vector::{V3, dot, length, minus, pick, plus_scaled, v3};
+
+/// Threads that work on one polygon.
+pub const LANES: u32 = 32;
+
+/// Corner `k` of a part.
+#[cube]
+pub fn node(p: Part, k: u32) -> V3 {
+    pick(k == 1u32, p.b, pick(k == 2u32, p.c, p.a))
+}
+
+/// The word of a cell.
+#[cube]
+fn word_of(assets: &Assets, shape: u32, cell: u32) -> u32 {
+    let mut word = NOT_OF_DOMAIN.runtime();
+    if cell != NONE && entry(assets, shape, KIND) == MESH {
+        word = assets.words[(entry(assets, shape, NODES) + cell) as usize];
+    }
+    word
+}
+
+#[cube]
+fn write(
+    counters: &[Atomic<u32>],
+    words: &mut [u32],
+    rows: &mut [Vector<f32, Const<4>>],
+    most: u32,
+    d: Direction,
+    face: u32,
+    cell: u32,
+    corner: u32,
+    point: V3,
+    v: Value,
+) {
+    let slot = append(counters, products::CONTACTS);
+    if slot < most {
+        let word = (slot * comptime!(CONTACT_WORDS as u32)) as usize;
+        words[word] = d.a;
+        words[word + 1usize] = d.b;
+        words[word + 2usize] = face;
+        words[word + 3usize] = cell;
+        words[word + 4usize] = v.face;
+        words[word + 5usize] = v.feature;
+        words[word + 6usize] = corner;
+        words[word + 7usize] = 1u32;
+        let row = (slot * comptime!(CONTACT_ROWS as u32)) as usize;
+        let on_surface = plus_scaled(point, -d.radius, v.gradient);
+        rows[row] = four(on_surface.x, on_surface.y, on_surface.z, v.distance - d.radius);
+        rows[row + 1usize] = four(v.gradient.x, v.gradient.y, v.gradient.z, 0.0f32);
+        rows[row + 2usize] = four(v.point.x, v.point.y, v.point.z, 0.0f32);
+    }
+}
+
+/// The cell of a contact: only one with a list is named.
+#[cube]
+fn named(word: u32, cell: u32) -> u32 {
+    select(is_listed(word), cell, NONE)
+}
+
+/// A thread for each node and its cell.
+#[cube(launch)]
+pub fn narrow_nodes(
+    assets: &Assets,
+    directions: &[u32],
+    maps: &[Vector<f32, Const<4>>],
+    items: &[u32],
+    counters: &[Atomic<u32>],
+    words: &mut [u32],
+    rows: &mut [Vector<f32, Const<4>>],
+    most_items: u32,
+    most: u32,
+) {
+    let item = ABSOLUTE_POS as u32;
+    let count = counters[products::POLYGONS as usize].load().min(most_items);
+    if item < count {
+        let first = (item * comptime!(POLYGON_WORDS as u32)) as usize;
+        let d: Direction = direction(directions, maps, items[first]);
+        let face = items[first + 1usize];
+        let cell = items[first + 2usize];
+        let corner = items[first + 3usize];
+        let p = node(part(assets, d, face), corner);
+        let word = word_of(assets, d.shape_b, cell);
+        if entry(assets, d.shape_b, KIND) == MESH {
+            let v = value_of(assets, d.shape_b, word, p, nearest(assets, d.shape_b, word, p));
+            if v.distance <= d.reach + d.radius {
+                write(counters, words, rows, most, d, face, named(word, cell), corner, p, v);
+            }
+        } else {
+            let v = simple_value(assets, d.shape_b, p);
+            if v.distance <= d.reach + d.radius {
+                write(counters, words, rows, most, d, face, NONE, corner, p, v);
+            }
+        }
+    }
+}
+
+/// The least over all threads of a group; of equal ones the lowest face.
+#[cube]
+fn least(
+    mine: Nearest,
+    squares: &mut Shared<[f32]>,
+    faces: &mut Shared<[u32]>,
+    #[comptime] lanes: u32,
+    #[comptime] planes: bool,
+) -> Nearest {
+    let mut squared = mine.squared;
+    let mut position = mine.face;
+    if lanes > 1u32 {
+        if planes {
+            let all = plane_min(squared);
+            position = plane_min(select(squared == all, position, u32::MAX.runtime()));
+            squared = all;
+        } else {
+            // Nobody writes while another still reads the last result.
+            sync_cube();
+            squares[UNIT_POS as usize] = squared;
+            faces[UNIT_POS as usize] = position;
+            sync_cube();
+            let mut i = 0usize;
+            while i < LANES as usize {
+                let (d, f) = (squares[i], faces[i]);
+                let nearer = d < squared || (d == squared && f < position);
+                squared = select(nearer, d, squared);
+                position = select(nearer, f, position);
+                i += 1usize;
+            }
+        }
+    }
+    Nearest { squared, face: position }
+}
+
+/// The field at a point of the polygon's cell, by all threads of the group together. `own` is the face that the thread keeps in registers, `position`
+/// its number, when it has one.
+#[cube]
+fn value_in(
+    assets: &Assets,
+    d: Direction,
+    word: u32,
+    faces: List,
+    own: Face,
+    position: u32,
+    p: V3,
+    squares: &mut Shared<[f32]>,
+    ids: &mut Shared<[u32]>,
+    #[comptime] lanes: u32,
+    #[comptime] planes: bool,
+) -> Value {
+    let shape = d.shape_b;
+    let mut distance = FAR.runtime();
+    let mut gx = 0.0f32;
+    let mut gy = 0.0f32;
+    let mut gz = 0.0f32;
+    let mut px = 0.0f32;
+    let mut py = 0.0f32;
+    let mut pz = 0.0f32;
+    let mut face_of = 0u32;
+    let mut feature = 0u32;
+    if entry(assets, shape, KIND) == MESH {
+        let mut squared = FAR.runtime();
+        let mut nearest_face = NONE.runtime();
+        if is_listed(word) {
+            let first = select(lanes == 1u32, 0u32, UNIT_POS);
+            if first < faces.count {
+                squared = distance_squared(own, p);
+                nearest_face = position;
+            }
+            let rest = nearest_in_list(assets, shape, faces, first + lanes, lanes, p);
+            let nearer = rest.squared < squared || (rest.squared == squared && rest.face < nearest_face);
+            squared = select(nearer, rest.squared, squared);
+            nearest_face = select(nearer, rest.face, nearest_face);
+            let all = least(Nearest { squared, face: nearest_face }, squares, ids, lanes, planes);
+            squared = all.squared;
+            nearest_face = all.face;
+        } else {
+            let found = nearest_in_tree(assets, shape, p, FAR);
+            squared = found.squared;
+            nearest_face = found.face;
+        }
+        let v = value_of(assets, shape, word, p, Nearest { squared, face: nearest_face });
+        distance = v.distance;
+        gx = v.gradient.x;
+        gy = v.gradient.y;
+        gz = v.gradient.z;
+        px = v.point.x;
+        py = v.point.y;
+        pz = v.point.z;
+        face_of = v.face;
+        feature = v.feature;
+    } else {
+        let v = simple_value(assets, shape, p);
+        distance = v.distance;
+        gx = v.gradient.x;
+        gy = v.gradient.y;
+        gz = v.gradient.z;
+        px = v.point.x;
+        py = v.point.y;
+        pz = v.point.z;
+        face_of = v.face;
+    }
+    Value {
+        distance,
+        gradient: v3(gx, gy, gz),
+        point: v3(px, py, pz),
+        face: face_of,
+        feature,
+    }
+}
+
+/// Weight `i` of a polygon: of the second corner of the face, or of the third one.
+#[cube]
+fn weight(rows: &[Vector<f32, Const<4>>], item: u32, i: u32, #[comptime] which: usize) -> f32 {
+    let row = rows[(item * comptime!(POLYGON_ROWS as u32) + i / 2u32) as usize];
+    select(i % 2u32 == 0u32, row.extract(which), row.extract(which + 2usize))
+}
+
+/// Frank–Wolfe on Eq. (9): from the best of centre and vertices, `iterations` steps of 2 / (k + 2) towards the vertex that lies farthest down
+/// the gradient; the best point seen, as `tesdf` does it.
+///
+/// With `lanes` 32 a group works on each polygon, each thread with a face of the list in registers and with every 32nd of the rest; with `lanes`
+/// 1 a thread works on each alone. `planes` says how a group finds its least distance: in a plane of 32 threads, or in shared memory.
+#[cube(launch)]
+pub fn narrow_faces(
+    assets: &Assets,
+    directions: &[u32],
+    maps: &[Vector<f32, Const<4>>],
+    items: &[u32],
+    weights: &[Vector<f32, Const<4>>],
+    counters: &[Atomic<u32>],
+    words: &mut [u32],
+    rows: &mut [Vector<f32, Const<4>>],
+    iterations: u32,
+    cos_theta: f32,
+    most_items: u32,
+    most: u32,
+    #[comptime] lanes: u32,
+    #[comptime] planes: bool,
+) {
+    let mut squares = Shared::<[f32]>::new_slice(LANES as usize);
+    let mut ids = Shared::<[u32]>::new_slice(LANES as usize);
+    let item = select(lanes == 1u32, ABSOLUTE_POS as u32, CUBE_POS as u32);
+    let count = counters[products::POLYGONS as usize].load().min(most_items);
+    if item < count {
+        let first = (item * comptime!(POLYGON_WORDS as u32)) as usize;
+        let d: Direction = direction(directions, maps, items[first]);
+        let face_a = items[first + 1usize];
+        let cell = items[first + 2usize];
+        let n = items[first + 3usize];
+        let surface = part(assets, d, face_a);
+        let reach = d.reach + d.radius;
+        let word = word_of(assets, d.shape_b, cell);
+        // The thread's own face stays in registers.
+        let faces = list(assets, d.shape_b, select(is_listed(word), offset(word), 0u32));
+        let mut position = 0u32;
+        let lane = select(lanes == 1u32, 0u32, UNIT_POS);
+        if is_listed(word) && lane < faces.count {
+            position = list_face(assets, d.shape_b, faces, lane);
+        }
+        let own = face(&assets.rows, (entry(assets, d.shape_b, RECORDS) + position * comptime!(ROWS as u32)) as usize);
+        let mut s = 0.0f32;
+        let mut t = 0.0f32;
+        let mut i = 0u32;
+        while i < n {
+            s += weight(weights, item, i, 0usize);
+            t += weight(weights, item, i, 1usize);
+            i += 1u32;
+        }
+        s /= n as f32;
+        t /= n as f32;
+        let center = at_weights(surface, s, t);
+        let at_center =
+            value_in(assets, d, word, faces, own, position, center, &mut squares, &mut ids, lanes, planes);
+        let mut radius = 0.0f32;
+        i = 0u32;
+        while i < n {
+            let p = at_weights(surface, weight(weights, item, i, 0usize), weight(weights, item, i, 1usize));
+            radius = radius.max(length(minus(p, center)));
+            i += 1u32;
+        }
+        // No point can be within reach, or all of them are looked at.
+        if at_center.distance - radius <= reach + ROUNDING {
+            let mut value = at_center.distance;
+            let mut gx = at_center.gradient.x;
+            let mut gy = at_center.gradient.y;
+            let mut gz = at_center.gradient.z;
+            if n > 1u32 {
+                i = 0u32;
+                while i < n {
+                    let vs = weight(weights, item, i, 0usize);
+                    let vt = weight(weights, item, i, 1usize);
+                    let p = at_weights(surface, vs, vt);
+                    let here = value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
+                    let lower = here.distance < value;
+                    value = select(lower, here.distance, value);
+                    gx = select(lower, here.gradient.x, gx);
+                    gy = select(lower, here.gradient.y, gy);
+                    gz = select(lower, here.gradient.z, gz);
+                    s = select(lower, vs, s);
+                    t = select(lower, vt, t);
+                    i += 1u32;
+                }
+            }
+            let mut best_s = s;
+            let mut best_t = t;
+            let mut k = 0u32;
+            let steps = select(n > 1u32, iterations, 0u32);
+            while k < steps {
+                // Down the gradient, in weights: the height of a corner over the first one.
+                let gradient = v3(gx, gy, gz);
+                let down_s = dot(gradient, minus(surface.b, surface.a));
+                let down_t = dot(gradient, minus(surface.c, surface.a));
+                let mut lowest = FAR.runtime();
+                let mut to_s = 0.0f32;
+                let mut to_t = 0.0f32;
+                i = 0u32;
+                while i < n {
+                    let vs = weight(weights, item, i, 0usize);
+                    let vt = weight(weights, item, i, 1usize);
+                    let height = down_s * vs + down_t * vt;
+                    let lower = height < lowest;
+                    lowest = select(lower, height, lowest);
+                    to_s = select(lower, vs, to_s);
+                    to_t = select(lower, vt, to_t);
+                    i += 1u32;
+                }
+                let step = 2.0f32 / (k as f32 + 2.0f32);
+                s += step * (to_s - s);
+                t += step * (to_t - t);
+                let p = at_weights(surface, s, t);
+                let here = value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
+                let lower = here.distance < value;
+                value = select(lower, here.distance, value);
+                best_s = select(lower, s, best_s);
+                best_t = select(lower, t, best_t);
+                gx = here.gradient.x;
+                gy = here.gradient.y;
+                gz = here.gradient.z;
+                k += 1u32;
+            }
+            let point = at_weights(surface, best_s, best_t);
+            let v = value_in(assets, d, word, faces, own, position, point, &mut squares, &mut ids, lanes, planes);
+            if v.distance <= reach && lane == 0u32 {
+                let is_face = surface.count == 3u32;
+                if is_face && dot(v.gradient, normal(surface)) > -cos_theta {
+                    counters[products::FILTERED as usize].fetch_add(1u32);
+                } else {
+                    write(counters, words, rows, most, d, face_a, named(word, cell), 0u32, point, v);
+                }
+            }
+        }
+    }
+}

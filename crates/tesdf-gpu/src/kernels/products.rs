@@ -1,0 +1,59 @@
+//! What the stages of a detection hand on, and how much of it there is.
+//!
+//! Threads append in any order: a counter says how much was wanted, also when it was more than the buffer holds, and then the pass is redone
+//! with greater ones. Contacts carry the ids that they are sorted by, so that no order of threads reaches the user.
+use cubecl::prelude::*;
+
+/// Ordered pairs of instances: one body's surface against another's field.
+pub const DIRECTIONS: u32 = 0;
+/// Runs of 32 meshlets of a direction.
+pub const BLOCKS: u32 = 1;
+/// Meshlets that can touch.
+pub const MESHLETS: u32 = 2;
+/// Faces that can touch, clipped by cells; or nodes, with their cells.
+pub const POLYGONS: u32 = 3;
+/// Contacts.
+pub const CONTACTS: u32 = 4;
+/// Contacts that the cosine filter dropped.
+pub const FILTERED: u32 = 5;
+/// Faces or nodes that the broad phase left.
+pub const CANDIDATES: u32 = 6;
+/// How many counters there are.
+pub const COUNTERS: usize = 8;
+
+/// Words of a direction: instance a, instance b, shape of a, shape of b.
+pub const DIRECTION_WORDS: usize = 4;
+/// Rows of a direction: the linear part by rows, each with its shift; then scale, reach and radius of the surface.
+pub const DIRECTION_ROWS: usize = 4;
+/// Words of a block: direction, first meshlet. Of a meshlet: direction, meshlet.
+pub const PAIR_WORDS: usize = 2;
+/// Words of a polygon: direction, face of a, number of the cell's word ([`NONE`](super::assets::NONE) outside of the cube), number of
+/// vertices. Of a node: the corner instead.
+pub const POLYGON_WORDS: usize = 4;
+/// Rows of a polygon: up to eight vertices, as weights of the second and third corner of the face.
+pub const POLYGON_ROWS: usize = 4;
+/// Most vertices of a polygon: a triangle clipped by a tetrahedron has seven.
+pub const POLYGON_VERTICES: usize = 8;
+/// Words of a contact: instances a and b, face of a, cell, face of b, its feature, corner of a, 1 when the minimum was found.
+pub const CONTACT_WORDS: usize = 8;
+/// Rows of a contact: point of a and distance, gradient, point of b; in the field's frame.
+pub const CONTACT_ROWS: usize = 3;
+
+/// Where the next element of a product goes.
+#[cube]
+pub fn append(counters: &[Atomic<u32>], #[comptime] product: u32) -> u32 {
+    counters[product as usize].fetch_add(1u32)
+}
+
+/// Groups that a stage needs for `wanted` elements of at most `most`, `per` to a group: x and y.
+#[cube(launch)]
+pub fn groups_for(counters: &[Atomic<u32>], groups: &mut [u32], most: u32, per: u32, #[comptime] product: u32) {
+    if ABSOLUTE_POS == 0usize {
+        let count = counters[product as usize].load().min(most);
+        let needed = (count + per - 1u32) / per;
+        let wide = needed.min(32768u32).max(1u32);
+        groups[0] = wide;
+        groups[1] = ((needed + wide - 1u32) / wide).max(1u32);
+        groups[2] = 1u32;
+    }
+}
