@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 
 use super::assets::{Assets, BOUND_UNIT, BOUNDS, EXACT_LISTS, HIGH, KIND, LOW, MESH, MESHLET_COUNT, MESHLETS, NONE, byte, entry, number, vector};
 use super::field::{is_listed, nearest, simple_value, value_of};
-use super::locate::{NOT_OF_DOMAIN, code, place};
+use super::locate::{code, offset, place};
 use super::nearest::nearest_in_tree;
 use super::products::{self, PAIR_WORDS, append};
 use super::surface::{Direction, direction, to_field};
@@ -41,22 +41,23 @@ pub fn is_beyond(assets: &Assets, shape: u32, p: V3, radius: f32, reach: f32) ->
         beyond = dot(out, out) > far * far;
         if !beyond {
             let held = place(assets, shape, p);
+            let kind = code(held.word);
             let listed = is_listed(held.word);
-            if code(held.word) == code(NOT_OF_DOMAIN.runtime()) || (listed && entry(assets, shape, EXACT_LISTS) == 0u32) {
-                beyond = cell_bound(assets, shape, held.at) > far;
-                if !beyond {
-                    // Outside, or between listed distances and true ones: is anything at all within the limit?
-                    let inside = code(held.word) == 1u32 || code(held.word) == 6u32;
-                    let found = nearest_in_tree(assets, shape, p, far * far);
-                    beyond = found.face == NONE && !inside;
-                    if listed && code(held.word) > 1u32 && beyond {
-                        let v = value_of(assets, shape, held.word, p, nearest(assets, shape, held.word, p));
-                        beyond = v.distance > 0.0f32;
-                    }
+            let out = kind == 7u32;
+            beyond = out && cell_bound(assets, shape, held.at) > far;
+            if !beyond {
+                // Between listed distances and true ones nothing can be ruled out: then the face tree answers for the distance.
+                let by_tree = out || (listed && entry(assets, shape, EXACT_LISTS) == 0u32);
+                let inside = kind == 1u32 || (kind == 6u32 && offset(held.word) == 1u32);
+                let mut none = false;
+                if by_tree && !inside {
+                    none = nearest_in_tree(assets, shape, p, far * far).face == NONE;
                 }
-            } else {
-                let v = value_of(assets, shape, held.word, p, nearest(assets, shape, held.word, p));
-                beyond = v.distance > limit + ROUNDING;
+                beyond = none && !listed;
+                if !by_tree || (none && listed) {
+                    let v = value_of(assets, shape, held.word, p, nearest(assets, shape, held.word, p));
+                    beyond = v.distance > select(none, 0.0f32, limit + ROUNDING);
+                }
             }
         }
     } else {

@@ -269,19 +269,17 @@ pub fn narrow_faces(
             position = list_face(assets, d.shape_b, faces, lane);
         }
         let own = face(&assets.rows, (entry(assets, d.shape_b, RECORDS) + position * comptime!(ROWS as u32)) as usize);
-        let mut s = 0.0f32;
-        let mut t = 0.0f32;
+        let mut center_s = 0.0f32;
+        let mut center_t = 0.0f32;
         let mut i = 0u32;
         while i < n {
-            s += weight(weights, item, i, 0usize);
-            t += weight(weights, item, i, 1usize);
+            center_s += weight(weights, item, i, 0usize);
+            center_t += weight(weights, item, i, 1usize);
             i += 1u32;
         }
-        s /= n as f32;
-        t /= n as f32;
-        let center = at_weights(surface, s, t);
-        let at_center =
-            value_in(assets, d, word, faces, own, position, center, &mut squares, &mut ids, lanes, planes);
+        center_s /= n as f32;
+        center_t /= n as f32;
+        let center = at_weights(surface, center_s, center_t);
         let mut radius = 0.0f32;
         i = 0u32;
         while i < n {
@@ -289,36 +287,40 @@ pub fn narrow_faces(
             radius = radius.max(length(minus(p, center)));
             i += 1u32;
         }
-        // No point can be within reach, or all of them are looked at.
-        if at_center.distance - radius <= reach + ROUNDING {
-            let mut value = at_center.distance;
-            let mut gx = at_center.gradient.x;
-            let mut gy = at_center.gradient.y;
-            let mut gz = at_center.gradient.z;
-            if n > 1u32 {
-                i = 0u32;
-                while i < n {
-                    let vs = weight(weights, item, i, 0usize);
-                    let vt = weight(weights, item, i, 1usize);
-                    let p = at_weights(surface, vs, vt);
-                    let here = value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
-                    let lower = here.distance < value;
-                    value = select(lower, here.distance, value);
-                    gx = select(lower, here.gradient.x, gx);
-                    gy = select(lower, here.gradient.y, gy);
-                    gz = select(lower, here.gradient.z, gz);
-                    s = select(lower, vs, s);
-                    t = select(lower, vt, t);
-                    i += 1u32;
-                }
+        // Where the iteration is, in weights, and the field there.
+        let mut at_s = center_s;
+        let mut at_t = center_t;
+        let mut at_value = FAR.runtime();
+        let mut at_x = 0.0f32;
+        let mut at_y = 0.0f32;
+        let mut at_z = 0.0f32;
+        // The best point so far.
+        let mut best_s = center_s;
+        let mut best_t = center_t;
+        let mut best = FAR.runtime();
+        let mut best_x = 0.0f32;
+        let mut best_y = 0.0f32;
+        let mut best_z = 0.0f32;
+        let mut on_x = 0.0f32;
+        let mut on_y = 0.0f32;
+        let mut on_z = 0.0f32;
+        let mut best_face = 0u32;
+        let mut best_feature = 0u32;
+        // One place evaluates the field, as the code of it is long: the centre, the vertices, then the steps.
+        let evaluations = select(n > 1u32, 1u32 + n + iterations, 1u32);
+        let mut evaluation = 0u32;
+        while evaluation < evaluations {
+            let mut s = center_s;
+            let mut t = center_t;
+            let is_vertex = evaluation >= 1u32 && evaluation <= n;
+            let is_step = evaluation > n;
+            if is_vertex {
+                s = weight(weights, item, evaluation - 1u32, 0usize);
+                t = weight(weights, item, evaluation - 1u32, 1usize);
             }
-            let mut best_s = s;
-            let mut best_t = t;
-            let mut k = 0u32;
-            let steps = select(n > 1u32, iterations, 0u32);
-            while k < steps {
+            if is_step {
                 // Down the gradient, in weights: the height of a corner over the first one.
-                let gradient = v3(gx, gy, gz);
+                let gradient = v3(at_x, at_y, at_z);
                 let down_s = dot(gradient, minus(surface.b, surface.a));
                 let down_t = dot(gradient, minus(surface.c, surface.a));
                 let mut lowest = FAR.runtime();
@@ -335,29 +337,50 @@ pub fn narrow_faces(
                     to_t = select(lower, vt, to_t);
                     i += 1u32;
                 }
-                let step = 2.0f32 / (k as f32 + 2.0f32);
-                s += step * (to_s - s);
-                t += step * (to_t - t);
-                let p = at_weights(surface, s, t);
-                let here = value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
-                let lower = here.distance < value;
-                value = select(lower, here.distance, value);
-                best_s = select(lower, s, best_s);
-                best_t = select(lower, t, best_t);
-                gx = here.gradient.x;
-                gy = here.gradient.y;
-                gz = here.gradient.z;
-                k += 1u32;
+                let step = 2.0f32 / ((evaluation - n - 1u32) as f32 + 2.0f32);
+                s = at_s + step * (to_s - at_s);
+                t = at_t + step * (to_t - at_t);
             }
-            let point = at_weights(surface, best_s, best_t);
-            let v = value_in(assets, d, word, faces, own, position, point, &mut squares, &mut ids, lanes, planes);
-            if v.distance <= reach && lane == 0u32 {
-                let is_face = surface.count == 3u32;
-                if is_face && dot(v.gradient, normal(surface)) > -cos_theta {
-                    counters[products::FILTERED as usize].fetch_add(1u32);
-                } else {
-                    write(counters, words, rows, most, d, face_a, named(word, cell), 0u32, point, v);
-                }
+            let p = at_weights(surface, s, t);
+            let here = value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
+            // The start is the best of centre and vertices.
+            let moves = is_step || here.distance < at_value;
+            at_s = select(moves, s, at_s);
+            at_t = select(moves, t, at_t);
+            at_value = select(moves, here.distance, at_value);
+            at_x = select(moves, here.gradient.x, at_x);
+            at_y = select(moves, here.gradient.y, at_y);
+            at_z = select(moves, here.gradient.z, at_z);
+            let lower = here.distance < best;
+            best_s = select(lower, s, best_s);
+            best_t = select(lower, t, best_t);
+            best = select(lower, here.distance, best);
+            best_x = select(lower, here.gradient.x, best_x);
+            best_y = select(lower, here.gradient.y, best_y);
+            best_z = select(lower, here.gradient.z, best_z);
+            on_x = select(lower, here.point.x, on_x);
+            on_y = select(lower, here.point.y, on_y);
+            on_z = select(lower, here.point.z, on_z);
+            best_face = select(lower, here.face, best_face);
+            best_feature = select(lower, here.feature, best_feature);
+            // From the centre: can any point be within reach?
+            let out = evaluation == 0u32 && here.distance - radius > reach + ROUNDING;
+            evaluation = select(out, evaluations, evaluation + 1u32);
+        }
+        if best <= reach && lane == 0u32 {
+            let v = Value {
+                distance: best,
+                gradient: v3(best_x, best_y, best_z),
+                point: v3(on_x, on_y, on_z),
+                face: best_face,
+                feature: best_feature,
+            };
+            let is_face = surface.count == 3u32;
+            if is_face && dot(v.gradient, normal(surface)) > -cos_theta {
+                counters[products::FILTERED as usize].fetch_add(1u32);
+            } else {
+                let point = at_weights(surface, best_s, best_t);
+                write(counters, words, rows, most, d, face_a, named(word, cell), 0u32, point, v);
             }
         }
     }
