@@ -8,6 +8,9 @@ use tesdf::collide::{
 };
 use tesdf::encode::Length;
 
+use tesdf_sim::newton::Detect as _;
+
+use crate::devices::{Choice, OnDevice};
 use crate::report::{self, Failure, Outcome, count};
 use crate::{asset_file, parse, why};
 
@@ -77,6 +80,9 @@ pub struct Args {
     /// Most contacts to keep of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
+    /// Where contacts are found: cpu, gpu, or a device by number or name; not in the mode `exact`
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why")]
+    pub device: Choice,
     /// Say instead why contacts are or are not there: what each stage made of all candidates, or of one face (in the mode `node`, node) of
     /// instance 0, or as INSTANCE:FACE of one of either
     #[arg(long, value_name = "FACE", value_parser = parse::part, num_args = 0..=1)]
@@ -138,7 +144,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if let Some(part) = args.why {
         return why::run(&scene, ids, &options, part, args.json);
     }
-    let found = detect(&scene, &options).map_err(Failure::new)?;
+    let found = match args.device.open()? {
+        Some(device) => OnDevice::new(device).detect(&scene, &options),
+        None => detect(&scene, &options),
+    };
+    let found = found.map_err(Failure::new)?;
     if args.json {
         report::json(&found.contacts)?;
     } else {

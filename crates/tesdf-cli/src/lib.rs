@@ -14,6 +14,7 @@ pub mod check;
 pub mod clearance;
 pub mod collide;
 pub mod completions;
+pub mod devices;
 pub mod encode;
 pub mod evaluate;
 pub mod inspect;
@@ -63,6 +64,8 @@ pub enum Command {
     Clearance(clearance::Args),
     /// When two moving bodies first touch
     Toi(toi::Args),
+    /// List the devices that can compute, by the numbers and names that --device takes
+    Devices(devices::Args),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
     /// Move the bodies of a scene and write the run
@@ -111,6 +114,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Collide(args) => collide::run(args),
         Command::Clearance(args) => clearance::run(args),
         Command::Toi(args) => toi::run(args),
+        Command::Devices(args) => devices::run(args),
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),

@@ -12,6 +12,7 @@ use tesdf_sim::criterion::ScrewReport;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{Moment, SimulateError, Summary, simulate};
 
+use crate::devices::{Choice, OnDevice};
 use crate::parse;
 use crate::progress::{interrupt_flag, watched};
 use crate::report::{self, Failure, Outcome};
@@ -36,6 +37,9 @@ pub struct Args {
     /// Instead of the geometry of a body: a .tesdf file, or a mesh that is encoded; may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = geometry)]
     pub geometries: Vec<(String, PathBuf)>,
+    /// Where contacts are found: cpu, gpu, or a device by number or name; not in the mode `exact`
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
+    pub device: Choice,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
@@ -79,6 +83,7 @@ struct Report<'a> {
 /// was. A run that does not meet the scene's criterion is written, and is not good.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let loaded = load(args)?;
+    let device = args.device.open()?;
     crate::encode::check_output(&args.scene, &args.output)?;
     let interrupted = interrupt_flag()?;
     let progress = EncodeProgress::default();
@@ -87,7 +92,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         SceneError::Cancelled => as_it_was("interrupted", &args.output),
         e => Failure::new(e),
     })?;
-    let mut engine = loaded.newton(system).map_err(Failure::new)?;
+    let engine = match device {
+        Some(device) => loaded.newton_with(system, OnDevice::new(device)),
+        None => loaded.newton(system),
+    };
+    let mut engine = engine.map_err(Failure::new)?;
     let bar = LiveProgress::new(&interrupted);
     let ended = simulate(&loaded.scene, &mut engine, |moment| bar.show(moment));
     drop(bar);

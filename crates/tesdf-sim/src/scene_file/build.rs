@@ -14,7 +14,7 @@ use tesdf::mesh::{self, LoadedMesh, SolidMesh};
 
 use super::read::LoadedScene;
 use super::{BodySection, DetectorMode, DetectorSection, SceneError, ShapeSection};
-use crate::newton::Newton;
+use crate::newton::{Detect, Newton};
 use crate::{Mass, MassProperties, System};
 
 /// Share of the smallest free body's diagonal up to which contacts are taken by default.
@@ -63,12 +63,24 @@ impl LoadedScene {
     /// # Errors
     /// A value of the sections `detector` and `solver` that makes no sense.
     pub fn newton(&self, system: System) -> Result<Newton, SceneError> {
+        self.newton_with(system, detect)
+    }
+
+    /// The same with another detector, which takes the place of [`tesdf::collide::detect`] unless the scene's mode is `off`.
+    ///
+    /// # Errors
+    /// As [`newton`](Self::newton).
+    pub fn newton_with(
+        &self,
+        system: System,
+        detector: impl Detect + 'static,
+    ) -> Result<Newton, SceneError> {
         let collide = collide_options(&self.scene.detector, &system);
         collide.validate().map_err(|e| self.value("detector", e))?;
         let solver = self.scene.solver;
         match self.scene.detector.mode {
             DetectorMode::Off => Newton::new(system, nothing, collide, solver),
-            _ => Newton::new(system, detect, collide, solver),
+            _ => Newton::new(system, detector, collide, solver),
         }
         .map_err(|e| self.value("solver", e))
     }

@@ -63,4 +63,7 @@ pub enum CollideError {
         /// What was expected.
         expected: &'static str,
     },
+    /// A detector of another device has failed.
+    #[error("{0}")]
+    Device(String),
 }
