@@ -71,7 +71,7 @@ const ROUNDING: f64 = 4e-6;
 impl TeSdf {
     fn least_in_leaf(&self, leaf: &Node, cell: &Cell) -> f64 {
         let center = cell.centroid();
-        let reach = cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max);
+        let reach = cell.radius();
         let least = match *leaf {
             Node::Listed(Label::Outside, offset) => self.with_list(offset, |faces| {
                 let least = |&face: &u32| self.least_to_face(face, center, &cell.corners);
