@@ -128,27 +128,10 @@ impl TeSdf {
     /// How many vertices and tetrahedra of a conforming domain there are of each class (Sec. III-A); `None` for the bisection domain.
     pub fn classes(&self) -> Option<Classes> {
         let domain = self.conforming.as_ref()?;
-        let of_surface = |v: u32| (v as usize) < self.vertices.len();
-        let mut classes = Classes::default();
-        let mut counted = vec![false; self.vertices.len() + domain.vertices.len()];
-        for (root, corners) in domain.tetrahedra.iter().enumerate() {
-            let at_boundary = corners.iter().any(|&v| of_surface(v));
-            let (vertices, tetrahedra) = match (self.side_of_root(root), at_boundary) {
-                (Side::Inside, true) => (&mut classes.inner_vertices, &mut classes.boundary_inner_tetrahedra),
-                (Side::Inside, false) => (&mut classes.inner_vertices, &mut classes.inner_tetrahedra),
-                (Side::Outside, true) => {
-                    (&mut classes.outer_vertices, &mut classes.boundary_outer_tetrahedra)
-                }
-                (Side::Outside, false) => (&mut classes.outer_vertices, &mut classes.outer_tetrahedra),
-            };
-            *tetrahedra += 1;
-            for &v in corners {
-                if !std::mem::replace(&mut counted[v as usize], true) {
-                    *(if of_surface(v) { &mut classes.surface_vertices } else { &mut *vertices }) += 1;
-                }
-            }
-        }
-        Some(classes)
+        let sides = (0..domain.tetrahedra.len()).map(|root| self.side_of_root(root));
+        let tetrahedra = domain.tetrahedra.iter().copied().zip(sides);
+        let vertices = self.vertices.len() + domain.vertices.len();
+        Some(Classes::count(vertices, tetrahedra, |v| (v as usize) < self.vertices.len()))
     }
 
     /// All cells of a root are on its side.
