@@ -83,13 +83,9 @@ fn grid(cell: &Cell, sampling: &Sampling) -> impl Iterator<Item = DVec3> {
 mod tests {
     use super::*;
     use crate::encode::surface::Touching;
-    use crate::geometry::Aabb;
+    use crate::geometry::{Aabb, strategy::point};
     use crate::mesh::TriangleMesh;
     use proptest::prelude::*;
-
-    fn point() -> impl Strategy<Value = DVec3> {
-        (-1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(|(x, y, z)| DVec3::new(x, y, z))
-    }
 
     proptest! {
         #[test]
