@@ -1,5 +1,7 @@
 //! `tesdf-bench exactness`
 
+use std::ops::ControlFlow;
+
 use tesdf::verify::{PointClass, VerifyOptions, verify};
 
 use crate::input::{Input, MeshesAndPoints};
@@ -37,7 +39,8 @@ pub fn run(args: &MeshesAndPoints) -> Result<(), Failure> {
         let input = Input::read(path)?;
         let (asset, _) = input.encode(&args.preset.options())?;
         let options = VerifyOptions { samples: args.points as usize, seed: args.seed };
-        let report = verify(&asset, &options, |_| {}).map_err(|e| format!("{}: {e}", path.display()))?;
+        let report = verify(&asset, &options, |_| ControlFlow::Continue(()))
+            .map_err(|e| format!("{}: {e}", path.display()))?;
         let passed = if report.passed { "yes" } else { "**no**" };
         let mut cells = vec![input.name.clone(), passed.into(), report.faces.to_string()];
         for p in &report.precisions {
