@@ -2,7 +2,8 @@
 use bytemuck::Pod;
 use numpy::ndarray::ArrayView;
 use numpy::{
-    Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods,
+    Element, IntoPyArray, PyArray1, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2,
+    PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -36,6 +37,41 @@ impl<'py> Rows<'py> {
     pub fn as_slice(&self) -> PyResult<&[DVec3]> {
         Ok(bytemuck::cast_slice(self.0.as_slice()?))
     }
+}
+
+/// Whole numbers of any type, in an array whose shape `fits`.
+///
+/// # Errors
+/// `ValueError` names the argument and what was found.
+pub fn integers<'py>(
+    name: &str,
+    any: &Bound<'py, PyAny>,
+    expected: &str,
+    fits: impl Fn(&[usize]) -> bool,
+) -> PyResult<PyReadonlyArrayDyn<'py, i64>> {
+    let py = any.py();
+    let array = py.import("numpy")?.call_method1("asarray", (any,))?;
+    let untyped = array.cast::<PyUntypedArray>()?;
+    if !fits(untyped.shape()) {
+        return Err(argument(name, format!("an array of shape {}", array.getattr("shape")?), expected));
+    }
+    if !matches!(untyped.dtype().kind(), b'i' | b'u') {
+        return Err(argument(name, format!("an array of {}", untyped.dtype()), "integers"));
+    }
+    array.call_method1("astype", (numpy::dtype::<i64>(py), "C"))?.extract()
+}
+
+/// Ids of vertices or the like, of shape `[N]`.
+///
+/// # Errors
+/// `ValueError` names the argument and what was found.
+pub fn ids(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
+    let numbers = integers(name, any, "shape (N,)", |shape| shape.len() == 1)?;
+    let id = |&number: &i64| {
+        u32::try_from(number)
+            .map_err(|_| argument(name, format!("the id {number}"), "ids from 0 to 2^32 - 1 (0-based)"))
+    };
+    numbers.as_slice()?.iter().map(id).collect()
 }
 
 /// A row for each of `vectors`, as an array of shape `[N, 3]`.

@@ -1,5 +1,7 @@
 //! `tesdf.Asset`
+use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
@@ -14,12 +16,14 @@ use tesdf::verify::{VerifyOptions, verify};
 
 use crate::arrays::{self, Rows};
 use crate::errors::{Error, argument};
+use crate::interrupt::cancellable;
 use crate::{classes, pool};
 
 /// Points between two looks at Python's signals: under a second of work.
 const CHUNK: usize = 1 << 19;
 
-/// An encoded mesh: exact signed distances, closest points and gradients. Immutable; made by encode, or opened from a file.
+/// An encoded mesh: exact signed distances, closest points and gradients. Made by encode, or opened from a file; immutable: what
+/// moves its vertices gives another asset.
 ///
 /// All lengths are in the mesh's unit. Points are arrays [N, 3]; float64, contiguous ones are read in place. Queries run
 /// on all cores (RAYON_NUM_THREADS says on how many) with the interpreter's lock free.
@@ -112,12 +116,13 @@ impl Asset {
         TeSdf::from_bytes(data).map(Self::new).map_err(|e| Error::Asset(None, e).raise(py))
     }
 
-    /// The whole file.
-    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
-        PyBytes::new(py, self.inner.as_bytes())
+    /// The whole file. One of a moved mesh does not say which lists are stale; make them anew before.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = self.inner.to_bytes().map_err(|e| Error::Asset(None, e).raise(py))?;
+        Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Writes the file; one that is there is replaced in one step.
+    /// Writes the file, that of to_bytes; one that is there is replaced in one step.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.inner.save(&path)).map_err(|e| Error::Asset(Some(path), e).raise(py))
     }
@@ -219,24 +224,83 @@ impl Asset {
         ))
     }
 
-    /// What the asset costs and what a query reads: counts, list lengths, reads, bytes by section.
+    /// The asset with vertices [N] at positions [N, 3], in a conforming domain: Moved(asset, faces, tetrahedra, inverted).
+    ///
+    /// Ids from 0 are of the mesh's vertices, in their order; those of the domain's own (sections["domain.vertices"]) follow. Tetrahedra
+    /// and lists stay: distances are those to the listed faces where they are now, and nothing of them is proved until
+    /// reencode_stale. This asset stays as it is.
+    ///
+    /// Raises DeformError in the bisection domain, and for ids and positions that cannot be.
+    fn move_vertices<'py>(
+        &self,
+        vertices: &Bound<'py, PyAny>,
+        positions: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let py = vertices.py();
+        let ids = arrays::ids("vertices", vertices)?;
+        let positions = Rows::new("positions", positions)?;
+        let positions = positions.as_slice()?;
+        if ids.len() != positions.len() {
+            let found = format!("{} of {} vertices", positions.len(), ids.len());
+            return Err(argument("positions", found, "one for each vertex"));
+        }
+        let moves: Vec<(u32, DVec3)> = ids.into_iter().zip(positions.iter().copied()).collect();
+        let moved = py.detach(|| {
+            let mut asset = self.inner.clone();
+            asset.move_vertices(&moves).map(|moved| (asset, moved))
+        });
+        let (asset, moved) = moved.map_err(|e| Error::Deform(e).raise(py))?;
+        let inverted = PyArray1::from_vec(py, moved.inverted);
+        classes::moved(py)?.call1((Self::new(asset), moved.faces, moved.tetrahedra, inverted))
+    }
+
+    /// The cells whose lists may not hold where the vertices are now: their words in sections["domain.nodes"], ascending.
+    fn stale_cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
+        let pool = pool::shared().map_err(|e| e.raise(py))?;
+        let found = py.detach(|| pool.install(|| self.inner.stale_cells()));
+        Ok(PyArray1::from_vec(py, found.map_err(|e| Error::Encode(None, e).raise(py))?))
+    }
+
+    /// The asset with the lists of stale cells made anew, as it was encoded: Reencoded(asset, cells, checked, stale). What is proved
+    /// holds then for the mesh as it is.
+    fn reencode_stale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let pool = pool::shared().map_err(|e| e.raise(py))?;
+        let reencoded = py.detach(|| {
+            let mut asset = self.inner.clone();
+            pool.install(|| asset.reencode_stale()).map(|reencoded| (asset, reencoded))
+        });
+        let (asset, found) = reencoded.map_err(|e| Error::Encode(None, e).raise(py))?;
+        let stale = PyArray1::from_vec(py, found.stale);
+        classes::reencoded(py)?.call1((Self::new(asset), found.cells, found.checked, stale))
+    }
+
+    /// What the asset costs and what a query reads: counts, list lengths, reads, bytes by section; of a conforming domain the classes
+    /// of its vertices and tetrahedra, too.
     fn inspect<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         let found = py.detach(|| pool.install(|| inspect(&self.inner, &InspectOptions::default())));
         classes::report(py, "Inspection", &found)
     }
 
-    /// Reads every byte and compares it with the checksums, then answers at samples points with brute force over all faces.
+    /// Reads every byte and compares it with the checksums, then answers at samples points with brute force over all faces;
+    /// Ctrl-C ends it with KeyboardInterrupt.
     ///
     /// Raises AssetError when the file was damaged. Wrong answers are in the report.
     #[pyo3(signature = (samples = 10_000))]
     fn verify<'py>(&self, py: Python<'py>, samples: u32) -> PyResult<Bound<'py, PyAny>> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         let options = VerifyOptions { samples: samples as usize, ..VerifyOptions::default() };
-        let found = py.detach(|| {
+        let cancelled = AtomicBool::new(false);
+        let go_on = |_| match cancelled.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        let work = || {
             self.inner.verify_checksums().map_err(|e| Error::Asset(None, e))?;
-            pool.install(|| verify(&self.inner, &options, |_| ())).map_err(Error::Verify)
-        });
+            pool.install(|| verify(&self.inner, &options, go_on)).map_err(Error::Verify)
+        };
+        let cancel = || cancelled.store(true, Ordering::Relaxed);
+        let found = cancellable(py, work, cancel, || Ok(()))?;
         classes::report(py, "VerifyReport", &found.map_err(|e| e.raise(py))?)
     }
 
@@ -293,7 +357,7 @@ impl Asset {
     #[getter]
     fn sections<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let found = PyDict::new(slf.py());
-        for section in slf.get().inner.container().sections() {
+        for section in slf.get().inner.sections() {
             let (owner, columns) = (slf.as_any(), section.spec.columns);
             let bytes = section.bytes;
             // SAFETY: an asset never changes, its bytes (a mapping or a heap block) do not move, and it is the owner.
@@ -321,8 +385,8 @@ impl Asset {
         )
     }
 
-    /// Assets can be pickled.
+    /// Assets can be pickled: as the bytes of the file.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
-        Ok((slf.getattr("from_bytes")?, (slf.get().to_bytes(slf.py()),)))
+        Ok((slf.getattr("from_bytes")?, (slf.get().to_bytes(slf.py())?,)))
     }
 }

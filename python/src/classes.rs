@@ -18,6 +18,18 @@ pub fn ray_hits(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
     CLASS.import(py, "tesdf.results", "RayHits")
 }
 
+/// `Moved` of `tesdf.results`.
+pub fn moved(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    CLASS.import(py, "tesdf.results", "Moved")
+}
+
+/// `Reencoded` of `tesdf.results`.
+pub fn reencoded(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    CLASS.import(py, "tesdf.results", "Reencoded")
+}
+
 /// `Repaired` of `tesdf.results`.
 pub fn repaired(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();

@@ -1,8 +1,13 @@
 //! `tesdf.encode`
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
+use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use tesdf::encode::{EncodeOptions, EncodeProgress, Length, Preset, Stage};
+use pyo3::types::PyString;
+use tesdf::encode::{
+    Deformation, Domain, DomainChoice, EncodeChoices, EncodeProgress, EncoderChoice, Preset, Refinement,
+    Stage, Threshold, encode_in,
+};
 
 use crate::asset::Asset;
 use crate::errors::{Error, argument};
@@ -13,40 +18,64 @@ use crate::pool;
 /// Encodes a closed mesh; Ctrl-C ends it with KeyboardInterrupt.
 ///
 /// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an object that has both.
-/// preset: "default" (few faces per query), "fast" (quickest to encode) or "compact" (smallest); all are exact.
-/// band: width of the layer around the solid that is encoded too, in the mesh's unit; None is 5 % of the diagonal.
+/// preset: "default" (few faces per query), "fast" (quickest to encode) or "compact" (smallest), all exact; "paper" (the paper's
+/// encoder: sampled, 129 samples along an edge, plain) or "sampled-safe" (sampled so that nothing is missing).
+/// domain: how space is cut into tetrahedra. None or "bisection" needs nothing else; "gmsh" runs Gmsh (the program of that name, or what
+/// the environment variable TESDF_GMSH names); a path (.msh, .node, .ele, .vtu) has tetrahedra whose sides are the mesh's faces.
+/// encoder: how the closest faces of each are found, "certified" (proven) or "sampled" (as in the paper: faces that are closest
+/// only between samples may be missing); None is that of the preset.
+/// resolution: samples along an edge of a tetrahedron, less one; None is 32, or that of the preset.
+/// threshold: how much farther than the closest face a listed one may be at a sample, in the mesh's unit; "safe" is so much that
+/// nothing is missing.
+/// e_max: lists are cut to this many faces, those that are needed nearest to the surface.
+/// deformable: makes lists ready for moving vertices; needs a conforming domain ("gmsh" or a path).
+/// plain: leaves the tetrahedra of a conforming domain as they are, instead of bisecting them where that pays.
+/// band: width of the layer around the solid that is encoded too, in the mesh's unit; None is 5 % of the diagonal, with "gmsh" none.
 /// regions: boxes [R, 6] that are encoded too, each min x y z, max x y z.
 /// unit: name of the mesh's unit, recorded in the asset; nothing is scaled.
 /// threads: None is one per core; the asset is the same, byte by byte, for every number.
 /// progress: called with the stage ("refine", "tighten", "assemble") and the share of it that is done, 0 to 1, some
 /// twenty times a second; what it raises ends the encoding and is raised.
 ///
-/// Raises OSError or MeshError when there is no mesh, NotSolidError when it has no well-defined inside, and EncodeError
-/// when an option has no meaning for it.
+/// Raises OSError or MeshError when there is no mesh or no tetrahedra, NotSolidError when the mesh has no well-defined inside, and
+/// EncodeError when an option has no meaning for it, options exclude each other, Gmsh fails, or tetrahedra do not conform to the mesh.
 #[pyfunction]
-#[pyo3(signature = (mesh, preset = "default", *, band = None, regions = None, unit = None, threads = None, progress = None))]
+#[pyo3(signature = (
+    mesh, preset = "default", *, domain = None, encoder = None, resolution = None, threshold = None, e_max = None,
+    deformable = false, plain = false, band = None, regions = None, unit = None, threads = None, progress = None
+))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn encode(
     py: Python<'_>,
     mesh: &Bound<'_, PyAny>,
     preset: &str,
+    domain: Option<&Bound<'_, PyAny>>,
+    encoder: Option<&str>,
+    resolution: Option<u32>,
+    threshold: Option<&Bound<'_, PyAny>>,
+    e_max: Option<NonZeroU32>,
+    deformable: bool,
+    plain: bool,
     band: Option<f64>,
     regions: Option<Vec<[f64; 6]>>,
     unit: Option<String>,
     threads: Option<NonZeroUsize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Asset> {
-    let mut options = EncodeOptions::preset(match preset {
-        "default" => Preset::Default,
-        "fast" => Preset::Fast,
-        "compact" => Preset::Compact,
-        _ => return Err(argument("preset", format!("'{preset}'"), "'default', 'fast' or 'compact'")),
-    });
-    if let Some(band) = band {
-        options.band = Length::Absolute(band);
-    }
-    options.regions = regions.unwrap_or_default();
-    options.unit = unit;
+    let choices = EncodeChoices {
+        preset: named_preset(preset)?,
+        domain: domain.map(domain_choice).transpose()?.unwrap_or_default(),
+        encoder: encoder.map(named_encoder).transpose()?,
+        resolution,
+        threshold: threshold.map(length_or_safe).transpose()?,
+        max_entries: e_max,
+        deformation: if deformable { Deformation::Expected } else { Deformation::None },
+        refinement: plain.then_some(Refinement::None),
+        band,
+        regions: regions.unwrap_or_default(),
+        unit,
+    };
+    let options = choices.options().map_err(|e| Error::Choice(e).raise(py))?;
 
     let input = MeshInput::new(mesh)?;
     let pool = pool::of(threads).map_err(|e| e.raise(py))?;
@@ -54,7 +83,9 @@ pub fn encode(
     let work = || {
         pool.install(|| {
             let (solid, path, source) = input.load()?.solid()?;
-            tesdf::encode::encode(&solid, &source, &options, &state).map_err(|e| Error::Encode(path, e))
+            let tetrahedra = choices.tetrahedra(&solid, &state).map_err(Error::Domain)?;
+            let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
+            encode_in(&solid, domain, &source, &options, &state).map_err(|e| Error::Encode(path, e))
         })
     };
     let watch = || match progress {
@@ -72,4 +103,49 @@ pub fn encode(
     let encoded = cancellable(py, work, || state.cancel(), watch)?.map_err(|e| e.raise(py))?;
     watch()?;
     Ok(Asset::new(encoded))
+}
+
+fn named_preset(name: &str) -> PyResult<Preset> {
+    Ok(match name {
+        "default" => Preset::Default,
+        "fast" => Preset::Fast,
+        "compact" => Preset::Compact,
+        "paper" => Preset::Paper,
+        "sampled-safe" => Preset::SampledSafe,
+        _ => {
+            let expected = "'default', 'fast', 'compact', 'paper' or 'sampled-safe'";
+            return Err(argument("preset", format!("'{name}'"), expected));
+        }
+    })
+}
+
+fn named_encoder(name: &str) -> PyResult<EncoderChoice> {
+    match name {
+        "certified" => Ok(EncoderChoice::Certified),
+        "sampled" => Ok(EncoderChoice::Sampled),
+        _ => Err(argument("encoder", format!("'{name}'"), "'certified' or 'sampled'")),
+    }
+}
+
+/// A name or a path as text; other paths are paths.
+fn domain_choice(any: &Bound<'_, PyAny>) -> PyResult<DomainChoice> {
+    if let Ok(text) = any.cast::<PyString>()
+        && let Ok(choice) = text.to_cow()?.parse()
+    {
+        return Ok(choice);
+    }
+    any.extract::<PathBuf>().map(DomainChoice::File).map_err(|_| {
+        let found = any.get_type().name().map_or("an object".into(), |name| name.to_string());
+        argument("domain", found, "'bisection', 'gmsh' or a path of tetrahedra")
+    })
+}
+
+fn length_or_safe(any: &Bound<'_, PyAny>) -> PyResult<Threshold> {
+    if let Ok(text) = any.cast::<PyString>() {
+        return match &*text.to_cow()? {
+            "safe" => Ok(Threshold::CoveringRadius),
+            text => Err(argument("threshold", format!("'{text}'"), "a length or 'safe'")),
+        };
+    }
+    any.extract().map(Threshold::Absolute)
 }

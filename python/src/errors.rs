@@ -6,7 +6,9 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use tesdf::asset::AssetError;
-use tesdf::encode::EncodeError;
+use tesdf::deform::DeformError;
+use tesdf::domain::ReadTetrahedraError;
+use tesdf::encode::{ChoiceError, DomainError, EncodeError};
 use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
 use tesdf::verify::VerifyError;
 
@@ -21,7 +23,10 @@ pub enum Error {
     /// The file, if the mesh is of one.
     NotSolid(Option<PathBuf>, NotSolid),
     Repair(Option<PathBuf>, RepairError),
+    Choice(ChoiceError),
+    Domain(DomainError),
     Encode(Option<PathBuf>, EncodeError),
+    Deform(DeformError),
     /// The file, if the asset is of one.
     Asset(Option<PathBuf>, AssetError),
     Verify(VerifyError),
@@ -35,14 +40,20 @@ impl Error {
         match self {
             Self::Read(_, ReadError::Open { ref source, .. }) => system(source, self.text()),
             Self::Asset(_, AssetError::Io { ref source, .. }) => system(source, self.text()),
-            Self::Read(..) | Self::Mesh(_) | Self::Repair(..) => new(py, "MeshError", self.text()),
+            Self::Domain(DomainError::Read {
+                source: ReadTetrahedraError::Open { ref source, .. }, ..
+            }) => system(source, self.text()),
+            Self::Read(..) | Self::Mesh(_) | Self::Repair(..) | Self::Domain(DomainError::Read { .. }) => {
+                new(py, "MeshError", self.text())
+            }
             Self::NotSolid(_, ref found) => {
                 match classes::report(py, "CheckReport", &Checked::of(found.report(), &[])) {
                     Ok(report) => new(py, "NotSolidError", (self.text(), report.unbind())),
                     Err(e) => e,
                 }
             }
-            Self::Encode(..) => new(py, "EncodeError", self.text()),
+            Self::Choice(_) | Self::Domain(_) | Self::Encode(..) => new(py, "EncodeError", self.text()),
+            Self::Deform(_) => new(py, "DeformError", self.text()),
             Self::Asset(..) | Self::Verify(_) => new(py, "AssetError", self.text()),
             Self::Report(_) => PyValueError::new_err(self.text()),
             Self::Threads(_) => PyOSError::new_err(self.text()),
@@ -61,7 +72,10 @@ impl Error {
             Self::Mesh(e) => e.to_string(),
             Self::NotSolid(path, e) => at(path, e),
             Self::Repair(path, e) => at(path, e),
+            Self::Choice(e) => e.to_string(),
+            Self::Domain(e) => e.to_string(),
             Self::Encode(path, e) => at(path, e),
+            Self::Deform(e) => e.to_string(),
             Self::Asset(_, e @ AssetError::Io { .. }) => e.to_string(),
             Self::Asset(path, e) => at(path, e),
             Self::Verify(e) => e.to_string(),

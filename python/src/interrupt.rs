@@ -35,7 +35,8 @@ pub fn cancellable<T: Send>(
         loop {
             py.detach(|| wait(locked()));
             if let Some(result) = locked().take() {
-                return (result, raised);
+                // Ctrl-C ends programs that `work` has run, too, and then it is not their error that counts.
+                return (result, raised.or_else(|| py.check_signals().err()));
             }
             if raised.is_none()
                 && let Err(e) = py.check_signals().and_then(|()| watch())

@@ -1,7 +1,6 @@
 //! Meshes: from files, arrays or objects with `vertices` and `faces`; `check` and `repair`.
 use std::path::PathBuf;
 
-use numpy::{PyArrayDescrMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use serde::Serialize;
@@ -79,22 +78,7 @@ impl Loaded {
 
 /// Corner ids of faces, of shape `[F, 3]` and any type of integers.
 fn corner_ids(any: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
-    let py = any.py();
-    let array = py.import("numpy")?.call_method1("asarray", (any,))?;
-    let untyped = array.cast::<PyUntypedArray>()?;
-    let (kind, shape) = (untyped.dtype().kind(), untyped.shape());
-    if !matches!(shape, [_, 3]) {
-        return Err(argument(
-            "faces",
-            format!("an array of shape {}", array.getattr("shape")?),
-            "shape (F, 3)",
-        ));
-    }
-    if !matches!(kind, b'i' | b'u') {
-        return Err(argument("faces", format!("an array of {}", untyped.dtype()), "integers"));
-    }
-    let array = array.call_method1("astype", (numpy::dtype::<i64>(py), "C"))?;
-    let ids: PyReadonlyArray2<'_, i64> = array.extract()?;
+    let ids = arrays::integers("faces", any, "shape (F, 3)", |shape| matches!(shape, [_, 3]))?;
     let ids = ids.as_slice()?.as_chunks::<3>().0;
     let corners = |(face, ids): (usize, &[i64; 3])| -> PyResult<[u32; 3]> {
         let mut corners = [0; 3];

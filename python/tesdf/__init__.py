@@ -10,14 +10,17 @@
     vertices, faces, report = tesdf.repair("part.stl") # says every change
     tesdf.encode((vertices, faces))
 
+    asset = tesdf.encode("beam.stl", domain="gmsh", deformable=True)       # tetrahedra that follow the surface
+    asset = asset.move_vertices(ids, positions).asset.reencode_stale().asset
+
 All lengths are in the mesh's unit; ids are 0-based. Errors are `MeshError` (`NotSolidError` when the mesh has no
-well-defined inside), `EncodeError`, `AssetError`, all of them `ValueError`, and `OSError` for files.
+well-defined inside), `EncodeError`, `DeformError`, `AssetError`, all of them `ValueError`, and `OSError` for files.
 """
 
 from ._native import NO_FACE, Asset, __version__, check, encode, repair
-from .errors import AssetError, EncodeError, MeshError, NotSolidError
+from .errors import AssetError, DeformError, EncodeError, MeshError, NotSolidError
 from .reports import CheckReport, Defect, RepairReport, VerifyReport
-from .results import Answers, RayHits, Repaired
+from .results import Answers, Moved, RayHits, Reencoded, Repaired
 
 __all__ = [
     "NO_FACE",
@@ -26,10 +29,13 @@ __all__ = [
     "AssetError",
     "CheckReport",
     "Defect",
+    "DeformError",
     "EncodeError",
     "MeshError",
+    "Moved",
     "NotSolidError",
     "RayHits",
+    "Reencoded",
     "RepairReport",
     "Repaired",
     "VerifyReport",

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .reports import Certificate, CheckReport, Inspection, Source, Statistics, VerifyReport
-from .results import Answers, RayHits, Repaired
+from .results import Answers, Moved, RayHits, Reencoded, Repaired
 
 class _HasMesh(Protocol):
     @property
@@ -27,8 +27,15 @@ def check(mesh: _Mesh) -> CheckReport: ...
 def repair(mesh: _Mesh, *, weld_tolerance: float | None = None) -> Repaired: ...
 def encode(
     mesh: _Mesh,
-    preset: Literal["default", "fast", "compact"] = "default",
+    preset: Literal["default", "fast", "compact", "paper", "sampled-safe"] = "default",
     *,
+    domain: Literal["bisection", "gmsh"] | _Path | None = None,
+    encoder: Literal["certified", "sampled"] | None = None,
+    resolution: int | None = None,
+    threshold: float | Literal["safe"] | None = None,
+    e_max: int | None = None,
+    deformable: bool = False,
+    plain: bool = False,
     band: float | None = None,
     regions: Sequence[Sequence[float]] | None = None,
     unit: str | None = None,
@@ -48,6 +55,9 @@ class Asset:
     def signed_distance(self, points: npt.ArrayLike, precision: _Precision = "f64") -> npt.NDArray[np.float64]: ...
     def is_inside(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]: ...
     def ray_cast(self, origins: npt.ArrayLike, directions: npt.ArrayLike, limit: float = ...) -> RayHits: ...
+    def move_vertices(self, vertices: npt.ArrayLike, positions: npt.ArrayLike) -> Moved: ...
+    def stale_cells(self) -> npt.NDArray[np.uint32]: ...
+    def reencode_stale(self) -> Reencoded: ...
     def inspect(self) -> Inspection: ...
     def verify(self, samples: int = 10_000) -> VerifyReport: ...
     @property

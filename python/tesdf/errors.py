@@ -26,5 +26,9 @@ class EncodeError(ValueError):
     """A solid cannot be encoded as asked."""
 
 
+class DeformError(ValueError):
+    """Vertices cannot be moved; nothing was."""
+
+
 class AssetError(ValueError):
     """A file or bytes are not an asset of this version, or were damaged."""

@@ -1,13 +1,16 @@
-"""What queries and `repair` give: tuples with names."""
+"""What queries, `repair` and moved vertices give: tuples with names."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from .reports import RepairReport
+
+if TYPE_CHECKING:
+    from ._native import Asset
 
 
 class Answers(NamedTuple):
@@ -45,3 +48,29 @@ class Repaired(NamedTuple):
     """[F, 3]"""
     report: RepairReport
     """every change, and what is left to be done"""
+
+
+class Moved(NamedTuple):
+    """An asset after `Asset.move_vertices`, and what has changed."""
+
+    asset: Asset
+    """the asset as it is now"""
+    faces: int
+    """number of faces with a vertex that moved"""
+    tetrahedra: int
+    """number of tetrahedra with a vertex that moved"""
+    inverted: npt.NDArray[np.uint32]
+    """those of them that are now inside out or flat, ascending: points of them may be found in several cells or in none"""
+
+
+class Reencoded(NamedTuple):
+    """An asset after `Asset.reencode_stale`, and what was done."""
+
+    asset: Asset
+    """the asset with the new lists"""
+    cells: int
+    """number of cells with a list"""
+    checked: int
+    """number of those that something that moved may matter to"""
+    stale: npt.NDArray[np.uint32]
+    """those whose list was made anew, ascending"""

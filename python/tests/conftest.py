@@ -1,4 +1,5 @@
 import sys
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -42,3 +43,24 @@ def points(torus):
     on_surface = (random.dirichlet([1, 1, 1], 600)[:, :, None] * corners).sum(1)
     near = on_surface + random.normal(size=(600, 3)) * 10.0 ** random.uniform(-6, -1, (600, 1))
     return np.concatenate([random.uniform(-1.6, 1.6, (600, 3)), near, random.uniform(-50, 50, (50, 3))])
+
+
+@pytest.fixture(scope="session")
+def beam(tmp_path_factory):
+    """a beam of 4 x 2 x 2 cubes in a grid of 6 x 4 x 4, each cut into six tetrahedra: the beam's mesh, and a file of the tetrahedra"""
+    shape = np.array([6, 4, 4])
+    cubes = np.stack(np.meshgrid(*map(range, shape), indexing="ij"), -1).reshape(-1, 3)
+    # From corner to opposite corner along the axes, in each order; the order tells the orientation.
+    walks = np.array([np.cumsum(np.vstack([np.zeros(3, int), np.eye(3, dtype=int)[list(axes)]]), 0) for axes in permutations(range(3))])
+    walks[[1, 2, 5], 2:] = walks[[1, 2, 5], :1:-1]
+    tetrahedra = ((cubes[:, None, None] + walks) @ [25, 5, 1]).reshape(-1, 4)
+    places = np.stack(np.meshgrid(*map(range, shape + 1), indexing="ij"), -1).reshape(-1, 3).astype(float)
+    inside = np.repeat(((cubes > 0) & (cubes < shape - 1)).all(1), 6)
+    sides = tetrahedra[inside][:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
+    _, first, count = np.unique(np.sort(sides, 1), axis=0, return_index=True, return_counts=True)
+    used, faces = np.unique(sides[np.sort(first[count == 1])], return_inverse=True)
+    file = tmp_path_factory.mktemp("beam") / "beam.node"
+    rows = lambda name, numbers: "\n".join([name] + [" ".join(map(str, [i, *row])) for i, row in enumerate(numbers)])  # noqa: E731
+    file.write_text(rows(f"{len(places)} 3 0 0", places))
+    file.with_suffix(".ele").write_text(rows(f"{len(tetrahedra)} 4 0", tetrahedra))
+    return (places[used], faces.reshape(-1, 3)), file

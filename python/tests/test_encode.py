@@ -1,8 +1,10 @@
 """Ways to give a mesh, options, progress, Ctrl-C."""
 
+import os
 import signal
 import subprocess
 import sys
+import time
 import types
 
 import numpy as np
@@ -80,7 +82,7 @@ def test_what_has_no_inside():
 def test_options_without_meaning(torus):
     with pytest.raises(tesdf.EncodeError, match="band"):
         tesdf.encode(torus, band=-1.0)
-    with pytest.raises(ValueError, match="preset: 'best'; expected 'default', 'fast' or 'compact'"):
+    with pytest.raises(ValueError, match="preset: 'best'; expected 'default', 'fast', 'compact', 'paper' or"):
         tesdf.encode(torus, "best")
     with pytest.raises(ValueError):
         tesdf.encode(torus, threads=0)
@@ -106,24 +108,44 @@ def test_progress_ends_it():
     assert len(seen) == 1 and seen[0] < 1
 
 
-def test_ctrl_c():
-    program = (
-        "import sys, tesdf\n"
-        "said = []\n"
-        "def progress(stage, share):\n"
-        "    if not said: said.append(1); print('started', flush=True)\n"
-        "try:\n"
-        "    tesdf.encode(sys.argv[1], progress=progress)\n"
-        "except KeyboardInterrupt:\n"
-        "    print('interrupted', flush=True)\n"
-        "    sys.exit(3)\n"
-    )
-    mesh = DATA / "procedural" / "iso_m16_bolt_24k.obj"
-    child = subprocess.Popen([sys.executable, "-c", program, str(mesh)], stdout=subprocess.PIPE, text=True)
+SAYING = [
+    "said = []",
+    "def progress(stage, share):",
+    "    if not said: said.append(1); print('started', flush=True)",
+]
+
+
+def ended_by_ctrl_c(body, *arguments, environment=None):
+    """Runs `body` in another process, which says "started", sends it SIGINT, and it alone, and looks how it ends."""
+    lines = ["import sys, time, tesdf", "try:", *("    " + line for line in body), "except KeyboardInterrupt:"]
+    program = "\n".join([*lines, "    print('interrupted', flush=True)", "    sys.exit(3)"])
+    command = [sys.executable, "-c", program, *map(str, arguments)]
+    child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, **(environment or {})})
     try:
         assert child.stdout.readline() == "started\n"
+        # Where the call follows the word, it has begun by then; if not, it is ended before it does.
+        time.sleep(0.3)
         child.send_signal(signal.SIGINT)
         out, _ = child.communicate(timeout=120)
     finally:
         child.kill()
     assert (out, child.returncode) == ("interrupted\n", 3)
+
+
+def test_ctrl_c_ends_encode():
+    body = [*SAYING, "tesdf.encode(sys.argv[1], progress=progress)"]
+    ended_by_ctrl_c(body, DATA / "procedural" / "iso_m16_bolt_24k.obj")
+
+
+def test_ctrl_c_ends_verify():
+    # 2^32 - 1 points would take days.
+    body = ["asset = tesdf.encode(sys.argv[1])", "print('started', flush=True)", "asset.verify(2**32 - 1)"]
+    ended_by_ctrl_c(body, CUBE)
+
+
+def test_ctrl_c_ends_gmsh(tmp_path):
+    gmsh = tmp_path / "gmsh"
+    gmsh.write_text("#!/bin/sh\nexec sleep 300\n")
+    gmsh.chmod(0o755)
+    body = [*SAYING, "tesdf.encode(sys.argv[1], domain='gmsh', progress=progress)"]
+    ended_by_ctrl_c(body, CUBE, environment={"TESDF_GMSH": str(gmsh)})

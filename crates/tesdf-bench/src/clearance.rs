@@ -2,11 +2,12 @@
 use std::array::from_fn;
 use std::collections::VecDeque;
 
+use tesdf::collide::Pose;
 use tesdf::geometry::{Aabb, Triangle, triangles_meet};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 
-use crate::poses::Pose;
+use crate::poses::in_frame_of;
 use crate::reference::Reference;
 
 /// Depths are found up to this share of the other solid's diagonal; distances up to rounding.
@@ -29,14 +30,14 @@ impl<'a> Body<'a> {
     /// not the length of the shortest translation that separates the solids.
     pub fn clearance(&self, other: &Self, [own, others]: [Pose; 2]) -> f64 {
         let depth =
-            self.deepest(other, own.in_frame_of(others)).max(other.deepest(self, others.in_frame_of(own)));
-        if depth > 0.0 { -depth } else { self.separation(other, own.in_frame_of(others)) }
+            self.deepest(other, in_frame_of(others, own)).max(other.deepest(self, in_frame_of(own, others)));
+        if depth > 0.0 { -depth } else { self.separation(other, in_frame_of(others, own)) }
     }
 
     /// How deep the surface reaches into `other`, in whose frame `pose` places it; 0 if it does not.
     fn deepest(&self, other: &Self, pose: Pose) -> f64 {
         let bounds = other.mesh.bounds();
-        let vertices: Vec<DVec3> = self.mesh.vertices().iter().map(|&v| pose.apply(v)).collect();
+        let vertices: Vec<DVec3> = self.mesh.vertices().iter().map(|&v| pose.to_world(v)).collect();
         let mut depth = 0.0f64;
         for &v in vertices.iter().filter(|&&v| bounds.contains(v)) {
             depth = other.deeper(v, depth);
@@ -96,7 +97,7 @@ impl<'a> Body<'a> {
 
     /// The distance between the surfaces, which must not cross; `pose` places `self` in the frame of `other`.
     fn separation(&self, other: &Self, pose: Pose) -> f64 {
-        let placed = |face: &[u32; 3]| face.map(|v| pose.apply(self.mesh.vertices()[v as usize]));
+        let placed = |face: &[u32; 3]| face.map(|v| pose.to_world(self.mesh.vertices()[v as usize]));
         let mut least = placed(&self.mesh.faces()[0])
             .map(|c| other.reference.distance(c).0)
             .into_iter()
@@ -192,7 +193,7 @@ mod tests {
             let poses = [
                 Pose {
                     rotation: world.rotation * moved,
-                    translation: world.apply(DVec3::new(reach, 0.003, 0.002)),
+                    translation: world.to_world(DVec3::new(reach, 0.003, 0.002)),
                 },
                 Pose { rotation: world.rotation * other, ..world },
             ];

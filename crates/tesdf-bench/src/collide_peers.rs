@@ -12,7 +12,7 @@ use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::collide::{
-    self, ClearanceOptions, CollideOptions, Instance, InstanceId, Mode, Scene, clearance, detect,
+    ClearanceOptions, CollideOptions, Instance, InstanceId, Mode, Pose, Scene, clearance, detect,
 };
 use tesdf::encode::Length;
 use tesdf::glam::DVec3;
@@ -22,7 +22,7 @@ use tesdf::query::Precision;
 use crate::clearance::Body;
 use crate::input::{Input, Preset};
 use crate::parry::{self, Peer};
-use crate::poses::{Pose, PoseSet};
+use crate::poses::{PoseSet, in_frame_of};
 use crate::{Failure, output};
 
 /// Arguments of `tesdf-bench collide-peers`.
@@ -143,7 +143,7 @@ fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
         let mut scene = Scene::new();
         let mut add = |asset: &Arc<TeSdf>, pose: Pose| -> Result<InstanceId, Failure> {
             let shape = scene.add_shape(asset.clone())?;
-            Ok(scene.add(Instance::new(shape, collide::Pose::new(pose.translation, pose.rotation)?))?)
+            Ok(scene.add(Instance::new(shape, pose))?)
         };
         let ids = [add(&a.asset, poses[0])?, add(&b.asset, poses[1])?];
         Ok((scene, ids))
@@ -187,8 +187,8 @@ fn vertices(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
     [(Precision::F32, "f32"), (Precision::F64, "f64")]
         .map(|(precision, name)| {
             let poses = measure(set, |[pose_a, pose_b], distance| {
-                let of_a = vertex_contacts(a, b, pose_a.in_frame_of(pose_b), distance, precision);
-                let of_b = vertex_contacts(b, a, pose_b.in_frame_of(pose_a), distance, precision);
+                let of_a = vertex_contacts(a, b, in_frame_of(pose_b, pose_a), distance, precision);
+                let of_b = vertex_contacts(b, a, in_frame_of(pose_a, pose_b), distance, precision);
                 Ok(Found {
                     contacts: Some(of_a.0 + of_b.0),
                     clearance: Some(of_a.1.min(of_b.1)).filter(|c| c.is_finite()),
@@ -216,7 +216,7 @@ fn vertex_contacts(
     precision: Precision,
 ) -> (usize, f64) {
     let bounds = b.input.solid.mesh().bounds().grown(distance);
-    let vertices = a.input.solid.mesh().vertices().iter().map(|&v| pose.apply(v));
+    let vertices = a.input.solid.mesh().vertices().iter().map(|&v| pose.to_world(v));
     let near: Vec<DVec3> = vertices.filter(|&v| bounds.contains(v)).collect();
     let answers = b.asset.query_batch(&near, precision);
     let contacts = answers.iter().filter(|a| a.signed_distance <= distance).count();

@@ -1,27 +1,11 @@
 //! `tesdf-bench exactness`
-use std::path::PathBuf;
+
+use std::ops::ControlFlow;
 
 use tesdf::verify::{PointClass, VerifyOptions, verify};
 
-use crate::input::{Input, Preset};
+use crate::input::{Input, MeshesAndPoints};
 use crate::{Failure, heading, output};
-
-/// Arguments of `tesdf-bench exactness`.
-#[derive(clap::Args)]
-pub struct Args {
-    /// Meshes of any format; those without an inside are repaired
-    #[arg(required = true)]
-    meshes: Vec<PathBuf>,
-    /// What is encoded
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
-    preset: Preset,
-    /// Points for each mesh; their classes take turns
-    #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
-    points: u32,
-    /// The same seed gives the same points
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-}
 
 const COLUMNS: [&str; 11] = [
     "mesh",
@@ -37,7 +21,7 @@ const COLUMNS: [&str; 11] = [
     "gradient mistakes, f64",
 ];
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &MeshesAndPoints) -> Result<(), Failure> {
     heading::print()?;
     let classes = PointClass::ALL.map(PointClass::name).join(", ");
     output::line(&format!(
@@ -55,7 +39,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let input = Input::read(path)?;
         let (asset, _) = input.encode(&args.preset.options())?;
         let options = VerifyOptions { samples: args.points as usize, seed: args.seed };
-        let report = verify(&asset, &options, |_| {}).map_err(|e| format!("{}: {e}", path.display()))?;
+        let report = verify(&asset, &options, |_| ControlFlow::Continue(()))
+            .map_err(|e| format!("{}: {e}", path.display()))?;
         let passed = if report.passed { "yes" } else { "**no**" };
         let mut cells = vec![input.name.clone(), passed.into(), report.faces.to_string()];
         for p in &report.precisions {

@@ -1,5 +1,5 @@
 //! Meshes and presets as the benchmarks take them.
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
@@ -39,6 +39,23 @@ impl Preset {
             Self::Compact => tesdf::encode::Preset::Compact,
         })
     }
+}
+
+/// Meshes, and the points at which they are asked.
+#[derive(clap::Args)]
+pub struct MeshesAndPoints {
+    /// Meshes of any format; those without an inside are repaired
+    #[arg(required = true)]
+    pub meshes: Vec<PathBuf>,
+    /// What is encoded
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    pub preset: Preset,
+    /// Points for each mesh: `query` so many of each kind, `exactness` so many whose kinds take turns
+    #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub points: u32,
+    /// The same seed gives the same points
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
 }
 
 /// A mesh that can be encoded.

@@ -26,6 +26,8 @@ mod scaling;
 mod screw;
 mod timing;
 
+use input::MeshesAndPoints;
+
 /// Why a benchmark could not run: what was found, where, and what to do.
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
@@ -40,7 +42,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     /// Time of a signed distance with closest point and gradient, against parry3d and a face tree
-    Query(query::Args),
+    Query(MeshesAndPoints),
     /// Time of one batch over points of a file, as JSON for `scripts/python_batch.py`
     Batch(batch::Args),
     /// Bytes, and faces read per query, by preset
@@ -50,7 +52,7 @@ enum Command {
     /// Memory against speed over the encoder's options
     Curve(curve::Args),
     /// Largest errors and sign mistakes against brute force
-    Exactness(exactness::Args),
+    Exactness(MeshesAndPoints),
     /// A nut on a bolt: travel, energy, penetration and time by clearance, time step and detector
     Screw(screw::Args),
     /// Time of a detection as a scene grows: instances in a row, worlds side by side

@@ -5,11 +5,12 @@ use parry3d::query::{
     intersection_test,
 };
 use parry3d::shape::{TriMesh, TriMeshFlags};
+use tesdf::collide::Pose;
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 
 use crate::Failure;
-use crate::poses::Pose;
+use crate::poses::in_frame_of;
 
 /// Name with version and features.
 pub const NAME: &str = if cfg!(feature = "parry-simd8") {
@@ -97,7 +98,7 @@ pub fn point(p: DVec3) -> Vector {
 
 /// As the peer takes it, in a unit of `scale` to the mesh's unit. The pose of the first in the frame of the second is found in `f64`.
 pub fn pair(poses: [Pose; 2], scale: f64) -> [ParryPose; 2] {
-    let first = poses[0].in_frame_of(poses[1]);
+    let first = in_frame_of(poses[1], poses[0]);
     let rotation: [f32; 4] = first.rotation.as_quat().to_array();
     [
         ParryPose::from_parts(point(first.translation * scale), Rotation::from_array(rotation)),

@@ -2,32 +2,17 @@
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
 
 use crate::Failure;
 
-/// A rigid motion from a mesh's frame to the world.
-#[derive(Clone, Copy, Debug)]
-pub struct Pose {
-    /// Unit quaternion.
-    pub rotation: DQuat,
-    /// In the mesh's unit.
-    pub translation: DVec3,
-}
-
-impl Pose {
-    /// The point in the world.
-    pub fn apply(self, p: DVec3) -> DVec3 {
-        self.rotation * p + self.translation
-    }
-
-    /// The same pose as seen from the frame that the other pose places.
-    pub fn in_frame_of(self, frame: Self) -> Self {
-        let back = frame.rotation.conjugate();
-        Self {
-            rotation: (back * self.rotation).normalize(),
-            translation: back * (self.translation - frame.translation),
-        }
+/// The pose as seen from the body that `frame` places.
+pub fn in_frame_of(frame: Pose, pose: Pose) -> Pose {
+    let back = frame.rotation.conjugate();
+    Pose {
+        rotation: (back * pose.rotation).normalize(),
+        translation: back * (pose.translation - frame.translation),
     }
 }
 

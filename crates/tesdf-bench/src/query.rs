@@ -1,6 +1,5 @@
 //! `tesdf-bench query`
 use std::hint::black_box;
-use std::path::PathBuf;
 
 use parry3d::math::Vector;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -8,28 +7,11 @@ use tesdf::TeSdf;
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;
 
-use crate::input::{Input, Preset};
+use crate::input::{Input, MeshesAndPoints};
 use crate::parry::Peer;
 use crate::reference::Reference;
 use crate::timing::{PASSES, best_pass};
 use crate::{Failure, heading, output, parry, points};
-
-/// Arguments of `tesdf-bench query`.
-#[derive(clap::Args)]
-pub struct Args {
-    /// Meshes of any format; those without an inside are repaired
-    #[arg(required = true)]
-    meshes: Vec<PathBuf>,
-    /// What is encoded
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
-    preset: Preset,
-    /// Points of each kind
-    #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
-    points: u32,
-    /// The same seed gives the same points
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-}
 
 const COLUMNS: [&str; 9] = [
     "mesh",
@@ -43,7 +25,7 @@ const COLUMNS: [&str; 9] = [
     "sign mistakes",
 ];
 
-pub fn run(args: &Args) -> Result<(), Failure> {
+pub fn run(args: &MeshesAndPoints) -> Result<(), Failure> {
     heading::print()?;
     output::line(&format!(
         "One thread, preset `{}`, {} points of each kind, seed {}; the best of {PASSES} passes after one to warm up. All give \

@@ -1,4 +1,5 @@
 //! `tesdf-bench reencode`
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -75,7 +76,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let start = Instant::now();
         let reencoded = asset.reencode_stale()?;
         let reencoding = 1e3 * start.elapsed().as_secs_f64();
-        let report = verify(&asset, &VerifyOptions { samples: args.samples, seed: 1 }, |_| {})?;
+        let report =
+            verify(&asset, &VerifyOptions { samples: args.samples, seed: 1 }, |_| ControlFlow::Continue(()))?;
         if !report.passed {
             return Err(format!("bent by a share of {share}, it is not exact after re-encoding").into());
         }

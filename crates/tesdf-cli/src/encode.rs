@@ -8,7 +8,7 @@ use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::asset::about::{Certificate, Source, Statistics};
-use tesdf::encode::{Domain, EncodeError, EncodeOptions, EncodeProgress, Threshold, encode_in};
+use tesdf::encode::{Domain, DomainChoice, EncodeOptions, EncodeProgress, Threshold, encode_in};
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 
@@ -18,7 +18,7 @@ use crate::{mesh_file, parse};
 
 mod choices;
 
-pub use choices::{DomainChoice, EncoderChoice, Preset};
+pub use choices::{EncoderChoice, Preset};
 
 /// Arguments of `tesdf encode`.
 #[derive(clap::Args, Debug)]
@@ -119,19 +119,19 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let source = Source { name, blake3: load.source_blake3.clone() };
     let interrupted = interrupt_flag()?;
     let progress = EncodeProgress::default();
-    let options = args.options().map_err(Failure::new)?;
-    let conforming = pool.install(|| args.domain.tetrahedra(&solid, args))?;
-    let domain = conforming.as_ref().map_or(Domain::Bisection, Domain::Conforming);
+    let choices = args.choices();
+    let options = choices.options().map_err(Failure::new)?;
     let encoded = watched(&progress, &interrupted, || {
-        pool.install(|| encode_in(&solid, domain, &source, &options, &progress))
+        pool.install(|| {
+            let tetrahedra = choices.tetrahedra(&solid, &progress).map_err(Failure::new)?;
+            let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
+            encode_in(&solid, domain, &source, &options, &progress).map_err(|e| at(&e))
+        })
     });
-    let asset: TeSdf = match encoded {
-        Ok(asset) if !interrupted.load(Ordering::Relaxed) => asset,
-        Ok(_) | Err(EncodeError::Cancelled) => {
-            return Err(Failure::new(format!("interrupted; {} is as it was", args.output.display())));
-        }
-        Err(e) => return Err(at(&e)),
-    };
+    if interrupted.load(Ordering::Relaxed) {
+        return Err(Failure::new(format!("interrupted; {} is as it was", args.output.display())));
+    }
+    let asset: TeSdf = encoded?;
     asset.save(&args.output).map_err(Failure::new)?;
     let seconds = start.elapsed().as_secs_f64();
     print(args, &load, solid.warnings(), &asset, seconds)?;

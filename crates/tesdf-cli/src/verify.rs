@@ -1,4 +1,5 @@
 //! `tesdf verify FILE`
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -56,7 +57,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     };
     let bar = Progress::new("comparing with brute force");
     let options = VerifyOptions { samples: args.samples as usize, ..VerifyOptions::default() };
-    let found = verify(&asset, &options, |share| bar.set(share));
+    let found = verify(&asset, &options, |share| {
+        bar.set(share);
+        ControlFlow::Continue(())
+    });
     drop(bar);
     let (comparison, error) = match found {
         Ok(found) => (Some(found), None),

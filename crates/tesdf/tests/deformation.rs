@@ -2,6 +2,7 @@
 mod support;
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use support::random::Random;
 use support::shapes::Shape;
@@ -62,7 +63,8 @@ fn moves(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<(u32, DVec
 }
 
 fn verified(asset: &TeSdf) -> VerifyReport {
-    verify(asset, &VerifyOptions { samples: 3000, seed: 3 }, |_| {}).expect("a valid mesh")
+    verify(asset, &VerifyOptions { samples: 3000, seed: 3 }, |_| ControlFlow::Continue(()))
+        .expect("a valid mesh")
 }
 
 fn moved(solid: &SolidMesh, to: impl Fn(DVec3) -> DVec3) -> SolidMesh {

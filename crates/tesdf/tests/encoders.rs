@@ -2,6 +2,7 @@
 mod support;
 
 use std::collections::BTreeSet;
+use std::ops::ControlFlow;
 
 use support::random::Random;
 use support::shapes::Shape;
@@ -24,7 +25,8 @@ fn encoded(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf 
 }
 
 fn verified(asset: &TeSdf) -> VerifyReport {
-    verify(asset, &VerifyOptions { samples: 3000, seed: 1 }, |_| {}).expect("a valid mesh")
+    verify(asset, &VerifyOptions { samples: 3000, seed: 1 }, |_| ControlFlow::Continue(()))
+        .expect("a valid mesh")
 }
 
 /// An L of 4 by 3 cubes, two thick, in a grid with an outer layer.

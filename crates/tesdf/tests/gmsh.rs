@@ -12,7 +12,7 @@ use tesdf::domain::gmsh::{
     tetrahedralise_and_report,
 };
 use tesdf::domain::{ConformingError, ConformingMesh};
-use tesdf::encode::Length;
+use tesdf::encode::{EncodeProgress, Length};
 use tesdf::geometry::{Aabb, WindingNumber, tetrahedron_volume};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
@@ -176,7 +176,8 @@ fn the_next_settings_are_tried_when_the_gate_refuses() {
     let script = format!(
         "if grep -q 'Algorithm3D = 10' domain.geo; then cp {at}/good.msh domain.msh; else cp {at}/flat.msh domain.msh; fi"
     );
-    let report = tetrahedralise_and_report(&unit_cube(), &stand_in(folder.path(), &script)).unwrap();
+    let options = stand_in(folder.path(), &script);
+    let report = tetrahedralise_and_report(&unit_cube(), &options, &EncodeProgress::default()).unwrap();
     assert_eq!(report.mesh.sides(), [Side::Inside; 6]);
     assert_eq!(report.settings.algorithm, GmshAlgorithm::Hxt);
     let [first] = &report.refused[..] else { panic!("{:?}", report.refused) };
@@ -219,6 +220,24 @@ fn a_program_that_fails_is_told_apart() {
     let options = GmshOptions { settings: options.settings[..1].to_vec(), ..options };
     let error = tetrahedralise(&unit_cube(), &options).unwrap_err();
     assert!(error.to_string().contains("stopped after 30ms"), "{error}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_that_is_no_longer_wanted_is_ended() {
+    let folder = tempfile::tempdir().unwrap();
+    let started = folder.path().join("started");
+    let options = stand_in(folder.path(), &format!("touch {}; exec sleep 60", started.display()));
+    let progress = EncodeProgress::default();
+    let found = std::thread::scope(|scope| {
+        let running = scope.spawn(|| tetrahedralise_and_report(&unit_cube(), &options, &progress));
+        while !started.exists() && !running.is_finished() {
+            std::thread::yield_now();
+        }
+        progress.cancel();
+        running.join().unwrap()
+    });
+    assert!(matches!(found, Err(GmshError::Cancelled)), "{found:?}");
 }
 
 #[test]

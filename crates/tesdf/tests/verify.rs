@@ -1,6 +1,8 @@
 //! Brute force finds what is wrong with an asset; a good one passes.
 mod support;
 
+use std::ops::ControlFlow;
+
 use support::shapes::Shape;
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
@@ -27,7 +29,7 @@ fn hollow() -> TeSdf {
 }
 
 fn verified(asset: &TeSdf, samples: usize) -> VerifyReport {
-    verify(asset, &VerifyOptions { samples, seed: 1 }, |_| {}).expect("a valid mesh")
+    verify(asset, &VerifyOptions { samples, seed: 1 }, |_| ControlFlow::Continue(())).expect("a valid mesh")
 }
 
 /// The asset after `change` of a section; opening does not look at checksums.
@@ -63,9 +65,23 @@ fn a_good_asset_passes_the_same_way_on_any_number_of_threads() {
     verify(&asset, &VerifyOptions { samples: 100, seed: 2 }, |share| {
         let mut most = progress.lock().expect("no panic");
         *most = most.max(share);
+        ControlFlow::Continue(())
     })
     .expect("a valid mesh");
     assert_eq!(*progress.lock().expect("no panic"), 1.0);
+}
+
+#[test]
+fn a_comparison_can_be_broken_off() {
+    let asset = hollow();
+    let chunks = std::sync::atomic::AtomicUsize::new(0);
+    let found = verify(&asset, &VerifyOptions { samples: 100_000, seed: 1 }, |_| {
+        chunks.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        ControlFlow::Break(())
+    });
+    assert_eq!(found, Err(VerifyError::Cancelled));
+    // One for each thread at most, of three thousand.
+    assert!(chunks.into_inner() <= rayon::current_num_threads());
 }
 
 #[test]
@@ -119,9 +135,15 @@ fn a_mesh_without_an_inside_is_refused() {
         let [first, second, ..] = bytes.as_chunks_mut::<4>().0 else { panic!("no face") };
         std::mem::swap(first, second);
     });
-    assert_eq!(verify(&asset, &VerifyOptions::default(), |_| {}), Err(VerifyError::NotClosed));
+    assert_eq!(
+        verify(&asset, &VerifyOptions::default(), |_| ControlFlow::Continue(())),
+        Err(VerifyError::NotClosed)
+    );
     let asset = changed(&hollow(), layout::VERTICES, |bytes| bytes.fill(0));
-    assert_eq!(verify(&asset, &VerifyOptions::default(), |_| {}), Err(VerifyError::Diagonal(0.0)));
+    assert_eq!(
+        verify(&asset, &VerifyOptions::default(), |_| ControlFlow::Continue(())),
+        Err(VerifyError::Diagonal(0.0))
+    );
 }
 
 #[test]

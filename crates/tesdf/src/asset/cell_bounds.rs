@@ -3,7 +3,7 @@ use glam::DVec3;
 use super::TeSdf;
 use super::layout::{Label, Node, Side};
 use crate::domain::Cell;
-use crate::query::Place;
+use crate::query::{Place, Precision};
 
 /// For every word of the forest a lower bound of the signed distances in its cell, made when a detection first wants it.
 ///
@@ -71,18 +71,17 @@ const ROUNDING: f64 = 4e-6;
 impl TeSdf {
     fn least_in_leaf(&self, leaf: &Node, cell: &Cell) -> f64 {
         let center = cell.centroid();
-        let reach = cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max);
+        let reach = cell.radius();
+        let at_center = |place| self.found_at(center, place, Precision::F32).signed_distance - reach;
         let least = match *leaf {
             Node::Listed(Label::Outside, offset) => self.with_list(offset, |faces| {
                 let least = |&face: &u32| self.least_to_face(face, center, &cell.corners);
                 faces.ids().iter().map(least).fold(f64::INFINITY, f64::min)
             }),
-            Node::Far(Side::Outside) => {
-                self.found_at(center, Place::Far(Side::Outside)).signed_distance - reach
-            }
+            Node::Far(Side::Outside) => at_center(Place::Far(Side::Outside)),
             Node::NotOfDomain => {
                 // Far out nothing is as near as the bounds.
-                let low = (self.found_at(center, Place::NotOfDomain).signed_distance - reach).max(0.0);
+                let low = at_center(Place::NotOfDomain).max(0.0);
                 low.max(self.band() * (1.0 - 1e-9))
             }
             _ => 0.0,

@@ -19,18 +19,6 @@ pub(crate) struct Conforming {
 const LEAF: usize = 4;
 /// A point of the border may be out of all tetrahedra by rounding: by less than this, in barycentric coordinates.
 const OUTSIDE: f64 = -1e-12;
-/// Whether a point is in front of a side by more than rounding: most tetrahedra whose boxes hold it.
-fn is_clearly_outside([a, b, c, d]: &[DVec3; 4], p: DVec3) -> bool {
-    let (ab, ac, ad, ap) = (*b - *a, *c - *a, *d - *a, p - *a);
-    // Six times the volumes that the point has with three of the sides.
-    let across = [ac.cross(ad), ad.cross(ab), ab.cross(ac)];
-    let whole = ab.dot(across[0]);
-    let parts = across.map(|side| ap.dot(side) * whole.signum());
-    // The second part is what slivers need: the rounding of volumes of edges up to 4.
-    let slack = 1e-9 * whole.abs() + 1e-13;
-    parts.iter().any(|&part| part < -slack) || parts.iter().sum::<f64>() > whole.abs() + slack
-}
-
 /// What boxes are grown by, in the local frame, to hold such points.
 const PAD: f64 = 1e-14;
 
@@ -62,17 +50,12 @@ impl Conforming {
             return wrong(TETRAHEDRA.name, "there is no tetrahedron".into());
         }
         let mut domain = Self { tetrahedra, vertices, tree: AabbTree::build(&[], LEAF) };
-        domain.fit(asset);
+        let boxes: Vec<Aabb> = (0..domain.tetrahedra.len()).map(|t| domain.bounds(asset, t)).collect();
+        domain.tree = AabbTree::build(&boxes, LEAF);
         Ok(Some(domain))
     }
 
-    /// Makes the tree of boxes for where the vertices are.
-    fn fit(&mut self, asset: &TeSdf) {
-        let boxes: Vec<Aabb> = (0..self.tetrahedra.len()).map(|t| self.bounds(asset, t)).collect();
-        self.tree = AabbTree::build(&boxes, LEAF);
-    }
-
-    /// The same for where some tetrahedra are now.
+    /// Fits the tree of boxes to where some tetrahedra are now.
     pub fn refit(&mut self, asset: &TeSdf, tetrahedra: &[u32], incidence: &Incidence) {
         let mut tree = std::mem::replace(&mut self.tree, AabbTree::build(&[], LEAF));
         let places = tetrahedra.iter().map(|&t| incidence.place[t as usize]);
@@ -128,27 +111,10 @@ impl TeSdf {
     /// How many vertices and tetrahedra of a conforming domain there are of each class (Sec. III-A); `None` for the bisection domain.
     pub fn classes(&self) -> Option<Classes> {
         let domain = self.conforming.as_ref()?;
-        let of_surface = |v: u32| (v as usize) < self.vertices.len();
-        let mut classes = Classes::default();
-        let mut counted = vec![false; self.vertices.len() + domain.vertices.len()];
-        for (root, corners) in domain.tetrahedra.iter().enumerate() {
-            let at_boundary = corners.iter().any(|&v| of_surface(v));
-            let (vertices, tetrahedra) = match (self.side_of_root(root), at_boundary) {
-                (Side::Inside, true) => (&mut classes.inner_vertices, &mut classes.boundary_inner_tetrahedra),
-                (Side::Inside, false) => (&mut classes.inner_vertices, &mut classes.inner_tetrahedra),
-                (Side::Outside, true) => {
-                    (&mut classes.outer_vertices, &mut classes.boundary_outer_tetrahedra)
-                }
-                (Side::Outside, false) => (&mut classes.outer_vertices, &mut classes.outer_tetrahedra),
-            };
-            *tetrahedra += 1;
-            for &v in corners {
-                if !std::mem::replace(&mut counted[v as usize], true) {
-                    *(if of_surface(v) { &mut classes.surface_vertices } else { &mut *vertices }) += 1;
-                }
-            }
-        }
-        Some(classes)
+        let sides = (0..domain.tetrahedra.len()).map(|root| self.side_of_root(root));
+        let tetrahedra = domain.tetrahedra.iter().copied().zip(sides);
+        let vertices = self.vertices.len() + domain.vertices.len();
+        Some(Classes::count(vertices, tetrahedra, |v| (v as usize) < self.vertices.len()))
     }
 
     /// All cells of a root are on its side.
@@ -217,4 +183,16 @@ impl TeSdf {
     pub(crate) fn visit_roots(&self, domain: &Conforming, bounds: Aabb, mut visit: impl FnMut(usize)) {
         domain.tree.visit(|b| b.overlaps(bounds), |leaf| leaf.iter().for_each(|&t| visit(t as usize)));
     }
+}
+
+/// Whether a point is in front of a side by more than rounding: most tetrahedra whose boxes hold it.
+fn is_clearly_outside([a, b, c, d]: &[DVec3; 4], p: DVec3) -> bool {
+    let (ab, ac, ad, ap) = (*b - *a, *c - *a, *d - *a, p - *a);
+    // Six times the volumes that the point has with three of the sides.
+    let across = [ac.cross(ad), ad.cross(ab), ab.cross(ac)];
+    let whole = ab.dot(across[0]);
+    let parts = across.map(|side| ap.dot(side) * whole.signum());
+    // The second part is what slivers need: the rounding of volumes of edges up to 4.
+    let slack = 1e-9 * whole.abs() + 1e-13;
+    parts.iter().any(|&part| part < -slack) || parts.iter().sum::<f64>() > whole.abs() + slack
 }

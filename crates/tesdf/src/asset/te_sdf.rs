@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -173,16 +174,27 @@ impl TeSdf {
     /// # Errors
     /// What the operating system refused; no half file is left.
     pub fn save(&self, path: &Path) -> Result<(), AssetError> {
+        save_atomic(path, &self.to_bytes()?)
+    }
+
+    /// The whole file, with vertices and lists as they are now. It does not say which lists are stale.
+    ///
+    /// # Errors
+    /// As [`write_container`].
+    pub fn to_bytes(&self) -> Result<Cow<'_, [u8]>, AssetError> {
         if self.motion.is_none() {
-            return save_atomic(path, self.as_bytes());
+            return Ok(Cow::Borrowed(self.as_bytes()));
         }
-        // What told the sign at rest need not tell it now.
-        let no_hints = vec![0u16; self.sign_hints.len()];
-        let now = |section| {
-            let Section { spec, bytes } = section;
+        let sections: Vec<Section> = self.sections().collect();
+        Ok(Cow::Owned(write_container(&sections, &self.about.to_metadata())?))
+    }
+
+    /// The sections as they are now, in the order of the file. They stay where they are in memory until vertices move or lists are made anew.
+    pub fn sections(&self) -> impl Iterator<Item = Section<'_>> {
+        self.container.sections().map(|Section { spec, bytes }| {
             let bytes: &[u8] = match spec {
                 layout::VERTICES => bytemuck::cast_slice(&self.vertices),
-                layout::SIGN_HINTS => bytemuck::cast_slice(&no_hints),
+                layout::SIGN_HINTS => bytemuck::cast_slice(&self.sign_hints),
                 layout::NODES => bytemuck::cast_slice(&self.nodes),
                 layout::LISTS => &self.lists,
                 layout::TREE_BOXES => bytemuck::cast_slice(&self.tree_boxes),
@@ -192,9 +204,7 @@ impl TeSdf {
                 _ => bytes,
             };
             Section { spec, bytes }
-        };
-        let sections: Vec<Section> = self.container.sections().map(now).collect();
-        save_atomic(path, &write_container(&sections, &self.about.to_metadata())?)
+        })
     }
 
     /// Compares every byte with the checksums.

@@ -2,10 +2,9 @@
 //!
 //! The polygon goes down the bisection forest, from the six roots of the cube or from the tetrahedra of a conforming domain: each bisection is a plane through the cell, so what arrives at a leaf is the face
 //! clipped by that leaf, and no cell that the face does not meet is visited.
-use arrayvec::ArrayVec;
 use glam::DVec3;
 
-use super::polygon::{MOST_VERTICES, Parts, Polygon, Vertex};
+use super::polygon::{Parts, Polygon, Vertex};
 use crate::TeSdf;
 use crate::asset::Conforming;
 use crate::asset::layout::{Node, Side};
@@ -71,16 +70,14 @@ impl Clipping<'_> {
     /// Clips by the tetrahedra of a conforming domain; what none of them holds is what the face tree answers.
     fn tetrahedra(&self, domain: &Conforming, polygon: Polygon, visit: &mut impl FnMut(&ClippedPolygon)) {
         let mut rest = vec![polygon.clone()];
-        let points: ArrayVec<DVec3, MOST_VERTICES> = polygon.points().collect();
-        self.asset.visit_roots(domain, Aabb::of(&points), |root| {
+        self.asset.visit_roots(domain, polygon.bounds(), |root| {
             let corners = self.asset.root(root).corners;
             if let Some(held) = cut_by(&corners, polygon.clone(), |_| {}) {
                 self.below(root, held, visit);
             }
             if self.beyond {
                 for part in std::mem::take(&mut rest) {
-                    let bounds = Aabb::of(&part.points().collect::<ArrayVec<DVec3, MOST_VERTICES>>());
-                    if bounds.overlaps(Aabb::of(&corners)) {
+                    if part.bounds().overlaps(Aabb::of(&corners)) {
                         cut_by(&corners, part, |out| rest.push(out));
                     } else {
                         rest.push(part);

@@ -1,6 +1,8 @@
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
+use crate::geometry::Aabb;
+
 /// Most vertices of a polygon: a triangle clipped by a tetrahedron has seven; the rest is room for those that rounding
 /// leaves on a line.
 pub const MOST_VERTICES: usize = 12;
@@ -60,6 +62,11 @@ impl Polygon {
     /// Where the vertices are.
     pub fn points(&self) -> impl ExactSizeIterator<Item = DVec3> + Clone {
         self.0.iter().map(|v| v.point)
+    }
+
+    /// Bounds of the vertices.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of(&self.points().collect::<ArrayVec<DVec3, MOST_VERTICES>>())
     }
 
     /// Mean of the vertices: a point of the polygon.

@@ -97,7 +97,8 @@ impl TeSdf {
     fn apply(&mut self, moves: &[(u32, DVec3)], domain: &mut Conforming) -> Moved {
         let mesh_count = self.vertices.len() as u32;
         let mut motion = self.motion.take().unwrap_or_else(|| {
-            // How a feature tells the sign depends on the faces around it.
+            // How a feature tells the sign depends on the faces around it: what told it at rest need not tell it now.
+            self.sign_hints = SharedSection::of_rows(&vec![0; self.faces.len()]);
             self.records.iter_mut().for_each(|record| record.forget_hints());
             Motion {
                 incidence: Arc::new(domain.incidence(self)),

@@ -221,8 +221,7 @@ impl Search<'_> {
                 .min_by(|x, y| x.distance.total_cmp(&y.distance))
                 .map_or(DVec3::INFINITY, |found| found.point)
         });
-        let radius = cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max);
-        let limit = rivals[0].distance(center) + 2.0 * radius;
+        let limit = rivals[0].distance(center) + 2.0 * cell.radius();
         let reach = rivals.map(|q| cell.corners.map(|c| c.distance(q) + surface.margin));
         let mut newcomers = Vec::new();
         self.moved_tree.visit(

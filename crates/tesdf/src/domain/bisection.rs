@@ -99,6 +99,12 @@ impl Cell {
         edges.into_iter().map(|(i, j)| c[i].distance(c[j])).fold(0.0, f64::max)
     }
 
+    /// Greatest distance of a corner from the centroid: that of the least ball around it that holds the cell.
+    pub fn radius(&self) -> f64 {
+        let center = self.centroid();
+        self.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max)
+    }
+
     /// Volume.
     pub fn volume(&self) -> f64 {
         crate::geometry::tetrahedron_volume(&self.corners)

@@ -1,5 +1,4 @@
 use glam::DVec3;
-use serde::Serialize;
 
 mod error;
 mod labels;
@@ -7,10 +6,9 @@ mod measure;
 mod triangles;
 mod weld;
 
-use super::TetMesh;
+use super::{Classes, TetMesh};
 use crate::{asset::layout::Side, geometry::orientation, mesh::SolidMesh};
 pub use error::{ConformingError, MissingFace};
-use triangles::Triangle;
 use weld::Welded;
 pub(super) use {triangles::sides_of, weld::first_at_position};
 
@@ -47,28 +45,6 @@ pub struct ConformingMesh {
     classes: Classes,
 }
 
-/// Numbers of vertices and tetrahedra by class, as the paper has them in Sec. III-A.
-///
-/// A tetrahedron at the boundary has a surface vertex. A vertex that is on no face is inner or outer, as the
-/// tetrahedra around it are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Classes {
-    /// `V_S`: vertices of the surface, one for each position.
-    pub surface_vertices: usize,
-    /// `V_I`: vertices inside.
-    pub inner_vertices: usize,
-    /// `V_O`: vertices outside.
-    pub outer_vertices: usize,
-    /// `T_BI`: tetrahedra inside with a surface vertex.
-    pub boundary_inner_tetrahedra: usize,
-    /// `T_I`: tetrahedra inside without one.
-    pub inner_tetrahedra: usize,
-    /// `T_BO`: tetrahedra outside with a surface vertex.
-    pub boundary_outer_tetrahedra: usize,
-    /// `T_O`: tetrahedra outside without one.
-    pub outer_tetrahedra: usize,
-}
-
 impl ConformingMesh {
     /// Matches tetrahedra with a surface and checks that they conform to it.
     ///
@@ -88,7 +64,11 @@ impl ConformingMesh {
 
         let side = |winding: &i32| if *winding >= 1 { Side::Inside } else { Side::Outside };
         let sides: Vec<Side> = windings.iter().map(side).collect();
-        let classes = Classes::of(&welded, &triangles, &sides);
+        let mut on_surface = vec![false; welded.vertices.len()];
+        let of_faces = triangles.iter().filter(|t| t.face.is_some()).flat_map(|t| t.corners);
+        of_faces.for_each(|v| on_surface[v as usize] = true);
+        let tetrahedra = welded.tetrahedra.iter().copied().zip(sides.iter().copied());
+        let classes = Classes::count(welded.vertices.len(), tetrahedra, |v| on_surface[v as usize]);
         Ok(Self { vertices: welded.vertices, tetrahedra: welded.tetrahedra, sides, classes })
     }
 
@@ -147,31 +127,4 @@ fn orient(welded: &mut Welded) -> Result<(), ConformingError> {
     let Some(tetrahedron) = first else { return Ok(()) };
     let position = 0.25 * welded.corners(tetrahedron).iter().sum::<DVec3>();
     Err(ConformingError::Flat { flat, of: welded.tetrahedra.len(), tetrahedron, position })
-}
-
-impl Classes {
-    fn of(welded: &Welded, triangles: &[Triangle], sides: &[Side]) -> Self {
-        let mut classes = Self::default();
-        let mut on_surface = vec![false; welded.vertices.len()];
-        for triangle in triangles.iter().filter(|t| t.face.is_some()) {
-            triangle.corners.iter().for_each(|&v| on_surface[v as usize] = true);
-        }
-        classes.surface_vertices = on_surface.iter().filter(|&&on| on).count();
-        let mut counted = on_surface.clone();
-        for (corners, side) in welded.tetrahedra.iter().zip(sides) {
-            let at_boundary = corners.iter().any(|&v| on_surface[v as usize]);
-            let new = corners.iter().filter(|&&v| !std::mem::replace(&mut counted[v as usize], true)).count();
-            let (vertices, tetrahedra) = match (side, at_boundary) {
-                (Side::Inside, true) => (&mut classes.inner_vertices, &mut classes.boundary_inner_tetrahedra),
-                (Side::Inside, false) => (&mut classes.inner_vertices, &mut classes.inner_tetrahedra),
-                (Side::Outside, true) => {
-                    (&mut classes.outer_vertices, &mut classes.boundary_outer_tetrahedra)
-                }
-                (Side::Outside, false) => (&mut classes.outer_vertices, &mut classes.outer_tetrahedra),
-            };
-            *vertices += new;
-            *tetrahedra += 1;
-        }
-        classes
-    }
 }

@@ -13,7 +13,10 @@ mod input;
 mod run;
 
 use super::{ConformingMesh, TetMesh};
-use crate::{asset::layout::Side, encode::Length, geometry::Aabb, geometry::LocalFrame, mesh::SolidMesh};
+use crate::asset::layout::Side;
+use crate::encode::{EncodeProgress, Length};
+use crate::geometry::{Aabb, LocalFrame};
+use crate::mesh::SolidMesh;
 pub use error::{GmshError, Refused, RefusedBecause};
 
 /// How Gmsh fills the volume: its option `Mesh.Algorithm3D`.
@@ -123,21 +126,25 @@ pub struct GmshMesh {
 /// # Errors
 /// [`GmshError`] says how to install Gmsh, which option is wrong, or for each of the settings what failed.
 pub fn tetrahedralise(solid: &SolidMesh, options: &GmshOptions) -> Result<ConformingMesh, GmshError> {
-    Ok(tetrahedralise_and_report(solid, options)?.mesh)
+    Ok(tetrahedralise_and_report(solid, options, &EncodeProgress::default())?.mesh)
 }
 
-/// As [`tetrahedralise`], with the settings that it took.
+/// As [`tetrahedralise`], with the settings that it took. Gmsh is ended when `progress` is cancelled.
 ///
 /// # Errors
-/// As [`tetrahedralise`].
-pub fn tetrahedralise_and_report(solid: &SolidMesh, options: &GmshOptions) -> Result<GmshMesh, GmshError> {
+/// As [`tetrahedralise`], and [`GmshError::Cancelled`].
+pub fn tetrahedralise_and_report(
+    solid: &SolidMesh,
+    options: &GmshOptions,
+    progress: &EncodeProgress,
+) -> Result<GmshMesh, GmshError> {
     let layers = Layers::new(solid, options)?;
     let frame = LocalFrame::of(solid.mesh().bounds());
     let surface = input::surface(solid, &frame, layers.hull());
     let mut refused = Vec::new();
     for &settings in &options.settings {
         let script = input::script(settings, layers.hull().is_some());
-        let result = match run::run(&surface, &script, options)? {
+        let result = match run::run(&surface, &script, options, progress)? {
             Ok(found) => conform(solid, &found, &frame, &layers),
             Err(because) => Err(because),
         };

@@ -7,6 +7,7 @@
 //!
 //! [`SolidMesh`]: crate::mesh::SolidMesh
 mod bisection;
+mod classes;
 mod conforming;
 mod cube;
 pub mod gmsh;
@@ -14,7 +15,8 @@ mod read;
 mod tet_mesh;
 
 pub use bisection::{Barycentric, Cell, MAX_DEPTH, ROOTS};
-pub use conforming::{Classes, ConformingError, ConformingMesh, MissingFace};
+pub use classes::Classes;
+pub use conforming::{ConformingError, ConformingMesh, MissingFace};
 pub use cube::DomainCube;
 pub use read::{LoadedTetrahedra, ReadTetrahedraError, Skipped, TetFormat, load_tetrahedra, read_tetrahedra};
 pub use tet_mesh::{TetMesh, TetMeshError};

@@ -127,11 +127,11 @@ impl Forest {
                         if all.len() <= PALETTE_SIZE {
                             return Union::Small(all);
                         }
-                        self.add_palette(&a, &mut palette_of[start..middle]);
-                        self.add_palette(&b, &mut palette_of[middle..end]);
+                        palette_of[start..middle].fill(self.add_palette(&a));
+                        palette_of[middle..end].fill(self.add_palette(&b));
                     }
-                    (Union::Small(a), Union::Large) => self.add_palette(&a, &mut palette_of[start..middle]),
-                    (Union::Large, Union::Small(b)) => self.add_palette(&b, &mut palette_of[middle..end]),
+                    (Union::Small(a), Union::Large) => palette_of[start..middle].fill(self.add_palette(&a)),
+                    (Union::Large, Union::Small(b)) => palette_of[middle..end].fill(self.add_palette(&b)),
                     (Union::Large, Union::Large) => {}
                 }
                 Union::Large
@@ -139,14 +139,16 @@ impl Forest {
         }
     }
 
-    fn add_palette(&mut self, faces: &[u32], leaves: &mut [Option<u16>]) {
+    /// Its number; no faces need no palette.
+    fn add_palette(&mut self, faces: &[u32]) -> Option<u16> {
         if faces.is_empty() {
-            return;
+            return None;
         }
         // More palettes than u16 names are reported by the caller, which counts them.
-        leaves.fill(Some((self.palette_starts.len() - 1).min(usize::from(NO_PALETTE)) as u16));
+        let number = (self.palette_starts.len() - 1).min(usize::from(NO_PALETTE)) as u16;
         self.palettes.extend(faces);
         self.palette_starts.push(self.palettes.len() as u32);
+        Some(number)
     }
 
     fn share_palette(
@@ -155,10 +157,9 @@ impl Forest {
         sharing: &mut Vec<Range<usize>>,
         palette_of: &mut [Option<u16>],
     ) {
-        let number = self.palette_starts.len() - 1;
-        self.add_palette(faces, &mut []);
+        let number = self.add_palette(faces);
         for range in sharing.drain(..) {
-            palette_of[range].fill(Some(number.min(usize::from(NO_PALETTE)) as u16));
+            palette_of[range].fill(number);
         }
     }
 

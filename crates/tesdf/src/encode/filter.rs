@@ -93,7 +93,7 @@ const MANY: usize = 1 << 12;
 pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: &mut Scratch) -> Filtered {
     let m = cell.centroid();
     let n = candidates.faces.len();
-    let radius = cell.corners.iter().map(|c| c.distance(m)).fold(0.0, f64::max);
+    let radius = cell.radius();
     let at_centroid = candidates.look_from(surface, m, &mut scratch.centroid);
 
     // The closest points seen from the corners and the centroid: the strongest rivals for rule A.

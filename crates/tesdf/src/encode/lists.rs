@@ -88,17 +88,6 @@ impl Lists<'_> {
         crossing: bool,
         scratch: &mut Scratch,
     ) -> (Vec<u32>, f64) {
-        truncated(self.ranked(cell, tetrahedron, faces, crossing, scratch), self.options.max_entries)
-    }
-
-    fn ranked(
-        &self,
-        cell: &Cell,
-        tetrahedron: Option<&[u32; 4]>,
-        faces: &[u32],
-        crossing: bool,
-        scratch: &mut Scratch,
-    ) -> Vec<Ranked> {
         let mut ranked = match &self.options.encoder {
             Encoder::Certified => {
                 let levels = self.options.tighten_levels;
@@ -128,7 +117,7 @@ impl Lists<'_> {
             let faces: Vec<u32> = around.flat_map(|v| self.surface.vertex_faces(v).iter().copied()).collect();
             raise(&mut ranked, faces.into_iter(), 0.0);
         }
-        ranked
+        truncated(ranked, self.options.max_entries)
     }
 }
 

@@ -7,6 +7,7 @@
 //! 4. [`assemble`]: lays the forest and its lists out as bytes.
 pub mod assemble;
 pub mod candidates;
+mod choices;
 mod doubles;
 pub mod filter;
 pub mod hints;
@@ -22,6 +23,7 @@ pub mod sampled;
 pub mod surface;
 pub mod tighten;
 
+pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, EncoderChoice};
 pub use options::{Deformation, EncodeOptions, Encoder, Length, Preset, Refinement, Sampling, Threshold};
 pub use pipeline::{Domain, EncodeError, Source, encode, encode_in};
 pub use progress::{EncodeProgress, Stage};

@@ -22,16 +22,21 @@ impl Length {
     }
 }
 
-/// A named point on the curve of memory against speed. All are exact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Options by one name: a point on the curve of memory against speed, or what the paper has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
     /// Few faces per query.
+    #[default]
     Default,
     /// Quickest to encode; lists as they come.
     Fast,
     /// Smallest; more faces per query.
     Compact,
+    /// [`EncodeOptions::PAPER`]: the only one that is not exact.
+    Paper,
+    /// [`EncodeOptions::SAMPLED_SAFE`].
+    SampledSafe,
 }
 
 /// Which faces a list names.
@@ -149,6 +154,8 @@ impl EncodeOptions {
             Preset::Default => (0.067, 12),
             Preset::Fast => (0.12, 2),
             Preset::Compact => (0.24, 11),
+            Preset::Paper => return Self::PAPER,
+            Preset::SampledSafe => return Self::SAMPLED_SAFE,
         };
         Self {
             byte_worth,

@@ -14,7 +14,7 @@ pub fn lipschitz_candidates(surface: &Surface, tree: &AabbTree, cell: &Cell) -> 
     let center = cell.centroid();
     let distance = |face: u32| surface.triangles[face as usize].closest(center).distance;
     let nearest = tree.nearest(center, |face| distance(face).powi(2)).map_or(0.0, |(d, _)| d.sqrt());
-    let limit = nearest + 2.0 * radius(cell);
+    let limit = nearest + 2.0 * cell.radius();
     let mut faces = Vec::new();
     tree.visit(
         |bounds| bounds.distance_squared(center) <= limit * limit,
@@ -24,16 +24,10 @@ pub fn lipschitz_candidates(surface: &Surface, tree: &AabbTree, cell: &Cell) -> 
     faces
 }
 
-/// Greatest distance of a corner from the centroid: the ball of Lemma 1.
-fn radius(cell: &Cell) -> f64 {
-    let center = cell.centroid();
-    cell.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max)
-}
-
 /// No point of the cell is farther than this from a point of the grid (docs/math.md, 3).
 pub fn covering_radius(cell: &Cell, sampling: &Sampling) -> f64 {
     let grid = 0.75f64.sqrt() * sampling.shrink * cell.width() / f64::from(sampling.resolution);
-    grid + (1.0 - sampling.shrink) * radius(cell)
+    grid + (1.0 - sampling.shrink) * cell.radius()
 }
 
 /// Lines 9 to 19 of Alg. 1: faces within the threshold of the least distance at a sample, with d_f of Eq. (8).
@@ -89,13 +83,9 @@ fn grid(cell: &Cell, sampling: &Sampling) -> impl Iterator<Item = DVec3> {
 mod tests {
     use super::*;
     use crate::encode::surface::Touching;
-    use crate::geometry::Aabb;
+    use crate::geometry::{Aabb, strategy::point};
     use crate::mesh::TriangleMesh;
     use proptest::prelude::*;
-
-    fn point() -> impl Strategy<Value = DVec3> {
-        (-1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(|(x, y, z)| DVec3::new(x, y, z))
-    }
 
     proptest! {
         #[test]
@@ -111,7 +101,7 @@ mod tests {
             let distances: Vec<f64> = surface.triangles.iter().map(|t| t.closest(center).distance).collect();
             let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
             let all: Vec<u32> = (0..distances.len() as u32)
-                .filter(|&f| distances[f as usize] < nearest + 2.0 * radius(&cell))
+                .filter(|&f| distances[f as usize] < nearest + 2.0 * cell.radius())
                 .collect();
             prop_assert_eq!(lipschitz_candidates(&surface, &AabbTree::build(&boxes, 4), &cell), all);
         }

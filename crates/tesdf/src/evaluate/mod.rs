@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use crate::TeSdf;
 use crate::mesh::{MeshError, Topology};
-use crate::query::{Faces, Place, Precision};
+use crate::query::{Place, Precision};
 use crate::verify::mesh_of;
 pub use grid::{Grid, MAX_FINENESS};
 use reference::Reference;
@@ -138,12 +138,7 @@ impl<'a> Field<'a> {
 impl Field<'_> {
     /// At a point of the local frame, as its place in the domain answers it, in the mesh's unit.
     fn signed_distance(&self, local: DVec3, place: Place) -> f64 {
-        let found = match place {
-            Place::Listed { offset, .. } => {
-                self.asset.with_list(offset, |faces| self.asset.find(local, place, faces, Precision::F64))
-            }
-            _ => self.asset.find(local, place, &Faces::default(), Precision::F64),
-        };
+        let found = self.asset.found_at(local, place, Precision::F64);
         found.signed_distance * self.asset.frame.inverse_scale()
     }
 }

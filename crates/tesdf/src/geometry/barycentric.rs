@@ -17,11 +17,8 @@ pub fn barycentric(corners: &[DVec3; 4], p: DVec3) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::strategy::point;
     use proptest::prelude::*;
-
-    fn point() -> impl Strategy<Value = DVec3> {
-        (-1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(|(x, y, z)| DVec3::new(x, y, z))
-    }
 
     proptest! {
         #[test]

@@ -7,6 +7,8 @@ mod frame;
 mod meet;
 mod polygon_distance;
 mod self_overlap;
+#[cfg(test)]
+pub(crate) mod strategy;
 mod tetrahedron;
 mod triangle;
 mod winding;

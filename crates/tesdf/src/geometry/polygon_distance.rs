@@ -176,6 +176,7 @@ fn between_segments(p: DVec3, q: DVec3, r: DVec3, s: DVec3) -> (DVec3, DVec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::strategy::point;
     use proptest::prelude::*;
 
     fn sampled(points: &[DVec3], triangle: &Triangle) -> f64 {
@@ -191,10 +192,6 @@ mod tests {
             }
         }
         least
-    }
-
-    fn point() -> impl Strategy<Value = DVec3> {
-        (-1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64).prop_map(|(x, y, z)| DVec3::new(x, y, z))
     }
 
     proptest! {

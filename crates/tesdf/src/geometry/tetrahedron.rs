@@ -44,11 +44,8 @@ pub fn tetrahedron_volume(t: &[DVec3; 4]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::strategy::point;
     use proptest::prelude::*;
-
-    fn point() -> impl Strategy<Value = DVec3> {
-        (-1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(|(x, y, z)| DVec3::new(x, y, z))
-    }
 
     proptest! {
         /// Points of the triangle that lie in the tetrahedron must be seen.

@@ -165,17 +165,17 @@ impl TeSdf {
         result
     }
 
-    /// The answer at a point of the local frame whose place is known, in `f32`; the point is finite.
-    pub(crate) fn found_at(&self, local: DVec3, place: Place) -> Found {
+    /// The answer at a point of the local frame whose place is known; the point is finite.
+    pub(crate) fn found_at(&self, local: DVec3, place: Place, precision: Precision) -> Found {
         match place {
             Place::Listed { offset, .. } => {
-                self.with_list(offset, |faces| self.find(local, place, faces, Precision::F32))
+                self.with_list(offset, |faces| self.find(local, place, faces, precision))
             }
-            _ => self.find(local, place, &Faces::default(), Precision::F32),
+            _ => self.find(local, place, &Faces::default(), precision),
         }
     }
 
-    /// As [`found_at`](Self::found_at), with the exact distance also where lists are not known to be exact.
+    /// As [`found_at`](Self::found_at) in `f32`, with the exact distance also where lists are not known to be exact.
     pub(crate) fn found_exactly(&self, local: DVec3) -> Found {
         let place = self.place(local);
         match place {
@@ -185,9 +185,10 @@ impl TeSdf {
                     Label::Outside => false,
                     Label::Crossing(_) => self.winding_in_cell(local) >= 1,
                 };
-                self.found_at(local, Place::Far(if inside { Side::Inside } else { Side::Outside }))
+                let far = Place::Far(if inside { Side::Inside } else { Side::Outside });
+                self.found_at(local, far, Precision::F32)
             }
-            _ => self.found_at(local, place),
+            _ => self.found_at(local, place, Precision::F32),
         }
     }
 

@@ -7,6 +7,7 @@ pub(crate) mod brute_force;
 mod compare;
 mod samples;
 
+use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
@@ -72,6 +73,9 @@ pub enum VerifyError {
     /// The mesh in the asset is a point.
     #[error("the mesh in the file has the diagonal {0}; expected a positive length")]
     Diagonal(f64),
+    /// `progress` said so.
+    #[error("the comparison was cancelled")]
+    Cancelled,
 }
 
 /// One point in so many has its winding number found without a tree as well.
@@ -81,15 +85,15 @@ const CHUNK: u64 = 32;
 
 /// Compares the asset with brute force at points of every [`PointClass`], from all threads of the current rayon pool.
 ///
-/// `progress` is told the share done, 0 to 1, from any thread. Checksums are not looked at: that is
+/// `progress` is told the share done, 0 to 1, from any thread, and says whether to go on. Checksums are not looked at: that is
 /// [`TeSdf::verify_checksums`].
 ///
 /// # Errors
-/// [`VerifyError`]: the asset's mesh is not one that could have been encoded.
+/// [`VerifyError`]: the asset's mesh is not one that could have been encoded, or `progress` broke off.
 pub fn verify(
     asset: &TeSdf,
     options: &VerifyOptions,
-    progress: impl Fn(f64) + Sync,
+    progress: impl Fn(f64) -> ControlFlow<()> + Sync,
 ) -> Result<VerifyReport, VerifyError> {
     let (mesh, ids) = mesh_of(asset)?;
     let diagonal = mesh.diagonal();
@@ -115,10 +119,13 @@ pub fn verify(
             let count = (indices.end - indices.start) as usize;
             indices.for_each(|index| found.add(asset, &truth, index, sampler.point(index)));
             let before = done.fetch_add(count, Ordering::Relaxed);
-            progress((before + count) as f64 / options.samples as f64);
-            found
+            match progress((before + count) as f64 / options.samples as f64) {
+                ControlFlow::Continue(()) => Some(found),
+                ControlFlow::Break(()) => None,
+            }
         })
-        .reduce(|| Found::new(&mesh, certificate), Found::join);
+        .try_reduce(|| Found::new(&mesh, certificate), |a, b| Some(a.join(b)))
+        .ok_or(VerifyError::Cancelled)?;
     let precisions = found.comparisons.map(Comparison::report);
     Ok(VerifyReport {
         passed: precisions.iter().all(|p| p.passed) && found.disagreements == 0,

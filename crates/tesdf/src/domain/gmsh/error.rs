@@ -58,6 +58,9 @@ pub enum GmshError {
         /// Second corner.
         max: DVec3,
     },
+    /// The wish to stop was heard.
+    #[error("the run of Gmsh was cancelled")]
+    Cancelled,
     /// No settings gave tetrahedra that conform.
     #[error("{}", describe(.0))]
     AllRefused(

@@ -11,6 +11,7 @@ use std::{
 
 use super::{GmshError, GmshOptions, RefusedBecause, input::SURFACE};
 use crate::domain::{TetMesh, read_tetrahedra};
+use crate::encode::EncodeProgress;
 
 /// Between two looks at whether Gmsh has ended.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -24,6 +25,7 @@ pub(super) fn run(
     surface: &str,
     script: &str,
     options: &GmshOptions,
+    progress: &EncodeProgress,
 ) -> Result<Result<TetMesh, RefusedBecause>, GmshError> {
     let folder = tempfile::Builder::new().prefix("tesdf-gmsh-").tempdir().map_err(GmshError::Folder)?;
     let path = |name: &str| folder.path().join(name);
@@ -44,7 +46,11 @@ pub(super) fn run(
         .stderr(log_too)
         .spawn();
     let child = started.map_err(|source| GmshError::NotFound { executable: executable.clone(), source })?;
-    let Some(status) = wait(child, options.time_limit).map_err(GmshError::Folder)? else {
+    let status = wait(child, options.time_limit, progress).map_err(GmshError::Folder)?;
+    if progress.is_cancelled() {
+        return Err(GmshError::Cancelled);
+    }
+    let Some(status) = status else {
         return Ok(Err(RefusedBecause::TimeLimit(options.time_limit)));
     };
     let printed = fs::read(path(LOG)).map_err(GmshError::Folder)?;
@@ -74,14 +80,14 @@ fn executable(options: &GmshOptions) -> PathBuf {
     if has_folder { std::path::absolute(&path).unwrap_or(path) } else { path }
 }
 
-/// `None` when it took too long and was ended.
-fn wait(mut child: Child, limit: Duration) -> std::io::Result<Option<ExitStatus>> {
+/// `None` when it took too long or is no longer wanted, and was ended.
+fn wait(mut child: Child, limit: Duration, progress: &EncodeProgress) -> std::io::Result<Option<ExitStatus>> {
     let start = Instant::now();
     loop {
         if let Some(status) = child.try_wait()? {
             return Ok(Some(status));
         }
-        if start.elapsed() > limit {
+        if start.elapsed() > limit || progress.is_cancelled() {
             match child.kill() {
                 // It ended in between.
                 Err(error) if error.kind() == ErrorKind::InvalidInput => {}
