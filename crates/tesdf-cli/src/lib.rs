@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub mod asset_file;
+pub mod bench;
 pub mod check;
 pub mod clearance;
 pub mod collide;
@@ -66,6 +67,8 @@ pub enum Command {
     Toi(toi::Args),
     /// List the devices that can compute, by the numbers and names that --device takes
     Devices(devices::Args),
+    /// Measure what detection costs on a device, stage by stage
+    Bench(bench::Args),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
     /// Move the bodies of a scene and write the run
@@ -115,6 +118,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Clearance(args) => clearance::run(args),
         Command::Toi(args) => toi::run(args),
         Command::Devices(args) => devices::run(args),
+        Command::Bench(args) => bench::run(args),
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),

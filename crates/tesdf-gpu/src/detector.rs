@@ -10,9 +10,10 @@ use crate::contacts::{Row, Words, contacts};
 use crate::device::{Buffer, Device};
 use crate::images::{ImageBytes, Images};
 use crate::instances::Instances;
-use crate::kernels::{broad, clip, narrow, pairs, products};
-use crate::placed::FieldFrame;
+use crate::kernels::{broad, clip, exact, narrow, pairs, products};
+use crate::placed::{FieldFrame, Placed};
 use crate::GpuError;
+use tesdf::encode::Length;
 
 /// Most elements of the products that stages hand on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +67,16 @@ pub enum Exchange {
     Shared,
 }
 
+/// What is left out before the narrow phase. Contacts are the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pruning {
+    /// What the least signed distances of meshlets, faces and cells rule out.
+    #[default]
+    LeastDistance,
+    /// What lies out of the bounds or the domain of the field, for comparison.
+    Bounds,
+}
+
 /// Options of a detector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DetectorOptions {
@@ -77,6 +88,8 @@ pub struct DetectorOptions {
     pub lanes: Lanes,
     /// How its threads exchange values.
     pub exchange: Exchange,
+    /// What is left out before the narrow phase.
+    pub pruning: Pruning,
 }
 
 /// What a detection did on the device.
@@ -103,6 +116,8 @@ pub struct Detector {
     images: Images,
     shape_ids: Vec<ShapeId>,
     frames: Vec<FieldFrame>,
+    /// Diagonals of the shapes' bounds.
+    diagonals: Vec<f64>,
     products: Products,
     report: DeviceReport,
 }
@@ -131,6 +146,9 @@ pub struct DeviceBytes {
     /// State of an instance.
     pub per_instance: usize,
 }
+
+/// The finest tolerance of the exact mode, in the frame of a field: some times the rounding of distances in `f32`.
+const FINEST: f64 = 1e-6;
 
 const WORD: usize = 4;
 const ROW: usize = 16;
@@ -188,6 +206,7 @@ impl Detector {
             images: Images::new(device, &[])?,
             shape_ids: Vec::new(),
             frames: Vec::new(),
+            diagonals: Vec::new(),
             products,
             report: DeviceReport::default(),
         };
@@ -204,16 +223,18 @@ impl Detector {
         let shapes: Vec<&Shape> = ids.iter().map(|&id| scene.shape(id)).collect::<Result<_, _>>()?;
         self.images = Images::new(&self.device, &shapes)?;
         self.frames = shapes.iter().map(|shape| FieldFrame::new(shape)).collect();
+        self.diagonals = shapes.iter().map(|shape| shape.diagonal()).collect();
         self.shape_ids = ids;
         Ok(())
     }
 
-    /// All contacts of a scene, as [`tesdf::collide::detect`] finds them, in the same order; computed in `f32`.
+    /// All contacts of a scene, as [`tesdf::collide::detect`] finds them, in the same order; computed in `f32`. The exact mode's
+    /// tolerance is 1e-6 of the local frame at the finest.
     ///
     /// The same input gives the same bytes on the same device.
     ///
     /// # Errors
-    /// What no detector takes; [`GpuError::Unavailable`] for the exact mode; [`GpuError::Full`] with fixed memory; a device that refuses.
+    /// What no detector takes; [`GpuError::Full`] with fixed memory; a device that refuses.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::Off)
     }
@@ -247,12 +268,6 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         options.validate()?;
-        if let Mode::Face(FaceMethod::Exact { .. }) = options.mode {
-            return Err(GpuError::Unavailable {
-                what: "the exact mode".into(),
-                instead: "detect on the processor, or use Mode::FACE",
-            });
-        }
         if shape_ids(scene) != self.shape_ids {
             self.upload(scene)?;
         }
@@ -322,6 +337,7 @@ impl Detector {
             groups,
         } = &self.products;
         let images = &self.images;
+        let prune = u32::from(self.options.pruning == Pruning::LeastDistance);
         let mut stages = Stages { device: &device, timing, launches: 0, times: Vec::new() };
         let count = instances.ids.len() as u32;
         stages.run("instance pairs", || {
@@ -373,6 +389,7 @@ impl Detector {
                 meshlets.words(),
                 room.blocks,
                 room.meshlets,
+                prune,
             );
         })?;
         let per_meshlet = groups_for(&mut stages, room.meshlets, 1, products::MESHLETS)?;
@@ -391,6 +408,7 @@ impl Detector {
                         polygons.words(),
                         room.meshlets,
                         room.polygons,
+                        prune,
                     );
                 })?;
                 let per_node = groups_for(&mut stages, room.polygons, 64, products::POLYGONS)?;
@@ -412,7 +430,6 @@ impl Detector {
                 })?;
             }
             Mode::Face(method) => {
-                let FaceMethod::FrankWolfe { iterations } = method else { return Ok([0; products::COUNTERS]) };
                 stages.run("polygons", || {
                     clip::polygons::launch(
                         client,
@@ -427,37 +444,65 @@ impl Detector {
                         weights.rows(),
                         room.meshlets,
                         room.polygons,
+                        prune,
                     );
                 })?;
-                let (per, lanes) = match self.options.lanes {
-                    Lanes::Group => (1, narrow::LANES),
-                    Lanes::Single => (narrow::LANES, 1),
+                let (per, lanes) = match (self.options.lanes, method) {
+                    (Lanes::Single, FaceMethod::FrankWolfe { .. }) => (narrow::LANES, 1),
+                    _ => (1, narrow::LANES),
                 };
-                let planes = self.options.exchange == Exchange::Device && device.has_planes_of_32();
                 let per_polygon = groups_for(&mut stages, room.polygons, per, products::POLYGONS)?;
                 // Above any cosine: nothing is filtered.
                 let cos_theta = options.cos_theta.map_or(-2.0, |cos| cos as f32);
-                stages.run("face narrow phase", || {
-                    narrow::narrow_faces::launch(
-                        client,
-                        per_polygon,
-                        CubeDim::new_1d(narrow::LANES),
-                        images.argument(),
-                        directions.words(),
-                        maps.rows(),
-                        polygons.words(),
-                        weights.rows(),
-                        counters.words(),
-                        contact_words.words(),
-                        contact_rows.rows(),
-                        iterations,
-                        cos_theta,
-                        room.polygons,
-                        room.contacts,
-                        lanes,
-                        planes,
-                    );
-                })?;
+                match method {
+                    FaceMethod::FrankWolfe { iterations } => {
+                        let planes = self.options.exchange == Exchange::Device && device.has_planes_of_32();
+                        stages.run("face narrow phase", || {
+                            narrow::narrow_faces::launch(
+                                client,
+                                per_polygon,
+                                CubeDim::new_1d(narrow::LANES),
+                                images.argument(),
+                                directions.words(),
+                                maps.rows(),
+                                polygons.words(),
+                                weights.rows(),
+                                counters.words(),
+                                contact_words.words(),
+                                contact_rows.rows(),
+                                iterations,
+                                cos_theta,
+                                room.polygons,
+                                room.contacts,
+                                lanes,
+                                planes,
+                            );
+                        })?;
+                    }
+                    FaceMethod::Exact { tolerance } => {
+                        let tolerances = device.upload("tolerances", &self.tolerances(instances, tolerance))?;
+                        self.report.sent += tolerances.bytes();
+                        stages.run("exact narrow phase", || {
+                            exact::narrow_exact::launch(
+                                client,
+                                per_polygon,
+                                CubeDim::new_1d(narrow::LANES),
+                                images.argument(),
+                                directions.words(),
+                                maps.rows(),
+                                polygons.words(),
+                                weights.rows(),
+                                counters.words(),
+                                contact_words.words(),
+                                contact_rows.rows(),
+                                tolerances.words(),
+                                cos_theta,
+                                room.polygons,
+                                room.contacts,
+                            );
+                        })?;
+                    }
+                }
             }
         }
         let Stages { launches, times, .. } = stages;
@@ -466,6 +511,16 @@ impl Detector {
         let counts: Vec<u32> = device.read(&counters, products::COUNTERS)?;
         self.report.read += counts.len() * WORD;
         Ok(std::array::from_fn(|i| counts[i]))
+    }
+
+    /// In the frame of each instance's field; not finer than what `f32` can tell.
+    fn tolerances(&self, instances: &Instances, tolerance: Length) -> Vec<f32> {
+        let in_field = |(at, &shape): (&Placed, &usize)| {
+            let scale = at.unit / self.frames[shape].unit();
+            let diagonal = self.diagonals[shape].min(f64::MAX) * scale;
+            (tolerance.resolve(diagonal) / at.unit).max(FINEST) as f32
+        };
+        instances.placed.iter().zip(&instances.shapes).map(in_field).collect()
     }
 
     fn contacts(
@@ -489,6 +544,7 @@ impl Detector {
             polygons: count(products::POLYGONS),
             touching: found + count(products::FILTERED),
             filtered: count(products::FILTERED),
+            unconverged: contacts.iter().filter(|c| !c.converged).count(),
             bytes: self.products.bytes() + size_of_val(contacts.as_slice()),
             ..Statistics::default()
         };

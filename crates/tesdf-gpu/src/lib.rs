@@ -20,7 +20,7 @@ mod placed;
 mod query;
 
 pub use detector::{
-    Capacities, Detector, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory,
+    Capacities, Detector, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
 pub use device::{Device, DeviceInfo, DeviceKind, devices};
 pub use error::GpuError;

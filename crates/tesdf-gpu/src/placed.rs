@@ -22,6 +22,11 @@ impl FieldFrame {
             _ => Self { origin: DVec3::ZERO, unit: 1.0 },
         }
     }
+
+    /// The shape's unit per unit of the field's.
+    pub fn unit(&self) -> f64 {
+        self.unit
+    }
 }
 
 /// A field's frame, placed in the world.

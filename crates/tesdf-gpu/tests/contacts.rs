@@ -18,7 +18,7 @@ use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;
 use tesdf_gpu::{
-    Capacities, Detector, DetectorOptions, Device, Exchange, GpuError, Lanes, Memory,
+    Capacities, Detector, DetectorOptions, Device, Exchange, GpuError, Lanes, Memory, Pruning,
 };
 
 /// What `f32` may be off by, as a share of the larger body: rounding of poses, faces and distances.
@@ -160,9 +160,9 @@ fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
     Compared { touching: keys.len(), others, cells: h.len(), differing }
 }
 
-fn each_mode(size: f64) -> [CollideOptions; 3] {
+fn each_mode(size: f64) -> [CollideOptions; 4] {
     let face = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(Mode::FACE) };
-    [CollideOptions { mode: Mode::Node, ..face }, CollideOptions { cos_theta: Some(0.3), ..face }, face]
+    [CollideOptions { mode: Mode::Node, ..face }, CollideOptions { cos_theta: Some(0.3), ..face }, face, CollideOptions { mode: Mode::EXACT, ..face }]
 }
 
 #[test]
@@ -188,7 +188,7 @@ fn a_nut_on_its_bolt() {
     let bolt = Placed::around("iso_m16_bolt_6k", rotation(&mut random), 1.0, 3.0 * random.direction());
     let nut = Placed { body: body("iso_m16_nut_c25"), at: bolt.at };
     let size = bolt.diagonal();
-    for mode in [Mode::Node, Mode::FACE] {
+    for mode in [Mode::Node, Mode::FACE, Mode::EXACT] {
         let options = CollideOptions { contact_distance: 2e-5, cos_theta: Some(0.3), ..CollideOptions::with_mode(mode) };
         let nut = nut.moved(Pose::at(2e-5 * random.direction()));
         hold(&scene(&[bolt.clone(), nut]), &options, size).is_good(50);
@@ -342,27 +342,32 @@ fn buffers_grow_or_say_what_they_need() {
     assert_eq!(needed as usize, expected.contacts.len());
 }
 
-/// A thread alone finds what 32 find, and shared memory what planes find.
+/// A thread alone finds what 32 find, shared memory what planes find, and pruning loses nothing.
 #[test]
 fn the_same_however_a_polygon_is_worked_on() {
     let mut random = Random(6);
     let scene = worlds(3, &mut random);
     let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::FACE) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
-    for (lanes, exchange) in [(Lanes::Single, Exchange::Device), (Lanes::Group, Exchange::Shared)] {
-        let (other, _) = found(&scene, &options, DetectorOptions { lanes, exchange, ..DetectorOptions::default() });
-        assert_eq!(other.contacts, expected.contacts, "{lanes:?} {exchange:?}");
+    let usual = DetectorOptions::default();
+    for with in [
+        DetectorOptions { lanes: Lanes::Single, ..usual },
+        DetectorOptions { exchange: Exchange::Shared, ..usual },
+        DetectorOptions { pruning: Pruning::Bounds, ..usual },
+    ] {
+        let (other, _) = found(&scene, &options, with);
+        assert_eq!(other.contacts, expected.contacts, "{with:?}");
     }
 }
 
 #[test]
-fn what_cannot_be_done_is_an_error() {
+fn nothing_is_no_error() {
     let mut random = Random(1);
     let scene = worlds(1, &mut random);
     let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("fits");
-    let error = detector.detect(&scene, &CollideOptions::default()).expect_err("no exact mode");
-    assert!(error.to_string().starts_with("the exact mode is not available on a device"), "{error}");
-    let empty = Scene::new();
-    let contacts = detector.detect(&empty, &CollideOptions::with_mode(Mode::Node)).expect("nothing to do");
+    let contacts = detector.detect(&Scene::new(), &CollideOptions::default()).expect("nothing to do");
     assert!(contacts.contacts.is_empty());
+    let options = CollideOptions { contact_distance: f64::NAN, ..CollideOptions::default() };
+    let error = detector.detect(&scene, &options).expect_err("no distance");
+    assert!(error.to_string().starts_with("contact_distance is NaN"), "{error}");
 }

@@ -24,9 +24,10 @@ pub fn cell_bound(assets: &Assets, shape: u32, at: u32) -> f32 {
     least
 }
 
-/// Whether no point within `radius` of `p` can have a signed distance up to `reach`. May say no where it is so.
+/// Whether no point within `radius` of `p` can have a signed distance up to `reach`. May say no where it is so: with `prune` 0 only what is out of
+/// the bounds is beyond.
 #[cube]
-pub fn is_beyond(assets: &Assets, shape: u32, p: V3, radius: f32, reach: f32) -> bool {
+pub fn is_beyond(assets: &Assets, shape: u32, p: V3, radius: f32, reach: f32, prune: u32) -> bool {
     let limit = radius + reach;
     let mut beyond = false;
     if entry(assets, shape, KIND) == MESH {
@@ -39,7 +40,7 @@ pub fn is_beyond(assets: &Assets, shape: u32, p: V3, radius: f32, reach: f32) ->
         );
         let far = limit.max(0.0f32) + ROUNDING;
         beyond = dot(out, out) > far * far;
-        if !beyond {
+        if !beyond && prune == 1u32 {
             let held = place(assets, shape, p);
             let kind = code(held.word);
             let listed = is_listed(held.word);
@@ -79,6 +80,7 @@ pub fn meshlets(
     out: &mut [u32],
     most_blocks: u32,
     most_meshlets: u32,
+    prune: u32,
 ) {
     let block = CUBE_POS as u32;
     let count = counters[products::BLOCKS as usize].load().min(most_blocks);
@@ -91,7 +93,7 @@ pub fn meshlets(
             if entry(assets, d.shape_a, KIND) == MESH {
                 let ball = assets.rows[(entry(assets, d.shape_a, MESHLETS) + meshlet) as usize];
                 let center = to_field(d, v3(ball.extract(0usize), ball.extract(1usize), ball.extract(2usize)));
-                kept = !is_beyond(assets, d.shape_b, center, d.scale * ball.extract(3usize), d.reach);
+                kept = !is_beyond(assets, d.shape_b, center, d.scale * ball.extract(3usize), d.reach, prune);
             }
             if kept {
                 let slot = append(counters, products::MESHLETS);
@@ -106,6 +108,6 @@ pub fn meshlets(
 
 /// A part and its ball.
 #[cube]
-pub fn part_is_beyond(assets: &Assets, d: Direction, center: V3, radius: f32) -> bool {
-    is_beyond(assets, d.shape_b, center, radius, d.reach + d.radius)
+pub fn part_is_beyond(assets: &Assets, d: Direction, center: V3, radius: f32, prune: u32) -> bool {
+    is_beyond(assets, d.shape_b, center, radius, d.reach + d.radius, prune)
 }

@@ -186,6 +186,7 @@ pub fn polygons(
     rows: &mut [Vector<f32, Const<4>>],
     most_meshlets: u32,
     most: u32,
+    prune: u32,
 ) {
     let item = CUBE_POS as u32;
     let count = counters[products::MESHLETS as usize].load().min(most_meshlets);
@@ -197,12 +198,12 @@ pub fn polygons(
             let number_of = faces_of(assets, d.shape_a, meshlet, 0u32) + UNIT_POS;
             let p: Part = part(assets, d, number_of);
             let center = ball_center(p);
-            if !part_is_beyond(assets, d, center, ball_radius(p, center)) {
+            if !part_is_beyond(assets, d, center, ball_radius(p, center), prune) {
                 counters[products::CANDIDATES as usize].fetch_add(1u32);
                 let mut s = Array::<f32>::new(ROOM);
                 let mut t = Array::<f32>::new(ROOM);
                 if entry(assets, d.shape_b, KIND) == MESH {
-                    clip(assets, d, p, counters, words, rows, most, at, number_of, &mut s, &mut t);
+                    clip(assets, d, p, counters, words, rows, most, at, number_of, prune, &mut s, &mut t);
                 } else {
                     start(&mut s, &mut t);
                     write(counters, words, rows, most, at, number_of, NONE, &mut s, &mut t, p.count);
@@ -223,6 +224,7 @@ fn clip(
     most: u32,
     at: u32,
     face: u32,
+    prune: u32,
     s: &mut Array<f32>,
     t: &mut Array<f32>,
 ) {
@@ -270,7 +272,7 @@ fn clip(
             let word = assets.words[(nodes + cell) as usize];
             let mut down = false;
             let mut side = false;
-            if !is_separate(la, lb, lc) && cell_bound(assets, shape, cell) <= reach {
+            if !is_separate(la, lb, lc) && (prune == 0u32 || cell_bound(assets, shape, cell) <= reach) {
                 if is_split(word) {
                     let k = 3u32 - depth % 3u32;
                     let ha = la.l0 - lambda_at(la, k);
@@ -400,6 +402,7 @@ pub fn nodes(
     words: &mut [u32],
     most_meshlets: u32,
     most: u32,
+    prune: u32,
 ) {
     let item = CUBE_POS as u32;
     let count = counters[products::MESHLETS as usize].load().min(most_meshlets);
@@ -422,7 +425,7 @@ pub fn nodes(
                         let out = code(held.word) == code(NOT_OF_DOMAIN.runtime());
                         cell = held.at;
                         kept = (!out || reach >= number(assets, d.shape_b, BAND))
-                            && cell_bound(assets, d.shape_b, cell) <= reach;
+                            && (prune == 0u32 || cell_bound(assets, d.shape_b, cell) <= reach);
                     }
                     if kept {
                         let slot = append(counters, products::POLYGONS);

@@ -2,12 +2,14 @@
 pub mod assets;
 pub mod broad;
 pub mod clip;
+pub mod exact;
 pub mod field;
 pub mod list;
 pub mod locate;
 pub mod narrow;
 pub mod nearest;
 pub mod pairs;
+pub mod polygon_distance;
 pub mod pose;
 pub mod products;
 pub mod query;

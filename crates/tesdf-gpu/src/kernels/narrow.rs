@@ -8,7 +8,8 @@ use super::list::{List, list, list_face};
 use super::locate::{NOT_OF_DOMAIN, offset};
 use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
 use super::pairs::four;
-use super::products::{self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_ROWS, POLYGON_WORDS, append};
+use super::polygon_distance::weight;
+use super::products::{self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_WORDS, append};
 use super::surface::{Direction, Part, at_weights, direction, normal, part};
 use super::triangle::{Face, ROWS, distance_squared, face};
 use super::vector::{V3, dot, length, minus, pick, plus_scaled, v3};
@@ -24,7 +25,7 @@ pub fn node(p: Part, k: u32) -> V3 {
 
 /// The word of a cell.
 #[cube]
-fn word_of(assets: &Assets, shape: u32, cell: u32) -> u32 {
+pub fn word_of(assets: &Assets, shape: u32, cell: u32) -> u32 {
     let mut word = NOT_OF_DOMAIN.runtime();
     if cell != NONE && entry(assets, shape, KIND) == MESH {
         word = assets.words[(entry(assets, shape, NODES) + cell) as usize];
@@ -32,8 +33,9 @@ fn word_of(assets: &Assets, shape: u32, cell: u32) -> u32 {
     word
 }
 
+/// Appends a contact.
 #[cube]
-fn write(
+pub fn write(
     counters: &[Atomic<u32>],
     words: &mut [u32],
     rows: &mut [Vector<f32, Const<4>>],
@@ -42,6 +44,7 @@ fn write(
     face: u32,
     cell: u32,
     corner: u32,
+    converged: u32,
     point: V3,
     v: Value,
 ) {
@@ -55,7 +58,7 @@ fn write(
         words[word + 4usize] = v.face;
         words[word + 5usize] = v.feature;
         words[word + 6usize] = corner;
-        words[word + 7usize] = 1u32;
+        words[word + 7usize] = converged;
         let row = (slot * comptime!(CONTACT_ROWS as u32)) as usize;
         let on_surface = plus_scaled(point, -d.radius, v.gradient);
         rows[row] = four(on_surface.x, on_surface.y, on_surface.z, v.distance - d.radius);
@@ -66,7 +69,7 @@ fn write(
 
 /// The cell of a contact: only one with a list is named.
 #[cube]
-fn named(word: u32, cell: u32) -> u32 {
+pub fn named(word: u32, cell: u32) -> u32 {
     select(is_listed(word), cell, NONE)
 }
 
@@ -96,12 +99,12 @@ pub fn narrow_nodes(
         if entry(assets, d.shape_b, KIND) == MESH {
             let v = value_of(assets, d.shape_b, word, p, nearest(assets, d.shape_b, word, p));
             if v.distance <= d.reach + d.radius {
-                write(counters, words, rows, most, d, face, named(word, cell), corner, p, v);
+                write(counters, words, rows, most, d, face, named(word, cell), corner, 1u32, p, v);
             }
         } else {
             let v = simple_value(assets, d.shape_b, p);
             if v.distance <= d.reach + d.radius {
-                write(counters, words, rows, most, d, face, NONE, corner, p, v);
+                write(counters, words, rows, most, d, face, NONE, corner, 1u32, p, v);
             }
         }
     }
@@ -217,13 +220,6 @@ fn value_in(
         face: face_of,
         feature,
     }
-}
-
-/// Weight `i` of a polygon: of the second corner of the face, or of the third one.
-#[cube]
-fn weight(rows: &[Vector<f32, Const<4>>], item: u32, i: u32, #[comptime] which: usize) -> f32 {
-    let row = rows[(item * comptime!(POLYGON_ROWS as u32) + i / 2u32) as usize];
-    select(i % 2u32 == 0u32, row.extract(which), row.extract(which + 2usize))
 }
 
 /// Frank–Wolfe on Eq. (9): from the best of centre and vertices, `iterations` steps of 2 / (k + 2) towards the vertex that lies farthest down
@@ -380,7 +376,7 @@ pub fn narrow_faces(
                 counters[products::FILTERED as usize].fetch_add(1u32);
             } else {
                 let point = at_weights(surface, best_s, best_t);
-                write(counters, words, rows, most, d, face_a, named(word, cell), 0u32, point, v);
+                write(counters, words, rows, most, d, face_a, named(word, cell), 0u32, 1u32, point, v);
             }
         }
     }

@@ -1,0 +1,29 @@
+# Sourced by ./test and .ci/run: the software Vulkan driver, on which the tests of the GPU run, so that they give the same on every machine. With
+# TESDF_TEST_DEVICE set they run on that device instead: `TESDF_TEST_DEVICE=gpu ./test`.
+
+vulkan_driver() {
+    # Debian and Ubuntu, Fedora, a driver of one's own.
+    ls /usr/share/vulkan/icd.d/lvp_icd*.json /usr/local/share/vulkan/icd.d/lvp_icd*.json 2>/dev/null | head -n 1
+}
+
+if [ -z "${TESDF_TEST_DEVICE:-}" ]; then
+    if [ -z "$(vulkan_driver)" ] && command -v apt-get >/dev/null; then
+        as_root=
+        [ "$(id -u)" = 0 ] || as_root="sudo -n"
+        $as_root apt-get update --quiet >/dev/null && $as_root apt-get install --quiet --yes \
+            libvulkan1 mesa-vulkan-drivers >/dev/null || true
+    fi
+    if [ -z "$(vulkan_driver)" ]; then
+        echo "error: the software Vulkan driver, on which GPU tests run, was not found and could not be installed" >&2
+        echo "hint: on Debian or Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers; or run on a GPU: TESDF_TEST_DEVICE=gpu" >&2
+        exit 2
+    fi
+    VK_DRIVER_FILES=$(vulkan_driver)
+    # Older loaders know this name only.
+    VK_ICD_FILENAMES=$VK_DRIVER_FILES
+    export VK_DRIVER_FILES VK_ICD_FILENAMES
+fi
+if [ -z "${XDG_RUNTIME_DIR:-}" ]; then
+    # The driver warns without it.
+    export XDG_RUNTIME_DIR="${TMPDIR:-/tmp}"
+fi

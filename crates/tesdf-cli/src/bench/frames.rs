@@ -1,0 +1,141 @@
+//! Where the frames of a benchmark come from: a scene, a run, a file of poses.
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use tesdf::TeSdf;
+use tesdf::asset::about::Source;
+use tesdf::collide::{Instance, InstanceId, Pose, Scene};
+use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::glam::{DQuat, DVec3};
+use tesdf::mesh::SolidMesh;
+use tesdf_sim::RunRecord;
+use tesdf_sim::scene_file::LoadedScene;
+
+use super::poses::{PoseFile, VERSION};
+use crate::progress::{interrupt_flag, watched};
+use crate::report::Failure;
+use crate::{asset_file, mesh_file};
+
+/// Bodies, and where they are in each frame.
+pub struct Frames {
+    /// The bodies in their first poses.
+    pub scene: Scene,
+    /// For each frame, for each instance of the scene.
+    pub poses: Vec<Vec<Pose>>,
+    /// What the file says about contacts, if anything.
+    pub contact_distance: Option<f64>,
+}
+
+impl Frames {
+    /// Reads a scene (`.toml`), a run (`.tesrun`, at most `most` frames of it, evenly spaced) or poses (`.json`), and puts the same into
+    /// `worlds` worlds. Meshes of a file of poses get lists of at most `max_entries` faces.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or does not hold what its name says.
+    pub fn read(path: &Path, most: usize, worlds: u32, max_entries: Option<u32>) -> Result<Self, Failure> {
+        let frames = match path.extension().and_then(|e| e.to_str()) {
+            Some("toml") => Self::of_scene(&LoadedScene::read(path).map_err(Failure::new)?)?,
+            Some("json") => Self::of_poses(path, most, max_entries)?,
+            _ => Self::of_run(path, most)?,
+        };
+        frames.in_worlds(worlds)
+    }
+
+    fn of_scene(loaded: &LoadedScene) -> Result<Self, Failure> {
+        let interrupted = interrupt_flag()?;
+        let progress = EncodeProgress::default();
+        let system = watched(&progress, &interrupted, || loaded.system(&progress)).map_err(Failure::new)?;
+        let scene = system.scene().clone();
+        let poses = vec![scene.instances().map(|(_, instance)| instance.pose).collect()];
+        Ok(Self { scene, poses, contact_distance: loaded.scene.detector.contact_distance })
+    }
+
+    fn of_run(path: &Path, most: usize) -> Result<Self, Failure> {
+        let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
+        let record = RunRecord::open(path).map_err(|e| named(&e))?;
+        let loaded = LoadedScene::of_run(&record, path).map_err(Failure::new)?;
+        let start = Self::of_scene(&loaded)?;
+        let steps = record.times().len();
+        let every = steps.div_ceil(most.max(1)).max(1);
+        let bodies = start.poses[0].len();
+        let frame = |step| (0..bodies).map(|body| record.pose(step, body)).collect::<Option<Vec<Pose>>>();
+        let poses = (0..steps).step_by(every).map(frame).collect::<Option<Vec<_>>>();
+        let poses = poses.ok_or_else(|| named(&format!("a pose is missing; expected {bodies} a step")))?;
+        Ok(Self { poses, ..start })
+    }
+
+    fn of_poses(path: &Path, most: usize, max_entries: Option<u32>) -> Result<Self, Failure> {
+        let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
+        let text = std::fs::read(path).map_err(|e| named(&e))?;
+        let file: PoseFile = serde_json::from_slice(&text).map_err(|e| named(&e))?;
+        if file.tesdf_poses != VERSION {
+            return Err(named(&format!("version {}; this build reads {VERSION}", file.tesdf_poses)));
+        }
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let mut scene = Scene::new();
+        let mut shapes = Vec::new();
+        for body in &file.bodies {
+            shapes.push(scene.add_shape(geometry(&folder.join(body), max_entries)?).map_err(Failure::new)?);
+        }
+        let pose = |[x, y, z, i, j, k, w]: [f64; 7]| {
+            Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| named(&e))
+        };
+        let frames = file.frames.into_iter().take(most).map(|f| f.into_iter().map(pose).collect());
+        let poses: Vec<Vec<Pose>> = frames.collect::<Result<_, _>>()?;
+        let count = file.instances.len();
+        if let Some((k, f)) = poses.iter().enumerate().find(|(_, f)| f.len() != count) {
+            return Err(named(&format!("frame {k} has {} poses; expected {count}", f.len())));
+        }
+        let first = poses.first().ok_or_else(|| named(&"no frame"))?;
+        for (&(body, world), &pose) in file.instances.iter().zip(first) {
+            let shape = *shapes.get(body).ok_or_else(|| {
+                named(&format!("an instance of body {body}; expected one of {}", shapes.len()))
+            })?;
+            scene.add(Instance { world, ..Instance::new(shape, pose) }).map_err(Failure::new)?;
+        }
+        Ok(Self { scene, poses, contact_distance: Some(file.contact_distance) })
+    }
+
+    /// The same in several worlds: frame `f` of world `w` is frame `f + w`, so that worlds differ.
+    fn in_worlds(self, worlds: u32) -> Result<Self, Failure> {
+        if worlds <= 1 {
+            return Ok(self);
+        }
+        let Self { mut scene, poses, contact_distance } = self;
+        let instances: Vec<Instance> = scene.instances().map(|(_, instance)| *instance).collect();
+        for world in 1..worlds {
+            let more: Vec<Instance> = instances.iter().map(|i| Instance { world, ..*i }).collect();
+            scene.add_many(&more).map_err(Failure::new)?;
+        }
+        let frame = |f: usize| {
+            (0..worlds as usize).flat_map(|w| poses[(f + w) % poses.len()].iter().copied()).collect()
+        };
+        let poses = (0..poses.len()).map(frame).collect();
+        Ok(Self { scene, poses, contact_distance })
+    }
+
+    /// Moves the scene's instances to where they are in a frame.
+    ///
+    /// # Errors
+    /// None for frames of the same scene.
+    pub fn show(&mut self, frame: usize) -> Result<(), Failure> {
+        let ids: Vec<InstanceId> = self.scene.instances().map(|(id, _)| id).collect();
+        let poses: Vec<(InstanceId, Pose)> = ids.into_iter().zip(self.poses[frame].iter().copied()).collect();
+        self.scene.set_poses(&poses).map_err(Failure::new)
+    }
+}
+
+/// A `.tesdf` file, or a mesh that is encoded.
+fn geometry(path: &PathBuf, max_entries: Option<u32>) -> Result<Arc<TeSdf>, Failure> {
+    if path.extension().is_some_and(|e| e == "tesdf") {
+        return asset_file::open(path).map(Arc::new);
+    }
+    let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
+    let solid = SolidMesh::new(mesh_file::read(path)?.mesh).map_err(|e| named(&e))?;
+    let options = EncodeOptions { max_entries, ..EncodeOptions::preset(Preset::Default) };
+    let interrupted = interrupt_flag()?;
+    let progress = EncodeProgress::default();
+    watched(&progress, &interrupted, || encode(&solid, &Source::default(), &options, &progress))
+        .map(Arc::new)
+        .map_err(|e| named(&e))
+}

@@ -1,0 +1,146 @@
+//! Files of poses: bodies, and where their instances are, frame by frame.
+use std::path::{Path, PathBuf};
+
+use clap::ValueEnum;
+use serde::{Deserialize, Serialize};
+use tesdf::asset::save_atomic;
+use tesdf::glam::{DQuat, DVec3};
+
+use crate::report::{self, Failure, Outcome, count};
+
+/// The version that is written and read.
+pub const VERSION: u32 = 1;
+
+/// A file of poses, in JSON. Lengths are in the unit of the meshes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PoseFile {
+    /// [`VERSION`].
+    pub tesdf_poses: u32,
+    /// Contacts are taken up to this signed distance.
+    pub contact_distance: f64,
+    /// The bodies: meshes, or `.tesdf` files; relative to the folder of this file.
+    pub bodies: Vec<PathBuf>,
+    /// Which body each instance is, and its world.
+    pub instances: Vec<(usize, u32)>,
+    /// For each frame, for each instance: translation, unit quaternion x y z w.
+    pub frames: Vec<Vec<[f64; 7]>>,
+}
+
+/// Scenes that the generator knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Scene {
+    /// A nut on its bolt, within the clearance of 50 µm
+    BoltNut,
+    /// A lobed peg in its hole, 100 µm of clearance, on the way in
+    PegHole,
+    /// 128 shafts in deep overlap, in any pose
+    Shafts,
+}
+
+/// Arguments of `tesdf bench poses`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// What is posed
+    #[arg(value_enum)]
+    pub scene: Scene,
+    /// The file to write: JSON
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Frames
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    pub frames: usize,
+    /// The same input gives the same poses
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    pub seed: u64,
+    /// The folder of the meshes
+    #[arg(long, value_name = "FOLDER", default_value = "data/procedural")]
+    pub data: PathBuf,
+}
+
+/// Writes a file of poses.
+///
+/// # Errors
+/// The file cannot be written, or there is no current folder.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let data = std::path::absolute(&args.data)
+        .map_err(|e| Failure::new(format!("{}: {e}", args.data.display())))?;
+    let file = args.scene.poses(&data, args.frames, &mut fastrand::Rng::with_seed(args.seed));
+    let bytes = serde_json::to_vec(&file).map_err(Failure::new)?;
+    save_atomic(&args.output, &bytes).map_err(Failure::new)?;
+    let line = format!(
+        "{}: {}, {}\n",
+        args.output.display(),
+        count(file.instances.len(), "instance"),
+        count(file.frames.len(), "frame")
+    );
+    report::result(line.as_bytes())?;
+    Ok(Outcome::Good)
+}
+
+impl Scene {
+    fn poses(self, data: &Path, frames: usize, random: &mut fastrand::Rng) -> PoseFile {
+        let file = |bodies: &[&str], instances, contact_distance, frames| PoseFile {
+            tesdf_poses: VERSION,
+            contact_distance,
+            bodies: bodies.iter().map(|name| data.join(name)).collect(),
+            instances,
+            frames,
+        };
+        let still = pose(DVec3::ZERO, DQuat::IDENTITY);
+        match self {
+            Self::BoltNut => {
+                // A shift along the axis turns the nut by the pitch of 2 mm.
+                let frame = |_| {
+                    let z = random.f64() * 0.01;
+                    let angle = z / 0.002 * std::f64::consts::TAU;
+                    let aside = 2e-5 * (in_cube(random) * DVec3::new(1.0, 1.0, 0.5));
+                    vec![still, pose(DVec3::Z * (0.004 + z) + aside, DQuat::from_rotation_z(angle))]
+                };
+                let bodies = ["iso_m16_bolt_24k.obj", "iso_m16_nut_c50.obj"];
+                let frames = (0..frames).map(frame).collect();
+                file(&bodies, vec![(0, 0), (1, 0)], 2e-4, frames)
+            }
+            Self::PegHole => {
+                // On its floor the peg stands 5 mm up.
+                let frame = |_| {
+                    let aside = 4e-5 * (in_cube(random) * DVec3::new(1.0, 1.0, 0.0));
+                    vec![still, pose(aside + DVec3::Z * (0.006 + 0.02 * random.f64()), DQuat::IDENTITY)]
+                };
+                let bodies = ["lobed_hole_c100.obj", "lobed_peg.obj"];
+                let frames = (0..frames).map(frame).collect();
+                file(&bodies, vec![(0, 0), (1, 0)], 2e-4, frames)
+            }
+            Self::Shafts => {
+                let frame = |_| {
+                    (0..128).map(|_| pose(SHAFTS * in_cube(random), rotation(random))).collect::<Vec<_>>()
+                };
+                let instances = vec![(0, 0); 128];
+                let frames = (0..frames).map(frame).collect();
+                file(&["shaft_keyway.obj"], instances, 0.0, frames)
+            }
+        }
+    }
+}
+
+/// Half the side of the cube that the middles of 128 shafts lie in.
+const SHAFTS: f64 = 0.06;
+
+fn pose(p: DVec3, q: DQuat) -> [f64; 7] {
+    [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
+}
+
+fn in_cube(random: &mut fastrand::Rng) -> DVec3 {
+    let mut between = || 2.0 * random.f64() - 1.0;
+    DVec3::new(between(), between(), between())
+}
+
+/// Uniform over all rotations.
+fn rotation(random: &mut fastrand::Rng) -> DQuat {
+    loop {
+        let v = in_cube(random);
+        let q = DQuat::from_xyzw(v.x, v.y, v.z, 2.0 * random.f64() - 1.0);
+        if (0.01..1.0).contains(&q.length_squared()) {
+            return q.normalize();
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! The least distance between a polygon and a face, in closed form: what [`tesdf::geometry::polygon_to_triangle`] computes.
+use cubecl::prelude::*;
+
+use super::nearest::FAR;
+use super::products::POLYGON_ROWS;
+use super::surface::{Part, at_weights};
+use super::triangle::{Face, PART, closest, corner, distance_squared};
+use super::vector::{V3, cross, dot, length, minus, pick, plus_scaled};
+
+/// A distance, and where on the polygon, as weights of the face that it was cut from.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Apart {
+    pub distance: f32,
+    pub s: f32,
+    pub t: f32,
+}
+
+/// Weight `i` of a polygon: of the second corner of the face, or of the third one.
+#[cube]
+pub fn weight(rows: &[Vector<f32, Const<4>>], item: u32, i: u32, #[comptime] which: usize) -> f32 {
+    let row = rows[(item * comptime!(POLYGON_ROWS as u32) + i / 2u32) as usize];
+    select(i % 2u32 == 0u32, row.extract(which), row.extract(which + 2usize))
+}
+
+/// The nearer of two.
+#[cube]
+pub fn nearer(a: Apart, b: Apart) -> Apart {
+    let first = a.distance <= b.distance;
+    Apart {
+        distance: select(first, a.distance, b.distance),
+        s: select(first, a.s, b.s),
+        t: select(first, a.t, b.t),
+    }
+}
+
+/// The share of the first segment at which two segments are nearest (Ericson 2005, 5.1.9), and their distance as the first value.
+#[cube]
+fn between_segments(p: V3, q: V3, r: V3, s: V3) -> Apart {
+    let u = minus(q, p);
+    let v = minus(s, r);
+    let w = minus(p, r);
+    let a = dot(u, u);
+    let e = dot(v, v);
+    let f = dot(v, w);
+    let b = dot(u, v);
+    let c = dot(u, w);
+    let denominator = a * e - b * b;
+    let parallel = denominator <= 1e-7f32 * a * e;
+    let start = select(parallel, 0.0f32, ((b * f - c * e) / denominator.max(1e-30f32)).clamp(0.0f32, 1.0f32));
+    let t = select(e > 0.0f32, ((b * start + f) / e.max(1e-30f32)).clamp(0.0f32, 1.0f32), 0.0f32);
+    let start = select(a > 0.0f32, ((b * t - c) / a.max(1e-30f32)).clamp(0.0f32, 1.0f32), 0.0f32);
+    Apart { distance: length(minus(plus_scaled(p, start, u), plus_scaled(r, t, v))), s: start, t }
+}
+
+/// Whether a point of the polygon's plane lies in it; `n` vertices go around `normal` one way or the other.
+#[cube]
+fn holds(part: Part, weights: &[Vector<f32, Const<4>>], item: u32, n: u32, normal: V3, x: V3) -> bool {
+    let mut left = true;
+    let mut right = true;
+    let mut i = 0u32;
+    while i < n {
+        let j = select(i + 1u32 == n, 0u32, i + 1u32);
+        let p = at_weights(part, weight(weights, item, i, 0usize), weight(weights, item, i, 1usize));
+        let q = at_weights(part, weight(weights, item, j, 0usize), weight(weights, item, j, 1usize));
+        let side = dot(cross(minus(q, p), minus(x, p)), normal);
+        left = left && side >= 0.0f32;
+        right = right && side <= 0.0f32;
+        i += 1u32;
+    }
+    n > 2u32 && (left || right)
+}
+
+/// Weights of a point of the part's plane.
+#[cube]
+fn weights_of(part: Part, x: V3) -> Apart {
+    let u = minus(part.b, part.a);
+    let v = minus(part.c, part.a);
+    let w = minus(x, part.a);
+    let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
+    let (wu, wv) = (dot(w, u), dot(w, v));
+    let inverse = 1.0f32 / (uu * vv - uv * uv).max(1e-30f32);
+    Apart { distance: FAR, s: inverse * (vv * wu - uv * wv), t: inverse * (uu * wv - uv * wu) }
+}
+
+/// The least distance between polygon `item`, which was cut from `part` with unit `normal`, and a face.
+#[cube]
+pub fn polygon_to_face(
+    part: Part,
+    weights: &[Vector<f32, Const<4>>],
+    item: u32,
+    n: u32,
+    normal: V3,
+    f: Face,
+) -> Apart {
+    let mut distance = FAR.runtime();
+    let mut best_s = 0.0f32;
+    let mut best_t = 0.0f32;
+    let mut i = 0u32;
+    while i < n {
+        let j = select(i + 1u32 == n, 0u32, i + 1u32);
+        let (si, ti) = (weight(weights, item, i, 0usize), weight(weights, item, i, 1usize));
+        let (sj, tj) = (weight(weights, item, j, 0usize), weight(weights, item, j, 1usize));
+        let p = at_weights(part, si, ti);
+        let q = at_weights(part, sj, tj);
+        // A corner of the polygon.
+        let squared = distance_squared(f, p);
+        let at_corner = length(closest(f, p, u32::reinterpret(squared) & PART).outward);
+        let first = at_corner < distance;
+        distance = select(first, at_corner, distance);
+        best_s = select(first, si, best_s);
+        best_t = select(first, ti, best_t);
+        // An edge of it through the face.
+        let (h, k) = (dot(f.normal, minus(p, f.a)), dot(f.normal, minus(q, f.a)));
+        if h * k < 0.0f32 {
+            let share = h / (h - k);
+            let x = plus_scaled(p, share, minus(q, p));
+            let squared = distance_squared(f, x);
+            let through = length(closest(f, x, u32::reinterpret(squared) & PART).outward);
+            let first = through < distance;
+            distance = select(first, through, distance);
+            best_s = select(first, si + share * (sj - si), best_s);
+            best_t = select(first, ti + share * (tj - ti), best_t);
+        }
+        // Two edges.
+        let mut e = 0u32;
+        while e < 3u32 {
+            let r = corner(f, e);
+            let s = pick(e == 2u32, corner(f, 0u32), corner(f, e + 1u32));
+            let found = between_segments(p, q, r, s);
+            let first = found.distance < distance;
+            distance = select(first, found.distance, distance);
+            best_s = select(first, si + found.s * (sj - si), best_s);
+            best_t = select(first, ti + found.s * (tj - ti), best_t);
+            e += 1u32;
+        }
+        i += 1u32;
+    }
+    let has_plane = n > 2u32 && dot(normal, normal) > 0.5f32;
+    let mut e = 0u32;
+    while e < 3u32 && has_plane {
+        // A corner of the face over the polygon, or an edge of it through the polygon.
+        let r = corner(f, e);
+        let s = pick(e == 2u32, corner(f, 0u32), corner(f, e + 1u32));
+        let (h, k) = (dot(normal, minus(r, part.a)), dot(normal, minus(s, part.a)));
+        let over = plus_scaled(r, -h, normal);
+        if h.abs() < distance && holds(part, weights, item, n, normal, over) {
+            let at = weights_of(part, over);
+            distance = h.abs();
+            best_s = at.s;
+            best_t = at.t;
+        }
+        if h * k < 0.0f32 {
+            let x = plus_scaled(r, h / (h - k), minus(s, r));
+            if holds(part, weights, item, n, normal, x) {
+                let at = weights_of(part, x);
+                distance = 0.0f32;
+                best_s = at.s;
+                best_t = at.t;
+            }
+        }
+        e += 1u32;
+    }
+    Apart { distance, s: best_s, t: best_t }
+}
