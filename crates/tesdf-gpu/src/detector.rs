@@ -103,7 +103,7 @@ pub struct DeviceReport {
     pub sent: usize,
     /// Bytes that were read back.
     pub read: usize,
-    /// What was counted: directions, blocks, meshlets, polygons, contacts, filtered, candidates.
+    /// What was counted: directions, blocks, meshlets, polygons, contacts, filtered, candidates, broken off.
     pub counts: [u32; products::COUNTERS],
     /// Device time by stage, when it was asked for.
     pub stages: Vec<(&'static str, Duration)>,
@@ -509,6 +509,17 @@ impl Detector {
         self.report.launches = launches;
         self.report.stages = times;
         let counts: Vec<u32> = device.read(&counters, products::COUNTERS)?;
+        if counts[products::BROKEN_OFF as usize] > 0 {
+            return Err(GpuError::Device {
+                device: device.info().name.clone(),
+                doing: "detecting contacts",
+                reason: format!(
+                    "the driver broke off the loops of {} threads, as Mesa's llvmpipe does after 65,535 iterations: a face meets too many cells. \
+                     Detect on the processor or on a GPU",
+                    counts[products::BROKEN_OFF as usize]
+                ),
+            });
+        }
         self.report.read += counts.len() * WORD;
         Ok(std::array::from_fn(|i| counts[i]))
     }

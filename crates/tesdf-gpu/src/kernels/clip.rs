@@ -8,14 +8,16 @@ use cubecl::prelude::*;
 use super::assets::{Assets, BAND, FACE_COUNT, KIND, MESH, MESHLET_FACES, NODES, NONE, entry, number};
 use super::broad::{cell_bound, part_is_beyond};
 use super::locate::{Lambda, NOT_OF_DOMAIN, code, coordinate, in_child, in_cube, in_root, is_split, lambda_at, place};
-use super::narrow::node;
+use super::narrow::{LANES, node};
 use super::pairs::four;
-use super::products::{self, PAIR_WORDS, POLYGON_ROWS, POLYGON_VERTICES, POLYGON_WORDS, append};
+use super::products::{self, PAIR_WORDS, POLYGON_ROWS, POLYGON_VERTICES, POLYGON_WORDS, append, tell_if_broken_off};
 use super::surface::{Direction, Part, ball_center, ball_radius, direction, part};
 use super::vector::V3;
 
 /// Deepest cell, as in `tesdf::domain::MAX_DEPTH`, and what is above it.
 const LEVELS: usize = 67;
+/// Words of a way through them, a bit a level; read three levels at a time.
+const PATH: usize = 3;
 /// Room for the vertices of a polygon while it is cut.
 const ROOM: usize = 12;
 
@@ -37,6 +39,16 @@ fn faces_of(assets: &Assets, shape: u32, meshlet: u32, #[comptime] which: u32) -
 /// `keep` is 1, what is below when it is −1. Returns the number of weights.
 #[cube]
 fn cut(s: &mut Array<f32>, t: &mut Array<f32>, n: u32, h0: f32, h1: f32, h2: f32, keep: f32) -> u32 {
+    // Most faces are all on the inner side.
+    let mut count = n;
+    if (keep * h0).min(keep * h1).min(keep * h2) < 0.0f32 || keep < 0.0f32 {
+        count = cut_across(s, t, n, h0, h1, h2, keep);
+    }
+    count
+}
+
+#[cube]
+fn cut_across(s: &mut Array<f32>, t: &mut Array<f32>, n: u32, h0: f32, h1: f32, h2: f32, keep: f32) -> u32 {
     let mut above = false;
     let mut below = false;
     let mut heights = Array::<f32>::new(ROOM);
@@ -146,6 +158,15 @@ fn bit(path: &Array<u32>, level: u32) -> bool {
     (path[(level / 32u32) as usize] >> (level % 32u32)) & 1u32 == 1u32
 }
 
+/// One more than the highest level whose bit is set; 0 without one.
+#[cube]
+fn last_bit(bits: &Array<u32>) -> u32 {
+    let high = 96u32 - bits[2].leading_zeros();
+    let middle = 64u32 - bits[1].leading_zeros();
+    let low = 32u32 - bits[0].leading_zeros();
+    select(bits[2] > 0u32, high, select(bits[1] > 0u32, middle, low))
+}
+
 #[cube]
 fn set_bit(path: &mut Array<u32>, level: u32, value: bool) {
     let mask = 1u32 << (level % 32u32);
@@ -154,27 +175,96 @@ fn set_bit(path: &mut Array<u32>, level: u32, value: bool) {
     path[at] = select(value, cleared | mask, cleared);
 }
 
-/// Coordinates of a corner of the face in the cell that a path leads to.
-#[cube]
-fn at_path(u: V3, root: u32, path: &Array<u32>, depth: u32) -> Lambda {
-    let first = in_root(u, root);
-    let mut l0 = first.l0;
-    let mut l1 = first.l1;
-    let mut l2 = first.l2;
-    let mut l3 = first.l3;
-    let mut level = 0u32;
-    while level < depth {
-        let below = in_child(Lambda { l0, l1, l2, l3 }, 3u32 - level % 3u32, bit(path, level));
-        l0 = below.l0;
-        l1 = below.l1;
-        l2 = below.l2;
-        l3 = below.l3;
-        level += 1u32;
-    }
-    Lambda { l0, l1, l2, l3 }
+/// Coordinates of the three corners of a face in a cell.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Corners {
+    a: Lambda,
+    b: Lambda,
+    c: Lambda,
 }
 
-/// A group for each meshlet, a thread for each face.
+#[cube]
+fn corners_in_child(held: Corners, k: u32, second: bool) -> Corners {
+    Corners { a: in_child(held.a, k, second), b: in_child(held.b, k, second), c: in_child(held.c, k, second) }
+}
+
+/// After one level, two, or three and more.
+#[cube]
+fn pick_lambda(levels: u32, one: Lambda, two: Lambda, three: Lambda) -> Lambda {
+    Lambda {
+        l0: select(levels == 1u32, one.l0, select(levels == 2u32, two.l0, three.l0)),
+        l1: select(levels == 1u32, one.l1, select(levels == 2u32, two.l1, three.l1)),
+        l2: select(levels == 1u32, one.l2, select(levels == 2u32, two.l2, three.l2)),
+        l3: select(levels == 1u32, one.l3, select(levels == 2u32, two.l3, three.l3)),
+    }
+}
+
+/// Coordinates of the corners in the cell that a path leads to.
+#[cube]
+fn at_path(a: V3, b: V3, c: V3, root: u32, path: &Array<u32>, depth: u32) -> Corners {
+    let held = Corners { a: in_root(a, root), b: in_root(b, root), c: in_root(c, root) };
+    let mut a0 = held.a.l0;
+    let mut a1 = held.a.l1;
+    let mut a2 = held.a.l2;
+    let mut a3 = held.a.l3;
+    let mut b0 = held.b.l0;
+    let mut b1 = held.b.l1;
+    let mut b2 = held.b.l2;
+    let mut b3 = held.b.l3;
+    let mut c0 = held.c.l0;
+    let mut c1 = held.c.l1;
+    let mut c2 = held.c.l2;
+    let mut c3 = held.c.l3;
+    // Three levels a turn, each with its refinement edge.
+    let mut level = 0u32;
+    while level < depth {
+        let here = Corners {
+            a: Lambda { l0: a0, l1: a1, l2: a2, l3: a3 },
+            b: Lambda { l0: b0, l1: b1, l2: b2, l3: b3 },
+            c: Lambda { l0: c0, l1: c1, l2: c2, l3: c3 },
+        };
+        let one = corners_in_child(here, 3u32, bit(path, level));
+        let two = corners_in_child(one, 2u32, bit(path, level + 1u32));
+        let three = corners_in_child(two, 1u32, bit(path, level + 2u32));
+        let left = depth - level;
+        let below = Corners {
+            a: pick_lambda(left, one.a, two.a, three.a),
+            b: pick_lambda(left, one.b, two.b, three.b),
+            c: pick_lambda(left, one.c, two.c, three.c),
+        };
+        a0 = below.a.l0;
+        a1 = below.a.l1;
+        a2 = below.a.l2;
+        a3 = below.a.l3;
+        b0 = below.b.l0;
+        b1 = below.b.l1;
+        b2 = below.b.l2;
+        b3 = below.b.l3;
+        c0 = below.c.l0;
+        c1 = below.c.l1;
+        c2 = below.c.l2;
+        c3 = below.c.l3;
+        level += 3u32;
+    }
+    Corners {
+        a: Lambda { l0: a0, l1: a1, l2: a2, l3: a3 },
+        b: Lambda { l0: b0, l1: b1, l2: b2, l3: b3 },
+        c: Lambda { l0: c0, l1: c1, l2: c2, l3: c3 },
+    }
+}
+
+/// How many threads share a face of a meshlet of few faces, which may be large: a power of two.
+#[cube]
+fn threads_per_face(faces: u32) -> u32 {
+    let mut threads = 1u32;
+    while 2u32 * threads * faces <= LANES {
+        threads *= 2u32;
+    }
+    threads
+}
+
+/// A group for each meshlet, a thread for each face, or several where there are few.
 #[cube(launch)]
 pub fn polygons(
     assets: &Assets,
@@ -194,22 +284,28 @@ pub fn polygons(
         let at = meshlets[(item * comptime!(PAIR_WORDS as u32)) as usize];
         let meshlet = meshlets[(item * comptime!(PAIR_WORDS as u32) + 1u32) as usize];
         let d: Direction = direction(directions, maps, at);
-        if UNIT_POS < faces_of(assets, d.shape_a, meshlet, 1u32) {
-            let number_of = faces_of(assets, d.shape_a, meshlet, 0u32) + UNIT_POS;
+        let faces = faces_of(assets, d.shape_a, meshlet, 1u32);
+        let threads = threads_per_face(faces);
+        let mine = UNIT_POS % threads;
+        if UNIT_POS / threads < faces {
+            let number_of = faces_of(assets, d.shape_a, meshlet, 0u32) + UNIT_POS / threads;
             let p: Part = part(assets, d, number_of);
             let center = ball_center(p);
             if !part_is_beyond(assets, d, center, ball_radius(p, center), prune) {
-                counters[products::CANDIDATES as usize].fetch_add(1u32);
+                if mine == 0u32 {
+                    counters[products::CANDIDATES as usize].fetch_add(1u32);
+                }
                 let mut s = Array::<f32>::new(ROOM);
                 let mut t = Array::<f32>::new(ROOM);
                 if entry(assets, d.shape_b, KIND) == MESH {
-                    clip(assets, d, p, counters, words, rows, most, at, number_of, prune, &mut s, &mut t);
-                } else {
+                    clip(assets, d, p, counters, words, rows, most, at, number_of, prune, mine, threads, &mut s, &mut t);
+                } else if mine == 0u32 {
                     start(&mut s, &mut t);
                     write(counters, words, rows, most, at, number_of, NONE, &mut s, &mut t, p.count);
                 }
             }
         }
+        tell_if_broken_off(counters, select(count > 0u32, 2u32, 0u32));
     }
 }
 
@@ -225,6 +321,8 @@ fn clip(
     at: u32,
     face: u32,
     prune: u32,
+    mine: u32,
+    threads: u32,
     s: &mut Array<f32>,
     t: &mut Array<f32>,
 ) {
@@ -234,50 +332,67 @@ fn clip(
     let a = in_cube(assets, shape, p.a);
     let b = in_cube(assets, shape, p.b);
     let c = in_cube(assets, shape, p.c);
-    if beyond {
+    if beyond && mine == 0u32 {
         outside(a, b, c, p.count, counters, words, rows, most, at, face, s, t);
     }
     let nodes = entry(assets, shape, NODES);
     // The first child at each level, and whether its sibling is still to be looked at.
     let mut children = Array::<u32>::new(LEVELS);
-    let mut path = Array::<u32>::new(3usize);
-    let mut waiting = Array::<u32>::new(3usize);
-    let mut root = 0u32;
-    while root < 6u32 {
+    let mut path = Array::<u32>::new(PATH);
+    let mut waiting = Array::<u32>::new(PATH);
+    // One thread goes through the six roots; several share the cells three levels below.
+    let levels = select(threads > 1u32, 3u32, 0u32);
+    let mut part_of = mine;
+    while part_of < 6u32 << levels {
+        let root = part_of >> levels;
         let mut depth = 0u32;
         let mut cell = root;
-        let first_a = in_root(a, root);
-        let first_b = in_root(b, root);
-        let first_c = in_root(c, root);
-        let mut a0 = first_a.l0;
-        let mut a1 = first_a.l1;
-        let mut a2 = first_a.l2;
-        let mut a3 = first_a.l3;
-        let mut b0 = first_b.l0;
-        let mut b1 = first_b.l1;
-        let mut b2 = first_b.l2;
-        let mut b3 = first_b.l3;
-        let mut c0 = first_c.l0;
-        let mut c1 = first_c.l1;
-        let mut c2 = first_c.l2;
-        let mut c3 = first_c.l3;
+        // A cell above stands for all of its part, once.
+        let mut open = true;
+        while depth < levels && open {
+            let word = assets.words[(nodes + cell) as usize];
+            if is_split(word) {
+                let side = (part_of >> (levels - 1u32 - depth)) & 1u32;
+                set_bit(&mut path, depth, side == 1u32);
+                cell = word + side;
+                depth += 1u32;
+            } else {
+                open = false;
+            }
+        }
+        let skipped = depth < levels && (part_of & ((1u32 << (levels - depth)) - 1u32)) != 0u32;
+        let held = at_path(a, b, c, root, &path, depth);
+        let mut a0 = held.a.l0;
+        let mut a1 = held.a.l1;
+        let mut a2 = held.a.l2;
+        let mut a3 = held.a.l3;
+        let mut b0 = held.b.l0;
+        let mut b1 = held.b.l1;
+        let mut b2 = held.b.l2;
+        let mut b3 = held.b.l3;
+        let mut c0 = held.c.l0;
+        let mut c1 = held.c.l1;
+        let mut c2 = held.c.l2;
+        let mut c3 = held.c.l3;
         waiting[0] = 0u32;
         waiting[1] = 0u32;
         waiting[2] = 0u32;
-        let mut open = true;
+        open = !skipped;
         while open {
-            let la = Lambda { l0: a0, l1: a1, l2: a2, l3: a3 };
-            let lb = Lambda { l0: b0, l1: b1, l2: b2, l3: b3 };
-            let lc = Lambda { l0: c0, l1: c1, l2: c2, l3: c3 };
+            let here = Corners {
+                a: Lambda { l0: a0, l1: a1, l2: a2, l3: a3 },
+                b: Lambda { l0: b0, l1: b1, l2: b2, l3: b3 },
+                c: Lambda { l0: c0, l1: c1, l2: c2, l3: c3 },
+            };
             let word = assets.words[(nodes + cell) as usize];
             let mut down = false;
             let mut side = false;
-            if !is_separate(la, lb, lc) && (prune == 0u32 || cell_bound(assets, shape, cell) <= reach) {
+            let k = 3u32 - depth % 3u32;
+            if !is_separate(here.a, here.b, here.c) && (prune == 0u32 || cell_bound(assets, shape, cell) <= reach) {
                 if is_split(word) {
-                    let k = 3u32 - depth % 3u32;
-                    let ha = la.l0 - lambda_at(la, k);
-                    let hb = lb.l0 - lambda_at(lb, k);
-                    let hc = lc.l0 - lambda_at(lc, k);
+                    let ha = a0 - lambda_at(here.a, k);
+                    let hb = b0 - lambda_at(here.b, k);
+                    let hc = c0 - lambda_at(here.c, k);
                     let above = ha > 0.0f32 || hb > 0.0f32 || hc > 0.0f32;
                     let below = ha < 0.0f32 || hb < 0.0f32 || hc < 0.0f32;
                     down = true;
@@ -288,64 +403,44 @@ fn clip(
                 } else if code(word) != 7u32 || beyond {
                     start(s, t);
                     let mut n = p.count;
-                    n = cut(s, t, n, la.l0, lb.l0, lc.l0, 1.0f32);
-                    n = cut(s, t, n, la.l1, lb.l1, lc.l1, 1.0f32);
-                    n = cut(s, t, n, la.l2, lb.l2, lc.l2, 1.0f32);
-                    n = cut(s, t, n, la.l3, lb.l3, lc.l3, 1.0f32);
+                    n = cut(s, t, n, a0, b0, c0, 1.0f32);
+                    n = cut(s, t, n, a1, b1, c1, 1.0f32);
+                    n = cut(s, t, n, a2, b2, c2, 1.0f32);
+                    n = cut(s, t, n, a3, b3, c3, 1.0f32);
                     if n > 0u32 {
                         write(counters, words, rows, most, at, face, cell, s, t, n);
                     }
                 }
             }
+            let next = corners_in_child(here, k, side);
             if down {
-                let k = 3u32 - depth % 3u32;
-                let na = in_child(la, k, side);
-                let nb = in_child(lb, k, side);
-                let nc = in_child(lc, k, side);
-                a0 = na.l0;
-                a1 = na.l1;
-                a2 = na.l2;
-                a3 = na.l3;
-                b0 = nb.l0;
-                b1 = nb.l1;
-                b2 = nb.l2;
-                b3 = nb.l3;
-                c0 = nc.l0;
-                c1 = nc.l1;
-                c2 = nc.l2;
-                c3 = nc.l3;
                 cell = word + select(side, 1u32, 0u32);
                 depth += 1u32;
             } else {
                 // Up to the last level whose sibling waits.
-                while depth > 0u32 && !bit(&waiting, depth - 1u32) {
-                    depth -= 1u32;
-                }
-                if depth == 0u32 {
-                    open = false;
-                } else {
+                depth = last_bit(&waiting);
+                open = depth > 0u32;
+                if open {
                     set_bit(&mut waiting, depth - 1u32, false);
                     set_bit(&mut path, depth - 1u32, true);
                     cell = children[(depth - 1u32) as usize] + 1u32;
-                    let na = at_path(a, root, &path, depth);
-                    let nb = at_path(b, root, &path, depth);
-                    let nc = at_path(c, root, &path, depth);
-                    a0 = na.l0;
-                    a1 = na.l1;
-                    a2 = na.l2;
-                    a3 = na.l3;
-                    b0 = nb.l0;
-                    b1 = nb.l1;
-                    b2 = nb.l2;
-                    b3 = nb.l3;
-                    c0 = nc.l0;
-                    c1 = nc.l1;
-                    c2 = nc.l2;
-                    c3 = nc.l3;
                 }
             }
+            let again = at_path(a, b, c, root, &path, select(down || !open, 0u32, depth));
+            a0 = select(down, next.a.l0, again.a.l0);
+            a1 = select(down, next.a.l1, again.a.l1);
+            a2 = select(down, next.a.l2, again.a.l2);
+            a3 = select(down, next.a.l3, again.a.l3);
+            b0 = select(down, next.b.l0, again.b.l0);
+            b1 = select(down, next.b.l1, again.b.l1);
+            b2 = select(down, next.b.l2, again.b.l2);
+            b3 = select(down, next.b.l3, again.b.l3);
+            c0 = select(down, next.c.l0, again.c.l0);
+            c1 = select(down, next.c.l1, again.c.l1);
+            c2 = select(down, next.c.l2, again.c.l2);
+            c3 = select(down, next.c.l3, again.c.l3);
         }
-        root += 1u32;
+        part_of += threads;
     }
 }
 

@@ -13,10 +13,10 @@ use super::locate::{code, offset};
 use super::narrow::{LANES, named, word_of, write};
 use super::nearest::FAR;
 use super::polygon_distance::{polygon_to_face, weight};
-use super::products::{self, POLYGON_WORDS};
+use super::products::{self, POLYGON_WORDS, tell_if_broken_off};
 use super::surface::{Direction, Part, at_weights, direction, normal, part};
 use super::triangle::{ROWS, distance_squared, face};
-use super::vector::{V3, dot, length, minus, scaled, plus, v3};
+use super::vector::{V3, cross, dot, length, minus, plus, scaled, v3};
 
 /// Pieces that wait.
 const POOL: u32 = 128;
@@ -85,71 +85,75 @@ fn lowest(mine: f32, s: f32, t: f32, shared: &mut Shared<[f32]>) -> V3 {
     v3(value, at_s, at_t)
 }
 
-/// The distance from a point to a face of the field.
+/// Least of four linear functions at weights.
 #[cube]
-fn to(assets: &Assets, shape: u32, position: u32, p: V3) -> f32 {
-    let at = (entry(assets, shape, RECORDS) + position * comptime!(ROWS as u32)) as usize;
-    distance_squared(face(&assets.rows, at), p).sqrt()
+fn least_of(f: V3, g: V3, h: V3, k: V3, a: f32, b: f32, c: f32) -> f32 {
+    let w = v3(a, b, c);
+    dot(f, w).min(dot(g, w)).min(dot(h, w).min(dot(k, w)))
 }
 
-/// Least of four linear functions, given by their values at three corners, at weights.
+/// Where two of them are equal on an edge, the least of all four; `least` when they are not equal there.
 #[cube]
-fn least_of(values: &Array<f32>, a: f32, b: f32, c: f32) -> f32 {
-    let mut least = FAR.runtime();
-    let mut k = 0usize;
-    while k < 4usize {
-        least = least.min(a * values[3usize * k] + b * values[3usize * k + 1usize] + c * values[3usize * k + 2usize]);
-        k += 1usize;
+fn on_edges(least: f32, d: V3, f: V3, g: V3, h: V3, k: V3) -> f32 {
+    let mut greatest = least;
+    if d.x * d.y < 0.0f32 {
+        let w = d.x / (d.x - d.y);
+        greatest = greatest.max(least_of(f, g, h, k, 1.0f32 - w, w, 0.0f32));
     }
-    least
-}
-
-/// The greatest minimum of four linear functions over a triangle: at a corner, where two are equal on an edge, or three inside.
-#[cube]
-fn greatest_minimum(values: &Array<f32>) -> f32 {
-    let mut greatest = least_of(values, 1.0f32, 0.0f32, 0.0f32)
-        .max(least_of(values, 0.0f32, 1.0f32, 0.0f32))
-        .max(least_of(values, 0.0f32, 0.0f32, 1.0f32));
-    let mut k = 0usize;
-    while k < 3usize {
-        let mut l = k + 1usize;
-        while l < 4usize {
-            let dx = values[3usize * k] - values[3usize * l];
-            let dy = values[3usize * k + 1usize] - values[3usize * l + 1usize];
-            let dz = values[3usize * k + 2usize] - values[3usize * l + 2usize];
-            if dx * dy < 0.0f32 {
-                let w = dx / (dx - dy);
-                greatest = greatest.max(least_of(values, 1.0f32 - w, w, 0.0f32));
-            }
-            if dy * dz < 0.0f32 {
-                let w = dy / (dy - dz);
-                greatest = greatest.max(least_of(values, 0.0f32, 1.0f32 - w, w));
-            }
-            if dz * dx < 0.0f32 {
-                let w = dz / (dz - dx);
-                greatest = greatest.max(least_of(values, w, 0.0f32, 1.0f32 - w));
-            }
-            let mut m = l + 1usize;
-            while m < 4usize {
-                let ex = values[3usize * k] - values[3usize * m];
-                let ey = values[3usize * k + 1usize] - values[3usize * m + 1usize];
-                let ez = values[3usize * k + 2usize] - values[3usize * m + 2usize];
-                let wx = dy * ez - dz * ey;
-                let wy = dz * ex - dx * ez;
-                let wz = dx * ey - dy * ex;
-                let sum = wx + wy + wz;
-                let inverse = select(sum == 0.0f32, 0.0f32, 1.0f32 / sum);
-                let inside = wx * inverse >= 0.0f32 && wy * inverse >= 0.0f32 && wz * inverse >= 0.0f32;
-                if inside && sum != 0.0f32 {
-                    greatest = greatest.max(least_of(values, wx * inverse, wy * inverse, wz * inverse));
-                }
-                m += 1usize;
-            }
-            l += 1usize;
-        }
-        k += 1usize;
+    if d.y * d.z < 0.0f32 {
+        let w = d.y / (d.y - d.z);
+        greatest = greatest.max(least_of(f, g, h, k, 0.0f32, 1.0f32 - w, w));
+    }
+    if d.z * d.x < 0.0f32 {
+        let w = d.z / (d.z - d.x);
+        greatest = greatest.max(least_of(f, g, h, k, w, 0.0f32, 1.0f32 - w));
     }
     greatest
+}
+
+/// Where three are equal inside, given two of their differences.
+#[cube]
+fn inside(least: f32, d: V3, e: V3, f: V3, g: V3, h: V3, k: V3) -> f32 {
+    let w = cross(d, e);
+    let sum = w.x + w.y + w.z;
+    let some = sum != 0.0f32;
+    let inverse = select(some, 1.0f32 / select(some, sum, 1.0f32), 0.0f32);
+    let (a, b, c) = (inverse * w.x, inverse * w.y, inverse * w.z);
+    let is_inside = some && a >= 0.0f32 && b >= 0.0f32 && c >= 0.0f32;
+    let mut greatest = least;
+    if is_inside {
+        greatest = greatest.max(least_of(f, g, h, k, a, b, c));
+    }
+    greatest
+}
+
+/// The greatest minimum of four linear functions over a triangle: at a corner, where two are equal on an edge, or three inside. Written out, as
+/// a loop over them is most of the iterations of a search.
+#[cube]
+fn greatest_minimum(f: V3, g: V3, h: V3, k: V3) -> f32 {
+    let (fg, fh, fk) = (minus(f, g), minus(f, h), minus(f, k));
+    let (gh, gk, hk) = (minus(g, h), minus(g, k), minus(h, k));
+    let mut greatest = least_of(f, g, h, k, 1.0f32, 0.0f32, 0.0f32)
+        .max(least_of(f, g, h, k, 0.0f32, 1.0f32, 0.0f32))
+        .max(least_of(f, g, h, k, 0.0f32, 0.0f32, 1.0f32));
+    greatest = on_edges(greatest, fg, f, g, h, k);
+    greatest = on_edges(greatest, fh, f, g, h, k);
+    greatest = on_edges(greatest, fk, f, g, h, k);
+    greatest = on_edges(greatest, gh, f, g, h, k);
+    greatest = on_edges(greatest, gk, f, g, h, k);
+    greatest = on_edges(greatest, hk, f, g, h, k);
+    greatest = inside(greatest, fg, fh, f, g, h, k);
+    greatest = inside(greatest, fg, fk, f, g, h, k);
+    greatest = inside(greatest, fh, fk, f, g, h, k);
+    inside(greatest, gh, gk, f, g, h, k)
+}
+
+/// Distances from three corners to a face.
+#[cube]
+fn distances(assets: &Assets, shape: u32, position: u32, a: V3, b: V3, c: V3) -> V3 {
+    let at = (entry(assets, shape, RECORDS) + position * comptime!(ROWS as u32)) as usize;
+    let f = face(&assets.rows, at);
+    v3(distance_squared(f, a).sqrt(), distance_squared(f, b).sqrt(), distance_squared(f, c).sqrt())
 }
 
 /// A piece of the polygon: where its middle is, the value there, and the bound.
@@ -178,16 +182,12 @@ fn bound_of(
     let here = value_at(assets, d, word, middle);
     let mut bound = here.distance - radius;
     if entry(assets, d.shape_b, KIND) == MESH && here.distance - radius < 0.0f32 {
-        let mut values = Array::<f32>::new(12usize);
-        let mut k = 0u32;
-        while k < 4u32 {
-            let position = select(k == 0u32, here.face, select(k == 1u32, fa, select(k == 2u32, fb, fc)));
-            values[(3u32 * k) as usize] = to(assets, d.shape_b, position, a);
-            values[(3u32 * k + 1u32) as usize] = to(assets, d.shape_b, position, b);
-            values[(3u32 * k + 2u32) as usize] = to(assets, d.shape_b, position, c);
-            k += 1u32;
-        }
-        bound = bound.max(-greatest_minimum(&values));
+        let shape = d.shape_b;
+        let near = distances(assets, shape, here.face, a, b, c);
+        let of_a = distances(assets, shape, fa, a, b, c);
+        let of_b = distances(assets, shape, fb, a, b, c);
+        let of_c = distances(assets, shape, fc, a, b, c);
+        bound = bound.max(-greatest_minimum(near, of_a, of_b, of_c));
     }
     Bound { value: here.distance, bound }
 }
@@ -507,5 +507,6 @@ pub fn narrow_exact(
                 }
             }
         }
+        tell_if_broken_off(counters, select(count > 0u32, 2u32, 0u32));
     }
 }

@@ -9,7 +9,7 @@ use super::locate::{NOT_OF_DOMAIN, offset};
 use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
 use super::pairs::four;
 use super::polygon_distance::weight;
-use super::products::{self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_WORDS, append};
+use super::products::{self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_WORDS, append, tell_if_broken_off};
 use super::surface::{Direction, Part, at_weights, direction, normal, part};
 use super::triangle::{Face, ROWS, distance_squared, face};
 use super::vector::{V3, dot, length, minus, pick, plus_scaled, v3};
@@ -379,5 +379,6 @@ pub fn narrow_faces(
                 write(counters, words, rows, most, d, face_a, named(word, cell), 0u32, 1u32, point, v);
             }
         }
+        tell_if_broken_off(counters, select(count > 0u32, 2u32, 0u32));
     }
 }

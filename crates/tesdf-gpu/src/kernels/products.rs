@@ -18,6 +18,8 @@ pub const CONTACTS: u32 = 4;
 pub const FILTERED: u32 = 5;
 /// Faces or nodes that the broad phase left.
 pub const CANDIDATES: u32 = 6;
+/// Threads whose loops a driver has broken off: see [`tell_if_broken_off`].
+pub const BROKEN_OFF: u32 = 7;
 /// How many counters there are.
 pub const COUNTERS: usize = 8;
 
@@ -43,6 +45,19 @@ pub const CONTACT_ROWS: usize = 3;
 #[cube]
 pub fn append(counters: &[Atomic<u32>], #[comptime] product: u32) -> u32 {
     counters[product as usize].fetch_add(1u32)
+}
+
+/// Counts the thread when the driver breaks off its loops: Mesa's llvmpipe allows a thread 65,535 iterations of all loops together, and goes on as if they had
+/// ended. From then on a loop has one iteration, so this one counts to one instead of two. Called last; `two` is 2, which no compiler may know.
+#[cube]
+pub fn tell_if_broken_off(counters: &[Atomic<u32>], two: u32) {
+    let mut count = 0u32;
+    while count < two {
+        count += 1u32;
+    }
+    if count != two {
+        counters[BROKEN_OFF as usize].fetch_add(1u32);
+    }
 }
 
 /// Groups that a stage needs for `wanted` elements of at most `most`, `per` to a group: x and y.
