@@ -51,7 +51,9 @@ impl Choice {
             Self::Best => Device::choose(None),
             Self::Named(name) => Device::choose(Some(name)),
         };
-        device.map(Some).map_err(|e| Failure::new(e).hint("`tesdf devices` lists them; `cpu` is the processor"))
+        device
+            .map(Some)
+            .map_err(|e| Failure::new(e).hint("`tesdf devices` lists them; `cpu` is the processor"))
     }
 }
 

@@ -6,13 +6,13 @@ use tesdf::collide::{
     CollideOptions, Contacts, FaceMethod, Mode, Scene, Shape, ShapeId, Statistics, reduce_pairs,
 };
 
+use crate::GpuError;
 use crate::contacts::{Row, Words, contacts};
 use crate::device::{Buffer, Device};
 use crate::images::{ImageBytes, Images};
 use crate::instances::Instances;
 use crate::kernels::{broad, clip, exact, narrow, pairs, products};
 use crate::placed::{FieldFrame, Placed};
-use crate::GpuError;
 use tesdf::encode::Length;
 
 /// Most elements of the products that stages hand on.
@@ -360,7 +360,7 @@ impl Detector {
                 room.blocks,
             );
         })?;
-        let mut groups_for = |stages: &mut Stages, most: u32, per: u32, product: u32| {
+        let groups_for = |stages: &mut Stages, most: u32, per: u32, product: u32| {
             stages.run("groups", || {
                 products::groups_for::launch(
                     client,
@@ -480,7 +480,8 @@ impl Detector {
                         })?;
                     }
                     FaceMethod::Exact { tolerance } => {
-                        let tolerances = device.upload("tolerances", &self.tolerances(instances, tolerance))?;
+                        let tolerances =
+                            device.upload("tolerances", &self.tolerances(instances, tolerance))?;
                         self.report.sent += tolerances.bytes();
                         stages.run("exact narrow phase", || {
                             exact::narrow_exact::launch(

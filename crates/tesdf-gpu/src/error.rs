@@ -37,7 +37,9 @@ pub enum GpuError {
         instead: &'static str,
     },
     /// Fixed memory that does not hold what a scene needs. Nothing was lost: there is no result.
-    #[error("{device}: buffer {buffer:?} holds {capacity} elements; the scene needs {needed}. Raise it, or let buffers grow")]
+    #[error(
+        "{device}: buffer {buffer:?} holds {capacity} elements; the scene needs {needed}. Raise it, or let buffers grow"
+    )]
     Full {
         /// Name of the device.
         device: String,

@@ -23,8 +23,7 @@ pub struct Images {
     table: Buffer,
     words: Buffer,
     rows: Buffer,
-    kinds: Vec<u32>,
-    meshlets: Vec<u32>,
+    count: usize,
 }
 
 /// Bytes of an asset's arrays on the device, by what they are.
@@ -52,19 +51,17 @@ impl Images {
     /// A shape that the device cannot hold, by its place.
     pub fn new(device: &Device, shapes: &[&Shape]) -> Result<Self, GpuError> {
         let mut packed = Packed::default();
-        let (mut kinds, mut meshlets) = (Vec::new(), Vec::new());
+        let mut count = 0;
         for (number, shape) in shapes.iter().enumerate() {
             let row = packed.add(shape).map_err(|reason| GpuError::Shape { number, reason })?;
-            kinds.push(row[assets::KIND as usize]);
-            meshlets.push(row[assets::MESHLET_COUNT as usize]);
+            count += 1;
             packed.table.extend(row);
         }
         Ok(Self {
             table: device.upload("shapes", &packed.table)?,
             words: device.upload("words of shapes", &packed.words)?,
             rows: device.upload("rows of shapes", &packed.rows)?,
-            kinds,
-            meshlets,
+            count,
         })
     }
 
@@ -75,17 +72,12 @@ impl Images {
 
     /// Number of shapes.
     pub fn len(&self) -> usize {
-        self.kinds.len()
+        self.count
     }
 
     /// Whether there is no shape.
     pub fn is_empty(&self) -> bool {
-        self.kinds.is_empty()
-    }
-
-    /// Groups of up to 32 faces that a shape's surface is cut into.
-    pub(crate) fn meshlets(&self, shape: usize) -> u32 {
-        self.meshlets[shape]
+        self.count == 0
     }
 
     /// Size on the device.
@@ -140,19 +132,20 @@ impl Packed {
         set(assets::NODES, self.words_at(mesh.nodes.iter().copied())?);
         set(assets::LISTS, self.bytes_at(mesh.lists)?);
         set(assets::PALETTE_STARTS, self.words_at(mesh.palette_starts.iter().copied())?);
-        let halves = mesh.palettes.chunks(2).map(|c| u32::from(c[0]) | u32::from(*c.get(1).unwrap_or(&0)) << 16);
+        let halves =
+            mesh.palettes.chunks(2).map(|c| u32::from(c[0]) | u32::from(*c.get(1).unwrap_or(&0)) << 16);
         set(assets::PALETTES, self.words_at(halves)?);
-        set(
-            assets::PALETTES_HIGH,
-            mesh.palettes_high.map_or(Ok(assets::NONE), |high| self.bytes_at(high))?,
-        );
+        set(assets::PALETTES_HIGH, mesh.palettes_high.map_or(Ok(assets::NONE), |high| self.bytes_at(high))?);
         set(assets::BOUNDS, self.bytes_at(mesh.cell_bounds)?);
         set(assets::CHILDREN, self.words_at(mesh.tree_children.as_flattened().iter().copied())?);
         set(assets::RECORDS, self.rows_at(records(mesh).into_iter().flat_map(four))?);
-        set(assets::BOXES, self.rows_at(mesh.tree_boxes.iter().flat_map(|b| {
-            let (rows, _) = b.as_chunks::<4>();
-            rows.to_vec()
-        }))?);
+        set(
+            assets::BOXES,
+            self.rows_at(mesh.tree_boxes.iter().flat_map(|b| {
+                let (rows, _) = b.as_chunks::<4>();
+                rows.to_vec()
+            }))?,
+        );
         let meshlets = meshlets(mesh);
         set(assets::MESHLETS, self.rows_at(meshlets.iter().map(|&(start, count)| ball(mesh, start, count)))?);
         set(
@@ -275,9 +268,8 @@ fn meshlets(mesh: &Arrays) -> Vec<(u32, u32)> {
 fn ball(mesh: &Arrays, start: u32, count: u32) -> [f32; 4] {
     let faces = &mesh.records[start as usize..(start + count) as usize];
     let corners = faces.iter().flat_map(|r| r.triangle().corners);
-    let (low, high) = corners
-        .clone()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+    let (low, high) =
+        corners.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
     let center: Vec3 = (0.5 * (low + high)).as_vec3();
     let radius = corners.map(|c| c.distance(center.as_dvec3())).fold(0.0, f64::max);
     let radius = radius * (1.0 + GROWN) + GROWN * mesh.cube.side();

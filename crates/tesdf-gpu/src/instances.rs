@@ -2,8 +2,8 @@
 use glam::DVec3;
 use tesdf::collide::{CollideOptions, InstanceId, Scene, Shape, ShapeId};
 
-use crate::placed::{FieldFrame, Placed, split};
 use crate::GpuError;
+use crate::placed::{FieldFrame, Placed, split};
 
 /// All instances, those of a world side by side, by id within it.
 pub struct Instances {

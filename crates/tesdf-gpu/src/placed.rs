@@ -17,7 +17,10 @@ impl FieldFrame {
         match shape {
             Shape::Mesh(asset) => {
                 let arrays = asset.arrays();
-                Self { origin: arrays.frame.to_world(arrays.cube.middle()), unit: arrays.frame.inverse_scale() }
+                Self {
+                    origin: arrays.frame.to_world(arrays.cube.middle()),
+                    unit: arrays.frame.inverse_scale(),
+                }
             }
             _ => Self { origin: DVec3::ZERO, unit: 1.0 },
         }
@@ -50,18 +53,18 @@ impl Placed {
     }
 
     /// From the field's frame to the world.
-    pub fn to_world(&self, p: Vec3) -> DVec3 {
+    pub fn to_world(self, p: Vec3) -> DVec3 {
         self.rotation * (self.unit * p.as_dvec3()) + self.origin
     }
 
     /// Of a direction.
-    pub fn turn(&self, v: Vec3) -> DVec3 {
+    pub fn turn(self, v: Vec3) -> DVec3 {
         self.rotation * v.as_dvec3()
     }
 
     /// Rows for the device, as `kernels::pose` reads them: origin rounded to `f32` and the unit, what rounding left of the origin, the
     /// quaternion x y z w.
-    pub fn rows(&self) -> [[f32; 4]; 3] {
+    pub fn rows(self) -> [[f32; 4]; 3] {
         let (high, low) = split(self.origin);
         [
             [high.x, high.y, high.z, self.unit as f32],

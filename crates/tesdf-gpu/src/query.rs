@@ -47,7 +47,7 @@ pub fn query(
     }
     let placed: Vec<Placed> =
         instances.iter().map(|&(shape, at)| Placed::new(FieldFrame::new(shapes[shape]), at)).collect();
-    let rows: Vec<[f32; 4]> = placed.iter().flat_map(Placed::rows).collect();
+    let rows: Vec<[f32; 4]> = placed.iter().flat_map(|at| at.rows()).collect();
     let numbers: Vec<u32> = instances.iter().map(|&(shape, _)| shape as u32).collect();
     let split_rows = |p: &DVec3| {
         let (high, low) = split(if p.is_finite() { *p } else { DVec3::ZERO });

@@ -17,9 +17,7 @@ use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;
-use tesdf_gpu::{
-    Capacities, Detector, DetectorOptions, Device, Exchange, GpuError, Lanes, Memory, Pruning,
-};
+use tesdf_gpu::{Capacities, Detector, DetectorOptions, Device, Exchange, GpuError, Lanes, Memory, Pruning};
 
 /// What `f32` may be off by, as a share of the larger body: rounding of poses, faces and distances.
 const ROUNDING: f64 = 2e-6;
@@ -146,7 +144,10 @@ fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
             (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
             // Without the filter only what is at the contact distance may be lost.
             _ => {
-                assert!(is_close || options.cos_theta.is_some(), "{key:?}: {h:?} on the host, {d:?} on the device");
+                assert!(
+                    is_close || options.cos_theta.is_some(),
+                    "{key:?}: {h:?} on the host, {d:?} on the device"
+                );
                 others += 1;
             }
         }
@@ -162,14 +163,20 @@ fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
 
 fn each_mode(size: f64) -> [CollideOptions; 4] {
     let face = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(Mode::FACE) };
-    [CollideOptions { mode: Mode::Node, ..face }, CollideOptions { cos_theta: Some(0.3), ..face }, face, CollideOptions { mode: Mode::EXACT, ..face }]
+    [
+        CollideOptions { mode: Mode::Node, ..face },
+        CollideOptions { cos_theta: Some(0.3), ..face },
+        face,
+        CollideOptions { mode: Mode::EXACT, ..face },
+    ]
 }
 
 #[test]
 fn pairs_of_bodies() {
     let mut random = Random(11);
     let mut compared = Compared::default();
-    let names = [["l_bracket", "cube"], ["torus_quads", "tetra"], ["tetra", "l_bracket"], ["beam", "torus_quads"]];
+    let names =
+        [["l_bracket", "cube"], ["torus_quads", "tetra"], ["tetra", "l_bracket"], ["beam", "torus_quads"]];
     for names in names {
         for relation in RELATIONS.into_iter().filter(|r| !matches!(r, Relation::Apart | Relation::Far)) {
             let bodies: [Placed; 2] = relation.place(names, &mut random);
@@ -189,7 +196,11 @@ fn a_nut_on_its_bolt() {
     let nut = Placed { body: body("iso_m16_nut_c25"), at: bolt.at };
     let size = bolt.diagonal();
     for mode in [Mode::Node, Mode::FACE, Mode::EXACT] {
-        let options = CollideOptions { contact_distance: 2e-5, cos_theta: Some(0.3), ..CollideOptions::with_mode(mode) };
+        let options = CollideOptions {
+            contact_distance: 2e-5,
+            cos_theta: Some(0.3),
+            ..CollideOptions::with_mode(mode)
+        };
         let nut = nut.moved(Pose::at(2e-5 * random.direction()));
         hold(&scene(&[bolt.clone(), nut]), &options, size).is_good(50);
     }
@@ -228,7 +239,12 @@ fn simple_shapes_meet_meshes_and_each_other() {
 /// Lists of at most 32 faces: distances of the lists, not of the mesh.
 #[test]
 fn truncated_lists() {
-    let solid = meshes::manifest().into_iter().find(|r| r.name == "torus_quads").expect("a row").solid().expect("solid");
+    let solid = meshes::manifest()
+        .into_iter()
+        .find(|r| r.name == "torus_quads")
+        .expect("a row")
+        .solid()
+        .expect("solid");
     let options = EncodeOptions { max_entries: Some(8), ..EncodeOptions::preset(Preset::Fast) };
     let asset: TeSdf =
         encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");

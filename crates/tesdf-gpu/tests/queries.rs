@@ -25,11 +25,11 @@ fn distances_are_those_of_the_host() {
         let Shape::Mesh(asset) = shape else { unreachable!("all are meshes") };
         let (bounds, diagonal) = (asset.bounds(), shape.diagonal());
         // A scale that is no power of two, and far from the origin.
-        let pose = Pose { translation: 100.0 * diagonal * random.direction(), rotation: rotation(&mut random) };
+        let pose =
+            Pose { translation: 100.0 * diagonal * random.direction(), rotation: rotation(&mut random) };
         let at = Placement { pose, scale: 1.7 };
-        let mut points: Vec<DVec3> = (0..600)
-            .map(|_| bounds.center() + 0.8 * bounds.extent() * random.in_cube())
-            .collect();
+        let mut points: Vec<DVec3> =
+            (0..600).map(|_| bounds.center() + 0.8 * bounds.extent() * random.in_cube()).collect();
         // Near the surface, on it, and far away.
         for k in 0..300 {
             let corners = asset.face_corners(k * 7 % asset.face_count());
@@ -45,13 +45,22 @@ fn distances_are_those_of_the_host() {
             // Far away `f32` is relative to the distance.
             let size = (at.scale * diagonal).max(expected.abs());
             let error = (answer.signed_distance - expected).abs() / size;
-            assert!(error <= DISTANCE, "{}: {p}: {} instead of {expected}", names[number], answer.signed_distance);
+            assert!(
+                error <= DISTANCE,
+                "{}: {p}: {} instead of {expected}",
+                names[number],
+                answer.signed_distance
+            );
             off = off.max(error);
             assert!((answer.gradient.length() - 1.0).abs() < 1e-5);
             // The way to the surface is along the gradient: of faces that are as near any may be named.
             for on in [answer.closest_point, at.to_world(*p) - answer.signed_distance * answer.gradient] {
                 let distance = at.scale * asset.signed_distance(at.to_shape(on), Precision::F64);
-                assert!(distance.abs() < 3.0 * DISTANCE * size, "{}: {p}: {distance} off the surface", names[number]);
+                assert!(
+                    distance.abs() < 3.0 * DISTANCE * size,
+                    "{}: {p}: {distance} off the surface",
+                    names[number]
+                );
             }
         }
         println!("{}: off by {off:.1e} of the diagonal", names[number]);
@@ -116,8 +125,12 @@ fn what_cannot_be_is_an_error() {
     let shapes = [&Shape::Plane];
     let images = Images::new(&device, &shapes).expect("fits");
     let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
-    let error = query(&device, &images, &shapes, &[(0, at), (3, at)], &[DVec3::ZERO]).expect_err("no shape 3");
+    let error =
+        query(&device, &images, &shapes, &[(0, at), (3, at)], &[DVec3::ZERO]).expect_err("no shape 3");
     assert_eq!(error.to_string(), "instance 1: shape 3; expected one of 1");
     let error = Device::choose(Some("no such device")).expect_err("no such device");
-    assert!(error.to_string().starts_with("no device is named \"no such device\"; this machine has 0: "), "{error}");
+    assert!(
+        error.to_string().starts_with("no device is named \"no such device\"; this machine has 0: "),
+        "{error}"
+    );
 }

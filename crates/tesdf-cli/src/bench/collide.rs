@@ -363,7 +363,10 @@ fn text(r: &Report) -> String {
     line("device", r.device.clone());
     line(
         "scene",
-        format!("{} instances in {} worlds, {} frames, {} times each", r.instances, r.worlds, r.frames, r.repeat),
+        format!(
+            "{} instances in {} worlds, {} frames, {} times each",
+            r.instances, r.worlds, r.frames, r.repeat
+        ),
     );
     line("ordered pairs", spread(&r.counts.directions));
     if r.launches > 0 {

@@ -62,8 +62,8 @@ pub struct Args {
 /// # Errors
 /// The file cannot be written, or there is no current folder.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let data = std::path::absolute(&args.data)
-        .map_err(|e| Failure::new(format!("{}: {e}", args.data.display())))?;
+    let data =
+        std::path::absolute(&args.data).map_err(|e| Failure::new(format!("{}: {e}", args.data.display())))?;
     let file = args.scene.poses(&data, args.frames, &mut fastrand::Rng::with_seed(args.seed));
     let bytes = serde_json::to_vec(&file).map_err(Failure::new)?;
     save_atomic(&args.output, &bytes).map_err(Failure::new)?;

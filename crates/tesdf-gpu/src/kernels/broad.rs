@@ -2,7 +2,10 @@
 //! distance than the point less `r`.
 use cubecl::prelude::*;
 
-use super::assets::{Assets, BOUND_UNIT, BOUNDS, EXACT_LISTS, HIGH, KIND, LOW, MESH, MESHLET_COUNT, MESHLETS, NONE, byte, entry, number, vector};
+use super::assets::{
+    Assets, BOUND_UNIT, BOUNDS, EXACT_LISTS, HIGH, KIND, LOW, MESH, MESHLET_COUNT, MESHLETS, NONE, byte,
+    entry, number, vector,
+};
 use super::field::{is_listed, nearest, simple_value, value_of};
 use super::locate::{code, offset, place};
 use super::nearest::nearest_in_tree;
@@ -92,7 +95,8 @@ pub fn meshlets(
             let mut kept = true;
             if entry(assets, d.shape_a, KIND) == MESH {
                 let ball = assets.rows[(entry(assets, d.shape_a, MESHLETS) + meshlet) as usize];
-                let center = to_field(d, v3(ball.extract(0usize), ball.extract(1usize), ball.extract(2usize)));
+                let center =
+                    to_field(d, v3(ball.extract(0usize), ball.extract(1usize), ball.extract(2usize)));
                 kept = !is_beyond(assets, d.shape_b, center, d.scale * ball.extract(3usize), d.reach, prune);
             }
             if kept {

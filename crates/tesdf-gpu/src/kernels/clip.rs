@@ -7,10 +7,14 @@ use cubecl::prelude::*;
 
 use super::assets::{Assets, BAND, FACE_COUNT, KIND, MESH, MESHLET_FACES, NODES, NONE, entry, number};
 use super::broad::{cell_bound, part_is_beyond};
-use super::locate::{Lambda, NOT_OF_DOMAIN, code, coordinate, in_child, in_cube, in_root, is_split, lambda_at, place};
+use super::locate::{
+    Lambda, NOT_OF_DOMAIN, code, coordinate, in_child, in_cube, in_root, is_split, lambda_at, place,
+};
 use super::narrow::{LANES, node};
 use super::pairs::four;
-use super::products::{self, PAIR_WORDS, POLYGON_ROWS, POLYGON_VERTICES, POLYGON_WORDS, append, tell_if_broken_off};
+use super::products::{
+    self, PAIR_WORDS, POLYGON_ROWS, POLYGON_VERTICES, POLYGON_WORDS, append, tell_if_broken_off,
+};
 use super::surface::{Direction, Part, ball_center, ball_radius, direction, part};
 use super::vector::V3;
 
@@ -132,7 +136,8 @@ fn write(
         let row = (slot * comptime!(POLYGON_ROWS as u32)) as usize;
         let mut k = 0usize;
         while k < POLYGON_ROWS {
-            rows[row + k] = four(s[2usize * k], t[2usize * k], s[2usize * k + 1usize], t[2usize * k + 1usize]);
+            rows[row + k] =
+                four(s[2usize * k], t[2usize * k], s[2usize * k + 1usize], t[2usize * k + 1usize]);
             k += 1usize;
         }
     }
@@ -149,7 +154,10 @@ fn is_out(a: f32, b: f32, c: f32) -> bool {
 /// Whether a face is all on the outer side of a side of a cell.
 #[cube]
 fn is_separate(a: Lambda, b: Lambda, c: Lambda) -> bool {
-    is_out(a.l0, b.l0, c.l0) || is_out(a.l1, b.l1, c.l1) || is_out(a.l2, b.l2, c.l2) || is_out(a.l3, b.l3, c.l3)
+    is_out(a.l0, b.l0, c.l0)
+        || is_out(a.l1, b.l1, c.l1)
+        || is_out(a.l2, b.l2, c.l2)
+        || is_out(a.l3, b.l3, c.l3)
 }
 
 /// Side taken at a level, of three words of bits.
@@ -298,7 +306,10 @@ pub fn polygons(
                 let mut s = Array::<f32>::new(ROOM);
                 let mut t = Array::<f32>::new(ROOM);
                 if entry(assets, d.shape_b, KIND) == MESH {
-                    clip(assets, d, p, counters, words, rows, most, at, number_of, prune, mine, threads, &mut s, &mut t);
+                    clip(
+                        assets, d, p, counters, words, rows, most, at, number_of, prune, mine, threads,
+                        &mut s, &mut t,
+                    );
                 } else if mine == 0u32 {
                     start(&mut s, &mut t);
                     write(counters, words, rows, most, at, number_of, NONE, &mut s, &mut t, p.count);
@@ -388,7 +399,9 @@ fn clip(
             let mut down = false;
             let mut side = false;
             let k = 3u32 - depth % 3u32;
-            if !is_separate(here.a, here.b, here.c) && (prune == 0u32 || cell_bound(assets, shape, cell) <= reach) {
+            if !is_separate(here.a, here.b, here.c)
+                && (prune == 0u32 || cell_bound(assets, shape, cell) <= reach)
+            {
                 if is_split(word) {
                     let ha = a0 - lambda_at(here.a, k);
                     let hb = b0 - lambda_at(here.b, k);

@@ -7,7 +7,7 @@ use cubecl::prelude::*;
 
 use super::assets::{Assets, KIND, MESH, RECORDS, entry};
 use super::broad::ROUNDING;
-use super::field::{Value, is_listed, nearest, simple_value, value_of};
+use super::field::{is_listed, value_in_cell};
 use super::list::{list, list_face};
 use super::locate::{code, offset};
 use super::narrow::{LANES, named, word_of, write};
@@ -24,43 +24,6 @@ const POOL: u32 = 128;
 const ROUNDS: u32 = 96;
 /// Closer to the surface than this a polygon may cross it.
 const CLEAR: f32 = 1e-6;
-
-/// The field at a point of the polygon's cell, by one thread.
-#[cube]
-fn value_at(assets: &Assets, d: Direction, word: u32, p: V3) -> Value {
-    let mut distance = FAR.runtime();
-    let mut gx = 0.0f32;
-    let mut gy = 0.0f32;
-    let mut gz = 0.0f32;
-    let mut px = 0.0f32;
-    let mut py = 0.0f32;
-    let mut pz = 0.0f32;
-    let mut position = 0u32;
-    let mut feature = 0u32;
-    if entry(assets, d.shape_b, KIND) == MESH {
-        let v = value_of(assets, d.shape_b, word, p, nearest(assets, d.shape_b, word, p));
-        distance = v.distance;
-        gx = v.gradient.x;
-        gy = v.gradient.y;
-        gz = v.gradient.z;
-        px = v.point.x;
-        py = v.point.y;
-        pz = v.point.z;
-        position = v.face;
-        feature = v.feature;
-    } else {
-        let v = simple_value(assets, d.shape_b, p);
-        distance = v.distance;
-        gx = v.gradient.x;
-        gy = v.gradient.y;
-        gz = v.gradient.z;
-        px = v.point.x;
-        py = v.point.y;
-        pz = v.point.z;
-        position = v.face;
-    }
-    Value { distance, gradient: v3(gx, gy, gz), point: v3(px, py, pz), face: position, feature }
-}
 
 /// The lowest value over the group, and where; of equal ones that of the lowest thread. All threads call it.
 #[cube]
@@ -179,7 +142,7 @@ fn bound_of(
 ) -> Bound {
     let middle = scaled(0.33333334f32, plus(plus(a, b), c));
     let radius = length(minus(a, middle)).max(length(minus(b, middle))).max(length(minus(c, middle)));
-    let here = value_at(assets, d, word, middle);
+    let here = value_in_cell(assets, d.shape_b, word, middle);
     let mut bound = here.distance - radius;
     if entry(assets, d.shape_b, KIND) == MESH && here.distance - radius < 0.0f32 {
         let shape = d.shape_b;
@@ -291,7 +254,7 @@ pub fn narrow_exact(
             radius = radius.max(length(minus(p, center)));
             i += 1u32;
         }
-        let at_center = value_at(assets, d, word, center);
+        let at_center = value_in_cell(assets, d.shape_b, word, center);
         let kind = code(word);
         let is_inside = kind == 1u32 || (kind == 6u32 && offset(word) == 1u32);
         let crossing = kind >= 2u32 && kind <= 5u32;
@@ -321,7 +284,7 @@ pub fn narrow_exact(
             let nearest_point = lowest(mine, s, t, &mut exchange);
             best_s = nearest_point.y;
             best_t = nearest_point.z;
-            best = value_at(assets, d, word, at_weights(surface, best_s, best_t)).distance;
+            best = value_in_cell(assets, d.shape_b, word, at_weights(surface, best_s, best_t)).distance;
             // It may cross the surface, or be all inside.
             search = crossing && (nearest_point.x <= CLEAR || best < 0.0f32);
         }
@@ -354,7 +317,7 @@ pub fn narrow_exact(
                 while k < 3u32 {
                     let ws = select(k == 0u32, sa, select(k == 1u32, sb, sc));
                     let wt = select(k == 0u32, ta, select(k == 1u32, tb, tc));
-                    let v = value_at(assets, d, word, at_weights(surface, ws, wt));
+                    let v = value_in_cell(assets, d.shape_b, word, at_weights(surface, ws, wt));
                     fa = select(k == 0u32, v.face, fa);
                     fb = select(k == 1u32, v.face, fb);
                     fc = select(k == 2u32, v.face, fc);
@@ -415,7 +378,8 @@ pub fn narrow_exact(
                         let (qsa, qta) = (pool[from], pool[from + 1usize]);
                         let (qsb, qtb) = (pool[from + 2usize], pool[from + 3usize]);
                         let (qsc, qtc) = (pool[from + 4usize], pool[from + 5usize]);
-                        let (qfa, qfb, qfc) = (pool_faces[ids], pool_faces[ids + 1usize], pool_faces[ids + 2usize]);
+                        let (qfa, qfb, qfc) =
+                            (pool_faces[ids], pool_faces[ids + 1usize], pool_faces[ids + 2usize]);
                         let pa = at_weights(surface, qsa, qta);
                         let pb = at_weights(surface, qsb, qtb);
                         let pc = at_weights(surface, qsc, qtc);
@@ -437,7 +401,7 @@ pub fn narrow_exact(
                         sm = 0.5f32 * (sa + sb);
                         tm = 0.5f32 * (ta + tb);
                         let m = at_weights(surface, sm, tm);
-                        let at_m = value_at(assets, d, word, m);
+                        let at_m = value_in_cell(assets, d.shape_b, word, m);
                         fm = at_m.face;
                         value = at_m.distance;
                         s = sm;
@@ -476,11 +440,39 @@ pub fn narrow_exact(
                 let (mine, all) = before(kept, &mut kept_by);
                 let mut to_place = base + mine;
                 if first_kept {
-                    put(&mut pool, &mut pool_faces, to_place, sa, ta, sm, tm, sc, tc, first_bound, fa, fm, fc);
+                    put(
+                        &mut pool,
+                        &mut pool_faces,
+                        to_place,
+                        sa,
+                        ta,
+                        sm,
+                        tm,
+                        sc,
+                        tc,
+                        first_bound,
+                        fa,
+                        fm,
+                        fc,
+                    );
                     to_place += 1u32;
                 }
                 if second_kept {
-                    put(&mut pool, &mut pool_faces, to_place, sb, tb, sm, tm, sc, tc, second_bound, fb, fm, fc);
+                    put(
+                        &mut pool,
+                        &mut pool_faces,
+                        to_place,
+                        sb,
+                        tb,
+                        sm,
+                        tm,
+                        sc,
+                        tc,
+                        second_bound,
+                        fb,
+                        fm,
+                        fc,
+                    );
                 }
                 let found = lowest(value, s, t, &mut exchange);
                 if found.x < best {
@@ -498,12 +490,24 @@ pub fn narrow_exact(
         }
         if within && best <= reach && UNIT_POS == 0u32 {
             let point = at_weights(surface, best_s, best_t);
-            let v = value_at(assets, d, word, point);
+            let v = value_in_cell(assets, d.shape_b, word, point);
             if v.distance <= reach {
                 if surface.count == 3u32 && dot(v.gradient, up) > -cos_theta {
                     counters[products::FILTERED as usize].fetch_add(1u32);
                 } else {
-                    write(counters, words, rows, most, d, face_a, named(word, cell), 0u32, select(converged, 1u32, 0u32), point, v);
+                    write(
+                        counters,
+                        words,
+                        rows,
+                        most,
+                        d,
+                        face_a,
+                        named(word, cell),
+                        0u32,
+                        select(converged, 1u32, 0u32),
+                        point,
+                        v,
+                    );
                 }
             }
         }

@@ -3,9 +3,14 @@
 //! Points are in the frame of the field: for a mesh its local frame relative to the middle of the cube, for a simple shape its own.
 use cubecl::prelude::*;
 
-use super::assets::{Assets, BOX, EXACT_LISTS, KIND, LISTS, MESH, NODES, PLANE, RECORDS, SIDE, SIZES, byte, entry, number, vector};
+use super::assets::{
+    Assets, BOX, KIND, LISTS, MESH, NODES, PLANE, RECORDS, SIDE, SIZES, byte, entry, number,
+    vector,
+};
 use super::list::{list, list_face};
-use super::locate::{Lambda, Place, code, in_child, in_cube, in_root, is_split, lambda_at, next_k, offset, place, root};
+use super::locate::{
+    Lambda, NOT_OF_DOMAIN, code, in_child, in_cube, in_root, is_split, lambda_at, next_k, offset, place, root,
+};
 use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
 use super::triangle::{PART, ROWS, closest, corner, face};
 use super::vector::{V3, cross, dot, length, minus, pick, plus, scaled, v3};
@@ -35,20 +40,22 @@ pub fn is_listed(word: u32) -> bool {
     code(word) <= 5u32
 }
 
-/// The nearest face to a point of a cell.
+/// The nearest face to a point of a cell; none of a simple shape.
 #[cube]
 pub fn nearest(assets: &Assets, shape: u32, word: u32, p: V3) -> Nearest {
     let mut squared = FAR.runtime();
     let mut position = u32::MAX.runtime();
-    if is_listed(word) {
-        let faces = list(assets, shape, offset(word));
-        let found = nearest_in_list(assets, shape, faces, 0u32, 1u32, p);
-        squared = found.squared;
-        position = found.face;
-    } else {
-        let found = nearest_in_tree(assets, shape, p, FAR);
-        squared = found.squared;
-        position = found.face;
+    if entry(assets, shape, KIND) == MESH {
+        if is_listed(word) {
+            let faces = list(assets, shape, offset(word));
+            let found = nearest_in_list(assets, shape, faces, 0u32, 1u32, p);
+            squared = found.squared;
+            position = found.face;
+        } else {
+            let found = nearest_in_tree(assets, shape, p, FAR);
+            squared = found.squared;
+            position = found.face;
+        }
     }
     Nearest { squared, face: position }
 }
@@ -74,7 +81,8 @@ pub fn value_of(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest)
     // Without a normal the face is an edge, and there is no better direction.
     let along = scaled(sign / distance.max(1e-30f32), c.outward);
     // In the plane of a face the height knows the direction better than the difference of two points.
-    let normal = scaled(select(c.feature == 0u32 && (c.height < 0.0f32) != inside, -1.0f32, 1.0f32), f.normal);
+    let normal =
+        scaled(select(c.feature == 0u32 && (c.height < 0.0f32) != inside, -1.0f32, 1.0f32), f.normal);
     let flat = dot(f.normal, f.normal) < 0.5f32;
     let by_normal = !flat && (distance < ON_SURFACE || c.feature == 0u32);
     let on_surface = pick(distance < ON_SURFACE, f.normal, normal);
@@ -203,7 +211,8 @@ pub fn simple_value(assets: &Assets, shape: u32, p: V3) -> Value {
     let from_core = minus(p, core);
     let reach = length(from_core);
     let on_core = reach <= 0.0f32;
-    let round_gradient = pick(on_core, v3(1.0f32, 0.0f32, 0.0f32), scaled(1.0f32 / reach.max(1e-30f32), from_core));
+    let round_gradient =
+        pick(on_core, v3(1.0f32, 0.0f32, 0.0f32), scaled(1.0f32 / reach.max(1e-30f32), from_core));
     let mut distance = reach - sizes.y;
     let mut gx = round_gradient.x;
     let mut gy = round_gradient.y;
@@ -216,7 +225,8 @@ pub fn simple_value(assets: &Assets, shape: u32, p: V3) -> Value {
         gz = 1.0f32;
     }
     if kind == BOX {
-        let clamped = v3(p.x.clamp(-sizes.x, sizes.x), p.y.clamp(-sizes.y, sizes.y), p.z.clamp(-sizes.z, sizes.z));
+        let clamped =
+            v3(p.x.clamp(-sizes.x, sizes.x), p.y.clamp(-sizes.y, sizes.y), p.z.clamp(-sizes.z, sizes.z));
         let outward = minus(p, clamped);
         let depth = minus(sizes, v3(p.x.abs(), p.y.abs(), p.z.abs()));
         let x_least = depth.x <= depth.y && depth.x <= depth.z;
@@ -237,9 +247,9 @@ pub fn simple_value(assets: &Assets, shape: u32, p: V3) -> Value {
     Value { distance, gradient, point: plus(p, scaled(-distance, gradient)), face: side, feature: 0u32 }
 }
 
-/// The value at any point of any shape, and the cell that answered.
+/// The value at a point of a cell, of any shape, when the nearest face is known.
 #[cube]
-pub fn value(assets: &Assets, shape: u32, p: V3) -> Value {
+pub fn value_near(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest) -> Value {
     let mut distance = 0.0f32;
     let mut gx = 0.0f32;
     let mut gy = 0.0f32;
@@ -250,8 +260,7 @@ pub fn value(assets: &Assets, shape: u32, p: V3) -> Value {
     let mut position = 0u32;
     let mut feature = 0u32;
     if entry(assets, shape, KIND) == MESH {
-        let held: Place = place(assets, shape, p);
-        let v = value_of(assets, shape, held.word, p, nearest(assets, shape, held.word, p));
+        let v = value_of(assets, shape, word, p, nearest);
         distance = v.distance;
         gx = v.gradient.x;
         gy = v.gradient.y;
@@ -275,20 +284,18 @@ pub fn value(assets: &Assets, shape: u32, p: V3) -> Value {
     Value { distance, gradient: v3(gx, gy, gz), point: v3(px, py, pz), face: position, feature }
 }
 
-/// The true distance at a point, negative inside, also where lists are not known to be exact; for leaving out what is beyond reach.
+/// The value at a point of a cell, of any shape.
 #[cube]
-pub fn rough(assets: &Assets, shape: u32, p: V3) -> f32 {
-    let mut distance = 0.0f32;
+pub fn value_in_cell(assets: &Assets, shape: u32, word: u32, p: V3) -> Value {
+    value_near(assets, shape, word, p, nearest(assets, shape, word, p))
+}
+
+/// The value at any point of any shape.
+#[cube]
+pub fn value(assets: &Assets, shape: u32, p: V3) -> Value {
+    let mut word = NOT_OF_DOMAIN.runtime();
     if entry(assets, shape, KIND) == MESH {
-        let held = place(assets, shape, p);
-        let found = nearest(assets, shape, held.word, p);
-        distance = value_of(assets, shape, held.word, p, found).distance;
-        if is_listed(held.word) && entry(assets, shape, EXACT_LISTS) == 0u32 {
-            let sign = select(distance < 0.0f32, -1.0f32, 1.0f32);
-            distance = sign * nearest_in_tree(assets, shape, p, FAR).squared.sqrt();
-        }
-    } else {
-        distance = simple_value(assets, shape, p).distance;
+        word = place(assets, shape, p).word;
     }
-    distance
+    value_in_cell(assets, shape, word, p)
 }

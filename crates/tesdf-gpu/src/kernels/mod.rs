@@ -1,4 +1,13 @@
 //! Code of the device. A function with `#[cube]` is also a function of the host, which tests compare it with.
+#![allow(
+    unused_assignments,
+    clippy::manual_clamp,
+    clippy::manual_div_ceil,
+    clippy::manual_is_multiple_of,
+    clippy::manual_range_contains,
+    clippy::too_many_arguments,
+    reason = "kernels have no values of branches, no methods of newer Rust, and one argument a buffer"
+)]
 pub mod assets;
 pub mod broad;
 pub mod clip;

@@ -3,10 +3,10 @@ use cubecl::prelude::*;
 
 use super::assets::{Assets, KIND, MESH, NODES, NONE, RECORDS, entry};
 use super::broad::ROUNDING;
-use super::field::{Value, is_listed, nearest, simple_value, value_of};
+use super::field::{Value, is_listed, nearest, value_in_cell, value_near};
 use super::list::{List, list, list_face};
 use super::locate::{NOT_OF_DOMAIN, offset};
-use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
+use super::nearest::{FAR, Nearest, nearest_in_list};
 use super::pairs::four;
 use super::polygon_distance::weight;
 use super::products::{self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_WORDS, append, tell_if_broken_off};
@@ -96,16 +96,9 @@ pub fn narrow_nodes(
         let corner = items[first + 3usize];
         let p = node(part(assets, d, face), corner);
         let word = word_of(assets, d.shape_b, cell);
-        if entry(assets, d.shape_b, KIND) == MESH {
-            let v = value_of(assets, d.shape_b, word, p, nearest(assets, d.shape_b, word, p));
-            if v.distance <= d.reach + d.radius {
-                write(counters, words, rows, most, d, face, named(word, cell), corner, 1u32, p, v);
-            }
-        } else {
-            let v = simple_value(assets, d.shape_b, p);
-            if v.distance <= d.reach + d.radius {
-                write(counters, words, rows, most, d, face, NONE, corner, 1u32, p, v);
-            }
+        let v = value_in_cell(assets, d.shape_b, word, p);
+        if v.distance <= d.reach + d.radius {
+            write(counters, words, rows, most, d, face, named(word, cell), corner, 1u32, p, v);
         }
     }
 }
@@ -162,64 +155,27 @@ fn value_in(
     #[comptime] planes: bool,
 ) -> Value {
     let shape = d.shape_b;
-    let mut distance = FAR.runtime();
-    let mut gx = 0.0f32;
-    let mut gy = 0.0f32;
-    let mut gz = 0.0f32;
-    let mut px = 0.0f32;
-    let mut py = 0.0f32;
-    let mut pz = 0.0f32;
-    let mut face_of = 0u32;
-    let mut feature = 0u32;
-    if entry(assets, shape, KIND) == MESH {
-        let mut squared = FAR.runtime();
-        let mut nearest_face = NONE.runtime();
-        if is_listed(word) {
-            let first = select(lanes == 1u32, 0u32, UNIT_POS);
-            if first < faces.count {
-                squared = distance_squared(own, p);
-                nearest_face = position;
-            }
-            let rest = nearest_in_list(assets, shape, faces, first + lanes, lanes, p);
-            let nearer = rest.squared < squared || (rest.squared == squared && rest.face < nearest_face);
-            squared = select(nearer, rest.squared, squared);
-            nearest_face = select(nearer, rest.face, nearest_face);
-            let all = least(Nearest { squared, face: nearest_face }, squares, ids, lanes, planes);
-            squared = all.squared;
-            nearest_face = all.face;
-        } else {
-            let found = nearest_in_tree(assets, shape, p, FAR);
-            squared = found.squared;
-            nearest_face = found.face;
+    let mut squared = FAR.runtime();
+    let mut nearest_face = NONE.runtime();
+    if entry(assets, shape, KIND) == MESH && is_listed(word) {
+        let first = select(lanes == 1u32, 0u32, UNIT_POS);
+        if first < faces.count {
+            squared = distance_squared(own, p);
+            nearest_face = position;
         }
-        let v = value_of(assets, shape, word, p, Nearest { squared, face: nearest_face });
-        distance = v.distance;
-        gx = v.gradient.x;
-        gy = v.gradient.y;
-        gz = v.gradient.z;
-        px = v.point.x;
-        py = v.point.y;
-        pz = v.point.z;
-        face_of = v.face;
-        feature = v.feature;
+        let rest = nearest_in_list(assets, shape, faces, first + lanes, lanes, p);
+        let nearer = rest.squared < squared || (rest.squared == squared && rest.face < nearest_face);
+        squared = select(nearer, rest.squared, squared);
+        nearest_face = select(nearer, rest.face, nearest_face);
+        let all = least(Nearest { squared, face: nearest_face }, squares, ids, lanes, planes);
+        squared = all.squared;
+        nearest_face = all.face;
     } else {
-        let v = simple_value(assets, shape, p);
-        distance = v.distance;
-        gx = v.gradient.x;
-        gy = v.gradient.y;
-        gz = v.gradient.z;
-        px = v.point.x;
-        py = v.point.y;
-        pz = v.point.z;
-        face_of = v.face;
+        let found = nearest(assets, shape, word, p);
+        squared = found.squared;
+        nearest_face = found.face;
     }
-    Value {
-        distance,
-        gradient: v3(gx, gy, gz),
-        point: v3(px, py, pz),
-        face: face_of,
-        feature,
-    }
+    value_near(assets, shape, word, p, Nearest { squared, face: nearest_face })
 }
 
 /// Frank–Wolfe on Eq. (9): from the best of centre and vertices, `iterations` steps of 2 / (k + 2) towards the vertex that lies farthest down
@@ -264,7 +220,10 @@ pub fn narrow_faces(
         if is_listed(word) && lane < faces.count {
             position = list_face(assets, d.shape_b, faces, lane);
         }
-        let own = face(&assets.rows, (entry(assets, d.shape_b, RECORDS) + position * comptime!(ROWS as u32)) as usize);
+        let own = face(
+            &assets.rows,
+            (entry(assets, d.shape_b, RECORDS) + position * comptime!(ROWS as u32)) as usize,
+        );
         let mut center_s = 0.0f32;
         let mut center_t = 0.0f32;
         let mut i = 0u32;
@@ -338,7 +297,8 @@ pub fn narrow_faces(
                 t = at_t + step * (to_t - at_t);
             }
             let p = at_weights(surface, s, t);
-            let here = value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
+            let here =
+                value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
             // The start is the best of centre and vertices.
             let moves = is_step || here.distance < at_value;
             at_s = select(moves, s, at_s);

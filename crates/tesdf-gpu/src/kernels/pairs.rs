@@ -87,8 +87,22 @@ pub fn instance_pairs(
                 let pose_j = pose(rows, j_rows as usize);
                 let at = counters[DIRECTIONS as usize].fetch_add(2u32);
                 if at + 2u32 <= most_directions {
-                    write_direction(assets, directions, maps, at, i, j, shape, other, pose_i, pose_j, distance);
-                    write_direction(assets, directions, maps, at + 1u32, j, i, other, shape, pose_j, pose_i, distance);
+                    write_direction(
+                        assets, directions, maps, at, i, j, shape, other, pose_i, pose_j, distance,
+                    );
+                    write_direction(
+                        assets,
+                        directions,
+                        maps,
+                        at + 1u32,
+                        j,
+                        i,
+                        other,
+                        shape,
+                        pose_j,
+                        pose_i,
+                        distance,
+                    );
                     write_blocks(assets, counters, blocks, at, shape, most_blocks);
                     write_blocks(assets, counters, blocks, at + 1u32, other, most_blocks);
                 }

@@ -62,7 +62,13 @@ pub fn tell_if_broken_off(counters: &[Atomic<u32>], two: u32) {
 
 /// Groups that a stage needs for `wanted` elements of at most `most`, `per` to a group: x and y.
 #[cube(launch)]
-pub fn groups_for(counters: &[Atomic<u32>], groups: &mut [u32], most: u32, per: u32, #[comptime] product: u32) {
+pub fn groups_for(
+    counters: &[Atomic<u32>],
+    groups: &mut [u32],
+    most: u32,
+    per: u32,
+    #[comptime] product: u32,
+) {
     if ABSOLUTE_POS == 0usize {
         let count = counters[product as usize].load().min(most);
         let needed = (count + per - 1u32) / per;

@@ -1,7 +1,7 @@
 //! Signed distances of many points to many instances.
 use cubecl::prelude::*;
 
-use super::assets::{Assets, AssetsExpand};
+use super::assets::Assets;
 use super::field::value;
 use super::pose::{ROWS, difference, pose, turn_back};
 use super::vector::{scaled, v3};

@@ -1,7 +1,9 @@
 //! One body's surface as the field of another sees it.
 use cubecl::prelude::*;
 
-use super::assets::{Assets, BOX, HIGH, KIND, LOW, MESH, OWNED_CORNERS, PLANE, RECORDS, ROUND, SIZES, entry, vector};
+use super::assets::{
+    Assets, HIGH, KIND, LOW, MESH, OWNED_CORNERS, PLANE, RECORDS, ROUND, SIZES, entry, vector,
+};
 use super::products::{DIRECTION_ROWS, DIRECTION_WORDS};
 use super::triangle::{ROWS, corner, face};
 use super::vector::{V3, cross, dot, length, minus, pick, plus, plus_scaled, scaled, v3};
@@ -172,9 +174,4 @@ pub fn ball_radius(p: Part, center: V3) -> f32 {
 #[cube]
 pub fn at_weights(p: Part, s: f32, t: f32) -> V3 {
     plus_scaled(plus_scaled(p.a, s, minus(p.b, p.a)), t, minus(p.c, p.a))
-}
-
-/// Whether a shape has parts that are uploaded as faces are.
-pub const fn has_records(kind: u32) -> bool {
-    kind == MESH || kind == BOX || kind == ROUND
 }

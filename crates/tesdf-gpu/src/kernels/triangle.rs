@@ -96,11 +96,8 @@ pub fn closest(f: Face, p: V3, part: u32) -> Closest {
     let next = select(part == 3u32, 4u32, part + 4u32);
     let of_edge = select(t <= 0.0f32, part + 3u32, select(t >= 1.0f32, next, part));
     let in_plane = part == 0u32;
-    let outward = pick(
-        in_plane,
-        scaled(height, f.normal),
-        plus_scaled(from, -t.clamp(0.0f32, 1.0f32), along),
-    );
+    let outward =
+        pick(in_plane, scaled(height, f.normal), plus_scaled(from, -t.clamp(0.0f32, 1.0f32), along));
     Closest { point: minus(p, outward), outward, feature: select(in_plane, 0u32, of_edge), height }
 }
 

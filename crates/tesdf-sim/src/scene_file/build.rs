@@ -70,11 +70,7 @@ impl LoadedScene {
     ///
     /// # Errors
     /// As [`newton`](Self::newton).
-    pub fn newton_with(
-        &self,
-        system: System,
-        detector: impl Detect + 'static,
-    ) -> Result<Newton, SceneError> {
+    pub fn newton_with(&self, system: System, detector: impl Detect + 'static) -> Result<Newton, SceneError> {
         let collide = collide_options(&self.scene.detector, &system);
         collide.validate().map_err(|e| self.value("detector", e))?;
         let solver = self.scene.solver;
