@@ -1,12 +1,12 @@
-# Sourced by ./test and .ci/run: the software Vulkan driver, on which the tests of the GPU run, so that they give the same on every machine. With
-# TESDF_TEST_DEVICE set they run on that device instead: `TESDF_TEST_DEVICE=gpu ./test`.
+# Sourced by ./test: the software Vulkan driver, on which the tests of the GPU run, so that they give the same on every machine. With
+# TESDF_DEVICE set they run on that device instead: `TESDF_DEVICE=0 ./test`.
 
 vulkan_driver() {
     # Debian and Ubuntu, Fedora, a driver of one's own.
     ls /usr/share/vulkan/icd.d/lvp_icd*.json /usr/local/share/vulkan/icd.d/lvp_icd*.json 2>/dev/null | head -n 1
 }
 
-if [ -z "${TESDF_TEST_DEVICE:-}" ]; then
+if [ -z "${TESDF_DEVICE:-}" ]; then
     if [ -z "$(vulkan_driver)" ] && command -v apt-get >/dev/null; then
         as_root=
         [ "$(id -u)" = 0 ] || as_root="sudo -n"
@@ -15,7 +15,7 @@ if [ -z "${TESDF_TEST_DEVICE:-}" ]; then
     fi
     if [ -z "$(vulkan_driver)" ]; then
         echo "error: the software Vulkan driver, on which GPU tests run, was not found and could not be installed" >&2
-        echo "hint: on Debian or Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers; or run on a GPU: TESDF_TEST_DEVICE=gpu" >&2
+        echo "hint: on Debian or Ubuntu: apt-get install libvulkan1 mesa-vulkan-drivers; or run on a GPU: TESDF_DEVICE=0 ./test" >&2
         exit 2
     fi
     VK_DRIVER_FILES=$(vulkan_driver)

@@ -78,7 +78,7 @@ pub enum Pruning {
 }
 
 /// Options of a detector.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DetectorOptions {
     /// Room at the start.
     pub capacities: Capacities,
@@ -90,6 +90,22 @@ pub struct DetectorOptions {
     pub exchange: Exchange,
     /// What is left out before the narrow phase.
     pub pruning: Pruning,
+    /// Up to so many pairs of instances within worlds the device looks at all of them; beyond, the processor finds those that meet, by a tree.
+    pub most_pair_tests: u64,
+}
+
+impl Default for DetectorOptions {
+    /// Growing buffers, groups of 32, pruning, 2^27 tests of bounds.
+    fn default() -> Self {
+        Self {
+            capacities: Capacities::default(),
+            memory: Memory::default(),
+            lanes: Lanes::default(),
+            exchange: Exchange::default(),
+            pruning: Pruning::default(),
+            most_pair_tests: 1 << 27,
+        }
+    }
 }
 
 /// What a detection did on the device.
@@ -271,7 +287,8 @@ impl Detector {
         if shape_ids(scene) != self.shape_ids {
             self.upload(scene)?;
         }
-        let instances = Instances::new(scene, options, &self.shape_ids, &self.frames)?;
+        let instances =
+            Instances::new(scene, options, &self.shape_ids, &self.frames, self.options.most_pair_tests)?;
         self.report = DeviceReport::default();
         loop {
             self.report.passes += 1;
@@ -340,10 +357,31 @@ impl Detector {
         let prune = u32::from(self.options.pruning == Pruning::LeastDistance);
         let mut stages = Stages { device: &device, timing, launches: 0, times: Vec::new() };
         let count = instances.ids.len() as u32;
-        stages.run("instance pairs", || {
-            pairs::instance_pairs::launch(
+        let given = match &instances.pairs {
+            Some(pairs) => Some((device.upload("pairs", pairs)?, pairs.len() as u32 / 2)),
+            None => None,
+        };
+        stages.run("instance pairs", || match &given {
+            Some((pairs, count)) => pairs::given_pairs::launch(
                 client,
-                CubeCount::Static(count.div_ceil(64).max(1), 1, 1),
+                spread(count.div_ceil(64)),
+                CubeDim::new_1d(64),
+                images.argument(),
+                rows.rows(),
+                words.words(),
+                pairs.words(),
+                counters.words(),
+                directions.words(),
+                maps.rows(),
+                blocks.words(),
+                *count,
+                options.contact_distance as f32,
+                room.directions,
+                room.blocks,
+            ),
+            None => pairs::instance_pairs::launch(
+                client,
+                spread(count.div_ceil(64)),
                 CubeDim::new_1d(64),
                 images.argument(),
                 rows.rows(),
@@ -358,7 +396,7 @@ impl Detector {
                 options.contact_distance as f32,
                 room.directions,
                 room.blocks,
-            );
+            ),
         })?;
         let groups_for = |stages: &mut Stages, most: u32, per: u32, product: u32| {
             stages.run("groups", || {
@@ -572,6 +610,12 @@ fn shape_ids(scene: &Scene) -> Vec<ShapeId> {
     ids.sort_unstable();
     ids.dedup();
     ids
+}
+
+/// Groups of a launch, in two dimensions where they are more than one holds.
+fn spread(groups: u32) -> CubeCount {
+    let wide = groups.clamp(1, 32768);
+    CubeCount::Static(wide, groups.div_ceil(wide).max(1), 1)
 }
 
 /// Counts launches, and times them.

@@ -1,6 +1,6 @@
 //! The instances of a scene as the device holds them.
 use glam::DVec3;
-use tesdf::collide::{CollideOptions, InstanceId, Scene, Shape, ShapeId};
+use tesdf::collide::{CollideOptions, InstanceId, InstancePair, Scene, Shape, ShapeId, instance_pairs};
 
 use crate::GpuError;
 use crate::placed::{FieldFrame, Placed, split};
@@ -19,6 +19,8 @@ pub struct Instances {
     pub words: Vec<u32>,
     /// Pairs that never meet, by place, sorted.
     pub excluded: Vec<u32>,
+    /// All pairs whose bounds meet, by place, when worlds are so large that a tree on the processor is faster than all pairs on the device.
+    pub pairs: Option<Vec<u32>>,
 }
 
 /// What half an extent is grown by, relative to it and to the distance from the world's origin: more than rounding takes away.
@@ -27,12 +29,13 @@ const GROWN: f64 = 1e-6;
 const ENDLESS: f64 = 1e30;
 
 impl Instances {
-    /// `shape_ids` and `frames` are those of the uploaded shapes, sorted by id.
+    /// `shape_ids` and `frames` are those of the uploaded shapes, sorted by id; beyond `most_tests` of bounds the pairs are found here.
     pub fn new(
         scene: &Scene,
         options: &CollideOptions,
         shape_ids: &[ShapeId],
         frames: &[FieldFrame],
+        most_tests: u64,
     ) -> Result<Self, GpuError> {
         let mut order: Vec<(u32, InstanceId)> = scene.instances().map(|(id, i)| (i.world, id)).collect();
         order.sort_unstable();
@@ -43,6 +46,7 @@ impl Instances {
             rows: Vec::with_capacity(6 * order.len()),
             words: Vec::with_capacity(4 * order.len()),
             excluded: Vec::new(),
+            pairs: None,
         };
         let mut end = 0;
         for (k, &(world, id)) in order.iter().enumerate() {
@@ -84,6 +88,13 @@ impl Instances {
             .collect();
         excluded.sort_unstable();
         all.excluded = excluded.into_flattened();
+        let tests: u64 =
+            order.chunk_by(|(v, _), (w, _)| v == w).map(|world| (world.len() as u64).pow(2) / 2).sum();
+        if tests > most_tests {
+            let pairs = instance_pairs(scene, options.contact_distance, options.speculative_time)?;
+            let places = |p: &InstancePair| [p.first, p.second].map(|id| place[id.0 as usize]);
+            all.pairs = Some(pairs.iter().flat_map(places).collect());
+        }
         Ok(all)
     }
 }

@@ -10,7 +10,7 @@ use super::vector::{V3, scaled, v3};
 pub const INSTANCE_ROWS: usize = 6;
 /// Words of an instance: shape, end of its world, memberships, filter.
 pub const INSTANCE_WORDS: usize = 4;
-/// Instances that a thread meets.
+/// Meshlets that a group of the next stage takes.
 const MESHLETS_OF_BLOCK: u32 = 32;
 
 #[cube]
@@ -64,7 +64,6 @@ pub fn instance_pairs(
         let filter = words[(i_words + 3u32) as usize];
         let is_plane = entry(assets, shape, KIND) == PLANE;
         let middle = row3(rows, i_rows + 3u32);
-        let motion = rows[(i_rows + 3u32) as usize].extract(3usize);
         let low = row3(rows, i_rows + 4u32);
         let half = row3(rows, i_rows + 5u32);
         let mut j = i + 1u32;
@@ -82,33 +81,92 @@ pub fn instance_pairs(
             let meet = (memberships & j_filter) != 0u32 && (j_memberships & filter) != 0u32;
             let planes = is_plane && entry(assets, other, KIND) == PLANE;
             if overlap && meet && !planes && !is_excluded(excluded, exclusions, i, j) {
-                let distance = contact_distance + motion + rows[(j_rows + 3u32) as usize].extract(3usize);
-                let pose_i = pose(rows, i_rows as usize);
-                let pose_j = pose(rows, j_rows as usize);
-                let at = counters[DIRECTIONS as usize].fetch_add(2u32);
-                if at + 2u32 <= most_directions {
-                    write_direction(
-                        assets, directions, maps, at, i, j, shape, other, pose_i, pose_j, distance,
-                    );
-                    write_direction(
-                        assets,
-                        directions,
-                        maps,
-                        at + 1u32,
-                        j,
-                        i,
-                        other,
-                        shape,
-                        pose_j,
-                        pose_i,
-                        distance,
-                    );
-                    write_blocks(assets, counters, blocks, at, shape, most_blocks);
-                    write_blocks(assets, counters, blocks, at + 1u32, other, most_blocks);
-                }
+                write_pair(
+                    assets,
+                    rows,
+                    words,
+                    counters,
+                    directions,
+                    maps,
+                    blocks,
+                    i,
+                    j,
+                    contact_distance,
+                    most_directions,
+                    most_blocks,
+                );
             }
             j += 1u32;
         }
+    }
+}
+
+/// A thread for each pair that was found elsewhere, of places of instances.
+#[cube(launch)]
+pub fn given_pairs(
+    assets: &Assets,
+    rows: &[Vector<f32, Const<4>>],
+    words: &[u32],
+    pairs: &[u32],
+    counters: &[Atomic<u32>],
+    directions: &mut [u32],
+    maps: &mut [Vector<f32, Const<4>>],
+    blocks: &mut [u32],
+    count: u32,
+    contact_distance: f32,
+    most_directions: u32,
+    most_blocks: u32,
+) {
+    let pair = ABSOLUTE_POS as u32;
+    if pair < count {
+        write_pair(
+            assets,
+            rows,
+            words,
+            counters,
+            directions,
+            maps,
+            blocks,
+            pairs[(2u32 * pair) as usize],
+            pairs[(2u32 * pair + 1u32) as usize],
+            contact_distance,
+            most_directions,
+            most_blocks,
+        );
+    }
+}
+
+/// Both directions of a pair, and their blocks.
+#[cube]
+fn write_pair(
+    assets: &Assets,
+    rows: &[Vector<f32, Const<4>>],
+    words: &[u32],
+    counters: &[Atomic<u32>],
+    directions: &mut [u32],
+    maps: &mut [Vector<f32, Const<4>>],
+    blocks: &mut [u32],
+    i: u32,
+    j: u32,
+    contact_distance: f32,
+    most_directions: u32,
+    most_blocks: u32,
+) {
+    let i_rows = i * comptime!(INSTANCE_ROWS as u32);
+    let j_rows = j * comptime!(INSTANCE_ROWS as u32);
+    let shape = words[(i * comptime!(INSTANCE_WORDS as u32)) as usize];
+    let other = words[(j * comptime!(INSTANCE_WORDS as u32)) as usize];
+    let motion =
+        rows[(i_rows + 3u32) as usize].extract(3usize) + rows[(j_rows + 3u32) as usize].extract(3usize);
+    let distance = contact_distance + motion;
+    let pose_i = pose(rows, i_rows as usize);
+    let pose_j = pose(rows, j_rows as usize);
+    let at = counters[DIRECTIONS as usize].fetch_add(2u32);
+    if at + 2u32 <= most_directions {
+        write_direction(assets, directions, maps, at, i, j, shape, other, pose_i, pose_j, distance);
+        write_direction(assets, directions, maps, at + 1u32, j, i, other, shape, pose_j, pose_i, distance);
+        write_blocks(assets, counters, blocks, at, shape, most_blocks);
+        write_blocks(assets, counters, blocks, at + 1u32, other, most_blocks);
     }
 }
 
