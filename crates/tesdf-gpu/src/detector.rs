@@ -77,6 +77,16 @@ pub enum Pruning {
     Bounds,
 }
 
+/// What is counted besides the products of the stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Counting {
+    /// Nothing.
+    #[default]
+    Products,
+    /// Evaluations of the field and point–triangle distances of Face-TES; costs two atomic additions a polygon.
+    Operations,
+}
+
 /// Options of a detector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DetectorOptions {
@@ -90,6 +100,8 @@ pub struct DetectorOptions {
     pub exchange: Exchange,
     /// What is left out before the narrow phase.
     pub pruning: Pruning,
+    /// What is counted besides the products.
+    pub counting: Counting,
     /// Up to so many pairs of instances within worlds the device looks at all of them; beyond, the processor finds those that meet, by a tree.
     pub most_pair_tests: u64,
 }
@@ -103,6 +115,7 @@ impl Default for DetectorOptions {
             lanes: Lanes::default(),
             exchange: Exchange::default(),
             pruning: Pruning::default(),
+            counting: Counting::default(),
             most_pair_tests: 1 << 27,
         }
     }
@@ -119,7 +132,8 @@ pub struct DeviceReport {
     pub sent: usize,
     /// Bytes that were read back.
     pub read: usize,
-    /// What was counted: directions, blocks, meshlets, polygons, contacts, filtered, candidates, broken off.
+    /// What was counted: directions, blocks, meshlets, polygons, contacts, filtered, candidates, broken off, evaluations,
+    /// point–triangle distances; the last two when they were asked for.
     pub counts: [u32; products::COUNTERS],
     /// Device time by stage, when it was asked for.
     pub stages: Vec<(&'static str, Duration)>,
@@ -514,6 +528,7 @@ impl Detector {
                                 room.contacts,
                                 lanes,
                                 planes,
+                                self.options.counting == Counting::Operations,
                             );
                         })?;
                     }

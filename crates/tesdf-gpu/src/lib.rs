@@ -20,7 +20,8 @@ mod placed;
 mod query;
 
 pub use detector::{
-    Capacities, Detector, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
+    Capacities, Counting, Detector, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory,
+    Pruning,
 };
 pub use device::{Device, DeviceInfo, DeviceKind, devices};
 pub use error::GpuError;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use clap::ValueEnum;
 use serde::Serialize;
 use tesdf::collide::{CollideOptions, FaceMethod, Mode, detect};
-use tesdf_gpu::{Detector, DetectorOptions, Exchange, Lanes, Memory, Pruning};
+use tesdf_gpu::{Counting, Detector, DetectorOptions, Exchange, Lanes, Memory, Pruning};
 
 use super::frames::Frames;
 use crate::devices::Choice;
@@ -116,6 +116,9 @@ struct Counts {
     queries_unpruned: Option<Spread>,
     contacts: Spread,
     filtered: Spread,
+    /// Of Face-TES: evaluations of the field, and point–triangle distances of the lists.
+    evaluations: Option<Spread>,
+    distances: Option<Spread>,
 }
 
 #[derive(Serialize)]
@@ -230,12 +233,19 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             let measured = measure(&mut frames, &mut detector, &options, report.repeat)?;
             report.launches = detector.report().launches;
             report.phases_ms = measured.phases();
+            let counting = DetectorOptions { counting: Counting::Operations, ..with };
+            let mut detector = Detector::new(&device, &frames.scene, counting).map_err(Failure::new)?;
+            let operations = measure(&mut frames, &mut detector, &options, 1)?;
             let unpruned = DetectorOptions { pruning: Pruning::Bounds, ..with };
             let mut detector = Detector::new(&device, &frames.scene, unpruned).map_err(Failure::new)?;
             let all = measure(&mut frames, &mut detector, &options, 1)?;
             report.phases_unpruned_ms = Some(all.phases());
             report.counts = measured.counts;
             report.counts.queries_unpruned = Some(all.counts.queries);
+            if args.mode == ModeName::Face {
+                report.counts.evaluations = operations.counts.evaluations;
+                report.counts.distances = operations.counts.distances;
+            }
             report.stages = measured.stages;
             report.bytes = Some(measured.bytes);
             report.wall_ms = measured.wall_ms;
@@ -339,6 +349,8 @@ fn measure(
             filtered: count(5),
             candidates: count(6),
             queries_unpruned: None,
+            evaluations: Some(count(8)),
+            distances: Some(count(9)),
         },
         bytes: Bytes {
             sent: bytes(|r| r.sent),
@@ -376,6 +388,10 @@ fn text(r: &Report) -> String {
     line("narrow-phase queries", spread(&r.counts.queries));
     if let Some(all) = &r.counts.queries_unpruned {
         line("  without pruning", spread(all));
+    }
+    if let (Some(evaluations), Some(distances)) = (&r.counts.evaluations, &r.counts.distances) {
+        line("  evaluations", spread(evaluations));
+        line("  distances", spread(distances));
     }
     line("contacts", spread(&r.counts.contacts));
     line("  filtered", spread(&r.counts.filtered));

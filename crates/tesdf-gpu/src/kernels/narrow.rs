@@ -199,6 +199,7 @@ pub fn narrow_faces(
     most: u32,
     #[comptime] lanes: u32,
     #[comptime] planes: bool,
+    #[comptime] counting: bool,
 ) {
     let mut squares = Shared::<[f32]>::new_slice(LANES as usize);
     let mut ids = Shared::<[u32]>::new_slice(LANES as usize);
@@ -264,7 +265,9 @@ pub fn narrow_faces(
         // One place evaluates the field, as the code of it is long: the centre, the vertices, then the steps.
         let evaluations = select(n > 1u32, 1u32 + n + iterations, 1u32);
         let mut evaluation = 0u32;
+        let mut made = 0u32;
         while evaluation < evaluations {
+            made += 1u32;
             let mut s = center_s;
             let mut t = center_t;
             let is_vertex = evaluation >= 1u32 && evaluation <= n;
@@ -322,6 +325,12 @@ pub fn narrow_faces(
             // From the centre: can any point be within reach?
             let out = evaluation == 0u32 && here.distance - radius > reach + ROUNDING;
             evaluation = select(out, evaluations, evaluation + 1u32);
+        }
+        if counting && lane == 0u32 {
+            counters[products::EVALUATIONS as usize].fetch_add(made);
+            if is_listed(word) && entry(assets, d.shape_b, KIND) == MESH {
+                counters[products::DISTANCES as usize].fetch_add(made * faces.count);
+            }
         }
         if best <= reach && lane == 0u32 {
             let v = Value {

@@ -20,8 +20,12 @@ pub const FILTERED: u32 = 5;
 pub const CANDIDATES: u32 = 6;
 /// Threads whose loops a driver has broken off: see [`tell_if_broken_off`].
 pub const BROKEN_OFF: u32 = 7;
+/// Evaluations of the field by the narrow phase of faces, when they are counted.
+pub const EVALUATIONS: u32 = 8;
+/// Point–triangle distances of their lists.
+pub const DISTANCES: u32 = 9;
 /// How many counters there are.
-pub const COUNTERS: usize = 8;
+pub const COUNTERS: usize = 10;
 
 /// Words of a direction: instance a, instance b, shape of a, shape of b.
 pub const DIRECTION_WORDS: usize = 4;
