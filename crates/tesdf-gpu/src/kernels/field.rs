@@ -4,8 +4,7 @@
 use cubecl::prelude::*;
 
 use super::assets::{
-    Assets, BOX, KIND, LISTS, MESH, NODES, PLANE, RECORDS, SIDE, SIZES, byte, entry, number,
-    vector,
+    Assets, BOX, KIND, LISTS, MESH, NODES, PLANE, RECORDS, SIDE, SIZES, byte, entry, number, vector,
 };
 use super::list::{list, list_face};
 use super::locate::{
