@@ -12,6 +12,8 @@ use cubecl_common::device::{Device as _, DeviceId};
 use cubecl_runtime::runtime::Runtime;
 
 use crate::GpuError;
+#[cfg(feature = "cuda")]
+use crate::cuda;
 
 /// The environment variable that chooses a device when the program does not.
 pub const DEVICE_VARIABLE: &str = "TESDF_DEVICE";
@@ -73,14 +75,26 @@ impl fmt::Debug for Device {
     }
 }
 
-/// The devices of this machine, the best first: graphics cards, then what is part of the processor, then software.
+/// The devices of this machine, the best first: graphics cards, the same through CUDA, then what is part of the processor, then software.
 pub fn devices() -> Vec<DeviceInfo> {
-    ids().into_iter().map(|id| Device::open(id).info).collect()
+    ids().into_iter().map(Id::info).collect()
 }
 
-fn ids() -> Vec<DeviceId> {
-    let mut ids = <WgpuRuntime>::enumerate_all_devices();
-    ids.sort_by_key(|id| match kind(*id) {
+/// How a device is reached.
+#[derive(Clone, Copy)]
+enum Id {
+    /// Vulkan, Metal or DirectX 12.
+    Wgpu(DeviceId),
+    /// CUDA, by number.
+    #[cfg(feature = "cuda")]
+    Cuda(usize),
+}
+
+fn ids() -> Vec<Id> {
+    let mut ids: Vec<Id> = <WgpuRuntime>::enumerate_all_devices().into_iter().map(Id::Wgpu).collect();
+    #[cfg(feature = "cuda")]
+    ids.extend((0..cuda::server::count()).map(Id::Cuda));
+    ids.sort_by_key(|id| match id.kind() {
         DeviceKind::Discrete => 0,
         DeviceKind::Integrated => 1,
         DeviceKind::Virtual => 2,
@@ -90,59 +104,88 @@ fn ids() -> Vec<DeviceId> {
     ids
 }
 
-fn kind(id: DeviceId) -> DeviceKind {
-    match WgpuDevice::from_id(id).kind {
-        WgpuDeviceKind::DiscreteGpu(_) => DeviceKind::Discrete,
-        WgpuDeviceKind::IntegratedGpu(_) => DeviceKind::Integrated,
-        WgpuDeviceKind::VirtualGpu(_) => DeviceKind::Virtual,
-        WgpuDeviceKind::Cpu => DeviceKind::Software,
-        _ => DeviceKind::Other,
+impl Id {
+    fn kind(self) -> DeviceKind {
+        let id = match self {
+            Self::Wgpu(id) => id,
+            #[cfg(feature = "cuda")]
+            Self::Cuda(_) => return DeviceKind::Discrete,
+        };
+        match WgpuDevice::from_id(id).kind {
+            WgpuDeviceKind::DiscreteGpu(_) => DeviceKind::Discrete,
+            WgpuDeviceKind::IntegratedGpu(_) => DeviceKind::Integrated,
+            WgpuDeviceKind::VirtualGpu(_) => DeviceKind::Virtual,
+            WgpuDeviceKind::Cpu => DeviceKind::Software,
+            _ => DeviceKind::Other,
+        }
+    }
+
+    fn client(self) -> Result<Client, GpuError> {
+        match self {
+            Self::Wgpu(id) => Ok(<WgpuRuntime>::client(&WgpuDevice::from_id(id))),
+            #[cfg(feature = "cuda")]
+            Self::Cuda(index) => cuda::server::client(index),
+        }
+    }
+
+    /// What the device is. A CUDA device is not opened for it, as that takes some of its memory.
+    fn info(self) -> DeviceInfo {
+        let properties = match self {
+            Self::Wgpu(id) => <WgpuRuntime>::client(&WgpuDevice::from_id(id)).properties().clone(),
+            #[cfg(feature = "cuda")]
+            Self::Cuda(index) => cuda::server::properties_of(index),
+        };
+        DeviceInfo {
+            name: properties.identity.name,
+            kind: self.kind(),
+            plane: (properties.hardware.plane_size_min, properties.hardware.plane_size_max),
+            has_plane_operations: properties.features.plane.contains(Plane::Ops),
+            most_bytes: properties.memory.max_page_size,
+            has_timestamps: properties.timing_method == cubecl::profile::TimingMethod::Device,
+        }
     }
 }
 
 impl Device {
-    /// The device that `asked` means: its number in [`devices`], or a part of its name in any case. Without one, what the environment
+    /// The device that `asked` means: its number in [`devices`], or a part of its name in any case, such as `cuda:0`. Without one, what the environment
     /// variable `TESDF_DEVICE` says, else the best there is.
     ///
     /// # Errors
-    /// [`GpuError::NoDevice`], [`GpuError::NoSuchDevice`].
+    /// [`GpuError::NoDevice`], [`GpuError::NoSuchDevice`]; what CUDA says when a device cannot be opened, [`GpuError::NoNvrtc`].
     pub fn choose(asked: Option<&str>) -> Result<Self, GpuError> {
         let variable = std::env::var(DEVICE_VARIABLE).ok().filter(|v| !v.is_empty());
         let ids = ids();
         let Some(&best) = ids.first() else { return Err(GpuError::NoDevice) };
-        let Some(asked) = asked.map(str::to_owned).or(variable) else { return Ok(Self::open(best)) };
+        let Some(asked) = asked.map(str::to_owned).or(variable) else { return Self::open(best) };
         if let Some(&id) = asked.parse().ok().and_then(|i: usize| ids.get(i)) {
-            return Ok(Self::open(id));
+            return Self::open(id);
         }
-        let devices: Vec<Self> = ids.into_iter().map(Self::open).collect();
-        let is_meant = |d: &&Self| d.info.name.to_lowercase().contains(&asked.to_lowercase());
-        match devices.iter().find(is_meant) {
-            Some(device) => Ok(device.clone()),
-            None => {
-                let found = devices.into_iter().map(|d| d.info.name).collect();
-                Err(GpuError::NoSuchDevice { asked, found })
-            }
+        let names: Vec<String> = ids.iter().map(|id| id.info().name).collect();
+        match names.iter().position(|name| name.to_lowercase().contains(&asked.to_lowercase())) {
+            Some(i) => Self::open(ids[i]),
+            None => Err(GpuError::NoSuchDevice { asked, found: names }),
         }
     }
 
-    fn open(id: DeviceId) -> Self {
-        let client = <WgpuRuntime>::client(&WgpuDevice::from_id(id));
-        let properties = client.properties();
-        let hardware = &properties.hardware;
-        let info = DeviceInfo {
-            name: properties.identity.name.clone(),
-            kind: kind(id),
-            plane: (hardware.plane_size_min, hardware.plane_size_max),
-            has_plane_operations: properties.features.plane.contains(Plane::Ops),
-            most_bytes: properties.memory.max_page_size,
-            has_timestamps: properties.timing_method == cubecl::profile::TimingMethod::Device,
-        };
-        Self { client, info }
+    fn open(id: Id) -> Result<Self, GpuError> {
+        Ok(Self { client: id.client()?, info: id.info() })
     }
 
     /// What the device is.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Waits for all that was launched.
+    ///
+    /// # Errors
+    /// What the device says of it.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        cubecl::future::block_on(self.client.sync()).map_err(|e| GpuError::Device {
+            device: self.info.name.clone(),
+            doing: "waiting",
+            reason: e.to_string(),
+        })
     }
 
     /// Launches kernels.
@@ -171,6 +214,36 @@ impl Device {
     pub(crate) fn empty(&self, name: &'static str, bytes: usize) -> Result<Buffer, GpuError> {
         self.fits(name, bytes)?;
         Ok(Buffer { name, handle: self.client.empty(bytes.max(16)), bytes: bytes.max(16) })
+    }
+
+    /// A buffer that is memory of others, from `pointer` on. CUDA devices alone can.
+    ///
+    /// # Safety
+    /// That memory is on this device, and stays until the buffer is dropped and what was launched with it is done.
+    #[cfg(feature = "cuda")]
+    pub(crate) unsafe fn outside(
+        &self,
+        name: &'static str,
+        pointer: u64,
+        bytes: usize,
+    ) -> Result<Buffer, GpuError> {
+        let handle =
+            cuda::server::outside(&self.client, pointer, bytes as u64).ok_or_else(|| self.is_not_cuda())?;
+        Ok(Buffer { name, handle, bytes })
+    }
+
+    /// Where a buffer begins. CUDA devices alone can tell.
+    #[cfg(feature = "cuda")]
+    pub(crate) fn pointer(&self, buffer: &Buffer) -> Result<u64, GpuError> {
+        cuda::server::pointer(&self.client, buffer.handle.clone()).map_err(|_| self.is_not_cuda())
+    }
+
+    #[cfg(feature = "cuda")]
+    fn is_not_cuda(&self) -> GpuError {
+        GpuError::Unavailable {
+            what: format!("a pointer of CUDA on {}", self.info.name),
+            instead: "choose a device such as \"cuda:0\"",
+        }
     }
 
     fn fits(&self, buffer: &'static str, bytes: usize) -> Result<(), GpuError> {

@@ -50,6 +50,30 @@ pub enum GpuError {
         /// Elements that are needed.
         needed: u32,
     },
+    /// An array on a device that is too short, or not whole.
+    #[error("array {array:?} has {found} elements; expected {expected}")]
+    Length {
+        /// Which array.
+        array: &'static str,
+        /// Elements that it has.
+        found: usize,
+        /// What was expected.
+        expected: String,
+    },
+    /// A kernel that a compiler refused.
+    #[error("kernel {kernel}: {reason}")]
+    Kernel {
+        /// Its name.
+        kernel: String,
+        /// What the compiler said.
+        reason: String,
+    },
+    /// Kernels cannot be compiled for CUDA.
+    #[error(
+        "NVRTC, which compiles kernels for CUDA, was not found; expected libnvrtc.so.12 or nvrtc64_12.dll. Install the CUDA toolkit 12, \
+         or `pip install nvidia-cuda-nvrtc-cu12` and put its folder nvidia/cuda_nvrtc/lib into LD_LIBRARY_PATH"
+    )]
+    NoNvrtc,
     /// A shape that kernels cannot read.
     #[error("shape {number}: {reason}")]
     Shape {

@@ -6,10 +6,12 @@
 //! ```
 //!
 //! Kernels are written once, with [CubeCL](https://github.com/tracel-ai/cubecl), and run through wgpu on Vulkan, Metal and
-//! DirectX 12. Everything is computed in `f32`, in the local frame of the field; `docs/gpu.md` has stages, layouts and limits.
+//! DirectX 12, and as generated CUDA C++ ([`cuda`]). Everything is computed in `f32`, in the local frame of the field; `docs/gpu.md` has stages, layouts and limits.
 #![warn(missing_docs)]
 
+mod arrays;
 mod contacts;
+pub mod cuda;
 mod detector;
 mod device;
 mod error;
@@ -19,6 +21,7 @@ mod kernels;
 mod placed;
 mod query;
 
+pub use arrays::{DeviceAnswers, DeviceArray, query_arrays};
 pub use detector::{
     Capacities, Counting, Detector, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory,
     Pruning,

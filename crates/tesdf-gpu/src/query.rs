@@ -2,7 +2,7 @@ use cubecl::prelude::*;
 use glam::{DVec3, Vec3};
 use tesdf::collide::{Placement, Shape};
 
-use crate::device::Device;
+use crate::device::{Buffer, Device};
 use crate::kernels::query::{ANSWER_ROWS, signed_distances};
 use crate::placed::{FieldFrame, Placed, split};
 use crate::{GpuError, Images};
@@ -41,21 +41,12 @@ pub fn query(
     instances: &[(usize, Placement)],
     points: &[DVec3],
 ) -> Result<Vec<Vec<WorldAnswer>>, GpuError> {
-    if let Some(i) = instances.iter().position(|(shape, _)| *shape >= images.len().min(shapes.len())) {
-        let reason = format!("shape {}; expected one of {}", instances[i].0, images.len().min(shapes.len()));
-        return Err(GpuError::Instance { instance: i, reason });
-    }
-    let placed: Vec<Placed> =
-        instances.iter().map(|&(shape, at)| Placed::new(FieldFrame::new(shapes[shape]), at)).collect();
-    let rows: Vec<[f32; 4]> = placed.iter().flat_map(|at| at.rows()).collect();
-    let numbers: Vec<u32> = instances.iter().map(|&(shape, _)| shape as u32).collect();
+    let OnDevice { placed, rows, shapes: numbers } = upload_instances(device, images, shapes, instances)?;
     let split_rows = |p: &DVec3| {
         let (high, low) = split(if p.is_finite() { *p } else { DVec3::ZERO });
         [high.extend(0.0).to_array(), low.extend(0.0).to_array()]
     };
     let point_rows: Vec<[f32; 4]> = points.iter().flat_map(split_rows).collect();
-    let rows = device.upload("instances", &rows)?;
-    let numbers = device.upload("shapes of instances", &numbers)?;
     let point_rows = device.upload("points", &point_rows)?;
     let all = instances.len() * points.len();
     let answers = device.empty("answers", LAUNCH.min(all) * ANSWER_ROWS * 16)?;
@@ -106,4 +97,31 @@ pub fn query(
     Ok((0..instances.len())
         .map(|i| (i * points.len()..(i + 1) * points.len()).map(|k| answer(k, i)).collect())
         .collect())
+}
+
+/// Instances, and their buffers.
+pub(crate) struct OnDevice {
+    pub placed: Vec<Placed>,
+    pub rows: Buffer,
+    pub shapes: Buffer,
+}
+
+/// Uploads where instances are, and of what shapes they are.
+pub(crate) fn upload_instances(
+    device: &Device,
+    images: &Images,
+    shapes: &[&Shape],
+    instances: &[(usize, Placement)],
+) -> Result<OnDevice, GpuError> {
+    if let Some(i) = instances.iter().position(|(shape, _)| *shape >= images.len().min(shapes.len())) {
+        let reason = format!("shape {}; expected one of {}", instances[i].0, images.len().min(shapes.len()));
+        return Err(GpuError::Instance { instance: i, reason });
+    }
+    let placed: Vec<Placed> =
+        instances.iter().map(|&(shape, at)| Placed::new(FieldFrame::new(shapes[shape]), at)).collect();
+    let rows: Vec<[f32; 4]> = placed.iter().flat_map(|at| at.rows()).collect();
+    let numbers: Vec<u32> = instances.iter().map(|&(shape, _)| shape as u32).collect();
+    let rows = device.upload("instances", &rows)?;
+    let shapes = device.upload("shapes of instances", &numbers)?;
+    Ok(OnDevice { placed, rows, shapes })
 }

@@ -73,7 +73,7 @@ pub fn is_beyond(assets: &Assets, shape: u32, p: V3, radius: f32, reach: f32, pr
 }
 
 /// A group for each block, a thread for each meshlet.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn meshlets(
     assets: &Assets,
     directions: &[u32],

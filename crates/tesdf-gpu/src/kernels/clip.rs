@@ -273,7 +273,7 @@ fn threads_per_face(faces: u32) -> u32 {
 }
 
 /// A group for each meshlet, a thread for each face, or several where there are few.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn polygons(
     assets: &Assets,
     directions: &[u32],
@@ -500,7 +500,7 @@ fn outside(
 }
 
 /// Nodes: a group for each meshlet, a thread for each face with the corners that no face before has. What can touch is written with its cell.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn nodes(
     assets: &Assets,
     directions: &[u32],

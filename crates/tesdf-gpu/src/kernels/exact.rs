@@ -203,7 +203,7 @@ fn before(kept: u32, shared: &mut Shared<[u32]>) -> (u32, u32) {
 }
 
 /// A group for each polygon.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn narrow_exact(
     assets: &Assets,
     directions: &[u32],

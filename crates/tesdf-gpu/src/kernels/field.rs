@@ -12,7 +12,7 @@ use super::locate::{
 };
 use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
 use super::triangle::{PART, ROWS, closest, corner, face};
-use super::vector::{V3, cross, dot, length, minus, pick, plus, scaled, v3};
+use super::vector::{V3, cross, dot, length, minus, pick, plus, same, scaled, v3};
 
 /// What a field says at a point.
 #[derive(CubeType, Clone, Copy)]
@@ -81,7 +81,7 @@ pub fn value_of(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest)
     let along = scaled(sign / distance.max(1e-30f32), c.outward);
     // In the plane of a face the height knows the direction better than the difference of two points.
     let normal =
-        scaled(select(c.feature == 0u32 && (c.height < 0.0f32) != inside, -1.0f32, 1.0f32), f.normal);
+        scaled(select(c.feature == 0u32 && !same(c.height < 0.0f32, inside), -1.0f32, 1.0f32), f.normal);
     let flat = dot(f.normal, f.normal) < 0.5f32;
     let by_normal = !flat && (distance < ON_SURFACE || c.feature == 0u32);
     let on_surface = pick(distance < ON_SURFACE, f.normal, normal);
@@ -128,7 +128,7 @@ pub fn crossing(p: V3, q: V3, a: V3, b: V3, c: V3) -> i32 {
     let ab = dot(way, cross(pa, pb)) >= 0.0f32;
     let bc = dot(way, cross(pb, pc)) >= 0.0f32;
     let ca = dot(way, cross(pc, pa)) >= 0.0f32;
-    let through = p_over != q_over && ab == bc && bc == ca;
+    let through = !same(p_over, q_over) && same(ab, bc) && same(bc, ca);
     select(through, select(p_over, -1i32, 1i32), 0i32)
 }
 

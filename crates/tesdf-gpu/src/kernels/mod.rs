@@ -10,6 +10,7 @@
 )]
 pub mod assets;
 pub mod broad;
+pub mod catalog;
 pub mod clip;
 pub mod exact;
 pub mod field;

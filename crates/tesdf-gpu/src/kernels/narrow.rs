@@ -74,7 +74,7 @@ pub fn named(word: u32, cell: u32) -> u32 {
 }
 
 /// A thread for each node and its cell.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn narrow_nodes(
     assets: &Assets,
     directions: &[u32],
@@ -183,7 +183,7 @@ fn value_in(
 ///
 /// With `lanes` 32 a group works on each polygon, each thread with a face of the list in registers and with every 32nd of the rest; with `lanes`
 /// 1 a thread works on each alone. `planes` says how a group finds its least distance: in a plane of 32 threads, or in shared memory.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn narrow_faces(
     assets: &Assets,
     directions: &[u32],

@@ -38,7 +38,7 @@ fn is_excluded(excluded: &[u32], count: u32, a: u32, b: u32) -> bool {
 }
 
 /// A thread for each instance looks at all later ones of its world.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn instance_pairs(
     assets: &Assets,
     rows: &[Vector<f32, Const<4>>],
@@ -102,7 +102,7 @@ pub fn instance_pairs(
 }
 
 /// A thread for each pair that was found elsewhere, of places of instances.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn given_pairs(
     assets: &Assets,
     rows: &[Vector<f32, Const<4>>],

@@ -65,7 +65,7 @@ pub fn tell_if_broken_off(counters: &[Atomic<u32>], two: u32) {
 }
 
 /// Groups that a stage needs for `wanted` elements of at most `most`, `per` to a group: x and y.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn groups_for(
     counters: &[Atomic<u32>],
     groups: &mut [u32],

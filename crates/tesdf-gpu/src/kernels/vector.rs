@@ -56,3 +56,9 @@ pub fn length(a: V3) -> f32 {
 pub fn pick(first: bool, a: V3, b: V3) -> V3 {
     V3 { x: select(first, a.x, b.x), y: select(first, a.y, b.y), z: select(first, a.z, b.z) }
 }
+
+/// Whether both hold or neither does; CubeCL's CUDA C++ cannot compare truth values.
+#[cube]
+pub fn same(a: bool, b: bool) -> bool {
+    (a && b) || (!a && !b)
+}

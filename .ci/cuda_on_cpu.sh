@@ -1,0 +1,16 @@
+# Sourced by ./test: builds what stands for CUDA's driver and NVRTC where there is no NVIDIA GPU, and sets cuda_on_cpu to its folder.
+
+cuda_on_cpu=$PWD/target/cuda_on_cpu
+cuda_on_cpu_source=$PWD/crates/tesdf-gpu/tests/cuda_on_cpu
+
+if ! command -v c++ >/dev/null; then
+    echo "error: a C++ compiler, which the CUDA kernels are tested with, was not found" >&2
+    echo "hint: on Debian or Ubuntu: apt-get install g++" >&2
+    exit 2
+fi
+mkdir -p "$cuda_on_cpu"
+if [ "$cuda_on_cpu_source/cuda.cpp" -nt "$cuda_on_cpu/libcuda.so" ]; then
+    c++ -std=c++17 -O2 -Wall -fPIC -shared -DHEADER="\"$cuda_on_cpu_source/kernel.h\"" -o "$cuda_on_cpu/libcuda.so" \
+        "$cuda_on_cpu_source/cuda.cpp" -ldl
+    cp "$cuda_on_cpu/libcuda.so" "$cuda_on_cpu/libnvrtc.so"
+fi

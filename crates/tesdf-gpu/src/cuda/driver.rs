@@ -1,0 +1,262 @@
+//! A GPU, through NVIDIA's driver, which is loaded when it is first needed.
+use std::ffi::{CString, c_void};
+use std::sync::LazyLock;
+
+use cubecl_server::driver::DriverError as Failure;
+use cudarc::driver::sys::CUdevice_attribute as Attribute;
+use cudarc::driver::sys::CUresult;
+use cudarc::driver::{DriverError, result, sys};
+
+/// What failed, in the words of the server that launches.
+pub fn failed(call: &'static str) -> impl FnOnce(DriverError) -> Failure {
+    move |error| {
+        let status = error.0 as u32;
+        // After these the context answers nothing else.
+        let ends_the_context = matches!(
+            error.0,
+            CUresult::CUDA_ERROR_ILLEGAL_ADDRESS
+                | CUresult::CUDA_ERROR_LAUNCH_FAILED
+                | CUresult::CUDA_ERROR_LAUNCH_TIMEOUT
+                | CUresult::CUDA_ERROR_ILLEGAL_INSTRUCTION
+                | CUresult::CUDA_ERROR_MISALIGNED_ADDRESS
+                | CUresult::CUDA_ERROR_ECC_UNCORRECTABLE
+        );
+        if ends_the_context { Failure::poisoned(call, status) } else { Failure::new(call, status) }
+    }
+}
+
+/// Number of CUDA devices; none without a driver.
+pub fn count() -> usize {
+    // SAFETY: it opens libraries by the names that NVIDIA gives them, and a driver's initialisers are trusted.
+    static PRESENT: LazyLock<bool> =
+        LazyLock::new(|| unsafe { sys::is_culib_present() } && result::init().is_ok());
+    if *PRESENT { result::device::get_count().map_or(0, |n| n.max(0) as usize) } else { 0 }
+}
+
+/// What the driver tells of a device, without a context on it.
+#[derive(Clone, Debug, Default)]
+pub struct Facts {
+    pub name: String,
+    /// Compute capability, as 90.
+    pub capability: i32,
+    pub memory_bytes: u64,
+    pub shared_bytes: usize,
+    pub multiprocessors: u32,
+    /// Whether memory is taken and given back in the order of a stream.
+    has_pools: bool,
+}
+
+/// Asks the driver about device `index`.
+pub fn facts(index: usize) -> Result<Facts, Failure> {
+    let device = result::device::get(index as i32).map_err(failed("cuDeviceGet"))?;
+    // SAFETY: the driver gave the device.
+    let ask = |attribute| unsafe {
+        result::device::get_attribute(device, attribute).map_err(failed("cuDeviceGetAttribute"))
+    };
+    let major = ask(Attribute::CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MAJOR)?;
+    let minor = ask(Attribute::CU_DEVICE_ATTRIBUTE_COMPUTE_CAPABILITY_MINOR)?;
+    Ok(Facts {
+        name: result::device::get_name(device).map_err(failed("cuDeviceGetName"))?,
+        capability: 10 * major + minor,
+        // SAFETY: as above.
+        memory_bytes: unsafe { result::device::total_mem(device) }.map_err(failed("cuDeviceTotalMem"))?
+            as u64,
+        shared_bytes: ask(Attribute::CU_DEVICE_ATTRIBUTE_MAX_SHARED_MEMORY_PER_BLOCK_OPTIN)? as usize,
+        multiprocessors: ask(Attribute::CU_DEVICE_ATTRIBUTE_MULTIPROCESSOR_COUNT)? as u32,
+        has_pools: ask(Attribute::CU_DEVICE_ATTRIBUTE_MEMORY_POOLS_SUPPORTED)? != 0,
+    })
+}
+
+/// The primary context of a device, and one stream.
+#[derive(Debug)]
+pub struct Gpu {
+    pub facts: Facts,
+    context: sys::CUcontext,
+    stream: sys::CUstream,
+}
+
+// SAFETY: the driver may be called from any thread, and from many at a time, once the context is current there.
+unsafe impl Send for Gpu {}
+// SAFETY: as above.
+unsafe impl Sync for Gpu {}
+
+/// A loaded kernel.
+#[derive(Clone, Copy, Debug)]
+pub struct Function {
+    function: sys::CUfunction,
+    threads: (u32, u32, u32),
+    shared_bytes: usize,
+    /// Blocks that the GPU runs at a time.
+    pub resident: u32,
+}
+
+// SAFETY: as for `Gpu`.
+unsafe impl Send for Function {}
+// SAFETY: as for `Gpu`.
+unsafe impl Sync for Function {}
+
+/// A point in the order of the stream.
+#[derive(Debug)]
+pub struct Event(sys::CUevent);
+
+// SAFETY: as for `Gpu`.
+unsafe impl Send for Event {}
+
+impl Drop for Event {
+    fn drop(&mut self) {
+        // SAFETY: created once, destroyed once. A failure leaves nothing to do.
+        let _ = unsafe { result::event::destroy(self.0) };
+    }
+}
+
+impl Gpu {
+    /// Opens device `index`. What it allocates stays: contexts live as long as the process.
+    pub fn open(index: usize) -> Result<Self, Failure> {
+        let facts = facts(index)?;
+        let device = result::device::get(index as i32).map_err(failed("cuDeviceGet"))?;
+        // SAFETY: the driver gave the device, and the context is current for the stream.
+        unsafe {
+            let context = result::primary_ctx::retain(device).map_err(failed("cuDevicePrimaryCtxRetain"))?;
+            result::ctx::set_current(context).map_err(failed("cuCtxSetCurrent"))?;
+            // Of the default kind: in order with the legacy default stream, on which others work.
+            let stream = result::stream::create(result::stream::StreamKind::Default)
+                .map_err(failed("cuStreamCreate"))?;
+            if facts.has_pools {
+                let pool = result::device::get_default_mem_pool(device)
+                    .map_err(failed("cuDeviceGetDefaultMemPool"))?;
+                // Memory that is given back is kept for the next buffer.
+                let mut kept = u64::MAX;
+                let attribute = sys::CUmemPool_attribute::CU_MEMPOOL_ATTR_RELEASE_THRESHOLD;
+                result::mem_pool::set_attribute(pool, attribute, (&raw mut kept).cast())
+                    .map_err(failed("cuMemPoolSetAttribute"))?;
+            }
+            Ok(Self { facts, context, stream })
+        }
+    }
+
+    /// To be called before anything else on a thread.
+    pub fn make_current(&self) -> Result<(), Failure> {
+        // SAFETY: the context is never released.
+        unsafe { result::ctx::set_current(self.context) }.map_err(failed("cuCtxSetCurrent"))
+    }
+
+    pub fn allocate(&self, bytes: usize) -> Result<u64, Failure> {
+        // SAFETY: the stream is never destroyed, and what is allocated is used on it alone.
+        unsafe {
+            if self.facts.has_pools {
+                result::malloc_async(self.stream, bytes).map_err(failed("cuMemAllocAsync"))
+            } else {
+                result::malloc_sync(bytes).map_err(failed("cuMemAlloc"))
+            }
+        }
+    }
+
+    /// # Safety
+    /// `pointer` came from [`Gpu::allocate`], and nothing uses it from now on.
+    pub unsafe fn free(&self, pointer: u64) -> Result<(), Failure> {
+        // SAFETY: by the caller; work that was launched before comes first on the stream.
+        unsafe {
+            if self.facts.has_pools {
+                result::free_async(pointer, self.stream).map_err(failed("cuMemFreeAsync"))
+            } else {
+                result::free_sync(pointer).map_err(failed("cuMemFree"))
+            }
+        }
+    }
+
+    /// # Safety
+    /// `bytes.len()` bytes of the device begin at `pointer`.
+    pub unsafe fn write(&self, pointer: u64, bytes: &[u8]) -> Result<(), Failure> {
+        // SAFETY: by the caller. Ordinary memory has been read when the call returns.
+        unsafe { result::memcpy_htod_async(pointer, bytes, self.stream) }.map_err(failed("cuMemcpyHtoDAsync"))
+    }
+
+    /// Waits for all that was launched, and reads.
+    ///
+    /// # Safety
+    /// `bytes` bytes of the device begin at `pointer`.
+    pub unsafe fn read(&self, pointer: u64, bytes: usize) -> Result<Vec<u8>, Failure> {
+        let mut read = vec![0; bytes];
+        // SAFETY: by the caller; `read` outlives the copy.
+        unsafe { result::memcpy_dtoh_async(&mut read, pointer, self.stream) }
+            .map_err(failed("cuMemcpyDtoHAsync"))?;
+        self.wait()?;
+        Ok(read)
+    }
+
+    pub fn wait(&self) -> Result<(), Failure> {
+        // SAFETY: the stream is never destroyed.
+        unsafe { result::stream::synchronize(self.stream) }.map_err(failed("cuStreamSynchronize"))
+    }
+
+    /// Loads a kernel from machine code or PTX.
+    pub fn load(
+        &self,
+        image: &[u8],
+        entry: &str,
+        threads: (u32, u32, u32),
+        shared_bytes: usize,
+    ) -> Result<Function, Failure> {
+        let entry = CString::new(entry).unwrap_or_default();
+        // SAFETY: the image is what NVRTC made. The module is never unloaded.
+        unsafe {
+            let module =
+                result::module::load_data(image.as_ptr().cast()).map_err(failed("cuModuleLoadData"))?;
+            let function =
+                result::module::get_function(module, entry).map_err(failed("cuModuleGetFunction"))?;
+            let attribute = sys::CUfunction_attribute::CU_FUNC_ATTRIBUTE_MAX_DYNAMIC_SHARED_SIZE_BYTES;
+            result::function::set_function_attribute(function, attribute, shared_bytes as i32)
+                .map_err(failed("cuFuncSetAttribute"))?;
+            let all = (threads.0 * threads.1 * threads.2) as i32;
+            let on_one = result::occupancy::max_active_block_per_multiprocessor(function, all, shared_bytes)
+                .map_err(failed("cuOccupancyMaxActiveBlocksPerMultiprocessor"))?;
+            Ok(Function {
+                function,
+                threads,
+                shared_bytes,
+                resident: on_one.max(1) as u32 * self.facts.multiprocessors,
+            })
+        }
+    }
+
+    /// # Safety
+    /// `arguments` point to what the kernel takes, in order, and the kernel stays within its buffers.
+    pub unsafe fn launch(
+        &self,
+        kernel: Function,
+        blocks: (u32, u32, u32),
+        arguments: &mut [*mut c_void],
+    ) -> Result<(), Failure> {
+        // SAFETY: by the caller; arguments have been copied when the call returns.
+        unsafe {
+            result::launch_kernel(
+                kernel.function,
+                blocks,
+                kernel.threads,
+                kernel.shared_bytes as u32,
+                self.stream,
+                arguments,
+            )
+        }
+        .map_err(failed("cuLaunchKernel"))
+    }
+
+    /// Marks what was launched until now.
+    pub fn mark(&self) -> Result<Event, Failure> {
+        let event =
+            result::event::create(sys::CUevent_flags::CU_EVENT_DEFAULT).map_err(failed("cuEventCreate"))?;
+        let event = Event(event);
+        // SAFETY: both are alive.
+        unsafe { result::event::record(event.0, self.stream) }.map_err(failed("cuEventRecord"))?;
+        Ok(event)
+    }
+
+    /// Milliseconds of the device's clock between two marks; waits for the second.
+    pub fn between(&self, from: &Event, to: &Event) -> Result<f32, Failure> {
+        // SAFETY: both are alive and were recorded.
+        unsafe {
+            result::event::synchronize(to.0).map_err(failed("cuEventSynchronize"))?;
+            result::event::elapsed(from.0, to.0).map_err(failed("cuEventElapsedTime"))
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! The compiler of CUDA C++, a library that is loaded when it is first needed.
+use std::ffi::{CStr, CString, c_char};
+use std::fmt;
+use std::sync::LazyLock;
+
+use cudarc::nvrtc::{result, sys};
+
+use super::CudaSource;
+use crate::GpuError;
+
+/// A kernel in the language of a GPU.
+#[derive(Clone, Debug)]
+pub struct Compiled {
+    /// Machine code (`sm_…`), or PTX that ends with a zero (`compute_…`).
+    pub image: Vec<u8>,
+    /// What a thread or block of it takes; of PTX only the driver knows.
+    pub resources: Option<Resources>,
+}
+
+/// What machine code takes of a GPU.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Resources {
+    /// Registers of a thread.
+    pub registers: u32,
+    /// Bytes of a thread's stack: arrays with an index that is computed, and spilled registers.
+    pub stack_bytes: u32,
+    /// Bytes of registers that are spilled, stored and loaded.
+    pub spilled_bytes: (u32, u32),
+    /// Bytes of static shared memory of a block.
+    pub shared_bytes: u32,
+}
+
+impl Resources {
+    /// Warps of blocks of `threads` threads that a multiprocessor runs at a time, as far as registers say: of compute capability 8.0 and
+    /// 9.0, with 65,536 registers, 64 warps and 32 blocks at most.
+    pub fn warps(&self, threads: u32) -> u32 {
+        let of_block = threads.div_ceil(32).max(1);
+        // A warp gets registers in units of 256.
+        let registers = of_block * (32 * self.registers.max(1)).next_multiple_of(256);
+        of_block * (65_536 / registers).min(64 / of_block).min(32)
+    }
+}
+
+impl fmt::Display for Resources {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (stores, loads) = self.spilled_bytes;
+        write!(
+            f,
+            "{} registers, {} bytes of stack, {stores} + {loads} spilled",
+            self.registers, self.stack_bytes
+        )
+    }
+}
+
+/// Compiles a kernel for an architecture: `sm_90a` gives machine code, `compute_75` PTX.
+///
+/// # Errors
+/// [`GpuError::NoNvrtc`]; [`GpuError::Kernel`] with the compiler's messages.
+pub fn compile(source: &CudaSource, architecture: &str) -> Result<Compiled, GpuError> {
+    if !is_present() {
+        return Err(GpuError::NoNvrtc);
+    }
+    let refused = |reason: String| GpuError::Kernel { kernel: source.kernel.clone(), reason };
+    let text = CString::new(source.text.as_str()).map_err(|e| refused(e.to_string()))?;
+    let mut program = Program::new(&text).map_err(|e| refused(e.to_string()))?;
+    let is_machine_code = architecture.starts_with("sm_");
+    let mut options =
+        vec![format!("--gpu-architecture={architecture}"), "--fmad=false".into(), "--std=c++17".into()];
+    if is_machine_code {
+        options.push("--ptxas-options=-v".into());
+    }
+    let compiled = program.compile(&options);
+    let log = program.log();
+    compiled.map_err(|e| refused(format!("{e} for {architecture}\n{log}")))?;
+    let image = program.image(is_machine_code).map_err(|e| refused(e.to_string()))?;
+    Ok(Compiled { image, resources: is_machine_code.then(|| resources(&log)) })
+}
+
+/// The architecture to compile for on a GPU of a compute capability such as 90: its own, or the next one below that the compiler knows, as PTX.
+pub(super) fn architecture(capability: i32) -> Result<String, GpuError> {
+    if !is_present() {
+        return Err(GpuError::NoNvrtc);
+    }
+    let known = supported();
+    if known.contains(&capability) {
+        return Ok(format!("sm_{capability}"));
+    }
+    match known.iter().filter(|&&k| k < capability).max() {
+        Some(below) => Ok(format!("compute_{below}")),
+        None => Err(GpuError::Kernel {
+            kernel: "every".into(),
+            reason: format!("compute capability {capability}; this NVRTC knows {known:?}"),
+        }),
+    }
+}
+
+fn is_present() -> bool {
+    // SAFETY: it opens libraries by the names that NVIDIA gives them, and their initialisers are trusted as the driver's are.
+    static PRESENT: LazyLock<bool> = LazyLock::new(|| unsafe { sys::is_culib_present() });
+    *PRESENT
+}
+
+fn supported() -> Vec<i32> {
+    let mut count = 0;
+    // SAFETY: the first call writes one number, the second as many as the first said.
+    unsafe {
+        if sys::nvrtcGetNumSupportedArchs(&mut count).result().is_err() {
+            return Vec::new();
+        }
+        let mut known = vec![0; count.max(0) as usize];
+        if sys::nvrtcGetSupportedArchs(known.as_mut_ptr()).result().is_err() {
+            return Vec::new();
+        }
+        known
+    }
+}
+
+/// A program of NVRTC, destroyed when dropped.
+struct Program<'a> {
+    program: sys::nvrtcProgram,
+    /// NVRTC may refer to it.
+    _text: &'a CStr,
+}
+
+impl<'a> Program<'a> {
+    fn new(text: &'a CStr) -> Result<Self, result::NvrtcError> {
+        Ok(Self { program: result::create_program(text, None)?, _text: text })
+    }
+
+    fn compile(&mut self, options: &[String]) -> Result<(), result::NvrtcError> {
+        // SAFETY: the program is alive until drop. The options are without zeros.
+        unsafe {
+            result::compile_program(self.program, &options.iter().map(String::as_str).collect::<Vec<_>>())
+        }
+    }
+
+    fn log(&self) -> String {
+        // SAFETY: the program is alive; the log ends with a zero.
+        let log = unsafe { result::get_program_log(self.program) }.unwrap_or_default();
+        let bytes: Vec<u8> = log.iter().map(|&c| c as u8).take_while(|&c| c != 0).collect();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
+    fn image(&self, is_machine_code: bool) -> Result<Vec<u8>, result::NvrtcError> {
+        let mut size = 0;
+        // SAFETY: the program is alive, and the buffer has the size that NVRTC told.
+        unsafe {
+            if is_machine_code {
+                sys::nvrtcGetCUBINSize(self.program, &mut size).result()?;
+            } else {
+                sys::nvrtcGetPTXSize(self.program, &mut size).result()?;
+            }
+            let mut image = vec![0u8; size];
+            let to = image.as_mut_ptr().cast::<c_char>();
+            if is_machine_code {
+                sys::nvrtcGetCUBIN(self.program, to).result()?;
+            } else {
+                sys::nvrtcGetPTX(self.program, to).result()?;
+            }
+            Ok(image)
+        }
+    }
+}
+
+impl Drop for Program<'_> {
+    fn drop(&mut self) {
+        // SAFETY: created by `new`, destroyed once. A failure leaves nothing to do.
+        let _ = unsafe { result::destroy_program(self.program) };
+    }
+}
+
+/// Reads what ptxas says with `-v`: of the kernel, and of the function that it calls when its count is indirect.
+fn resources(log: &str) -> Resources {
+    let sum_before = |what: &str| -> u32 {
+        log.match_indices(what)
+            .filter_map(|(end, _)| log[..end].split_whitespace().next_back()?.parse::<u32>().ok())
+            .sum()
+    };
+    Resources {
+        registers: sum_before(" registers"),
+        stack_bytes: sum_before(" bytes stack frame"),
+        spilled_bytes: (sum_before(" bytes spill stores"), sum_before(" bytes spill loads")),
+        shared_bytes: sum_before(" bytes smem"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_log_is_read() {
+        let log = "ptxas info    : Compiling entry function 'k' for 'sm_90a'\nptxas info    : Function properties for k\nptxas         .    \
+                   160 bytes stack frame, 8 bytes spill stores, 12 bytes spill loads\nptxas info    : Used 30 registers, used 0 barriers, \
+                   64 bytes smem\n";
+        let expected =
+            Resources { registers: 30, stack_bytes: 160, spilled_bytes: (8, 12), shared_bytes: 64 };
+        assert_eq!(resources(log), expected);
+        // 30 registers are given as 32.
+        assert_eq!(expected.warps(64), 64);
+        // No more than 32 blocks.
+        assert_eq!(expected.warps(32), 32);
+        assert_eq!(Resources { registers: 65, ..expected }.warps(64), 28);
+        assert_eq!(Resources { registers: 65, ..expected }.warps(128), 28);
+    }
+}

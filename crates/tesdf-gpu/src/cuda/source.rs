@@ -1,0 +1,207 @@
+//! The text of a kernel.
+use std::sync::Arc;
+
+use cubecl::features::Plane;
+use cubecl::ir::{
+    DeviceIdentity, DeviceProperties, HardwareProperties, MemoryDeviceProperties, TargetProperties,
+    VectorSize,
+};
+use cubecl::prelude::CubeKernel;
+use cubecl::profile::TimingMethod;
+use cubecl::server::CubeDim;
+use cubecl::{Compiler as _, define_kernel};
+use cubecl_cpp::register_supported_types;
+use cubecl_cpp::shared::{CompilationOptions, CppCompiler, CppSupportedFeatures};
+use cubecl_cpp::target::Cuda;
+use cubecl_runtime::kernel::BufferIOAttr;
+
+use crate::GpuError;
+use crate::kernels::catalog;
+
+/// Before every kernel.
+///
+/// CubeCL fuses products into sums by itself, and `a·d − b·c` then is no longer `−(b·c − a·d)`: two faces would disagree on which side of their
+/// common edge a ray passes. And it lets the lanes exchange that happen to be together, where kernels mean all of a plane: lanes that went
+/// different ways need not have met again.
+const HEAD: &str = "#define fma(a, b, c) ((a) * (b) + (c))
+#define __activemask() 0xFFFFFFFFu
+";
+
+/// Where the number of blocks comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Count {
+    /// The host knows it.
+    Direct,
+    /// A buffer of the device holds it.
+    Indirect,
+}
+
+/// A kernel as CUDA C++.
+#[derive(Clone, Debug)]
+pub struct CudaSource {
+    /// Name of the kernel and what tells its variants apart.
+    pub kernel: String,
+    /// Where the number of blocks comes from.
+    pub count: Count,
+    /// Name of the function to launch.
+    pub entry: String,
+    /// Threads of a block.
+    pub threads: (u32, u32, u32),
+    /// Bytes of dynamic shared memory.
+    pub shared_bytes: usize,
+    /// The text. It includes nothing.
+    pub text: String,
+    /// What is done with each buffer.
+    pub(crate) io: Vec<BufferIOAttr>,
+}
+
+/// What kernels are told of the GPU.
+pub(crate) fn properties(
+    identity: DeviceIdentity,
+    memory: MemoryDeviceProperties,
+    hardware: HardwareProperties,
+) -> DeviceProperties {
+    let mut properties =
+        DeviceProperties::new(Default::default(), memory, hardware, TimingMethod::Device, identity);
+    register_supported_types(&mut properties);
+    properties.features.memory_reinterpret = true;
+    properties.features.alignment = true;
+    properties.features.device_memory_scope = true;
+    properties.features.plane.insert(Plane::Ops);
+    properties.features.plane.insert(Plane::Sync);
+    properties.features.plane.insert(Plane::NonUniformControlFlow);
+    properties
+}
+
+/// The least of what a GPU of compute capability 7.5 or more has.
+pub(crate) fn least_hardware() -> HardwareProperties {
+    HardwareProperties {
+        load_width: 128,
+        vector_register_count: None,
+        plane_size_min: 32,
+        plane_size_max: 32,
+        max_bindings: 1024,
+        max_shared_memory_size: 48 << 10,
+        max_cube_count: (i32::MAX as u32, 65_535, 65_535),
+        max_units_per_cube: 1024,
+        max_cube_dim: (1024, 1024, 64),
+        num_streaming_multiprocessors: None,
+        num_cpu_cores: None,
+        last_level_cache_size: None,
+        num_tensor_cores: None,
+        min_tensor_cores_dim: None,
+        max_vector_size: VectorSize::MAX,
+        cube_mma_reserved_shared_memory: 0,
+    }
+}
+
+/// The text of every kernel in every variant, launched as the host launches it.
+///
+/// # Errors
+/// A kernel that CUDA C++ cannot express.
+pub fn sources() -> Result<Vec<CudaSource>, GpuError> {
+    let identity = DeviceIdentity { name: "CUDA".into(), fingerprint: "cuda".into(), physical: None };
+    let properties = properties(identity, MemoryDeviceProperties::new(1 << 30, 256), least_hardware());
+    let kernels = catalog::kernels(&Arc::new(properties), &Arc::new(TargetProperties::default()));
+    let text = |named: &catalog::Named| {
+        let direct = source(&*named.kernel, &named.name)?;
+        match named.count {
+            Count::Direct => Ok(direct),
+            Count::Indirect => direct.counted_by_device(),
+        }
+    };
+    kernels.iter().map(text).collect()
+}
+
+/// The text of a kernel, launched with a count that the host knows.
+pub(crate) fn source(kernel: &dyn CubeKernel, name: &str) -> Result<CudaSource, GpuError> {
+    let refused = |reason: String| GpuError::Kernel { kernel: name.to_owned(), reason };
+    let definition = define_kernel(kernel).map_err(|e| refused(e.to_string()))?;
+    let entry = definition.settings.kernel_name.clone();
+    let threads = CubeDim::from(definition.settings.cube_dim);
+    let options = CompilationOptions {
+        supports_features: CppSupportedFeatures { grid_constants: true, ..Default::default() },
+        ..Default::default()
+    };
+    let compiled =
+        CppCompiler::<Cuda>::default().compile(definition, &options).map_err(|e| refused(e.to_string()))?;
+    Ok(CudaSource {
+        kernel: name.to_owned(),
+        count: Count::Direct,
+        entry,
+        threads: (threads.x, threads.y, threads.z),
+        shared_bytes: compiled.shared_memory_size,
+        text: format!("{HEAD}{}", compiled.source),
+        io: compiled.io,
+    })
+}
+
+impl CudaSource {
+    /// The same, launched with a count that a buffer holds.
+    pub(crate) fn counted_by_device(self) -> Result<Self, GpuError> {
+        let Some(text) = indirect(&self.text, &self.entry) else {
+            let reason = format!("no function {} as it is expected in\n{}", self.entry, self.text);
+            return Err(GpuError::Kernel { kernel: self.kernel, reason });
+        };
+        Ok(Self { count: Count::Indirect, entry: format!("{}_indirect", self.entry), text, ..self })
+    }
+}
+
+/// The same kernel, with its blocks taken in a loop and their number from a buffer, as the module's documentation says.
+fn indirect(text: &str, entry: &str) -> Option<String> {
+    let head = text.find("extern \"C\" __global__")?;
+    let open = head + text[head..].find(&format!("{entry}("))? + entry.len();
+    let body = open + text[open..].find(") {")?;
+    let qualifiers = text[head..open].strip_suffix(entry)?;
+    let parameters = &text[open + 1..body];
+    let names: Vec<&str> = parameters.split(", ").map(|p| p.rsplit(' ').next().unwrap_or(p)).collect();
+    let arguments = names.join(", ");
+    // Only a kernel has parameters of the grid. The body is not inlined: in the loop, arrays of which one is needed at a time would no longer share
+    // the stack (the narrow phase of faces: 1,552 bytes instead of 384).
+    let inner = parameters.replace("__grid_constant__ ", "");
+    let before = &text[..head];
+    let after = &text[body..];
+    Some(format!(
+        "{before}#define blockIdx tesdf_block
+#define gridDim tesdf_grid
+static __device__ __noinline__ void {entry}(const uint3 tesdf_block, const uint3 tesdf_grid, {inner}{after}
+#undef blockIdx
+#undef gridDim
+{qualifiers}{entry}_indirect({parameters}, uint32_t const* const tesdf_count) {{
+    const uint3 grid = {{tesdf_count[0], tesdf_count[1], tesdf_count[2]}};
+    const uint64_t slab = uint64_t(grid.x) * grid.y;
+    const uint64_t blocks = slab * grid.z;
+    for (uint64_t i = blockIdx.x; i < blocks; i += gridDim.x) {{
+        const uint64_t rest = i % slab;
+        const uint3 block = {{uint32_t(rest % grid.x), uint32_t(rest / grid.x), uint32_t(i / slab)}};
+        {entry}(block, grid, {arguments});
+        __syncthreads();
+    }}
+}}
+"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_indirect_count_is_a_loop_around_the_same_body() {
+        let text = "struct s {};\nextern \"C\" __global__ void __launch_bounds__(64)  k_1(uint32_t* const __restrict__ a, __grid_constant__ \
+                    info_st const info) {\na[blockIdx.x] = gridDim.x;\n}\n";
+        let looped = indirect(text, "k_1").expect("a kernel");
+        assert!(
+            looped.contains(
+                "void k_1(const uint3 tesdf_block, const uint3 tesdf_grid, uint32_t* const __restrict__ a, "
+            ),
+            "{looped}"
+        );
+        assert!(
+            looped.contains("__launch_bounds__(64)  k_1_indirect(uint32_t* const __restrict__ a, "),
+            "{looped}"
+        );
+        assert!(looped.contains("k_1(block, grid, a, info);"), "{looped}");
+        assert!(indirect(text, "k_2").is_none());
+    }
+}

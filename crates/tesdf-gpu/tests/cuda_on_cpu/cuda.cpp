@@ -1,0 +1,278 @@
+// The part of CUDA's driver and of NVRTC that this crate calls, on the CPU: what it does with them is tested without a GPU.
+//
+// "Machine code" is the path of a shared library, which the C++ compiler makes of a kernel's text. Threads of a block are fibers, each run to its
+// next barrier; a barrier that some of them never reach ends the process. Buffers lie right before memory that nothing may touch, so a kernel
+// that reads or writes past one ends it, too.
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <dlfcn.h>
+#include <fstream>
+#include <map>
+#include <string>
+#include <sys/mman.h>
+#include <ucontext.h>
+#include <unistd.h>
+#include <vector>
+
+#define CUDA extern "C" __attribute__((visibility("default")))
+
+struct uint3 { unsigned x, y, z; };
+
+// Any that are told apart from others.
+static void *const CONTEXT = (void *)1, *const STREAM = (void *)2, *const POOL = (void *)3;
+static const int INVALID = 1, NO_CONTEXT = 201, NOT_FOUND = 500;
+
+[[noreturn]] static void stop(const std::string &why) {
+    fprintf(stderr, "CUDA on the CPU: %s\n", why.c_str());
+    _exit(70);
+}
+
+// Devices and memory.
+
+static thread_local void *current = nullptr;
+static std::map<uint64_t, std::pair<void *, size_t>> taken;
+
+CUDA int cuInit(unsigned) { return 0; }
+CUDA int cuDeviceGetCount(int *count) { *count = 1; return 0; }
+CUDA int cuDeviceGet(int *device, int index) { *device = index; return index == 0 ? 0 : 101; }
+CUDA int cuDeviceGetName(char *name, int size, int) { snprintf(name, size, "CUDA on the CPU"); return 0; }
+CUDA int cuDeviceTotalMem_v2(size_t *bytes, int) { *bytes = size_t(1) << 32; return 0; }
+CUDA int cuDeviceGetAttribute(int *value, int attribute, int) {
+    // Multiprocessors, compute capability 9.0, shared memory of a block, memory pools.
+    static const std::map<int, int> attributes = {{16, 3}, {75, 9}, {76, 0}, {97, 227 << 10}, {115, 1}};
+    auto found = attributes.find(attribute);
+    if (found == attributes.end()) return INVALID;
+    *value = found->second;
+    return 0;
+}
+CUDA int cuDevicePrimaryCtxRetain(void **context, int) { *context = CONTEXT; return 0; }
+CUDA int cuCtxSetCurrent(void *context) { current = context; return 0; }
+CUDA int cuStreamCreate(void **stream, unsigned flags) { *stream = STREAM; return flags == 0 ? 0 : INVALID; }
+CUDA int cuDeviceGetDefaultMemPool(void **pool, int) { *pool = POOL; return 0; }
+CUDA int cuMemPoolSetAttribute(void *pool, int, void *) { return pool == POOL ? 0 : INVALID; }
+CUDA int cuGetErrorString(int, const char **text) { *text = "see cuda.h"; return 0; }
+
+CUDA int cuMemAllocAsync(uint64_t *pointer, size_t bytes, void *stream) {
+    if (current != CONTEXT) return NO_CONTEXT;
+    if (stream != STREAM) return INVALID;
+    const size_t page = sysconf(_SC_PAGESIZE), all = (bytes + page - 1) / page * page + 2 * page;
+    char *begin = (char *)mmap(nullptr, all, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (begin == MAP_FAILED || mprotect(begin + page, all - 2 * page, PROT_READ | PROT_WRITE) != 0) return 2;
+    // Not zeros, so that what nobody wrote shows.
+    memset(begin + page, 0xCD, all - 2 * page);
+    *pointer = (uint64_t)(begin + all - page - bytes) & ~uint64_t(15);
+    taken[*pointer] = {begin, all};
+    return 0;
+}
+CUDA int cuMemFreeAsync(uint64_t pointer, void *) {
+    auto found = taken.find(pointer);
+    if (current != CONTEXT || found == taken.end()) return INVALID;
+    munmap(found->second.first, found->second.second);
+    taken.erase(found);
+    return 0;
+}
+CUDA int cuMemcpyHtoDAsync_v2(uint64_t to, const void *from, size_t bytes, void *stream) {
+    if (current != CONTEXT || stream != STREAM) return NO_CONTEXT;
+    memcpy((void *)to, from, bytes);
+    return 0;
+}
+CUDA int cuMemcpyDtoHAsync_v2(void *to, uint64_t from, size_t bytes, void *stream) {
+    if (current != CONTEXT || stream != STREAM) return NO_CONTEXT;
+    memcpy(to, (void *)from, bytes);
+    return 0;
+}
+CUDA int cuStreamSynchronize(void *) { return current == CONTEXT ? 0 : NO_CONTEXT; }
+
+CUDA int cuEventCreate(void **event, unsigned) { *event = new timespec{}; return 0; }
+CUDA int cuEventRecord(void *event, void *) { return clock_gettime(CLOCK_MONOTONIC, (timespec *)event); }
+CUDA int cuEventSynchronize(void *) { return 0; }
+CUDA int cuEventElapsedTime(float *milliseconds, void *from, void *to) {
+    auto *a = (timespec *)from, *b = (timespec *)to;
+    *milliseconds = (b->tv_sec - a->tv_sec) * 1e3f + (b->tv_nsec - a->tv_nsec) * 1e-6f;
+    return 0;
+}
+CUDA int cuEventDestroy_v2(void *event) { delete (timespec *)event; return 0; }
+
+// Kernels.
+
+static const char MAGIC[] = "\x7f" "ELF";
+
+struct Kernel {
+    std::string name;
+    void (*run)(void **);
+    uint3 *thread, *block, *grid, *threads;
+    char **shared;
+    void (**sync)();
+    unsigned (**exchange)(unsigned, unsigned);
+};
+
+CUDA int cuModuleLoadData(void **module, const void *image) {
+    if (current != CONTEXT) return NO_CONTEXT;
+    const std::string library = (const char *)image + strlen(MAGIC), folder = library.substr(0, library.rfind('/'));
+    *module = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
+    for (const char *file : {"/kernel.cpp", "/kernel.so", "/log", ""}) remove((folder + file).c_str());
+    return *module ? 0 : INVALID;
+}
+template <typename T> static bool find(T &to, void *module, const char *name) {
+    to = (T)dlsym(module, name);
+    return to != nullptr;
+}
+CUDA int cuModuleGetFunction(void **function, void *module, const char *name) {
+    auto *k = new Kernel{name};
+    bool whole = dlsym(module, name) && find(k->run, module, "cuda_run") && find(k->thread, module, "threadIdx") &&
+                 find(k->block, module, "blockIdx") && find(k->grid, module, "gridDim") && find(k->threads, module, "blockDim") &&
+                 find(k->shared, module, "cuda_shared") && find(k->sync, module, "cuda_sync") &&
+                 find(k->exchange, module, "cuda_exchange");
+    *function = k;
+    return whole ? 0 : NOT_FOUND;
+}
+CUDA int cuFuncSetAttribute(void *, int, int) { return 0; }
+// Few, so that the loop of an indirect launch runs more than once.
+CUDA int cuOccupancyMaxActiveBlocksPerMultiprocessor(int *blocks, void *, int, size_t) { *blocks = 2; return 0; }
+
+enum class Fiber { Ready, Done };
+static ucontext_t launcher;
+static std::vector<ucontext_t> fibers;
+static std::vector<Fiber> states;
+static std::vector<unsigned> words;
+static unsigned running;
+static Kernel *kernel;
+static void **arguments;
+
+static void leave() { swapcontext(&fibers[running], &launcher); }
+static unsigned exchange(unsigned word, unsigned other) {
+    words[running] = word;
+    leave();
+    const unsigned found = words[other];
+    leave();
+    return found;
+}
+static void body() {
+    kernel->run(arguments);
+    states[running] = Fiber::Done;
+    leave();
+}
+static void run_block(unsigned threads, const std::vector<std::vector<char>> &stacks) {
+    states.assign(threads, Fiber::Ready);
+    for (unsigned t = 0; t < threads; t++) {
+        getcontext(&fibers[t]);
+        fibers[t].uc_stack.ss_sp = (void *)stacks[t].data();
+        fibers[t].uc_stack.ss_size = stacks[t].size();
+        fibers[t].uc_link = nullptr;
+        makecontext(&fibers[t], body, 0);
+    }
+    for (unsigned done = 0; done < threads;) {
+        done = 0;
+        for (running = 0; running < threads; running++) {
+            *kernel->thread = {running, 0, 0};
+            if (states[running] != Fiber::Done) swapcontext(&launcher, &fibers[running]);
+            done += states[running] == Fiber::Done;
+        }
+        if (done != 0 && done != threads) stop(kernel->name + ": a barrier that some threads of a block never reach");
+    }
+}
+CUDA int cuLaunchKernel(void *function, unsigned gx, unsigned gy, unsigned gz, unsigned bx, unsigned by, unsigned bz, unsigned shared,
+                        void *stream, void **parameters, void **) {
+    if (current != CONTEXT) return NO_CONTEXT;
+    if (stream != STREAM || gx == 0 || gy == 0 || gz == 0 || by != 1 || bz != 1) return INVALID;
+    static std::vector<std::vector<char>> stacks;
+    while (stacks.size() < bx) stacks.emplace_back(256 << 10);
+    kernel = (Kernel *)function;
+    arguments = parameters;
+    fibers.resize(bx);
+    words.resize(bx);
+    std::vector<char> memory(shared + 16);
+    *kernel->shared = memory.data();
+    *kernel->sync = leave;
+    *kernel->exchange = exchange;
+    *kernel->threads = {bx, by, bz};
+    *kernel->grid = {gx, gy, gz};
+    for (unsigned z = 0; z < gz; z++)
+        for (unsigned y = 0; y < gy; y++)
+            for (unsigned x = 0; x < gx; x++) {
+                *kernel->block = {x, y, z};
+                run_block(bx, stacks);
+            }
+    return 0;
+}
+
+// NVRTC.
+
+struct Program { std::string text, log, image; };
+
+static std::string between(const std::string &text, const std::string &from, const std::string &to, size_t &at) {
+    const size_t begin = text.find(from, at);
+    if (begin == std::string::npos) return {};
+    const size_t end = text.find(to, begin + from.size());
+    if (end == std::string::npos) stop("\"" + from + "\" without \"" + to + "\"");
+    at = end + to.size();
+    return text.substr(begin + from.size(), end - begin - from.size());
+}
+static void replace_all(std::string &text, const std::string &from, const std::string &to, const std::string &with_from,
+                        const std::string &with_to) {
+    for (size_t at = 0; (at = text.find(from, at)) != std::string::npos;) {
+        size_t end = at;
+        const std::string inner = between(text, from, to, end);
+        text.replace(at, end - at, with_from + inner + with_to);
+    }
+}
+// The kernel as C++, and a function that calls it with CUDA's pointers to its arguments.
+static std::string as_cpp(std::string text) {
+    replace_all(text, "extern __shared__ __align__(4) char ", "[];", "char* const ", " = cuda_shared;");
+    const std::string atom = "asm volatile(\"atom.relaxed.add.u32 %0, [%1], %2;\" : \"=r\"(result) : \"l\"(";
+    replace_all(text, atom, ") );", "result = __sync_fetch_and_add((uint32_t*)", ");");
+    for (size_t at; (at = text.find("), \"r\"(")) != std::string::npos;) text.replace(at, 7, ", ");
+    if (text.find("asm ") != std::string::npos || text.find("__shared__") != std::string::npos) return {};
+    size_t head = text.rfind("extern \"C\" __global__");
+    head = text.find("  ", head) + 2;
+    const size_t open = text.find('(', head);
+    std::string parameters = text.substr(open + 1, text.find(") {", open) - open - 1) + ", ", call;
+    int number = 0;
+    for (size_t at = 0, comma; (comma = parameters.find(", ", at)) != std::string::npos; at = comma + 2) {
+        std::string type = parameters.substr(at, comma - at);
+        type = type.substr(0, type.rfind(' '));
+        for (const char *word : {"__restrict__", "__grid_constant__"})
+            if (size_t found = type.find(word); found != std::string::npos) type.erase(found, strlen(word));
+        call += (number ? ", *(" : "*(") + type + "*)a[" + std::to_string(number) + "]";
+        number++;
+    }
+    const std::string name = text.substr(head, open - head);
+    return "#include \"" HEADER "\"\n" + text + "\nextern \"C\" void cuda_run(void** a) { " + name + "(" + call + "); }\n";
+}
+
+CUDA int nvrtcGetNumSupportedArchs(int *count) { *count = 1; return 0; }
+CUDA int nvrtcGetSupportedArchs(int *known) { known[0] = 90; return 0; }
+CUDA int nvrtcCreateProgram(void **program, const char *text, const char *, int, const char **, const char **) {
+    *program = new Program{text, "", ""};
+    return 0;
+}
+CUDA int nvrtcCompileProgram(void *program, int, const char **) {
+    auto *p = (Program *)program;
+    const std::string cpp = as_cpp(p->text);
+    if (cpp.empty()) {
+        p->log = "assembly that is not known on the CPU";
+        return 6;
+    }
+    char name[] = "/tmp/cuda_on_cpu.XXXXXX";
+    if (!mkdtemp(name)) stop("no temporary folder");
+    const std::string folder = name;
+    std::ofstream(folder + "/kernel.cpp") << cpp;
+    const std::string command = "c++ -w -std=c++17 -O1 -fno-strict-aliasing -ffp-contract=off -fPIC -shared -o " + folder +
+                                "/kernel.so " + folder + "/kernel.cpp 2> " + folder + "/log";
+    if (system(command.c_str()) != 0) {
+        std::ifstream log(folder + "/log");
+        p->log.assign(std::istreambuf_iterator<char>(log), {});
+        return 6;
+    }
+    p->image = MAGIC + folder + "/kernel.so";
+    return 0;
+}
+CUDA int nvrtcGetProgramLogSize(void *program, size_t *size) { *size = ((Program *)program)->log.size() + 1; return 0; }
+CUDA int nvrtcGetProgramLog(void *program, char *log) { strcpy(log, ((Program *)program)->log.c_str()); return 0; }
+CUDA int nvrtcGetCUBINSize(void *program, size_t *size) { *size = ((Program *)program)->image.size() + 1; return 0; }
+CUDA int nvrtcGetCUBIN(void *program, char *image) { strcpy(image, ((Program *)program)->image.c_str()); return 0; }
+CUDA int nvrtcDestroyProgram(void **program) { delete (Program *)*program; return 0; }
+CUDA const char *nvrtcGetErrorString(int) { return "see nvrtc.h"; }

@@ -1,0 +1,35 @@
+// What a kernel finds on a GPU. Put before the text of a kernel, which is then compiled as C++.
+typedef unsigned long size_t;
+struct uint3 { unsigned x, y, z; };
+extern "C" {
+uint3 threadIdx, blockIdx, gridDim, blockDim;
+char* cuda_shared;
+void (*cuda_sync)();
+// The word that the lane `other` of the same plane gives.
+unsigned (*cuda_exchange)(unsigned word, unsigned other);
+}
+#define warpSize 32u
+#define __global__
+#define __device__
+#define __grid_constant__
+#define __noinline__ __attribute__((noinline))
+#define __launch_bounds__(...)
+#define __syncthreads() cuda_sync()
+static inline unsigned __shfl_xor_sync(unsigned, unsigned word, unsigned mask) {
+    return cuda_exchange(word, threadIdx.x ^ mask);
+}
+static inline float __shfl_xor_sync(unsigned, float number, unsigned mask) {
+    unsigned word;
+    __builtin_memcpy(&word, &number, 4);
+    word = cuda_exchange(word, threadIdx.x ^ mask);
+    __builtin_memcpy(&number, &word, 4);
+    return number;
+}
+static inline unsigned min(unsigned a, unsigned b) { return a < b ? a : b; }
+static inline unsigned max(unsigned a, unsigned b) { return a > b ? a : b; }
+static inline int min(int a, int b) { return a < b ? a : b; }
+static inline int max(int a, int b) { return a > b ? a : b; }
+static inline float min(float a, float b) { return __builtin_fminf(a, b); }
+static inline float max(float a, float b) { return __builtin_fmaxf(a, b); }
+static inline float sqrt(float x) { return __builtin_sqrtf(x); }
+static inline float fabs(float x) { return __builtin_fabsf(x); }

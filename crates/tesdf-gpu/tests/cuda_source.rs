@@ -1,0 +1,101 @@
+//! Every kernel as CUDA C++: its form, and that NVRTC compiles it. Needs NVRTC, but no GPU.
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use tesdf_gpu::cuda::{Count, CudaSource, Resources, compile, sources};
+
+static SOURCES: LazyLock<Vec<CudaSource>> = LazyLock::new(|| sources().unwrap_or_else(|e| panic!("{e}")));
+
+/// Machine code for the GPUs of compute centers, with what each kernel takes of them.
+#[test]
+fn every_kernel_compiles_to_machine_code() {
+    println!("{:46} registers warps stack spilled shared", "kernel");
+    for source in SOURCES.iter() {
+        let compiled = compile(source, "sm_90a").unwrap_or_else(|e| panic!("{e}"));
+        assert!(compiled.image.starts_with(b"\x7fELF"), "{}", source.kernel);
+        let found = compiled.resources.expect("machine code has it");
+        let Resources { registers, stack_bytes, spilled_bytes: (stores, loads), .. } = found;
+        let warps = found.warps(source.threads.0);
+        let shared = source.shared_bytes + found.shared_bytes as usize;
+        println!(
+            "{:46} {registers:9} {warps:5} {stack_bytes:5} {:7} {shared:6}",
+            source.kernel,
+            stores + loads
+        );
+        assert!((1..=255).contains(&registers), "{}: {registers} registers", source.kernel);
+    }
+}
+
+/// PTX for all GPUs from Turing on.
+#[test]
+fn every_kernel_compiles_to_ptx() {
+    for source in SOURCES.iter() {
+        let compiled = compile(source, "compute_75").unwrap_or_else(|e| panic!("{e}"));
+        let text = String::from_utf8_lossy(&compiled.image);
+        assert!(text.contains(&format!(".visible .entry {}(", source.entry)), "{}", source.kernel);
+    }
+}
+
+#[test]
+fn a_refused_kernel_says_why() {
+    let mut source = SOURCES[0].clone();
+    source.text.push_str("no such thing;");
+    let error = compile(&source, "sm_90a").expect_err("no kernel").to_string();
+    assert!(error.contains("error: identifier \"no\" is undefined"), "{error}");
+}
+
+/// What launches rely on, in the text of the kernel: pointers in order, then scalars and lengths by value.
+#[test]
+fn arguments_are_pointers_then_scalars_and_lengths() {
+    let named = |name: &str| SOURCES.iter().find(|s| s.kernel == name).expect("the kernel is listed");
+    let direct = named("query::signed_distances");
+    let parameters = parameters(direct);
+    // Shapes, instances, shapes of instances, points, answers, faces: three, one, one, one, one, one.
+    let types: Vec<&str> = parameters.iter().map(|p| p.split_whitespace().next().unwrap_or("")).collect();
+    let rows = "float_4";
+    assert_eq!(
+        types[..8].iter().map(|t| t.trim_end_matches('*')).collect::<Vec<_>>(),
+        ["uint32_t", "uint32_t", rows, rows, "uint32_t", rows, rows, "uint32_t"],
+    );
+    assert_eq!(parameters.len(), 9);
+    assert!(parameters[8].starts_with("__grid_constant__ info_st const "), "{}", parameters[8]);
+    assert_eq!(direct.threads, (64, 1, 1));
+    // Three scalars are padded to four; eight lengths follow.
+    let info = between(&direct.text, "struct info_st {", "};");
+    let fields: Vec<&str> = info.split_inclusive(';').map(str::trim).filter(|f| !f.is_empty()).collect();
+    assert_eq!(fields, ["uint32_t scalars_u32[4];", "uint32_t static_meta[8];"]);
+    let indirect = named("clip::nodes");
+    assert!(indirect.count == Count::Indirect && indirect.entry.ends_with("_indirect"));
+    assert!(indirect.text.contains(&format!(" {}(", indirect.entry)));
+    assert!(
+        indirect.text.contains(" info_v") && indirect.text.contains(", uint32_t const* const tesdf_count) {")
+    );
+}
+
+/// The list of kernels is whole: what `src/kernels` marks for launching is on it.
+#[test]
+fn every_kernel_is_listed() {
+    let listed: BTreeSet<String> =
+        SOURCES.iter().map(|s| s.kernel.split(' ').next().unwrap_or("").to_owned()).collect();
+    let mut written = BTreeSet::new();
+    for file in
+        std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/kernels")).expect("a folder")
+    {
+        let path = file.expect("a file").path();
+        let text = std::fs::read_to_string(&path).expect("text");
+        let module = path.file_stem().expect("a name").to_string_lossy().into_owned();
+        let names = text.split("#[cube(launch").skip(1).map(|after| between(after, "fn ", "(").to_owned());
+        written.extend(names.map(|name| format!("{module}::{name}")));
+    }
+    assert_eq!(listed, written);
+}
+
+fn parameters(source: &CudaSource) -> Vec<&str> {
+    between(&source.text, &format!("{}(", source.entry), ") {").split(", ").collect()
+}
+
+fn between<'a>(text: &'a str, from: &str, to: &str) -> &'a str {
+    let rest = text.split_once(from).expect(from).1;
+    rest.split_once(to).expect(to).0
+}
