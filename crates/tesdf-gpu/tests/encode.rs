@@ -2,6 +2,8 @@
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
+use std::ops::ControlFlow;
+
 use support::meshes;
 use support::tetrahedra::grid;
 use tesdf::TeSdf;
@@ -181,7 +183,8 @@ fn a_threshold_as_wide_as_the_grid_misses_nothing() {
     let domain = Domain::Conforming(&conforming);
     let asset = encode(&device(), &solid, domain, &source, &options, &progress).expect("encodes");
     assert!(asset.about().certificate.delta.is_some());
-    let report = verify(&asset, &VerifyOptions { samples: 3000, seed: 1 }, |_| {}).expect("a valid mesh");
+    let go_on = |_| ControlFlow::Continue(());
+    let report = verify(&asset, &VerifyOptions { samples: 3000, seed: 1 }, go_on).expect("a valid mesh");
     assert!(report.passed, "{report:#?}");
 }
 
