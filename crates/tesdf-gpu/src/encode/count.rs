@@ -99,7 +99,7 @@ impl Sampler for SampleCounter {
         let chosen: Vec<&SampledCell> = cells
             .iter()
             .enumerate()
-            .filter(|(at, _)| (first + at) % self.every == 0)
+            .filter(|(at, _)| (first + at).is_multiple_of(self.every))
             .map(|(_, c)| c)
             .collect();
         let seen: Vec<(u64, u64)> =
