@@ -74,7 +74,7 @@ fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
     println!("device: {}", sampler.name());
     let progress = EncodeProgress::default();
     let thresholds = [Threshold::Absolute(0.0), Threshold::Absolute(1e-3), Threshold::CoveringRadius];
-    let (mut listed, mut besides) = (0, 0);
+    let (mut listed, mut besides, mut most_candidates) = (0, 0, 0);
     for name in ["tetra", "cube", "l_bracket", "torus_quads", "shaft_keyway", "icosphere_5k"] {
         let case = Case::new(name);
         for (threshold, resolution) in thresholds.into_iter().zip([9, 4, 3]) {
@@ -93,6 +93,7 @@ fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
             let most = Processor.sample(&case.surface, &wider, &sampling, &progress).expect("samples");
             for (at, cell) in cells.iter().enumerate() {
                 let slack = slack(cell);
+                most_candidates = most_candidates.max(cell.faces.len());
                 for (k, face) in cell.faces.iter().enumerate() {
                     let (found, least, most) = (found[at][k], least[at][k], most[at][k]);
                     let what =
@@ -109,6 +110,8 @@ fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
             }
         }
     }
+    // Groups look at 1024 in one go.
+    assert!(most_candidates > 2048, "{most_candidates} candidates at most");
     // Ties: of faces that are equally near, rounding picks some in `f64`, too.
     println!("{listed} entries, {besides} besides");
     assert!(listed > 1000 && besides < listed, "{listed} entries, {besides} besides");

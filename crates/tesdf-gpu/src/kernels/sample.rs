@@ -134,6 +134,33 @@ pub fn block_limit(nearest: f32, threshold: f32, radius: f32, reach: f32) -> f32
     limit + ROUNDING * (radius + reach + limit)
 }
 
+/// Of `count` candidates from `first` on, those within the limit of the middle of the block, into `list`; for the whole group.
+#[cube]
+fn gather(
+    faces: &[Vector<f32, Const<4>>],
+    first: usize,
+    count: usize,
+    center: V3,
+    squared_limit: f32,
+    list: &mut Shared<[u32]>,
+    length: &Shared<[Atomic<u32>]>,
+) {
+    if UNIT_POS == 0u32 {
+        length[0].store(0u32);
+    }
+    sync_cube();
+    for step in 0..comptime!(TILE / GROUP) {
+        let at = step * comptime!(GROUP) + UNIT_POS as usize;
+        if at < count {
+            let face = first + at;
+            if distance_to(faces, face, center) <= squared_limit {
+                list[length[0].fetch_add(1u32) as usize] = face as u32;
+            }
+        }
+    }
+    sync_cube();
+}
+
 /// A group for each block of each cell: d_f², as bits, of the candidates that are within ε at a sample, into `least`.
 ///
 /// `ranges` has first candidate and number of candidates of each cell, `blocks` where each block is, in blocks, ten bits for each index.
@@ -196,21 +223,7 @@ pub fn sample(
     let tiles = count.div_ceil(TILE);
     let mut nearest = 3.0e38f32;
     for tile in 0..tiles {
-        let end = (tile * comptime!(TILE) + comptime!(TILE)).min(count);
-        if unit == 0 {
-            length[0].store(0u32);
-        }
-        sync_cube();
-        for step in 0..comptime!(TILE / GROUP) {
-            let at = tile * comptime!(TILE) + step * comptime!(GROUP) + unit;
-            if at < end {
-                let face = first + at;
-                if distance_to(faces, face, center) <= block_limit {
-                    list[length[0].fetch_add(1u32) as usize] = face as u32;
-                }
-            }
-        }
-        sync_cube();
+        gather(faces, first + tile * comptime!(TILE), (count - tile * comptime!(TILE)).min(TILE), center, block_limit, &mut list, &length);
         if is_sample {
             for n in 0..length[0].load() {
                 let face = list[n as usize] as usize;
@@ -223,21 +236,7 @@ pub fn sample(
     let limit = limit * limit;
     for tile in 0..tiles {
         if tiles > 1 {
-            let end = (tile * comptime!(TILE) + comptime!(TILE)).min(count);
-            if unit == 0 {
-                length[0].store(0u32);
-            }
-            sync_cube();
-            for step in 0..comptime!(TILE / GROUP) {
-                let at = tile * comptime!(TILE) + step * comptime!(GROUP) + unit;
-                if at < end {
-                    let face = first + at;
-                    if distance_to(faces, face, center) <= block_limit {
-                        list[length[0].fetch_add(1u32) as usize] = face as u32;
-                    }
-                }
-            }
-            sync_cube();
+            gather(faces, first + tile * comptime!(TILE), (count - tile * comptime!(TILE)).min(TILE), center, block_limit, &mut list, &length);
         }
         if is_sample {
             for n in 0..length[0].load() {
