@@ -310,5 +310,8 @@ fn samples_on_a_device_are_in_32_bits_and_the_file_says_so() {
     let on_device = encoded("gpu");
     assert!(on_device.starts_with("sampled, f32, "), "{on_device}");
     let (code, _, err) = folder.tesdf(&["encode", "cube.obj", "-o", "cube.tesdf", "--device", "gpu"]);
-    assert_eq!((code, err.trim()), (Some(2), "error: --device is of the sampled encoder; add --encoder sampled"));
+    assert_eq!(
+        (code, err.trim()),
+        (Some(2), "error: --device is of the sampled encoder; add --encoder sampled")
+    );
 }

@@ -223,7 +223,15 @@ pub fn sample(
     let tiles = count.div_ceil(TILE);
     let mut nearest = 3.0e38f32;
     for tile in 0..tiles {
-        gather(faces, first + tile * comptime!(TILE), (count - tile * comptime!(TILE)).min(TILE), center, block_limit, &mut list, &length);
+        gather(
+            faces,
+            first + tile * comptime!(TILE),
+            (count - tile * comptime!(TILE)).min(TILE),
+            center,
+            block_limit,
+            &mut list,
+            &length,
+        );
         if is_sample {
             for n in 0..length[0].load() {
                 let face = list[n as usize] as usize;
@@ -236,7 +244,15 @@ pub fn sample(
     let limit = limit * limit;
     for tile in 0..tiles {
         if tiles > 1 {
-            gather(faces, first + tile * comptime!(TILE), (count - tile * comptime!(TILE)).min(TILE), center, block_limit, &mut list, &length);
+            gather(
+                faces,
+                first + tile * comptime!(TILE),
+                (count - tile * comptime!(TILE)).min(TILE),
+                center,
+                block_limit,
+                &mut list,
+                &length,
+            );
         }
         if is_sample {
             for n in 0..length[0].load() {
