@@ -164,7 +164,7 @@ fn gather(
 /// A group for each block of each cell: d_f², as bits, of the candidates that are within ε at a sample, into `least`.
 ///
 /// `ranges` has first candidate and number of candidates of each cell, `blocks` where each block is, in blocks, ten bits for each index.
-#[cube(launch)]
+#[cube(launch, create_dummy_kernel)]
 pub fn sample(
     faces: &[Vector<f32, Const<4>>],
     cells: &[Vector<f32, Const<4>>],
