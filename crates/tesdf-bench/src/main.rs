@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod algorithm_1;
 mod batch;
 mod clearance;
 mod collide_peers;
@@ -49,6 +50,9 @@ enum Command {
     Memory(memory::Args),
     /// Time, peak memory and hash of one encode
     Encode(encode::Args),
+    /// Distances of Algorithm 1 at a resolution, as the paper has it and as a device measures them
+    #[command(name = "algorithm-1")]
+    Algorithm1(algorithm_1::Args),
     /// Memory against speed over the encoder's options
     Curve(curve::Args),
     /// Largest errors and sign mistakes against brute force
@@ -71,6 +75,7 @@ fn main() -> ExitCode {
         Command::Batch(args) => batch::run(args),
         Command::Memory(args) => memory::run(args),
         Command::Encode(args) => encode::run(args),
+        Command::Algorithm1(args) => algorithm_1::run(args),
         Command::Curve(args) => curve::run(args),
         Command::Exactness(args) => exactness::run(args),
         Command::Screw(args) => screw::run(args),

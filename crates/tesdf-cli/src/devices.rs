@@ -3,7 +3,9 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::Serialize;
 use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene};
-use tesdf_gpu::{Detector, DetectorOptions, Device, DeviceInfo, devices};
+use tesdf::encode::Sampler;
+use tesdf::encode::sampled::Processor;
+use tesdf_gpu::{Detector, DetectorOptions, Device, DeviceInfo, DeviceSampler, devices};
 use tesdf_sim::newton::Detect;
 
 use crate::report::{self, Failure, Outcome};
@@ -54,6 +56,17 @@ impl Choice {
         device
             .map(Some)
             .map_err(|e| Failure::new(e).hint("`tesdf devices` lists them; `cpu` is the processor"))
+    }
+
+    /// What looks at the samples of Algorithm 1 there.
+    ///
+    /// # Errors
+    /// There is no such device.
+    pub fn sampler(&self) -> Result<Box<dyn Sampler>, Failure> {
+        Ok(match self.open()? {
+            Some(device) => Box::new(DeviceSampler::new(device)),
+            None => Box::new(Processor),
+        })
     }
 }
 

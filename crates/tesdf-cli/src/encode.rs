@@ -8,10 +8,11 @@ use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::asset::about::{Certificate, Source, Statistics};
-use tesdf::encode::{Domain, DomainChoice, EncodeOptions, EncodeProgress, Threshold, encode_in};
+use tesdf::encode::{Domain, DomainChoice, EncodeOptions, EncodeProgress, Encoder, Threshold, encode_with};
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 
+use crate::devices::Choice;
 use crate::progress::{interrupt_flag, watched};
 use crate::report::{self, Failure, Outcome};
 use crate::{mesh_file, parse};
@@ -44,6 +45,9 @@ pub struct Args {
     /// How much farther than the closest face a listed one may be at a sample: a length, or `safe` for so much that nothing is missing
     #[arg(long, value_name = "LENGTH|safe", value_parser = choices::threshold)]
     pub threshold: Option<Threshold>,
+    /// Where samples are looked at: cpu in 64 bits, gpu in 32 bits, or so on a device by number or name
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
+    pub device: Choice,
     /// Cut lists to this many faces, those that are needed nearest to the surface
     #[arg(long, value_name = "N")]
     pub e_max: Option<NonZeroU32>,
@@ -121,11 +125,15 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let progress = EncodeProgress::default();
     let choices = args.choices();
     let options = choices.options().map_err(Failure::new)?;
+    if options.encoder == Encoder::Certified && args.device != Choice::Processor {
+        return Err(Failure::new("--device is of the sampled encoder; add --encoder sampled"));
+    }
+    let sampler = args.device.sampler()?;
     let encoded = watched(&progress, &interrupted, || {
         pool.install(|| {
             let tetrahedra = choices.tetrahedra(&solid, &progress).map_err(Failure::new)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
-            encode_in(&solid, domain, &source, &options, &progress).map_err(|e| at(&e))
+            encode_with(&solid, domain, &source, &options, &*sampler, &progress).map_err(|e| at(&e))
         })
     });
     if interrupted.load(Ordering::Relaxed) {

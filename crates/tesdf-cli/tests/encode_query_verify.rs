@@ -295,3 +295,23 @@ fn a_slice_is_a_png_of_the_size_asked_for() {
         assert!(warm > 1000 && cold > 1000, "{axis}: {warm} {cold}");
     }
 }
+
+#[test]
+fn samples_on_a_device_are_in_32_bits_and_the_file_says_so() {
+    let folder = Folder::new();
+    folder.write("cube.obj", CUBE);
+    let encoded = |device: &str| {
+        let sampled = ["--encoder", "sampled", "--resolution", "4", "--device", device, "--json"];
+        let out = folder.good(&[&["encode", "cube.obj", "-o", "cube.tesdf"], &sampled[..]].concat());
+        let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+        report["certificate"]["encoder"].as_str().unwrap().to_string()
+    };
+    assert_eq!(encoded("cpu"), "sampled");
+    let on_device = encoded("gpu");
+    assert!(on_device.starts_with("sampled, f32, "), "{on_device}");
+    let (code, _, err) = folder.tesdf(&["encode", "cube.obj", "-o", "cube.tesdf", "--device", "gpu"]);
+    assert_eq!(
+        (code, err.trim()),
+        (Some(2), "error: --device is of the sampled encoder; add --encoder sampled")
+    );
+}

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! TeSdf ──Images──▶ buffers ──SignedDistances──▶ answers of many points
+//! SolidMesh ──encode──▶ TeSdf, by samples
 //! Scene ──Detector──▶ contacts, in the form and order of `tesdf::collide::detect`
 //! ```
 //!
@@ -14,6 +15,7 @@ mod contacts;
 pub mod cuda;
 mod detector;
 mod device;
+mod encode;
 mod error;
 mod images;
 mod instances;
@@ -27,6 +29,7 @@ pub use detector::{
     Pruning,
 };
 pub use device::{Device, DeviceInfo, DeviceKind, devices};
+pub use encode::{DeviceSampler, ROUNDING, SampleCounter, SampleCounts, SamplerLimits, encode};
 pub use error::GpuError;
 pub use images::{ImageBytes, Images};
 pub use query::{WorldAnswer, query};

@@ -5,7 +5,8 @@ use std::time::Instant;
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::encode::{
-    Deformation, EncodeOptions, EncodeProgress, Encoder, Refinement, Sampling, Threshold, encode_in,
+    Deformation, EncodeOptions, EncodeProgress, Encoder, Refinement, Sampler, Sampling, Threshold,
+    encode_with,
 };
 use tesdf::evaluate::{BandReport, EvaluateOptions, evaluate};
 use tesdf::inspect::{InspectOptions, inspect};
@@ -65,16 +66,16 @@ impl Way {
         Self { options, ..self.clone() }
     }
 
-    /// Encodes; also the seconds that it took.
+    /// Encodes, the samples of Algorithm 1 looked at by `sampler`; also the seconds that it took.
     ///
     /// # Errors
     /// What the library refused.
-    pub fn encode(&self, place: &Place) -> Result<(TeSdf, f64), Failure> {
+    pub fn encode(&self, place: &Place, sampler: &dyn Sampler) -> Result<(TeSdf, f64), Failure> {
         let start = Instant::now();
         let progress = EncodeProgress::default();
         let never = AtomicBool::new(false);
         let asset = watched(&progress, &never, || {
-            encode_in(&place.solid, place.domain(), &place.source, &self.options, &progress)
+            encode_with(&place.solid, place.domain(), &place.source, &self.options, sampler, &progress)
         });
         let asset = asset.map_err(|e| Failure::new(format!("{}: {e}", place.source.name)))?;
         Ok((asset, start.elapsed().as_secs_f64()))

@@ -1,6 +1,8 @@
 //! The meshes of Table I: nearest to the paper's, whose own are not public.
 use tesdf::encode::Length;
 
+use super::paper;
+
 /// A mesh, and how it is measured.
 #[derive(Debug)]
 pub struct Mesh {
@@ -45,6 +47,17 @@ const fn rigid(
     quick: Quick,
 ) -> Mesh {
     Mesh { name, path, paper, threshold, outside, deforms: Deforms::No, quick }
+}
+
+/// Q of the paper for meshes that have no row of their own.
+const USUAL_RESOLUTION: u32 = 128;
+
+impl Mesh {
+    /// Q of the paper's row.
+    pub fn paper_resolution(&self) -> u32 {
+        let row = self.paper.iter().find_map(|name| paper::table_1(name)?.sampling);
+        row.map_or(USUAL_RESOLUTION, |(resolution, _)| resolution)
+    }
 }
 
 /// All of them, in the order of the table.

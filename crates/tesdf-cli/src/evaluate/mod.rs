@@ -15,8 +15,10 @@ mod table4;
 
 use std::path::PathBuf;
 
+use meshes::Mesh;
 use tesdf::evaluate::EvaluateOptions;
 
+use crate::devices::Choice;
 use crate::report::{Failure, Outcome};
 
 /// Arguments of `tesdf evaluate`.
@@ -45,9 +47,12 @@ pub struct TableArgs {
     /// Points of the grid along the diagonal of a mesh [default: 1024; with --quick 64]
     #[arg(long, value_name = "N")]
     pub grid: Option<u32>,
-    /// Q of the sampled encoder: samples per edge of a tetrahedron [default: 32; with --quick 4]
+    /// Q of the sampled encoder: samples per edge of a tetrahedron [default: 32; with --quick 4; on a device the paper's of each mesh]
     #[arg(long, value_name = "Q")]
     pub resolution: Option<u32>,
+    /// Where samples are looked at: cpu in 64 bits, gpu in 32 bits, or so on a device by number or name
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
+    pub device: Choice,
     /// A coarse grid, few samples, and in Table I the smaller meshes alone
     #[arg(long)]
     pub quick: bool,
@@ -91,8 +96,12 @@ impl TableArgs {
         EvaluateOptions { fineness: self.grid.unwrap_or(usual), ..EvaluateOptions::default() }
     }
 
-    fn resolution(&self) -> u32 {
-        self.resolution.unwrap_or(if self.quick { 4 } else { 32 })
+    fn resolution(&self, mesh: &Mesh) -> u32 {
+        self.resolution.unwrap_or(match (self.quick, &self.device) {
+            (true, _) => 4,
+            (false, Choice::Processor) => 32,
+            (false, _) => mesh.paper_resolution(),
+        })
     }
 }
 

@@ -3,7 +3,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 use tesdf::TeSdf;
-use tesdf::encode::Deformation;
+use tesdf::encode::{Deformation, Sampler};
 use tesdf::evaluate::{BandReport, EvaluateOptions};
 
 use super::deformed::Bend;
@@ -134,10 +134,11 @@ struct Made {
 }
 
 impl Made {
-    fn new(way: Way, place: &Place) -> Result<Self, Failure> {
-        let (full, seconds) = way.encode(place)?;
+    fn new(way: Way, place: &Place, sampler: &dyn Sampler) -> Result<Self, Failure> {
+        let (full, seconds) = way.encode(place, sampler)?;
         let cut = full.about().statistics.longest_list > MAX_ENTRIES as usize;
-        let truncated = cut.then(|| way.truncated(MAX_ENTRIES).encode(place)).transpose()?.map(|(a, _)| a);
+        let truncated =
+            cut.then(|| way.truncated(MAX_ENTRIES).encode(place, sampler)).transpose()?.map(|(a, _)| a);
         Ok(Self { way, full, truncated, seconds })
     }
 
@@ -185,6 +186,7 @@ fn rows(mesh: &Mesh, place: &Place, made: &[Made], options: &EvaluateOptions) ->
 /// As [`run`](super::run).
 pub fn run(args: &TableArgs) -> Result<(), Failure> {
     let options = args.evaluate_options();
+    let sampler = args.device.sampler()?;
     let mut table = Table { table: 1, grid: options.fineness, max_entries: MAX_ENTRIES, rows: Vec::new() };
     for mesh in chosen(args)? {
         let mut domains = args.domain.clone();
@@ -195,7 +197,7 @@ pub fn run(args: &TableArgs) -> Result<(), Failure> {
         for domain in domains {
             note(&format!("{}, {domain:?}", mesh.name));
             let place = open(mesh, &args.data, domain)?;
-            measure(mesh, &place, args, &options, &mut table.rows)?;
+            measure(mesh, &place, args, &*sampler, &options, &mut table.rows)?;
         }
     }
     print(args, "table1", &table, &csv(&table.rows), &markdown(&table))
@@ -217,6 +219,7 @@ fn measure(
     mesh: &Mesh,
     place: &Place,
     args: &TableArgs,
+    sampler: &dyn Sampler,
     options: &EvaluateOptions,
     table: &mut Vec<Row>,
 ) -> Result<(), Failure> {
@@ -224,11 +227,12 @@ fn measure(
     let deformation = if deforms { Deformation::Expected } else { Deformation::None };
     let ways = [
         Way::certified(place, Cells::Plain, deformation),
-        Way::sampled(place, args.resolution(), mesh.threshold, deformation),
+        Way::sampled(place, args.resolution(mesh), mesh.threshold, deformation),
     ];
-    let mut made = ways.into_iter().map(|way| Made::new(way, place)).collect::<Result<Vec<_>, _>>()?;
+    let mut made =
+        ways.into_iter().map(|way| Made::new(way, place, sampler)).collect::<Result<Vec<_>, _>>()?;
     if place.conforming.is_some() {
-        made.push(Made::new(Way::certified(place, Cells::Bisected, deformation), place)?);
+        made.push(Made::new(Way::certified(place, Cells::Bisected, deformation), place, sampler)?);
     }
     table.extend(rows(mesh, place, &made, options)?);
     let Some(domain) = place.conforming.as_ref().filter(|_| deforms) else { return Ok(()) };

@@ -83,13 +83,14 @@ fn paper_row() -> Row {
 /// As [`run`](super::run).
 pub fn run(args: &TableArgs) -> Result<(), Failure> {
     let options = args.evaluate_options();
+    let sampler = args.device.sampler()?;
     let mut table = Table { table: 4, grid: options.fineness, rows: vec![paper_row()] };
     let Some(mesh) = MESHES.iter().find(|m| m.path == SHAFT) else { return Ok(()) };
     for &domain in &args.domain {
         let place = open(mesh, &args.data, domain)?;
         let mut ways = vec![
             Way::certified(&place, Cells::Plain, Deformation::None),
-            Way::sampled(&place, args.resolution(), mesh.threshold, Deformation::None),
+            Way::sampled(&place, args.resolution(mesh), mesh.threshold, Deformation::None),
         ];
         if place.conforming.is_some() {
             ways.push(Way::certified(&place, Cells::Bisected, Deformation::None));
@@ -100,7 +101,7 @@ pub fn run(args: &TableArgs) -> Result<(), Failure> {
         let mut columns: Vec<Vec<usize>> = Vec::new();
         for way in &ways {
             note(&format!("{}, {}, {}", mesh.name, way.domain, way.encoder));
-            let (full, _) = way.encode(&place)?;
+            let (full, _) = way.encode(&place, &*sampler)?;
             let longest = full.about().statistics.longest_list;
             let whole = assets.len();
             assets.push(full);
@@ -110,7 +111,7 @@ pub fn run(args: &TableArgs) -> Result<(), Failure> {
                     at.push(whole);
                 } else {
                     at.push(assets.len());
-                    assets.push(way.truncated(column.max_entries).encode(&place)?.0);
+                    assets.push(way.truncated(column.max_entries).encode(&place, &*sampler)?.0);
                 }
             }
             columns.push(at);

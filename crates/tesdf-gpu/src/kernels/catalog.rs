@@ -10,7 +10,7 @@ use cubecl_common::device::{DeviceId, ServiceId};
 use cubecl_environment::stream::StreamId;
 
 use super::assets::AssetsLaunch;
-use super::{broad, clip, exact, narrow, pairs, products, query};
+use super::{broad, clip, exact, narrow, pairs, products, query, sample};
 
 use crate::cuda::Count;
 
@@ -99,6 +99,11 @@ pub fn kernels(device: &Arc<DeviceProperties>, target: &Arc<TargetProperties>) -
         Direct query::world_distances,
         64,
         (assets(), rows(), words(), words(), words(), words(), words(), words(), 1, 1)
+    );
+    kernel!(
+        Direct sample::sample,
+        sample::GROUP as u32,
+        (rows(), rows(), words(), words(), words(), 1, 1, 0, 1)
     );
     all
 }

@@ -23,6 +23,7 @@ pub mod polygon_distance;
 pub mod pose;
 pub mod products;
 pub mod query;
+pub mod sample;
 pub mod surface;
 pub mod triangle;
 pub mod vector;

@@ -9,7 +9,7 @@ use super::AssetError;
 use super::layout::Label;
 use crate::domain::{Cell, DomainCube};
 use crate::encode::refine::{Leaf, Tree};
-use crate::encode::{Domain, EncodeOptions, Encoder, Sampling, Threshold};
+use crate::encode::{Domain, EncodeOptions, Encoder, Sampler, Sampling, Threshold};
 use crate::geometry::LocalFrame;
 use crate::mesh::TriangleMesh;
 
@@ -28,7 +28,7 @@ pub struct Source {
 /// `E_t` is the distance from `x` to the mesh, up to `delta`. Faces at equal distance may be left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
-    /// How the lists were made.
+    /// How the lists were made: `certified`; `sampled`, and on what, unless it was the processor in `f64`.
     pub encoder: String,
     /// How the domain was made.
     pub domain: String,
@@ -52,22 +52,23 @@ impl Certificate {
     pub(crate) fn of(
         options: &EncodeOptions,
         domain: &Domain,
+        sampler: &dyn Sampler,
         diagonal: f64,
         cube: &DomainCube,
         within: f64,
     ) -> Self {
         let delta = Self::DELTA * cube.side().max(1.0);
         let (encoder, proved) = match options.encoder {
-            Encoder::Certified => ("certified", true),
-            Encoder::Sampled(Sampling { threshold: Threshold::CoveringRadius, .. }) => ("sampled", true),
-            Encoder::Sampled(_) => ("sampled", false),
+            Encoder::Certified => ("certified".into(), true),
+            Encoder::Sampled(Sampling { threshold: Threshold::CoveringRadius, .. }) => (sampler.name(), true),
+            Encoder::Sampled(_) => (sampler.name(), false),
         };
         let domain = match domain {
             Domain::Bisection => "bisection",
             Domain::Conforming(_) => "conforming",
         };
         Self {
-            encoder: encoder.into(),
+            encoder,
             domain: domain.into(),
             delta: proved.then_some(delta * diagonal),
             delta_of_diagonal: proved.then_some(delta),

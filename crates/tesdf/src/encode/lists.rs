@@ -6,10 +6,10 @@ use super::filter::{PAD, Scratch};
 use super::rank::{Ranked, rank};
 use super::refine::{Leaf, Tree};
 use super::roots::Roots;
-use super::sampled::{lipschitz_candidates, sample};
+use super::sampled::{SampledCell, Sampler, sample};
 use super::surface::Surface;
 use super::tighten::tighten;
-use super::{Deformation, EncodeError, EncodeOptions, EncodeProgress, Encoder, Stage};
+use super::{Deformation, EncodeError, EncodeOptions, EncodeProgress, Encoder, Sampling, Stage};
 use crate::asset::layout::{Label, Side};
 use crate::domain::Cell;
 use crate::geometry::{AabbTree, WindingNumber, triangle_meets_tetrahedron};
@@ -28,12 +28,14 @@ pub struct Lists<'a> {
 
 impl Lists<'_> {
     /// Finishes the lists and labels the cells, in depth-first order. Also the distance from the surface within which
-    /// every list is exact (local frame): infinite unless lists were truncated. `winding` labels the bisection domain.
+    /// every list is exact (local frame): infinite unless lists were truncated. `winding` labels the bisection domain, `sampler` is of
+    /// the sampled encoder.
     pub fn finish(
         &self,
         trees: &mut [Tree],
         roots: &Roots,
         winding: &WindingNumber,
+        sampler: &dyn Sampler,
         progress: &EncodeProgress,
     ) -> Result<(Vec<Label>, f64), EncodeError> {
         let mut cells = Vec::new();
@@ -45,11 +47,17 @@ impl Lists<'_> {
             collect(tree, &mut |leaf| leaves.push(leaf));
         }
         progress.begin(Stage::Tighten, leaves.len() as u64);
+        let (sampled, step) = match &self.options.encoder {
+            Encoder::Certified => (vec![None; leaves.len()], 1),
+            // Nearly all of the work is done then.
+            Encoder::Sampled(sampling) => (self.sampled(&leaves, &cells, sampling, sampler, progress)?, 0),
+        };
         let finished: Option<Vec<(Label, f64)>> = leaves
             .into_par_iter()
             .zip(cells)
-            .map_init(Scratch::default, |scratch, (leaf, (cell, root))| {
-                progress.advance(1);
+            .zip(sampled)
+            .map_init(Scratch::default, |scratch, ((leaf, (cell, root)), sampled)| {
+                progress.advance(step);
                 if progress.is_cancelled() {
                     return None;
                 }
@@ -57,8 +65,9 @@ impl Lists<'_> {
                 let mut crosses = false;
                 if let Leaf::Listed { faces, crossing } = leaf {
                     crosses = *crossing;
+                    let ranked = sampled.unwrap_or_else(|| self.ranked(&cell, faces, scratch));
                     let tetrahedron = roots.tetrahedra.get(root);
-                    (*faces, exact_within) = self.of_cell(&cell, tetrahedron, faces, crosses, scratch);
+                    (*faces, exact_within) = self.completed(&cell, tetrahedron, faces, crosses, ranked);
                 }
                 let label = match (&leaf, roots.sides.get(root)) {
                     (Leaf::Outside, _) | (_, Some(Side::Outside)) => Label::Outside,
@@ -88,7 +97,39 @@ impl Lists<'_> {
         crossing: bool,
         scratch: &mut Scratch,
     ) -> (Vec<u32>, f64) {
-        let mut ranked = match &self.options.encoder {
+        let ranked = self.ranked(cell, faces, scratch);
+        self.completed(cell, tetrahedron, faces, crossing, ranked)
+    }
+
+    /// What Alg. 1 finds in the listed cells, before anything is added or dropped; `None` for other leaves.
+    fn sampled(
+        &self,
+        leaves: &[&mut Leaf],
+        cells: &[(Cell, usize)],
+        sampling: &Sampling,
+        sampler: &dyn Sampler,
+        progress: &EncodeProgress,
+    ) -> Result<Vec<Option<Vec<Ranked>>>, EncodeError> {
+        let mut found = Vec::with_capacity(leaves.len());
+        for (leaves, cells) in leaves.chunks(SAMPLED_AT_ONCE).zip(cells.chunks(SAMPLED_AT_ONCE)) {
+            let listed = leaves.par_iter().zip(cells).filter(|(leaf, _)| matches!(leaf, Leaf::Listed { .. }));
+            let listed: Vec<SampledCell> = listed
+                .map(|(_, (cell, _))| SampledCell::new(self.surface, self.tree, *cell, sampling, self.scale))
+                .collect();
+            let distances = sampler.sample(self.surface, &listed, sampling, progress)?;
+            let mut of_listed = listed.iter().zip(&distances).map(|(cell, least)| in_list(cell, least));
+            found.extend(leaves.iter().map(|leaf| match leaf {
+                Leaf::Listed { .. } => of_listed.next(),
+                _ => None,
+            }));
+            progress.advance(leaves.len() as u64);
+        }
+        Ok(found)
+    }
+
+    /// The faces of a cell's list, before anything is added or dropped.
+    fn ranked(&self, cell: &Cell, faces: &[u32], scratch: &mut Scratch) -> Vec<Ranked> {
+        match &self.options.encoder {
             Encoder::Certified => {
                 let levels = self.options.tighten_levels;
                 let tight = match levels {
@@ -101,10 +142,21 @@ impl Lists<'_> {
                 }
             }
             Encoder::Sampled(sampling) => {
-                let candidates = lipschitz_candidates(self.surface, self.tree, cell);
-                sample(self.surface, cell, &candidates, sampling, self.scale, scratch)
+                let sampled = SampledCell::new(self.surface, self.tree, *cell, sampling, self.scale);
+                in_list(&sampled, &sample(self.surface, &sampled, sampling, scratch))
             }
-        };
+        }
+    }
+
+    /// What the encoder found, with the faces that a cell has whatever that is, truncated; as [`of_cell`](Self::of_cell).
+    fn completed(
+        &self,
+        cell: &Cell,
+        tetrahedron: Option<&[u32; 4]>,
+        faces: &[u32],
+        crossing: bool,
+        mut ranked: Vec<Ranked>,
+    ) -> (Vec<u32>, f64) {
         if crossing {
             // The sign of a point is counted over these.
             let corners = |&face: &u32| self.surface.triangles[face as usize].corners;
@@ -119,6 +171,15 @@ impl Lists<'_> {
         }
         truncated(ranked, self.options.max_entries)
     }
+}
+
+/// Cells whose candidates are held at once, by the sampled encoder.
+const SAMPLED_AT_ONCE: usize = 1 << 10;
+
+/// E_t: the candidates with a d_f.
+fn in_list(cell: &SampledCell, least: &[f64]) -> Vec<Ranked> {
+    let found = cell.faces.iter().zip(least).filter(|(_, least)| least.is_finite());
+    found.map(|(&face, &distance)| Ranked { face, order: distance, distance }).collect()
 }
 
 /// Gives some faces an order, and a place in the list.

@@ -25,5 +25,6 @@ pub mod tighten;
 
 pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, EncoderChoice};
 pub use options::{Deformation, EncodeOptions, Encoder, Length, Preset, Refinement, Sampling, Threshold};
-pub use pipeline::{Domain, EncodeError, Source, encode, encode_in};
+pub use pipeline::{Domain, EncodeError, Source, encode, encode_in, encode_with};
 pub use progress::{EncodeProgress, Stage};
+pub use sampled::{SampledCell, Sampler};

@@ -5,7 +5,7 @@ use super::hints::{Simplicity, sign_hints};
 use super::lists::Lists;
 use super::refine::{ROOT_VOLUME, Refiner, Tree, Weights};
 use super::roots::Roots;
-use super::sampled::lipschitz_candidates;
+use super::sampled::{Processor, Sampler, lipschitz_candidates};
 use super::surface::{Surface, Touching};
 use super::{Deformation, EncodeOptions, EncodeProgress, Encoder, Refinement, Stage, Threshold};
 use crate::asset::layout::{self, TREE_LEAF, TreeChild};
@@ -43,6 +43,9 @@ pub enum EncodeError {
     /// The mesh does not fit the local frame.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+    /// What looks at samples cannot.
+    #[error("{0}")]
+    Sampler(Box<dyn std::error::Error + Send + Sync>),
     /// The finished file does not open.
     #[error("the encoded asset is not valid: {0}")]
     Asset(#[from] AssetError),
@@ -83,6 +86,21 @@ pub fn encode_in(
     domain: Domain,
     source: &Source,
     options: &EncodeOptions,
+    progress: &EncodeProgress,
+) -> Result<TeSdf, EncodeError> {
+    encode_with(solid, domain, source, options, &Processor, progress)
+}
+
+/// As [`encode_in`], the samples of [`Encoder::Sampled`] looked at by a `sampler` of choice.
+///
+/// # Errors
+/// [`EncodeError`]; nothing is written anywhere.
+pub fn encode_with(
+    solid: &SolidMesh,
+    domain: Domain,
+    source: &Source,
+    options: &EncodeOptions,
+    sampler: &dyn Sampler,
     progress: &EncodeProgress,
 ) -> Result<TeSdf, EncodeError> {
     let mesh = solid.mesh();
@@ -154,7 +172,7 @@ pub fn encode_in(
         .ok_or(EncodeError::Cancelled)?;
 
     let lists = Lists { surface: &surface, tree: &tree, options, scale: frame.scale };
-    let (labels, exact_within) = lists.finish(&mut trees, &roots, &winding, progress)?;
+    let (labels, exact_within) = lists.finish(&mut trees, &roots, &winding, sampler, progress)?;
 
     progress.begin(Stage::Assemble, 1);
     let simplicity = if solid.is_simple() { Simplicity::Simple } else { Simplicity::Involved };
@@ -201,7 +219,7 @@ pub fn encode_in(
         sections.push(Section::new(layout::PALETTES_HIGH, &high));
     }
     let certificate =
-        about::Certificate::of(options, &domain, diagonal, &roots.cube, exact_within / frame.scale);
+        about::Certificate::of(options, &domain, sampler, diagonal, &roots.cube, exact_within / frame.scale);
     let about = about::About {
         source: source.clone(),
         options: options.clone(),

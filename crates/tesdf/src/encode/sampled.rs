@@ -1,13 +1,81 @@
 //! Algorithm 1: which faces are closest at the points of a grid. It can miss those that are closest only between them, unless the
 //! threshold is as wide as the grid ([`Threshold::CoveringRadius`]).
+//!
+//! [`SampledCell`] is a cell with what Lemma 1 leaves, a [`Sampler`] looks at its samples: the [`Processor`] here, or a device that
+//! another crate brings.
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::filter::Scratch;
-use super::rank::Ranked;
 use super::surface::Surface;
-use super::{Sampling, Threshold};
+use super::{EncodeError, EncodeProgress, Sampling, Threshold};
 use crate::domain::Cell;
 use crate::geometry::AabbTree;
+
+/// A cell, with what Lemma 1 leaves of the faces; everything in the local frame.
+#[derive(Clone, Debug)]
+pub struct SampledCell {
+    /// The cell.
+    pub cell: Cell,
+    /// Its candidates, ascending.
+    pub faces: Vec<u32>,
+    /// ε: how much farther than the closest face one of E_t may be at a sample.
+    pub threshold: f64,
+}
+
+impl SampledCell {
+    /// Lines 2 to 8 of Alg. 1. `scale` is that of the local frame; a threshold is in the mesh's unit.
+    pub fn new(surface: &Surface, tree: &AabbTree, cell: Cell, sampling: &Sampling, scale: f64) -> Self {
+        let threshold = match sampling.threshold {
+            Threshold::Absolute(length) => length * scale,
+            // The margin is for what rounding does to a gap.
+            Threshold::CoveringRadius => 2.0 * covering_radius(&cell, sampling) + surface.margin,
+        };
+        Self { cell, faces: lipschitz_candidates(surface, tree, &cell), threshold }
+    }
+}
+
+/// Lines 9 to 19 of Alg. 1, for many cells.
+pub trait Sampler: Sync {
+    /// How the certificate calls lists that this made.
+    fn name(&self) -> String;
+
+    /// For each cell and each of its candidates d_f of Eq. (8), local frame; infinite for a face that is not in E_t.
+    ///
+    /// # Errors
+    /// [`EncodeError::Cancelled`]; [`EncodeError::Sampler`] for what a device refuses.
+    fn sample(
+        &self,
+        surface: &Surface,
+        cells: &[SampledCell],
+        sampling: &Sampling,
+        progress: &EncodeProgress,
+    ) -> Result<Vec<Vec<f64>>, EncodeError>;
+}
+
+/// Samples on the processor, in `f64`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Processor;
+
+impl Sampler for Processor {
+    fn name(&self) -> String {
+        "sampled".into()
+    }
+
+    fn sample(
+        &self,
+        surface: &Surface,
+        cells: &[SampledCell],
+        sampling: &Sampling,
+        progress: &EncodeProgress,
+    ) -> Result<Vec<Vec<f64>>, EncodeError> {
+        let of_cell = |scratch: &mut Scratch, cell: &SampledCell| {
+            (!progress.is_cancelled()).then(|| sample(surface, cell, sampling, scratch))
+        };
+        let found: Option<_> = cells.par_iter().map_init(Scratch::default, of_cell).collect();
+        found.ok_or(EncodeError::Cancelled)
+    }
+}
 
 /// The faces that Lemma 1, Eq. (6), does not drop: those with a gap below twice the cell's radius at its centroid, ascending.
 pub fn lipschitz_candidates(surface: &Surface, tree: &AabbTree, cell: &Cell) -> Vec<u32> {
@@ -30,22 +98,13 @@ pub fn covering_radius(cell: &Cell, sampling: &Sampling) -> f64 {
     grid + (1.0 - sampling.shrink) * cell.radius()
 }
 
-/// Lines 9 to 19 of Alg. 1: faces within the threshold of the least distance at a sample, with d_f of Eq. (8).
-///
-/// `scale` is that of the local frame, in which the cell is; a threshold is in the mesh's unit.
+/// d_f of Eq. (8) for each candidate: the least distance at samples where it is within the threshold of the closest.
 pub fn sample(
     surface: &Surface,
-    cell: &Cell,
-    faces: &[u32],
+    SampledCell { cell, faces, threshold }: &SampledCell,
     sampling: &Sampling,
-    scale: f64,
     scratch: &mut Scratch,
-) -> Vec<Ranked> {
-    let threshold = match sampling.threshold {
-        Threshold::Absolute(length) => length * scale,
-        // The margin is for what rounding does to a gap.
-        Threshold::CoveringRadius => 2.0 * covering_radius(cell, sampling) + surface.margin,
-    };
+) -> Vec<f64> {
     let mut least = vec![f64::INFINITY; faces.len()];
     let mut pool = scratch.pool();
     pool.fill(surface, faces, cell);
@@ -53,14 +112,13 @@ pub fn sample(
     for point in grid(cell, sampling) {
         let nearest = candidates.look_from(surface, point, &mut scratch.centroid);
         for (least, &distance) in least.iter_mut().zip(&scratch.centroid) {
-            if distance - nearest.distance <= threshold {
+            if distance - nearest.distance <= *threshold {
                 *least = least.min(distance);
             }
         }
     }
     scratch.give_back(pool);
-    let found = faces.iter().zip(least).filter(|(_, least)| *least < f64::INFINITY);
-    found.map(|(&face, distance)| Ranked { face, order: distance, distance }).collect()
+    least
 }
 
 /// The points with barycentric coordinates i/Q, j/Q, k/Q, l/Q in the cell shrunk towards its centroid.
@@ -83,9 +141,13 @@ fn grid(cell: &Cell, sampling: &Sampling) -> impl Iterator<Item = DVec3> {
 mod tests {
     use super::*;
     use crate::encode::surface::Touching;
-    use crate::geometry::{Aabb, strategy::point};
+    use crate::geometry::Aabb;
     use crate::mesh::TriangleMesh;
     use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        (-1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(|(x, y, z)| DVec3::new(x, y, z))
+    }
 
     proptest! {
         #[test]

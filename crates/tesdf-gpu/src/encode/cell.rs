@@ -1,0 +1,82 @@
+use bytemuck::{Pod, Zeroable};
+use tesdf::encode::{SampledCell, Sampling};
+use tesdf::glam::DVec3;
+
+use crate::kernels::sample::{BLOCK, CELL_ROWS, block_limit};
+use crate::kernels::vector::V3;
+
+/// The samples of a cell, in blocks.
+pub struct Grid {
+    pub resolution: u32,
+    shrink: f64,
+    /// Where each block is, in blocks, ten bits for each index.
+    pub blocks: Vec<u32>,
+}
+
+impl Grid {
+    pub fn new(sampling: &Sampling) -> Self {
+        let q = sampling.resolution;
+        let [wide, high, deep] = BLOCK;
+        let mut blocks = Vec::new();
+        for k in 0..=q / deep {
+            for j in 0..=(q - k * deep) / high {
+                let row = 0..=(q - k * deep - j * high) / wide;
+                blocks.extend(row.map(|i| i | j << 10 | k << 20));
+            }
+        }
+        Self { resolution: q, shrink: sampling.shrink, blocks }
+    }
+}
+
+/// A cell as the kernel reads it.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct CellRows([[f32; 4]; CELL_ROWS]);
+
+impl CellRows {
+    pub fn new(SampledCell { cell, threshold, .. }: &SampledCell, grid: &Grid) -> Self {
+        let center = cell.centroid();
+        let corners = cell.corners.map(|c| grid.shrink * (c - center));
+        let numbers = [*threshold, cell.radius(), 2.0 * block_radius(&corners, grid.resolution), 0.0];
+        let row = |k: usize| {
+            let [x, y, z] = corners[k].as_vec3().to_array();
+            [x, y, z, at_least(numbers[k])]
+        };
+        Self(std::array::from_fn(row))
+    }
+
+    /// The middle of a block, as the kernel has it.
+    pub fn middle(&self, block: u32, resolution: u32) -> V3 {
+        let first = [block & 1023, (block >> 10) & 1023, block >> 20];
+        let [i, j, k] =
+            std::array::from_fn(|k| BLOCK[k] as f32 * first[k] as f32 + 0.5 * (BLOCK[k] - 1) as f32);
+        let weights = [i, j, k, resolution as f32 - i - j - k];
+        let along = |axis: usize| -> f32 {
+            self.0.iter().zip(weights).map(|(row, weight)| weight * row[axis]).sum::<f32>()
+                / resolution as f32
+        };
+        V3 { x: along(0), y: along(1), z: along(2) }
+    }
+
+    /// How far from the middle of a block a face may be that is needed in it, when the nearest is so far.
+    pub fn block_limit(&self, nearest: f32) -> f32 {
+        block_limit(nearest, self.0[0][3], self.0[1][3], self.0[2][3])
+    }
+
+    pub fn radius(&self) -> f64 {
+        f64::from(self.0[1][3])
+    }
+}
+
+fn at_least(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x { near.next_up() } else { near }
+}
+
+/// No sample of a block is farther than this from its middle.
+fn block_radius([a, b, c, d]: &[DVec3; 4], resolution: u32) -> f64 {
+    let half =
+        |k: usize, corner: &DVec3| 0.5 * f64::from(BLOCK[k] - 1) / f64::from(resolution) * (*corner - *d);
+    let (x, y, z) = (half(0, a), half(1, b), half(2, c));
+    [x + y + z, x + y - z, x - y + z, x - y - z].map(DVec3::length).into_iter().fold(0.0, f64::max)
+}
