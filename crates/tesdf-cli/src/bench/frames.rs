@@ -1,5 +1,5 @@
 //! Where the frames of a benchmark come from: a scene, a run, a file of poses.
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use tesdf::TeSdf;
@@ -126,7 +126,7 @@ impl Frames {
 }
 
 /// A `.tesdf` file, or a mesh that is encoded.
-fn geometry(path: &PathBuf, max_entries: Option<u32>) -> Result<Arc<TeSdf>, Failure> {
+fn geometry(path: &Path, max_entries: Option<u32>) -> Result<Arc<TeSdf>, Failure> {
     if path.extension().is_some_and(|e| e == "tesdf") {
         return asset_file::open(path).map(Arc::new);
     }
