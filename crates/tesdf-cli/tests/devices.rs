@@ -80,7 +80,8 @@ fn a_run_comes_out_as_on_the_processor() {
     let last = host.times().len() - 1;
     for body in [1, 2] {
         let [h, d] = [&host, &device].map(|r| r.pose(last, body).expect("a pose").translation);
-        assert!(h.distance(d) < 1e-6, "body {body}: {d} instead of {h}");
+        // Nothing holds them sideways: rounding makes them drift, micrometres of twenty millimetres.
+        assert!(h.distance(d) < 1e-5, "body {body}: {d} instead of {h}");
     }
 }
 

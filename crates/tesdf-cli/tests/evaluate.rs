@@ -104,3 +104,14 @@ fn what_is_not_there_is_an_error() {
     assert_eq!(code, Some(2));
     assert!(err.contains("no mesh washer") && err.contains("bolt, nut"), "{err}");
 }
+
+#[test]
+fn a_folder_that_cannot_be_is_told_before_the_work() {
+    let folder = Folder::new();
+    folder.write("file", "in the way");
+    let data = meshes();
+    let args = ["evaluate", "table4", "--grid", "4096", "--data", &data, "-o", "file/results"];
+    let (code, _, err) = folder.tesdf(&args);
+    assert_eq!(code, Some(2));
+    assert!(err.contains("cannot make the folder file/results"), "{err}");
+}

@@ -123,7 +123,7 @@ impl Scene {
 }
 
 /// Half the side of the cube that the middles of 128 shafts lie in.
-const SHAFTS: f64 = 0.06;
+const SHAFTS: f64 = 0.24;
 
 fn pose(p: DVec3, q: DQuat) -> [f64; 7] {
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]

@@ -65,7 +65,7 @@ pub struct TableArgs {
     /// Form of the result
     #[arg(long, value_enum, default_value_t = Format::Md)]
     pub format: Format,
-    /// Write the result in every form to this folder, instead of printing it
+    /// Write the result in every form to this folder, which is made where it is not there, instead of printing it
     #[arg(short, long, value_name = "FOLDER", conflicts_with = "format")]
     pub output: Option<PathBuf>,
 }
@@ -110,6 +110,12 @@ impl TableArgs {
 /// # Errors
 /// A mesh cannot be read or encoded, Gmsh is not there or fails, or the result cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let (Table::Table1(table) | Table::Table4(table)) = &args.table;
+    if let Some(folder) = &table.output {
+        // Before the work of minutes to hours, whose result it takes.
+        std::fs::create_dir_all(folder)
+            .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", folder.display())))?;
+    }
     match &args.table {
         Table::Table1(args) => table1::run(args)?,
         Table::Table4(args) => table4::run(args)?,
