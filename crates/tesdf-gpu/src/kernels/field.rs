@@ -73,7 +73,7 @@ pub fn value_of(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest)
         let hint = (f.hints >> (2u32 * c.feature)) & 3u32;
         inside = hint == 3u32 || (hint == 1u32 && c.height < 0.0f32);
         if hint == 0u32 {
-            inside = winding(assets, shape, word, p) >= 1i32;
+            inside = winding(assets, shape, p) >= 1i32;
         }
     }
     let sign = select(inside, -1.0f32, 1.0f32);
@@ -89,30 +89,37 @@ pub fn value_of(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest)
     Value { distance: sign * distance, gradient, point: c.point, face: nearest.face, feature: c.feature }
 }
 
-/// Winding number of a point of a crossing cell: that at the centroid of the cell, and the faces on the way there.
+/// Winding number of a point: that at the centroid of its cell, and the faces on the way there.
+///
+/// The cell is the one that [`place`] finds. On a border that may be another one than what the caller has, with another label and another centroid.
 #[cube]
-fn winding(assets: &Assets, shape: u32, word: u32, p: V3) -> i32 {
-    let at = offset(word);
-    let lists = entry(assets, shape, LISTS);
-    let mut sum = (code(word) - 2u32) as i32;
-    if code(word) == 5u32 {
-        let mut k = 0u32;
-        let mut long = 0u32;
-        while k < 4u32 {
-            long |= byte(&assets.words, lists, at - 4u32 + k) << (8u32 * k);
-            k += 1u32;
+fn winding(assets: &Assets, shape: u32, p: V3) -> i32 {
+    let held = centroid(assets, shape, p);
+    let word = held.word;
+    let kind = code(word);
+    let mut sum = select(kind == 1u32 || (kind == 6u32 && offset(word) == 1u32), 1i32, 0i32);
+    if kind >= 2u32 && kind <= 5u32 {
+        let at = offset(word);
+        let lists = entry(assets, shape, LISTS);
+        sum = (kind - 2u32) as i32;
+        if kind == 5u32 {
+            let mut k = 0u32;
+            let mut long = 0u32;
+            while k < 4u32 {
+                long |= byte(&assets.words, lists, at - 4u32 + k) << (8u32 * k);
+                k += 1u32;
+            }
+            sum = long as i32;
         }
-        sum = long as i32;
-    }
-    let center = centroid(assets, shape, p);
-    let faces = list(assets, shape, at);
-    let mut i = 0u32;
-    while i < faces.count {
-        let position = list_face(assets, shape, faces, i);
-        let row = (entry(assets, shape, RECORDS) + position * comptime!(ROWS as u32)) as usize;
-        let f = face(&assets.rows, row);
-        sum += crossing(p, center, corner(f, 0u32), corner(f, 1u32), corner(f, 2u32));
-        i += 1u32;
+        let faces = list(assets, shape, at);
+        let mut i = 0u32;
+        while i < faces.count {
+            let position = list_face(assets, shape, faces, i);
+            let row = (entry(assets, shape, RECORDS) + position * comptime!(ROWS as u32)) as usize;
+            let f = face(&assets.rows, row);
+            sum += crossing(p, held.centroid, corner(f, 0u32), corner(f, 1u32), corner(f, 2u32));
+            i += 1u32;
+        }
     }
     sum
 }
@@ -132,10 +139,19 @@ pub fn crossing(p: V3, q: V3, a: V3, b: V3, c: V3) -> i32 {
     select(through, select(p_over, -1i32, 1i32), 0i32)
 }
 
-/// Centroid of the cell that holds a point, found as [`place`] finds the cell.
+/// A cell and its middle.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Middle {
+    word: u32,
+    centroid: V3,
+}
+
+/// The cell that holds a point, found as [`place`] finds it, and its centroid. A point that rounding puts out of the cube is moved into it.
 #[cube]
-fn centroid(assets: &Assets, shape: u32, p: V3) -> V3 {
-    let u = in_cube(assets, shape, p);
+fn centroid(assets: &Assets, shape: u32, p: V3) -> Middle {
+    let free = in_cube(assets, shape, p);
+    let u = v3(free.x.clamp(0.0f32, 1.0f32), free.y.clamp(0.0f32, 1.0f32), free.z.clamp(0.0f32, 1.0f32));
     let nodes = entry(assets, shape, NODES);
     let first = root(u);
     let l = in_root(u, first);
@@ -193,11 +209,12 @@ fn centroid(assets: &Assets, shape: u32, p: V3) -> V3 {
     }
     let side = 0.25f32 * number(assets, shape, SIDE);
     let half = 0.5f32 * number(assets, shape, SIDE);
-    v3(
+    let middle = v3(
         side * (corners[0] + corners[3] + corners[6] + corners[9]) - half,
         side * (corners[1] + corners[4] + corners[7] + corners[10]) - half,
         side * (corners[2] + corners[5] + corners[8] + corners[11]) - half,
-    )
+    );
+    Middle { word, centroid: middle }
 }
 
 /// The value of a simple shape.
