@@ -89,7 +89,7 @@ fn a_run_comes_out_as_on_the_processor() {
 fn a_benchmark_says_what_it_did() {
     let folder = Folder::new();
     let poses = format!(
-        r#"{{"tesdf_poses": 1, "contact_distance": 1e-3, "bodies": ["{}"], "instances": [[0, 0], [0, 0]],
+        r#"{{"tesdf_poses": 1, "contact_distance": 1e-3, "bodies": ["{0}", "{0}"], "instances": [[0, 0], [1, 0]],
             "frames": [[[0, 0, 0, 0, 0, 0, 1], [0.011, 0, 0, 0, 0, 0, 1]], [[0, 0, 0, 0, 0, 0, 1], [0.013, 0, 0, 0, 0, 0, 1]]]}}"#,
         data("cube.obj")
     );

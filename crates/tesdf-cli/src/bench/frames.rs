@@ -1,6 +1,7 @@
 //! Where the frames of a benchmark come from: a scene, a run, a file of poses.
 use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
@@ -74,8 +75,10 @@ impl Frames {
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut scene = Scene::new();
         let mut shapes = Vec::new();
+        let interrupted = interrupt_flag()?;
         for body in &file.bodies {
-            shapes.push(scene.add_shape(geometry(&folder.join(body), max_entries)?).map_err(Failure::new)?);
+            let asset = geometry(&folder.join(body), max_entries, &interrupted)?;
+            shapes.push(scene.add_shape(asset).map_err(Failure::new)?);
         }
         let pose = |[x, y, z, i, j, k, w]: [f64; 7]| {
             Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| named(&e))
@@ -126,16 +129,15 @@ impl Frames {
 }
 
 /// A `.tesdf` file, or a mesh that is encoded.
-fn geometry(path: &Path, max_entries: Option<u32>) -> Result<Arc<TeSdf>, Failure> {
+fn geometry(path: &Path, max_entries: Option<u32>, interrupted: &AtomicBool) -> Result<Arc<TeSdf>, Failure> {
     if path.extension().is_some_and(|e| e == "tesdf") {
         return asset_file::open(path).map(Arc::new);
     }
     let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
     let solid = SolidMesh::new(mesh_file::read(path)?.mesh).map_err(|e| named(&e))?;
     let options = EncodeOptions { max_entries, ..EncodeOptions::preset(Preset::Default) };
-    let interrupted = interrupt_flag()?;
     let progress = EncodeProgress::default();
-    watched(&progress, &interrupted, || encode(&solid, &Source::default(), &options, &progress))
+    watched(&progress, interrupted, || encode(&solid, &Source::default(), &options, &progress))
         .map(Arc::new)
         .map_err(|e| named(&e))
 }
