@@ -272,6 +272,7 @@ pub fn narrow_faces(
             let mut t = center_t;
             let is_vertex = evaluation >= 1u32 && evaluation <= n;
             let is_step = evaluation > n;
+            let mut stays = false;
             if is_vertex {
                 s = weight(weights, item, evaluation - 1u32, 0usize);
                 t = weight(weights, item, evaluation - 1u32, 1usize);
@@ -295,6 +296,8 @@ pub fn narrow_faces(
                     to_t = select(lower, vt, to_t);
                     i += 1u32;
                 }
+                // At a vertex that is the target itself every further step stays there: most minima are such.
+                stays = to_s == at_s && to_t == at_t;
                 let step = 2.0f32 / ((evaluation - n - 1u32) as f32 + 2.0f32);
                 s = at_s + step * (to_s - at_s);
                 t = at_t + step * (to_t - at_t);
@@ -324,7 +327,7 @@ pub fn narrow_faces(
             best_feature = select(lower, here.feature, best_feature);
             // From the centre: can any point be within reach?
             let out = evaluation == 0u32 && here.distance - radius > reach + ROUNDING;
-            evaluation = select(out, evaluations, evaluation + 1u32);
+            evaluation = select(out || stays, evaluations, evaluation + 1u32);
         }
         if counting && lane == 0u32 {
             counters[products::EVALUATIONS as usize].fetch_add(made);

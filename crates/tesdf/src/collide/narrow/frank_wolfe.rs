@@ -26,6 +26,10 @@ pub fn lowest(cell: &CellField, polygon: &Polygon, iterations: u32, reach: f64) 
     for k in 0..iterations {
         let down = |p: &glam::DVec3| value.gradient.dot(*p);
         let Some(target) = polygon.points().min_by(|p, q| down(p).total_cmp(&down(q))) else { break };
+        // At a vertex that is the target itself every further step stays there: most minima are such.
+        if target == at {
+            break;
+        }
         at += 2.0 / (f64::from(k) + 2.0) * (target - at);
         value = cell.value(at, Precision::F32);
         if value.distance < least {
