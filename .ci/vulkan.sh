@@ -3,7 +3,12 @@
 
 vulkan_driver() {
     # Debian and Ubuntu, Fedora, a driver of one's own.
-    ls /usr/share/vulkan/icd.d/lvp_icd*.json /usr/local/share/vulkan/icd.d/lvp_icd*.json 2>/dev/null | head -n 1
+    for file in /usr/share/vulkan/icd.d/lvp_icd*.json /usr/local/share/vulkan/icd.d/lvp_icd*.json; do
+        if [ -e "$file" ]; then
+            echo "$file"
+            break
+        fi
+    done
 }
 
 if [ -z "${TESDF_DEVICE:-}" ]; then
