@@ -8,6 +8,7 @@ use cubecl::prelude::*;
 use super::assets::{Assets, KIND, MESH, RECORDS, entry};
 use super::broad::ROUNDING;
 use super::field::{is_listed, value_in_cell};
+use super::greatest_minimum::greatest_minimum;
 use super::list::{list, list_face};
 use super::locate::{code, offset};
 use super::narrow::{LANES, named, word_of, write};
@@ -16,7 +17,7 @@ use super::polygon_distance::{polygon_to_face, weight};
 use super::products::{self, POLYGON_WORDS, tell_if_broken_off};
 use super::surface::{Direction, Part, at_weights, direction, normal, part};
 use super::triangle::{ROWS, distance_squared, face};
-use super::vector::{V3, cross, dot, length, minus, plus, scaled, v3};
+use super::vector::{V3, dot, length, minus, plus, scaled, v3};
 
 /// Pieces that wait.
 const POOL: u32 = 128;
@@ -46,69 +47,6 @@ fn lowest(mine: f32, s: f32, t: f32, shared: &mut Shared<[f32]>) -> V3 {
         lane += 1u32;
     }
     v3(value, at_s, at_t)
-}
-
-/// Least of four linear functions at weights.
-#[cube]
-fn least_of(f: V3, g: V3, h: V3, k: V3, a: f32, b: f32, c: f32) -> f32 {
-    let w = v3(a, b, c);
-    dot(f, w).min(dot(g, w)).min(dot(h, w).min(dot(k, w)))
-}
-
-/// Where two of them are equal on an edge, the least of all four; `least` when they are not equal there.
-#[cube]
-fn on_edges(least: f32, d: V3, f: V3, g: V3, h: V3, k: V3) -> f32 {
-    let mut greatest = least;
-    if d.x * d.y < 0.0f32 {
-        let w = d.x / (d.x - d.y);
-        greatest = greatest.max(least_of(f, g, h, k, 1.0f32 - w, w, 0.0f32));
-    }
-    if d.y * d.z < 0.0f32 {
-        let w = d.y / (d.y - d.z);
-        greatest = greatest.max(least_of(f, g, h, k, 0.0f32, 1.0f32 - w, w));
-    }
-    if d.z * d.x < 0.0f32 {
-        let w = d.z / (d.z - d.x);
-        greatest = greatest.max(least_of(f, g, h, k, w, 0.0f32, 1.0f32 - w));
-    }
-    greatest
-}
-
-/// Where three are equal inside, given two of their differences.
-#[cube]
-fn inside(least: f32, d: V3, e: V3, f: V3, g: V3, h: V3, k: V3) -> f32 {
-    let w = cross(d, e);
-    let sum = w.x + w.y + w.z;
-    let some = sum != 0.0f32;
-    let inverse = select(some, 1.0f32 / select(some, sum, 1.0f32), 0.0f32);
-    let (a, b, c) = (inverse * w.x, inverse * w.y, inverse * w.z);
-    let is_inside = some && a >= 0.0f32 && b >= 0.0f32 && c >= 0.0f32;
-    let mut greatest = least;
-    if is_inside {
-        greatest = greatest.max(least_of(f, g, h, k, a, b, c));
-    }
-    greatest
-}
-
-/// The greatest minimum of four linear functions over a triangle: at a corner, where two are equal on an edge, or three inside. Written out, as
-/// a loop over them is most of the iterations of a search.
-#[cube]
-fn greatest_minimum(f: V3, g: V3, h: V3, k: V3) -> f32 {
-    let (fg, fh, fk) = (minus(f, g), minus(f, h), minus(f, k));
-    let (gh, gk, hk) = (minus(g, h), minus(g, k), minus(h, k));
-    let mut greatest = least_of(f, g, h, k, 1.0f32, 0.0f32, 0.0f32)
-        .max(least_of(f, g, h, k, 0.0f32, 1.0f32, 0.0f32))
-        .max(least_of(f, g, h, k, 0.0f32, 0.0f32, 1.0f32));
-    greatest = on_edges(greatest, fg, f, g, h, k);
-    greatest = on_edges(greatest, fh, f, g, h, k);
-    greatest = on_edges(greatest, fk, f, g, h, k);
-    greatest = on_edges(greatest, gh, f, g, h, k);
-    greatest = on_edges(greatest, gk, f, g, h, k);
-    greatest = on_edges(greatest, hk, f, g, h, k);
-    greatest = inside(greatest, fg, fh, f, g, h, k);
-    greatest = inside(greatest, fg, fk, f, g, h, k);
-    greatest = inside(greatest, fh, fk, f, g, h, k);
-    inside(greatest, gh, gk, f, g, h, k)
 }
 
 /// Distances from three corners to a face.

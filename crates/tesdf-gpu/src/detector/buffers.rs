@@ -1,0 +1,57 @@
+//! Memory between the stages.
+use super::Capacities;
+use crate::GpuError;
+use crate::device::{Buffer, Device};
+use crate::kernels::products;
+
+/// Bytes of a word and of a row of four `f32`.
+pub const WORD: usize = 4;
+pub const ROW: usize = 16;
+
+/// Buffers between the stages.
+pub struct Products {
+    /// Most elements of each.
+    pub room: Capacities,
+    pub directions: Buffer,
+    pub maps: Buffer,
+    pub blocks: Buffer,
+    pub meshlets: Buffer,
+    pub polygons: Buffer,
+    pub weights: Buffer,
+    pub contact_words: Buffer,
+    pub contact_rows: Buffer,
+    pub groups: Buffer,
+}
+
+impl Products {
+    pub fn new(device: &Device, room: Capacities) -> Result<Self, GpuError> {
+        let buffer = |name, count: u32, size: usize| device.empty(name, count as usize * size);
+        Ok(Self {
+            room,
+            directions: buffer("directions", room.directions, products::DIRECTION_WORDS * WORD)?,
+            maps: buffer("maps of directions", room.directions, products::DIRECTION_ROWS * ROW)?,
+            blocks: buffer("blocks", room.blocks, products::PAIR_WORDS * WORD)?,
+            meshlets: buffer("meshlets", room.meshlets, products::PAIR_WORDS * WORD)?,
+            polygons: buffer("polygons", room.polygons, products::POLYGON_WORDS * WORD)?,
+            weights: buffer("weights of polygons", room.polygons, products::POLYGON_ROWS * ROW)?,
+            contact_words: buffer("contacts", room.contacts, products::CONTACT_WORDS * WORD)?,
+            contact_rows: buffer("rows of contacts", room.contacts, products::CONTACT_ROWS * ROW)?,
+            groups: device.empty("groups", 3 * WORD)?,
+        })
+    }
+
+    pub fn bytes(&self) -> usize {
+        let buffers = [
+            &self.directions,
+            &self.maps,
+            &self.blocks,
+            &self.meshlets,
+            &self.polygons,
+            &self.weights,
+            &self.contact_words,
+            &self.contact_rows,
+            &self.groups,
+        ];
+        buffers.into_iter().map(Buffer::bytes).sum()
+    }
+}
