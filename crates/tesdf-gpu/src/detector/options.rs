@@ -32,7 +32,7 @@ pub enum Memory {
     /// Buffers grow and the pass is redone.
     #[default]
     Grow,
-    /// The detection fails with [`GpuError::Full`].
+    /// The detection fails with [`GpuError::Full`](crate::GpuError::Full).
     Fixed,
 }
 
