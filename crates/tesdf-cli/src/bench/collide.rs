@@ -242,10 +242,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             report.phases_unpruned_ms = Some(all.phases());
             report.counts = measured.counts;
             report.counts.queries_unpruned = Some(all.counts.queries);
-            if args.mode == ModeName::Face {
-                report.counts.evaluations = operations.counts.evaluations;
-                report.counts.distances = operations.counts.distances;
-            }
+            let is_face = args.mode == ModeName::Face;
+            report.counts.evaluations = operations.counts.evaluations.filter(|_| is_face);
+            report.counts.distances = operations.counts.distances.filter(|_| is_face);
             report.stages = measured.stages;
             report.bytes = Some(measured.bytes);
             report.wall_ms = measured.wall_ms;
