@@ -2,10 +2,10 @@
 use std::marker::PhantomData;
 
 use bytemuck::Pod;
-use cubecl::prelude::{CubeCount, CubeDim};
+use cubecl::prelude::CubeDim;
 use tesdf::collide::{Placement, Shape};
 
-use crate::device::{Buffer, Device};
+use crate::device::{Buffer, Device, spread};
 use crate::kernels::query::world_distances;
 use crate::query::upload_instances;
 use crate::{GpuError, Images};
@@ -124,8 +124,6 @@ impl DeviceAnswers {
 
 /// Threads of a group.
 const GROUP: u32 = 64;
-/// Most groups of a dimension.
-const WIDE: u32 = 65_535;
 
 /// Signed distances as of [`query`](crate::query()), of points on the device, x y z each in the world. Answers are left there; nothing is waited
 /// for. Points are of `f32` alone, so far from the origin answers are off by what rounding a point to it is.
@@ -160,10 +158,9 @@ pub fn query_arrays(
     if count == 0 {
         return Ok(());
     }
-    let groups = count.div_ceil(GROUP);
     world_distances::launch(
         device.client(),
-        CubeCount::Static(groups.min(WIDE), groups.div_ceil(WIDE), 1),
+        spread(count.div_ceil(GROUP)),
         CubeDim::new_1d(GROUP),
         images.argument(),
         placed.rows.rows(),

@@ -286,6 +286,12 @@ impl Device {
     }
 }
 
+/// Groups of a launch, in two dimensions where they are more than one holds.
+pub(crate) fn spread(groups: u32) -> CubeCount {
+    let wide = groups.clamp(1, 32768);
+    CubeCount::Static(wide, groups.div_ceil(wide).max(1), 1)
+}
+
 /// Memory of a device.
 #[derive(Clone)]
 pub(crate) struct Buffer {

@@ -3,9 +3,10 @@ use cubecl::prelude::*;
 use tesdf::collide::{CollideOptions, FaceMethod, Mode};
 
 use super::buffers::{Products, WORD};
-use super::stages::{Stages, Timing, spread};
+use super::stages::{Stages, Timing};
 use super::{Counting, Detector, Exchange, Lanes, Pruning};
 use crate::GpuError;
+use crate::device::spread;
 use crate::instances::Instances;
 use crate::kernels::{broad, clip, exact, narrow, pairs, products};
 

@@ -1,8 +1,6 @@
 //! Launches, counted and timed.
 use std::time::Duration;
 
-use cubecl::prelude::*;
-
 use crate::GpuError;
 use crate::device::Device;
 
@@ -11,12 +9,6 @@ use crate::device::Device;
 pub enum Timing {
     Off,
     On,
-}
-
-/// Groups of a launch, in two dimensions where they are more than one holds.
-pub fn spread(groups: u32) -> CubeCount {
-    let wide = groups.clamp(1, 32768);
-    CubeCount::Static(wide, groups.div_ceil(wide).max(1), 1)
 }
 
 /// Counts launches, and times them.

@@ -7,7 +7,7 @@ use super::assets::{
     entry, number, vector,
 };
 use super::field::{is_listed, nearest, simple_value, value_of};
-use super::locate::{code, offset, place};
+use super::locate::{code, is_inside, place};
 use super::nearest::nearest_in_tree;
 use super::products::{self, PAIR_WORDS, append};
 use super::surface::{Direction, direction, to_field};
@@ -45,14 +45,13 @@ pub fn is_beyond(assets: &Assets, shape: u32, p: V3, radius: f32, reach: f32, pr
         beyond = dot(out, out) > far * far;
         if !beyond && prune == 1u32 {
             let held = place(assets, shape, p);
-            let kind = code(held.word);
             let listed = is_listed(held.word);
-            let out = kind == 7u32;
+            let out = code(held.word) == 7u32;
             beyond = out && cell_bound(assets, shape, held.at) > far;
             if !beyond {
                 // Between listed distances and true ones nothing can be ruled out: then the face tree answers for the distance.
                 let by_tree = out || (listed && entry(assets, shape, EXACT_LISTS) == 0u32);
-                let inside = kind == 1u32 || (kind == 6u32 && offset(held.word) == 1u32);
+                let inside = is_inside(held.word);
                 let mut none = false;
                 if by_tree && !inside {
                     none = nearest_in_tree(assets, shape, p, far * far).face == NONE;
@@ -108,10 +107,4 @@ pub fn meshlets(
             }
         }
     }
-}
-
-/// A part and its ball.
-#[cube]
-pub fn part_is_beyond(assets: &Assets, d: Direction, center: V3, radius: f32, prune: u32) -> bool {
-    is_beyond(assets, d.shape_b, center, radius, d.reach + d.radius, prune)
 }

@@ -6,7 +6,7 @@
 use cubecl::prelude::*;
 
 use super::assets::{Assets, BAND, FACE_COUNT, KIND, MESH, MESHLET_FACES, NODES, NONE, entry, number};
-use super::broad::{cell_bound, part_is_beyond};
+use super::broad::{cell_bound, is_beyond};
 use super::cut::{ROOM, cut, start};
 use super::locate::{
     Lambda, NOT_OF_DOMAIN, code, coordinate, in_child, in_cube, in_root, is_split, lambda_at, place,
@@ -226,7 +226,7 @@ pub fn polygons(
             let number_of = faces_of(assets, d.shape_a, meshlet, 0u32) + UNIT_POS / threads;
             let p: Part = part(assets, d, number_of);
             let center = ball_center(p);
-            if !part_is_beyond(assets, d, center, ball_radius(p, center), prune) {
+            if !is_beyond(assets, d.shape_b, center, ball_radius(p, center), d.reach + d.radius, prune) {
                 if mine == 0u32 {
                     counters[products::CANDIDATES as usize].fetch_add(1u32);
                 }

@@ -10,10 +10,10 @@ use super::broad::ROUNDING;
 use super::field::{is_listed, value_in_cell};
 use super::greatest_minimum::greatest_minimum;
 use super::list::{list, list_face};
-use super::locate::{code, offset};
+use super::locate::{is_crossing, is_inside, offset};
 use super::narrow::{LANES, named, word_of, write};
 use super::nearest::FAR;
-use super::polygon_distance::{polygon_to_face, weight};
+use super::polygon_distance::{ball_around, polygon_to_face, weight};
 use super::products::{self, POLYGON_WORDS, tell_if_broken_off};
 use super::surface::{Direction, Part, at_weights, direction, normal, part};
 use super::triangle::{ROWS, distance_squared, face};
@@ -174,29 +174,13 @@ pub fn narrow_exact(
         let tolerance = tolerances[d.b as usize];
         let word = word_of(assets, d.shape_b, cell);
         let is_mesh = entry(assets, d.shape_b, KIND) == MESH;
-        let mut center_s = 0.0f32;
-        let mut center_t = 0.0f32;
+        let ball = ball_around(surface, weights, item, n);
+        let (center_s, center_t, radius) = (ball.s, ball.t, ball.distance);
         let mut i = 0u32;
-        while i < n {
-            center_s += weight(weights, item, i, 0usize);
-            center_t += weight(weights, item, i, 1usize);
-            i += 1u32;
-        }
-        center_s /= n as f32;
-        center_t /= n as f32;
         let center = at_weights(surface, center_s, center_t);
-        let mut radius = 0.0f32;
-        i = 0u32;
-        while i < n {
-            let p = at_weights(surface, weight(weights, item, i, 0usize), weight(weights, item, i, 1usize));
-            radius = radius.max(length(minus(p, center)));
-            i += 1u32;
-        }
         let at_center = value_in_cell(assets, d.shape_b, word, center);
-        let kind = code(word);
-        let is_inside = kind == 1u32 || (kind == 6u32 && offset(word) == 1u32);
-        let crossing = kind >= 2u32 && kind <= 5u32;
-        let all_inside = is_inside || (crossing && at_center.distance < -radius - ROUNDING);
+        let crossing = is_crossing(word);
+        let all_inside = is_inside(word) || (crossing && at_center.distance < -radius - ROUNDING);
         let within = at_center.distance - radius <= reach + ROUNDING;
         let mut best = at_center.distance;
         let mut best_s = center_s;

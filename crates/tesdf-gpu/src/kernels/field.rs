@@ -8,7 +8,8 @@ use super::assets::{
 };
 use super::list::{list, list_face};
 use super::locate::{
-    Lambda, NOT_OF_DOMAIN, code, in_child, in_cube, in_root, is_split, lambda_at, next_k, offset, place, root,
+    Lambda, NOT_OF_DOMAIN, axes, code, in_child, in_cube, in_root, is_crossing, is_inside, is_split,
+    lambda_at, next_k, offset, place, root,
 };
 use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
 use super::triangle::{PART, ROWS, closest, corner, face};
@@ -66,10 +67,8 @@ pub fn value_of(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest)
     let f = face(&assets.rows, at);
     let c = closest(f, p, u32::reinterpret(nearest.squared) & PART);
     let distance = length(c.outward);
-    let kind = code(word);
-    let far_inside = kind == 6u32 && offset(word) == 1u32;
-    let mut inside = kind == 1u32 || far_inside;
-    if kind >= 2u32 && kind <= 5u32 {
+    let mut inside = is_inside(word);
+    if is_crossing(word) {
         let hint = (f.hints >> (2u32 * c.feature)) & 3u32;
         inside = hint == 3u32 || (hint == 1u32 && c.height < 0.0f32);
         if hint == 0u32 {
@@ -97,8 +96,8 @@ fn winding(assets: &Assets, shape: u32, p: V3) -> i32 {
     let held = centroid(assets, shape, p);
     let word = held.word;
     let kind = code(word);
-    let mut sum = select(kind == 1u32 || (kind == 6u32 && offset(word) == 1u32), 1i32, 0i32);
-    if kind >= 2u32 && kind <= 5u32 {
+    let mut sum = select(is_inside(word), 1i32, 0i32);
+    if is_crossing(word) {
         let at = offset(word);
         let lists = entry(assets, shape, LISTS);
         sum = (kind - 2u32) as i32;
@@ -160,10 +159,7 @@ fn centroid(assets: &Assets, shape: u32, p: V3) -> Middle {
     let mut l2 = l.l2;
     let mut l3 = l.l3;
     // Corners 0, e_i, e_i + e_j, (1, 1, 1) of the unit cube.
-    let i = first / 2u32;
-    let low = select(i == 0u32, 1u32, 0u32);
-    let high = select(i == 2u32, 1u32, 2u32);
-    let j = select(first % 2u32 == 0u32, low, high);
+    let (i, j, _) = axes(first);
     let mut corners = Array::<f32>::new(12usize);
     let mut axis = 0u32;
     while axis < 3u32 {

@@ -39,6 +39,18 @@ pub fn offset(word: u32) -> u32 {
     word & 268435455u32
 }
 
+/// Whether all of a cell is inside, with a list or far from the surface.
+#[cube]
+pub fn is_inside(word: u32) -> bool {
+    code(word) == 1u32 || (code(word) == 6u32 && offset(word) == 1u32)
+}
+
+/// Whether the surface comes into a cell, or close to it.
+#[cube]
+pub fn is_crossing(word: u32) -> bool {
+    code(word) >= 2u32 && code(word) <= 5u32
+}
+
 /// The word of what is not of the domain.
 pub const NOT_OF_DOMAIN: u32 = 0xF000_0000;
 
@@ -71,16 +83,21 @@ pub fn coordinate(u: V3, axis: u32) -> f32 {
     select(axis == 0u32, u.x, select(axis == 1u32, u.y, u.z))
 }
 
-/// Coordinates in a root of the cube: root `r` walks the axes i, j, k.
+/// The axes in the order in which a root walks them, as [`tesdf::domain::ROOTS`].
 #[cube]
-pub fn in_root(u: V3, root: u32) -> Lambda {
+pub fn axes(root: u32) -> (u32, u32, u32) {
     let i = root / 2u32;
-    // The lower of the other two axes comes first in even roots.
+    // The lower of the other two comes first in even roots.
     let low = select(i == 0u32, 1u32, 0u32);
     let high = select(i == 2u32, 1u32, 2u32);
     let even = root % 2u32 == 0u32;
-    let j = select(even, low, high);
-    let k = select(even, high, low);
+    (i, select(even, low, high), select(even, high, low))
+}
+
+/// Coordinates in a root of the cube: root `r` walks the axes i, j, k.
+#[cube]
+pub fn in_root(u: V3, root: u32) -> Lambda {
+    let (i, j, k) = axes(root);
     let (x, y, z) = (coordinate(u, i), coordinate(u, j), coordinate(u, k));
     Lambda { l0: 1.0f32 - x, l1: x - y, l2: y - z, l3: z }
 }

@@ -8,11 +8,11 @@ use super::list::{List, list, list_face};
 use super::locate::{NOT_OF_DOMAIN, offset};
 use super::nearest::{FAR, Nearest, nearest_in_list};
 use super::pairs::four;
-use super::polygon_distance::weight;
+use super::polygon_distance::{ball_around, weight};
 use super::products::{self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_WORDS, append, tell_if_broken_off};
 use super::surface::{Direction, Part, at_weights, direction, normal, part};
 use super::triangle::{Face, ROWS, distance_squared, face};
-use super::vector::{V3, dot, length, minus, pick, plus_scaled, v3};
+use super::vector::{V3, dot, minus, pick, plus_scaled, v3};
 
 /// Threads that work on one polygon.
 pub const LANES: u32 = 32;
@@ -225,24 +225,9 @@ pub fn narrow_faces(
             &assets.rows,
             (entry(assets, d.shape_b, RECORDS) + position * comptime!(ROWS as u32)) as usize,
         );
-        let mut center_s = 0.0f32;
-        let mut center_t = 0.0f32;
+        let ball = ball_around(surface, weights, item, n);
+        let (center_s, center_t, radius) = (ball.s, ball.t, ball.distance);
         let mut i = 0u32;
-        while i < n {
-            center_s += weight(weights, item, i, 0usize);
-            center_t += weight(weights, item, i, 1usize);
-            i += 1u32;
-        }
-        center_s /= n as f32;
-        center_t /= n as f32;
-        let center = at_weights(surface, center_s, center_t);
-        let mut radius = 0.0f32;
-        i = 0u32;
-        while i < n {
-            let p = at_weights(surface, weight(weights, item, i, 0usize), weight(weights, item, i, 1usize));
-            radius = radius.max(length(minus(p, center)));
-            i += 1u32;
-        }
         // Where the iteration is, in weights, and the field there.
         let mut at_s = center_s;
         let mut at_t = center_t;

@@ -23,15 +23,28 @@ pub fn weight(rows: &[Vector<f32, Const<4>>], item: u32, i: u32, #[comptime] whi
     select(i % 2u32 == 0u32, row.extract(which), row.extract(which + 2usize))
 }
 
-/// The nearer of two.
+/// The mean of a polygon's vertices, as weights, and the greatest distance of a vertex from it.
 #[cube]
-pub fn nearer(a: Apart, b: Apart) -> Apart {
-    let first = a.distance <= b.distance;
-    Apart {
-        distance: select(first, a.distance, b.distance),
-        s: select(first, a.s, b.s),
-        t: select(first, a.t, b.t),
+pub fn ball_around(part: Part, weights: &[Vector<f32, Const<4>>], item: u32, n: u32) -> Apart {
+    let mut s = 0.0f32;
+    let mut t = 0.0f32;
+    let mut i = 0u32;
+    while i < n {
+        s += weight(weights, item, i, 0usize);
+        t += weight(weights, item, i, 1usize);
+        i += 1u32;
     }
+    s /= n as f32;
+    t /= n as f32;
+    let center = at_weights(part, s, t);
+    let mut distance = 0.0f32;
+    i = 0u32;
+    while i < n {
+        let p = at_weights(part, weight(weights, item, i, 0usize), weight(weights, item, i, 1usize));
+        distance = distance.max(length(minus(p, center)));
+        i += 1u32;
+    }
+    Apart { distance, s, t }
 }
 
 /// The share of the first segment at which two segments are nearest (Ericson 2005, 5.1.9), and their distance as the first value.
