@@ -117,7 +117,9 @@ SAYING = [
 
 def ended_by_ctrl_c(body, *arguments, environment=None):
     """Runs `body` in another process, which says "started", sends it SIGINT, and it alone, and looks how it ends."""
-    lines = ["import sys, time, tesdf", "try:", *("    " + line for line in body), "except KeyboardInterrupt:"]
+    # A process whose parents ignore the signal, as background jobs do, would ignore it too.
+    heeding = "signal.signal(signal.SIGINT, signal.default_int_handler)"
+    lines = ["import signal, sys, time, tesdf", heeding, "try:", *("    " + line for line in body), "except KeyboardInterrupt:"]
     program = "\n".join([*lines, "    print('interrupted', flush=True)", "    sys.exit(3)"])
     command = [sys.executable, "-c", program, *map(str, arguments)]
     child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, **(environment or {})})
