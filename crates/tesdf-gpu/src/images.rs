@@ -1,4 +1,6 @@
 //! Shapes as the device holds them: each once, whatever the number of its instances.
+mod roots;
+
 use glam::{DVec3, Vec3};
 use tesdf::asset::Arrays;
 use tesdf::asset::layout::{SignHints, TreeChild};
@@ -10,6 +12,7 @@ use crate::GpuError;
 use crate::device::{Buffer, Device};
 use crate::kernels::assets::{self, AssetsLaunch, STRIDE};
 use crate::kernels::nearest::TREE_DEPTH;
+use roots::Roots;
 
 /// Most faces of a meshlet: one for each thread of a group.
 pub const MESHLET: u32 = 32;
@@ -24,6 +27,7 @@ pub struct Images {
     words: Buffer,
     rows: Buffer,
     count: usize,
+    conforming: usize,
 }
 
 /// Bytes of an asset's arrays on the device, by what they are.
@@ -51,10 +55,11 @@ impl Images {
     /// A shape that the device cannot hold, by its place.
     pub fn new(device: &Device, shapes: &[&Shape]) -> Result<Self, GpuError> {
         let mut packed = Packed::default();
-        let mut count = 0;
+        let (mut count, mut conforming) = (0, 0);
         for (number, shape) in shapes.iter().enumerate() {
             let row = packed.add(shape).map_err(|reason| GpuError::Shape { number, reason })?;
             count += 1;
+            conforming += usize::from(row[assets::TREE_NODES as usize] > 0);
             packed.table.extend(row);
         }
         Ok(Self {
@@ -62,6 +67,7 @@ impl Images {
             words: device.upload("words of shapes", &packed.words)?,
             rows: device.upload("rows of shapes", &packed.rows)?,
             count,
+            conforming,
         })
     }
 
@@ -78,6 +84,11 @@ impl Images {
     /// Whether there is no shape.
     pub fn is_empty(&self) -> bool {
         self.count == 0
+    }
+
+    /// Number of shapes with a conforming domain.
+    pub(crate) fn conforming(&self) -> usize {
+        self.conforming
     }
 
     /// Size on the device.
@@ -115,12 +126,6 @@ impl Packed {
     }
 
     fn add_mesh(&mut self, mesh: &Arrays) -> Result<[u32; STRIDE as usize], String> {
-        if mesh.tetrahedra > 0 {
-            return Err(format!(
-                "a conforming domain of {} tetrahedra; expected the bisection domain. Encode the mesh without `--domain`",
-                mesh.tetrahedra
-            ));
-        }
         let depth = depth(mesh);
         // A node's children are pushed at its own level.
         if depth + 2 > TREE_DEPTH {
@@ -155,6 +160,11 @@ impl Packed {
         set(assets::MESHLET_COUNT, meshlets.len() as u32);
         set(assets::FACE_COUNT, mesh.faces.len() as u32);
         set(assets::EXACT_LISTS, u32::from(mesh.has_exact_lists));
+        let roots = Roots::new(mesh);
+        set(assets::TETRAHEDRA, self.rows_at(roots.rows.into_iter())?);
+        set(assets::TREE_BOXES, self.rows_at(roots.boxes.into_iter())?);
+        set(assets::TREE, self.words_at(roots.tree.iter().flatten().copied())?);
+        set(assets::TREE_NODES, roots.tree.len() as u32);
         let mut set = |at: u32, value: f64| set(at, (value as f32).to_bits());
         set(assets::SIDE, mesh.cube.side());
         set(assets::INVERSE_SIDE, 1.0 / mesh.cube.side());

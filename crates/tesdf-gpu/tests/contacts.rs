@@ -2,8 +2,11 @@
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
-use std::collections::{BTreeMap, BTreeSet};
+mod compare;
+
 use std::sync::Arc;
+
+use compare::{Compared, device, each_mode, found, hold, least};
 
 use support::bodies::{Body, Placed, RELATIONS, Relation, body, rotation, scene};
 use support::meshes;
@@ -14,162 +17,8 @@ use tesdf::collide::{
     CollideOptions, Contact, Contacts, Groups, Instance, InstanceId, Mode, Pose, Scene, Shape, detect,
 };
 use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
-use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
-use tesdf::query::Precision;
 use tesdf_gpu::{Capacities, Detector, DetectorOptions, Device, Exchange, GpuError, Lanes, Memory, Pruning};
-
-/// What `f32` may be off by, as a share of the larger body: rounding of poses, faces and distances.
-const ROUNDING: f64 = 2e-6;
-/// Frank–Wolfe goes another way where two vertices are equally far down: minima of one face that differ by more than this, as a share of the
-/// larger body, are counted.
-const ANOTHER_WAY: f64 = 1e-5;
-/// Most faces, as a share, that may be found at another depth, or on the other side of a threshold.
-const MOST_OTHERS: f64 = 0.01;
-/// Most cells, as a share, in which one of both alone sees a part: slivers at borders, and faces that lie in them.
-const MOST_CELLS: f64 = 0.02;
-
-fn device() -> Device {
-    Device::choose(None).expect("a device: `.ci/vulkan.sh` installs the software one")
-}
-
-fn found(scene: &Scene, options: &CollideOptions, with: DetectorOptions) -> (Contacts, Detector) {
-    let mut detector = Detector::new(&device(), scene, with).expect("fits");
-    let contacts = detector.detect(scene, options).expect("detects");
-    (contacts, detector)
-}
-
-/// Signed distance and gradient of a shape, in its frame.
-fn exact(shape: &Shape, p: DVec3) -> f64 {
-    match shape {
-        Shape::Mesh(asset) => asset.query_by_tree(p, Precision::F64).signed_distance,
-        Shape::Plane => p.z,
-        Shape::Sphere { radius } => p.length() - radius,
-        Shape::Capsule { half_height, radius } => {
-            (p - DVec3::Z * p.z.clamp(-half_height, *half_height)).length() - radius
-        }
-        Shape::Box { half_extents } => {
-            let q = p.abs() - *half_extents;
-            q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
-        }
-    }
-}
-
-fn field(scene: &Scene, id: InstanceId, p: DVec3) -> f64 {
-    let instance = scene.instance(id).expect("it is there");
-    let shape = scene.shape(instance.shape).expect("it is there");
-    instance.scale * exact(shape, instance.placement().to_shape(p))
-}
-
-/// A contact says what the field says, whoever found it.
-fn is_true(scene: &Scene, c: &Contact, size: f64) {
-    let (a, b) = (c.instance_a, c.instance_b);
-    let instance = scene.instance(a).expect("it is there");
-    let shape = scene.shape(instance.shape).expect("it is there");
-    // Of what is round the core was measured, which may be anywhere inside.
-    if matches!(shape, Shape::Sphere { .. } | Shape::Capsule { .. }) {
-        return;
-    }
-    if let Shape::Mesh(asset) = shape {
-        let place = (0..asset.face_count()).find(|&k| asset.face_id(k) == c.face_a).expect("a face");
-        let triangle = Triangle::new(asset.face_corners(place).map(|p| instance.placement().to_world(p)));
-        let off = triangle.closest(c.point_a).distance;
-        assert!(off < ROUNDING * size, "point {} is {off} off its face {}", c.point_a, c.face_a);
-    }
-    let distance = field(scene, b, c.point_a);
-    assert!((distance - c.distance).abs() < 2.0 * ROUNDING * size, "{c:?}: the field says {distance}");
-    let surface = field(scene, b, c.point_b);
-    assert!(surface.abs() < 2.0 * ROUNDING * size, "{c:?}: point b is {surface} off the surface");
-    assert!((c.normal.length() - 1.0).abs() < 1e-5);
-    let ahead = c.point_b + c.distance * c.normal;
-    assert!(ahead.distance(c.point_a) < 3.0 * ROUNDING * size, "{c:?}: normal");
-}
-
-/// The least distance of each part of a direction.
-fn least(contacts: &[Contact]) -> BTreeMap<(InstanceId, InstanceId, u32), f64> {
-    let mut least = BTreeMap::new();
-    for c in contacts {
-        let known: &mut f64 = least.entry((c.instance_a, c.instance_b, c.feature.a)).or_insert(f64::INFINITY);
-        *known = known.min(c.distance);
-    }
-    least
-}
-
-/// Parts that touch, and those of them that were found otherwise.
-#[derive(Clone, Copy, Debug, Default)]
-struct Compared {
-    touching: usize,
-    others: usize,
-    /// Contacts by part and cell.
-    cells: usize,
-    /// Of those, what one of both has alone.
-    differing: usize,
-}
-
-impl Compared {
-    fn add(&mut self, more: Self) {
-        self.touching += more.touching;
-        self.others += more.others;
-        self.cells += more.cells;
-        self.differing += more.differing;
-    }
-
-    /// Enough was compared, and few were otherwise.
-    fn is_good(self, least: usize) {
-        println!("{self:?}");
-        assert!(self.touching >= least, "{self:?}; expected {least} that touch at least");
-        let most = 2 + (MOST_OTHERS * self.touching as f64) as usize;
-        assert!(self.others <= most, "{self:?}; expected {most} others at most");
-        let most = 4 + (MOST_CELLS * self.cells as f64) as usize;
-        assert!(self.differing <= most, "{self:?}; expected {most} cells at most that differ");
-    }
-}
-
-/// Compares all of a scene.
-fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
-    let host = detect(scene, options).expect("a good scene");
-    let (device, _) = found(scene, options, DetectorOptions::default());
-    device.contacts.iter().step_by(7).for_each(|c| is_true(scene, c, size));
-    let (on_host, on_device) = (least(&host.contacts), least(&device.contacts));
-    let keys: BTreeSet<_> = on_host.keys().chain(on_device.keys()).collect();
-    let mut others = 0;
-    for key in &keys {
-        let (h, d) = (on_host.get(key), on_device.get(key));
-        let deepest = h.into_iter().chain(d).fold(f64::INFINITY, |x: f64, y| x.min(*y));
-        let is_close = options.contact_distance - deepest < ROUNDING * size;
-        match (h, d) {
-            (Some(h), Some(d)) if options.mode == Mode::Node => {
-                assert!((h - d).abs() < ROUNDING * size, "node {key:?}: {d} instead of {h}");
-            }
-            (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
-            // Without the filter only what is at the contact distance may be lost.
-            _ => {
-                assert!(
-                    is_close || options.cos_theta.is_some(),
-                    "{key:?}: {h:?} on the host, {d:?} on the device"
-                );
-                others += 1;
-            }
-        }
-    }
-    // Cells: those of one part may differ by slivers at their borders.
-    let cells = |c: &Contacts| {
-        c.contacts.iter().map(|c| (c.instance_a, c.instance_b, c.feature.a, c.tet_b)).collect::<BTreeSet<_>>()
-    };
-    let (h, d) = (cells(&host), cells(&device));
-    let differing = h.symmetric_difference(&d).count();
-    Compared { touching: keys.len(), others, cells: h.len(), differing }
-}
-
-fn each_mode(size: f64) -> [CollideOptions; 4] {
-    let face = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(Mode::FACE) };
-    [
-        CollideOptions { mode: Mode::Node, ..face },
-        CollideOptions { cos_theta: Some(0.3), ..face },
-        face,
-        CollideOptions { mode: Mode::EXACT, ..face },
-    ]
-}
 
 #[test]
 fn pairs_of_bodies() {

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 
 use support::random::Random;
 use support::shapes::Shape;
-use support::tetrahedra::grid;
+use support::tetrahedra::{bare_beam, beam, bend, moves};
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::asset::layout::Side;
@@ -28,38 +28,6 @@ fn options() -> EncodeOptions {
 fn encoded(solid: &SolidMesh, domain: &ConformingMesh, options: &EncodeOptions) -> TeSdf {
     encode_in(solid, Domain::Conforming(domain), &Source::default(), options, &EncodeProgress::default())
         .expect("valid options")
-}
-
-/// A beam of 6 × 2 × 2 cubes with an outer layer.
-fn beam() -> (SolidMesh, ConformingMesh) {
-    let inside = |x, y, z| (1..7).contains(&x) && (3..5).contains(&y) && (3..5).contains(&z);
-    let (solid, tetrahedra) = grid(8, 0.1, inside);
-    let conforming = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
-    (solid, conforming)
-}
-
-/// The same without anything around it.
-fn bare_beam() -> (SolidMesh, ConformingMesh) {
-    let (solid, domain) = beam();
-    let cells = domain.tetrahedra().iter().zip(domain.sides());
-    let tetrahedra: Vec<[u32; 4]> =
-        cells.filter(|(_, side)| **side == Side::Inside).map(|(t, _)| *t).collect();
-    let bare = TetMesh::new(domain.vertices().to_vec(), tetrahedra).expect("tetrahedra");
-    let bare = ConformingMesh::new(&solid, &bare).expect("the inside conforms, too");
-    (solid, bare)
-}
-
-fn bend(p: DVec3) -> DVec3 {
-    let turn = DQuat::from_rotation_z(0.08 * (p.x - 1.0));
-    DVec3::new(1.0, 4.0, 4.0) + turn * (p - DVec3::new(1.0, 4.0, 4.0))
-}
-
-fn moves(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<(u32, DVec3)> {
-    (0..)
-        .zip(domain.vertices())
-        .map(|(id, &p)| (id, to(p)))
-        .filter(|(id, q)| domain.vertices()[*id as usize] != *q)
-        .collect()
 }
 
 fn verified(asset: &TeSdf) -> VerifyReport {

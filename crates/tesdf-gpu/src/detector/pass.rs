@@ -8,7 +8,7 @@ use super::{Counting, Detector, Exchange, Lanes, Pruning};
 use crate::GpuError;
 use crate::device::spread;
 use crate::instances::Instances;
-use crate::kernels::{broad, clip, exact, narrow, pairs, products};
+use crate::kernels::{broad, clip, exact, narrow, outside, pairs, products};
 
 impl Detector {
     /// Launches all stages, and reads the counters.
@@ -155,7 +155,7 @@ impl Detector {
                 stages.run("polygons", || {
                     clip::polygons::launch(
                         client,
-                        per_meshlet,
+                        per_meshlet.clone(),
                         CubeDim::new_1d(narrow::LANES),
                         images.argument(),
                         directions.words(),
@@ -169,6 +169,25 @@ impl Detector {
                         prune,
                     );
                 })?;
+                if images.conforming() > 0 {
+                    stages.run("outside of domains", || {
+                        outside::outside_polygons::launch(
+                            client,
+                            per_meshlet,
+                            CubeDim::new_1d(narrow::LANES),
+                            images.argument(),
+                            directions.words(),
+                            maps.rows(),
+                            meshlets.words(),
+                            counters.words(),
+                            polygons.words(),
+                            weights.rows(),
+                            room.meshlets,
+                            room.polygons,
+                            prune,
+                        );
+                    })?;
+                }
                 let (per, lanes) = match (self.options.lanes, method) {
                     (Lanes::Single, FaceMethod::FrankWolfe { .. }) => (narrow::LANES, 1),
                     _ => (1, narrow::LANES),

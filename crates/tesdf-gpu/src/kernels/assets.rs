@@ -59,6 +59,14 @@ pub const LOW: u32 = 19;
 pub const HIGH: u32 = 22;
 /// Half extents of a box; half height and radius of what is round.
 pub const SIZES: u32 = 25;
+/// Row of the first root, [`tetrahedra::ROWS`](super::tetrahedra::ROWS) each.
+pub const TETRAHEDRA: u32 = 28;
+/// Row of the first box of the tree that finds the tetrahedra of a conforming domain: least corner, greatest corner.
+pub const TREE_BOXES: u32 = 29;
+/// Word of its first node: where to go on when the box is left out, and the tetrahedron of a leaf, else [`NONE`].
+pub const TREE: u32 = 30;
+/// Number of its nodes; 0 for the bisection domain.
+pub const TREE_NODES: u32 = 31;
 
 /// No such array, or no cell.
 pub const NONE: u32 = u32::MAX;
@@ -94,6 +102,12 @@ pub fn number(assets: &Assets, shape: u32, #[comptime] at: u32) -> f32 {
 #[cube]
 pub fn vector(assets: &Assets, shape: u32, #[comptime] at: u32) -> V3 {
     v3(number(assets, shape, at), number(assets, shape, at + 1), number(assets, shape, at + 2))
+}
+
+/// Whether the domain is a conforming one: its roots are tetrahedra of their own, not the six of the cube.
+#[cube]
+pub fn is_conforming(assets: &Assets, shape: u32) -> bool {
+    entry(assets, shape, TREE_NODES) > 0u32
 }
 
 /// Byte `at` of an array of bytes that begins at word `start`.

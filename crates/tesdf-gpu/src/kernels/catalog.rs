@@ -10,7 +10,7 @@ use cubecl_common::device::{DeviceId, ServiceId};
 use cubecl_environment::stream::StreamId;
 
 use super::assets::AssetsLaunch;
-use super::{broad, clip, exact, narrow, pairs, products, query, sample};
+use super::{broad, clip, exact, narrow, outside, pairs, products, query, sample};
 
 use crate::cuda::Count;
 
@@ -61,6 +61,11 @@ pub fn kernels(device: &Arc<DeviceProperties>, target: &Arc<TargetProperties>) -
     kernel!(Indirect clip::nodes, group, (assets(), words(), rows(), words(), words(), words(), 1, 1, 1));
     kernel!(
         Indirect clip::polygons,
+        group,
+        (assets(), words(), rows(), words(), words(), words(), rows(), 1, 1, 1)
+    );
+    kernel!(
+        Indirect outside::outside_polygons,
         group,
         (assets(), words(), rows(), words(), words(), words(), rows(), 1, 1, 1)
     );

@@ -1,22 +1,24 @@
 //! Middle phase: which cells a face meets, and the polygon that each of them holds.
 //!
-//! A thread walks the bisection forest with the barycentric coordinates of the three corners. It goes down one child and comes back for
+//! A thread walks the bisection forest, from the roots of the cube or from the tetrahedra of a conforming domain that a tree of boxes finds, with the barycentric coordinates of the three corners. It goes down one child and comes back for
 //! the other: what it needs for that is the way it went, a bit a level, and the words of the first children. A polygon is
 //! kept as weights of the face's corners, in which the coordinates of all cells are linear.
 use cubecl::prelude::*;
 
-use super::assets::{Assets, BAND, FACE_COUNT, KIND, MESH, MESHLET_FACES, NODES, NONE, entry, number};
+use super::assets::{
+    Assets, BAND, FACE_COUNT, KIND, MESH, MESHLET_FACES, NODES, NONE, TREE_NODES, entry, is_conforming,
+    number,
+};
 use super::broad::{cell_bound, is_beyond};
 use super::cut::{ROOM, cut, start};
-use super::locate::{
-    Lambda, NOT_OF_DOMAIN, code, coordinate, in_child, in_cube, in_root, is_split, lambda_at, place,
-};
+use super::locate::{Lambda, NOT_OF_DOMAIN, code, coordinate, in_child, in_cube, is_split, lambda_at, place};
 use super::narrow::{LANES, node};
 use super::pairs::four;
 use super::products::{
     self, PAIR_WORDS, POLYGON_ROWS, POLYGON_VERTICES, POLYGON_WORDS, append, tell_if_broken_off,
 };
 use super::surface::{Direction, Part, ball_center, ball_radius, direction, part};
+use super::tetrahedra::{around_of, is_flat, lambda_in, tetrahedron, visit};
 use super::vector::V3;
 
 /// Deepest cell, as in `tesdf::domain::MAX_DEPTH`, and what is above it.
@@ -26,7 +28,7 @@ const PATH: usize = 3;
 
 /// First face and number of faces of a meshlet; simple shapes have one.
 #[cube]
-fn faces_of(assets: &Assets, shape: u32, meshlet: u32, #[comptime] which: u32) -> u32 {
+pub fn faces_of(assets: &Assets, shape: u32, meshlet: u32, #[comptime] which: u32) -> u32 {
     let mut value = comptime!(0u32).runtime();
     if entry(assets, shape, KIND) == MESH {
         value = assets.words[(entry(assets, shape, MESHLET_FACES) + 2u32 * meshlet + which) as usize];
@@ -38,8 +40,9 @@ fn faces_of(assets: &Assets, shape: u32, meshlet: u32, #[comptime] which: u32) -
     value
 }
 
+/// Appends a polygon.
 #[cube]
-fn write(
+pub fn write(
     counters: &[Atomic<u32>],
     words: &mut [u32],
     rows: &mut [Vector<f32, Const<4>>],
@@ -80,11 +83,11 @@ fn is_out(a: f32, b: f32, c: f32) -> bool {
 
 /// Whether a face is all on the outer side of a side of a cell.
 #[cube]
-fn is_separate(a: Lambda, b: Lambda, c: Lambda) -> bool {
-    is_out(a.l0, b.l0, c.l0)
-        || is_out(a.l1, b.l1, c.l1)
-        || is_out(a.l2, b.l2, c.l2)
-        || is_out(a.l3, b.l3, c.l3)
+pub fn is_separate(l: Corners) -> bool {
+    is_out(l.a.l0, l.b.l0, l.c.l0)
+        || is_out(l.a.l1, l.b.l1, l.c.l1)
+        || is_out(l.a.l2, l.b.l2, l.c.l2)
+        || is_out(l.a.l3, l.b.l3, l.c.l3)
 }
 
 /// Side taken at a level, of three words of bits.
@@ -113,10 +116,10 @@ fn set_bit(path: &mut Array<u32>, level: u32, value: bool) {
 /// Coordinates of the three corners of a face in a cell.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-struct Corners {
-    a: Lambda,
-    b: Lambda,
-    c: Lambda,
+pub struct Corners {
+    pub a: Lambda,
+    pub b: Lambda,
+    pub c: Lambda,
 }
 
 #[cube]
@@ -137,8 +140,9 @@ fn pick_lambda(levels: u32, one: Lambda, two: Lambda, three: Lambda) -> Lambda {
 
 /// Coordinates of the corners in the cell that a path leads to.
 #[cube]
-fn at_path(a: V3, b: V3, c: V3, root: u32, path: &Array<u32>, depth: u32) -> Corners {
-    let held = Corners { a: in_root(a, root), b: in_root(b, root), c: in_root(c, root) };
+fn at_path(assets: &Assets, shape: u32, p: Part, root: u32, path: &Array<u32>, depth: u32) -> Corners {
+    let from = tetrahedron(assets, shape, root);
+    let held = Corners { a: lambda_in(from, p.a), b: lambda_in(from, p.b), c: lambda_in(from, p.c) };
     let mut a0 = held.a.l0;
     let mut a1 = held.a.l1;
     let mut a2 = held.a.l2;
@@ -266,11 +270,13 @@ fn clip(
 ) {
     let shape = d.shape_b;
     let reach = d.reach + d.radius;
-    let beyond = reach >= number(assets, shape, BAND);
-    let a = in_cube(assets, shape, p.a);
-    let b = in_cube(assets, shape, p.b);
-    let c = in_cube(assets, shape, p.c);
-    if beyond && mine == 0u32 {
+    let conforming = is_conforming(assets, shape);
+    // Around a conforming domain `outside::outside_polygons` looks.
+    let beyond = (conforming && reach > 0.0f32) || (!conforming && reach >= number(assets, shape, BAND));
+    if beyond && !conforming && mine == 0u32 {
+        let a = in_cube(assets, shape, p.a);
+        let b = in_cube(assets, shape, p.b);
+        let c = in_cube(assets, shape, p.c);
         outside(a, b, c, p.count, counters, words, rows, most, at, face, s, t);
     }
     let nodes = entry(assets, shape, NODES);
@@ -278,11 +284,25 @@ fn clip(
     let mut children = Array::<u32>::new(LEVELS);
     let mut path = Array::<u32>::new(PATH);
     let mut waiting = Array::<u32>::new(PATH);
-    // One thread goes through the six roots; several share the cells three levels below.
-    let levels = select(threads > 1u32, 3u32, 0u32);
-    let mut part_of = mine;
-    while part_of < 6u32 << levels {
-        let root = part_of >> levels;
+    // One thread goes through the six roots; several share the cells three levels below, or take turns at the tetrahedra of a conforming
+    // domain, where a part is a node of the tree that finds them.
+    let levels = select(threads > 1u32 && !conforming, 3u32, 0u32);
+    let parts = select(conforming, entry(assets, shape, TREE_NODES), 6u32 << levels);
+    let mut part_of = select(conforming, 0u32, mine);
+    let mut turn = 0u32;
+    while part_of < parts {
+        let mut root = part_of >> levels;
+        let mut next_part = part_of + threads;
+        let mut elsewhere = false;
+        if conforming {
+            let step = visit(assets, shape, part_of, around_of(p.a, p.b, p.c));
+            next_part = step.next;
+            root = select(step.tetrahedron == NONE, 0u32, step.tetrahedron);
+            elsewhere = step.tetrahedron == NONE
+                || turn % threads != mine
+                || is_flat(tetrahedron(assets, shape, root));
+            turn += select(step.tetrahedron == NONE, 0u32, 1u32);
+        }
         let mut depth = 0u32;
         let mut cell = root;
         // A cell above stands for all of its part, once.
@@ -298,8 +318,9 @@ fn clip(
                 open = false;
             }
         }
-        let skipped = depth < levels && (part_of & ((1u32 << (levels - depth)) - 1u32)) != 0u32;
-        let held = at_path(a, b, c, root, &path, depth);
+        let skipped =
+            elsewhere || (depth < levels && (part_of & ((1u32 << (levels - depth)) - 1u32)) != 0u32);
+        let held = at_path(assets, shape, p, root, &path, depth);
         let mut a0 = held.a.l0;
         let mut a1 = held.a.l1;
         let mut a2 = held.a.l2;
@@ -326,9 +347,7 @@ fn clip(
             let mut down = false;
             let mut side = false;
             let k = 3u32 - depth % 3u32;
-            if !is_separate(here.a, here.b, here.c)
-                && (prune == 0u32 || cell_bound(assets, shape, cell) <= reach)
-            {
+            if !is_separate(here) && (prune == 0u32 || cell_bound(assets, shape, cell) <= reach) {
                 if is_split(word) {
                     let ha = a0 - lambda_at(here.a, k);
                     let hb = b0 - lambda_at(here.b, k);
@@ -366,7 +385,7 @@ fn clip(
                     cell = children[(depth - 1u32) as usize] + 1u32;
                 }
             }
-            let again = at_path(a, b, c, root, &path, select(down || !open, 0u32, depth));
+            let again = at_path(assets, shape, p, root, &path, select(down || !open, 0u32, depth));
             a0 = select(down, next.a.l0, again.a.l0);
             a1 = select(down, next.a.l1, again.a.l1);
             a2 = select(down, next.a.l2, again.a.l2);
@@ -380,7 +399,7 @@ fn clip(
             c2 = select(down, next.c.l2, again.c.l2);
             c3 = select(down, next.c.l3, again.c.l3);
         }
-        part_of += threads;
+        part_of = next_part;
     }
 }
 

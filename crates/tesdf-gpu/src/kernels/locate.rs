@@ -1,10 +1,11 @@
-//! Which cell holds a point, by descending the bisection forest in barycentric coordinates.
+//! Which cell holds a point, by descending the bisection forest in barycentric coordinates, from a root of the cube or of a conforming domain.
 //!
 //! [`tesdf::domain::Cell`] has the rule. In `f32` a point is off by 2^-24 of the cube, which is far less than what the lists leave room for:
 //! on a border a neighbour may be found instead, whose list is good there too.
 use cubecl::prelude::*;
 
-use super::assets::{Assets, INVERSE_SIDE, NODES, NONE, entry, number};
+use super::assets::{Assets, INVERSE_SIDE, NODES, NONE, entry, is_conforming, number};
+use super::tetrahedra::root_holding;
 use super::vector::{V3, plus, scaled, v3};
 
 /// Barycentric coordinates in a cell.
@@ -23,7 +24,7 @@ pub struct Lambda {
 pub struct Place {
     /// The word.
     pub word: u32,
-    /// Its number; [`NONE`] outside of the cube.
+    /// Its number; [`NONE`] outside of all roots.
     pub at: u32,
 }
 
@@ -138,19 +139,34 @@ pub fn next_k(k: u32) -> u32 {
 /// The cell that holds a point, relative to the middle of the cube.
 #[cube]
 pub fn place(assets: &Assets, shape: u32, p: V3) -> Place {
-    let u = in_cube(assets, shape, p);
-    let least = u.x.min(u.y).min(u.z);
-    let greatest = u.x.max(u.y).max(u.z);
     let mut word = NOT_OF_DOMAIN.runtime();
     let mut at = NONE.runtime();
-    if least >= 0.0f32 && greatest <= 1.0f32 {
+    let mut l0 = 0.0f32;
+    let mut l1 = 0.0f32;
+    let mut l2 = 0.0f32;
+    let mut l3 = 0.0f32;
+    if is_conforming(assets, shape) {
+        let held = root_holding(assets, shape, p);
+        at = held.root;
+        l0 = held.lambda.l0;
+        l1 = held.lambda.l1;
+        l2 = held.lambda.l2;
+        l3 = held.lambda.l3;
+    } else {
+        let u = in_cube(assets, shape, p);
+        let least = u.x.min(u.y).min(u.z);
+        let greatest = u.x.max(u.y).max(u.z);
+        if least >= 0.0f32 && greatest <= 1.0f32 {
+            at = root(u);
+            let l = in_root(u, at);
+            l0 = l.l0;
+            l1 = l.l1;
+            l2 = l.l2;
+            l3 = l.l3;
+        }
+    }
+    if at != NONE {
         let nodes = entry(assets, shape, NODES);
-        at = root(u);
-        let l = in_root(u, at);
-        let mut l0 = l.l0;
-        let mut l1 = l.l1;
-        let mut l2 = l.l2;
-        let mut l3 = l.l3;
         let mut k = 3u32;
         word = assets.words[(nodes + at) as usize];
         while is_split(word) {

@@ -44,8 +44,13 @@ pub struct Arrays<'a> {
     pub band: f64,
     /// Whether every list is proved to be exact where the vertices are now.
     pub has_exact_lists: bool,
-    /// Tetrahedra of a conforming domain; 0 for the bisection domain, whose roots are the six of the cube.
-    pub tetrahedra: usize,
+    /// Corner vertices of the tetrahedra of a conforming domain, each a root of the forest; none for the bisection domain, whose roots are
+    /// the six of the cube. The mesh's vertices come first, then the domain's own.
+    pub tetrahedra: &'a [[u32; 4]],
+    /// Vertices of the mesh where they are now, in its unit.
+    pub vertices: &'a [[f64; 3]],
+    /// Vertices of a conforming domain that are not of the mesh, likewise.
+    pub domain_vertices: &'a [[f64; 3]],
 }
 
 impl TeSdf {
@@ -71,7 +76,9 @@ impl TeSdf {
             bounds: self.local_bounds(),
             band: self.band(),
             has_exact_lists: self.has_exact_lists(),
-            tetrahedra: self.conforming.as_ref().map_or(0, |c: &Conforming| c.tetrahedra().len()),
+            tetrahedra: self.conforming.as_ref().map_or(&[], Conforming::tetrahedra),
+            vertices: &self.vertices,
+            domain_vertices: self.conforming.as_ref().map_or(&[], Conforming::vertices),
         }
     }
 }

@@ -1,7 +1,8 @@
 use std::collections::HashMap;
 
-use tesdf::domain::TetMesh;
-use tesdf::glam::DVec3;
+use tesdf::asset::layout::Side;
+use tesdf::domain::{ConformingMesh, TetMesh};
+use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 
 use super::random::Random;
@@ -56,4 +57,38 @@ pub fn grid(n: usize, jitter: f64, inside: impl Fn(usize, usize, usize) -> bool)
     let mesh = TriangleMesh::new(vertices, faces).expect("valid ids");
     let solid = SolidMesh::new(mesh).expect("a closed surface");
     (solid, TetMesh::new(points, tetrahedra).expect("valid tetrahedra"))
+}
+
+/// A beam of 6 × 2 × 2 cubes with an outer layer.
+pub fn beam() -> (SolidMesh, ConformingMesh) {
+    let inside = |x, y, z| (1..7).contains(&x) && (3..5).contains(&y) && (3..5).contains(&z);
+    let (solid, tetrahedra) = grid(8, 0.1, inside);
+    let conforming = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
+    (solid, conforming)
+}
+
+/// The same without anything around it.
+pub fn bare_beam() -> (SolidMesh, ConformingMesh) {
+    let (solid, domain) = beam();
+    let cells = domain.tetrahedra().iter().zip(domain.sides());
+    let tetrahedra: Vec<[u32; 4]> =
+        cells.filter(|(_, side)| **side == Side::Inside).map(|(t, _)| *t).collect();
+    let bare = TetMesh::new(domain.vertices().to_vec(), tetrahedra).expect("tetrahedra");
+    let bare = ConformingMesh::new(&solid, &bare).expect("the inside conforms, too");
+    (solid, bare)
+}
+
+/// A mild bend of the beam about its end.
+pub fn bend(p: DVec3) -> DVec3 {
+    let turn = DQuat::from_rotation_z(0.08 * (p.x - 1.0));
+    DVec3::new(1.0, 4.0, 4.0) + turn * (p - DVec3::new(1.0, 4.0, 4.0))
+}
+
+/// What [`TeSdf::move_vertices`](tesdf::TeSdf::move_vertices) takes to move all vertices.
+pub fn moves(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<(u32, DVec3)> {
+    (0..)
+        .zip(domain.vertices())
+        .map(|(id, &p)| (id, to(p)))
+        .filter(|(id, q)| domain.vertices()[*id as usize] != *q)
+        .collect()
 }

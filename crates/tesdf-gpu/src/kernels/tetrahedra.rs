@@ -1,0 +1,216 @@
+//! The roots of the forest: six tetrahedra of a cube, or those of a conforming domain, which a tree of boxes finds.
+use cubecl::prelude::*;
+
+use super::assets::{Assets, NONE, TETRAHEDRA, TREE, TREE_BOXES, TREE_NODES, entry};
+use super::locate::Lambda;
+use super::vector::{V3, cross, dot, length, minus, pick, plus, scaled, v3};
+
+/// Rows that a tetrahedron takes: each the numbers of [`Tetrahedron`] and a height.
+pub const ROWS: usize = 4;
+
+/// A tetrahedron in the local frame, relative to the middle of the cube.
+#[derive(CubeType, Clone, Copy, Debug)]
+#[expand(derive(Clone, Copy))]
+pub struct Tetrahedron {
+    /// Corner 0.
+    pub corner: V3,
+    /// Gradients of the barycentric coordinates 1, 2 and 3.
+    pub g1: V3,
+    pub g2: V3,
+    pub g3: V3,
+    /// Heights of the corners over the opposite sides; the first one is −1 for a tetrahedron that is flat, which holds no point.
+    pub h0: f32,
+    pub h1: f32,
+    pub h2: f32,
+    pub h3: f32,
+}
+
+/// Of less height than this (local frame) a tetrahedron is flat: rounding of its corners may have turned it inside out.
+const FLAT: f32 = 4e-7;
+
+/// A triangle is thin when its height is less than this share of its longest edge.
+const THIN: f32 = 1e-3;
+
+/// A point may be out of a tetrahedron by this (local frame) and still belong to it, when no other holds it: more than rounding takes
+/// away between two, also where a flat one is left out.
+pub const OUT: f32 = 5e-7;
+
+/// The tetrahedron of four corners, in either orientation.
+#[cube]
+pub fn tetrahedron_of(a: V3, b: V3, c: V3, d: V3) -> Tetrahedron {
+    let (e1, e2, e3) = (minus(b, a), minus(c, a), minus(d, a));
+    let (c1, c2, c3) = (cross(e2, e3), cross(e3, e1), cross(e1, e2));
+    let volume = dot(e1, c1);
+    let c0 = plus(plus(c1, c2), c3);
+    let greatest = length(c0).max(length(c1)).max(length(c2)).max(length(c3));
+    let flat = volume.abs() <= FLAT * greatest;
+    let inverse = select(flat, 0.0f32, 1.0f32 / select(flat, 1.0f32, volume));
+    let size = volume.abs();
+    Tetrahedron {
+        corner: a,
+        g1: scaled(inverse, c1),
+        g2: scaled(inverse, c2),
+        g3: scaled(inverse, c3),
+        h0: select(flat, -1.0f32, size / length(c0).max(1e-30f32)),
+        h1: size / length(c1).max(1e-30f32),
+        h2: size / length(c2).max(1e-30f32),
+        h3: size / length(c3).max(1e-30f32),
+    }
+}
+
+/// Reads a root.
+#[cube]
+pub fn tetrahedron(assets: &Assets, shape: u32, root: u32) -> Tetrahedron {
+    let at = (entry(assets, shape, TETRAHEDRA) + root * comptime!(ROWS as u32)) as usize;
+    let (p, q, r, s) = (assets.rows[at], assets.rows[at + 1], assets.rows[at + 2], assets.rows[at + 3]);
+    Tetrahedron {
+        corner: v3(p.extract(0usize), p.extract(1usize), p.extract(2usize)),
+        g1: v3(q.extract(0usize), q.extract(1usize), q.extract(2usize)),
+        g2: v3(r.extract(0usize), r.extract(1usize), r.extract(2usize)),
+        g3: v3(s.extract(0usize), s.extract(1usize), s.extract(2usize)),
+        h0: p.extract(3usize),
+        h1: q.extract(3usize),
+        h2: r.extract(3usize),
+        h3: s.extract(3usize),
+    }
+}
+
+/// Whether it holds no point.
+#[cube]
+pub fn is_flat(t: Tetrahedron) -> bool {
+    t.h0 < 0.0f32
+}
+
+/// Barycentric coordinates.
+#[cube]
+pub fn lambda_in(t: Tetrahedron, p: V3) -> Lambda {
+    let from = minus(p, t.corner);
+    let l1 = dot(t.g1, from);
+    let l2 = dot(t.g2, from);
+    let l3 = dot(t.g3, from);
+    Lambda { l0: 1.0f32 - l1 - l2 - l3, l1, l2, l3 }
+}
+
+/// How far a point is inside of the nearest side; negative outside.
+#[cube]
+fn inside_by(t: Tetrahedron, l: Lambda) -> f32 {
+    (l.l0 * t.h0).min(l.l1 * t.h1).min(l.l2 * t.h2).min(l.l3 * t.h3)
+}
+
+/// What may lie in a box: a point, or a triangle, with its bounds and its plane.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Around {
+    pub low: V3,
+    pub high: V3,
+    /// Unit normal, and how high over the origin; zero without a plane.
+    pub normal: V3,
+    pub height: f32,
+    /// What the normal may be off by.
+    pub slope: f32,
+}
+
+/// A triangle, or less.
+#[cube]
+pub fn around_of(a: V3, b: V3, c: V3) -> Around {
+    let across = cross(minus(b, a), minus(c, a));
+    let size = length(across);
+    let normal = scaled(select(size > 0.0f32, 1.0f32 / size.max(1e-30f32), 0.0f32), across);
+    let longest = length(minus(b, a)).max(length(minus(c, a))).max(length(minus(c, b)));
+    // Of what has hardly an area the plane says nothing.
+    let is_thin = size <= THIN * longest * longest;
+    let normal = pick(is_thin, v3(0.0f32, 0.0f32, 0.0f32), normal);
+    Around {
+        low: v3(a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y), a.z.min(b.z).min(c.z)),
+        high: v3(a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)),
+        normal,
+        height: dot(normal, a),
+        slope: 4e-7f32 * longest * longest / size.max(1e-30f32),
+    }
+}
+
+/// Whether a box may hold some of it.
+#[cube]
+fn may_hold(low: V3, high: V3, around: Around) -> bool {
+    let middle = scaled(0.5f32, plus(low, high));
+    let reach = 0.5f32
+        * ((high.x - low.x) * around.normal.x.abs()
+            + (high.y - low.y) * around.normal.y.abs()
+            + (high.z - low.z) * around.normal.z.abs());
+    let rough = 2.0f32 * OUT + around.slope.min(1.0f32) * length(minus(middle, around.low));
+    around.high.x >= low.x - OUT
+        && around.low.x <= high.x + OUT
+        && around.high.y >= low.y - OUT
+        && around.low.y <= high.y + OUT
+        && around.high.z >= low.z - OUT
+        && around.low.z <= high.z + OUT
+        && (dot(around.normal, middle) - around.height).abs() <= reach + rough
+}
+
+/// A step of a walk over the tree of a conforming domain, which visits nodes in order and leaves out what is below boxes elsewhere.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Step {
+    /// The node that comes after this one.
+    pub next: u32,
+    /// The tetrahedron when this is a leaf whose box is near, else [`NONE`].
+    pub tetrahedron: u32,
+}
+
+/// Visits a node, for what lies in `around`.
+#[cube]
+pub fn visit(assets: &Assets, shape: u32, node: u32, around: Around) -> Step {
+    let row = (entry(assets, shape, TREE_BOXES) + 2u32 * node) as usize;
+    let word = (entry(assets, shape, TREE) + 2u32 * node) as usize;
+    let (low, high) = (assets.rows[row], assets.rows[row + 1]);
+    let near = may_hold(
+        v3(low.extract(0usize), low.extract(1usize), low.extract(2usize)),
+        v3(high.extract(0usize), high.extract(1usize), high.extract(2usize)),
+        around,
+    );
+    Step {
+        next: select(near, node + 1u32, assets.words[word]),
+        tetrahedron: select(near, assets.words[word + 1], NONE.runtime()),
+    }
+}
+
+/// A root, and coordinates in it.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Held {
+    /// [`NONE`] when none holds the point.
+    pub root: u32,
+    pub lambda: Lambda,
+}
+
+/// The tetrahedron of a conforming domain that holds a point: the first one found, or the one that the point is least out of.
+#[cube]
+pub fn root_holding(assets: &Assets, shape: u32, p: V3) -> Held {
+    let around = around_of(p, p, p);
+    let count = entry(assets, shape, TREE_NODES);
+    let mut root = NONE.runtime();
+    let mut best = comptime!(-OUT).runtime();
+    let mut l0 = 0.0f32;
+    let mut l1 = 0.0f32;
+    let mut l2 = 0.0f32;
+    let mut l3 = 0.0f32;
+    let mut node = 0u32;
+    while node < count {
+        let step = visit(assets, shape, node, around);
+        node = step.next;
+        if step.tetrahedron != NONE {
+            let t = tetrahedron(assets, shape, step.tetrahedron);
+            let l = lambda_in(t, p);
+            let by = inside_by(t, l);
+            let better = by > best;
+            best = select(better, by, best);
+            root = select(better, step.tetrahedron, root);
+            l0 = select(better, l.l0, l0);
+            l1 = select(better, l.l1, l1);
+            l2 = select(better, l.l2, l2);
+            l3 = select(better, l.l3, l3);
+            node = select(by >= 0.0f32, count, node);
+        }
+    }
+    Held { root, lambda: Lambda { l0, l1, l2, l3 } }
+}
