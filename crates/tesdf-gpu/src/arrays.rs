@@ -73,6 +73,11 @@ impl<T: Word> DeviceArray<T> {
         device.read(&self.buffer, self.len)
     }
 
+    /// For kernels.
+    pub(crate) fn buffer(&self) -> &Buffer {
+        &self.buffer
+    }
+
     /// Number of elements.
     pub fn len(&self) -> usize {
         self.len

@@ -4,7 +4,9 @@ mod options;
 mod pass;
 mod stages;
 
-use tesdf::collide::{CollideOptions, Contacts, Scene, Shape, ShapeId, Statistics, reduce_pairs};
+use tesdf::collide::{
+    CollideError, CollideOptions, Contacts, Scene, Shape, ShapeId, Statistics, reduce_pairs,
+};
 use tesdf::encode::Length;
 
 use buffers::{Products, ROW, WORD};
@@ -14,6 +16,7 @@ pub use options::{
 use stages::Timing;
 
 use crate::GpuError;
+use crate::arrays::DeviceArray;
 use crate::contacts::{Row, Words, contacts};
 use crate::device::Device;
 use crate::images::Images;
@@ -72,6 +75,16 @@ impl Detector {
         Ok(())
     }
 
+    /// Moves all vertices of a shape with a conforming domain, on the device: see [`Images::move_vertices`]. Where the scene has it does not matter for what follows, but
+    /// [`upload`](Self::upload) takes it from there.
+    ///
+    /// # Errors
+    /// As [`Images::move_vertices`]; the shape's number is its place among those of the scene's instances, by id.
+    pub fn move_vertices(&mut self, shape: ShapeId, positions: &DeviceArray<f32>) -> Result<(), GpuError> {
+        let number = self.shape_ids.binary_search(&shape).map_err(|_| CollideError::NoShape(shape))?;
+        self.images.move_vertices(&self.device, number, positions)
+    }
+
     /// All contacts of a scene, as [`tesdf::collide::detect`] finds them, in the same order; computed in `f32`. The exact mode's
     /// tolerance is 1e-6 of the local frame at the finest.
     ///
@@ -106,17 +119,24 @@ impl Detector {
         DeviceBytes {
             shapes: self.images.bytes(),
             products: self.products.bytes(),
-            per_instance: pairs::INSTANCE_ROWS * ROW + pairs::INSTANCE_WORDS * WORD,
+            per_instance: (pairs::INSTANCE_ROWS + pairs::BOUNDS_ROWS) * ROW + pairs::INSTANCE_WORDS * WORD,
         }
     }
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         options.validate()?;
         if shape_ids(scene) != self.shape_ids {
+            if self.images.have_moved() {
+                return Err(GpuError::Unavailable {
+                    what: "a scene with other shapes than those that have moved".into(),
+                    instead: "upload the scene, and move its vertices again",
+                });
+            }
             self.upload(scene)?;
         }
-        let instances =
-            Instances::new(scene, options, &self.shape_ids, &self.frames, self.options.most_pair_tests)?;
+        // The processor's tree knows nothing of what has moved here.
+        let most_tests = if self.images.have_moved() { u64::MAX } else { self.options.most_pair_tests };
+        let instances = Instances::new(scene, options, &self.shape_ids, &self.frames, most_tests)?;
         self.report = DeviceReport::default();
         loop {
             self.report.passes += 1;

@@ -1,4 +1,5 @@
 //! Shapes as the device holds them: each once, whatever the number of its instances.
+mod moving;
 mod roots;
 
 use glam::{DVec3, Vec3};
@@ -11,14 +12,13 @@ use tesdf::query::FaceRecord;
 use crate::GpuError;
 use crate::device::{Buffer, Device};
 use crate::kernels::assets::{self, AssetsLaunch, STRIDE};
+use crate::kernels::deform::GROWN;
 use crate::kernels::nearest::TREE_DEPTH;
+use moving::{Moving, face_levels, tree_levels};
 use roots::Roots;
 
 /// Most faces of a meshlet: one for each thread of a group.
 pub const MESHLET: u32 = 32;
-
-/// What a ball is grown by, of its radius and of the cube: more than rounding to `f32` takes away.
-const GROWN: f64 = 1e-6;
 
 /// Shapes on a device.
 #[derive(Clone)]
@@ -26,8 +26,9 @@ pub struct Images {
     table: Buffer,
     words: Buffer,
     rows: Buffer,
-    count: usize,
-    conforming: usize,
+    /// Of each shape; none of those whose cells do not follow the surface.
+    moving: Vec<Option<Moving>>,
+    moved: bool,
 }
 
 /// Bytes of an asset's arrays on the device, by what they are.
@@ -55,19 +56,22 @@ impl Images {
     /// A shape that the device cannot hold, by its place.
     pub fn new(device: &Device, shapes: &[&Shape]) -> Result<Self, GpuError> {
         let mut packed = Packed::default();
-        let (mut count, mut conforming) = (0, 0);
+        let mut moving = Vec::with_capacity(shapes.len());
         for (number, shape) in shapes.iter().enumerate() {
             let row = packed.add(shape).map_err(|reason| GpuError::Shape { number, reason })?;
-            count += 1;
-            conforming += usize::from(row[assets::TREE_NODES as usize] > 0);
+            let tree_nodes = row[assets::TREE_NODES as usize] as usize;
+            moving.push(match shape {
+                Shape::Mesh(asset) if tree_nodes > 0 => Some(Moving::new(&asset.arrays(), tree_nodes)),
+                _ => None,
+            });
             packed.table.extend(row);
         }
         Ok(Self {
             table: device.upload("shapes", &packed.table)?,
             words: device.upload("words of shapes", &packed.words)?,
             rows: device.upload("rows of shapes", &packed.rows)?,
-            count,
-            conforming,
+            moving,
+            moved: false,
         })
     }
 
@@ -78,17 +82,17 @@ impl Images {
 
     /// Number of shapes.
     pub fn len(&self) -> usize {
-        self.count
+        self.moving.len()
     }
 
     /// Whether there is no shape.
     pub fn is_empty(&self) -> bool {
-        self.count == 0
+        self.moving.is_empty()
     }
 
     /// Number of shapes with a conforming domain.
     pub(crate) fn conforming(&self) -> usize {
-        self.conforming
+        self.moving.iter().flatten().count()
     }
 
     /// Size on the device.
@@ -115,6 +119,7 @@ impl Packed {
             }
         }
         row[assets::MESHLET_COUNT as usize] = 1;
+        row[assets::BAD_VERTEX as usize] = assets::NONE;
         // Two triangles of a plane depend on the field that they meet.
         row[assets::FACE_COUNT as usize] = 2;
         if !matches!(shape, Shape::Plane) {
@@ -165,6 +170,14 @@ impl Packed {
         set(assets::TREE_BOXES, self.rows_at(roots.boxes.into_iter())?);
         set(assets::TREE, self.words_at(roots.tree.iter().flatten().copied())?);
         set(assets::TREE_NODES, roots.tree.len() as u32);
+        set(assets::BAD_VERTEX, assets::NONE);
+        if !roots.tree.is_empty() {
+            set(assets::FACE_VERTICES, self.words_at(mesh.faces.as_flattened().iter().copied())?);
+            set(assets::TET_VERTICES, self.words_at(mesh.tetrahedra.as_flattened().iter().copied())?);
+            set(assets::FACE_LEVELS, self.words_at(face_levels(mesh.tree_children).into_iter())?);
+            set(assets::TREE_LEVELS, self.words_at(tree_levels(&roots.tree).into_iter())?);
+            set(assets::VERTEX_COUNT, (mesh.vertices.len() + mesh.domain_vertices.len()) as u32);
+        }
         let mut set = |at: u32, value: f64| set(at, (value as f32).to_bits());
         set(assets::SIDE, mesh.cube.side());
         set(assets::INVERSE_SIDE, 1.0 / mesh.cube.side());
@@ -282,6 +295,7 @@ fn ball(mesh: &Arrays, start: u32, count: u32) -> [f32; 4] {
         corners.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
     let center: Vec3 = (0.5 * (low + high)).as_vec3();
     let radius = corners.map(|c| c.distance(center.as_dvec3())).fold(0.0, f64::max);
-    let radius = radius * (1.0 + GROWN) + GROWN * mesh.cube.side();
+    let grown = f64::from(GROWN);
+    let radius = radius * (1.0 + grown) + grown * mesh.cube.side();
     [center.x, center.y, center.z, radius as f32]
 }

@@ -1,9 +1,9 @@
 //! The instances of a scene as the device holds them.
-use glam::DVec3;
-use tesdf::collide::{CollideOptions, InstanceId, InstancePair, Scene, Shape, ShapeId, instance_pairs};
+use tesdf::collide::{CollideOptions, InstanceId, InstancePair, Scene, ShapeId, instance_pairs};
 
 use crate::GpuError;
-use crate::placed::{FieldFrame, Placed, split};
+use crate::kernels::pairs::{INSTANCE_ROWS, INSTANCE_WORDS};
+use crate::placed::{FieldFrame, Placed};
 
 /// All instances, those of a world side by side, by id within it.
 pub struct Instances {
@@ -13,20 +13,15 @@ pub struct Instances {
     pub placed: Vec<Placed>,
     /// Number of each one's shape.
     pub shapes: Vec<usize>,
-    /// [`INSTANCE_ROWS`](crate::kernels::pairs::INSTANCE_ROWS) each.
+    /// [`INSTANCE_ROWS`] each.
     pub rows: Vec<[f32; 4]>,
-    /// [`INSTANCE_WORDS`](crate::kernels::pairs::INSTANCE_WORDS) each.
+    /// [`INSTANCE_WORDS`] each.
     pub words: Vec<u32>,
     /// Pairs that never meet, by place, sorted.
     pub excluded: Vec<u32>,
     /// All pairs whose bounds meet, by place, when worlds are so large that a tree on the processor is faster than all pairs on the device.
     pub pairs: Option<Vec<u32>>,
 }
-
-/// What half an extent is grown by, relative to it and to the distance from the world's origin: more than rounding takes away.
-const GROWN: f64 = 1e-6;
-/// Half the extent of what has no end.
-const ENDLESS: f64 = 1e30;
 
 impl Instances {
     /// `shape_ids` and `frames` are those of the uploaded shapes, sorted by id; beyond `most_tests` of bounds the pairs are found here.
@@ -43,8 +38,8 @@ impl Instances {
             ids: order.iter().map(|&(_, id)| id).collect(),
             placed: Vec::with_capacity(order.len()),
             shapes: Vec::with_capacity(order.len()),
-            rows: Vec::with_capacity(6 * order.len()),
-            words: Vec::with_capacity(4 * order.len()),
+            rows: Vec::with_capacity(INSTANCE_ROWS * order.len()),
+            words: Vec::with_capacity(INSTANCE_WORDS * order.len()),
             excluded: Vec::new(),
             pairs: None,
         };
@@ -60,20 +55,10 @@ impl Instances {
                 reason: format!("shape {} is not on the device; upload the scene again", instance.shape.0),
             })?;
             let placed = Placed::new(frames[number], instance.placement());
-            let bounds = scene.bounds(id)?;
             let motion = instance.motion_ahead(shape, options.speculative_time);
-            let (center, half) = if matches!(shape, Shape::Plane) {
-                (DVec3::ZERO, DVec3::splat(ENDLESS))
-            } else {
-                let (center, half) = (bounds.center(), 0.5 * bounds.extent());
-                let rounding = GROWN * (half.max_element() + 1e-6 * center.abs().max_element());
-                (center, half + rounding + 0.5 * options.contact_distance + motion)
-            };
-            let (high, low) = split(center);
-            all.rows.extend(placed.rows());
-            all.rows.push(high.extend(motion as f32).to_array());
-            all.rows.push(low.extend(0.0).to_array());
-            all.rows.push(half.as_vec3().extend(0.0).to_array());
+            let [high, mut low, rotation] = placed.rows();
+            low[3] = motion as f32;
+            all.rows.extend([high, low, rotation]);
             let groups = instance.groups;
             all.words.extend([number as u32, end as u32, groups.memberships, groups.filter]);
             all.placed.push(placed);

@@ -4,10 +4,10 @@ mod support;
 
 mod compare;
 
-use compare::{Compared, device, each_mode, hold};
+use compare::{Compared, device, each_mode, hold, hold_against};
 use support::random::Random;
 use support::shapes;
-use support::tetrahedra::{bare_beam, beam};
+use support::tetrahedra::{bare_beam, beam, bend, moves};
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{Instance, Placement, Pose, Scene, Shape};
@@ -16,7 +16,7 @@ use tesdf::encode::{Domain, EncodeOptions, EncodeProgress, Preset, Refinement, e
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
 use tesdf::query::Precision;
-use tesdf_gpu::{Images, query};
+use tesdf_gpu::{Detector, DetectorOptions, DeviceArray, GpuError, Images, query};
 
 fn plain() -> EncodeOptions {
     EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Fast) }
@@ -91,17 +91,122 @@ fn contacts_are_those_of_the_host() {
     );
     let mut compared = Compared::default();
     for (solid, domain) in [beam(), bare_beam()] {
-        for encoding in &encodings()[..2] {
+        let [plain, by_cost, _] = encodings();
+        for (encoding, other, turn) in [(&plain, &ball, 2.0), (&by_cost, &ball, 2.0), (&plain, &block, 0.1)] {
             let beam = encoded(&solid, &domain, encoding);
-            for (other, turn) in [(&ball, 2.0), (&block, 0.1)] {
-                let scene = meeting(&beam, other, turn, &mut random);
-                for options in each_mode(8.0) {
-                    let one = hold(&scene, &options, 8.0);
-                    println!("{:?}: {one:?}", options.mode);
-                    compared.add(one);
-                }
+            let scene = meeting(&beam, other, turn, &mut random);
+            for options in each_mode(8.0) {
+                let one = hold(&scene, &options, 8.0);
+                println!("{:?}: {one:?}", options.mode);
+                compared.add(one);
             }
         }
     }
     compared.is_good(1000);
+}
+
+/// All vertices of a domain as the device takes them.
+fn positions(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<f32> {
+    domain.vertices().iter().flat_map(|&p| to(p).as_vec3().to_array()).collect()
+}
+
+/// To where the device's `f32` has it.
+fn rounded(p: DVec3) -> DVec3 {
+    bend(p).as_vec3().as_dvec3()
+}
+
+#[test]
+fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
+    let device = device();
+    let mut random = Random(4);
+    let ball = shapes::Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid();
+    let ball =
+        encode(&ball, &Source::default(), &EncodeOptions::preset(Preset::Fast), &EncodeProgress::default())
+            .expect("encodes");
+    let mut compared = Compared::default();
+    for (solid, domain) in [beam(), bare_beam()] {
+        for encoding in &encodings()[..2] {
+            let rest = encoded(&solid, &domain, encoding);
+            let mut bent = rest.clone();
+            assert!(bent.move_vertices(&moves(&domain, rounded)).expect("moderate").inverted.is_empty());
+            let array = DeviceArray::upload(&device, &positions(&domain, bend)).expect("fits");
+            // Distances.
+            let shape = Shape::from(rest.clone());
+            let mut images = Images::new(&device, &[&Shape::Plane, &shape]).expect("fits");
+            images.move_vertices(&device, 1, &array).expect("as many vertices");
+            let (bounds, diagonal) = (bent.bounds(), shape.diagonal());
+            let points: Vec<DVec3> =
+                (0..2000).map(|_| bounds.center() + 0.9 * bounds.extent() * random.in_cube()).collect();
+            let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
+            let answers =
+                query(&device, &images, &[&Shape::Plane, &shape], &[(1, at)], &points).expect("answers");
+            let off = |(p, found): (&DVec3, f64)| (bent.signed_distance(*p, Precision::F64) - found).abs();
+            let distances = answers[0].iter().map(|a| a.signed_distance);
+            let others = points.iter().zip(distances).map(off).filter(|off| *off > 2e-6 * diagonal).count();
+            // Lists of moved faces jump at borders of cells, where rounding may find another one.
+            assert!(others <= 4, "{others} of {} points", points.len());
+            // Contacts.
+            let here = meeting(&rest, &ball, 2.0, &mut random);
+            let mut there = here.clone();
+            let mut detector = Detector::new(&device, &here, DetectorOptions::default()).expect("fits");
+            let beams: Vec<_> = here.instances().step_by(2).map(|(_, instance)| instance.shape).collect();
+            for &beam in &beams {
+                detector.move_vertices(beam, &array).expect("as many vertices");
+                there
+                    .mesh_mut(beam)
+                    .expect("a mesh")
+                    .move_vertices(&moves(&domain, rounded))
+                    .expect("moderate");
+            }
+            for options in each_mode(8.0) {
+                let found = detector.detect(&here, &options).expect("detects");
+                let one = hold_against(&there, &options, 8.0, &found);
+                println!("{:?}: {one:?}", options.mode);
+                compared.add(one);
+            }
+            // And back again.
+            let array = DeviceArray::upload(&device, &positions(&domain, |p| p)).expect("fits");
+            beams.iter().for_each(|&b| detector.move_vertices(b, &array).expect("as many vertices"));
+            let [options, ..] = each_mode(8.0);
+            let found = detector.detect(&here, &options).expect("detects");
+            compared.add(hold_against(&here, &options, 8.0, &found));
+        }
+    }
+    compared.is_good(1000);
+}
+
+#[test]
+fn bad_moves_are_errors() {
+    let device = device();
+    let (solid, domain) = bare_beam();
+    let mut scene = Scene::new();
+    let beam = scene.add_shape(encoded(&solid, &domain, &plain())).expect("a shape");
+    let block = scene.add_shape(Shape::Box { half_extents: DVec3::ONE }).expect("a shape");
+    for shape in [beam, block] {
+        scene.add(Instance::new(shape, Pose::IDENTITY)).expect("a pose");
+    }
+    let mut detector = Detector::new(&device, &scene, DetectorOptions::default()).expect("fits");
+    let mut places = positions(&domain, |p| p);
+    let moved = |detector: &mut Detector, shape, places: &[f32]| {
+        detector.move_vertices(shape, &DeviceArray::upload(&device, places).expect("fits"))
+    };
+    let error = moved(&mut detector, beam, &places[3..]).expect_err("a vertex is missing");
+    assert!(matches!(error, GpuError::Length { array: "positions", .. }), "{error}");
+    let error = moved(&mut detector, block, &places).expect_err("no vertices");
+    assert!(error.to_string().starts_with("shape 1: its cells do not follow the surface"), "{error}");
+    for bad in [f32::NAN, f32::INFINITY, 1e9] {
+        let good = std::mem::replace(&mut places[3 * 7 + 1], bad);
+        moved(&mut detector, beam, &places).expect("nothing was read yet");
+        let error = detector.detect(&scene, &Default::default()).expect_err("a vertex is nowhere");
+        assert!(error.to_string().starts_with("shape 0: vertex 7 was moved to where none can be"), "{error}");
+        places[3 * 7 + 1] = good;
+    }
+    moved(&mut detector, beam, &places).expect("as many vertices");
+    detector.detect(&scene, &Default::default()).expect("all is well again");
+    let third = scene.add_shape(Shape::Plane).expect("a shape");
+    scene.add(Instance::new(third, Pose::IDENTITY)).expect("a pose");
+    let error = detector.detect(&scene, &Default::default()).expect_err("the moved vertices would be lost");
+    assert!(error.to_string().contains("upload the scene, and move its vertices again"), "{error}");
+    detector.upload(&scene).expect("fits");
+    detector.detect(&scene, &Default::default()).expect("all is well again");
 }

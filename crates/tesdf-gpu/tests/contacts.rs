@@ -18,7 +18,7 @@ use tesdf::collide::{
 };
 use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
 use tesdf::glam::DVec3;
-use tesdf_gpu::{Capacities, Detector, DetectorOptions, Device, Exchange, GpuError, Lanes, Memory, Pruning};
+use tesdf_gpu::{Capacities, Detector, DetectorOptions, Exchange, GpuError, Lanes, Memory, Pruning};
 
 #[test]
 fn pairs_of_bodies() {

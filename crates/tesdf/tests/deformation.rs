@@ -9,7 +9,6 @@ use support::shapes::Shape;
 use support::tetrahedra::{bare_beam, beam, bend, moves};
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::asset::layout::Side;
 use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Scene, detect};
 use tesdf::deform::DeformError;
 use tesdf::domain::{ConformingMesh, TetMesh};

@@ -2,7 +2,7 @@
 use cubecl::prelude::*;
 use tesdf::collide::{CollideOptions, FaceMethod, Mode};
 
-use super::buffers::{Products, WORD};
+use super::buffers::{Products, ROW, WORD};
 use super::stages::{Stages, Timing};
 use super::{Counting, Detector, Exchange, Lanes, Pruning};
 use crate::GpuError;
@@ -45,6 +45,21 @@ impl Detector {
             Some(pairs) => Some((device.upload("pairs", pairs)?, pairs.len() as u32 / 2)),
             None => None,
         };
+        let bounds = device.empty("bounds of instances", count as usize * pairs::BOUNDS_ROWS * ROW)?;
+        stages.run("instance bounds", || {
+            pairs::instance_bounds::launch(
+                client,
+                spread(count.div_ceil(64)),
+                CubeDim::new_1d(64),
+                images.argument(),
+                rows.rows(),
+                words.words(),
+                counters.words(),
+                bounds.rows(),
+                count,
+                options.contact_distance as f32,
+            );
+        })?;
         stages.run("instance pairs", || match &given {
             Some((pairs, count)) => pairs::given_pairs::launch(
                 client,
@@ -69,6 +84,7 @@ impl Detector {
                 CubeDim::new_1d(64),
                 images.argument(),
                 rows.rows(),
+                bounds.rows(),
                 words.words(),
                 excluded.words(),
                 counters.words(),
@@ -252,6 +268,9 @@ impl Detector {
         self.report.launches = launches;
         self.report.stages = times;
         let counts: Vec<u32> = device.read(&counters, products::COUNTERS)?;
+        if counts[products::BADLY_MOVED as usize] > 0 {
+            return Err(self.images.badly_moved(&device)?);
+        }
         if counts[products::BROKEN_OFF as usize] > 0 {
             return Err(GpuError::Device {
                 device: device.info().name.clone(),

@@ -15,7 +15,7 @@ pub struct Assets {
 }
 
 /// Words a shape takes in the table.
-pub const STRIDE: u32 = 32;
+pub const STRIDE: u32 = 40;
 
 /// One of `MESH` … `ROUND`.
 pub const KIND: u32 = 0;
@@ -67,6 +67,17 @@ pub const TREE_BOXES: u32 = 29;
 pub const TREE: u32 = 30;
 /// Number of its nodes; 0 for the bisection domain.
 pub const TREE_NODES: u32 = 31;
+
+/// Of a conforming domain, for shapes whose vertices move: word of the three vertices of the first face, of the four of the first tetrahedron, of the
+/// levels of the face tree and of the tree over tetrahedra.
+pub const FACE_VERTICES: u32 = 32;
+pub const TET_VERTICES: u32 = 33;
+pub const FACE_LEVELS: u32 = 34;
+pub const TREE_LEVELS: u32 = 35;
+/// Number of vertices, of the mesh and of the domain.
+pub const VERTEX_COUNT: u32 = 36;
+/// The lowest vertex that was moved to where nothing can be; [`NONE`] when all is well.
+pub const BAD_VERTEX: u32 = 37;
 
 /// No such array, or no cell.
 pub const NONE: u32 = u32::MAX;

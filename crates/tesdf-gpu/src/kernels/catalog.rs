@@ -10,7 +10,7 @@ use cubecl_common::device::{DeviceId, ServiceId};
 use cubecl_environment::stream::StreamId;
 
 use super::assets::AssetsLaunch;
-use super::{broad, clip, exact, narrow, outside, pairs, products, query, sample};
+use super::{broad, clip, deform, exact, narrow, outside, pairs, products, query, sample};
 
 use crate::cuda::Count;
 
@@ -43,16 +43,19 @@ pub fn kernels(device: &Arc<DeviceProperties>, target: &Arc<TargetProperties>) -
         };
     }
     let counted = [products::BLOCKS, products::MESHLETS, products::POLYGONS];
+    kernel!(Direct pairs::instance_bounds, 64, (assets(), rows(), words(), words(), rows(), 1, 0.0));
     kernel!(
         Direct pairs::instance_pairs,
         64,
-        (assets(), rows(), words(), words(), words(), words(), rows(), words(), 1, 0, 0.0, 1, 1)
+        (assets(), rows(), rows(), words(), words(), words(), words(), rows(), words(), 1, 0, 0.0, 1, 1)
     );
     kernel!(
         Direct pairs::given_pairs,
         64,
         (assets(), rows(), words(), words(), words(), words(), rows(), words(), 1, 0.0, 1, 1)
     );
+    kernel!(Direct deform::follow, 64, (words(), words(), rows(), words(), rows(), 0));
+    kernel!(Direct deform::refit, deform::GROUP, (words(), words(), rows(), words(), rows(), 0));
     for product in counted {
         kernel!(Direct products::groups_for, 1, (words(), words(), 1, 1, product); product);
     }

@@ -13,6 +13,7 @@ pub mod broad;
 pub mod catalog;
 pub mod clip;
 pub mod cut;
+pub mod deform;
 pub mod exact;
 pub mod field;
 pub mod greatest_minimum;

@@ -1,13 +1,18 @@
 //! Instance pairs: those of one world whose bounds meet, as `tesdf::collide::instance_pairs` finds them.
 use cubecl::prelude::*;
 
-use super::assets::{Assets, KIND, MESHLET_COUNT, PLANE, ROUND, SIZES, entry, number};
-use super::pose::{Pose, difference, pose, turn, turn_back};
-use super::products::{BLOCKS, DIRECTION_ROWS, DIRECTION_WORDS, DIRECTIONS, PAIR_WORDS};
-use super::vector::{V3, scaled, v3};
+use super::assets::{
+    Assets, BAD_VERTEX, HIGH, KIND, LOW, MESH, MESHLET_COUNT, NONE, PLANE, ROUND, SIZES, entry, number,
+    vector,
+};
+use super::pose::{Pose, ROWS as POSE_ROWS, difference, pose, turn, turn_back};
+use super::products::{BADLY_MOVED, BLOCKS, DIRECTION_ROWS, DIRECTION_WORDS, DIRECTIONS, PAIR_WORDS};
+use super::vector::{V3, length, minus, pick, plus, scaled, v3};
 
-/// Rows of an instance: its pose, then the middle of its bounds (a sum of two) with the motion ahead, then half their extent.
-pub const INSTANCE_ROWS: usize = 6;
+/// Rows of an instance: its pose, with the motion ahead behind the second row.
+pub const INSTANCE_ROWS: usize = POSE_ROWS;
+/// Rows of its bounds: their middle as a sum of two, half their extent.
+pub const BOUNDS_ROWS: usize = 3;
 /// Words of an instance: shape, end of its world, memberships, filter.
 pub const INSTANCE_WORDS: usize = 4;
 /// Meshlets that a group of the next stage takes.
@@ -37,11 +42,77 @@ fn is_excluded(excluded: &[u32], count: u32, a: u32, b: u32) -> bool {
     found
 }
 
+/// How far the velocity can take a point of an instance.
+#[cube]
+fn motion(rows: &[Vector<f32, Const<4>>], instance: u32) -> f32 {
+    rows[(instance * comptime!(INSTANCE_ROWS as u32) + 1u32) as usize].extract(3usize)
+}
+
+/// Half the extent of what has no end.
+const ENDLESS: f32 = 1e30;
+
+/// What half an extent is grown by, relative to it and to the way from the field's origin to the middle: more than rounding takes away.
+const GROWN: f32 = 2e-6;
+
+/// A thread for each instance: its bounds in the world, grown by its motion ahead and half the contact distance. Counts those of shapes with a vertex where none can be.
+#[cube(launch, create_dummy_kernel)]
+pub fn instance_bounds(
+    assets: &Assets,
+    rows: &[Vector<f32, Const<4>>],
+    words: &[u32],
+    counters: &[Atomic<u32>],
+    bounds: &mut [Vector<f32, Const<4>>],
+    instances: u32,
+    contact_distance: f32,
+) {
+    let i = ABSOLUTE_POS as u32;
+    if i < instances {
+        let first = i * comptime!(INSTANCE_ROWS as u32);
+        let shape = words[(i * comptime!(INSTANCE_WORDS as u32)) as usize];
+        let kind = entry(assets, shape, KIND);
+        let sizes = vector(assets, shape, SIZES);
+        let low = vector(assets, shape, LOW);
+        let high = vector(assets, shape, HIGH);
+        let is_mesh = kind == MESH;
+        let round = v3(sizes.y, sizes.y, sizes.x + sizes.y);
+        let simple = pick(kind == ROUND, round, sizes);
+        let middle = pick(is_mesh, scaled(0.5f32, plus(low, high)), v3(0.0f32, 0.0f32, 0.0f32));
+        let half = pick(is_mesh, scaled(0.5f32, minus(high, low)), simple);
+        let at = pose(rows, first as usize);
+        let ahead = motion(rows, i);
+        let off = turn(at.axis, at.scalar, scaled(at.unit, middle));
+        let x = turn(at.axis, at.scalar, v3(at.unit * half.x, 0.0f32, 0.0f32));
+        let y = turn(at.axis, at.scalar, v3(0.0f32, at.unit * half.y, 0.0f32));
+        let z = turn(at.axis, at.scalar, v3(0.0f32, 0.0f32, at.unit * half.z));
+        let reach = v3(
+            x.x.abs() + y.x.abs() + z.x.abs(),
+            x.y.abs() + y.y.abs() + z.y.abs(),
+            x.z.abs() + y.z.abs() + z.z.abs(),
+        );
+        let more = GROWN * (length(off) + length(reach)) + 0.5f32 * contact_distance + ahead;
+        let endless = kind == PLANE;
+        let from_low = plus(at.low, off);
+        let to = (i * comptime!(BOUNDS_ROWS as u32)) as usize;
+        bounds[to] = four(at.high.x, at.high.y, at.high.z, 0.0f32);
+        bounds[to + 1] = four(from_low.x, from_low.y, from_low.z, 0.0f32);
+        bounds[to + 2] = four(
+            select(endless, ENDLESS, reach.x + more),
+            select(endless, ENDLESS, reach.y + more),
+            select(endless, ENDLESS, reach.z + more),
+            0.0f32,
+        );
+        if entry(assets, shape, BAD_VERTEX) != NONE {
+            counters[BADLY_MOVED as usize].fetch_add(1u32);
+        }
+    }
+}
+
 /// A thread for each instance looks at all later ones of its world.
 #[cube(launch, create_dummy_kernel)]
 pub fn instance_pairs(
     assets: &Assets,
     rows: &[Vector<f32, Const<4>>],
+    bounds: &[Vector<f32, Const<4>>],
     words: &[u32],
     excluded: &[u32],
     counters: &[Atomic<u32>],
@@ -56,25 +127,25 @@ pub fn instance_pairs(
 ) {
     let i = ABSOLUTE_POS as u32;
     if i < instances {
-        let i_rows = i * comptime!(INSTANCE_ROWS as u32);
+        let i_rows = i * comptime!(BOUNDS_ROWS as u32);
         let i_words = i * comptime!(INSTANCE_WORDS as u32);
         let shape = words[i_words as usize];
         let end = words[(i_words + 1u32) as usize];
         let memberships = words[(i_words + 2u32) as usize];
         let filter = words[(i_words + 3u32) as usize];
         let is_plane = entry(assets, shape, KIND) == PLANE;
-        let middle = row3(rows, i_rows + 3u32);
-        let low = row3(rows, i_rows + 4u32);
-        let half = row3(rows, i_rows + 5u32);
+        let middle = row3(bounds, i_rows);
+        let low = row3(bounds, i_rows + 1u32);
+        let half = row3(bounds, i_rows + 2u32);
         let mut j = i + 1u32;
         while j < end {
-            let j_rows = j * comptime!(INSTANCE_ROWS as u32);
+            let j_rows = j * comptime!(BOUNDS_ROWS as u32);
             let j_words = j * comptime!(INSTANCE_WORDS as u32);
             let other = words[j_words as usize];
             let j_memberships = words[(j_words + 2u32) as usize];
             let j_filter = words[(j_words + 3u32) as usize];
-            let apart = difference(row3(rows, j_rows + 3u32), row3(rows, j_rows + 4u32), middle, low);
-            let j_half = row3(rows, j_rows + 5u32);
+            let apart = difference(row3(bounds, j_rows), row3(bounds, j_rows + 1u32), middle, low);
+            let j_half = row3(bounds, j_rows + 2u32);
             let overlap = apart.x.abs() <= half.x + j_half.x
                 && apart.y.abs() <= half.y + j_half.y
                 && apart.z.abs() <= half.z + j_half.z;
@@ -156,9 +227,7 @@ fn write_pair(
     let j_rows = j * comptime!(INSTANCE_ROWS as u32);
     let shape = words[(i * comptime!(INSTANCE_WORDS as u32)) as usize];
     let other = words[(j * comptime!(INSTANCE_WORDS as u32)) as usize];
-    let motion =
-        rows[(i_rows + 3u32) as usize].extract(3usize) + rows[(j_rows + 3u32) as usize].extract(3usize);
-    let distance = contact_distance + motion;
+    let distance = contact_distance + motion(rows, i) + motion(rows, j);
     let pose_i = pose(rows, i_rows as usize);
     let pose_j = pose(rows, j_rows as usize);
     let at = counters[DIRECTIONS as usize].fetch_add(2u32);

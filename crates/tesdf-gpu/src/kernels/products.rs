@@ -24,8 +24,10 @@ pub const BROKEN_OFF: u32 = 7;
 pub const EVALUATIONS: u32 = 8;
 /// Point–triangle distances of their lists.
 pub const DISTANCES: u32 = 9;
+/// Instances of shapes that have a vertex where none can be.
+pub const BADLY_MOVED: u32 = 10;
 /// How many counters there are.
-pub const COUNTERS: usize = 10;
+pub const COUNTERS: usize = 11;
 
 /// Words of a direction: instance a, instance b, shape of a, shape of b.
 pub const DIRECTION_WORDS: usize = 4;

@@ -23,6 +23,38 @@ pub struct Face {
     pub hints: u32,
 }
 
+/// Faces of less height than this (local frame) are no more than their edges, as in `tesdf`.
+const FLAT: f32 = 7e-7;
+
+/// The face of three corners, as `tesdf::query::FaceRecord` makes it, without hints; in `f32` alone.
+///
+/// The normal is that of the two shorter edges, where rounding is least, and made square to the longest edge, along which an error would count most.
+#[cube]
+pub fn record_of(a: V3, b: V3, c: V3) -> Face {
+    let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
+    let (u, v, w) = (dot(ab, ab), dot(ac, ac), dot(bc, bc));
+    let ab_longest = u >= v && u >= w;
+    let ac_longest = v >= w;
+    // All three are (b − a) × (c − a).
+    let by_ab = cross(ac, bc);
+    let by_ac = cross(ab, bc);
+    let by_bc = cross(ab, ac);
+    let across = pick(ab_longest, by_ab, pick(ac_longest, by_ac, by_bc));
+    let along = pick(ab_longest, ab, pick(ac_longest, ac, bc));
+    let longest = u.max(v).max(w);
+    let off = dot(across, along) / longest.max(1e-30f32);
+    let across = plus_scaled(across, -off, along);
+    let size = dot(across, across).sqrt();
+    let flat = size < FLAT * longest.sqrt() || size <= 1e-30f32;
+    let normal = scaled(select(flat, 0.0f32, 1.0f32 / size.max(1e-30f32)), across);
+    Face { a, ab, ac, normal, inverse: v3(inverse(u), inverse(v), inverse(w)), hints: 0u32 }
+}
+
+#[cube]
+fn inverse(squared: f32) -> f32 {
+    select(squared > 1e-30f32, 1.0f32 / squared.max(1e-30f32), 0.0f32)
+}
+
 /// Reads a face; `at` is its first row.
 #[cube]
 pub fn face(rows: &[Vector<f32, Const<4>>], at: usize) -> Face {

@@ -119,9 +119,14 @@ impl Compared {
 
 /// Compares all of a scene.
 pub fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
-    let host = detect(scene, options).expect("a good scene");
     let (device, _) = found(scene, options, DetectorOptions::default());
     device.contacts.iter().step_by(7).for_each(|c| is_true(scene, c, size));
+    hold_against(scene, options, size, &device)
+}
+
+/// Compares contacts of a device with all of a scene.
+pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: &Contacts) -> Compared {
+    let host = detect(scene, options).expect("a good scene");
     let (on_host, on_device) = (least(&host.contacts), least(&device.contacts));
     let keys: BTreeSet<_> = on_host.keys().chain(on_device.keys()).collect();
     let mut others = 0;
@@ -148,7 +153,7 @@ pub fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
     let cells = |c: &Contacts| {
         c.contacts.iter().map(|c| (c.instance_a, c.instance_b, c.feature.a, c.tet_b)).collect::<BTreeSet<_>>()
     };
-    let (h, d) = (cells(&host), cells(&device));
+    let (h, d) = (cells(&host), cells(device));
     let differing = h.symmetric_difference(&d).count();
     Compared { touching: keys.len(), others, cells: h.len(), differing }
 }
