@@ -15,6 +15,9 @@ unsigned (*cuda_exchange)(unsigned word, unsigned other);
 #define __noinline__ __attribute__((noinline))
 #define __launch_bounds__(...)
 #define __syncthreads() cuda_sync()
+// Groups run one after the other.
+#define __threadfence()
+static inline int __clz(unsigned x) { return x ? __builtin_clz(x) : 32; }
 static inline unsigned __shfl_xor_sync(unsigned, unsigned word, unsigned mask) {
     return cuda_exchange(word, threadIdx.x ^ mask);
 }
