@@ -27,6 +27,10 @@ const HEAD: &str = "#define fma(a, b, c) ((a) * (b) + (c))
 #define __activemask() 0xFFFFFFFFu
 ";
 
+/// Kernels that are worth more blocks on a multiprocessor than the compiler takes registers for, by the name of their function: the blocks. What
+/// then lies in memory instead is mostly read after the loops; `cargo test --test cuda_source -- --nocapture` prints how much.
+const BLOCKS: [(&str, u32); 2] = [("narrow_faces_", 28), ("narrow_exact_", 20)];
+
 /// Where the number of blocks comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Count {
@@ -128,12 +132,26 @@ pub(crate) fn source(kernel: &dyn CubeKernel, name: &str) -> Result<CudaSource, 
     Ok(CudaSource {
         kernel: name.to_owned(),
         count: Count::Direct,
-        entry,
         threads: (threads.x, threads.y, threads.z),
         shared_bytes: compiled.shared_memory_size,
-        text: format!("{HEAD}{}", compiled.source),
+        text: format!("{HEAD}{}", bounded(&compiled.source, &entry)),
         io: compiled.io,
+        entry,
     })
+}
+
+/// The text, with the bound of [`BLOCKS`].
+fn bounded(text: &str, entry: &str) -> String {
+    match BLOCKS.iter().find(|(name, _)| entry.starts_with(name)) {
+        Some((_, blocks)) => {
+            let (before, after) = text.split_once("__launch_bounds__(").unwrap_or((text, ""));
+            match after.split_once(')') {
+                Some((threads, rest)) => format!("{before}__launch_bounds__({threads}, {blocks}){rest}"),
+                None => text.to_owned(),
+            }
+        }
+        None => text.to_owned(),
+    }
 }
 
 impl CudaSource {
@@ -156,24 +174,24 @@ fn indirect(text: &str, entry: &str) -> Option<String> {
     let parameters = &text[open + 1..body];
     let names: Vec<&str> = parameters.split(", ").map(|p| p.rsplit(' ').next().unwrap_or(p)).collect();
     let arguments = names.join(", ");
-    // Only a kernel has parameters of the grid. The body is not inlined: in the loop, arrays of which one is needed at a time would no longer share
-    // the stack (the narrow phase of faces: 1,552 bytes instead of 384).
+    // Only a kernel has parameters of the grid. The body is inlined: the parameters of a function take registers, two a pointer, those of a kernel none
+    // (the narrow phase of faces: 96 registers instead of 127).
     let inner = parameters.replace("__grid_constant__ ", "");
     let before = &text[..head];
     let after = &text[body..];
     Some(format!(
         "{before}#define blockIdx tesdf_block
 #define gridDim tesdf_grid
-static __device__ __noinline__ void {entry}(const uint3 tesdf_block, const uint3 tesdf_grid, {inner}{after}
+static __device__ __forceinline__ void {entry}(const uint3 tesdf_block, const uint3 tesdf_grid, {inner}{after}
 #undef blockIdx
 #undef gridDim
 {qualifiers}{entry}_indirect({parameters}, uint32_t const* const tesdf_count) {{
     const uint3 grid = {{tesdf_count[0], tesdf_count[1], tesdf_count[2]}};
-    const uint64_t slab = uint64_t(grid.x) * grid.y;
-    const uint64_t blocks = slab * grid.z;
-    for (uint64_t i = blockIdx.x; i < blocks; i += gridDim.x) {{
-        const uint64_t rest = i % slab;
-        const uint3 block = {{uint32_t(rest % grid.x), uint32_t(rest / grid.x), uint32_t(i / slab)}};
+    const uint32_t slab = grid.x * grid.y;
+    const uint32_t blocks = slab * grid.z;
+    for (uint32_t i = blockIdx.x; i < blocks; i += gridDim.x) {{
+        const uint32_t rest = i % slab;
+        const uint3 block = {{rest % grid.x, rest / grid.x, i / slab}};
         {entry}(block, grid, {arguments});
         __syncthreads();
     }}
@@ -185,6 +203,16 @@ static __device__ __noinline__ void {entry}(const uint3 tesdf_block, const uint3
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_bound_is_put_beside_the_threads() {
+        let text = "void __launch_bounds__(32)  narrow_faces_1(int a) {}";
+        assert_eq!(
+            bounded(text, "narrow_faces_1"),
+            "void __launch_bounds__(32, 28)  narrow_faces_1(int a) {}"
+        );
+        assert_eq!(bounded(text, "narrow_nodes_1"), text);
+    }
 
     #[test]
     fn an_indirect_count_is_a_loop_around_the_same_body() {

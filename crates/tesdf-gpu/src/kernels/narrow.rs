@@ -9,7 +9,9 @@ use super::locate::{NOT_OF_DOMAIN, offset};
 use super::nearest::{FAR, Nearest, nearest_in_list};
 use super::pairs::four;
 use super::polygon_distance::{ball_around, weight};
-use super::products::{self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_WORDS, append, tell_if_broken_off};
+use super::products::{
+    self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_VERTICES, POLYGON_WORDS, append, tell_if_broken_off,
+};
 use super::surface::{Direction, Part, at_weights, direction, normal, part};
 use super::triangle::{Face, ROWS, distance_squared, face};
 use super::vector::{V3, dot, minus, pick, plus_scaled, v3};
@@ -203,6 +205,9 @@ pub fn narrow_faces(
 ) {
     let mut squares = Shared::<[f32]>::new_slice(LANES as usize);
     let mut ids = Shared::<[u32]>::new_slice(LANES as usize);
+    let polygons = comptime!((LANES / lanes) as usize);
+    let mut best_rows = Shared::<[Vector<f32, Const<4>>]>::new_slice(comptime!(2 * polygons));
+    let mut best_words = Shared::<[u32]>::new_slice(comptime!(2 * polygons));
     let item = select(lanes == 1u32, ABSOLUTE_POS as u32, CUBE_POS as u32);
     let count = counters[products::POLYGONS as usize].load().min(most_items);
     if item < count {
@@ -226,93 +231,97 @@ pub fn narrow_faces(
             (entry(assets, d.shape_b, RECORDS) + position * comptime!(ROWS as u32)) as usize,
         );
         let ball = ball_around(surface, weights, item, n);
-        let (center_s, center_t, radius) = (ball.s, ball.t, ball.distance);
-        let mut i = 0u32;
-        // Where the iteration is, in weights, and the field there.
-        let mut at_s = center_s;
-        let mut at_t = center_t;
-        let mut at_value = FAR.runtime();
-        let mut at_x = 0.0f32;
-        let mut at_y = 0.0f32;
-        let mut at_z = 0.0f32;
-        // The best point so far.
-        let mut best_s = center_s;
-        let mut best_t = center_t;
+        // Where the iteration is, in weights, from the centre on; and what the field gains there along both edges of the face.
+        let mut at_s = ball.s;
+        let mut at_t = ball.t;
+        let mut down_s = 0.0f32;
+        let mut down_t = 0.0f32;
+        // The same at the vertices.
+        let mut downs = Array::<f32>::new(comptime!(2 * POLYGON_VERTICES));
+        // The best point so far. What only its contact needs is not held in registers, of which a thread has too few.
+        let mut best_s = ball.s;
+        let mut best_t = ball.t;
         let mut best = FAR.runtime();
-        let mut best_x = 0.0f32;
-        let mut best_y = 0.0f32;
-        let mut best_z = 0.0f32;
-        let mut on_x = 0.0f32;
-        let mut on_y = 0.0f32;
-        let mut on_z = 0.0f32;
-        let mut best_face = 0u32;
-        let mut best_feature = 0u32;
+        let held = select(lanes == 1u32, UNIT_POS, 0u32) as usize;
         // One place evaluates the field, as the code of it is long: the centre, the vertices, then the steps.
         let evaluations = select(n > 1u32, 1u32 + n + iterations, 1u32);
         let mut evaluation = 0u32;
         let mut made = 0u32;
         while evaluation < evaluations {
-            made += 1u32;
-            let mut s = center_s;
-            let mut t = center_t;
-            let is_vertex = evaluation >= 1u32 && evaluation <= n;
+            let mut s = at_s;
+            let mut t = at_t;
             let is_step = evaluation > n;
-            let mut stays = false;
-            if is_vertex {
+            let mut is_known = false;
+            let mut ends = false;
+            if evaluation >= 1u32 && !is_step {
                 s = weight(weights, item, evaluation - 1u32, 0usize);
                 t = weight(weights, item, evaluation - 1u32, 1usize);
             }
             if is_step {
                 // Down the gradient, in weights: the height of a corner over the first one.
-                let gradient = v3(at_x, at_y, at_z);
-                let down_s = dot(gradient, minus(surface.b, surface.a));
-                let down_t = dot(gradient, minus(surface.c, surface.a));
                 let mut lowest = FAR.runtime();
+                let mut to = 0u32;
                 let mut to_s = 0.0f32;
                 let mut to_t = 0.0f32;
-                i = 0u32;
+                let mut i = 0u32;
                 while i < n {
                     let vs = weight(weights, item, i, 0usize);
                     let vt = weight(weights, item, i, 1usize);
                     let height = down_s * vs + down_t * vt;
                     let lower = height < lowest;
                     lowest = select(lower, height, lowest);
+                    to = select(lower, i, to);
                     to_s = select(lower, vs, to_s);
                     to_t = select(lower, vt, to_t);
                     i += 1u32;
                 }
-                // At a vertex that is the target itself every further step stays there: most minima are such.
-                stays = to_s == at_s && to_t == at_t;
                 let step = 2.0f32 / ((evaluation - n - 1u32) as f32 + 2.0f32);
                 s = at_s + step * (to_s - at_s);
                 t = at_t + step * (to_t - at_t);
+                // At a vertex that is the target itself every further step stays there: most minima are such.
+                ends = to_s == at_s && to_t == at_t;
+                is_known = ends;
+                // The first step goes all the way to a vertex, where the field is known.
+                if evaluation == n + 1u32 {
+                    is_known = true;
+                    at_s = to_s;
+                    at_t = to_t;
+                    down_s = downs[(2u32 * to) as usize];
+                    down_t = downs[(2u32 * to + 1u32) as usize];
+                }
             }
-            let p = at_weights(surface, s, t);
-            let here =
-                value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
-            // The start is the best of centre and vertices.
-            let moves = is_step || here.distance < at_value;
-            at_s = select(moves, s, at_s);
-            at_t = select(moves, t, at_t);
-            at_value = select(moves, here.distance, at_value);
-            at_x = select(moves, here.gradient.x, at_x);
-            at_y = select(moves, here.gradient.y, at_y);
-            at_z = select(moves, here.gradient.z, at_z);
-            let lower = here.distance < best;
-            best_s = select(lower, s, best_s);
-            best_t = select(lower, t, best_t);
-            best = select(lower, here.distance, best);
-            best_x = select(lower, here.gradient.x, best_x);
-            best_y = select(lower, here.gradient.y, best_y);
-            best_z = select(lower, here.gradient.z, best_z);
-            on_x = select(lower, here.point.x, on_x);
-            on_y = select(lower, here.point.y, on_y);
-            on_z = select(lower, here.point.z, on_z);
-            best_face = select(lower, here.face, best_face);
-            best_feature = select(lower, here.feature, best_feature);
-            // From the centre: can any point be within reach?
-            let out = evaluation == 0u32 && here.distance - radius > reach + ROUNDING;
-            evaluation = select(out || stays, evaluations, evaluation + 1u32);
+            if !is_known {
+                made += 1u32;
+                let p = at_weights(surface, s, t);
+                let here =
+                    value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
+                let here_s = dot(here.gradient, minus(surface.b, surface.a));
+                let here_t = dot(here.gradient, minus(surface.c, surface.a));
+                if evaluation >= 1u32 && !is_step {
+                    downs[(2u32 * evaluation - 2u32) as usize] = here_s;
+                    downs[(2u32 * evaluation - 1u32) as usize] = here_t;
+                }
+                let lower = here.distance < best;
+                if lower && lane == 0u32 {
+                    best_rows[2usize * held] =
+                        four(here.gradient.x, here.gradient.y, here.gradient.z, 0.0f32);
+                    best_rows[2usize * held + 1usize] = four(here.point.x, here.point.y, here.point.z, 0.0f32);
+                    best_words[2usize * held] = here.face;
+                    best_words[2usize * held + 1usize] = here.feature;
+                }
+                best_s = select(lower, s, best_s);
+                best_t = select(lower, t, best_t);
+                best = select(lower, here.distance, best);
+                // The start is the best of centre and vertices.
+                let moves = is_step || lower;
+                at_s = select(moves, s, at_s);
+                at_t = select(moves, t, at_t);
+                down_s = select(moves, here_s, down_s);
+                down_t = select(moves, here_t, down_t);
+                // From the centre: can any point be within reach?
+                ends = evaluation == 0u32 && here.distance - ball.distance > reach + ROUNDING;
+            }
+            evaluation = select(ends, evaluations, evaluation + 1u32);
         }
         if counting && lane == 0u32 {
             counters[products::EVALUATIONS as usize].fetch_add(made);
@@ -321,12 +330,14 @@ pub fn narrow_faces(
             }
         }
         if best <= reach && lane == 0u32 {
+            let gradient = best_rows[2usize * held];
+            let point = best_rows[2usize * held + 1usize];
             let v = Value {
                 distance: best,
-                gradient: v3(best_x, best_y, best_z),
-                point: v3(on_x, on_y, on_z),
-                face: best_face,
-                feature: best_feature,
+                gradient: v3(gradient.extract(0usize), gradient.extract(1usize), gradient.extract(2usize)),
+                point: v3(point.extract(0usize), point.extract(1usize), point.extract(2usize)),
+                face: best_words[2usize * held],
+                feature: best_words[2usize * held + 1usize],
             };
             let is_face = surface.count == 3u32;
             if is_face && dot(v.gradient, normal(surface)) > -cos_theta {

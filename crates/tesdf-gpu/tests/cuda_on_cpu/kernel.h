@@ -12,7 +12,7 @@ unsigned (*cuda_exchange)(unsigned word, unsigned other);
 #define __global__
 #define __device__
 #define __grid_constant__
-#define __noinline__ __attribute__((noinline))
+#define __forceinline__ inline
 #define __launch_bounds__(...)
 #define __syncthreads() cuda_sync()
 // Groups run one after the other.
