@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::asset::save_atomic;
 use tesdf::glam::{DQuat, DVec3};
 
+use crate::parse;
 use crate::report::{self, Failure, Outcome, count};
 
 /// The version that is written and read.
@@ -52,6 +53,9 @@ pub struct Args {
     /// The same input gives the same poses
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub seed: u64,
+    /// Contacts are taken up to this signed distance [default: 0.2 mm, for shafts 0]
+    #[arg(long, value_name = "D", value_parser = parse::length)]
+    pub contact_distance: Option<f64>,
     /// The folder of the meshes
     #[arg(long, value_name = "FOLDER", default_value = "data/procedural")]
     pub data: PathBuf,
@@ -64,7 +68,8 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let data =
         std::path::absolute(&args.data).map_err(|e| Failure::new(format!("{}: {e}", args.data.display())))?;
-    let file = args.scene.poses(&data, args.frames, &mut fastrand::Rng::with_seed(args.seed));
+    let mut file = args.scene.poses(&data, args.frames, &mut fastrand::Rng::with_seed(args.seed));
+    file.contact_distance = args.contact_distance.unwrap_or(file.contact_distance);
     let bytes = serde_json::to_vec(&file).map_err(Failure::new)?;
     save_atomic(&args.output, &bytes).map_err(Failure::new)?;
     let line = format!(

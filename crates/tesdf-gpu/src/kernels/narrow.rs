@@ -105,10 +105,11 @@ pub fn narrow_nodes(
     }
 }
 
-/// The least over all threads of a group; of equal ones the lowest face.
+/// The least over `width` neighbouring threads of a group, a power of two; of equal ones the lowest face.
 #[cube]
 fn least(
     mine: Nearest,
+    width: u32,
     squares: &mut Shared<[f32]>,
     faces: &mut Shared<[u32]>,
     #[comptime] lanes: u32,
@@ -118,30 +119,69 @@ fn least(
     let mut position = mine.face;
     if lanes > 1u32 {
         if planes {
-            let all = plane_min(squared);
-            position = plane_min(select(squared == all, position, u32::MAX.runtime()));
-            squared = all;
+            // Unrolled, which the planes' own minimum is not: a fifth of an evaluation's instructions were its loops.
+            #[unroll]
+            for k in 0..5u32 {
+                let other = plane_shuffle_xor(squared, comptime!(1u32 << k));
+                squared = select(comptime!(1u32 << k) < width, squared.min(other), squared);
+            }
+            position = select(squared == mine.squared, position, u32::MAX.runtime());
+            #[unroll]
+            for k in 0..5u32 {
+                let other = plane_shuffle_xor(position, comptime!(1u32 << k));
+                position = select(comptime!(1u32 << k) < width, position.min(other), position);
+            }
         } else {
             // Nobody writes while another still reads the last result.
             sync_cube();
             squares[UNIT_POS as usize] = squared;
             faces[UNIT_POS as usize] = position;
             sync_cube();
-            let mut i = 0usize;
-            while i < LANES as usize {
-                let (d, f) = (squares[i], faces[i]);
+            let mut i = UNIT_POS / width * width;
+            let end = i + width;
+            while i < end {
+                let (d, f) = (squares[i as usize], faces[i as usize]);
                 let nearer = d < squared || (d == squared && f < position);
                 squared = select(nearer, d, squared);
                 position = select(nearer, f, position);
-                i += 1usize;
+                i += 1u32;
             }
         }
     }
     Nearest { squared, face: position }
 }
 
-/// The field at a point of the polygon's cell, by all threads of the group together. `own` is the face that the thread keeps in registers, `position`
-/// its number, when it has one.
+/// What a thread of the group has.
+#[cube]
+fn of_lane(
+    mine: f32,
+    lane: u32,
+    values: &mut Shared<[f32]>,
+    #[comptime] lanes: u32,
+    #[comptime] planes: bool,
+) -> f32 {
+    let mut value = mine;
+    if lanes > 1u32 {
+        if planes {
+            value = plane_shuffle(mine, lane);
+        } else {
+            sync_cube();
+            values[UNIT_POS as usize] = mine;
+            sync_cube();
+            value = values[lane as usize];
+        }
+    }
+    value
+}
+
+/// How many threads share a point: as many as its list has faces, at least as many as leave a part of the group for each of eight vertices.
+#[cube]
+fn width_for(count: u32) -> u32 {
+    select(count <= 4u32, 4u32, select(count <= 8u32, 8u32, select(count <= 16u32, 16u32, LANES)))
+}
+
+/// The field at a point of the polygon's cell, by `width` threads of the group together: each part of the group may have a point of its own. `own` is
+/// the face that the thread keeps in registers, `position` its number, when it has one.
 #[cube]
 fn value_in(
     assets: &Assets,
@@ -150,6 +190,7 @@ fn value_in(
     faces: List,
     own: Face,
     position: u32,
+    width: u32,
     p: V3,
     squares: &mut Shared<[f32]>,
     ids: &mut Shared<[u32]>,
@@ -160,7 +201,7 @@ fn value_in(
     let mut squared = FAR.runtime();
     let mut nearest_face = NONE.runtime();
     if entry(assets, shape, KIND) == MESH && is_listed(word) {
-        let first = select(lanes == 1u32, 0u32, UNIT_POS);
+        let first = select(lanes == 1u32, 0u32, UNIT_POS % width);
         if first < faces.count {
             squared = distance_squared(own, p);
             nearest_face = position;
@@ -169,7 +210,7 @@ fn value_in(
         let nearer = rest.squared < squared || (rest.squared == squared && rest.face < nearest_face);
         squared = select(nearer, rest.squared, squared);
         nearest_face = select(nearer, rest.face, nearest_face);
-        let all = least(Nearest { squared, face: nearest_face }, squares, ids, lanes, planes);
+        let all = least(Nearest { squared, face: nearest_face }, width, squares, ids, lanes, planes);
         squared = all.squared;
         nearest_face = all.face;
     } else {
@@ -183,8 +224,8 @@ fn value_in(
 /// Frank–Wolfe on Eq. (9): from the best of centre and vertices, `iterations` steps of 2 / (k + 2) towards the vertex that lies farthest down
 /// the gradient; the best point seen, as `tesdf` does it.
 ///
-/// With `lanes` 32 a group works on each polygon, each thread with a face of the list in registers and with every 32nd of the rest; with `lanes`
-/// 1 a thread works on each alone. `planes` says how a group finds its least distance: in a plane of 32 threads, or in shared memory.
+/// With `lanes` 32 a group works on each polygon, each thread with a face of the list in registers and with every 32nd of the rest; a list of 16
+/// faces or less leaves threads for more vertices at a time. With `lanes` 1 a thread works on each polygon alone. `planes` says how a group finds its least distance: in a plane of 32 threads, or in shared memory.
 #[cube(launch, create_dummy_kernel)]
 pub fn narrow_faces(
     assets: &Assets,
@@ -223,8 +264,10 @@ pub fn narrow_faces(
         let faces = list(assets, d.shape_b, select(is_listed(word), offset(word), 0u32));
         let mut position = 0u32;
         let lane = select(lanes == 1u32, 0u32, UNIT_POS);
-        if is_listed(word) && lane < faces.count {
-            position = list_face(assets, d.shape_b, faces, lane);
+        let width = width_for(select(is_listed(word), faces.count, 0u32));
+        let points = select(lanes == 1u32, 1u32, LANES / width);
+        if is_listed(word) && lane % width < faces.count {
+            position = list_face(assets, d.shape_b, faces, lane % width);
         }
         let own = face(
             &assets.rows,
@@ -236,7 +279,7 @@ pub fn narrow_faces(
         let mut at_t = ball.t;
         let mut down_s = 0.0f32;
         let mut down_t = 0.0f32;
-        // The same at the vertices.
+        // The same at the vertices, each with the threads that had it.
         let mut downs = Array::<f32>::new(comptime!(2 * POLYGON_VERTICES));
         // The best point so far. What only its contact needs is not held in registers, of which a thread has too few.
         let mut best_s = ball.s;
@@ -247,15 +290,19 @@ pub fn narrow_faces(
         let evaluations = select(n > 1u32, 1u32 + n + iterations, 1u32);
         let mut evaluation = 0u32;
         let mut made = 0u32;
+        let mut made_points = 0u32;
         while evaluation < evaluations {
             let mut s = at_s;
             let mut t = at_t;
             let is_step = evaluation > n;
+            let is_vertex = evaluation >= 1u32 && !is_step;
             let mut is_known = false;
             let mut ends = false;
-            if evaluation >= 1u32 && !is_step {
-                s = weight(weights, item, evaluation - 1u32, 0usize);
-                t = weight(weights, item, evaluation - 1u32, 1usize);
+            let mut vertex = 0u32;
+            if is_vertex {
+                vertex = (evaluation - 1u32 + lane / width).min(n - 1u32);
+                s = weight(weights, item, vertex, 0usize);
+                t = weight(weights, item, vertex, 1usize);
             }
             if is_step {
                 // Down the gradient, in weights: the height of a corner over the first one.
@@ -286,23 +333,41 @@ pub fn narrow_faces(
                     is_known = true;
                     at_s = to_s;
                     at_t = to_t;
-                    down_s = downs[(2u32 * to) as usize];
-                    down_t = downs[(2u32 * to + 1u32) as usize];
+                    let at = (2u32 * (to / points)) as usize;
+                    let from = to % points * width;
+                    down_s = of_lane(downs[at], from, &mut squares, lanes, planes);
+                    down_t = of_lane(downs[at + 1usize], from, &mut squares, lanes, planes);
                 }
             }
             if !is_known {
                 made += 1u32;
+                made_points += select(is_vertex, points.min(n + 1u32 - evaluation), 1u32);
                 let p = at_weights(surface, s, t);
-                let here =
-                    value_in(assets, d, word, faces, own, position, p, &mut squares, &mut ids, lanes, planes);
-                let here_s = dot(here.gradient, minus(surface.b, surface.a));
-                let here_t = dot(here.gradient, minus(surface.c, surface.a));
-                if evaluation >= 1u32 && !is_step {
-                    downs[(2u32 * evaluation - 2u32) as usize] = here_s;
-                    downs[(2u32 * evaluation - 1u32) as usize] = here_t;
+                let here = value_in(
+                    assets, d, word, faces, own, position, width, p, &mut squares, &mut ids, lanes, planes,
+                );
+                let mut here_s = dot(here.gradient, minus(surface.b, surface.a));
+                let mut here_t = dot(here.gradient, minus(surface.c, surface.a));
+                let mut distance = here.distance;
+                let mut from = 0u32;
+                if is_vertex {
+                    let at = (2u32 * ((evaluation - 1u32) / points)) as usize;
+                    downs[at] = here_s;
+                    downs[at + 1usize] = here_t;
+                    if points > 1u32 {
+                        // Of the vertices of this turn the lowest.
+                        let mine = Nearest { squared: distance, face: vertex };
+                        let first = least(mine, LANES, &mut squares, &mut ids, lanes, planes);
+                        distance = first.squared;
+                        from = ((first.face - (evaluation - 1u32)) * width).min(comptime!(LANES - 1));
+                        s = of_lane(s, from, &mut squares, lanes, planes);
+                        t = of_lane(t, from, &mut squares, lanes, planes);
+                        here_s = of_lane(here_s, from, &mut squares, lanes, planes);
+                        here_t = of_lane(here_t, from, &mut squares, lanes, planes);
+                    }
                 }
-                let lower = here.distance < best;
-                if lower && lane == 0u32 {
+                let lower = distance < best;
+                if lower && lane == from {
                     best_rows[2usize * held] =
                         four(here.gradient.x, here.gradient.y, here.gradient.z, 0.0f32);
                     best_rows[2usize * held + 1usize] = four(here.point.x, here.point.y, here.point.z, 0.0f32);
@@ -311,7 +376,7 @@ pub fn narrow_faces(
                 }
                 best_s = select(lower, s, best_s);
                 best_t = select(lower, t, best_t);
-                best = select(lower, here.distance, best);
+                best = select(lower, distance, best);
                 // The start is the best of centre and vertices.
                 let moves = is_step || lower;
                 at_s = select(moves, s, at_s);
@@ -319,14 +384,19 @@ pub fn narrow_faces(
                 down_s = select(moves, here_s, down_s);
                 down_t = select(moves, here_t, down_t);
                 // From the centre: can any point be within reach?
-                ends = evaluation == 0u32 && here.distance - ball.distance > reach + ROUNDING;
+                ends = evaluation == 0u32 && distance - ball.distance > reach + ROUNDING;
             }
-            evaluation = select(ends, evaluations, evaluation + 1u32);
+            let next = select(is_vertex, (evaluation + points).min(n + 1u32), evaluation + 1u32);
+            evaluation = select(ends, evaluations, next);
+        }
+        if lanes > 1u32 {
+            // The thread that writes the contact need not be the one that found it.
+            sync_cube();
         }
         if counting && lane == 0u32 {
             counters[products::EVALUATIONS as usize].fetch_add(made);
             if is_listed(word) && entry(assets, d.shape_b, KIND) == MESH {
-                counters[products::DISTANCES as usize].fetch_add(made * faces.count);
+                counters[products::DISTANCES as usize].fetch_add(made_points * faces.count);
             }
         }
         if best <= reach && lane == 0u32 {

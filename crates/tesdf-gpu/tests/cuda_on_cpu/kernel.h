@@ -28,6 +28,13 @@ static inline float __shfl_xor_sync(unsigned, float number, unsigned mask) {
     __builtin_memcpy(&number, &word, 4);
     return number;
 }
+static inline float __shfl_sync(unsigned, float number, unsigned lane) {
+    unsigned word;
+    __builtin_memcpy(&word, &number, 4);
+    word = cuda_exchange(word, lane % warpSize);
+    __builtin_memcpy(&number, &word, 4);
+    return number;
+}
 static inline unsigned min(unsigned a, unsigned b) { return a < b ? a : b; }
 static inline unsigned max(unsigned a, unsigned b) { return a > b ? a : b; }
 static inline int min(int a, int b) { return a < b ? a : b; }
