@@ -344,7 +344,18 @@ pub fn narrow_faces(
                 made_points += select(is_vertex, points.min(n + 1u32 - evaluation), 1u32);
                 let p = at_weights(surface, s, t);
                 let here = value_in(
-                    assets, d, word, faces, own, position, width, p, &mut squares, &mut ids, lanes, planes,
+                    assets,
+                    d,
+                    word,
+                    faces,
+                    own,
+                    position,
+                    width,
+                    p,
+                    &mut squares,
+                    &mut ids,
+                    lanes,
+                    planes,
                 );
                 let mut here_s = dot(here.gradient, minus(surface.b, surface.a));
                 let mut here_t = dot(here.gradient, minus(surface.c, surface.a));
@@ -370,7 +381,8 @@ pub fn narrow_faces(
                 if lower && lane == from {
                     best_rows[2usize * held] =
                         four(here.gradient.x, here.gradient.y, here.gradient.z, 0.0f32);
-                    best_rows[2usize * held + 1usize] = four(here.point.x, here.point.y, here.point.z, 0.0f32);
+                    best_rows[2usize * held + 1usize] =
+                        four(here.point.x, here.point.y, here.point.z, 0.0f32);
                     best_words[2usize * held] = here.face;
                     best_words[2usize * held + 1usize] = here.feature;
                 }

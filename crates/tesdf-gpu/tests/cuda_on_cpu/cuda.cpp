@@ -222,6 +222,7 @@ static void replace_all(std::string &text, const std::string &from, const std::s
 // The kernel as C++, and a function that calls it with CUDA's pointers to its arguments.
 static std::string as_cpp(std::string text) {
     replace_all(text, "extern __shared__ __align__(4) char ", "[];", "char* const ", " = cuda_shared;");
+    replace_all(text, "extern __shared__ __align__(16) char ", "[];", "char* const ", " = cuda_shared;");
     const std::string atom = "asm volatile(\"atom.relaxed.add.u32 %0, [%1], %2;\" : \"=r\"(result) : \"l\"(";
     replace_all(text, atom, ") );", "result = __sync_fetch_and_add((uint32_t*)", ");");
     for (size_t at; (at = text.find("), \"r\"(")) != std::string::npos;) text.replace(at, 7, ", ");
