@@ -17,6 +17,7 @@ pub mod deform;
 pub mod exact;
 pub mod field;
 pub mod greatest_minimum;
+pub mod group;
 pub mod list;
 pub mod locate;
 pub mod narrow;
