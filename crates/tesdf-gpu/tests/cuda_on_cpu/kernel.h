@@ -35,7 +35,6 @@ static inline float __shfl_sync(unsigned, float number, unsigned lane) {
     __builtin_memcpy(&number, &word, 4);
     return number;
 }
-static inline int __clz(int word) { return word ? __builtin_clz(unsigned(word)) : 32; }
 static inline unsigned min(unsigned a, unsigned b) { return a < b ? a : b; }
 static inline unsigned max(unsigned a, unsigned b) { return a > b ? a : b; }
 static inline int min(int a, int b) { return a < b ? a : b; }
