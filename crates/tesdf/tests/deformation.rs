@@ -11,7 +11,7 @@ use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Scene, detect};
 use tesdf::deform::DeformError;
-use tesdf::domain::{ConformingMesh, TetMesh};
+use tesdf::domain::ConformingMesh;
 use tesdf::encode::{
     Deformation, Domain, EncodeOptions, EncodeProgress, Preset, Refinement, encode, encode_in,
 };
