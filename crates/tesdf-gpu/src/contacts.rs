@@ -2,10 +2,11 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use tesdf::collide::{Contact, FeatureB, FeatureId, Mode, Shape};
+use tesdf::collide::{Contact, FeatureB, FeatureId, Mode, PairReduction, Shape};
 
 use crate::instances::Instances;
 use crate::kernels::assets::NONE;
+use crate::kernels::products::CONVERGED;
 
 /// Words of a contact; see [`CONTACT_WORDS`](crate::kernels::products::CONTACT_WORDS).
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -18,7 +19,7 @@ pub struct Words {
     face_b: u32,
     feature: u32,
     corner: u32,
-    converged: u32,
+    direction: u32,
 }
 
 /// Rows of a contact; see [`CONTACT_ROWS`](crate::kernels::products::CONTACT_ROWS).
@@ -29,6 +30,41 @@ pub struct Row {
     distance: f32,
     gradient: [f32; 4],
     point_b: [f32; 4],
+}
+
+/// A pair that touches; see [`TOUCHING_WORDS`](crate::kernels::products::TOUCHING_WORDS).
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Touching {
+    a: u32,
+    b: u32,
+    contacts: u32,
+    first_member: u32,
+    kept: u32,
+}
+
+/// What reducing it has lost; see [`REPORT_ROWS`](crate::kernels::products::REPORT_ROWS).
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Report {
+    center: [f32; 3],
+    length: f32,
+    error: f32,
+    unused: [f32; 3],
+}
+
+/// The same in the world. Instances of a world are in the order of their ids, and the first direction is of the first one.
+pub fn pair_reduction(instances: &Instances, touching: &Touching, report: &Report) -> PairReduction {
+    let at = &instances.placed[touching.b as usize];
+    PairReduction {
+        instance_a: instances.ids[touching.a as usize],
+        instance_b: instances.ids[touching.b as usize],
+        contacts: touching.contacts as usize,
+        kept: touching.kept as usize,
+        wrench_error: f64::from(report.error),
+        center: at.to_world(Vec3::from_array(report.center)),
+        length: f64::from(report.length) * at.unit,
+    }
 }
 
 /// Contacts in the world, sorted by world, pair of instances, direction, face, feature and cell.
@@ -70,13 +106,13 @@ fn contact(shapes: &[&Shape], instances: &Instances, mode: Mode, words: &Words, 
         instance_a: instances.ids[a],
         instance_b: instances.ids[b],
         feature: FeatureId { a: feature_a, b: feature_b },
-        converged: words.converged == 1,
+        converged: words.corner >= CONVERGED,
     }
 }
 
 /// The user's number of the face, and of what was tested: the face, or the node.
 fn surface_names(shape: &Shape, mode: Mode, words: &Words) -> (u32, u32) {
-    let (part, corner) = (words.face_a, words.corner as usize);
+    let (part, corner) = (words.face_a, (words.corner % CONVERGED) as usize);
     match (mode, shape) {
         (Mode::Node, Shape::Mesh(asset)) => {
             let node = asset.face_vertices(part as usize)[corner];

@@ -2,14 +2,13 @@
 mod buffers;
 mod options;
 mod pass;
+mod reduction;
 mod stages;
 
-use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, Scene, Shape, ShapeId, Statistics, reduce_pairs,
-};
+use tesdf::collide::{CollideError, CollideOptions, Contacts, Reduction, Scene, Shape, ShapeId, Statistics};
 use tesdf::encode::Length;
 
-use buffers::{Products, ROW, WORD};
+use buffers::{Members, Products, ROW, WORD};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
@@ -17,7 +16,7 @@ use stages::Timing;
 
 use crate::GpuError;
 use crate::arrays::DeviceArray;
-use crate::contacts::{Row, Words, contacts};
+use crate::contacts::contacts;
 use crate::device::Device;
 use crate::images::Images;
 use crate::instances::Instances;
@@ -86,7 +85,7 @@ impl Detector {
     }
 
     /// All contacts of a scene, as [`tesdf::collide::detect`] finds them, in the same order; computed in `f32`. The exact mode's
-    /// tolerance is 1e-6 of the local frame at the finest.
+    /// tolerance is 1e-6 of the local frame at the finest. A reduction goes by the same rules, with bounds of distances in place of distances, so it may keep others.
     ///
     /// The same input gives the same bytes on the same device.
     ///
@@ -138,6 +137,9 @@ impl Detector {
         let most_tests = if self.images.have_moved() { u64::MAX } else { self.options.most_pair_tests };
         let instances = Instances::new(scene, options, &self.shape_ids, &self.frames, most_tests)?;
         self.report = DeviceReport::default();
+        if options.reduction != Reduction::None && self.products.members.is_none() {
+            self.products.members = Some(Members::new(&self.device, self.products.room)?);
+        }
         loop {
             self.report.passes += 1;
             let counts = self.pass(&instances, options, timing)?;
@@ -157,6 +159,7 @@ impl Detector {
             ("meshlets", &mut room.meshlets, products::MESHLETS),
             ("polygons", &mut room.polygons, products::POLYGONS),
             ("contacts", &mut room.contacts, products::CONTACTS),
+            ("kept contacts", &mut room.kept, products::KEPT),
         ];
         for (buffer, capacity, product) in wanted {
             let needed = counts[product as usize];
@@ -171,7 +174,8 @@ impl Detector {
         if room == self.products.room {
             return Ok(false);
         }
-        self.products = Products::new(&self.device, room)?;
+        let members = self.products.members.as_ref().map(|_| Members::new(&self.device, room));
+        self.products = Products { members: members.transpose()?, ..Products::new(&self.device, room)? };
         Ok(true)
     }
 
@@ -192,27 +196,40 @@ impl Detector {
         options: &CollideOptions,
     ) -> Result<Contacts, GpuError> {
         let counts = self.report.counts;
-        let found = counts[products::CONTACTS as usize] as usize;
-        let words: Vec<Words> = self.device.read(&self.products.contact_words, found)?;
-        let rows: Vec<Row> = self.device.read(&self.products.contact_rows, found)?;
-        self.report.read += size_of_val(words.as_slice()) + size_of_val(rows.as_slice());
+        let count = |product: u32| counts[product as usize] as usize;
+        let found = count(products::CONTACTS);
         let shapes: Vec<&Shape> =
             self.shape_ids.iter().map(|&id| scene.shape(id)).collect::<Result<_, _>>()?;
+        let (words, rows) = match (options.reduction, &self.products.members) {
+            (Reduction::PerPair(_), Some(members)) => {
+                let kept = count(products::KEPT);
+                (self.device.read(&members.kept_words, kept)?, self.device.read(&members.kept_rows, kept)?)
+            }
+            _ => {
+                let products = &self.products;
+                (
+                    self.device.read(&products.contact_words, found)?,
+                    self.device.read(&products.contact_rows, found)?,
+                )
+            }
+        };
+        self.report.read += size_of_val(words.as_slice()) + size_of_val(rows.as_slice());
         let contacts = contacts(&shapes, instances, options.mode, &words, &rows);
-        let count = |product: u32| counts[product as usize] as usize;
-        let mut statistics = Statistics {
+        let reductions = self.reductions(instances, options.reduction)?;
+        let unconverged = match options.reduction {
+            Reduction::None => contacts.iter().filter(|c| !c.converged).count(),
+            Reduction::PerPair(_) => count(products::UNCONVERGED),
+        };
+        let statistics = Statistics {
             instance_pairs: count(products::DIRECTIONS),
             candidates: count(products::CANDIDATES),
             polygons: count(products::POLYGONS),
             touching: found + count(products::FILTERED),
             filtered: count(products::FILTERED),
-            unconverged: contacts.iter().filter(|c| !c.converged).count(),
+            reduced: found - contacts.len(),
+            unconverged,
             bytes: self.products.bytes() + size_of_val(contacts.as_slice()),
-            ..Statistics::default()
         };
-        let all = contacts.len();
-        let (contacts, reductions) = reduce_pairs(contacts, options.reduction);
-        statistics.reduced = all - contacts.len();
         Ok(Contacts { contacts, statistics, reductions })
     }
 }

@@ -217,7 +217,7 @@ fn buffers_grow_or_say_what_they_need() {
     let scene = worlds(6, &mut random);
     let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::FACE) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
-    let capacities = Capacities { directions: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1 };
+    let capacities = Capacities { directions: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1, kept: 1 };
     let little = DetectorOptions { capacities, ..DetectorOptions::default() };
     let (grown, detector) = found(&scene, &options, little);
     assert_eq!(grown.contacts, expected.contacts);

@@ -3,7 +3,9 @@ mod support;
 
 use proptest::prelude::*;
 use support::random::Random;
-use tesdf::collide::{Contact, FeatureB, FeatureId, InstanceId, PairReduction, Reduction, reduce_pairs};
+use tesdf::collide::{
+    Contact, FeatureB, FeatureId, InstanceId, PairReduction, Reduction, reduce_pairs, wrench_error,
+};
 use tesdf::glam::{DQuat, DVec3};
 
 type Wrench = [f64; 6];
@@ -183,6 +185,16 @@ proptest! {
             }
             axes.push(axis);
         }
+    }
+
+    /// The report says what is lost, and whoever asks is told the same.
+    #[test]
+    fn reports_tell_the_error(contacts in any_patch(), n in 1..40u32) {
+        let (kept, report) = reduce(&contacts, n);
+        let error = wrench_error(&contacts, &kept, report.center, report.length);
+        prop_assert!((error - report.wrench_error).abs() <= 1e-6 * error + 1e-9, "{error} {report:?}");
+        prop_assert_eq!(wrench_error(&[], &kept, report.center, report.length), 0.0);
+        prop_assert_eq!(wrench_error(&contacts, &[], report.center, report.length), f64::INFINITY);
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub struct Products {
     pub contact_words: Buffer,
     pub contact_rows: Buffer,
     pub groups: Buffer,
+    /// From the first reduction on.
+    pub members: Option<Members>,
 }
 
 impl Products {
@@ -37,6 +39,7 @@ impl Products {
             contact_words: buffer("contacts", room.contacts, products::CONTACT_WORDS * WORD)?,
             contact_rows: buffer("rows of contacts", room.contacts, products::CONTACT_ROWS * ROW)?,
             groups: device.empty("groups", 3 * WORD)?,
+            members: None,
         })
     }
 
@@ -51,6 +54,49 @@ impl Products {
             &self.contact_words,
             &self.contact_rows,
             &self.groups,
+        ];
+        let members = self.members.as_ref().map_or(0, Members::bytes);
+        buffers.into_iter().map(Buffer::bytes).sum::<usize>() + members
+    }
+}
+
+/// What a reduction needs besides.
+pub struct Members {
+    /// Contacts of each pair of instances, then the next place for one.
+    pub tallies: Buffer,
+    pub touching: Buffer,
+    /// The contact that a member is.
+    pub numbers: Buffer,
+    pub members: Buffer,
+    pub reports: Buffer,
+    pub kept_words: Buffer,
+    pub kept_rows: Buffer,
+}
+
+impl Members {
+    pub fn new(device: &Device, room: Capacities) -> Result<Self, GpuError> {
+        let buffer = |name, count: u32, size: usize| device.empty(name, count as usize * size);
+        let pairs = room.directions / 2;
+        Ok(Self {
+            tallies: buffer("tallies of pairs", pairs, WORD)?,
+            touching: buffer("pairs that touch", pairs, products::TOUCHING_WORDS * WORD)?,
+            numbers: buffer("numbers of members", room.contacts, WORD)?,
+            members: buffer("members of pairs", room.contacts, products::MEMBER_ROWS * ROW)?,
+            reports: buffer("reports of pairs", pairs, products::REPORT_ROWS * ROW)?,
+            kept_words: buffer("kept contacts", room.kept, products::CONTACT_WORDS * WORD)?,
+            kept_rows: buffer("rows of kept contacts", room.kept, products::CONTACT_ROWS * ROW)?,
+        })
+    }
+
+    fn bytes(&self) -> usize {
+        let buffers = [
+            &self.tallies,
+            &self.touching,
+            &self.numbers,
+            &self.members,
+            &self.reports,
+            &self.kept_words,
+            &self.kept_rows,
         ];
         buffers.into_iter().map(Buffer::bytes).sum()
     }

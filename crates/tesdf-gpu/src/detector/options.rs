@@ -17,12 +17,21 @@ pub struct Capacities {
     pub polygons: u32,
     /// Contacts.
     pub contacts: u32,
+    /// Contacts that a reduction keeps. Without one nothing is held for them.
+    pub kept: u32,
 }
 
 impl Default for Capacities {
     /// Some 10 MiB.
     fn default() -> Self {
-        Self { directions: 1 << 10, blocks: 1 << 12, meshlets: 1 << 14, polygons: 1 << 16, contacts: 1 << 14 }
+        Self {
+            directions: 1 << 10,
+            blocks: 1 << 12,
+            meshlets: 1 << 14,
+            polygons: 1 << 16,
+            contacts: 1 << 14,
+            kept: 1 << 12,
+        }
     }
 }
 
@@ -122,7 +131,7 @@ pub struct DeviceReport {
     /// Bytes that were read back.
     pub read: usize,
     /// What was counted: directions, blocks, meshlets, polygons, contacts, filtered, candidates, broken off, evaluations,
-    /// point–triangle distances; the last two when they were asked for.
+    /// point–triangle distances, which were asked for; instances with a vertex where none can be; then of a reduction: contacts that did not converge, pairs that touch, their members, contacts kept.
     pub counts: [u32; products::COUNTERS],
     /// Device time by stage, when it was asked for.
     pub stages: Vec<(&'static str, Duration)>,

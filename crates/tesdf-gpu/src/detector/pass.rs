@@ -1,10 +1,10 @@
 //! One pass: the launches of all stages.
 use cubecl::prelude::*;
-use tesdf::collide::{CollideOptions, FaceMethod, Mode};
+use tesdf::collide::{CollideOptions, FaceMethod, Mode, Reduction};
 
 use super::buffers::{Products, ROW, WORD};
 use super::stages::{Stages, Timing};
-use super::{Counting, Detector, Exchange, Lanes, Pruning};
+use super::{Counting, Detector, Exchange, Lanes, Pruning, reduction};
 use crate::GpuError;
 use crate::device::spread;
 use crate::instances::Instances;
@@ -36,6 +36,7 @@ impl Detector {
             contact_words,
             contact_rows,
             groups,
+            members,
         } = &self.products;
         let images = &self.images;
         let prune = u32::from(self.options.pruning == Pruning::LeastDistance);
@@ -264,6 +265,9 @@ impl Detector {
                 }
             }
         }
+        if let (Reduction::PerPair(most), Some(members)) = (options.reduction, members) {
+            reduction::launch(&mut stages, groups_for, client, &self.products, members, &counters, most)?;
+        }
         let Stages { launches, times, .. } = stages;
         self.report.launches = launches;
         self.report.stages = times;
@@ -276,7 +280,8 @@ impl Detector {
                 device: device.info().name.clone(),
                 doing: "detecting contacts",
                 reason: format!(
-                    "the driver broke off the loops of {} threads, as Mesa's llvmpipe does after 65,535 iterations: a face meets too many cells. \
+                    "the driver broke off the loops of {} threads, as Mesa's llvmpipe does after 65,535 iterations: a face meets too many cells, or a pair has \
+                     too many contacts to reduce. \
                      Detect on the processor or on a GPU",
                     counts[products::BROKEN_OFF as usize]
                 ),

@@ -10,7 +10,9 @@ use cubecl_common::device::{DeviceId, ServiceId};
 use cubecl_environment::stream::StreamId;
 
 use super::assets::AssetsLaunch;
-use super::{broad, clip, deform, exact, narrow, outside, pairs, products, query, sample};
+use super::{
+    broad, choice, clip, deform, exact, members, narrow, outside, pairs, products, query, reduce, sample,
+};
 
 use crate::cuda::Count;
 
@@ -42,7 +44,8 @@ pub fn kernels(device: &Arc<DeviceProperties>, target: &Arc<TargetProperties>) -
             })
         };
     }
-    let counted = [products::BLOCKS, products::MESHLETS, products::POLYGONS];
+    let counted =
+        [products::BLOCKS, products::MESHLETS, products::POLYGONS, products::CONTACTS, products::TOUCHING];
     kernel!(Direct pairs::instance_bounds, 64, (assets(), rows(), words(), words(), rows(), 1, 0.0));
     kernel!(
         Direct pairs::instance_pairs,
@@ -101,6 +104,19 @@ pub fn kernels(device: &Arc<DeviceProperties>, target: &Arc<TargetProperties>) -
         Indirect exact::narrow_exact,
         group,
         (assets(), words(), rows(), words(), rows(), words(), words(), rows(), words(), 0.0, 1, 1)
+    );
+    kernel!(Direct members::clear, members::GROUP, (words(), 1));
+    kernel!(Indirect members::count, members::GROUP, (words(), words(), words(), 1));
+    kernel!(Direct members::place, members::GROUP, (words(), words(), words(), words(), 1));
+    kernel!(
+        Indirect members::fill,
+        members::GROUP,
+        (words(), rows(), words(), rows(), words(), words(), words(), rows(), 1)
+    );
+    kernel!(
+        Indirect reduce::reduce,
+        choice::GROUP,
+        (words(), rows(), words(), words(), words(), rows(), rows(), words(), rows(), 1, 1, 1)
     );
     kernel!(Direct query::signed_distances, 64, (assets(), rows(), words(), rows(), rows(), words(), 1, 0, 1));
     kernel!(

@@ -11,7 +11,7 @@ use super::nearest::{FAR, Nearest, nearest_in_list};
 use super::pairs::four;
 use super::polygon_distance::{ball_around, weight};
 use super::products::{
-    self, CONTACT_ROWS, CONTACT_WORDS, POLYGON_VERTICES, POLYGON_WORDS, append, tell_if_broken_off,
+    self, CONTACT_ROWS, CONTACT_WORDS, CONVERGED, POLYGON_VERTICES, POLYGON_WORDS, append, tell_if_broken_off,
 };
 use super::surface::{Direction, Part, at_weights, direction, normal, part};
 use super::triangle::{Face, ROWS, distance_squared, face};
@@ -60,8 +60,8 @@ pub fn write(
         words[word + 3usize] = cell;
         words[word + 4usize] = v.face;
         words[word + 5usize] = v.feature;
-        words[word + 6usize] = corner;
-        words[word + 7usize] = converged;
+        words[word + 6usize] = corner + converged * CONVERGED;
+        words[word + 7usize] = d.number;
         let row = (slot * comptime!(CONTACT_ROWS as u32)) as usize;
         let on_surface = plus_scaled(point, -d.radius, v.gradient);
         rows[row] = four(on_surface.x, on_surface.y, on_surface.z, v.distance - d.radius);

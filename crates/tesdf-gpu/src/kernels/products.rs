@@ -26,8 +26,16 @@ pub const EVALUATIONS: u32 = 8;
 pub const DISTANCES: u32 = 9;
 /// Instances of shapes that have a vertex where none can be.
 pub const BADLY_MOVED: u32 = 10;
+/// Contacts that did not converge, when contacts are reduced: those that are read back do not tell.
+pub const UNCONVERGED: u32 = 11;
+/// Pairs of instances that touch, when contacts are reduced.
+pub const TOUCHING: u32 = 12;
+/// Places of [`MEMBER_ROWS`] that pairs have taken, then.
+pub const MEMBERS: u32 = 13;
+/// Contacts that the reduction keeps.
+pub const KEPT: u32 = 14;
 /// How many counters there are.
-pub const COUNTERS: usize = 11;
+pub const COUNTERS: usize = 15;
 
 /// Words of a direction: instance a, instance b, shape of a, shape of b.
 pub const DIRECTION_WORDS: usize = 4;
@@ -42,10 +50,20 @@ pub const POLYGON_WORDS: usize = 4;
 pub const POLYGON_ROWS: usize = 4;
 /// Most vertices of a polygon: a triangle clipped by a tetrahedron has seven.
 pub const POLYGON_VERTICES: usize = 8;
-/// Words of a contact: instances a and b, face of a, cell, face of b, its feature, corner of a, 1 when the minimum was found.
+/// Words of a contact: instances a and b, face of a, cell, face of b, its feature, corner of a with [`CONVERGED`] when the minimum was found,
+/// direction.
 pub const CONTACT_WORDS: usize = 8;
+/// Added to the corner of a contact whose minimum was found.
+pub const CONVERGED: u32 = 4;
 /// Rows of a contact: point of a and distance, gradient, point of b; in the field's frame.
 pub const CONTACT_ROWS: usize = 3;
+/// Words of a pair that touches: instances of its first direction, contacts, its first member, contacts that are kept.
+pub const TOUCHING_WORDS: usize = 5;
+/// Rows of a contact as a member of its pair, in the field's frame of the pair's first direction: point and distance, force on the first instance and size
+/// of what was rounded. Later its wrench and the way there from the hull of those kept: see [`reduce`](super::reduce).
+pub const MEMBER_ROWS: usize = 4;
+/// Rows of what a reduction has lost: center and length, in the frame of the members; then the error.
+pub const REPORT_ROWS: usize = 2;
 
 /// Where the next element of a product goes.
 #[cube]

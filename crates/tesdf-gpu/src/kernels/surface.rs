@@ -12,6 +12,8 @@ use super::vector::{V3, cross, dot, length, minus, pick, plus, plus_scaled, scal
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Direction {
+    /// Its place; the other direction of the pair is its neighbour.
+    pub number: u32,
     pub a: u32,
     pub b: u32,
     pub shape_a: u32,
@@ -36,6 +38,7 @@ pub fn direction(words: &[u32], maps: &[Vector<f32, Const<4>>], at: u32) -> Dire
     let row = (at * comptime!(DIRECTION_ROWS as u32)) as usize;
     let (p, q, r, s) = (maps[row], maps[row + 1usize], maps[row + 2usize], maps[row + 3usize]);
     Direction {
+        number: at,
         a: words[first],
         b: words[first + 1usize],
         shape_a: words[first + 2usize],

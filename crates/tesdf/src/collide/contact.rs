@@ -78,7 +78,7 @@ pub struct Statistics {
 ///
 /// Any normal forces on all contacts of the pair, of total size `F`, can be replaced by normal forces on the kept ones, of the
 /// same total, that differ in their sum by at most `wrench_error · F`, and in their torque around `center` by at most
-/// `wrench_error · length · F`. Up to rounding, of some 1e-12.
+/// `wrench_error · length · F`. Up to rounding, of some 1e-12; a GPU adds what it rounds to `wrench_error`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PairReduction {
     /// The instance of the lower id.
@@ -92,9 +92,10 @@ pub struct PairReduction {
     /// The greatest distance of the wrench of a contact from the convex hull of those of the kept contacts, without
     /// unit; 0 when all are kept.
     pub wrench_error: f64,
-    /// The mean of the contact points `point_a`, in the world.
+    /// The middle of a box around the contact points `point_a`, in the world: of one along its axes, or along those of `instance_b`
+    /// when a GPU detects.
     pub center: DVec3,
-    /// The greatest distance of a contact point from `center`, in the world's unit.
+    /// The greatest distance of a contact point from `center`, in the world's unit. On a GPU not less than what its rounding can tell.
     pub length: f64,
 }
 

@@ -8,7 +8,7 @@
 //!   velocity, a scale, a world. An instance costs its state only.
 //! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
 //! - [`candidates`](candidates()): what the broad and the middle phase leave, for debug views.
-//! - [`reduce_pairs`]: fewer contacts per pair, with a bound on what is lost.
+//! - [`reduce_pairs`]: fewer contacts per pair, with a bound on what is lost; [`wrench_error`] tells what is.
 //! - [`clearance`](clearance()): the signed distance between two instances, with witnesses.
 //! - [`time_of_impact`](time_of_impact()): when two moving instances first touch, never too late.
 //! - [`why`](why()): why a contact is, or is not, there.
@@ -49,7 +49,7 @@ pub use instance_pairs::{InstancePair, instance_pairs};
 pub use motion::Motion;
 pub use options::{CollideOptions, FaceMethod, Mode, Reduction};
 pub use pose::{Placement, Pose};
-pub use reduce::reduce_pairs;
+pub use reduce::{reduce_pairs, wrench_error};
 pub use scene::{Groups, Instance, InstanceId, Scene, ShapeId, Velocity};
 pub use shape::Shape;
 pub use shape_ray::ShapeHit;

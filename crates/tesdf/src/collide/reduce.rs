@@ -3,7 +3,7 @@
 //! In: contacts in the order of a detection. Out: those kept, in the same order, and per pair a bound on what is lost.
 //!
 //! The wrench of a unit force at contact *i*, on the instance of the lower id, is `w_i = (n_i, (p_i − c) × n_i / L)`: `c` is the
-//! mean of the contact points and `L` their radius around it, so force and torque are comparable. What the pair can exert with
+//! middle of the box around the contact points and `L` their radius around it, so force and torque are comparable. What the pair can exert with
 //! a total force `F` is `F` times the convex hull of all `w_i`, so the kept contacts should span a hull that is nearly as
 //! large. Kept are
 //!
@@ -55,6 +55,31 @@ pub fn reduce_pairs(contacts: Vec<Contact>, reduction: Reduction) -> (Vec<Contac
     (kept, reduced.into_iter().map(|(_, report)| report).collect())
 }
 
+/// What is lost when `kept` stand for all `contacts` of a pair, whoever chose them: the greatest distance of the wrench of a contact from the hull of
+/// those of the kept ones, as [`PairReduction::wrench_error`], with torques around `center` and in units of `length`. To 1e-7 of it.
+///
+/// All contacts are of one pair of instances, in either direction. 0 without contacts, infinite where none of them is kept.
+pub fn wrench_error(contacts: &[Contact], kept: &[Contact], center: DVec3, length: f64) -> f64 {
+    let hull: Vec<Wrench> = kept.iter().map(|c| wrench_of(c, center, length)).collect();
+    let distance = |c: &Contact| {
+        if hull.is_empty() {
+            return f64::INFINITY;
+        }
+        let way = residual(&hull, &wrench_of(c, center, length));
+        dot(&way, &way).sqrt()
+    };
+    contacts.par_iter().map(distance).reduce(|| 0.0, f64::max)
+}
+
+/// The wrench of a unit force on the instance of the lower id.
+fn wrench_of(contact: &Contact, center: DVec3, length: f64) -> Wrench {
+    let Contact { point_a, normal, instance_a: a, instance_b: b, .. } = *contact;
+    let force = if a < b { normal } else { -normal };
+    // A single point needs no scale: its torques are 0.
+    let torque = (point_a - center).cross(force) / if length > 0.0 { length } else { 1.0 };
+    [force.x, force.y, force.z, torque.x, torque.y, torque.z]
+}
+
 /// The places in `contacts` of those that are kept of one pair.
 fn reduce(
     contacts: &[Contact],
@@ -64,7 +89,10 @@ fn reduce(
     let (instance_a, instance_b, _) = pair[0];
     let contact = |i: usize| &contacts[pair[i].2];
     let points = pair.iter().map(|p| contacts[p.2].point_a);
-    let center = points.clone().sum::<DVec3>() / pair.len() as f64;
+    let (low, high) = points
+        .clone()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+    let center = 0.5 * (low + high);
     let length = points.map(|p| p.distance(center)).fold(0.0, f64::max);
     let mut report = PairReduction {
         instance_a,
@@ -78,14 +106,7 @@ fn reduce(
     if pair.len() <= n {
         return (pair.iter().map(|p| p.2).collect(), report);
     }
-    let wrench = |i: usize| {
-        let Contact { point_a, normal, instance_a: a, .. } = *contact(i);
-        let force = if a == instance_a { normal } else { -normal };
-        // A single point needs no scale: its torques are 0.
-        let torque = (point_a - center).cross(force) / if length > 0.0 { length } else { 1.0 };
-        [force.x, force.y, force.z, torque.x, torque.y, torque.z]
-    };
-    let mut kept = Kept::new(pair.len(), wrench);
+    let mut kept = Kept::new(pair.len(), |i| wrench_of(contact(i), center, length));
     let deepest = first_most(pair.len(), |i| -contact(i).distance);
     for i in [deepest].into_iter().chain(extremes(pair.len(), length, |i| contact(i).point_a - center)) {
         if kept.order.len() < n && !kept.order.contains(&i) {
@@ -112,7 +133,7 @@ fn first_most(n: usize, key: impl Fn(usize) -> f64) -> usize {
     (0..n).rev().map(|i| (key(i), i)).max_by(|x, y| x.0.total_cmp(&y.0)).map_or(0, |(_, i)| i)
 }
 
-/// The extremes of points `at(i)`, relative to their mean, within `radius` of it.
+/// The extremes of points `at(i)`, relative to their center, within `radius` of it.
 fn extremes(n: usize, radius: f64, at: impl Fn(usize) -> DVec3) -> Vec<usize> {
     let mut extremes = Vec::with_capacity(6);
     let mut axes = Vec::with_capacity(3);
