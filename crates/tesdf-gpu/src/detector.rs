@@ -117,7 +117,7 @@ impl Detector {
     pub fn bytes(&self) -> DeviceBytes {
         DeviceBytes {
             shapes: self.images.bytes(),
-            products: self.products.bytes(),
+            products: self.products.account(),
             per_instance: (pairs::INSTANCE_ROWS + pairs::BOUNDS_ROWS) * ROW + pairs::INSTANCE_WORDS * WORD,
         }
     }
@@ -137,11 +137,11 @@ impl Detector {
         let most_tests = if self.images.have_moved() { u64::MAX } else { self.options.most_pair_tests };
         let instances = Instances::new(scene, options, &self.shape_ids, &self.frames, most_tests)?;
         self.report = DeviceReport::default();
-        if options.reduction != Reduction::None && self.products.members.is_none() {
-            self.products.members = Some(Members::new(&self.device, self.products.room)?);
-        }
         loop {
             self.report.passes += 1;
+            if options.reduction != Reduction::None && self.products.members.is_none() {
+                self.products.members = Some(Members::new(&self.device, self.products.room)?);
+            }
             let counts = self.pass(&instances, options, timing)?;
             if !self.grow(&counts)? {
                 self.report.counts = counts;
@@ -174,8 +174,7 @@ impl Detector {
         if room == self.products.room {
             return Ok(false);
         }
-        let members = self.products.members.as_ref().map(|_| Members::new(&self.device, room));
-        self.products = Products { members: members.transpose()?, ..Products::new(&self.device, room)? };
+        self.products = Products::new(&self.device, room)?;
         Ok(true)
     }
 
@@ -220,6 +219,7 @@ impl Detector {
             Reduction::None => contacts.iter().filter(|c| !c.converged).count(),
             Reduction::PerPair(_) => count(products::UNCONVERGED),
         };
+        let products_bytes: usize = self.products.account().iter().map(|(_, bytes)| bytes).sum();
         let statistics = Statistics {
             instance_pairs: count(products::DIRECTIONS),
             candidates: count(products::CANDIDATES),
@@ -228,7 +228,7 @@ impl Detector {
             filtered: count(products::FILTERED),
             reduced: found - contacts.len(),
             unconverged,
-            bytes: self.products.bytes() + size_of_val(contacts.as_slice()),
+            bytes: products_bytes + size_of_val(contacts.as_slice()),
         };
         Ok(Contacts { contacts, statistics, reductions })
     }

@@ -322,6 +322,11 @@ impl Buffer {
         CubeCount::Dynamic(self.handle.clone().binding())
     }
 
+    /// What it is for.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
     /// Size in bytes.
     pub fn bytes(&self) -> usize {
         self.bytes

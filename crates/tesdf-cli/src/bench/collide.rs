@@ -129,7 +129,10 @@ struct Bytes {
     shapes_words: usize,
     shapes_rows: usize,
     products: usize,
+    products_by_buffer: Vec<(&'static str, usize)>,
     per_instance: usize,
+    /// Shapes, products and instances.
+    total: usize,
 }
 
 #[derive(Serialize)]
@@ -166,7 +169,7 @@ const PHASES: [&str; 3] = ["BP", "MP", "NP"];
 
 fn phase(stage: &str) -> &'static str {
     match stage {
-        "polygons" | "nodes" => "MP",
+        "polygons" | "outside of domains" | "nodes" => "MP",
         "face narrow phase" | "node narrow phase" => "NP",
         _ => "BP",
     }
@@ -357,8 +360,10 @@ fn measure(
             shapes_table: held.shapes.table,
             shapes_words: held.shapes.words,
             shapes_rows: held.shapes.rows,
-            products: held.products,
+            products: held.products.iter().map(|(_, bytes)| bytes).sum(),
+            total: held.with_instances(frames.scene.instances().len()),
             per_instance: held.per_instance,
+            products_by_buffer: held.products,
         },
         wall_ms: Spread::of(walls),
     })
@@ -416,15 +421,12 @@ fn text(r: &Report) -> String {
     }
     if let Some(b) = &r.bytes {
         line("bytes sent, read", format!("{}, {}", size(b.sent.mean as usize), size(b.read.mean as usize)));
-        line(
-            "bytes held",
-            format!(
-                "shapes {}, products {}, {} an instance",
-                size(b.shapes_table + b.shapes_words + b.shapes_rows),
-                size(b.products),
-                b.per_instance
-            ),
-        );
+        line("bytes held", size(b.total));
+        line("  shapes", size(b.shapes_table + b.shapes_words + b.shapes_rows));
+        line("  instances", format!("{}, {} each", size(r.instances * b.per_instance), b.per_instance));
+        for (name, bytes) in &b.products_by_buffer {
+            line(&format!("  {name}"), size(*bytes));
+        }
     }
     text
 }

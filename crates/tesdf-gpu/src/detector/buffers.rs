@@ -17,7 +17,8 @@ pub struct Products {
     pub blocks: Buffer,
     pub meshlets: Buffer,
     pub polygons: Buffer,
-    pub weights: Buffer,
+    /// From the first detection of faces on.
+    weights: Option<Buffer>,
     pub contact_words: Buffer,
     pub contact_rows: Buffer,
     pub groups: Buffer,
@@ -35,7 +36,7 @@ impl Products {
             blocks: buffer("blocks", room.blocks, products::PAIR_WORDS * WORD)?,
             meshlets: buffer("meshlets", room.meshlets, products::PAIR_WORDS * WORD)?,
             polygons: buffer("polygons", room.polygons, products::POLYGON_WORDS * WORD)?,
-            weights: buffer("weights of polygons", room.polygons, products::POLYGON_ROWS * ROW)?,
+            weights: None,
             contact_words: buffer("contacts", room.contacts, products::CONTACT_WORDS * WORD)?,
             contact_rows: buffer("rows of contacts", room.contacts, products::CONTACT_ROWS * ROW)?,
             groups: device.empty("groups", 3 * WORD)?,
@@ -43,20 +44,26 @@ impl Products {
         })
     }
 
-    pub fn bytes(&self) -> usize {
-        let buffers = [
-            &self.directions,
-            &self.maps,
-            &self.blocks,
-            &self.meshlets,
-            &self.polygons,
-            &self.weights,
-            &self.contact_words,
-            &self.contact_rows,
-            &self.groups,
-        ];
-        let members = self.members.as_ref().map_or(0, Members::bytes);
-        buffers.into_iter().map(Buffer::bytes).sum::<usize>() + members
+    /// Where the vertices of polygons are; nodes have none.
+    pub fn weights(&mut self, device: &Device) -> Result<Buffer, GpuError> {
+        let bytes = self.room.polygons as usize * products::POLYGON_ROWS * ROW;
+        let weights = match self.weights.take() {
+            Some(weights) => weights,
+            None => device.empty("weights of polygons", bytes)?,
+        };
+        self.weights = Some(weights.clone());
+        Ok(weights)
+    }
+
+    /// Names and bytes of all.
+    pub fn account(&self) -> Vec<(&'static str, usize)> {
+        let Self {
+            directions, maps, blocks, meshlets, polygons, contact_words, contact_rows, groups, ..
+        } = self;
+        let own = [directions, maps, blocks, meshlets, polygons, contact_words, contact_rows, groups];
+        let members = self.members.as_ref().map(Members::buffers);
+        let all = own.into_iter().chain(&self.weights).chain(members.into_iter().flatten());
+        all.map(|buffer| (buffer.name(), buffer.bytes())).collect()
     }
 }
 
@@ -88,16 +95,8 @@ impl Members {
         })
     }
 
-    fn bytes(&self) -> usize {
-        let buffers = [
-            &self.tallies,
-            &self.touching,
-            &self.numbers,
-            &self.members,
-            &self.reports,
-            &self.kept_words,
-            &self.kept_rows,
-        ];
-        buffers.into_iter().map(Buffer::bytes).sum()
+    fn buffers(&self) -> [&Buffer; 7] {
+        let Self { tallies, touching, numbers, members, reports, kept_words, kept_rows } = self;
+        [tallies, touching, numbers, members, reports, kept_words, kept_rows]
     }
 }

@@ -138,12 +138,21 @@ pub struct DeviceReport {
 }
 
 /// Bytes on the device, by buffer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceBytes {
-    /// Shapes.
+    /// Shapes, each once.
     pub shapes: ImageBytes,
-    /// Products of the stages.
-    pub products: usize,
-    /// State of an instance.
+    /// Products of the stages, by name.
+    pub products: Vec<(&'static str, usize)>,
+    /// State of an instance, during a detection.
     pub per_instance: usize,
+}
+
+impl DeviceBytes {
+    /// All, with the state of so many instances.
+    pub fn with_instances(&self, instances: usize) -> usize {
+        let ImageBytes { table, words, rows } = self.shapes;
+        let products: usize = self.products.iter().map(|(_, bytes)| bytes).sum();
+        table + words + rows + products + instances * self.per_instance
+    }
 }
