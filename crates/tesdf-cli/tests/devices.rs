@@ -111,6 +111,23 @@ fn a_benchmark_says_what_it_did() {
     let text = folder.good(&["bench", "collide", "poses.json", "--repeat", "1"]);
     assert!(text.contains("BP / MP / NP") && text.contains("without pruning"), "{text}");
 
+    for mode in ["node", "exact"] {
+        let few =
+            ["bench", "collide", "poses.json", "--repeat", "1", "--mode", mode, "--reduce", "4", "--json"];
+        let report = json(&folder.good(&few));
+        let counts = &report["counts"];
+        assert!(counts["kept"]["max"].as_f64() <= Some(4.0), "{counts}");
+        assert!(counts["contacts"]["mean"].as_f64() > counts["kept"]["mean"].as_f64(), "{counts}");
+        let bytes = &report["bytes"];
+        let buffers = bytes["products_by_buffer"].as_array().expect("buffers").iter();
+        let products: u64 = buffers.map(|b| b[1].as_u64().expect("bytes")).sum();
+        assert_eq!(bytes["products"].as_u64(), Some(products));
+        let shapes =
+            ["shapes_table", "shapes_words", "shapes_rows"].map(|k| bytes[k].as_u64().expect("bytes"));
+        let instances = 2 * bytes["per_instance"].as_u64().expect("bytes");
+        assert_eq!(bytes["total"].as_u64(), Some(products + shapes.iter().sum::<u64>() + instances));
+    }
+
     folder.good(&["bench", "poses", "shafts", "--frames", "2", "-o", "shafts.json"]);
     let shafts = json(&std::fs::read_to_string(folder.path("shafts.json")).expect("a file"));
     assert_eq!(shafts["frames"][1].as_array().map(Vec::len), Some(128));

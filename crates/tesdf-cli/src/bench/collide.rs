@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::ValueEnum;
 use serde::Serialize;
-use tesdf::collide::{CollideOptions, FaceMethod, Mode, detect};
+use tesdf::collide::{CollideOptions, FaceMethod, Mode, Reduction, detect};
 use tesdf_gpu::{Counting, Detector, DetectorOptions, Exchange, Lanes, Memory, Pruning};
 
 use super::frames::Frames;
@@ -37,6 +37,9 @@ pub struct Args {
     /// Longest lists of meshes that are encoded for a file of poses [default: not cut]
     #[arg(long, value_name = "E")]
     pub e_max: Option<u32>,
+    /// Keep at most N contacts of a pair of bodies
+    #[arg(long, value_name = "N")]
+    pub reduce: Option<u32>,
     /// The scene so many times, in worlds of their own
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub worlds: u32,
@@ -68,6 +71,8 @@ pub enum ModeName {
     Node,
     /// The faces, by Frank-Wolfe iterations
     Face,
+    /// The faces, exactly
+    Exact,
 }
 
 /// How a polygon is worked on.
@@ -101,7 +106,7 @@ impl Spread {
 #[derive(Serialize)]
 struct Stage {
     name: &'static str,
-    /// `BP`, `MP` or `NP`: the paper's broad, middle and narrow phase.
+    /// `BP`, `MP` or `NP`: the paper's broad, middle and narrow phase; or `reduction`.
     phase: &'static str,
     ms: Spread,
 }
@@ -116,6 +121,8 @@ struct Counts {
     queries_unpruned: Option<Spread>,
     contacts: Spread,
     filtered: Spread,
+    /// Of the contacts, those that a reduction keeps.
+    kept: Option<Spread>,
     /// Of Face-TES: evaluations of the field, and point–triangle distances of the lists.
     evaluations: Option<Spread>,
     distances: Option<Spread>,
@@ -167,11 +174,14 @@ struct Report {
 
 const PHASES: [&str; 3] = ["BP", "MP", "NP"];
 
-fn phase(stage: &str) -> &'static str {
-    match stage {
+/// Of a stage, among all; what only prepares a launch belongs to that. Reduction is none of the three.
+fn phase(stages: &[(&str, Duration)], stage: usize) -> &'static str {
+    match stages[stage].0 {
+        "groups" if stage + 1 < stages.len() => phase(stages, stage + 1),
+        "instance bounds" | "instance pairs" | "meshlets" => "BP",
         "polygons" | "outside of domains" | "nodes" => "MP",
-        "face narrow phase" | "node narrow phase" => "NP",
-        _ => "BP",
+        "face narrow phase" | "node narrow phase" | "exact narrow phase" => "NP",
+        _ => "reduction",
     }
 }
 
@@ -190,10 +200,12 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mode = match args.mode {
         ModeName::Node => Mode::Node,
         ModeName::Face => Mode::Face(FaceMethod::FrankWolfe { iterations: args.iterations }),
+        ModeName::Exact => Mode::EXACT,
     };
     let options = CollideOptions {
         contact_distance,
         cos_theta: Some(args.cos_theta),
+        reduction: args.reduce.map_or(Reduction::None, Reduction::PerPair),
         ..CollideOptions::with_mode(mode)
     };
     options.validate().map_err(Failure::new)?;
@@ -291,6 +303,7 @@ fn on_processor(
         queries: spread(|s| s.polygons),
         contacts: spread(|s| s.touching - s.filtered),
         filtered: spread(|s| s.filtered),
+        kept: (options.reduction != Reduction::None).then(|| spread(|s| s.touching - s.filtered - s.reduced)),
         ..Counts::default()
     };
     Ok((Spread::of(times), counts))
@@ -333,7 +346,7 @@ fn measure(
     let stage = |k: usize| {
         let name = reports[0].stages[k].0;
         let ms = Spread::of(reports.iter().map(|r| ms(r.stages[k].1)).collect());
-        Stage { name, phase: phase(name), ms }
+        Stage { name, phase: phase(&reports[0].stages, k), ms }
     };
     let stages = (0..reports.first().map_or(0, |r| r.stages.len())).map(stage).collect();
     let count = |k: usize| Spread::of(reports.iter().map(|r| f64::from(r.counts[k])).collect());
@@ -349,6 +362,7 @@ fn measure(
             queries: count(3),
             contacts: count(4),
             filtered: count(5),
+            kept: (options.reduction != Reduction::None).then(|| count(14)),
             candidates: count(6),
             queries_unpruned: None,
             evaluations: Some(count(8)),
@@ -399,6 +413,9 @@ fn text(r: &Report) -> String {
     }
     line("contacts", spread(&r.counts.contacts));
     line("  filtered", spread(&r.counts.filtered));
+    if let Some(kept) = &r.counts.kept {
+        line("  kept", spread(kept));
+    }
     if r.launches > 0 {
         line("launches", r.launches.to_string());
     }
