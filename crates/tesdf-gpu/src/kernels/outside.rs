@@ -241,15 +241,17 @@ fn around(
                 held = is_covered(assets, shape, p, q, &mut near, found, &mut s, &mut t);
             }
             down = !held && found > MANY && level < QUARTERINGS && p.count == 3u32;
-            if !held && !down {
-                let used = select(found > comptime!(MOST as u32), 0u32, found);
+            if !held && !down && found > comptime!(MOST as u32) {
+                begin(q, &mut s, &mut t);
+                write(counters, words, rows, most, at, face, NONE, &mut s, &mut t, p.count);
+            } else if !held && !down {
                 parts(
                     assets,
                     shape,
                     p,
                     q,
                     &mut near,
-                    used,
+                    found,
                     &mut choices,
                     counters,
                     words,
