@@ -234,9 +234,13 @@ impl Detector {
     }
 }
 
+/// The shapes of all instances, sorted: few, of many instances.
 fn shape_ids(scene: &Scene) -> Vec<ShapeId> {
-    let mut ids: Vec<ShapeId> = scene.instances().map(|(_, instance)| instance.shape).collect();
-    ids.sort_unstable();
-    ids.dedup();
+    let mut ids = Vec::new();
+    for (_, instance) in scene.instances() {
+        if let Err(at) = ids.binary_search(&instance.shape) {
+            ids.insert(at, instance.shape);
+        }
+    }
     ids
 }

@@ -214,3 +214,46 @@ pub fn root_holding(assets: &Assets, shape: u32, p: V3) -> Held {
     }
     Held { root, lambda: Lambda { l0, l1, l2, l3 } }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+
+    /// Coordinates give the point back, in tetrahedra of any shape and orientation, and tell how far inside it is.
+    #[test]
+    fn coordinates_give_the_point_back() {
+        let mut random = fastrand::Rng::with_seed(9);
+        let mut in_cube = || DVec3::from_array(std::array::from_fn(|_| random.f64() - 0.5));
+        let (mut flat, mut greatest) = (0, 0.0f64);
+        for k in 0..20_000 {
+            let size = 10f64.powf(-f64::from(k % 4));
+            let middle = in_cube();
+            let thin = 10f64.powf(-f64::from(k / 4 % 5));
+            let mut corners = [(); 4].map(|()| middle + size * in_cube());
+            // The last corner close to the plane of the others.
+            let foot = (corners[0] + corners[1] + corners[2]) / 3.0;
+            corners[3] = foot + thin * (corners[3] - foot);
+            let corners: [Vec3; 4] = corners.map(|p| p.as_vec3());
+            let [a, b, c, d] = corners.map(|p| v3(p.x, p.y, p.z));
+            let t = tetrahedron_of(a, b, c, d);
+            if is_flat(t) {
+                flat += 1;
+                assert!(thin * size < 1e-4, "a tetrahedron of {size} and {thin} is flat");
+                continue;
+            }
+            let weights = in_cube().extend(in_cube().x).to_array().map(|x| x + 0.5);
+            let all: f64 = weights.iter().sum();
+            let p: DVec3 = corners.iter().zip(weights).map(|(c, w)| w / all * c.as_dvec3()).sum();
+            let p = p.as_vec3();
+            let l = lambda_in(t, v3(p.x, p.y, p.z));
+            let back: DVec3 =
+                corners.iter().zip([l.l0, l.l1, l.l2, l.l3]).map(|(c, l)| f64::from(l) * c.as_dvec3()).sum();
+            greatest = greatest.max(back.distance(p.as_dvec3()));
+            assert!(f64::from(inside_by(t, l)) > -2e-7, "{p} is inside by {}", inside_by(t, l));
+        }
+        assert!(flat < 2_000, "{flat} are flat");
+        assert!(greatest < OUT.into(), "a point comes back {greatest} off");
+    }
+}

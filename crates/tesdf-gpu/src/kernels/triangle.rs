@@ -138,3 +138,46 @@ pub fn closest(f: Face, p: V3, part: u32) -> Closest {
 pub fn corner(f: Face, k: u32) -> V3 {
     pick(k == 1u32, plus(f.a, f.ab), pick(k == 2u32, plus(f.a, f.ac), f.a))
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+    use tesdf::geometry::Triangle;
+
+    use super::*;
+
+    fn f64_of(v: V3) -> DVec3 {
+        Vec3::new(v.x, v.y, v.z).as_dvec3()
+    }
+
+    /// The plane goes through all corners, needles and caps included, and looks the way that `tesdf` says.
+    #[test]
+    fn planes_of_faces_hold_their_corners() {
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut in_cube = || DVec3::from_array(std::array::from_fn(|_| random.f64() - 0.5));
+        let (mut faces, mut greatest) = (0, 0.0f64);
+        for k in 0..20_000 {
+            let [a, b, c] = [(); 3].map(|()| in_cube());
+            // From well-shaped triangles to those a millionth as high as long: needles, then caps.
+            let thin = 10f64.powf(-f64::from(k % 7));
+            let c = if k % 2 == 0 { a + thin * (c - a) } else { 0.5 * (a + b) + thin * (c - a) };
+            let [a, b, c] = [a, b, c].map(|p: DVec3| v3(p.x as f32, p.y as f32, p.z as f32));
+            let record = record_of(a, b, c);
+            let corners = [a, b, c].map(f64_of);
+            let n = f64_of(record.normal);
+            if n == DVec3::ZERO {
+                let height = Triangle::new(corners).closest(0.5 * (corners[0] + corners[1])).distance;
+                assert!(thin < 1e-5 && height < 1e-3, "a face of height {thin} is flat");
+                continue;
+            }
+            faces += 1;
+            assert!((n.length() - 1.0).abs() < 1e-6);
+            let off = corners.map(|p| (p - corners[0]).dot(n).abs()).into_iter().fold(0.0, f64::max);
+            greatest = greatest.max(off);
+            let expected = Triangle::new(corners).normal;
+            assert!(n.dot(expected) > 0.9, "{n} instead of {expected}");
+        }
+        assert!(faces > 15_000, "{faces} faces");
+        assert!(greatest < 4e-7, "a corner is {greatest} off its plane");
+    }
+}
