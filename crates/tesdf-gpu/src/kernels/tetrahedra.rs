@@ -221,9 +221,10 @@ mod tests {
 
     use super::*;
 
-    /// Coordinates give the point back, in tetrahedra of any shape and orientation, and tell how far inside it is.
+    /// Coordinates times heights are the distances from the sides, in tetrahedra of any shape and orientation. (The coordinates alone are as rough
+    /// as a tetrahedron is thin.)
     #[test]
-    fn coordinates_give_the_point_back() {
+    fn heights_over_the_sides_are_right() {
         let mut random = fastrand::Rng::with_seed(9);
         let mut in_cube = || DVec3::from_array(std::array::from_fn(|_| random.f64() - 0.5));
         let (mut flat, mut greatest) = (0, 0.0f64);
@@ -247,17 +248,18 @@ mod tests {
                 assert!(height < 2.0 * f64::from(FLAT), "a tetrahedron of height {height} is flat");
                 continue;
             }
-            let weights = in_cube().extend(in_cube().x).to_array().map(|x| x + 0.5);
-            let all: f64 = weights.iter().sum();
-            let p: DVec3 = corners.iter().zip(weights).map(|(c, w)| w / all * c.as_dvec3()).sum();
-            let p = p.as_vec3();
+            let p = (middle + 2.0 * size * in_cube()).as_vec3();
             let l = lambda_in(t, v3(p.x, p.y, p.z));
-            let back: DVec3 =
-                corners.iter().zip([l.l0, l.l1, l.l2, l.l3]).map(|(c, l)| f64::from(l) * c.as_dvec3()).sum();
-            greatest = greatest.max(back.distance(p.as_dvec3()));
-            assert!(f64::from(inside_by(t, l)) > -2e-7, "{p} is inside by {}", inside_by(t, l));
+            let heights = [l.l0 * t.h0, l.l1 * t.h1, l.l2 * t.h2, l.l3 * t.h3].map(f64::from);
+            let corners = corners.map(|p| p.as_dvec3());
+            for (side, height) in heights.into_iter().enumerate() {
+                let [q, r, s] = [1, 2, 3].map(|k| corners[(side + k) % 4]);
+                let normal = (r - q).cross(s - q).normalize();
+                let expected = normal.dot(p.as_dvec3() - q) * normal.dot(corners[side] - q).signum();
+                greatest = greatest.max((height - expected).abs() / size.max(0.1));
+            }
         }
         assert!(flat < 4_000, "{flat} are flat");
-        assert!(greatest < OUT.into(), "a point comes back {greatest} off");
+        assert!(greatest < OUT.into(), "a height is {greatest} off");
     }
 }
