@@ -77,5 +77,5 @@ fn tetrahedron_of_corners(corners: [DVec3; 4]) -> Tetrahedron {
 
 fn rows(t: &Tetrahedron) -> [[f32; 4]; ROWS] {
     let row = |v: V3, h: f32| [v.x, v.y, v.z, h];
-    [row(t.corner, t.h0), row(t.g1, t.h1), row(t.g2, t.h2), row(t.g3, t.h3)]
+    [row(t.corner, t.h0), row(t.g1, t.h1), row(t.g2, t.h2), row(t.g3, t.h3), row(t.g0, 0.0)]
 }

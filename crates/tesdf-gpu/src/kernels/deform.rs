@@ -106,6 +106,7 @@ pub fn follow(
             rows[to + 1] = four(t.g1.x, t.g1.y, t.g1.z, t.h1);
             rows[to + 2] = four(t.g2.x, t.g2.y, t.g2.z, t.h2);
             rows[to + 3] = four(t.g3.x, t.g3.y, t.g3.z, t.h3);
+            rows[to + 4] = four(t.g0.x, t.g0.y, t.g0.z, 0.0f32);
             let all = both(both(point(a), point(b)), both(point(c), point(d)));
             let to = (entry(table, shape, TREE_BOXES) + 2u32 * node) as usize;
             rows[to] = four(all.low.x, all.low.y, all.low.z, 0.0f32);

@@ -3,10 +3,11 @@ use cubecl::prelude::*;
 
 use super::assets::{Assets, NONE, TETRAHEDRA, TREE, TREE_BOXES, TREE_NODES, entry};
 use super::locate::Lambda;
+use super::triangle::normal_of;
 use super::vector::{V3, cross, dot, length, minus, pick, plus, scaled, v3};
 
-/// Rows that a tetrahedron takes: each the numbers of [`Tetrahedron`] and a height.
-pub const ROWS: usize = 4;
+/// Rows that a tetrahedron takes: corner, then gradients 1, 2, 3 and 0, the first four with the heights 0 to 3.
+pub const ROWS: usize = 5;
 
 /// A tetrahedron in the local frame, relative to the middle of the cube.
 #[derive(CubeType, Clone, Copy, Debug)]
@@ -14,7 +15,8 @@ pub const ROWS: usize = 4;
 pub struct Tetrahedron {
     /// Corner 0.
     pub corner: V3,
-    /// Gradients of the barycentric coordinates 1, 2 and 3.
+    /// Gradients of the barycentric coordinates.
+    pub g0: V3,
     pub g1: V3,
     pub g2: V3,
     pub g3: V3,
@@ -38,24 +40,33 @@ pub const OUT: f32 = 5e-7;
 /// The tetrahedron of four corners, in either orientation.
 #[cube]
 pub fn tetrahedron_of(a: V3, b: V3, c: V3, d: V3) -> Tetrahedron {
-    let (e1, e2, e3) = (minus(b, a), minus(c, a), minus(d, a));
-    let (c1, c2, c3) = (cross(e2, e3), cross(e3, e1), cross(e1, e2));
-    let volume = dot(e1, c1);
-    let c0 = plus(plus(c1, c2), c3);
-    let greatest = length(c0).max(length(c1)).max(length(c2)).max(length(c3));
-    let flat = volume.abs() <= FLAT * greatest;
-    let inverse = select(flat, 0.0f32, 1.0f32 / select(flat, 1.0f32, volume));
-    let size = volume.abs();
+    let n0 = normal_of(b, c, d);
+    let n1 = normal_of(a, c, d);
+    let n2 = normal_of(a, b, d);
+    let n3 = normal_of(a, b, c);
+    let h0 = dot(n0, minus(a, b));
+    let h1 = dot(n1, minus(b, a));
+    let h2 = dot(n2, minus(c, a));
+    let h3 = dot(n3, minus(d, a));
+    // Without a normal the height is 0.
+    let flat = h0.abs().min(h1.abs()).min(h2.abs()).min(h3.abs()) <= FLAT;
     Tetrahedron {
         corner: a,
-        g1: scaled(inverse, c1),
-        g2: scaled(inverse, c2),
-        g3: scaled(inverse, c3),
-        h0: select(flat, -1.0f32, size / length(c0).max(1e-30f32)),
-        h1: size / length(c1).max(1e-30f32),
-        h2: size / length(c2).max(1e-30f32),
-        h3: size / length(c3).max(1e-30f32),
+        g0: gradient(n0, h0, flat),
+        g1: gradient(n1, h1, flat),
+        g2: gradient(n2, h2, flat),
+        g3: gradient(n3, h3, flat),
+        h0: select(flat, -1.0f32, h0.abs()),
+        h1: h1.abs(),
+        h2: h2.abs(),
+        h3: h3.abs(),
     }
+}
+
+/// Of a coordinate that is 0 in a side and 1 at `height` over it.
+#[cube]
+fn gradient(normal: V3, height: f32, flat: bool) -> V3 {
+    scaled(select(flat, 0.0f32, 1.0f32 / select(flat, 1.0f32, height)), normal)
 }
 
 /// Reads a root.
@@ -63,8 +74,10 @@ pub fn tetrahedron_of(a: V3, b: V3, c: V3, d: V3) -> Tetrahedron {
 pub fn tetrahedron(assets: &Assets, shape: u32, root: u32) -> Tetrahedron {
     let at = (entry(assets, shape, TETRAHEDRA) + root * comptime!(ROWS as u32)) as usize;
     let (p, q, r, s) = (assets.rows[at], assets.rows[at + 1], assets.rows[at + 2], assets.rows[at + 3]);
+    let t = assets.rows[at + 4];
     Tetrahedron {
         corner: v3(p.extract(0usize), p.extract(1usize), p.extract(2usize)),
+        g0: v3(t.extract(0usize), t.extract(1usize), t.extract(2usize)),
         g1: v3(q.extract(0usize), q.extract(1usize), q.extract(2usize)),
         g2: v3(r.extract(0usize), r.extract(1usize), r.extract(2usize)),
         g3: v3(s.extract(0usize), s.extract(1usize), s.extract(2usize)),
@@ -81,14 +94,11 @@ pub fn is_flat(t: Tetrahedron) -> bool {
     t.h0 < 0.0f32
 }
 
-/// Barycentric coordinates.
+/// Barycentric coordinates; each is right to what rounding is of its height.
 #[cube]
 pub fn lambda_in(t: Tetrahedron, p: V3) -> Lambda {
     let from = minus(p, t.corner);
-    let l1 = dot(t.g1, from);
-    let l2 = dot(t.g2, from);
-    let l3 = dot(t.g3, from);
-    Lambda { l0: 1.0f32 - l1 - l2 - l3, l1, l2, l3 }
+    Lambda { l0: 1.0f32 + dot(t.g0, from), l1: dot(t.g1, from), l2: dot(t.g2, from), l3: dot(t.g3, from) }
 }
 
 /// How far a point is inside of the nearest side; negative outside.
@@ -221,8 +231,8 @@ mod tests {
 
     use super::*;
 
-    /// Coordinates times heights are the distances from the sides, in tetrahedra of any shape and orientation. (The coordinates alone are as rough
-    /// as a tetrahedron is thin.)
+    /// Coordinates times heights are the distances from the sides, in and around tetrahedra of any shape and orientation. (The coordinates alone are as
+    /// rough as a tetrahedron is thin.)
     #[test]
     fn heights_over_the_sides_are_right() {
         let mut random = fastrand::Rng::with_seed(9);
@@ -248,7 +258,10 @@ mod tests {
                 assert!(height < 2.0 * f64::from(FLAT), "a tetrahedron of height {height} is flat");
                 continue;
             }
-            let p = (middle + 2.0 * size * in_cube()).as_vec3();
+            let weights = [(); 4].map(|()| in_cube().x + 0.45);
+            let all: f64 = weights.iter().sum::<f64>().max(0.5);
+            let from = |(c, w): (&Vec3, f64)| w / all * (c.as_dvec3() - corners[0].as_dvec3());
+            let p = (corners[0].as_dvec3() + corners.iter().zip(weights).map(from).sum::<DVec3>()).as_vec3();
             let l = lambda_in(t, v3(p.x, p.y, p.z));
             let heights = [l.l0 * t.h0, l.l1 * t.h1, l.l2 * t.h2, l.l3 * t.h3].map(f64::from);
             let corners = corners.map(|p| p.as_dvec3());

@@ -26,11 +26,11 @@ pub struct Face {
 /// Faces of less height than this (local frame) are no more than their edges, as in `tesdf`.
 const FLAT: f32 = 7e-7;
 
-/// The face of three corners, as `tesdf::query::FaceRecord` makes it, without hints; in `f32` alone.
+/// The unit normal of a face; zero for one that is no more than its edges.
 ///
-/// The normal is that of the two shorter edges, where rounding is least, and made square to the longest edge, along which an error would count most.
+/// It is that of the two shorter edges, where rounding is least, and made square to the longest edge, along which an error would count most.
 #[cube]
-pub fn record_of(a: V3, b: V3, c: V3) -> Face {
+pub fn normal_of(a: V3, b: V3, c: V3) -> V3 {
     let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
     let (u, v, w) = (dot(ab, ab), dot(ac, ac), dot(bc, bc));
     let ab_longest = u >= v && u >= w;
@@ -46,8 +46,15 @@ pub fn record_of(a: V3, b: V3, c: V3) -> Face {
     let across = plus_scaled(across, -off, along);
     let size = dot(across, across).sqrt();
     let flat = size < FLAT * longest.sqrt() || size <= 1e-30f32;
-    let normal = scaled(select(flat, 0.0f32, 1.0f32 / size.max(1e-30f32)), across);
-    Face { a, ab, ac, normal, inverse: v3(inverse(u), inverse(v), inverse(w)), hints: 0u32 }
+    scaled(select(flat, 0.0f32, 1.0f32 / size.max(1e-30f32)), across)
+}
+
+/// The face of three corners, as `tesdf::query::FaceRecord` makes it, without hints; in `f32` alone.
+#[cube]
+pub fn record_of(a: V3, b: V3, c: V3) -> Face {
+    let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));
+    let inverse = v3(inverse(dot(ab, ab)), inverse(dot(ac, ac)), inverse(dot(bc, bc)));
+    Face { a, ab, ac, normal: normal_of(a, b, c), inverse, hints: 0u32 }
 }
 
 #[cube]
