@@ -11,10 +11,10 @@ use super::cut::{ROOM, cut};
 use super::locate::{is_inside, place};
 use super::narrow::LANES;
 use super::nearest::nearest_in_tree;
-use super::products::{self, PAIR_WORDS, tell_if_broken_off};
+use super::products::{self, PAIR_WORDS, POLYGON_VERTICES, tell_if_broken_off};
 use super::surface::{Direction, Part, at_weights, ball_center, ball_radius, direction, part};
-use super::tetrahedra::{Around, around_of, is_flat, lambda_in, tetrahedron, visit};
-use super::vector::V3;
+use super::tetrahedra::{Around, OUT, around_of, is_flat, lambda_in, part_of, tetrahedron, visit};
+use super::vector::{V3, cross, length, minus, v3};
 
 /// Most tetrahedra that parts are chosen of.
 const MOST: usize = 48;
@@ -191,6 +191,7 @@ fn around(
 ) -> u32 {
     let shape = d.shape_b;
     let nodes = entry(assets, shape, TREE_NODES);
+    let face_plane = around_of(p.a, p.b, p.c);
     let mut s = Array::<f32>::new(ROOM);
     let mut t = Array::<f32>::new(ROOM);
     let mut near = Array::<u32>::new(MOST);
@@ -213,7 +214,7 @@ fn around(
         let middle = ball_center(here);
         let mut down = false;
         if !is_far(assets, shape, middle, ball_radius(here, middle), reach) {
-            let bounds: Around = around_of(here.a, here.b, here.c);
+            let bounds: Around = part_of(face_plane, here.a, here.b, here.c);
             let mut found = 0u32;
             let mut held = false;
             let mut node = 0u32;
@@ -392,7 +393,11 @@ fn parts(
     }
 }
 
-/// Appends a part, unless it is a sliver that rounding has left between two tetrahedra.
+/// A part of a face that is thinner than this (local frame) is what rounding has left along the side that two tetrahedra share, and goes on along its plane out of the domain.
+/// A true part so thin has others beside it, where the face is as near up to that.
+const SLIVER: f32 = 2.0 * OUT;
+
+/// Appends a part, unless it is a sliver between two tetrahedra.
 #[cube]
 fn write_outside(
     assets: &Assets,
@@ -408,16 +413,46 @@ fn write_outside(
     t: &mut Array<f32>,
     n: u32,
 ) {
-    let mut sum_s = 0.0f32;
-    let mut sum_t = 0.0f32;
-    let mut i = 0u32;
+    let first = at_weights(p, s[0], t[0]);
+    let mut sum_s = s[0];
+    let mut sum_t = t[0];
+    let mut longest = 0.0f32;
+    // Twice the area.
+    let mut x = 0.0f32;
+    let mut y = 0.0f32;
+    let mut z = 0.0f32;
+    let mut before_x = 0.0f32;
+    let mut before_y = 0.0f32;
+    let mut before_z = 0.0f32;
+    let mut i = 1u32;
     while i < n {
         sum_s += s[i as usize];
         sum_t += t[i as usize];
+        let here = minus(at_weights(p, s[i as usize], t[i as usize]), first);
+        let across = cross(v3(before_x, before_y, before_z), here);
+        x += across.x;
+        y += across.y;
+        z += across.z;
+        longest = longest.max(length(here));
+        before_x = here.x;
+        before_y = here.y;
+        before_z = here.z;
         i += 1u32;
     }
+    let is_sliver = p.count == 3u32 && length(v3(x, y, z)) < SLIVER * longest;
     let middle = at_weights(p, sum_s / n as f32, sum_t / n as f32);
-    if place(assets, shape, middle).at == NONE {
+    if !is_sliver && place(assets, shape, middle).at == NONE {
         write(counters, words, rows, most, at, face, NONE, s, t, n);
+        // What is more than a polygon holds: the first vertex, the last one written, and the rest.
+        let last = comptime!(POLYGON_VERTICES as u32 - 1).runtime();
+        if n > last + 1u32 {
+            let mut k = last;
+            while k < n {
+                s[(k - last + 1u32) as usize] = s[k as usize];
+                t[(k - last + 1u32) as usize] = t[k as usize];
+                k += 1u32;
+            }
+            write(counters, words, rows, most, at, face, NONE, s, t, n - last + 1u32);
+        }
     }
 }

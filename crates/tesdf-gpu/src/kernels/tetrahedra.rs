@@ -116,7 +116,7 @@ pub struct Around {
     /// Unit normal, and how high over the origin; zero without a plane.
     pub normal: V3,
     pub height: f32,
-    /// What the normal may be off by.
+    /// What the normal may be off by: what rounding moves corners by, over the height of the triangle.
     pub slope: f32,
 }
 
@@ -135,7 +135,19 @@ pub fn around_of(a: V3, b: V3, c: V3) -> Around {
         high: v3(a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)),
         normal,
         height: dot(normal, a),
-        slope: 4e-7f32 * longest * longest / size.max(1e-30f32),
+        slope: longest * (4e-7f32 * longest + OUT) / size.max(1e-30f32),
+    }
+}
+
+/// A part of it, with three of its own corners: its plane is that of the whole, which is the surer the larger it is.
+#[cube]
+pub fn part_of(whole: Around, a: V3, b: V3, c: V3) -> Around {
+    Around {
+        low: v3(a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y), a.z.min(b.z).min(c.z)),
+        high: v3(a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)),
+        normal: whole.normal,
+        height: whole.height,
+        slope: whole.slope,
     }
 }
 

@@ -12,6 +12,9 @@ use crate::domain::{Cell, ROOTS};
 use crate::geometry::{Aabb, barycentric};
 use crate::query::Place;
 
+/// What is thinner (local frame) is a sliver: parts beside it are as near.
+const SLIVER: f64 = 1e-11;
+
 /// A face, clipped by a cell.
 #[derive(Clone, Debug)]
 pub struct ClippedPolygon {
@@ -86,8 +89,10 @@ impl Clipping<'_> {
             }
         });
         if self.beyond {
-            // Between two tetrahedra rounding leaves slivers.
-            let outside = |part: &Polygon| matches!(self.asset.place(part.center()), Place::NotOfDomain);
+            // Between two tetrahedra rounding leaves slivers, which may go on along their side out of the domain.
+            let outside = |part: &Polygon| {
+                !part.is_thinner(SLIVER) && matches!(self.asset.place(part.center()), Place::NotOfDomain)
+            };
             for polygon in rest.into_iter().filter(outside) {
                 visit(&ClippedPolygon { polygon, place: Place::NotOfDomain, cell: None });
             }

@@ -74,6 +74,15 @@ impl Polygon {
         self.points().sum::<DVec3>() / self.0.len() as f64
     }
 
+    /// Whether it has an area, of less than `thickness` times its greatest length from the first vertex; no points and segments.
+    pub fn is_thinner(&self, thickness: f64) -> bool {
+        let Some(first) = self.points().next() else { return false };
+        let ways: ArrayVec<DVec3, MOST_VERTICES> = self.points().skip(1).map(|p| p - first).collect();
+        let twice_the_area: DVec3 = ways.windows(2).map(|pair| pair[0].cross(pair[1])).sum();
+        let longest = ways.iter().map(|way| way.length()).fold(0.0, f64::max);
+        ways.len() > 1 && twice_the_area.length() < thickness * longest
+    }
+
     /// Greatest distance from `p` to a point of the polygon: to a vertex, as the polygon is convex.
     pub fn reach(&self, p: DVec3) -> f64 {
         self.points().map(|v| v.distance_squared(p)).fold(0.0, f64::max).sqrt()
