@@ -367,7 +367,7 @@ fn parts(
         let mut back = false;
         if depth == found {
             if n > 0u32 {
-                write_outside(assets, shape, p, counters, words, rows, most, at, face, s, t, n);
+                write_outside(assets, shape, p, counters, words, rows, most, at, face, s, t, n, found);
             }
             back = true;
         } else if choice == 0u32 && n > 0u32 {
@@ -412,6 +412,7 @@ fn write_outside(
     s: &mut Array<f32>,
     t: &mut Array<f32>,
     n: u32,
+    cuts: u32,
 ) {
     let first = at_weights(p, s[0], t[0]);
     let mut sum_s = s[0];
@@ -439,7 +440,8 @@ fn write_outside(
         before_z = here.z;
         i += 1u32;
     }
-    let is_sliver = p.count == 3u32 && length(v3(x, y, z)) < SLIVER * longest;
+    // What no tetrahedron has cut is as thin as the face itself.
+    let is_sliver = cuts > 0u32 && p.count == 3u32 && length(v3(x, y, z)) < SLIVER * longest;
     let middle = at_weights(p, sum_s / n as f32, sum_t / n as f32);
     if !is_sliver && place(assets, shape, middle).at == NONE {
         write(counters, words, rows, most, at, face, NONE, s, t, n);
