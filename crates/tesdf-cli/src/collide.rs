@@ -3,8 +3,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
+use serde::Serialize;
 use tesdf::collide::{
-    CollideOptions, Contact, Contacts, FaceMethod, Instance, InstanceId, Mode, Pose, Reduction, Scene, detect,
+    CollideOptions, Contact, Contacts, FaceMethod, HiddenOverlap, Instance, InstanceId, Mode, PairReduction,
+    Pose, Reduction, Scene, Statistics, detect,
 };
 use tesdf::encode::Length;
 
@@ -90,6 +92,19 @@ pub struct Args {
     /// Print the contacts as a JSON array; with --why the reports
     #[arg(long)]
     pub json: bool,
+    /// With --json: print an object instead, with the contacts, the statistics, what the reduction has lost, and the pairs that overlap although
+    /// no contact shows it (`hidden`)
+    #[arg(long, requires = "json", conflicts_with = "why")]
+    pub report: bool,
+}
+
+/// What `--json --report` prints.
+#[derive(Serialize)]
+struct Report<'a> {
+    contacts: &'a [Contact],
+    statistics: &'a Statistics,
+    reductions: &'a [PairReduction],
+    hidden: &'a [HiddenOverlap],
 }
 
 /// The cosine filter's threshold, if it is on.
@@ -149,12 +164,34 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         None => detect(&scene, &options),
     };
     let found = found.map_err(Failure::new)?;
-    if args.json {
+    warn_of(&found.hidden, options.mode);
+    if args.report {
+        let Contacts { contacts, statistics, reductions, hidden } = &found;
+        report::json(&Report { contacts, statistics, reductions, hidden })?;
+    } else if args.json {
         report::json(&found.contacts)?;
     } else {
         report::result(text(&found).as_bytes())?;
     }
     Ok(Outcome::Good)
+}
+
+/// Says which pairs overlap although no contact shows it, and what to do next.
+fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
+    for HiddenOverlap { instance_a, instance_b, depth } in hidden {
+        report::warning(&format!(
+            "instances {instance_a} and {instance_b} overlap by {depth:.3e} or more, and no contact shows it"
+        ));
+    }
+    if !hidden.is_empty() {
+        report::hint(match mode {
+            Mode::Node => "the mode node tests vertices alone: use --mode face or --mode exact",
+            Mode::Face(_) => {
+                "their surfaces are hardly inside of each other, as of bodies in one place: `tesdf clearance` tells how far, and a \
+                 pose that parts them ends it"
+            }
+        });
+    }
 }
 
 /// Contacts that are shown to people.

@@ -10,7 +10,7 @@ use serde::Serialize;
 use tesdf::encode::EncodeProgress;
 use tesdf_sim::criterion::ScrewReport;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
-use tesdf_sim::{Moment, SimulateError, Summary, simulate};
+use tesdf_sim::{HiddenPair, Moment, SimulateError, Summary, simulate};
 
 use crate::devices::{Choice, OnDevice};
 use crate::parse;
@@ -108,6 +108,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let scene = absolute(&args.scene)?;
     record.folder = scene.parent().unwrap_or(&scene).to_string_lossy().into_owned();
     record.save(&args.output).map_err(Failure::new)?;
+    warn_of(&summary.hidden, loaded.scene.detector.mode);
     print(args, &summary)?;
     Ok(if summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
 }
@@ -194,6 +195,14 @@ impl<'a> LiveProgress<'a> {
 impl Drop for LiveProgress<'_> {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// Says which bodies overlapped although no contact showed it, and what to do next.
+fn warn_of(hidden: &[HiddenPair], mode: DetectorMode) {
+    hidden.iter().for_each(|pair| report::warning(&pair.message()));
+    if !hidden.is_empty() && mode == DetectorMode::Node {
+        report::hint("the mode node tests vertices alone: use --mode face or --mode exact, or mesh the bodies more finely");
     }
 }
 

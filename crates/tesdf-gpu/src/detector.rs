@@ -5,7 +5,11 @@ mod pass;
 mod reduction;
 mod stages;
 
-use tesdf::collide::{CollideError, CollideOptions, Contacts, Reduction, Scene, Shape, ShapeId, Statistics};
+use std::collections::BTreeMap;
+
+use tesdf::collide::{
+    CollideError, CollideOptions, Contacts, HiddenOverlap, Reduction, Scene, Shape, ShapeId, Statistics,
+};
 use tesdf::encode::Length;
 
 use buffers::{Members, Products, ROW, WORD};
@@ -20,7 +24,8 @@ use crate::contacts::contacts;
 use crate::device::Device;
 use crate::images::Images;
 use crate::instances::Instances;
-use crate::kernels::{pairs, products};
+use crate::kernels::pairs;
+use crate::kernels::products::{self, DIRECTION_WORDS};
 use crate::placed::{FieldFrame, Placed};
 
 /// Finds contacts on a device; keeps shapes and buffers there from step to step.
@@ -230,7 +235,31 @@ impl Detector {
             unconverged,
             bytes: products_bytes + size_of_val(contacts.as_slice()),
         };
-        Ok(Contacts { contacts, statistics, reductions })
+        let hidden = HiddenOverlap::not_shown(self.overlaps(instances)?, &contacts);
+        Ok(Contacts { contacts, statistics, reductions, hidden })
+    }
+
+    /// The pairs that overlap, as far as contacts need not show it.
+    fn overlaps(&mut self, instances: &Instances) -> Result<Vec<HiddenOverlap>, GpuError> {
+        if self.report.counts[products::HIDDEN as usize] == 0 {
+            return Ok(Vec::new());
+        }
+        let count = self.report.counts[products::DIRECTIONS as usize] as usize;
+        let depths: Vec<f32> = self.device.read(&self.products.depths, count)?;
+        let directions: Vec<[u32; DIRECTION_WORDS]> = self.device.read(&self.products.directions, count)?;
+        self.report.read += size_of_val(depths.as_slice()) + size_of_val(directions.as_slice());
+        let mut deepest: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+        for (depth, [a, b, ..]) in depths.into_iter().zip(directions).filter(|(depth, _)| *depth > 0.0) {
+            let (a, b) = (a as usize, b as usize);
+            let of_pair = deepest.entry((a.min(b), a.max(b))).or_default();
+            *of_pair = of_pair.max(f64::from(depth) * instances.placed[b].unit);
+        }
+        let overlap = |((a, b), depth)| HiddenOverlap {
+            instance_a: instances.ids[a],
+            instance_b: instances.ids[b],
+            depth,
+        };
+        Ok(deepest.into_iter().map(overlap).collect())
     }
 }
 

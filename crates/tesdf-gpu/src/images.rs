@@ -127,6 +127,7 @@ impl Packed {
             row[assets::FACE_COUNT as usize] = records.len() as u32;
             row[assets::RECORDS as usize] = self.rows_at(records.into_iter().flat_map(four))?;
         }
+        row[assets::INNER_BALL as usize] = self.rows_at([inner_ball(shape.inner_ball())].into_iter())?;
         Ok(row)
     }
 
@@ -170,6 +171,7 @@ impl Packed {
         set(assets::TREE_BOXES, self.rows_at(roots.boxes.into_iter())?);
         set(assets::TREE, self.words_at(roots.tree.iter().flatten().copied())?);
         set(assets::TREE_NODES, roots.tree.len() as u32);
+        set(assets::INNER_BALL, self.rows_at([inner_ball(mesh.inner_ball)].into_iter())?);
         set(assets::BAD_VERTEX, assets::NONE);
         if !roots.tree.is_empty() {
             set(assets::FACE_VERTICES, self.words_at(mesh.faces.as_flattened().iter().copied())?);
@@ -248,6 +250,12 @@ fn with_owned(mut record: [f32; 16], owned: impl Iterator<Item = usize>) -> [f32
     let owned: u32 = owned.map(|k| 1 << (assets::OWNED_CORNERS + k as u32)).sum();
     record[15] = f32::from_bits(assets::HINTS | hints | owned);
     record
+}
+
+/// Middle and radius; 0 without a ball.
+fn inner_ball(ball: Option<(DVec3, f64)>) -> [f32; 4] {
+    let (center, radius) = ball.unwrap_or_default();
+    center.as_vec3().extend(radius as f32).to_array()
 }
 
 /// Levels of the face tree.

@@ -7,7 +7,7 @@ use rapier3d_f64::parry::query::{
     ClosestPoints, Contact as ParryContact, DefaultQueryDispatcher, NonlinearRigidMotion,
     PersistentQueryDispatcher, QueryDispatcher, ShapeCastHit, ShapeDistance, ShapeIntersection, Unsupported,
 };
-use tesdf::collide::{self, CollideError, CollideOptions, Contact, Instance, Placement, Scene};
+use tesdf::collide::{self, CollideError, CollideOptions, Contacts, Instance, Placement, Scene};
 
 use crate::known::{self, Known};
 use crate::manifolds::{self, FIRST};
@@ -53,7 +53,7 @@ impl TesdfDispatcher {
     }
 
     /// Contacts up to a distance in the frame of the first shape, which is instance 0.
-    fn contacts(&self, pos12: &Pose, pair: [Known; 2], distance: f64) -> Result<Vec<Contact>, CollideError> {
+    fn contacts(&self, pos12: &Pose, pair: [Known; 2], distance: f64) -> Result<Contacts, CollideError> {
         let mut scene = Scene::new();
         let placed = |known: &Known, pose| Placement { pose, scale: known.scale };
         let [first, second] = pair;
@@ -63,7 +63,7 @@ impl TesdfDispatcher {
             scene.add(Instance { scale, ..Instance::new(shape, pose) })?;
         }
         let options = CollideOptions { contact_distance: distance, speculative_time: 0.0, ..self.options };
-        Ok(collide::detect(&scene, &options)?.contacts)
+        collide::detect(&scene, &options)
     }
 }
 
@@ -80,7 +80,7 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TesdfDispat
         let begin = Instant::now();
         let pair = self.pair(g1, g2)?;
         let found = self.contacts(pos12, pair, prediction.max(0.0));
-        let contacts = found.as_deref().unwrap_or(&[]);
+        let contacts = found.as_ref().map_or(&[][..], |found| &found.contacts);
         manifolds::replace(contacts, pos12, manifolds, workspace);
         if let Some(record) = &self.record {
             let mut record = record.lock();
@@ -118,8 +118,8 @@ impl QueryDispatcher for TesdfDispatcher {
         g2: &dyn Shape,
     ) -> Result<ShapeIntersection, Unsupported> {
         let pair = self.pair(g1, g2)?;
-        let contacts = self.contacts(pos12, pair, 0.0).map_err(|_| Unsupported)?;
-        Ok(ShapeIntersection::new(!contacts.is_empty()))
+        let found = self.contacts(pos12, pair, 0.0).map_err(|_| Unsupported)?;
+        Ok(ShapeIntersection::new(!(found.contacts.is_empty() && found.hidden.is_empty())))
     }
 
     /// The deepest contact.
@@ -131,7 +131,7 @@ impl QueryDispatcher for TesdfDispatcher {
         prediction: f64,
     ) -> Result<Option<ParryContact>, Unsupported> {
         let pair = self.pair(g1, g2)?;
-        let contacts = self.contacts(pos12, pair, prediction.max(0.0)).map_err(|_| Unsupported)?;
+        let contacts = self.contacts(pos12, pair, prediction.max(0.0)).map_err(|_| Unsupported)?.contacts;
         let deepest = contacts.iter().min_by(|c, d| c.distance.total_cmp(&d.distance));
         Ok(deepest.map(|c| {
             let flipped = c.instance_a != FIRST;

@@ -1,7 +1,7 @@
 use std::time::Instant;
 
 use rapier3d_f64::geometry::PairContacts;
-use tesdf::collide::{CollideOptions, Contact, Pose};
+use tesdf::collide::{CollideOptions, Contact, HiddenOverlap, Pose, hidden_overlaps};
 use tesdf_sim::{Dynamics, DynamicsError, State, StepReport, System};
 
 use crate::RapierOptions;
@@ -24,6 +24,7 @@ pub struct RapierEngine {
     /// Made by the first step, and anew when the prediction distance changes: Rapier keeps boxes that were made with it.
     world: Option<World>,
     contacts: Vec<Contact>,
+    hidden: Vec<HiddenOverlap>,
 }
 
 impl RapierEngine {
@@ -40,8 +41,8 @@ impl RapierEngine {
     ) -> Result<Self, DynamicsError> {
         options.validate()?;
         collide.validate()?;
-        let (record, contacts) = (Record::default(), Vec::new());
-        Ok(Self { system, collide, options, record, world: None, contacts })
+        let (record, contacts, hidden) = (Record::default(), Vec::new(), Vec::new());
+        Ok(Self { system, collide, options, record, world: None, contacts, hidden })
     }
 
     /// Bodies and colliders as Rapier has them, in the order of the system's bodies; `None` before the first step.
@@ -155,9 +156,12 @@ impl Dynamics for RapierEngine {
             });
         }
         let contacts = self.contacts_of(&world, &found);
+        // Rapier asks pair by pair, and knows of contacts alone.
+        let before = self.system.states().to_vec();
+        let hidden = hidden_overlaps(self.system.scene_at(&before)?, &self.collide, &contacts)?;
         let states = world.states(self.system.states());
         self.set_states(&states)?;
-        self.contacts = contacts;
+        (self.contacts, self.hidden) = (contacts, hidden);
         let report = StepReport {
             contacts: self.contacts.len(),
             deepest: self.contacts.iter().map(|c| c.distance).reduce(f64::min),
@@ -174,5 +178,9 @@ impl Dynamics for RapierEngine {
 
     fn contacts(&self) -> &[Contact] {
         &self.contacts
+    }
+
+    fn hidden(&self) -> &[HiddenOverlap] {
+        &self.hidden
     }
 }

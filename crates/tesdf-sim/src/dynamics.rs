@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use tesdf::collide::{CollideError, Contact};
+use tesdf::collide::{CollideError, Contact, HiddenOverlap};
 
 use crate::{State, System};
 
@@ -24,6 +24,9 @@ pub trait Dynamics {
 
     /// The contacts at the beginning of the last step, those ahead of time included; sorted as the detector sorts.
     fn contacts(&self) -> &[Contact];
+
+    /// The pairs that overlapped at the beginning of the last step although no contact showed it.
+    fn hidden(&self) -> &[HiddenOverlap];
 }
 
 /// What a step did.

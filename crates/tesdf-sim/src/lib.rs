@@ -25,5 +25,5 @@ mod system;
 pub use dynamics::{Dynamics, DynamicsError, StepReport};
 pub use mass::{MassError, MassProperties};
 pub use record::RunRecord;
-pub use simulate::{Moment, SimulateError, Summary, simulate};
+pub use simulate::{HiddenPair, Moment, SimulateError, Summary, simulate};
 pub use system::{Body, Mass, State, System};

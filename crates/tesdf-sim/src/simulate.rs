@@ -1,8 +1,10 @@
 //! A scene from its beginning to its end.
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use serde::Serialize;
+use tesdf::collide::HiddenOverlap;
 
 use crate::criterion::{ScrewReport, ScrewTracker};
 use crate::scene_file::SceneFile;
@@ -34,7 +36,8 @@ pub struct Summary {
     pub mean_contacts: f64,
     /// The most.
     pub most_contacts: usize,
-    /// Greatest penetration that the detection saw at the beginning of a step, m; 0 when it saw none.
+    /// Greatest penetration that the detection saw at the beginning of a step, m; 0 when it saw none. Where contacts hide an overlap its
+    /// depth is taken, at least.
     pub deepest_penetration: f64,
     /// Kinetic energy at the end, J.
     pub kinetic_energy: f64,
@@ -48,10 +51,34 @@ pub struct Summary {
     pub detection_ms: f64,
     /// Wall time per step for the rest, ms.
     pub solution_ms: f64,
+    /// Pairs of bodies that overlapped although no contact showed it, so that nothing kept them apart; sorted by bodies. A run with such
+    /// pairs meets no criterion.
+    pub hidden: Vec<HiddenPair>,
     /// The screw of the criterion.
     pub screw: Option<ScrewReport>,
     /// Whether the criterion holds; `None` without one.
     pub passed: Option<bool>,
+}
+
+/// Two bodies that overlapped although no contact showed it, during a run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HiddenPair {
+    /// Names of the bodies.
+    pub bodies: [String; 2],
+    /// The first step at whose beginning they did, from 0.
+    pub first_step: u64,
+    /// The number of such steps.
+    pub steps: u64,
+    /// The greatest depth, m, at least.
+    pub depth: f64,
+}
+
+impl HiddenPair {
+    /// A sentence for people.
+    pub fn message(&self) -> String {
+        let Self { bodies: [a, b], first_step, depth, .. } = self;
+        format!("bodies {a} and {b} overlapped by {depth:.3e} m or more, from step {first_step} on, and no contact showed it")
+    }
 }
 
 /// Why a run ended early.
@@ -105,13 +132,17 @@ pub fn simulate(
             tracker.observe(system, h);
         }
         totals.add(&report);
+        totals.add_hidden(step, engine.hidden(), system);
         let moment = Moment { step: step + 1, steps, time, report, system };
         if watch(&moment).is_break() {
             return Err(SimulateError::Interrupted { steps: step + 1 });
         }
     }
     let system = engine.system();
-    let screw = tracker.map(|tracker| tracker.report(system));
+    let mut screw = tracker.map(|tracker| tracker.report(system));
+    if let Some(screw) = &mut screw {
+        screw.failures.extend(totals.hidden.values().map(HiddenPair::message));
+    }
     let summary = Summary {
         seconds: steps as f64 * h,
         kinetic_energy: system.kinetic_energy(),
@@ -131,6 +162,8 @@ struct Totals {
     deepest: f64,
     iterations: u64,
     unconverged: u64,
+    /// By the numbers of the bodies.
+    hidden: BTreeMap<[usize; 2], HiddenPair>,
     detection: Duration,
     solution: Duration,
 }
@@ -147,7 +180,19 @@ impl Totals {
         self.solution += report.solution;
     }
 
-    fn summary(&self) -> Summary {
+    fn add_hidden(&mut self, step: u64, overlaps: &[HiddenOverlap], system: &System) {
+        for &HiddenOverlap { instance_a, instance_b, depth } in overlaps {
+            let (Some(a), Some(b)) = (system.body_of(instance_a), system.body_of(instance_b)) else { continue };
+            let bodies = [a, b].map(|body| system.bodies()[body].name.clone());
+            let first = HiddenPair { bodies, first_step: step, steps: 0, depth };
+            let pair = self.hidden.entry([a, b]).or_insert(first);
+            pair.steps += 1;
+            pair.depth = pair.depth.max(depth);
+            self.deepest = self.deepest.max(depth);
+        }
+    }
+
+    fn summary(self) -> Summary {
         let n = self.steps as f64;
         let ms = |d: Duration| d.as_secs_f64() * 1e3 / n;
         Summary {
@@ -159,6 +204,7 @@ impl Totals {
             unconverged_steps: self.unconverged,
             detection_ms: ms(self.detection),
             solution_ms: ms(self.solution),
+            hidden: self.hidden.into_values().collect(),
             ..Summary::default()
         }
     }

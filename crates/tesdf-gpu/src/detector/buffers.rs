@@ -21,6 +21,8 @@ pub struct Products {
     weights: Option<Buffer>,
     pub contact_words: Buffer,
     pub contact_rows: Buffer,
+    /// Of directions: how deep, where no contact need show it.
+    pub depths: Buffer,
     pub groups: Buffer,
     /// From the first reduction on.
     pub members: Option<Members>,
@@ -39,6 +41,7 @@ impl Products {
             weights: None,
             contact_words: buffer("contacts", room.contacts, products::CONTACT_WORDS * WORD)?,
             contact_rows: buffer("rows of contacts", room.contacts, products::CONTACT_ROWS * ROW)?,
+            depths: buffer("depths of directions", room.directions, WORD)?,
             groups: device.empty("groups", 3 * WORD)?,
             members: None,
         })
@@ -58,9 +61,9 @@ impl Products {
     /// Names and bytes of all.
     pub fn account(&self) -> Vec<(&'static str, usize)> {
         let Self {
-            directions, maps, blocks, meshlets, polygons, contact_words, contact_rows, groups, ..
+            directions, maps, blocks, meshlets, polygons, contact_words, contact_rows, depths, groups, ..
         } = self;
-        let own = [directions, maps, blocks, meshlets, polygons, contact_words, contact_rows, groups];
+        let own = [directions, maps, blocks, meshlets, polygons, contact_words, contact_rows, depths, groups];
         let members = self.members.as_ref().map(Members::buffers);
         let all = own.into_iter().chain(&self.weights).chain(members.into_iter().flatten());
         all.map(|buffer| (buffer.name(), buffer.bytes())).collect()

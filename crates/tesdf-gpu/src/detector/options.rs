@@ -131,7 +131,8 @@ pub struct DeviceReport {
     /// Bytes that were read back.
     pub read: usize,
     /// What was counted: directions, blocks, meshlets, polygons, contacts, filtered, candidates, broken off, evaluations,
-    /// point–triangle distances, which were asked for; instances with a vertex where none can be; then of a reduction: contacts that did not converge, pairs that touch, their members, contacts kept.
+    /// point–triangle distances, which were asked for; instances with a vertex where none can be; then of a reduction: contacts that did not converge, pairs that touch, their members, contacts kept; at
+    /// last threads that found an overlap that no contact need show.
     pub counts: [u32; products::COUNTERS],
     /// Device time by stage, when it was asked for.
     pub stages: Vec<(&'static str, Duration)>,

@@ -8,7 +8,7 @@ use super::{Counting, Detector, Exchange, Lanes, Pruning, reduction};
 use crate::GpuError;
 use crate::device::{Buffer, spread};
 use crate::instances::Instances;
-use crate::kernels::{broad, clip, exact, narrow, outside, pairs, products};
+use crate::kernels::{broad, clip, exact, hidden, members, narrow, outside, pairs, products};
 
 /// Threads of a group where each works alone.
 const GROUP: u32 = 64;
@@ -35,10 +35,11 @@ impl Detector {
             stages: Stages::new(&device, timing),
         };
         pass.pairs(instances)?;
-        pass.meshlets()?;
+        let per_meshlet = pass.meshlets()?;
+        pass.hidden(per_meshlet.clone())?;
         match weights {
-            None => pass.nodes()?,
-            Some((method, weights)) => pass.faces(instances, method, &weights)?,
+            None => pass.nodes(per_meshlet)?,
+            Some((method, weights)) => pass.faces(per_meshlet, instances, method, &weights)?,
         }
         pass.reduction()?;
         let Pass { sent, stages: Stages { launches, times, .. }, .. } = pass;
@@ -147,8 +148,8 @@ impl Pass<'_> {
         })
     }
 
-    /// Which meshlets can touch.
-    fn meshlets(&mut self) -> Result<(), GpuError> {
+    /// Which meshlets can touch; groups of launches over them.
+    fn meshlets(&mut self) -> Result<CubeCount, GpuError> {
         let Detector { device, images, products, .. } = self.detector;
         let Products { room, directions, maps, blocks, meshlets, .. } = products;
         let per_block = self.groups_for(room.blocks, 1, products::BLOCKS)?;
@@ -168,15 +169,46 @@ impl Pass<'_> {
                 room.meshlets,
                 prune,
             );
+        })?;
+        self.groups_for(room.meshlets, 1, products::MESHLETS)
+    }
+
+    /// Overlaps that no contact need show.
+    fn hidden(&mut self, per_meshlet: CubeCount) -> Result<(), GpuError> {
+        let Detector { device, images, products, .. } = self.detector;
+        let Products { room, directions, maps, meshlets, depths, .. } = products;
+        let by_faces = u32::from(self.options.mode == Mode::Node);
+        self.stages.run("no depths", || {
+            members::clear::launch(
+                device.client(),
+                spread(room.directions.div_ceil(members::GROUP)),
+                CubeDim::new_1d(members::GROUP),
+                depths.words(),
+                room.directions,
+            );
+        })?;
+        self.stages.run("hidden overlaps", || {
+            hidden::hidden::launch(
+                device.client(),
+                per_meshlet,
+                CubeDim::new_1d(narrow::LANES),
+                images.argument(),
+                directions.words(),
+                maps.rows(),
+                meshlets.words(),
+                self.counters.words(),
+                depths.words(),
+                room.meshlets,
+                by_faces,
+            );
         })
     }
 
     /// Nodes with their cells, and Node-TES.
-    fn nodes(&mut self) -> Result<(), GpuError> {
+    fn nodes(&mut self, per_meshlet: CubeCount) -> Result<(), GpuError> {
         let Detector { device, images, products, .. } = self.detector;
         let Products { room, directions, maps, meshlets, polygons, contact_words, contact_rows, .. } =
             products;
-        let per_meshlet = self.groups_for(room.meshlets, 1, products::MESHLETS)?;
         let prune = self.prune();
         self.stages.run("nodes", || {
             clip::nodes::launch(
@@ -214,11 +246,16 @@ impl Pass<'_> {
     }
 
     /// Faces clipped by their cells, and Face-TES or the exact minimum.
-    fn faces(&mut self, instances: &Instances, method: FaceMethod, weights: &Buffer) -> Result<(), GpuError> {
+    fn faces(
+        &mut self,
+        per_meshlet: CubeCount,
+        instances: &Instances,
+        method: FaceMethod,
+        weights: &Buffer,
+    ) -> Result<(), GpuError> {
         let Detector { device, images, products, options: with, .. } = self.detector;
         let Products { room, directions, maps, meshlets, polygons, contact_words, contact_rows, .. } =
             products;
-        let per_meshlet = self.groups_for(room.meshlets, 1, products::MESHLETS)?;
         let (counters, prune) = (&self.counters, self.prune());
         self.stages.run("polygons", || {
             clip::polygons::launch(

@@ -78,6 +78,9 @@ pub const TREE_LEVELS: u32 = 35;
 pub const VERTEX_COUNT: u32 = 36;
 /// The lowest vertex that was moved to where nothing can be; [`NONE`] when all is well.
 pub const BAD_VERTEX: u32 = 37;
+/// Row of a ball inside of the shape: middle and radius; 0 without one, negative when the vertices have moved here, so that the middle need not be
+/// inside.
+pub const INNER_BALL: u32 = 38;
 
 /// No such array, or no cell.
 pub const NONE: u32 = u32::MAX;

@@ -11,7 +11,7 @@ use cubecl_environment::stream::StreamId;
 
 use super::assets::AssetsLaunch;
 use super::{
-    broad, choice, clip, deform, exact, members, narrow, outside, pairs, products, query, reduce, sample,
+    broad, choice, clip, deform, exact, hidden, members, narrow, outside, pairs, products, query, reduce, sample,
 };
 
 use crate::cuda::Count;
@@ -69,6 +69,11 @@ pub fn kernels(device: &Arc<DeviceProperties>, target: &Arc<TargetProperties>) -
         Indirect clip::polygons,
         group,
         (assets(), words(), rows(), words(), words(), words(), rows(), 1, 1, 1)
+    );
+    kernel!(
+        Indirect hidden::hidden,
+        group,
+        (assets(), words(), rows(), words(), words(), words(), 1, 1)
     );
     kernel!(
         Indirect outside::outside_polygons,

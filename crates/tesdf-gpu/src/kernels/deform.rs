@@ -5,7 +5,8 @@
 use cubecl::prelude::*;
 
 use super::assets::{
-    BAD_VERTEX, BOUND_UNIT, BOXES, CHILDREN, EXACT_LISTS, FACE_COUNT, FACE_LEVELS, FACE_VERTICES, HIGH, LOW,
+    BAD_VERTEX, BOUND_UNIT, BOXES, CHILDREN, EXACT_LISTS, FACE_COUNT, FACE_LEVELS, FACE_VERTICES, HIGH,
+    INNER_BALL, LOW,
     MESHLET_COUNT, MESHLET_FACES, MESHLETS, NONE, RECORDS, SIDE, STRIDE, TET_VERTICES, TETRAHEDRA, TREE,
     TREE_BOXES, TREE_LEVELS, TREE_NODES, VERTEX_COUNT,
 };
@@ -321,6 +322,10 @@ pub fn refit(
         // Of moved lists and cells nothing is proved.
         table[first + EXACT_LISTS as usize] = 0u32;
         table[first + BOUND_UNIT as usize] = 0u32;
+        // As thick as before, more or less, but not where.
+        let inner = entry(table, shape, INNER_BALL) as usize;
+        let thickness = rows[inner].extract(3usize).abs();
+        rows[inner] = four(0.0f32, 0.0f32, 0.0f32, -thickness);
         let all = of_node(rows, boxes, 0u32);
         table[first + LOW as usize] = u32::reinterpret(all.low.x);
         table[first + LOW as usize + 1usize] = u32::reinterpret(all.low.y);

@@ -19,6 +19,7 @@ pub mod exact;
 pub mod field;
 pub mod greatest_minimum;
 pub mod group;
+pub mod hidden;
 pub mod hull;
 pub mod list;
 pub mod locate;

@@ -29,18 +29,18 @@ const QUARTERINGS: u32 = 12;
 /// A quarter of a quarter of … a face: its corners as weights of the second and the third corner of the face.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-struct Quarter {
-    a_s: f32,
-    a_t: f32,
-    b_s: f32,
-    b_t: f32,
-    c_s: f32,
-    c_t: f32,
+pub struct Quarter {
+    pub a_s: f32,
+    pub a_t: f32,
+    pub b_s: f32,
+    pub b_t: f32,
+    pub c_s: f32,
+    pub c_t: f32,
 }
 
 /// By two bits a level, the last level lowest: 0 to 2 at that corner, 3 in the middle.
 #[cube]
-fn quarter(path: u32, levels: u32) -> Quarter {
+pub fn quarter(path: u32, levels: u32) -> Quarter {
     let mut a_s = 0.0f32;
     let mut a_t = 0.0f32;
     let mut b_s = 1.0f32;

@@ -34,8 +34,10 @@ pub const TOUCHING: u32 = 12;
 pub const MEMBERS: u32 = 13;
 /// Contacts that the reduction keeps.
 pub const KEPT: u32 = 14;
+/// Threads that found an overlap that no contact need show: see [`hidden`](super::hidden).
+pub const HIDDEN: u32 = 15;
 /// How many counters there are.
-pub const COUNTERS: usize = 15;
+pub const COUNTERS: usize = 16;
 
 /// Words of a direction: instance a, instance b, shape of a, shape of b.
 pub const DIRECTION_WORDS: usize = 4;

@@ -2,7 +2,7 @@ use std::time::Instant;
 
 use nalgebra::Vector6;
 use rayon::prelude::*;
-use tesdf::collide::{CollideError, CollideOptions, Contact, Contacts, InstanceId, Pose, Scene};
+use tesdf::collide::{CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, Pose, Scene};
 
 use super::NewtonOptions;
 use super::integrate::{free_velocity, moved, unpack, velocity};
@@ -38,6 +38,7 @@ pub struct Newton {
     /// Diagonal of each body's bounds.
     sizes: Vec<f64>,
     contacts: Vec<Contact>,
+    hidden: Vec<HiddenOverlap>,
 }
 
 /// What stays the same within a step.
@@ -84,7 +85,8 @@ impl Newton {
             Ok(system.scene().shape(instance.shape)?.diagonal() * instance.scale)
         };
         let sizes = system.bodies().iter().map(size).collect::<Result<_, CollideError>>()?;
-        Ok(Self { system, detector: Box::new(detector), collide, options, sizes, contacts: Vec::new() })
+        let (detector, contacts, hidden) = (Box::new(detector), Vec::new(), Vec::new());
+        Ok(Self { system, detector, collide, options, sizes, contacts, hidden })
     }
 
     fn begin(&self, h: f64) -> Step {
@@ -116,10 +118,10 @@ impl Newton {
         states
     }
 
-    fn detect(&mut self, step: &mut Step, states: &[State]) -> Result<Vec<Contact>, DynamicsError> {
+    fn detect(&mut self, step: &mut Step, states: &[State]) -> Result<Contacts, DynamicsError> {
         let start = Instant::now();
         let options = CollideOptions { speculative_time: self.options.speculation * step.h, ..self.collide };
-        let contacts = self.detector.detect(self.system.scene_at(states)?, &options)?.contacts;
+        let contacts = self.detector.detect(self.system.scene_at(states)?, &options)?;
         step.report.detections += 1;
         step.report.detection += start.elapsed();
         Ok(contacts)
@@ -246,7 +248,7 @@ impl Newton {
             let depths = Depths::of_contacts(contacts);
             for _ in 0..self.options.redetections {
                 let predicted = self.moved(step, &velocities);
-                let contacts = self.detect(step, &predicted)?;
+                let contacts = self.detect(step, &predicted)?.contacts;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
                 rows = self.predicted_rows(step, &contacts, &poses, &velocities, &depths);
                 rows.retain(|row| !stays(row));
@@ -283,7 +285,7 @@ impl Dynamics for Newton {
         for (free, target) in step.free.iter().zip(&step.target) {
             (ahead[free.body].linear, ahead[free.body].angular) = unpack(target);
         }
-        let contacts = self.detect(&mut step, &ahead)?;
+        let Contacts { contacts, hidden, .. } = self.detect(&mut step, &ahead)?;
         let [velocities, carried] = self.velocities(&mut step, &contacts)?;
         let mut states = self.moved(&step, &velocities);
         for (free, v) in step.free.iter().zip(&carried) {
@@ -294,12 +296,16 @@ impl Dynamics for Newton {
         report.contacts = contacts.len();
         report.deepest = contacts.iter().map(|c| c.distance).reduce(f64::min);
         report.solution = begin.elapsed().saturating_sub(report.detection);
-        self.contacts = contacts;
+        (self.contacts, self.hidden) = (contacts, hidden);
         Ok(report)
     }
 
     fn contacts(&self) -> &[Contact] {
         &self.contacts
+    }
+
+    fn hidden(&self) -> &[HiddenOverlap] {
+        &self.hidden
     }
 }
 

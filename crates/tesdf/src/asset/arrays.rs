@@ -1,3 +1,5 @@
+use glam::DVec3;
+
 use super::{Conforming, TeSdf};
 use crate::domain::DomainCube;
 use crate::geometry::{Aabb, LocalFrame};
@@ -42,6 +44,8 @@ pub struct Arrays<'a> {
     pub bounds: Aabb,
     /// How far around the solid the domain is sure to reach.
     pub band: f64,
+    /// Middle and radius of a ball inside of the solid; see [`Shape::inner_ball`](crate::collide::Shape::inner_ball).
+    pub inner_ball: Option<(DVec3, f64)>,
     /// Whether every list is proved to be exact where the vertices are now.
     pub has_exact_lists: bool,
     /// Corner vertices of the tetrahedra of a conforming domain, each a root of the forest; none for the bisection domain, whose roots are
@@ -57,6 +61,7 @@ impl TeSdf {
     /// What kernels of other devices read. Makes the bounds of the cells when nothing has made them yet.
     pub fn arrays(&self) -> Arrays<'_> {
         let (cell_bounds, cell_bound_unit) = self.cell_bounds().bytes();
+        let ball = self.inner_ball();
         Arrays {
             frame: self.frame,
             cube: self.cube,
@@ -75,6 +80,7 @@ impl TeSdf {
             cell_bound_unit,
             bounds: self.local_bounds(),
             band: self.band(),
+            inner_ball: (ball.radius > 0.0).then(|| (ball.center - self.cube.middle(), ball.radius)),
             has_exact_lists: self.has_exact_lists(),
             tetrahedra: self.conforming.as_ref().map_or(&[], Conforming::tetrahedra),
             vertices: &self.vertices,

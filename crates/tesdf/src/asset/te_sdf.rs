@@ -8,7 +8,7 @@ use super::about::About;
 use super::cell_bounds::CellBounds;
 use super::conforming::Conforming;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
-use super::{AssetError, Container, Section, SharedSection, save_atomic, write_container};
+use super::{AssetError, Container, InnerBall, Section, SharedSection, save_atomic, write_container};
 use crate::deform::Motion;
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
@@ -63,6 +63,8 @@ pub struct TeSdf {
     /// What has moved since it was opened, if anything has.
     pub(crate) motion: Option<Motion>,
     lowest_faces: OnceLock<Vec<u32>>,
+    pub(super) inner_ball: OnceLock<InnerBall>,
+    pub(super) corner_reaches: OnceLock<Vec<f32>>,
 }
 
 impl TeSdf {
@@ -118,6 +120,8 @@ impl TeSdf {
             cell_bounds: OnceLock::new(),
             motion: None,
             lowest_faces: OnceLock::new(),
+            inner_ball: OnceLock::new(),
+            corner_reaches: OnceLock::new(),
         };
         asset.check_mesh()?;
         asset.conforming = Conforming::open(&asset)?;
@@ -147,6 +151,8 @@ impl TeSdf {
     pub(crate) fn shape_changed(&mut self) {
         self.bounds = self.bounds_of_faces();
         self.cell_bounds = OnceLock::from(CellBounds::none());
+        self.inner_ball = OnceLock::new();
+        self.corner_reaches = OnceLock::new();
     }
 
     fn bounds_of_faces(&self) -> Aabb {

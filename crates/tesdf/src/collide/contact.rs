@@ -1,7 +1,7 @@
 use glam::DVec3;
 use serde::Serialize;
 
-use super::InstanceId;
+use super::{HiddenOverlap, InstanceId};
 
 /// A place where body *a* touches body *b*, in the world's unit and frame.
 ///
@@ -108,4 +108,7 @@ pub struct Contacts {
     pub statistics: Statistics,
     /// What the reduction has lost, by pair of instances; empty without reduction.
     pub reductions: Vec<PairReduction>,
+    /// Pairs that overlap although no contact shows it, as the mode [`Node`](super::Mode::Node) has them; sorted by world and instances.
+    /// Contacts will not keep these apart.
+    pub hidden: Vec<HiddenOverlap>,
 }

@@ -1,6 +1,7 @@
 use rayon::prelude::*;
 
 use super::field::FieldBody;
+use super::hidden;
 use super::instance_pairs::instance_pairs;
 use super::narrow::{Minimum, Search};
 use super::surface::{Candidates, Part, SurfaceBody};
@@ -15,6 +16,7 @@ const TASK: usize = 64;
 /// All contacts of a scene up to the contact distance.
 ///
 /// Both directions of each pair are evaluated: faces (or nodes) of the one against the field of the other, and the other way around.
+/// Pairs that overlap although no contact shows it are in [`Contacts::hidden`].
 /// Runs on the current rayon pool; the result is the same on any number of threads.
 ///
 /// # Errors
@@ -52,7 +54,8 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
     let all = contacts.len();
     let (contacts, reductions) = reduce_pairs(contacts, options.reduction);
     statistics.reduced = all - contacts.len();
-    Ok(Contacts { contacts, statistics, reductions })
+    let hidden = hidden::among(&directions, options.mode, &contacts);
+    Ok(Contacts { contacts, statistics, reductions, hidden })
 }
 
 /// Within one ordered pair of instances. A point in no cell may be one of several pieces outside of the cube.

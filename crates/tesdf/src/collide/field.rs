@@ -133,6 +133,14 @@ impl<'a> FieldBody<'a> {
         distance - slack - radius
     }
 
+    /// Radius of a ball inside, in the field's frame; see [`Shape::inner_ball`].
+    pub fn inner_radius(&self) -> Option<f64> {
+        match self.field {
+            Field::Mesh(asset) => Some(asset.inner_ball().radius).filter(|&radius| radius > 0.0),
+            Field::Simple(simple) => simple.inner_radius(),
+        }
+    }
+
     /// The names of a face and a feature, as the user knows them.
     pub fn names(&self, value: &FieldValue) -> (u32, FeatureB) {
         let Field::Mesh(asset) = self.field else {

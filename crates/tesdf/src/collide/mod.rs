@@ -9,6 +9,7 @@
 //! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
 //! - [`candidates`](candidates()): what the broad and the middle phase leave, for debug views.
 //! - [`reduce_pairs`]: fewer contacts per pair, with a bound on what is lost; [`wrench_error`] tells what is.
+//! - [`hidden_overlaps`]: pairs that overlap although no contact shows it, which detections tell beside their contacts.
 //! - [`clearance`](clearance()): the signed distance between two instances, with witnesses.
 //! - [`time_of_impact`](time_of_impact()): when two moving instances first touch, never too late.
 //! - [`why`](why()): why a contact is, or is not, there.
@@ -21,6 +22,7 @@ mod contact;
 mod detect;
 mod error;
 mod field;
+mod hidden;
 mod hull;
 mod instance_pairs;
 mod least;
@@ -45,6 +47,7 @@ pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};
 pub use detect::detect;
 pub use error::CollideError;
+pub use hidden::{HiddenOverlap, hidden_overlaps};
 pub use instance_pairs::{InstancePair, instance_pairs};
 pub use motion::Motion;
 pub use options::{CollideOptions, FaceMethod, Mode, Reduction};

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::CollideError;
 use super::simple::Simple;
 use crate::TeSdf;
+use crate::asset::InnerBall;
 use crate::geometry::Aabb;
 
 /// A body's geometry, in its own frame; shared by all instances.
@@ -60,17 +61,22 @@ impl Shape {
 
     /// Bounds in the shape's frame; those of a plane are infinite.
     pub fn bounds(&self) -> Aabb {
-        let symmetric = |half: DVec3| Aabb { min: -half, max: half };
         match self {
             Self::Mesh(asset) => asset.bounds(),
-            Self::Plane => {
-                Aabb { min: DVec3::NEG_INFINITY, max: DVec3::new(f64::INFINITY, f64::INFINITY, 0.0) }
+            simple => Simple::new(simple).bounds(),
+        }
+    }
+
+    /// Middle and radius of a ball inside, in the shape's frame: how thick the body is, at least. Of a mesh it is the largest of those that touch
+    /// the surface at the middles of up to 64 faces; made on first use. `None` for a plane, and for a mesh in which no ball was found.
+    pub fn inner_ball(&self) -> Option<(DVec3, f64)> {
+        match self {
+            Self::Mesh(asset) => {
+                let InnerBall { center, radius } = asset.inner_ball();
+                let frame = asset.frame;
+                (radius > 0.0).then(|| (frame.to_world(center), radius * frame.inverse_scale()))
             }
-            Self::Box { half_extents } => symmetric(*half_extents),
-            Self::Sphere { radius } => symmetric(DVec3::splat(*radius)),
-            Self::Capsule { half_height, radius } => {
-                symmetric(DVec3::new(*radius, *radius, half_height + radius))
-            }
+            simple => Simple::new(simple).inner_radius().map(|radius| (DVec3::ZERO, radius)),
         }
     }
 

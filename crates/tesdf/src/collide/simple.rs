@@ -3,7 +3,7 @@ use glam::DVec3;
 
 use super::Shape;
 use super::field::FieldValue;
-use crate::geometry::Feature;
+use crate::geometry::{Aabb, Feature};
 
 /// A convex shape whose signed distance is a formula. All of the fields are convex functions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +48,27 @@ impl Simple {
             }
         };
         FieldValue { distance, gradient, closest_point, position, feature: Feature::Face }
+    }
+
+    /// Bounds; those of a plane are infinite.
+    pub fn bounds(&self) -> Aabb {
+        let half = match *self {
+            Self::Plane => {
+                return Aabb { min: DVec3::NEG_INFINITY, max: DVec3::new(f64::INFINITY, f64::INFINITY, 0.0) };
+            }
+            Self::Box(half) => half,
+            Self::Round { half_height, radius } => DVec3::new(radius, radius, half_height + radius),
+        };
+        Aabb { min: -half, max: half }
+    }
+
+    /// The radius of the largest ball inside, around the origin; none for a plane, which has no largest.
+    pub fn inner_radius(&self) -> Option<f64> {
+        match *self {
+            Self::Plane => None,
+            Self::Box(half) => Some(half.min_element()),
+            Self::Round { radius, .. } => Some(radius),
+        }
     }
 
     /// What is tested of the shape as a surface: parts, each within `radius` of a convex polygon of up to three points.

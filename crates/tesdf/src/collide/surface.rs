@@ -223,6 +223,39 @@ impl<'a> SurfaceBody<'a> {
         })
     }
 
+    /// The greatest distance of a point of the faces below from the nearest corner of its face, in the field's frame.
+    pub fn corner_reach(&self, child: TreeChild) -> f64 {
+        match (self.shape, child) {
+            (Shape::Mesh(asset), TreeChild::Node(node)) => {
+                f64::from(asset.corner_reaches()[node as usize]) * asset.frame.inverse_scale() * self.scale
+            }
+            // Faces are looked at one by one.
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The [`inner ball`](Shape::inner_ball) in the field's frame: middle and radius.
+    pub fn inner_ball(&self) -> Option<(DVec3, f64)> {
+        let (center, radius) = self.shape.inner_ball()?;
+        Some((self.to_field(center), radius * self.scale))
+    }
+
+    /// Whether the bounds of the shape and a box of the field's frame may have a point in common: no side of either parts them.
+    pub fn may_meet(&self, other: Aabb) -> bool {
+        let own = self.shape.bounds();
+        let around = |b: Aabb, to: &dyn Fn(DVec3) -> DVec3| {
+            let corner = |k: usize| {
+                let pick = |axis: usize| if k >> axis & 1 == 1 { b.max[axis] } else { b.min[axis] };
+                to(DVec3::new(pick(0), pick(1), pick(2)))
+            };
+            Aabb::of(&std::array::from_fn::<_, 8, _>(corner))
+        };
+        let back = self.linear.transpose() * (1.0 / (self.scale * self.scale));
+        other.min.cmple(other.max).all()
+            && around(own, &|p| self.to_field(p)).overlaps(other)
+            && around(other, &|p| back * (p - self.shift)).overlaps(own)
+    }
+
     /// The leaves of the face tree that can come within `reach` of the solid: a node is left out when the ball around its box
     /// is out of the field's reach (the field is 1-Lipschitz).
     fn visit_leaves(&self, asset: &TeSdf, field: &FieldBody, reach: f64, mut leaf: impl FnMut(u32, u32)) {
@@ -271,6 +304,14 @@ impl<'a> SurfaceBody<'a> {
 }
 
 impl FieldBody<'_> {
+    /// Bounds of the body, in the field's frame; endless for a plane.
+    pub fn bounds(&self) -> Aabb {
+        match self.field {
+            Field::Mesh(asset) => asset.local_bounds(),
+            Field::Simple(simple) => simple.bounds(),
+        }
+    }
+
     /// A ball around the body, in the field's frame; endless for a plane.
     fn ball(&self) -> (DVec3, f64) {
         let bounds = match self.field {

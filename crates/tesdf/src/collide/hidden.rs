@@ -1,0 +1,195 @@
+//! Overlaps that no contact shows.
+//!
+//! A node tells of an overlap only where it is inside of the other body. Two equal boxes, one of which is moved along an edge, overlap
+//! without such a node, and so do two bars that cross like a plus sign. Two bodies in one place overlap although their surfaces are
+//! nowhere inside of each other, so that no face tells either.
+//!
+//! Two searches find them, and neither changes a contact:
+//! - for nodes, the faces of each body in the field of the other. A face is nowhere deeper than its deepest corner by more than its
+//!   [`corner_reach`], so finely meshed faces are passed over unseen;
+//! - in every mode, a ball inside of each body in the field of the other.
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::detect::Direction;
+use super::field::FieldBody;
+use super::surface::SurfaceBody;
+use super::{CollideError, CollideOptions, Contact, InstanceId, Mode, Scene};
+use crate::asset::corner_reach;
+use crate::asset::layout::TreeChild;
+use crate::geometry::Aabb;
+
+/// Two bodies that overlap although no contact of theirs shows it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct HiddenOverlap {
+    /// The instance of the lower id.
+    pub instance_a: InstanceId,
+    /// The instance of the higher id.
+    pub instance_b: InstanceId,
+    /// How deep one body is in the other, at least, in the world's unit: how far a point of the one is inside of the other, or the radius
+    /// of a ball that is inside of both.
+    pub depth: f64,
+}
+
+impl HiddenOverlap {
+    /// From this depth on, as a share of the lesser of the [inner balls](super::Shape::inner_ball) of the bodies, an overlap is found.
+    pub const SURE: f64 = 0.5;
+    /// From this depth on it is found where few looks are enough; nothing less deep is told.
+    pub const FINE: f64 = 0.05;
+    /// Looks at a face for what is less deep than [`SURE`](Self::SURE).
+    pub const FINE_LOOKS: u32 = 4;
+    /// Looks at the faces of a body after which a search gives up. Plates a thousandth as thick as wide that lie on each other would take a
+    /// million.
+    pub const MOST_LOOKS: u32 = 1 << 14;
+    /// An overlap is hidden when it is more than so many times as deep as the deepest contact.
+    pub const SHOWN: f64 = 2.0;
+
+    /// Of overlaps those that the contacts do not show.
+    pub fn not_shown(overlaps: Vec<Self>, contacts: &[Contact]) -> Vec<Self> {
+        if overlaps.is_empty() {
+            return overlaps;
+        }
+        let mut shown: BTreeMap<(InstanceId, InstanceId), f64> = BTreeMap::new();
+        for c in contacts {
+            let pair = (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
+            let depth = shown.entry(pair).or_default();
+            *depth = depth.max(-c.distance);
+        }
+        let of_pair = |o: &Self| shown.get(&(o.instance_a, o.instance_b)).copied().unwrap_or(0.0);
+        overlaps.into_iter().filter(|overlap| overlap.depth > Self::SHOWN * of_pair(overlap)).collect()
+    }
+}
+
+/// The overlaps of a scene that `contacts`, which were found with the same options, do not show; sorted by world and instances. As
+/// [`Contacts::hidden`](super::Contacts::hidden), for contacts of other detectors.
+///
+/// # Errors
+/// As [`detect`](super::detect()).
+pub fn hidden_overlaps(
+    scene: &Scene,
+    options: &CollideOptions,
+    contacts: &[Contact],
+) -> Result<Vec<HiddenOverlap>, CollideError> {
+    Ok(among(&Direction::all(scene, options)?, options.mode, contacts))
+}
+
+/// The same for directions, of which both of a pair are side by side.
+pub fn among(directions: &[Direction], mode: Mode, contacts: &[Contact]) -> Vec<HiddenOverlap> {
+    let overlap = |pair: &[Direction]| {
+        let depth = |d: &Direction| depth(&d.surface, &d.field, mode) * d.field.unit();
+        let (a, b) = (pair[0].a, pair[0].b);
+        let depth = pair.iter().map(depth).fold(0.0, f64::max);
+        (depth > 0.0).then_some(HiddenOverlap { instance_a: a.min(b), instance_b: a.max(b), depth })
+    };
+    HiddenOverlap::not_shown(directions.par_chunks(2).filter_map(overlap).collect(), contacts)
+}
+
+/// How deep a surface is in a field where no contact need show it, at least, in the field's frame; 0 when no such place was found.
+fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode) -> f64 {
+    let (Some((center, radius)), Some(of_field)) = (surface.inner_ball(), field.inner_radius()) else {
+        return 0.0;
+    };
+    let thickness = radius.min(of_field);
+    let core = field.bounds().grown(-HiddenOverlap::FINE * thickness);
+    if !surface.may_meet(core) {
+        return 0.0;
+    }
+    let (at_center, slack) = field.rough(center);
+    if HiddenOverlap::FINE * thickness <= 2.0 * slack {
+        // Thinner than what rounding leaves to see.
+        return 0.0;
+    }
+    let mut search = Looks { field, core, thickness, deepest: radius.min(-at_center).max(0.0), looks: 0 };
+    if mode == Mode::Node {
+        search.at_surface(surface);
+    }
+    if search.deepest > HiddenOverlap::FINE * thickness { search.deepest } else { 0.0 }
+}
+
+/// A search for places where a surface is deep in a field.
+struct Looks<'a> {
+    field: &'a FieldBody<'a>,
+    /// What is deep enough is within this box.
+    core: Aabb,
+    thickness: f64,
+    /// The greatest depth so far.
+    deepest: f64,
+    looks: u32,
+}
+
+impl Looks<'_> {
+    /// What is not deeper than this is not looked for.
+    fn wanted(&self, share: f64) -> f64 {
+        (share * self.thickness).max(1.25 * self.deepest)
+    }
+
+    /// How deep a point is in the field.
+    fn look(&mut self, p: DVec3) -> f64 {
+        self.looks += 1;
+        -self.field.rough(p).0
+    }
+
+    fn at_surface(&mut self, surface: &SurfaceBody) {
+        let mut stack = vec![surface.whole()];
+        while let Some(child) = stack.pop() {
+            match child {
+                TreeChild::Leaf(start, count) => (start..start + count).for_each(|f| self.at_face(surface, f)),
+                TreeChild::Node(node) => {
+                    for branch in surface.halves(node).into_iter().flatten() {
+                        let is_fine = surface.corner_reach(branch.child) <= self.wanted(HiddenOverlap::SURE);
+                        let is_out = self.core.distance_squared(branch.center) > branch.radius * branch.radius;
+                        if !is_fine
+                            && !is_out
+                            && self.look(branch.center) + branch.radius > self.wanted(HiddenOverlap::FINE)
+                        {
+                            stack.push(branch.child);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Looks at a face, and at quarters of it as long as these can be deep.
+    fn at_face(&mut self, surface: &SurfaceBody, face: u32) {
+        let part = surface.face(face, self.field, 0.0);
+        let (first, last) = (part.points()[0], part.points()[part.points().len() - 1]);
+        let corners = [first, *part.points().get(1).unwrap_or(&last), last];
+        if corner_reach(corners) <= self.wanted(HiddenOverlap::SURE) {
+            return;
+        }
+        let before = self.looks;
+        let mut stack = vec![corners];
+        while let Some(corners) = stack.pop() {
+            if self.looks >= HiddenOverlap::MOST_LOOKS || !Aabb::of(&corners).grown(part.radius).overlaps(self.core) {
+                continue;
+            }
+            let (middle, reach) = middle(corners);
+            let depth = self.look(middle) + part.radius;
+            self.deepest = self.deepest.max(depth);
+            let wanted = self.wanted(if self.looks - before <= HiddenOverlap::FINE_LOOKS { HiddenOverlap::FINE } else { HiddenOverlap::SURE });
+            // What a piece this small holds is as deep as its middle, but for a quarter.
+            if depth + reach > wanted && reach > 0.25 * wanted {
+                stack.extend(quarters(corners));
+            }
+        }
+    }
+}
+
+/// The middle of a triangle's longest side or its centroid, whichever is nearer to the farthest corner, and that distance.
+fn middle(corners: [DVec3; 3]) -> (DVec3, f64) {
+    let [a, b, c] = corners;
+    let reach = |p: DVec3| corners.map(|q| q.distance(p)).into_iter().fold(0.0, f64::max);
+    let points = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a), (a + b + c) / 3.0];
+    let nearer = |x: (DVec3, f64), y: (DVec3, f64)| if y.1 < x.1 { y } else { x };
+    points.into_iter().map(|p| (p, reach(p))).fold((a, f64::INFINITY), nearer)
+}
+
+/// The one in the middle comes out first.
+fn quarters([a, b, c]: [DVec3; 3]) -> [[DVec3; 3]; 4] {
+    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
+    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+}
