@@ -234,9 +234,12 @@ fn simple_records(shape: &Shape) -> Vec<[f32; 16]> {
     let (parts, nodes) = (shape.parts().0, shape.nodes());
     let record = |(number, points): (usize, &Vec<DVec3>)| {
         let corners = std::array::from_fn(|k| points[k.min(points.len() - 1)]);
-        let record = FaceRecord::new(&Triangle::new(corners), DVec3::ZERO, SignHints::default());
+        let triangle = Triangle::new(corners);
+        let mut record = *FaceRecord::new(&triangle, DVec3::ZERO, SignHints::default()).as_array();
+        // Which faces are flat depends on the frame of a mesh; a simple shape may be of any size.
+        record[9..12].copy_from_slice(&triangle.normal.as_vec3().to_array());
         let owned = (0..points.len()).filter(|&k| nodes.contains(&(points[k], number as u32)));
-        with_owned(*record.as_array(), owned)
+        with_owned(record, owned)
     };
     parts.iter().enumerate().map(record).collect()
 }

@@ -169,7 +169,7 @@ pub fn narrow_exact(
         let cell = items[first + 2usize];
         let n = items[first + 3usize];
         let surface: Part = part(assets, d, face_a);
-        let up = normal(surface);
+        let up = normal(assets, d, face_a);
         let reach = d.reach + d.radius;
         let tolerance = tolerances[d.b as usize];
         let word = word_of(assets, d.shape_b, cell);
@@ -196,7 +196,7 @@ pub fn narrow_exact(
             while i < faces.count {
                 let position = list_face(assets, d.shape_b, faces, i);
                 let at = (entry(assets, d.shape_b, RECORDS) + position * comptime!(ROWS as u32)) as usize;
-                let apart = polygon_to_face(surface, weights, item, n, up, face(&assets.rows, at));
+                let apart = polygon_to_face(surface, weights, item, n, up, center, radius, face(&assets.rows, at));
                 let lower = apart.distance < mine;
                 mine = select(lower, apart.distance, mine);
                 s = select(lower, apart.s, s);

@@ -12,7 +12,7 @@ use super::locate::{
     lambda_at, next_k, offset, place, root,
 };
 use super::nearest::{FAR, Nearest, nearest_in_list, nearest_in_tree};
-use super::triangle::{PART, ROWS, closest, corner, face};
+use super::triangle::{PART, ROWS, across, closest, corner, face, is_flat};
 use super::vector::{V3, cross, dot, length, minus, pick, plus, same, scaled, v3};
 
 /// What a field says at a point.
@@ -33,6 +33,8 @@ pub struct Value {
 
 /// Below this distance the gradient is the normal of the nearest face.
 const ON_SURFACE: f32 = 1e-6;
+/// Below this distance from a face without a normal no direction is left: its square is next to nothing in `f32`.
+const ON_EDGE: f32 = 1e-15;
 
 /// Whether a cell has a list.
 #[cube]
@@ -67,21 +69,23 @@ pub fn value_of(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest)
     let f = face(&assets.rows, at);
     let c = closest(f, p, u32::reinterpret(nearest.squared) & PART);
     let distance = length(c.outward);
+    let flat = is_flat(f);
     let mut inside = is_inside(word);
     if is_crossing(word) {
         let hint = (f.hints >> (2u32 * c.feature)) & 3u32;
         inside = hint == 3u32 || (hint == 1u32 && c.height < 0.0f32);
-        if hint == 0u32 {
+        // What is no more than its edges has no height that could tell.
+        if hint == 0u32 || (hint == 1u32 && flat) {
             inside = winding(assets, shape, p) >= 1i32;
         }
     }
     let sign = select(inside, -1.0f32, 1.0f32);
-    // Without a normal the face is an edge, and there is no better direction.
-    let along = scaled(sign / distance.max(1e-30f32), c.outward);
+    let away = distance > ON_EDGE;
+    let along =
+        pick(away, scaled(sign / select(away, distance, 1.0f32), c.outward), across(f));
     // In the plane of a face the height knows the direction better than the difference of two points.
     let normal =
         scaled(select(c.feature == 0u32 && !same(c.height < 0.0f32, inside), -1.0f32, 1.0f32), f.normal);
-    let flat = dot(f.normal, f.normal) < 0.5f32;
     let by_normal = !flat && (distance < ON_SURFACE || c.feature == 0u32);
     let on_surface = pick(distance < ON_SURFACE, f.normal, normal);
     let gradient = pick(by_normal, on_surface, along);

@@ -348,7 +348,7 @@ pub fn narrow_faces(
                 feature: best_words[2usize * held + 1usize],
             };
             let is_face = surface.count == 3u32;
-            if is_face && dot(v.gradient, normal(surface)) > -cos_theta {
+            if is_face && dot(v.gradient, normal(assets, d, face_a)) > -cos_theta {
                 counters[products::FILTERED as usize].fetch_add(1u32);
             } else {
                 let point = at_weights(surface, best_s, best_t);

@@ -5,7 +5,7 @@ use super::nearest::FAR;
 use super::products::POLYGON_ROWS;
 use super::surface::{Part, at_weights};
 use super::triangle::{Face, PART, closest, corner, distance_squared};
-use super::vector::{V3, cross, dot, length, minus, pick, plus_scaled};
+use super::vector::{V3, cross, dot, length, minus, pick, plus, plus_scaled, scaled};
 
 /// A distance, and where on the polygon, as weights of the face that it was cut from.
 #[derive(CubeType, Clone, Copy)]
@@ -47,6 +47,9 @@ pub fn ball_around(part: Part, weights: &[Vector<f32, Const<4>>], item: u32, n: 
     Apart { distance, s, t }
 }
 
+/// Segments whose sine, squared, is at most this are parallel: any of their points is as near as any other, up to 1e-6 of their length.
+const PARALLEL: f32 = 1e-12;
+
 /// The share of the first segment at which two segments are nearest (Ericson 2005, 5.1.9), and their distance as the first value.
 #[cube]
 fn between_segments(p: V3, q: V3, r: V3, s: V3) -> Apart {
@@ -58,17 +61,30 @@ fn between_segments(p: V3, q: V3, r: V3, s: V3) -> Apart {
     let f = dot(v, w);
     let b = dot(u, v);
     let c = dot(u, w);
-    let denominator = a * e - b * b;
-    let parallel = denominator <= 1e-7f32 * a * e;
-    let start = select(parallel, 0.0f32, ((b * f - c * e) / denominator.max(1e-30f32)).clamp(0.0f32, 1.0f32));
+    // Products instead of a e - b b: that difference is rounding for segments that cross at less than 3e-4.
+    let across = cross(u, v);
+    let denominator = dot(across, across);
+    let parallel = denominator <= PARALLEL * a * e;
+    let start =
+        select(parallel, 0.0f32, (dot(cross(v, w), across) / denominator.max(1e-30f32)).clamp(0.0f32, 1.0f32));
     let t = select(e > 0.0f32, ((b * start + f) / e.max(1e-30f32)).clamp(0.0f32, 1.0f32), 0.0f32);
     let start = select(a > 0.0f32, ((b * t - c) / a.max(1e-30f32)).clamp(0.0f32, 1.0f32), 0.0f32);
     Apart { distance: length(minus(plus_scaled(p, start, u), plus_scaled(r, t, v))), s: start, t }
 }
 
-/// Whether a point of the polygon's plane lies in it; `n` vertices go around `normal` one way or the other.
+/// Whether a point of the polygon's plane lies in it; `n` vertices go around `normal` one way or the other, in a ball around `center`.
+/// Beyond the tip of a narrow polygon sides alone cannot tell.
 #[cube]
-fn holds(part: Part, weights: &[Vector<f32, Const<4>>], item: u32, n: u32, normal: V3, x: V3) -> bool {
+fn holds(
+    part: Part,
+    weights: &[Vector<f32, Const<4>>],
+    item: u32,
+    n: u32,
+    normal: V3,
+    center: V3,
+    radius: f32,
+    x: V3,
+) -> bool {
     let mut left = true;
     let mut right = true;
     let mut i = 0u32;
@@ -81,22 +97,26 @@ fn holds(part: Part, weights: &[Vector<f32, Const<4>>], item: u32, n: u32, norma
         right = right && side <= 0.0f32;
         i += 1u32;
     }
-    n > 2u32 && (left || right)
+    n > 2u32 && (left || right) && length(minus(x, center)) <= radius
 }
 
-/// Weights of a point of the part's plane.
+/// Weights of a point of the part's plane. What rounding makes of them for a narrow part is taken away once more.
 #[cube]
-fn weights_of(part: Part, x: V3) -> Apart {
+fn weights_of(part: Part, normal: V3, x: V3) -> Apart {
     let u = minus(part.b, part.a);
     let v = minus(part.c, part.a);
+    let area = dot(cross(u, v), normal);
+    let inverse = 1.0f32 / select(area.abs() > 1e-30f32, area, 1.0f32);
     let w = minus(x, part.a);
-    let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
-    let (wu, wv) = (dot(w, u), dot(w, v));
-    let inverse = 1.0f32 / (uu * vv - uv * uv).max(1e-30f32);
-    Apart { distance: FAR, s: inverse * (vv * wu - uv * wv), t: inverse * (uu * wv - uv * wu) }
+    let s = inverse * dot(cross(w, v), normal);
+    let t = inverse * dot(cross(u, w), normal);
+    let left = minus(w, plus(scaled(s, u), scaled(t, v)));
+    let s = s + inverse * dot(cross(left, v), normal);
+    let t = t + inverse * dot(cross(u, left), normal);
+    Apart { distance: FAR, s, t }
 }
 
-/// The least distance between polygon `item`, which was cut from `part` with unit `normal`, and a face.
+/// The least distance between polygon `item`, which was cut from `part` with unit `normal` and is within a ball, and a face.
 #[cube]
 pub fn polygon_to_face(
     part: Part,
@@ -104,6 +124,8 @@ pub fn polygon_to_face(
     item: u32,
     n: u32,
     normal: V3,
+    center: V3,
+    radius: f32,
     f: Face,
 ) -> Apart {
     let mut distance = FAR.runtime();
@@ -157,16 +179,16 @@ pub fn polygon_to_face(
         let s = pick(e == 2u32, corner(f, 0u32), corner(f, e + 1u32));
         let (h, k) = (dot(normal, minus(r, part.a)), dot(normal, minus(s, part.a)));
         let over = plus_scaled(r, -h, normal);
-        if h.abs() < distance && holds(part, weights, item, n, normal, over) {
-            let at = weights_of(part, over);
+        if h.abs() < distance && holds(part, weights, item, n, normal, center, radius, over) {
+            let at = weights_of(part, normal, over);
             distance = h.abs();
             best_s = at.s;
             best_t = at.t;
         }
         if h * k < 0.0f32 {
             let x = plus_scaled(r, h / (h - k), minus(s, r));
-            if holds(part, weights, item, n, normal, x) {
-                let at = weights_of(part, x);
+            if holds(part, weights, item, n, normal, center, radius, x) {
+                let at = weights_of(part, normal, x);
                 distance = 0.0f32;
                 best_s = at.s;
                 best_t = at.t;

@@ -6,7 +6,7 @@ use super::assets::{
 };
 use super::products::{DIRECTION_ROWS, DIRECTION_WORDS};
 use super::triangle::{ROWS, corner, face};
-use super::vector::{V3, cross, dot, length, minus, pick, plus, plus_scaled, scaled, v3};
+use super::vector::{V3, dot, length, minus, pick, plus, plus_scaled, scaled, v3};
 
 /// An ordered pair of instances.
 #[derive(CubeType, Clone, Copy)]
@@ -150,13 +150,22 @@ pub fn part(assets: &Assets, d: Direction, number: u32) -> Part {
     }
 }
 
-/// Unit normal; zero for what is round or has no area.
+/// Unit normal of part `number` of the surface of a direction; zero for what is round or no more than its edges. It is that of the face: of a
+/// needle's corners in another frame rounding would make any.
 #[cube]
-pub fn normal(p: Part) -> V3 {
-    let n = cross(minus(p.b, p.a), minus(p.c, p.a));
-    let size = length(n);
-    let flat = size <= 0.0f32 || p.count < 3u32;
-    scaled(select(flat, 0.0f32, 1.0f32 / size.max(1e-30f32)), n)
+pub fn normal(assets: &Assets, d: Direction, number: u32) -> V3 {
+    let mut x = 0.0f32;
+    let mut y = 0.0f32;
+    let mut z = 1.0f32;
+    if entry(assets, d.shape_a, KIND) != PLANE {
+        let at = (entry(assets, d.shape_a, RECORDS) + number * comptime!(ROWS as u32)) as usize;
+        let f = face(&assets.rows, at);
+        x = f.normal.x;
+        y = f.normal.y;
+        z = f.normal.z;
+    }
+    let own = v3(x, y, z);
+    scaled(1.0f32 / d.scale, v3(dot(d.x, own), dot(d.y, own), dot(d.z, own)))
 }
 
 /// The middle of the box around a part.

@@ -45,8 +45,9 @@ pub fn normal_of(a: V3, b: V3, c: V3) -> V3 {
     let off = dot(across, along) / longest.max(1e-30f32);
     let across = plus_scaled(across, -off, along);
     let size = dot(across, across).sqrt();
-    let flat = size < FLAT * longest.sqrt() || size <= 1e-30f32;
-    scaled(select(flat, 0.0f32, 1.0f32 / size.max(1e-30f32)), across)
+    // Not "less": corners that coincide have neither size nor length.
+    let spans = size > FLAT * longest.sqrt();
+    scaled(select(spans, 1.0f32 / size.max(1e-30f32), 0.0f32), across)
 }
 
 /// The face of three corners, as `tesdf::query::FaceRecord` makes it, without hints; in `f32` alone.
@@ -76,13 +77,28 @@ pub fn face(rows: &[Vector<f32, Const<4>>], at: usize) -> Face {
     }
 }
 
-/// Squared distance to the segment from the origin of `from` to `along`.
+/// Whether a face is no more than its edges: a segment or a point.
 #[cube]
-fn to_edge(from: V3, along: V3, inverse: f32) -> f32 {
-    let t = (dot(along, from) * inverse).clamp(0.0f32, 1.0f32);
-    let to = plus_scaled(from, -t, along);
+pub fn is_flat(f: Face) -> bool {
+    dot(f.normal, f.normal) < 0.5f32
+}
+
+/// Where along an edge the foot of a point is: 0 at its start, 1 at its end.
+#[cube]
+fn foot(from: V3, along: V3, inverse: f32) -> f32 {
+    dot(along, from) * inverse
+}
+
+/// Squared distance to the segment from the origin of `from` to `along`, by the foot.
+#[cube]
+fn to_edge(from: V3, along: V3, foot: f32) -> f32 {
+    let to = plus_scaled(from, -foot.clamp(0.0f32, 1.0f32), along);
     dot(to, to)
 }
+
+/// Added to squared distances of flat faces, so that of a flat face and its neighbour, which are equally near, the one with a normal is
+/// the nearest. It is that of 1e-7 (local frame), and only tells which face is meant.
+const AFTER: f32 = 1e-14;
 
 #[cube]
 fn with_part(squared: f32, part: u32) -> f32 {
@@ -95,15 +111,25 @@ pub fn distance_squared(f: Face, p: V3) -> f32 {
     let ap = minus(p, f.a);
     let bp = minus(ap, f.ab);
     let bc = minus(f.ac, f.ab);
+    let on_ab = foot(ap, f.ab, f.inverse.x);
+    let on_ac = foot(ap, f.ac, f.inverse.y);
+    let on_bc = foot(bp, bc, f.inverse.z);
+    // Beyond the tip of a needle its long sides are both within rounding of the point: there the longest edge tells.
+    let ab_longest = f.inverse.x <= f.inverse.y && f.inverse.x <= f.inverse.z;
+    let on_longest = select(ab_longest, on_ab, select(f.inverse.y <= f.inverse.z, on_ac, on_bc));
+    let flat = is_flat(f);
     let turned = cross(ap, f.normal);
     let inside = dot(f.ab, turned) >= 0.0f32
         && dot(f.ac, turned) <= 0.0f32
         && dot(bc, cross(bp, f.normal)) >= 0.0f32
-        && dot(f.normal, f.normal) > 0.5f32;
+        && on_longest >= 0.0f32
+        && on_longest <= 1.0f32
+        && !flat;
     let height = dot(f.normal, ap);
-    let to_ab = with_part(to_edge(ap, f.ab, f.inverse.x), 1u32);
-    let to_bc = with_part(to_edge(bp, bc, f.inverse.z), 2u32);
-    let to_ca = with_part(to_edge(ap, f.ac, f.inverse.y), 3u32);
+    let after = select(flat, AFTER, 0.0f32);
+    let to_ab = with_part(to_edge(ap, f.ab, on_ab) + after, 1u32);
+    let to_bc = with_part(to_edge(bp, bc, on_bc) + after, 2u32);
+    let to_ca = with_part(to_edge(ap, f.ac, on_ac) + after, 3u32);
     let to_edges = to_ab.min(to_bc).min(to_ca);
     select(inside, with_part(height * height, 0u32), to_edges)
 }
@@ -138,6 +164,16 @@ pub fn closest(f: Face, p: V3, part: u32) -> Closest {
     let outward =
         pick(in_plane, scaled(height, f.normal), plus_scaled(from, -t.clamp(0.0f32, 1.0f32), along));
     Closest { point: minus(p, outward), outward, feature: select(in_plane, 0u32, of_edge), height }
+}
+
+/// A unit vector across a flat face, more or less: the direction away from it of a point that is on it.
+#[cube]
+pub fn across(f: Face) -> V3 {
+    let along = pick(f.inverse.x > 0.0f32, f.ab, f.ac);
+    let flat_part = along.x * along.x + along.y * along.y;
+    let is_steep = flat_part <= 0.01f32 * along.z * along.z;
+    let inverse = 1.0f32 / select(is_steep, 1.0f32, flat_part).sqrt();
+    pick(is_steep, v3(1.0f32, 0.0f32, 0.0f32), v3(-inverse * along.y, inverse * along.x, 0.0f32))
 }
 
 /// Corner `k` of a face.
