@@ -307,7 +307,7 @@ impl Asset {
     /// What the encoder proved.
     #[getter]
     fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        classes::report(py, "Certificate", &self.inner.about().certificate)
+        classes::report(py, "Certificate", &self.inner.about().certificate())
     }
 
     /// Counts taken while encoding.

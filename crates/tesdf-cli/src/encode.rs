@@ -75,7 +75,7 @@ pub struct Args {
 }
 
 fn exactness(certificate: &Certificate) -> String {
-    match (certificate.delta_of_diagonal, certificate.exactness_distance) {
+    match (certificate.delta_of_diagonal(), certificate.exactness_distance()) {
         (Some(delta), None) => format!("to {delta:.1e} of the diagonal, proven"),
         (Some(delta), Some(within)) => {
             format!("to {delta:.1e} of the diagonal up to {within:.4e} from the surface, proven")
@@ -215,7 +215,7 @@ fn print(
             options: &about.options,
             source: &about.source,
             statistics,
-            certificate: &about.certificate,
+            certificate: about.certificate(),
         });
     }
     let cells = statistics.listed_cells + statistics.far_cells;
@@ -225,7 +225,7 @@ fn print(
         ("file", format!("{output}, {}, {bytes_per_face:.0} per face", report::size(bytes))),
         ("cells", format!("{cells}, of which {} with a list", statistics.listed_cells)),
         ("lists", format!("{mean:.1} faces on average, at most {}", statistics.longest_list)),
-        ("exact", exactness(&about.certificate)),
+        ("exact", exactness(about.certificate())),
         ("time", format!("{seconds:.1} s")),
     ])
 }

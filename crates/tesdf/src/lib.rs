@@ -42,6 +42,8 @@ pub mod inspect;
 pub mod mesh;
 pub mod query;
 mod sampling;
+#[cfg(test)]
+pub(crate) mod testing;
 pub mod verify;
 
 pub use asset::TeSdf;

@@ -156,7 +156,7 @@ impl TeSdf {
     /// Whether every list is proved to be exact where the vertices are now.
     pub(crate) fn has_exact_lists(&self) -> bool {
         let certificate = &self.about.certificate;
-        certificate.delta.is_some() && certificate.exactness_distance.is_none()
+        certificate.delta().is_some() && certificate.exactness_distance().is_none()
     }
 
     /// The whole file as it was opened, whatever has moved since.

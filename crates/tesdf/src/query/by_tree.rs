@@ -40,6 +40,9 @@ impl TeSdf {
             return self.by_tree_f64(point, local);
         };
         let triangle = record.triangle();
+        if triangle.normal == glam::DVec3::ZERO {
+            return self.by_tree_f64(point, local);
+        }
         let closest = match found.part() {
             0 => triangle.closest_in_plane(relative),
             edge => triangle.closest_on_edge(edge as usize - 1, relative),

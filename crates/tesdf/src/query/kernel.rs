@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use super::lanes::Lanes;
 
 use crate::asset::layout::SignHints;
-use crate::geometry::Triangle;
+use crate::geometry::{Triangle, is_flat};
 
 /// A face in `f32`, relative to the middle of the cube, in one cache line: corner a, b − a, c − a, unit normal,
 /// inverse squared lengths of b − a, c − a, c − b, and the bits of the sign hints.
@@ -32,7 +32,7 @@ impl FaceRecord {
         let [a, b, c] = triangle.corners.map(|p| (p - middle).as_vec3());
         let (u, v) = ((b - a).as_dvec3(), (c - a).as_dvec3());
         let longest = u.length().max(v.length()).max((u - v).length());
-        let flat = u.cross(v).dot(triangle.normal) < FLAT * longest;
+        let flat = is_flat(u.cross(v).dot(triangle.normal), longest, FLAT);
         let n = if flat { Vec3::NAN } else { triangle.normal.as_vec3() };
         let inverse = |v: Vec3| {
             let inverse = 1.0 / v.as_dvec3().length_squared();
@@ -295,5 +295,50 @@ impl<L> V<L> {
     {
         let ([a, b, c], [x, y, z]) = (self.0, o.0);
         Self([c.neg_mul_add(y, b.mul(z)), a.neg_mul_add(z, c.mul(x)), b.neg_mul_add(x, a.mul(y))])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{degenerate, exact};
+
+    /// What `f32` promises of a body with a diagonal of 0.5, the least that there is: 1e-6 of it.
+    const PROMISE: f64 = 5e-7;
+
+    fn isas() -> Vec<Isa> {
+        let mut isas = vec![Isa::Baseline];
+        #[cfg(target_arch = "x86_64")]
+        if Isa::detect() != Isa::Baseline {
+            isas.extend([Isa::Avx2, Isa::detect()]);
+        }
+        isas
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #[test]
+        fn degenerate_faces_are_edges((corners, p) in degenerate::face_and_point()) {
+            // Within a ball of a diameter of about 1, as bodies are.
+            let (corners, p) = (corners.map(|c| 0.25 * c), 0.25 * p);
+            let record = FaceRecord::new(&Triangle::new(corners), DVec3::ZERO, SignHints::default());
+            let squared = exact::squared_distance(p, corners);
+            for isa in isas() {
+                let found = nearest(isa, &[record], &[[0; LANES]], p.as_vec3(), Nearest::NONE);
+                let distance = f64::from(found.distance_squared).sqrt();
+                prop_assert!(exact::is_root(distance, &squared, PROMISE), "{isa:?}: {found:?} {record:?}");
+                let triangle = record.triangle();
+                let closest = match found.part() {
+                    0 => triangle.closest_in_plane(p),
+                    edge => triangle.closest_on_edge(edge as usize - 1, p),
+                };
+                prop_assert!(exact::is_root(closest.distance, &squared, PROMISE), "{isa:?}: {closest:?}");
+                let mut near = Vec::new();
+                within(isa, &[record], &[[0; LANES]], p.as_vec3(), found.distance_squared, &mut near);
+                prop_assert_eq!(near, [0]);
+            }
+        }
     }
 }

@@ -32,7 +32,8 @@ use sign::hinted_side;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
     /// Faces rounded to `f32` in a local frame, several at a time: within 1e-6 × diagonal, the right sign
-    /// beyond that, gradients within 1e-3 rad from 1e-4 × diagonal on.
+    /// beyond that, gradients within 1e-3 rad from 1e-4 × diagonal on. Where faces are lower than 1e-6 × diagonal, gradients are off by
+    /// that length over the distance as well.
     F32,
     /// Faces as they are in the mesh: within 1e-12 × diagonal plus 4 ulp of the largest coordinate, signs by
     /// exact predicates, gradients within 1e-3 rad from 1e-9 × diagonal on.
@@ -238,6 +239,10 @@ impl TeSdf {
             return self.answer_f64(local, place, faces);
         };
         let triangle = record.triangle();
+        if triangle.normal == DVec3::ZERO {
+            // A segment in `f32` may be a narrow face in `f64`: the gradient would be off by its width over the distance.
+            return self.answer_f64(local, place, faces);
+        }
         // The kernel has found the part; in f64 the point on it is as good as the f32 corners allow.
         let closest = match found.part() {
             0 => triangle.closest_in_plane(relative),
@@ -253,10 +258,6 @@ impl TeSdf {
         };
         let on_surface = |d: f64| match place {
             _ if d >= ON_SURFACE_F32 => None,
-            Place::Listed { .. } if triangle.normal == DVec3::ZERO => {
-                let closest = Closest { point: closest.point + self.cube.middle(), ..closest };
-                Some(self.pseudonormal(faces, found.face, &closest))
-            }
             _ => Some(triangle.normal),
         };
         self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
@@ -278,7 +279,7 @@ impl TeSdf {
             _ if d >= ON_SURFACE_F64 => None,
             Place::Listed { .. } => Some(self.pseudonormal(faces, position, &closest)),
             // A cell that no list was worth its bytes for may touch the surface.
-            _ => Some(self.local_triangle(position as usize).normal),
+            _ => Some(self.face_normal(position)),
         };
         self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
     }
@@ -306,12 +307,25 @@ impl TeSdf {
         }
     }
 
+    /// The unit normal of a face; of a face that is a segment or a point some direction at right angles to it.
+    fn face_normal(&self, position: u32) -> DVec3 {
+        let triangle = self.local_triangle(position as usize);
+        if triangle.normal != DVec3::ZERO {
+            return triangle.normal;
+        }
+        let [a, b, c] = triangle.corners;
+        let longest = [c - b, a - c]
+            .into_iter()
+            .fold(b - a, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
+        longest.try_normalize().map_or(DVec3::Z, DVec3::any_orthonormal_vector)
+    }
+
     /// The normal of a feature: of the face, the sum over an edge's faces, or the angle-weighted sum around a
     /// vertex (Bærentzen and Aanæs 2005). The list names all of them when the feature is within the padding of the cell; the lists of
     /// a conforming domain need not, and there the face tree is asked.
     fn pseudonormal(&self, faces: &Faces, position: u32, closest: &Closest) -> DVec3 {
         let corners = self.faces[position as usize];
-        let own = self.local_triangle(position as usize).normal;
+        let own = self.face_normal(position);
         let held: &[u32] = match closest.feature {
             Feature::Face => return own,
             Feature::Edge(k) => &[corners[k as usize], corners[(k as usize + 1) % 3]],

@@ -11,6 +11,9 @@ pub(crate) struct BruteForce {
     scale: f64,
 }
 
+/// Faces smaller than this (scaled) are their edges.
+const SMALLEST: f64 = 1e-70;
+
 /// A face in scaled lengths.
 struct Facet {
     corners: [DVec3; 3],
@@ -48,7 +51,10 @@ impl Facet {
         let [a, b, c] = corners;
         let along = [b - a, c - b, a - c];
         let inverse = along.map(|e| if e == DVec3::ZERO { 0.0 } else { 1.0 / e.length_squared() });
-        Self { corners, along, inverse, normal: accurate_cross(along[0], along[1]).try_normalize() }
+        let longest = along.iter().map(|e| e.length()).fold(0.0, f64::max);
+        // The squared area of a smaller face is not a number of full precision.
+        let normal = Some(accurate_cross(along[0], along[1])).filter(|_| longest > SMALLEST);
+        Self { corners, along, inverse, normal: normal.and_then(DVec3::try_normalize) }
     }
 
     fn offset(&self, p: DVec3) -> DVec3 {
@@ -100,6 +106,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::testing::{degenerate, exact};
 
     fn point() -> impl Strategy<Value = DVec3> {
         prop::array::uniform3(-3i32..4).prop_map(|[x, y, z]| DVec3::new(x.into(), y.into(), z.into()))
@@ -120,6 +127,16 @@ mod tests {
             }
             prop_assert!(offset.length() <= least + 1e-12, "{} {}", offset, least);
             prop_assert!(near <= 0.2, "the closest point is {} off the triangle", near);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn degenerate_faces_are_exact((corners, p) in degenerate::face_and_point()) {
+            let distance = Facet::new(corners).offset(p).length();
+            let squared = exact::squared_distance(p, corners);
+            prop_assert!(exact::is_root(distance, &squared, 2e-14), "{distance} at {p} from {corners:?}");
         }
     }
 
