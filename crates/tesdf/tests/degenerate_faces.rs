@@ -4,14 +4,17 @@ mod support;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use support::shapes::Shape;
+use proptest::prelude::*;
+use support::random::Random;
+use support::reference::Reference;
+use support::shapes::{FAMILIES, Family, Shape};
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{
-    ClearanceOptions, CollideOptions, FaceMethod, Instance, Mode, Pose, Scene, Shape as Body, clearance,
-    detect,
+    ClearanceOptions, CollideOptions, FaceMethod, Instance, InstanceId, Mode, Pose, Scene, Shape as Body,
+    clearance, detect,
 };
-use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
+use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::query::Precision;
@@ -193,5 +196,77 @@ fn clearance_sees_no_planes_of_points() {
         let b = scene.add(Instance::new(shape, Pose::at(DVec3::new(x, 0.0, 0.0)))).expect("valid");
         let found = clearance(&scene, a, b, &ClearanceOptions::default()).expect("valid");
         assert!((found.distance - expected).abs() < 1e-6, "{found:?}");
+    }
+}
+
+/// A member of a family with some edges shrunk to nothing or nearly so, and some faces of one vertex: closed all the same.
+fn degenerate(family: Family, seed: u64) -> SolidMesh {
+    let solid = family.member(seed);
+    let mut random = Random(seed);
+    let mut vertices = solid.mesh().vertices().to_vec();
+    let mut faces = solid.mesh().faces().to_vec();
+    let diagonal = solid.mesh().diagonal();
+    for _ in 0..1 + random.index(8) {
+        let [a, b, c] = faces[random.index(faces.len())].map(|v| v as usize);
+        let beside = random.power(-17.0, -7.0) * diagonal * random.in_cube();
+        vertices[a] = match random.index(4) {
+            0 => vertices[b],
+            1 => vertices[b] + beside,
+            2 => 0.5 * (vertices[b] + vertices[c]),
+            _ => 0.3 * vertices[b] + 0.7 * vertices[c] + beside,
+        };
+    }
+    for _ in 0..random.index(3) {
+        let vertex = random.index(vertices.len()) as u32;
+        faces.push([vertex; 3]);
+    }
+    match SolidMesh::new(TriangleMesh::new(vertices, faces).expect("valid ids")) {
+        Ok(solid) => solid,
+        // Shrinking an edge can turn a part inside out.
+        Err(_) => solid,
+    }
+}
+
+/// The deepest contact of each mode against the depths of the vertices, and every contact's distance against all faces.
+fn check_contacts(asset: &Arc<TeSdf>, solid: &SolidMesh, shift: DVec3) -> Result<(), TestCaseError> {
+    let reference = Reference::new(solid.mesh());
+    let mut scene = Scene::new();
+    let shape = scene.add_shape(asset.clone()).expect("room");
+    for at in [DVec3::ZERO, shift] {
+        scene.add(Instance::new(shape, Pose::at(at))).expect("valid");
+    }
+    let tolerance = 4.0 * reference.tolerance_f32(shift);
+    let others = |p: DVec3, instance: InstanceId| {
+        let placed = if instance == InstanceId(0) { p } else { p - shift };
+        reference.signed_distance(placed)
+    };
+    for mode in [Mode::Node, CollideOptions::default().mode] {
+        let options = CollideOptions { mode, ..CollideOptions::default() };
+        let found = detect(&scene, &options).expect("valid").contacts;
+        for contact in &found {
+            let exact = others(contact.point_a, contact.instance_b);
+            prop_assert!((contact.distance - exact).abs() < tolerance, "{exact} {contact:?}");
+            prop_assert!((contact.normal.length() - 1.0).abs() < 1e-3, "{contact:?}");
+        }
+        let deepest = found.iter().map(|c| c.distance).fold(0.0, f64::min);
+        let of_nodes =
+            solid.mesh().vertices().iter().map(|&v| reference.signed_distance(v - shift)).fold(0.0, f64::min);
+        prop_assert!(deepest <= of_nodes + tolerance, "{mode:?}: {deepest}, but a node at {of_nodes}");
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn random_meshes_with_degenerate_faces(family in prop::sample::select(FAMILIES.to_vec()), seed in any::<u64>()) {
+        let solid = degenerate(family, seed);
+        let options = EncodeOptions::preset(Preset::Fast);
+        let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
+        let report = verify(&asset, &VerifyOptions { samples: 600, seed }, |_| ControlFlow::Continue(())).expect("a valid mesh");
+        prop_assert!(report.passed, "{report:#?}");
+        let shift = 0.4 * solid.mesh().diagonal() * Random(seed).in_cube();
+        check_contacts(&Arc::new(asset), &solid, shift)?;
     }
 }
