@@ -282,6 +282,16 @@ mod tests {
     }
 
     proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #[test]
+        fn tips_are_exact((corners, p) in degenerate::beyond_a_tip()) {
+            let found = Triangle::new(corners).closest(p);
+            let squared = exact::squared_distance(p, corners);
+            prop_assert!(exact::is_root(found.distance, &squared, 2e-15), "{found:?} {:?}", corners);
+        }
+    }
+
+    proptest! {
         #[test]
         fn no_sample_of_the_triangle_is_closer(a in point(), b in point(), c in point(), p in point()) {
             let triangle = Triangle::new([a, b, c]);

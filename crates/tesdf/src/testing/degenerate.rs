@@ -59,3 +59,27 @@ fn lattice() -> impl Strategy<Value = DVec3> {
 pub fn face_and_point() -> impl Strategy<Value = ([DVec3; 3], DVec3)> {
     face().prop_flat_map(|corners| (Just(corners), point_beside(corners)))
 }
+
+/// A narrow face whose longest edge is about 1, and a point beyond one of its tips, near the plane and nearly in line with its sides: both sides
+/// are as near there as rounding.
+pub fn beyond_a_tip() -> impl Strategy<Value = ([DVec3; 3], DVec3)> {
+    let power = |low: f64, high: f64| (low..high).prop_map(|e| 10f64.powf(e));
+    let shape = (0.0..1.0f64, power(-7.0, 0.0), any::<bool>());
+    let place = (power(-16.0, 0.0), -0.2..1.2f64, power(-17.0, -3.0), 0usize..3);
+    (anywhere(), [anywhere(), anywhere()], shape, place).prop_map(
+        |(at, [u, v], (foot, width, is_cap), (beyond, across, above, turn))| {
+            let along = u.try_normalize().unwrap_or(DVec3::X);
+            let beside =
+                v.reject_from_normalized(along).try_normalize().unwrap_or(along.any_orthonormal_vector());
+            let at = 0.5 * at;
+            let foot = if is_cap { foot } else { 1.0 };
+            let corners = [at, at + along, at + foot * along + width * beside];
+            // From the tip outwards, between the directions of its two sides.
+            let side = along.lerp(corners[2] - corners[0], across).normalize_or(along);
+            let p = at - beyond * side + above * along.cross(beside);
+            let mut corners = corners;
+            corners.rotate_left(turn);
+            (corners, p)
+        },
+    )
+}

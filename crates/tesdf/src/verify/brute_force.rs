@@ -11,6 +11,8 @@ pub(crate) struct BruteForce {
     scale: f64,
 }
 
+/// Faces whose height is a smaller share of their length are their edges.
+const FLAT: f64 = 4e-15;
 /// Faces smaller than this (scaled) are their edges.
 const SMALLEST: f64 = 1e-70;
 
@@ -21,6 +23,8 @@ struct Facet {
     along: [DVec3; 3],
     /// Inverse squared lengths of those; 0 for a length of 0.
     inverse: [f64; 3],
+    /// The longest edge: over the face is beside it.
+    longest: usize,
     /// Unit normal; `None` without area.
     normal: Option<DVec3>,
 }
@@ -51,10 +55,14 @@ impl Facet {
         let [a, b, c] = corners;
         let along = [b - a, c - b, a - c];
         let inverse = along.map(|e| if e == DVec3::ZERO { 0.0 } else { 1.0 / e.length_squared() });
-        let longest = along.iter().map(|e| e.length()).fold(0.0, f64::max);
-        // The squared area of a smaller face is not a number of full precision.
-        let normal = Some(accurate_cross(along[0], along[1])).filter(|_| longest > SMALLEST);
-        Self { corners, along, inverse, normal: normal.and_then(DVec3::try_normalize) }
+        let longer = |i: usize, k: usize| if along[k].length() > along[i].length() { k } else { i };
+        let longest = longer(longer(0, 1), 2);
+        let length = along[longest].length();
+        let cross = accurate_cross(along[0], along[1]);
+        // Lower faces are rounding, and the squared area of smaller ones is not a number of full precision.
+        let has_plane = cross.length() > FLAT * length * length && length > SMALLEST;
+        let normal = has_plane.then_some(cross).and_then(DVec3::try_normalize);
+        Self { corners, along, inverse, longest, normal }
     }
 
     fn offset(&self, p: DVec3) -> DVec3 {
@@ -62,7 +70,8 @@ impl Facet {
             let from = self.corners.map(|c| p - c);
             // Beside a wrong "over the face" the foot is a rounding error away from the edge.
             let over = (0..3).all(|k| n.cross(self.along[k]).dot(from[k]) >= 0.0);
-            if over {
+            let at = from[self.longest].dot(self.along[self.longest]) * self.inverse[self.longest];
+            if over && (0.0..=1.0).contains(&at) {
                 return n.dot(from[0]) * n;
             }
         }
