@@ -11,9 +11,10 @@ use tesdf::TeSdf;
 use tesdf::asset::CellKind;
 use tesdf::asset::about::Source;
 use tesdf::domain::ConformingMesh;
+use tesdf::encode::surface::Surface;
 use tesdf::encode::{
-    Deformation, Domain, EncodeError, EncodeOptions, EncodeProgress, Encoder, Preset, Refinement, Sampling,
-    Threshold, encode_in,
+    Deformation, Domain, EncodeError, EncodeOptions, EncodeProgress, Encoder, Preset, Refinement,
+    SampledCell, Sampler, Sampling, Threshold, encode_in, encode_with,
 };
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
@@ -96,6 +97,43 @@ fn sampling_with_a_threshold_as_wide_as_the_grid_misses_nothing() {
             let report = verified(&asset);
             assert!(report.passed && report.precisions[1].largest_error_beyond.is_none(), "{report:#?}");
             assert!(asset.about().certificate().delta().is_some());
+        }
+    }
+}
+
+/// Names one face a cell, whatever is asked.
+struct OneFace;
+
+impl Sampler for OneFace {
+    fn name(&self) -> String {
+        "sampled, one face".into()
+    }
+
+    fn sample(
+        &self,
+        _: &Surface,
+        cells: &[SampledCell],
+        _: &Sampling,
+        _: &EncodeProgress,
+    ) -> Result<Vec<Vec<f64>>, EncodeError> {
+        let only_first = |cell: &SampledCell| {
+            (0..cell.faces.len()).map(|at| if at == 0 { 0.0 } else { f64::INFINITY }).collect()
+        };
+        Ok(cells.iter().map(only_first).collect())
+    }
+}
+
+#[test]
+fn what_a_sampler_says_is_no_proof() {
+    let (solid, conforming) = block();
+    let (source, progress) = (Source::default(), EncodeProgress::default());
+    for most in [None, Some(3)] {
+        for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
+            let encoder = Encoder::Sampled(Sampling { resolution: 3, ..Sampling::SAFE });
+            let options = EncodeOptions { encoder, max_entries: most, ..fast() };
+            let asset = encode_with(&solid, domain, &source, &options, &OneFace, &progress).expect("encodes");
+            let certificate = asset.about().certificate();
+            assert_eq!((certificate.delta(), certificate.chains()), (None, None), "{certificate:?}");
         }
     }
 }
