@@ -42,6 +42,7 @@ pub mod inspect;
 pub mod mesh;
 pub mod query;
 mod sampling;
+pub mod save;
 pub mod verify;
 
 pub use asset::TeSdf;
