@@ -122,7 +122,8 @@ impl Asset {
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Writes the file, that of to_bytes; one that is there is replaced in one step.
+    /// Writes the file, that of to_bytes; a file that is there is replaced in one step, and keeps its permissions. A read-only
+    /// file raises PermissionError.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.inner.save(&path)).map_err(|e| Error::Asset(Some(path), e).raise(py))
     }

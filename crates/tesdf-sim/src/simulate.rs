@@ -21,6 +21,8 @@ pub struct Moment<'a> {
     pub report: StepReport,
     /// The bodies now.
     pub system: &'a System,
+    /// The run so far, this step included.
+    pub record: &'a RunRecord,
 }
 
 /// What a run came to.
@@ -76,6 +78,32 @@ pub enum SimulateError {
     },
 }
 
+/// A run up to some step: the beginning of a new run, or a [`CutRun`](crate::CutRun) as it was read.
+#[derive(Clone, Debug)]
+pub struct PartialRun {
+    /// All states so far.
+    pub record: RunRecord,
+    pub(crate) totals: Totals,
+}
+
+impl PartialRun {
+    /// The beginning of a run of `scene`: the state of `system` now, at time 0. `folder` is what the scene's paths are relative to; empty: the
+    /// folder of whoever reads the run.
+    pub fn new(scene: &SceneFile, system: &System, folder: String) -> Self {
+        let mut record = RunRecord::new(system, serde_json::to_value(scene).unwrap_or_default());
+        record.folder = folder;
+        Self { record, totals: Totals::default() }
+    }
+
+    /// Puts the bodies of `system` where the last step left them.
+    ///
+    /// # Errors
+    /// The system has other bodies.
+    pub fn restore(&self, system: &mut System) -> Result<(), DynamicsError> {
+        system.set_states(self.record.states(self.record.steps() as usize).unwrap_or_default())
+    }
+}
+
 /// Runs `engine`, which was made for `scene`, for the scene's duration. `watch` is called after each step and may break off.
 ///
 /// # Errors
@@ -83,17 +111,29 @@ pub enum SimulateError {
 pub fn simulate(
     scene: &SceneFile,
     engine: &mut dyn Dynamics,
+    watch: impl FnMut(&Moment<'_>) -> ControlFlow<()>,
+) -> Result<(RunRecord, Summary), SimulateError> {
+    let run = PartialRun::new(scene, engine.system(), String::new());
+    simulate_from(scene, engine, run, watch)
+}
+
+/// As [`simulate`], from the last step of `run`, where `engine` is, too. Steps depend on the bodies' states alone, so the record is that of
+/// a run that was never cut, bit for bit.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from(
+    scene: &SceneFile,
+    engine: &mut dyn Dynamics,
+    run: PartialRun,
     mut watch: impl FnMut(&Moment<'_>) -> ControlFlow<()>,
 ) -> Result<(RunRecord, Summary), SimulateError> {
     let h = scene.time_step;
     let steps = ((scene.duration / h).round() as u64).max(1);
-    let json = serde_json::to_value(scene).unwrap_or_default();
-    let mut record = RunRecord::new(engine.system(), json);
-    let tracker = scene.criterion.screw.as_ref().map(|screw| ScrewTracker::new(screw, engine.system()));
-    let mut tracker = tracker.transpose().map_err(SimulateError::Criterion)?;
-    let energy = engine.system().kinetic_energy() + engine.system().potential_energy();
-    let mut totals = Totals::default();
-    for step in 0..steps {
+    let (mut tracker, energy) = replay(scene, engine.system(), &run.record)?;
+    let PartialRun { mut record, mut totals } = run;
+    record.plan(Some(steps));
+    for step in record.steps()..steps {
         let report = engine.step(h).map_err(|source| SimulateError::Step { step, source })?;
         let (system, time) = (engine.system(), (step + 1) as f64 * h);
         record.push(time, system);
@@ -105,11 +145,12 @@ pub fn simulate(
             tracker.observe(system, h);
         }
         totals.add(&report);
-        let moment = Moment { step: step + 1, steps, time, report, system };
+        let moment = Moment { step: step + 1, steps, time, report, system, record: &record };
         if watch(&moment).is_break() {
             return Err(SimulateError::Interrupted { steps: step + 1 });
         }
     }
+    record.plan(None);
     let system = engine.system();
     let screw = tracker.map(|tracker| tracker.report(system));
     let summary = Summary {
@@ -123,8 +164,31 @@ pub fn simulate(
     Ok((record, summary))
 }
 
-#[derive(Default)]
-struct Totals {
+/// Follows the criterion along the steps that are made; with the energy at the beginning.
+fn replay(
+    scene: &SceneFile,
+    system: &System,
+    record: &RunRecord,
+) -> Result<(Option<ScrewTracker>, f64), SimulateError> {
+    let mut system = system.clone();
+    let show = |system: &mut System, step: u64| {
+        let states = record.states(step as usize).unwrap_or_default();
+        system.set_states(states).map_err(|source| SimulateError::Step { step, source })
+    };
+    show(&mut system, 0)?;
+    let energy = system.kinetic_energy() + system.potential_energy();
+    let Some(screw) = &scene.criterion.screw else { return Ok((None, energy)) };
+    let mut tracker = ScrewTracker::new(screw, &system).map_err(SimulateError::Criterion)?;
+    for step in 1..=record.steps() {
+        show(&mut system, step)?;
+        tracker.observe(&system, scene.time_step);
+    }
+    Ok((Some(tracker), energy))
+}
+
+/// Sums over the steps.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Totals {
     steps: u64,
     contacts: usize,
     most: usize,
@@ -136,7 +200,7 @@ struct Totals {
 }
 
 impl Totals {
-    fn add(&mut self, report: &StepReport) {
+    pub(crate) fn add(&mut self, report: &StepReport) {
         self.steps += 1;
         self.contacts += report.contacts;
         self.most = self.most.max(report.contacts);

@@ -1,8 +1,14 @@
 //! A folder of its own for each test, and the binary run in it.
 // Each test file is a crate of its own and uses a part of this.
 #![allow(dead_code)]
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+use tesdf::encode::EncodeProgress;
+use tesdf::save::{Destination, SaveOptions};
+use tesdf_sim::scene_file::LoadedScene;
+use tesdf_sim::{PartialRun, RunJournal, RunOrigin, simulate_from};
 
 pub struct Folder(tempfile::TempDir);
 
@@ -29,7 +35,7 @@ impl Folder {
     }
 
     pub fn command(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tesdf"));
+        let mut command = Command::new(BINARY);
         command.args(args).current_dir(self.0.path());
         command
     }
@@ -56,4 +62,28 @@ pub fn texts(out: Output) -> (Option<i32>, String, String) {
 /// The library's test data.
 pub fn data(name: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tesdf/tests/data").join(name).display().to_string()
+}
+
+/// The binary that is tested.
+pub const BINARY: &str = env!("CARGO_BIN_EXE_tesdf");
+
+/// The file of a run that was killed after `steps` steps.
+pub fn cut_run(folder: &Folder, scene: &str, steps: u64) -> Vec<u8> {
+    let loaded = LoadedScene::read(&folder.path(scene)).unwrap();
+    let system = loaded.system(&EncodeProgress::default()).unwrap();
+    let origin = RunOrigin::of(&system, "cpu").unwrap();
+    let run = PartialRun::new(&loaded.scene, &system, folder.path("").display().to_string());
+    let mut engine = loaded.newton(system).unwrap();
+    let path = folder.path("run that is cut");
+    let destination = Destination::new(&path, &SaveOptions::default()).unwrap();
+    let mut journal = None;
+    let ended = simulate_from(&loaded.scene, &mut engine, run, |moment| {
+        let begin = || RunJournal::begin(&destination, moment.record, &origin).unwrap().unwrap();
+        journal.get_or_insert_with(begin).push(moment.record, &moment.report).unwrap();
+        if moment.step == steps { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(ended.is_err(), "the run was over before it was cut");
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    bytes
 }

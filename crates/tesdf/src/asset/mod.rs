@@ -22,16 +22,15 @@ mod container;
 mod error;
 mod header;
 pub mod layout;
-mod save;
 mod section;
 mod te_sdf;
 
+pub use crate::save::save_atomic;
 pub use arrays::Arrays;
 pub use cells::{CellKind, CellView};
 pub(crate) use conforming::Conforming;
 pub use container::{Container, SharedSection, write_container};
 pub use error::AssetError;
-pub use save::save_atomic;
 pub use section::{Element, Presence, Section, SectionSpec};
 pub use te_sdf::TeSdf;
 

@@ -172,9 +172,9 @@ impl TeSdf {
     /// Writes the file, replacing one at `path` atomically; with vertices and lists as they are now.
     ///
     /// # Errors
-    /// What the operating system refused; no half file is left.
+    /// As [`save_atomic`]; no half file is left.
     pub fn save(&self, path: &Path) -> Result<(), AssetError> {
-        save_atomic(path, &self.to_bytes()?)
+        Ok(save_atomic(path, &self.to_bytes()?)?)
     }
 
     /// The whole file, with vertices and lists as they are now. It does not say which lists are stale.
