@@ -78,8 +78,8 @@ pub(crate) const T_JUNCTION_TOLERANCE: f64 = 1e-9;
 /// A test is exact for its point: the winding number there, and the side of the face that the point is on. The points are
 /// rounded to 64-bit floats. So a test may miss a place, or say its winding number of another face, only where
 /// two faces are as near to each other as rounding, some 1e-14 of the largest coordinate, or where a region is narrower.
-/// Where the faces that cut a face cross each other so often that each is cut into more than four pieces there, only
-/// evenly chosen regions are tested.
+/// There is a bound on the work: where more than 4096 faces cut a face, or cross each other more than once each on it, or where
+/// there are more than 131072 regions in all, evenly chosen regions are tested.
 ///
 /// When a value is [out of range](DefectKind::OutOfRange) nothing else is tested.
 pub fn check(mesh: &TriangleMesh) -> CheckReport {

@@ -1,9 +1,11 @@
 //! The regions into which other faces cut a face, each with a point of it.
+use std::collections::HashMap;
+
 use glam::{DVec2, DVec3};
 
 use crate::{
     geometry::{Aabb, AabbTree, normal_signs, orientation, self_overlaps},
-    mesh::TriangleMesh,
+    mesh::{TriangleMesh, topology::DisjointSets},
 };
 
 /// A point in a region of a face.
@@ -16,10 +18,10 @@ pub(super) struct Sample {
     pub jump: i32,
 }
 
-/// Pieces of segments that get samples, for each segment on average: two closed surfaces that cross give one.
-const PIECES_PER_SEGMENT: usize = 4;
-/// Pieces that get samples whatever the number of segments is.
-const PIECES: usize = 16;
+/// Faces that cut a face, at most: of more, evenly chosen ones do.
+const CUTS: usize = 1 << 12;
+/// Pieces of a face's segments, besides one per segment: where there are more, evenly chosen ones get samples.
+const PIECES: usize = 64;
 /// Segments of a leaf of the tree.
 const LEAF_SIZE: usize = 4;
 
@@ -27,17 +29,18 @@ const LEAF_SIZE: usize = 4;
 ///
 /// The other faces meet a face in segments. A region that is not the whole face has a piece of a segment on its border,
 /// where a piece ends at the next segment that crosses. So a point on each side of each piece is a point of each
-/// region. From the middle of a piece the point is half of the way to what comes next.
+/// region. The point is half of the way from the middle of the piece to what comes next. Pieces that follow each
+/// other and end at no other piece have the same two regions, and get one point on each side together.
 ///
 /// Which corners are on which side of a plane is decided exactly. Points of segments and samples are rounded:
-/// regions and pieces narrower than `rounding` get no sample. When segments cross each other so often that they have more
-/// than four pieces each, evenly chosen pieces get samples.
+/// regions and pieces narrower than `rounding` get no sample. Where more than 4096 faces cut the face, or their segments are cut
+/// into more than two pieces each, not all regions get a sample.
 pub(super) fn samples(mesh: &TriangleMesh, face: u32, others: &[u32], rounding: f64) -> Vec<Sample> {
     let corners = mesh.triangle(face as usize);
     let Some(chart) = Chart::new(corners) else { return Vec::new() };
     let mut segments = Vec::new();
     let mut coplanar = Vec::new();
-    for &other in others {
+    for &other in others.iter().step_by(others.len().div_ceil(CUTS).max(1)) {
         match in_plane(corners, mesh.triangle(other as usize)) {
             InPlane::Triangle(triangle) => {
                 let (flat, turn) = chart.flat_triangle(triangle);
@@ -172,6 +175,30 @@ impl Chart {
     }
 }
 
+/// A part of a segment that no other segment crosses.
+#[derive(Clone, Copy)]
+struct Piece {
+    ends: Segment,
+}
+
+impl Piece {
+    fn middle(&self) -> DVec2 {
+        self.ends[0].midpoint(self.ends[1])
+    }
+
+    /// The direction along an axis to each of its sides, left and right of the way from its first end to its second.
+    ///
+    /// Along an axis, as the boxes of a tree that meet such a way are found without rounding.
+    fn across(&self) -> [DVec2; 2] {
+        let along = self.ends[1] - self.ends[0];
+        let left = match along.x.abs() >= along.y.abs() {
+            true => DVec2::Y * along.x.signum(),
+            false => DVec2::NEG_X * along.y.signum(),
+        };
+        [left, -left]
+    }
+}
+
 /// Points on both sides of pieces of segments that are on the face.
 fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
     let count = cuts.len();
@@ -180,8 +207,40 @@ fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
     let box_of = |[p, q]: &Segment| Aabb::of(&[p.extend(0.0), q.extend(0.0)]).grown(rounding);
     let boxes: Vec<Aabb> = segments.iter().map(box_of).collect();
     let tree = AabbTree::build(&boxes, LEAF_SIZE);
+    let mut pieces = pieces(&segments, count, &tree, &boxes, rounding);
+    let chain = if pieces.len() <= PIECES + 2 * count {
+        chains(&pieces, rounding)
+    } else {
+        let every = pieces.len().div_ceil(PIECES + count);
+        pieces = pieces.into_iter().step_by(every).collect();
+        (0..2 * pieces.len() as u32).collect()
+    };
+    // Of each side of a chain the point that is farthest from everything.
+    let mut best: Vec<Option<(f64, DVec2)>> = vec![None; chain.len()];
+    for (i, piece) in pieces.iter().enumerate() {
+        for (side, direction) in piece.across().into_iter().enumerate() {
+            let middle = piece.middle();
+            let known = &mut best[chain[2 * i + side] as usize];
+            if let Some(free) = clearance(&tree, &boxes, &segments, middle, direction, rounding)
+                && known.is_none_or(|(most, _)| free > most)
+            {
+                *known = Some((free, middle + 0.5 * free * direction));
+            }
+        }
+    }
+    best.into_iter().flatten().map(|(_, point)| point).collect()
+}
+
+/// The first `count` segments, cut where segments cross them.
+fn pieces(
+    segments: &[Segment],
+    count: usize,
+    tree: &AabbTree,
+    boxes: &[Aabb],
+    rounding: f64,
+) -> Vec<Piece> {
     let mut crossings = vec![vec![0.0, 1.0]; count];
-    self_overlaps(&tree, &boxes, |i, j| {
+    self_overlaps(tree, boxes, |i, j| {
         let (i, j) = (i as usize, j as usize);
         if j < count
             && let Some([s, t]) = crossing(segments[i], segments[j], rounding)
@@ -191,26 +250,41 @@ fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
         }
     });
     let mut pieces = Vec::new();
-    for (i, shares) in crossings.iter_mut().enumerate() {
+    for (shares, [p, q]) in crossings.iter_mut().zip(segments) {
         shares.sort_unstable_by(f64::total_cmp);
-        let [p, q] = segments[i];
-        let length = p.distance(q);
-        let long = |w: &&[f64]| (w[1] - w[0]) * length > rounding;
-        pieces.extend(shares.windows(2).filter(long).map(|w| (i, p.lerp(q, 0.5 * (w[0] + w[1])))));
+        let ends = shares.windows(2).map(|w| [w[0], w[1]].map(|share| p.lerp(*q, share)));
+        pieces.extend(ends.filter(|[a, b]| a.distance(*b) > rounding).map(|ends| Piece { ends }));
     }
-    let most = PIECES + PIECES_PER_SEGMENT * count;
-    let every = pieces.len().div_ceil(most).max(1);
-    let mut points = Vec::new();
-    for &(i, middle) in pieces.iter().step_by(every) {
-        let [p, q] = segments[i];
-        // Across the segment, along an axis: the boxes of the tree that the way there meets are found without rounding.
-        let across = if (q - p).abs().x >= (q - p).abs().y { DVec2::Y } else { DVec2::X };
-        for direction in [across, -across] {
-            let free = clearance(&tree, &boxes, &segments, middle, direction, rounding);
-            points.extend(free.map(|free| middle + 0.5 * free * direction));
+    pieces
+}
+
+/// For the left side (`2 i`) and the right side (`2 i + 1`) of each piece the least side of the same chain of pieces.
+fn chains(pieces: &[Piece], rounding: f64) -> Vec<u32> {
+    // Ends of one point are in one cell of a grid or in two that touch.
+    let cell = |p: DVec2| (p / (8.0 * rounding)).round().to_array().map(|c| c as i64);
+    let mut ends: HashMap<[i64; 2], Vec<(u32, usize)>> = HashMap::new();
+    for (i, piece) in pieces.iter().enumerate() {
+        for (end, &p) in piece.ends.iter().enumerate() {
+            ends.entry(cell(p)).or_default().push((i as u32, end));
         }
     }
-    points
+    let mut sides = DisjointSets::new(2 * pieces.len());
+    for (i, piece) in pieces.iter().enumerate() {
+        for (end, &p) in piece.ends.iter().enumerate() {
+            let [x, y] = cell(p);
+            let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
+            let here: Vec<(u32, usize)> = around.filter_map(|c| ends.get(&c)).flatten().copied().collect();
+            let others: Vec<_> = here.iter().filter(|e| **e != (i as u32, end)).collect();
+            if let [&(j, other)] = others[..]
+                && j != i as u32
+            {
+                // Left goes on as left where an end meets a beginning.
+                let turned = u32::from(end == other);
+                (0..2).for_each(|side| sides.join(2 * i as u32 + side, 2 * j + (side ^ turned)));
+            }
+        }
+    }
+    (0..2 * pieces.len() as u32).map(|side| sides.find(side)).collect()
 }
 
 /// Where two segments cross or touch, as shares of both; `None` for parallel segments.

@@ -3,7 +3,11 @@ use std::collections::HashSet;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{edges::centroid, faces::FaceFlaws, regions};
+use super::{
+    edges::centroid,
+    faces::FaceFlaws,
+    regions::{self, Sample},
+};
 use crate::{
     geometry::{WindingNumber, perturbed_orientation},
     mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, topology::Edge},
@@ -11,6 +15,9 @@ use crate::{
 
 /// What points of intersections may be off by, relative to the largest coordinate: some hundred roundings of it.
 const ROUNDING: f64 = 2e-14;
+
+/// Regions of all faces together that are tested: a second or two. Of more, evenly chosen ones of each face are.
+const REGIONS: usize = 1 << 17;
 
 /// What is known of how the faces of a closed mesh meet.
 pub(super) struct Meetings<'a> {
@@ -145,15 +152,18 @@ fn extremes(mesh: &TriangleMesh, winding: &WindingNumber, others: &Others) -> Ve
     let rounding = ROUNDING * bounds.min.abs().max(bounds.max.abs()).max_element();
     let meets = |&f: &u32| !others.of(f).is_empty() && !others.repeats[f as usize];
     let faces: Vec<u32> = (0..mesh.faces().len() as u32).filter(meets).collect();
-    let extremes_of = |&face: &u32| {
-        let samples = regions::samples(mesh, face, others.of(face), rounding);
-        let found: Vec<Sides> =
-            samples.iter().map(|s| sides(mesh, winding, face, s.point, s.jump)).collect();
+    let samples = |&face: &u32| (face, regions::samples(mesh, face, others.of(face), rounding));
+    let samples: Vec<(u32, Vec<Sample>)> = faces.par_iter().map(samples).collect();
+    let regions: usize = samples.iter().map(|(_, samples)| samples.len()).sum();
+    let every = regions.div_ceil(REGIONS).max(1);
+    let extremes_of = |(face, samples): &(u32, Vec<Sample>)| {
+        let tested = samples.iter().step_by(every);
+        let found: Vec<Sides> = tested.map(|s| sides(mesh, winding, *face, s.point, s.jump)).collect();
         let least = *found.iter().min_by_key(|s| s.least())?;
         let greatest = *found.iter().max_by_key(|s| s.greatest())?;
-        Some((face, least, greatest))
+        Some((*face, least, greatest))
     };
-    faces.par_iter().filter_map(extremes_of).collect()
+    samples.par_iter().filter_map(extremes_of).collect()
 }
 
 /// For each face with area the others with area that it meets, ascending.
