@@ -41,11 +41,12 @@ impl Asset {
     fn in_chunks(
         py: Python<'_>,
         rows: usize,
-        mut fill: impl FnMut(std::ops::Range<usize>) + Send,
+        mut fill: impl FnMut(std::ops::Range<usize>) -> Result<(), BatchError> + Send,
     ) -> PyResult<()> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         for start in (0..rows).step_by(CHUNK) {
-            py.detach(|| pool.install(|| fill(start..rows.min(start + CHUNK))));
+            py.detach(|| pool.install(|| fill(start..rows.min(start + CHUNK))))
+                .map_err(|e| PyValueError::new_err(e.to_string()))?;
             py.check_signals()?;
         }
         Ok(())
@@ -77,7 +78,7 @@ impl Asset {
                     closest_point: &mut c[at.clone()],
                     face: &mut f[at.clone()],
                 };
-                self.inner.query_batch_into(&points[at], precision, extent, columns);
+                self.inner.query_batch_into(&points[at], precision, extent, columns)
             })?;
         }
         classes::answers(py)?.call1((distance, gradient, closest, face))
@@ -163,7 +164,7 @@ impl Asset {
             let mut found = found.try_readwrite()?;
             let found = found.as_slice_mut()?;
             Self::in_chunks(py, points.len(), |at| {
-                self.inner.signed_distances_into(&points[at.clone()], precision, &mut found[at]);
+                self.inner.signed_distances_into(&points[at.clone()], precision, &mut found[at])
             })?;
         }
         Ok(found)
@@ -184,6 +185,7 @@ impl Asset {
             Self::in_chunks(py, points.len(), |at| {
                 let inside = |(inside, &p): (&mut bool, &DVec3)| *inside = self.inner.is_inside(p);
                 found[at.clone()].par_iter_mut().zip(&points[at]).for_each(inside);
+                Ok(())
             })?;
         }
         Ok(found)
@@ -212,6 +214,7 @@ impl Asset {
                 *hit = self.inner.ray_cast(origin, direction, limit);
             };
             hits[at].par_iter_mut().zip(rays).for_each(cast);
+            Ok(())
         })?;
         let t: Vec<f64> = hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.t)).collect();
         let point: Vec<DVec3> = hits.iter().map(|hit| hit.map_or(DVec3::NAN, |hit| hit.point)).collect();

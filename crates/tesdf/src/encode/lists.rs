@@ -103,7 +103,7 @@ impl Lists<'_> {
                     (Leaf::Outside, _) | (_, Some(Side::Outside)) => Label::Outside,
                     (_, Some(Side::Inside)) => Label::Inside,
                     (_, None) => match (crosses, winding.at_perturbed(cell.centroid())) {
-                        // Read back as i32: folds thinner than the check sees may be negative.
+                        // Read back as i32: it is negative where the surface is inside out.
                         (true, w) => Label::Crossing(w as u32),
                         (false, w) if w >= 1 => Label::Inside,
                         _ => Label::Outside,

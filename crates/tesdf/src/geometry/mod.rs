@@ -7,6 +7,7 @@ mod flat;
 mod frame;
 mod meet;
 mod polygon_distance;
+mod ray;
 mod self_overlap;
 #[cfg(test)]
 pub(crate) mod strategy;
@@ -22,6 +23,7 @@ pub use flat::is_flat;
 pub use frame::LocalFrame;
 pub use meet::{segment_meets_triangle, triangles_meet};
 pub use polygon_distance::polygon_to_triangle;
+pub(crate) use ray::{NearRay, length_and_direction};
 pub use self_overlap::self_overlaps;
 pub use tetrahedron::{tetrahedron_volume, triangle_meets_tetrahedron};
 pub use triangle::{Closest, Feature, Regions, Triangle};

@@ -5,6 +5,7 @@
 //! domain, or in a far cell) are answered from the tree over all faces, exactly too.
 mod batch;
 mod by_tree;
+mod far;
 mod kernel;
 mod lanes;
 mod locate;
@@ -16,7 +17,7 @@ use std::cell::RefCell;
 
 use glam::DVec3;
 
-pub use batch::{AnswerColumns, Extent};
+pub use batch::{AnswerColumns, BatchError, Extent};
 pub use kernel::{FaceRecord, Isa};
 pub use locate::Entries;
 pub(crate) use locate::{Faces, Place};
@@ -26,6 +27,7 @@ pub use ray::RayHit;
 use crate::TeSdf;
 use crate::asset::layout::{Label, Side};
 use crate::geometry::{Closest, Feature};
+use far::is_near;
 use sign::hinted_side;
 
 /// What a query computes with.
@@ -43,7 +45,8 @@ pub enum Precision {
 /// The answer to a query, in the mesh's unit and frame.
 ///
 /// A point with a NaN or infinite coordinate has no answer: the numbers are NaN and the face is
-/// [`NO_FACE`](Self::NO_FACE).
+/// [`NO_FACE`](Self::NO_FACE). Every other point has one, however far out it is; a distance above [`f64::MAX`] is given
+/// as [`f64::MAX`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Distance to the nearest face, negative inside.
@@ -97,7 +100,7 @@ impl TeSdf {
     /// Answers for any point; `point` is in the mesh's unit.
     pub fn query(&self, point: DVec3, precision: Precision) -> Answer {
         let local = self.frame.to_local(point);
-        self.answer_alone(local, self.place(local), precision)
+        self.answer_alone(point, local, self.place(local), precision)
     }
 
     /// As [`query`](Self::query), but `None` outside of the domain: more than the band from the solid, give or
@@ -106,7 +109,7 @@ impl TeSdf {
         let local = self.frame.to_local(point);
         match self.place(local) {
             Place::NotOfDomain => None,
-            place => Some(self.answer_alone(local, place, precision)),
+            place => Some(self.answer_alone(point, local, place, precision)),
         }
     }
 
@@ -141,7 +144,7 @@ impl TeSdf {
     }
 
     #[inline]
-    fn answer_alone(&self, local: DVec3, place: Place, precision: Precision) -> Answer {
+    fn answer_alone(&self, point: DVec3, local: DVec3, place: Place, precision: Precision) -> Answer {
         thread_local! {
             static FACES: RefCell<Faces> = RefCell::default();
         }
@@ -149,7 +152,7 @@ impl TeSdf {
             if let Place::Listed { offset, .. } = place {
                 self.read_list(offset, faces);
             }
-            self.answer(local, place, faces, precision)
+            self.answer(point, local, place, faces, precision)
         })
     }
 
@@ -193,17 +196,24 @@ impl TeSdf {
         }
     }
 
-    /// `faces` are those of the place's list, if it has one.
+    /// `faces` are those of the place's list, if it has one. `local` is `point` in the local frame.
     #[inline]
-    fn answer(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Answer {
-        if local.is_finite() {
+    fn answer(
+        &self,
+        point: DVec3,
+        local: DVec3,
+        place: Place,
+        faces: &Faces,
+        precision: Precision,
+    ) -> Answer {
+        if is_near(local) {
             self.to_answer(self.find(local, place, faces, precision))
         } else {
-            Answer::NONE
+            self.answer_far(point)
         }
     }
 
-    /// As [`answer`](Self::answer), in the local frame; `local` is finite.
+    /// As [`answer`](Self::answer), in the local frame; `local` is finite and not far.
     #[inline]
     pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
         match precision {
