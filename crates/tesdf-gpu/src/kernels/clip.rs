@@ -288,6 +288,7 @@ fn clip(
     // domain, where a part is a node of the tree that finds them.
     let levels = select(threads > 1u32 && !conforming, 3u32, 0u32);
     let parts = select(conforming, entry(assets, shape, TREE_NODES), 6u32 << levels);
+    let around = around_of(p.a, p.b, p.c);
     let mut part_of = select(conforming, 0u32, mine);
     let mut turn = 0u32;
     while part_of < parts {
@@ -295,7 +296,7 @@ fn clip(
         let mut next_part = part_of + threads;
         let mut elsewhere = false;
         if conforming {
-            let step = visit(assets, shape, part_of, around_of(p.a, p.b, p.c));
+            let step = visit(assets, shape, part_of, around);
             next_part = step.next;
             root = select(step.tetrahedron == NONE, 0u32, step.tetrahedron);
             elsewhere = step.tetrahedron == NONE

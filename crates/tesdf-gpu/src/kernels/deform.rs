@@ -115,6 +115,22 @@ pub fn follow(
     }
 }
 
+/// Around both boxes of a node of the face tree.
+#[cube]
+fn of_node(rows: &mut [Vector<f32, Const<4>>], boxes: u32, node: u32) -> Bounds {
+    let at = (boxes + 3u32 * node) as usize;
+    let (r, s, t) = (rows[at], rows[at + 1], rows[at + 2]);
+    let left = Bounds {
+        low: v3(r.extract(0usize), r.extract(1usize), r.extract(2usize)),
+        high: v3(r.extract(3usize), s.extract(0usize), s.extract(1usize)),
+    };
+    let right = Bounds {
+        low: v3(s.extract(2usize), s.extract(3usize), t.extract(0usize)),
+        high: v3(t.extract(1usize), t.extract(2usize), t.extract(3usize)),
+    };
+    both(left, right)
+}
+
 /// Around the faces or boxes below one side of a node of the face tree.
 #[cube]
 fn below(
@@ -144,14 +160,13 @@ fn below(
         hy = all.high.y;
         hz = all.high.z;
     } else {
-        let at = (boxes + 3u32 * child) as usize;
-        let (r, s, t) = (rows[at], rows[at + 1], rows[at + 2]);
-        lx = r.extract(0usize).min(s.extract(2usize));
-        ly = r.extract(1usize).min(s.extract(3usize));
-        lz = r.extract(2usize).min(t.extract(0usize));
-        hx = r.extract(3usize).max(t.extract(1usize));
-        hy = s.extract(0usize).max(t.extract(2usize));
-        hz = s.extract(1usize).max(t.extract(3usize));
+        let all = of_node(rows, boxes, child);
+        lx = all.low.x;
+        ly = all.low.y;
+        lz = all.low.z;
+        hx = all.high.x;
+        hy = all.high.y;
+        hz = all.high.z;
     }
     Bounds { low: v3(lx, ly, lz), high: v3(hx, hy, hz) }
 }
@@ -306,13 +321,12 @@ pub fn refit(
         // Of moved lists and cells nothing is proved.
         table[first + EXACT_LISTS as usize] = 0u32;
         table[first + BOUND_UNIT as usize] = 0u32;
-        let root = boxes as usize;
-        let (r, s, t) = (rows[root], rows[root + 1], rows[root + 2]);
-        table[first + LOW as usize] = u32::reinterpret(r.extract(0usize).min(s.extract(2usize)));
-        table[first + LOW as usize + 1usize] = u32::reinterpret(r.extract(1usize).min(s.extract(3usize)));
-        table[first + LOW as usize + 2usize] = u32::reinterpret(r.extract(2usize).min(t.extract(0usize)));
-        table[first + HIGH as usize] = u32::reinterpret(r.extract(3usize).max(t.extract(1usize)));
-        table[first + HIGH as usize + 1usize] = u32::reinterpret(s.extract(0usize).max(t.extract(2usize)));
-        table[first + HIGH as usize + 2usize] = u32::reinterpret(s.extract(1usize).max(t.extract(3usize)));
+        let all = of_node(rows, boxes, 0u32);
+        table[first + LOW as usize] = u32::reinterpret(all.low.x);
+        table[first + LOW as usize + 1usize] = u32::reinterpret(all.low.y);
+        table[first + LOW as usize + 2usize] = u32::reinterpret(all.low.z);
+        table[first + HIGH as usize] = u32::reinterpret(all.high.x);
+        table[first + HIGH as usize + 1usize] = u32::reinterpret(all.high.y);
+        table[first + HIGH as usize + 2usize] = u32::reinterpret(all.high.z);
     }
 }

@@ -107,7 +107,7 @@ fn inside_by(t: Tetrahedron, l: Lambda) -> f32 {
     (l.l0 * t.h0).min(l.l1 * t.h1).min(l.l2 * t.h2).min(l.l3 * t.h3)
 }
 
-/// What may lie in a box: a point, or a triangle, with its bounds and its plane.
+/// What may lie in a box: a point, or a triangle with its bounds and its plane.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Around {
@@ -130,13 +130,8 @@ pub fn around_of(a: V3, b: V3, c: V3) -> Around {
     // Of what has hardly an area the plane says nothing.
     let is_thin = size <= THIN * longest * longest;
     let normal = pick(is_thin, v3(0.0f32, 0.0f32, 0.0f32), normal);
-    Around {
-        low: v3(a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y), a.z.min(b.z).min(c.z)),
-        high: v3(a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y), a.z.max(b.z).max(c.z)),
-        normal,
-        height: dot(normal, a),
-        slope: longest * (4e-7f32 * longest + OUT) / size.max(1e-30f32),
-    }
+    let slope = longest * (4e-7f32 * longest + OUT) / size.max(1e-30f32);
+    part_of(Around { low: a, high: a, normal, height: dot(normal, a), slope }, a, b, c)
 }
 
 /// A part of it, with three of its own corners: its plane is that of the whole, which is the surer the larger it is.
@@ -208,7 +203,9 @@ pub struct Held {
 /// The tetrahedron of a conforming domain that holds a point: the first one found, or the one that the point is least out of.
 #[cube]
 pub fn root_holding(assets: &Assets, shape: u32, p: V3) -> Held {
-    let around = around_of(p, p, p);
+    // A point has no plane.
+    let around =
+        Around { low: p, high: p, normal: v3(0.0f32, 0.0f32, 0.0f32), height: 0.0f32, slope: 0.0f32 };
     let count = entry(assets, shape, TREE_NODES);
     let mut root = NONE.runtime();
     let mut best = comptime!(-OUT).runtime();
