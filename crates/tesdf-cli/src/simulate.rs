@@ -160,17 +160,17 @@ fn begin(
     system: &mut System,
     origin: &RunOrigin,
 ) -> Result<PartialRun, Failure> {
-    let Some(cut) = cut else {
+    let (Some(cut), Some(resumed)) = (cut, &args.resume) else {
         // So that the run finds its meshes, wherever it is read.
         let scene = absolute(args.source())?;
         let folder = scene.parent().unwrap_or(&scene).to_string_lossy().into_owned();
         return Ok(PartialRun::new(&loaded.scene, system, folder));
     };
     cut.check(&loaded.scene, origin).map_err(|e| {
-        Failure::new(format!("cannot resume {}: {e}", args.output().display()))
+        Failure::new(format!("cannot resume {}: {e}", resumed.display()))
             .hint("resume with the scene, options and geometries of the run, or simulate the scene from its beginning")
     })?;
-    cut.run.restore(system).map_err(|e| Failure::new(format!("{}: {e}", args.source().display())))?;
+    cut.run.restore(system).map_err(|e| Failure::new(format!("{}: {e}", resumed.display())))?;
     Ok(cut.run.clone())
 }
 
@@ -236,7 +236,7 @@ impl<'a> LiveProgress<'a> {
     }
 
     fn show(&self, moment: &Moment<'_>) -> ControlFlow<()> {
-        let Moment { step, steps, time, report, system } = moment;
+        let Moment { step, steps, time, report, system, .. } = moment;
         self.bar.set_length(*steps);
         self.bar.set_position(*step);
         self.bar.set_message(format!(

@@ -1,37 +1,16 @@
 //! `kill -9` at random moments: nothing is ever half a file, and a run loses one step at most.
+#![cfg(unix)]
 mod folder;
 
 use std::fs;
+use std::os::unix::process::ExitStatusExt;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use folder::Folder;
+use folder::{Folder, block};
 use tesdf_sim::RunRecord;
 
 const KILLS: usize = 50;
-
-/// A block of `n` × `n` × `n` cubes, as its surface.
-fn block(n: u32) -> String {
-    let mut text = String::new();
-    let mut corners = 0;
-    for axis in 0..3 {
-        for (side, i, j) in (0..2 * n * n).map(|k| (k % 2, k / 2 % n, k / 2 / n)) {
-            let corner = |u: u32, v: u32| {
-                let mut p = [side * n; 3];
-                (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (i + u, j + v);
-                format!("v {} {} {}\n", p[0], p[1], p[2])
-            };
-            let mut around = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
-            if side == 0 {
-                around.reverse();
-            }
-            text += &around.concat();
-            text += &format!("f {} {} {} {}\n", corners + 1, corners + 2, corners + 3, corners + 4);
-            corners += 4;
-        }
-    }
-    text
-}
 
 /// A box that is thrown along a floor.
 const SCENE: &str = r#"
@@ -55,21 +34,41 @@ velocity = [1, 0, 0]
 angular_velocity = [5, 3, 1]
 "#;
 
-/// How long a command takes that nobody kills.
-fn measure(folder: &Folder, args: &[&str]) -> Duration {
-    let start = Instant::now();
-    folder.good(args);
-    start.elapsed()
+/// A command that is killed at random moments.
+struct Victim<'a> {
+    args: &'a [&'a str],
+    random: fastrand::Rng,
+    /// How long the command takes; the shortest time seen, as other work slows it down.
+    whole: Duration,
 }
 
-/// Starts the command and kills it after a while, if it is not over before.
-fn kill_after(folder: &Folder, args: &[&str], delay: Duration) {
-    let mut command = folder.command(args);
-    let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    std::thread::sleep(delay);
-    // SIGKILL on Unix; an error when the process has ended.
-    let _ = child.kill();
-    child.wait().unwrap();
+impl<'a> Victim<'a> {
+    fn new(folder: &Folder, args: &'a [&'a str], seed: u64) -> Self {
+        let start = Instant::now();
+        folder.good(args);
+        Self { args, random: fastrand::Rng::with_seed(seed), whole: start.elapsed() }
+    }
+
+    /// A share of the time that the whole command takes.
+    fn share(&mut self, from: f64, to: f64) -> Duration {
+        self.whole.mul_f64(from + (to - from) * self.random.f64())
+    }
+
+    /// Starts the command and kills it after a while. Whether it was killed, not over before.
+    fn kill(&mut self, folder: &Folder, args: &[&str], delay: Duration) -> bool {
+        let mut command = folder.command(args);
+        let start = Instant::now();
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        while start.elapsed() < delay && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        let _ = child.kill();
+        let killed = child.wait().unwrap().signal() == Some(9);
+        if !killed && args == self.args {
+            self.whole = self.whole.min(start.elapsed());
+        }
+        killed
+    }
 }
 
 #[test]
@@ -77,21 +76,17 @@ fn a_killed_encode_leaves_the_old_file_or_the_new_file() {
     let folder = Folder::new();
     folder.write("block.obj", block(12));
     let encode = ["encode", "block.obj", "-o", "f.tesdf", "--preset", "fast"];
-    folder.good(&encode);
-    let whole = measure(&folder, &encode);
+    let mut victim = Victim::new(&folder, &encode, 12);
     let new = fs::read(folder.path("f.tesdf")).unwrap();
-    let mut random = fastrand::Rng::with_seed(12);
-    let mut found = [0; 2];
-    for kill in 0..KILLS {
+    let mut kills = 0;
+    while kills < KILLS {
         folder.write("f.tesdf", "old");
-        // Every second one near the end, when the file is written.
-        let share = if kill % 2 == 0 { random.f64() } else { 0.8 + 0.4 * random.f64() };
-        kill_after(&folder, &encode, whole.mul_f64(share));
+        // Every second time near the end, when the file is written.
+        let delay = if kills % 2 == 0 { victim.share(0.0, 1.0) } else { victim.share(0.8, 1.0) };
+        kills += usize::from(victim.kill(&folder, &encode, delay));
         let left = fs::read(folder.path("f.tesdf")).unwrap();
-        assert!(left == b"old" || left == new, "kill {kill}: {} bytes", left.len());
-        found[usize::from(left == new)] += 1;
+        assert!(left == b"old" || left == new, "kill {kills}: {} bytes", left.len());
     }
-    assert!(found[0] >= KILLS / 5, "too few were killed in time: {found:?}");
     folder.good(&encode);
     assert_eq!(folder.names(), ["block.obj", "f.tesdf"]);
 }
@@ -102,38 +97,38 @@ fn a_killed_run_goes_on_from_its_last_step_to_the_same_bytes() {
     folder.write("scene.toml", SCENE);
     let simulate = ["simulate", "scene.toml", "-o", "run"];
     let resume = ["simulate", "--resume", "run"];
-    let whole = measure(&folder, &simulate);
+    let mut victim = Victim::new(&folder, &simulate, 5);
     let expected = fs::read(folder.path("run")).unwrap();
     let record = RunRecord::from_bytes(&expected).unwrap();
     assert!(record.contacts().any(|(_, contacts)| !contacts.is_empty()), "nothing touches");
     fs::remove_file(folder.path("run")).unwrap();
-    let mut random = fastrand::Rng::with_seed(5);
-    let (mut cut, mut steps) = (0, None);
-    for kill in 0..KILLS {
+    let (mut kills, mut cuts, mut steps) = (0, 0, None);
+    while kills < KILLS {
         let command = if steps.is_some() { &resume[..] } else { &simulate };
-        kill_after(&folder, command, whole.mul_f64(0.7 * random.f64()));
+        let delay = victim.share(0.0, 0.7);
+        kills += usize::from(victim.kill(&folder, command, delay));
         if !folder.path("run").exists() {
-            assert_eq!(steps, None, "kill {kill} took the run away");
+            assert_eq!(steps, None, "kill {kills} took the run away");
             continue;
         }
-        let left = RunRecord::open(&folder.path("run")).unwrap_or_else(|e| panic!("kill {kill}: {e}"));
-        assert!(Some(left.steps()) >= steps, "kill {kill} took steps away");
+        let left = RunRecord::open(&folder.path("run")).unwrap_or_else(|e| panic!("kill {kills}: {e}"));
+        assert!(Some(left.steps()) >= steps, "kill {kills} took steps away");
         let last = left.steps() as usize;
         assert_eq!(left.times(), &record.times()[..=last]);
-        assert!((0..=last).all(|step| left.pose(step, 1) == record.pose(step, 1)), "kill {kill}");
+        assert!((0..=last).all(|step| left.pose(step, 1) == record.pose(step, 1)), "kill {kills}");
         match left.planned_steps() {
             Some(planned) => {
                 assert_eq!(planned, record.steps());
-                (cut, steps) = (cut + 1, Some(left.steps()));
+                (cuts, steps) = (cuts + 1, Some(left.steps()));
             }
             None => {
-                assert!(fs::read(folder.path("run")).unwrap() == expected, "kill {kill}: other bytes");
+                assert!(fs::read(folder.path("run")).unwrap() == expected, "kill {kills}: other bytes");
                 fs::remove_file(folder.path("run")).unwrap();
                 steps = None;
             }
         }
     }
-    assert!(cut >= KILLS / 5, "too few were killed in time: {cut}");
+    assert!(cuts > 0, "no run was cut");
     folder.good(if steps.is_some() { &resume[..] } else { &simulate });
     assert!(fs::read(folder.path("run")).unwrap() == expected);
     assert_eq!(folder.names(), ["run", "scene.toml"]);

@@ -136,7 +136,7 @@ fn an_input_is_never_the_output() {
 const WRITERS: [(&[&str], &str); 6] = [
     (&["encode", "cube.obj", "--preset", "fast"], "out.tesdf"),
     (&["repair", "cube.obj"], "out.ply"),
-    (&["slice", "a.tesdf", "--size", "64"], "out.png"),
+    (&["slice", "a.tesdf", "--size", "256"], "out.png"),
     (&["render", "a.tesdf", "--size", "32x32"], "out.png"),
     (&["simulate", "scene.toml"], "out.tesrun"),
     (&["bench", "poses", "bolt-nut", "--frames", "1"], "out.json"),
@@ -312,11 +312,12 @@ fn a_full_disk_leaves_the_old_file_and_a_run_its_steps() {
     folder.good(&["simulate", "long.toml", "-o", "whole.tesrun"]);
     let whole = fs::read(folder.path("whole.tesrun")).unwrap();
     assert!(whole.len() > 40_000);
+    folder.write("block.obj", folder::block(8));
     let disks = FullDisk::all(&folder);
     let _unmount = Unmount(&folder);
     for disk in &disks {
         folder.write("disk/f.tesdf", "old");
-        let encode = ["encode", "cube.obj", "-o", "disk/f.tesdf", "--band", "3"];
+        let encode = ["encode", "block.obj", "-o", "disk/f.tesdf", "--preset", "fast"];
         let (code, _, err) = disk.run(&folder, &encode);
         assert_eq!(code, Some(2), "{err}");
         assert!(err.starts_with("error: cannot write disk/f.tesdf: "), "{err}");
@@ -334,7 +335,9 @@ fn a_full_disk_leaves_the_old_file_and_a_run_its_steps() {
         assert!(record.planned_steps() == Some(500) && (10..500).contains(&record.steps()));
         folder.good(&["simulate", "--resume", "disk/r.tesrun", "-o", "again.tesrun"]);
         assert!(fs::read(folder.path("again.tesrun")).unwrap() == whole);
-        ["disk/f.tesdf", "disk/r.tesrun"].map(|name| fs::remove_file(folder.path(name)).unwrap());
+        for name in ["disk/f.tesdf", "disk/r.tesrun"] {
+            fs::remove_file(folder.path(name)).unwrap();
+        }
     }
 }
 

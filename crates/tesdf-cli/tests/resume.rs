@@ -31,9 +31,10 @@ scale = 0.01
 translation = [0, 0, 1e-4]
 "#;
 
-/// A scene that takes a second or more.
-fn long() -> String {
-    SCENE.replace("duration = 0.04", "duration = 20").replace("contacts_every = 1", "contacts_every = 0")
+/// The scene with this number of steps, each of which takes about a millisecond.
+fn long(steps: u64) -> String {
+    let duration = format!("duration = {}", steps as f64 * 2e-3);
+    SCENE.replace("duration = 0.04", &duration).replace("contacts_every = 1", "contacts_every = 0")
 }
 
 fn workplace() -> Folder {
@@ -157,13 +158,13 @@ fn other_commands_read_a_cut_run_and_say_so() {
 }
 
 /// Starts the long scene and waits until it has made some steps.
-fn start(folder: &Folder) -> Child {
-    folder.write("long.toml", long());
+fn start(folder: &Folder, steps: u64) -> Child {
+    folder.write("long.toml", long(steps));
     let mut command = folder.command(&["simulate", "long.toml", "-o", "run"]);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     // The run of the test's beginning is shorter.
     while !RunRecord::open(&folder.path("run"))
-        .is_ok_and(|run| run.planned_steps() == Some(10_000) && run.steps() > 2)
+        .is_ok_and(|run| run.planned_steps() == Some(steps) && run.steps() > 2)
     {
         std::thread::sleep(Duration::from_millis(2));
     }
@@ -174,14 +175,14 @@ fn start(folder: &Folder) -> Child {
 #[test]
 fn ctrl_c_keeps_the_steps_and_says_how_to_go_on() {
     let folder = workplace();
-    let child = start(&folder);
+    let child = start(&folder, 2000);
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let (code, out, err) = texts(child.wait_with_output().unwrap());
     assert_eq!((code, out.as_str()), (Some(2), ""), "{err}");
     let steps = RunRecord::open(&folder.path("run")).unwrap().steps();
-    assert!((3..10_000).contains(&steps));
+    assert!((3..2000).contains(&steps));
     let expected = format!(
-        "error: interrupted after {steps} of 10000 steps; run has them\nhint: `tesdf simulate --resume run` goes on from there\n"
+        "error: interrupted after {steps} of 2000 steps; run has them\nhint: `tesdf simulate --resume run` goes on from there\n"
     );
     assert_eq!(err, expected);
     assert_eq!(folder.names(), ["cube.obj", "long.toml", "run", "scene.toml", "whole"]);
@@ -193,7 +194,7 @@ fn ctrl_c_keeps_the_steps_and_says_how_to_go_on() {
 #[test]
 fn a_run_that_is_being_written_is_left_to_its_process() {
     let folder = workplace();
-    let mut child = start(&folder);
+    let mut child = start(&folder, 20_000);
     let busy = "error: another process is writing run\n\
         hint: wait for that process, or give another file to -o\n";
     for args in [&["simulate", "--resume", "run"][..], &["simulate", "scene.toml", "-o", "run"]] {

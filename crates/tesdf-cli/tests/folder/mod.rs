@@ -67,12 +67,35 @@ pub fn data(name: &str) -> String {
 /// The binary that is tested.
 pub const BINARY: &str = env!("CARGO_BIN_EXE_tesdf");
 
+/// A block of `n` × `n` × `n` cubes, as its surface.
+pub fn block(n: u32) -> String {
+    let mut text = String::new();
+    let mut corners = 0;
+    for axis in 0..3 {
+        for (side, i, j) in (0..2 * n * n).map(|k| (k % 2, k / 2 % n, k / 2 / n)) {
+            let corner = |u: u32, v: u32| {
+                let mut p = [side * n; 3];
+                (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (i + u, j + v);
+                format!("v {} {} {}\n", p[0], p[1], p[2])
+            };
+            let mut around = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+            if side == 0 {
+                around.reverse();
+            }
+            text += &around.concat();
+            text += &format!("f {} {} {} {}\n", corners + 1, corners + 2, corners + 3, corners + 4);
+            corners += 4;
+        }
+    }
+    text
+}
+
 /// The file of a run that was killed after `steps` steps.
 pub fn cut_run(folder: &Folder, scene: &str, steps: u64) -> Vec<u8> {
     let loaded = LoadedScene::read(&folder.path(scene)).unwrap();
     let system = loaded.system(&EncodeProgress::default()).unwrap();
     let origin = RunOrigin::of(&system, "cpu").unwrap();
-    let run = PartialRun::new(&loaded.scene, &system, folder.path("").display().to_string());
+    let run = PartialRun::new(&loaded.scene, &system, folder.0.path().display().to_string());
     let mut engine = loaded.newton(system).unwrap();
     let path = folder.path("run that is cut");
     let destination = Destination::new(&path, &SaveOptions::default()).unwrap();

@@ -1,4 +1,4 @@
-use std::fs::{self, File, Permissions, TryLockError};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -112,7 +112,7 @@ fn create(target: &Path, folder: &Path) -> io::Result<NamedTempFile> {
         use std::os::unix::fs::PermissionsExt;
         // What the umask leaves of 0666 is an ordinary file.
         let mode = fs::metadata(target).map_or(0o666, |m| m.permissions().mode() & 0o777);
-        builder.permissions(Permissions::from_mode(mode));
+        builder.permissions(fs::Permissions::from_mode(mode));
     }
     #[cfg(not(unix))]
     let _ = target;
