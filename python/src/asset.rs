@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use tesdf::TeSdf;
 use tesdf::asset::{Element, layout};
 use tesdf::glam::DVec3;
 use tesdf::inspect::{InspectOptions, inspect};
-use tesdf::query::{Answer, AnswerColumns, Extent, Precision};
+use tesdf::query::{Answer, AnswerColumns, BatchError, Extent, Precision};
 use tesdf::verify::{VerifyOptions, verify};
 
 use crate::arrays::{self, Rows};
