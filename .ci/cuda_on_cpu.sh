@@ -3,16 +3,7 @@
 cuda_on_cpu=$PWD/target/cuda_on_cpu
 cuda_on_cpu_source=$PWD/crates/tesdf-gpu/tests/cuda_on_cpu
 
-if ! command -v c++ >/dev/null && command -v apt-get >/dev/null; then
-    as_root=
-    [ "$(id -u)" = 0 ] || as_root="sudo -n"
-    $as_root apt-get install --quiet --yes g++ >/dev/null || true
-fi
-if ! command -v c++ >/dev/null; then
-    echo "error: a C++ compiler, which the CUDA kernels are tested with, was not found" >&2
-    echo "hint: on Debian or Ubuntu: apt-get install g++" >&2
-    exit 2
-fi
+. .ci/cxx.sh
 mkdir -p "$cuda_on_cpu"
 if [ "$cuda_on_cpu_source/cuda.cpp" -nt "$cuda_on_cpu/libcuda.so" ]; then
     c++ -std=c++17 -O2 -Wall -fPIC -shared -DHEADER="\"$cuda_on_cpu_source/kernel.h\"" -o "$cuda_on_cpu/libcuda.so" \

@@ -1,6 +1,4 @@
 //! Mesh files of any bytes: the first byte chooses the format, the others are the file.
-//!
-//! `cargo +nightly fuzz run read_mesh`
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

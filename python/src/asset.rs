@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use rayon::prelude::*;
@@ -11,7 +12,7 @@ use tesdf::TeSdf;
 use tesdf::asset::{Element, layout};
 use tesdf::glam::DVec3;
 use tesdf::inspect::{InspectOptions, inspect};
-use tesdf::query::{Answer, AnswerColumns, Extent, Precision};
+use tesdf::query::{Answer, AnswerColumns, BatchError, Extent, Precision};
 use tesdf::verify::{VerifyOptions, verify};
 
 use crate::arrays::{self, Rows};
@@ -41,11 +42,12 @@ impl Asset {
     fn in_chunks(
         py: Python<'_>,
         rows: usize,
-        mut fill: impl FnMut(std::ops::Range<usize>) + Send,
+        mut fill: impl FnMut(std::ops::Range<usize>) -> Result<(), BatchError> + Send,
     ) -> PyResult<()> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         for start in (0..rows).step_by(CHUNK) {
-            py.detach(|| pool.install(|| fill(start..rows.min(start + CHUNK))));
+            py.detach(|| pool.install(|| fill(start..rows.min(start + CHUNK))))
+                .map_err(|e| PyValueError::new_err(e.to_string()))?;
             py.check_signals()?;
         }
         Ok(())
@@ -77,7 +79,7 @@ impl Asset {
                     closest_point: &mut c[at.clone()],
                     face: &mut f[at.clone()],
                 };
-                self.inner.query_batch_into(&points[at], precision, extent, columns);
+                self.inner.query_batch_into(&points[at], precision, extent, columns)
             })?;
         }
         classes::answers(py)?.call1((distance, gradient, closest, face))
@@ -122,7 +124,8 @@ impl Asset {
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Writes the file, that of to_bytes; one that is there is replaced in one step.
+    /// Writes the file, that of to_bytes; a file that is there is replaced in one step, and keeps its permissions. A read-only
+    /// file raises PermissionError.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.inner.save(&path)).map_err(|e| Error::Asset(Some(path), e).raise(py))
     }
@@ -162,7 +165,7 @@ impl Asset {
             let mut found = found.try_readwrite()?;
             let found = found.as_slice_mut()?;
             Self::in_chunks(py, points.len(), |at| {
-                self.inner.signed_distances_into(&points[at.clone()], precision, &mut found[at]);
+                self.inner.signed_distances_into(&points[at.clone()], precision, &mut found[at])
             })?;
         }
         Ok(found)
@@ -183,6 +186,7 @@ impl Asset {
             Self::in_chunks(py, points.len(), |at| {
                 let inside = |(inside, &p): (&mut bool, &DVec3)| *inside = self.inner.is_inside(p);
                 found[at.clone()].par_iter_mut().zip(&points[at]).for_each(inside);
+                Ok(())
             })?;
         }
         Ok(found)
@@ -211,6 +215,7 @@ impl Asset {
                 *hit = self.inner.ray_cast(origin, direction, limit);
             };
             hits[at].par_iter_mut().zip(rays).for_each(cast);
+            Ok(())
         })?;
         let t: Vec<f64> = hits.iter().map(|hit| hit.map_or(f64::INFINITY, |hit| hit.t)).collect();
         let point: Vec<DVec3> = hits.iter().map(|hit| hit.map_or(DVec3::NAN, |hit| hit.point)).collect();
@@ -307,7 +312,7 @@ impl Asset {
     /// What the encoder proved.
     #[getter]
     fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        classes::report(py, "Certificate", &self.inner.about().certificate)
+        classes::report(py, "Certificate", &self.inner.about().certificate())
     }
 
     /// Counts taken while encoding.

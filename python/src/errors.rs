@@ -2,7 +2,9 @@
 use std::io;
 use std::path::PathBuf;
 
-use pyo3::exceptions::{PyOSError, PyValueError};
+use pyo3::exceptions::{
+    PyFileNotFoundError, PyIsADirectoryError, PyOSError, PyPermissionError, PyValueError,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use tesdf::asset::AssetError;
@@ -10,6 +12,7 @@ use tesdf::deform::DeformError;
 use tesdf::domain::ReadTetrahedraError;
 use tesdf::encode::{ChoiceError, DomainError, EncodeError};
 use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
+use tesdf::save::SaveError;
 use tesdf::verify::VerifyError;
 
 use crate::classes;
@@ -40,6 +43,13 @@ impl Error {
         match self {
             Self::Read(_, ReadError::Open { ref source, .. }) => system(source, self.text()),
             Self::Asset(_, AssetError::Io { ref source, .. }) => system(source, self.text()),
+            Self::Asset(_, AssetError::Save(ref refused)) => match refused {
+                SaveError::Io { source, .. } => system(source, self.text()),
+                SaveError::ReadOnly { .. } => PyPermissionError::new_err(self.text()),
+                SaveError::NoFolder { .. } => PyFileNotFoundError::new_err(self.text()),
+                SaveError::IsFolder { .. } => PyIsADirectoryError::new_err(self.text()),
+                SaveError::Input { .. } | SaveError::Busy { .. } => PyOSError::new_err(self.text()),
+            },
             Self::Domain(DomainError::Read {
                 source: ReadTetrahedraError::Open { ref source, .. }, ..
             }) => system(source, self.text()),
@@ -76,7 +86,7 @@ impl Error {
             Self::Domain(e) => e.to_string(),
             Self::Encode(path, e) => at(path, e),
             Self::Deform(e) => e.to_string(),
-            Self::Asset(_, e @ AssetError::Io { .. }) => e.to_string(),
+            Self::Asset(_, e @ (AssetError::Io { .. } | AssetError::Save(_))) => e.to_string(),
             Self::Asset(path, e) => at(path, e),
             Self::Verify(e) => e.to_string(),
             Self::Report(e) => format!("the report cannot be handed to Python: {e}"),

@@ -1,6 +1,6 @@
 //! `tesdf encode MESH -o FILE`
 use std::num::{NonZeroU32, NonZeroUsize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -8,14 +8,16 @@ use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::asset::about::{Certificate, Source, Statistics};
+use tesdf::domain::tetrahedra_files;
 use tesdf::encode::{Domain, DomainChoice, EncodeOptions, EncodeProgress, Encoder, Threshold, encode_with};
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 
 use crate::devices::Choice;
+use crate::output::Consent;
 use crate::progress::{interrupt_flag, watched};
 use crate::report::{self, Failure, Outcome};
-use crate::{mesh_file, parse};
+use crate::{mesh_file, output, parse};
 
 mod choices;
 
@@ -26,9 +28,12 @@ pub use choices::{EncoderChoice, Preset};
 pub struct Args {
     /// Mesh: STL, OBJ, PLY, OFF, glTF or GLB
     pub mesh: PathBuf,
-    /// The file to write; an existing one is replaced
+    /// The file to write; an existing one is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
     /// How the space in and around the solid is cut into tetrahedra: `bisection` needs nothing else, `gmsh` runs Gmsh, a FILE (.msh, .node,
     /// .ele, .vtu) has tetrahedra whose sides are the mesh's faces
     #[arg(long, value_name = "bisection|gmsh|FILE", default_value = "bisection")]
@@ -75,7 +80,7 @@ pub struct Args {
 }
 
 fn exactness(certificate: &Certificate) -> String {
-    match (certificate.delta_of_diagonal, certificate.exactness_distance) {
+    match (certificate.delta_of_diagonal(), certificate.exactness_distance()) {
         (Some(delta), None) => format!("to {delta:.1e} of the diagonal, proven"),
         (Some(delta), Some(within)) => {
             format!("to {delta:.1e} of the diagonal up to {within:.4e} from the surface, proven")
@@ -111,7 +116,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         pool = pool.num_threads(threads.get());
     }
     let pool = pool.build().map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;
-    check_output(&args.mesh, &args.output)?;
+    let output = output::open(&args.output, &args.inputs(), args.consent)?;
     let start = Instant::now();
     let LoadedMesh { mesh, report: load, .. } = mesh_file::read(&args.mesh)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.mesh.display()));
@@ -140,36 +145,21 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         return Err(Failure::new(format!("interrupted; {} is as it was", args.output.display())));
     }
     let asset: TeSdf = encoded?;
-    asset.save(&args.output).map_err(Failure::new)?;
+    output::write(&output, &asset.to_bytes().map_err(Failure::new)?)?;
     let seconds = start.elapsed().as_secs_f64();
     print(args, &load, solid.warnings(), &asset, seconds)?;
     Ok(Outcome::Good)
 }
 
-/// What would be noticed only after the work: an output in no folder, or on top of the input.
-///
-/// # Errors
-/// Says which.
-pub(crate) fn check_output(mesh: &Path, output: &Path) -> Result<(), Failure> {
-    let folder = match output.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    if !folder.is_dir() {
-        return Err(Failure::new(format!(
-            "cannot write {}: there is no folder {}",
-            output.display(),
-            folder.display()
-        )));
+impl Args {
+    /// All files that the command reads.
+    fn inputs(&self) -> Vec<PathBuf> {
+        let mut inputs = tesdf::mesh::files(&self.mesh);
+        if let DomainChoice::File(path) = &self.domain {
+            inputs.extend(tetrahedra_files(path));
+        }
+        inputs
     }
-    let same = |a: &Path, b: &Path| a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b));
-    if same(mesh, output) {
-        return Err(Failure::new(format!(
-            "{} is the input itself; give another file to -o",
-            output.display()
-        )));
-    }
-    Ok(())
 }
 
 /// Defects of each kind that are printed; `tesdf check` prints more.
@@ -215,7 +205,7 @@ fn print(
             options: &about.options,
             source: &about.source,
             statistics,
-            certificate: &about.certificate,
+            certificate: about.certificate(),
         });
     }
     let cells = statistics.listed_cells + statistics.far_cells;
@@ -225,7 +215,7 @@ fn print(
         ("file", format!("{output}, {}, {bytes_per_face:.0} per face", report::size(bytes))),
         ("cells", format!("{cells}, of which {} with a list", statistics.listed_cells)),
         ("lists", format!("{mean:.1} faces on average, at most {}", statistics.longest_list)),
-        ("exact", exactness(&about.certificate)),
+        ("exact", exactness(about.certificate())),
         ("time", format!("{seconds:.1} s")),
     ])
 }

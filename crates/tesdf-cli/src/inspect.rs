@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         found: &found,
         source: &about.source,
         options: &about.options,
-        certificate: &about.certificate,
+        certificate: about.certificate(),
         statistics: &about.statistics,
     };
     if args.json {
@@ -134,23 +134,23 @@ fn rows(report: &Report) -> Vec<(String, String)> {
         ),
     ));
     rows.append(&mut bytes);
-    let exact = match certificate.exactness_distance {
+    let exact = match certificate.exactness_distance() {
         None => "in the whole domain".into(),
         Some(distance) => format!("up to {distance}{unit} from the surface"),
     };
     rows.extend([
         ("", String::new()),
-        ("encoder", format!("{}, domain {}", certificate.encoder, certificate.domain)),
+        ("encoder", format!("{}, domain {}", certificate.encoder(), certificate.domain())),
         (
             "exact",
-            match (certificate.delta, certificate.delta_of_diagonal) {
+            match (certificate.delta(), certificate.delta_of_diagonal()) {
                 (Some(delta), Some(share)) => {
                     format!("{exact}, to {delta:.1e}{unit} ({share:.1e} of the diagonal)")
                 }
                 _ => "not proven".into(),
             },
         ),
-        ("lists cut", yes_no(certificate.truncated).into()),
+        ("lists cut", yes_no(certificate.truncated()).into()),
         ("band", band),
         ("regions", options.regions.len().to_string()),
         ("byte worth", options.byte_worth.to_string()),

@@ -1,7 +1,8 @@
 //! The parts of the command-line tool `tesdf`: one module per command, and what they share.
 //!
-//! stdout carries only a command's result; notes, warnings, errors and progress go to stderr. The exit code is 0 when the
-//! command did its work, 1 when a mesh or file is not good (`check`, `repair`, `verify`), 2 for bad usage or input.
+//! stdout carries only a command's result; notes, warnings, errors and progress go to stderr. With `-o /dev/stdout` it carries only the bytes
+//! of the output. The exit code is 0 when the command did its work, 1 when a mesh or file is not good (`check`, `repair`, `verify`) or a run does
+//! not meet its criterion (`simulate`), 2 for bad usage or input, an output that cannot be written, and Ctrl-C.
 #![warn(missing_docs)]
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -20,12 +21,14 @@ pub mod encode;
 pub mod evaluate;
 pub mod inspect;
 pub mod mesh_file;
+pub mod output;
 pub mod parse;
 pub mod progress;
 pub mod query;
 pub mod render;
 pub mod repair;
 pub mod report;
+pub mod run_file;
 pub mod simulate;
 pub mod slice;
 pub mod toi;

@@ -59,7 +59,8 @@ pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
     let seen = Arc::clone(&flag);
     ctrlc::set_handler(move || {
         if seen.swap(true, Ordering::Relaxed) {
-            // Files are written aside and renamed, so nothing half-written is left under a final name.
+            // Files are written aside and renamed, so nothing half-written is left under a final name; a run that grows is read up to
+            // its last whole step.
             std::process::exit(2);
         }
     })

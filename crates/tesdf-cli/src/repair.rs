@@ -2,8 +2,12 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use tesdf::mesh::{LoadReport, RepairOptions, RepairReport, WriteFormat, check, repair, write};
+use tesdf::mesh::{
+    LoadReport, MeshFormat, RepairOptions, RepairReport, WriteFormat, check, files, read_bytes, repair,
+    write_bytes,
+};
 
+use crate::output::{self, Consent};
 use crate::report::{self, Failure, Outcome};
 use crate::{mesh_file, parse};
 
@@ -12,9 +16,13 @@ use crate::{mesh_file, parse};
 pub struct Args {
     /// Mesh: STL, OBJ, PLY, OFF, glTF or GLB
     pub mesh: PathBuf,
-    /// The file to write, .ply (keeps every digit), .obj or .stl; an existing one is replaced
+    /// The file to write, .ply (keeps every digit), .obj or .stl; an existing one is replaced, a pipe or device is written to, as PLY
+    /// unless its name says otherwise
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
     /// Merge vertices closer than this and close cracks up to it, mesh unit [default: bitwise equal positions only]
     #[arg(long, value_name = "T", value_parser = parse::length, allow_hyphen_values = true)]
     pub weld_tolerance: Option<f64>,
@@ -37,13 +45,18 @@ struct Report<'a> {
 /// # Errors
 /// The mesh cannot be read or has nothing to keep, or the result cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let output = output::open(&args.output, &files(&args.mesh), args.consent)?;
     // A wrong extension is found before the work.
-    let format = WriteFormat::of_path(&args.output).map_err(Failure::new)?;
+    let format = match args.output.extension() {
+        None if output.file_path().is_none() => WriteFormat::Ply,
+        _ => WriteFormat::of_path(&args.output).map_err(Failure::new)?,
+    };
     let loaded = mesh_file::read(&args.mesh)?;
     let options = RepairOptions { weld_tolerance: args.weld_tolerance, ..RepairOptions::DEFAULT };
     let repaired =
         repair(&loaded.mesh, &options).map_err(|e| Failure::new(format!("{}: {e}", args.mesh.display())))?;
-    write(&args.output, &repaired.mesh).map_err(Failure::new)?;
+    let bytes = write_bytes(&repaired.mesh, format).map_err(Failure::new)?;
+    output::write(&output, &bytes)?;
     let [file, output] = [&args.mesh, &args.output].map(|path| path.display().to_string());
     let found = &repaired.report;
     if args.json {
@@ -61,7 +74,8 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     if !format.is_exact() {
         // Rounding may have closed or opened what the repaired mesh did not.
-        let rounded = mesh_file::read(&args.output)?;
+        let rounded =
+            read_bytes(&bytes, MeshFormat::Stl).map_err(|e| Failure::new(format!("{output}: {e}")))?;
         if !check(&rounded.mesh).encodable {
             report::warning(&format!("{output}: not encodable, as the format rounds coordinates to 32 bits"));
             report::hint("write .ply, which keeps every digit");

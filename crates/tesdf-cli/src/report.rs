@@ -1,6 +1,7 @@
 //! What a person or a program sees: results on stdout, everything else on stderr.
 use std::fmt;
 use std::io::{self, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// How a command that did its work ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,15 +62,26 @@ pub fn hint(text: &str) {
     line("hint", "36", text);
 }
 
-/// Writes a result to stdout.
+/// Whether stdout carries the bytes of an output.
+static STDOUT_IS_TAKEN: AtomicBool = AtomicBool::new(false);
+
+/// From now on results go to stderr, as stdout carries the bytes of the output (`-o /dev/stdout`).
+pub fn leave_stdout_to_the_output() {
+    STDOUT_IS_TAKEN.store(true, Ordering::Relaxed);
+}
+
+/// Writes a result to stdout, or to stderr when stdout carries the bytes of the output.
 ///
 /// # Errors
-/// When stdout cannot be written. A reader that has seen enough and closed the pipe (`| head`) is not an error.
+/// When it cannot be written. A reader that has seen enough and closed the pipe (`| head`) is not an error.
 pub fn result(bytes: &[u8]) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
+    let (name, out): (_, &mut dyn Write) = match STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
+        true => ("stderr", &mut io::stderr()),
+        false => ("stdout", &mut io::stdout()),
+    };
     match out.write_all(bytes).and_then(|()| out.flush()) {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-            Err(Failure::new(format!("cannot write to stdout: {e}")))
+            Err(Failure::new(format!("cannot write to {name}: {e}")))
         }
         _ => Ok(()),
     }

@@ -1,4 +1,4 @@
-//! `tesdf simulate SCENE -o RUN`
+//! `tesdf simulate SCENE -o RUN`, `tesdf simulate --resume RUN`
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,22 +9,36 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tesdf::encode::EncodeProgress;
 use tesdf_sim::criterion::ScrewReport;
+use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
-use tesdf_sim::{HiddenPair, Moment, SimulateError, Summary, simulate};
+use tesdf_sim::{CutRun, HiddenPair, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
 use crate::devices::{Choice, OnDevice};
-use crate::parse;
+use crate::output::{self, Consent};
 use crate::progress::{interrupt_flag, watched};
 use crate::report::{self, Failure, Outcome};
+use crate::{parse, run_file};
+
+mod recorder;
+
+use recorder::Recorder;
 
 /// Arguments of `tesdf simulate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// A scene: TOML
-    pub scene: PathBuf,
-    /// The file to write, safetensors; an existing one is replaced
-    #[arg(short, long, value_name = "RUN")]
-    pub output: PathBuf,
+    /// A scene: TOML. With --resume it may be left out, and must be the scene of the run otherwise
+    #[arg(required_unless_present = "resume")]
+    pub scene: Option<PathBuf>,
+    /// The file to write, safetensors; an existing one is replaced when the first step is made. Until the run is complete, it holds the steps
+    /// so far. A pipe or device is written to at the end [default: with --resume, the run itself]
+    #[arg(short, long, value_name = "RUN", required_unless_present = "resume")]
+    pub output: Option<PathBuf>,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
+    /// Go on with a run that was interrupted or killed, from its last whole step, to the same bytes as without the interruption
+    #[arg(long, value_name = "RUN")]
+    pub resume: Option<PathBuf>,
     /// Instead of the scene's time step, s
     #[arg(long, value_name = "SECONDS", value_parser = parse::length)]
     pub time_step: Option<f64>,
@@ -76,50 +90,98 @@ struct Report<'a> {
     summary: &'a Summary,
 }
 
-/// Runs a scene and writes the run in one step at the end.
+impl Args {
+    /// The file that says what the run is of; for messages.
+    fn source(&self) -> &Path {
+        self.scene.as_deref().or(self.resume.as_deref()).unwrap_or(Path::new(""))
+    }
+
+    fn output(&self) -> &Path {
+        self.output.as_deref().or(self.resume.as_deref()).unwrap_or(Path::new(""))
+    }
+}
+
+/// Runs a scene, or goes on with a run that was cut. The run is recorded step by step, and written as a complete run at the end.
 ///
 /// # Errors
-/// The scene cannot be loaded, a step failed, the file cannot be written, or Ctrl-C was pressed; the output file is then as it
-/// was. A run that does not meet the scene's criterion is written, and is not good.
+/// The scene cannot be loaded, the run was made with something else, a step failed, the file cannot be written, or Ctrl-C was pressed.
+/// Before the first step the output file is as it was; after it, it holds the steps that were made. A run that does not meet the
+/// scene's criterion is written, and is not good.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let loaded = load(args)?;
+    let cut = args.resume.as_deref().map(open_cut).transpose()?;
+    let loaded = load(args, cut.as_ref())?;
+    let mut inputs = loaded.geometry_files();
+    inputs.extend(args.scene.clone());
+    let output = output::open(args.output(), &inputs, args.consent)?;
     let device = args.device.open()?;
-    crate::encode::check_output(&args.scene, &args.output)?;
     let interrupted = interrupt_flag()?;
     let progress = EncodeProgress::default();
     let system = watched(&progress, &interrupted, || loaded.system(&progress));
-    let system = system.map_err(|e| match e {
-        SceneError::Cancelled => as_it_was("interrupted", &args.output),
+    let mut system = system.map_err(|e| match e {
+        SceneError::Cancelled => {
+            Failure::new(format!("interrupted; {} is as it was", args.output().display()))
+        }
         e => Failure::new(e),
     })?;
+    let device_name = device.as_ref().map_or("cpu", |device| &device.info().name);
+    let origin = RunOrigin::of(&system, device_name).map_err(Failure::new)?;
+    let begun = begin(args, &loaded, cut.as_ref(), &mut system, &origin)?;
     let engine = match device {
         Some(device) => loaded.newton_with(system, OnDevice::new(device)),
         None => loaded.newton(system),
     };
     let mut engine = engine.map_err(Failure::new)?;
     let bar = LiveProgress::new(&interrupted);
-    let ended = simulate(&loaded.scene, &mut engine, |moment| bar.show(moment));
+    let mut recorder = Recorder::new(&output, &origin, cut.as_ref());
+    let ended = simulate_from(&loaded.scene, &mut engine, begun, |moment| {
+        recorder.push(moment)?;
+        bar.show(moment)
+    });
     drop(bar);
-    let (mut record, summary) = ended.map_err(|e| match e {
-        SimulateError::Interrupted { .. } => as_it_was(&e.to_string(), &args.output),
-        e => Failure::new(format!("{}: {e}", args.scene.display())),
-    })?;
-    // So that the run finds its meshes, wherever it is read.
-    let scene = absolute(&args.scene)?;
-    record.folder = scene.parent().unwrap_or(&scene).to_string_lossy().into_owned();
-    record.save(&args.output).map_err(Failure::new)?;
+    let (record, summary) = ended.map_err(|e| recorder.failure(e, args.source()))?;
+    recorder.finish(&record)?;
     warn_of(&summary.hidden, loaded.scene.detector.mode);
     print(args, &summary)?;
     Ok(if summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
 }
 
-fn as_it_was(what: &str, output: &Path) -> Failure {
-    Failure::new(format!("{what}; {} is as it was", output.display()))
+fn open_cut(run: &Path) -> Result<CutRun, Failure> {
+    CutRun::open(run).map_err(|e| match e {
+        e @ RecordError::Complete { .. } => run_file::failure(run, e)
+            .hint("there is nothing to resume; for a longer run, simulate the scene with --duration"),
+        e => run_file::failure(run, e),
+    })
+}
+
+/// The beginning of the run, where `system` then is: that of the scene, or the last step of the run that was cut.
+fn begin(
+    args: &Args,
+    loaded: &LoadedScene,
+    cut: Option<&CutRun>,
+    system: &mut System,
+    origin: &RunOrigin,
+) -> Result<PartialRun, Failure> {
+    let (Some(cut), Some(resumed)) = (cut, &args.resume) else {
+        // So that the run finds its meshes, wherever it is read.
+        let scene = absolute(args.source())?;
+        let folder = scene.parent().unwrap_or(&scene).to_string_lossy().into_owned();
+        return Ok(PartialRun::new(&loaded.scene, system, folder));
+    };
+    cut.check(&loaded.scene, origin).map_err(|e| {
+        Failure::new(format!("cannot resume {}: {e}", resumed.display()))
+            .hint("resume with the scene, options and geometries of the run, or simulate the scene from its beginning")
+    })?;
+    cut.run.restore(system).map_err(|e| Failure::new(format!("{}: {e}", resumed.display())))?;
+    Ok(cut.run.clone())
 }
 
 /// The scene with what the command line replaces.
-fn load(args: &Args) -> Result<LoadedScene, Failure> {
-    let mut loaded = LoadedScene::read(&args.scene).map_err(Failure::new)?;
+fn load(args: &Args, cut: Option<&CutRun>) -> Result<LoadedScene, Failure> {
+    let loaded = match (&args.scene, cut) {
+        (None, Some(cut)) => LoadedScene::of_run(&cut.run.record, args.source()),
+        _ => LoadedScene::read(args.source()),
+    };
+    let mut loaded = loaded.map_err(Failure::new)?;
     let scene = &mut loaded.scene;
     scene.time_step = args.time_step.unwrap_or(scene.time_step);
     scene.duration = args.duration.unwrap_or(scene.duration);
@@ -131,7 +193,7 @@ fn load(args: &Args) -> Result<LoadedScene, Failure> {
             Mode::Off => DetectorMode::Off,
         };
     }
-    replace_geometries(&mut loaded, &args.geometries, &args.scene)?;
+    replace_geometries(&mut loaded, &args.geometries, args.source())?;
     Ok(loaded)
 }
 
@@ -175,7 +237,7 @@ impl<'a> LiveProgress<'a> {
     }
 
     fn show(&self, moment: &Moment<'_>) -> ControlFlow<()> {
-        let Moment { step, steps, time, report, system } = moment;
+        let Moment { step, steps, time, report, system, .. } = moment;
         self.bar.set_length(*steps);
         self.bar.set_position(*step);
         self.bar.set_message(format!(
@@ -207,7 +269,7 @@ fn warn_of(hidden: &[HiddenPair], mode: DetectorMode) {
 }
 
 fn print(args: &Args, summary: &Summary) -> Result<(), Failure> {
-    let [scene, output] = [&args.scene, &args.output].map(|path| path.display().to_string());
+    let [scene, output] = [args.source(), args.output()].map(|path| path.display().to_string());
     if args.json {
         return report::json(&Report { scene, output, summary });
     }

@@ -111,7 +111,7 @@ fn an_output_is_replaced_in_one_step_or_left_alone() {
     assert_eq!(folder.names(), before);
     let (code, _, err) = folder.tesdf(&["encode", "cube.obj", "-o", "cube.obj"]);
     assert_eq!(code, Some(2));
-    assert!(err.contains("is the input itself"), "{err}");
+    assert!(err.contains("is the input cube.obj itself"), "{err}");
     let (code, _, err) = folder.tesdf(&["encode", "cube.obj", "-o", "no/f.tesdf"]);
     assert_eq!(code, Some(2));
     assert!(err.contains("there is no folder no"), "{err}");

@@ -69,7 +69,7 @@ fn errors_leave_no_file() {
         (&["simulate", "drop.toml", "-o", "run"][..], vec!["drop.toml", "line 12", "radios"]),
         (&["simulate", "none.toml", "-o", "run"], vec!["cannot read none.toml"]),
         (&["simulate", "good.toml", "-o", "no/run"], vec!["there is no folder no"]),
-        (&["simulate", "good.toml", "-o", "good.toml"], vec!["is the input itself"]),
+        (&["simulate", "good.toml", "-o", "good.toml"], vec!["is the input good.toml itself"]),
         (&["simulate", "good.toml", "-o", "run", "--geometry", "cone=a.obj"], vec!["there is no body cone"]),
         (
             &["simulate", "good.toml", "-o", "run", "--geometry", "ball=a.obj"],

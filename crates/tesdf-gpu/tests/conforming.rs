@@ -45,7 +45,7 @@ fn distances_are_those_of_the_host() {
             let images = Images::new(&device, &[&shape]).expect("fits");
             let (bounds, diagonal) = (shape.bounds(), shape.diagonal());
             // The device's points are off by half a unit in the last place; at borders lists of few faces jump.
-            let truncated = asset.about().certificate.truncated;
+            let truncated = asset.about().certificate().truncated();
             let points: Vec<DVec3> =
                 (0..3000).map(|_| bounds.center() + 0.9 * bounds.extent() * random.in_cube()).collect();
             let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };

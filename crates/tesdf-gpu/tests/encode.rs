@@ -155,10 +155,10 @@ fn a_whole_asset_in_both_domains() {
         for (list, expected) in lists.iter().zip(&expected_lists) {
             assert!(expected.iter().all(|face| list.contains(face)), "{expected:?} are not all in {list:?}");
         }
-        let said = |asset: &TeSdf| asset.about().certificate.encoder.clone();
+        let said = |asset: &TeSdf| asset.about().certificate().encoder().clone();
         assert_eq!(said(&asset), format!("sampled, f32, {}", device.info().kind));
         assert_eq!(said(&expected), "sampled");
-        assert_eq!(asset.about().certificate.delta, None);
+        assert_eq!(asset.about().certificate().delta(), None);
 
         let again = encode(&device, &solid, domain, &source, &options, &progress).expect("encodes");
         assert!(asset.as_bytes() == again.as_bytes(), "two runs differ");
@@ -169,8 +169,8 @@ fn a_whole_asset_in_both_domains() {
 
         let cut = EncodeOptions { max_entries: Some(6), refinement: Refinement::ByCost, ..options };
         let cut = encode(&device, &solid, domain, &source, &cut, &progress).expect("encodes");
-        let certificate = &cut.about().certificate;
-        assert!(certificate.truncated && certificate.exactness_distance > Some(0.0), "{certificate:?}");
+        let certificate = cut.about().certificate();
+        assert!(certificate.truncated() && certificate.exactness_distance() > Some(0.0), "{certificate:?}");
         // Faces that pass through a cell of the bisection domain are never dropped.
         if let Domain::Conforming(_) = domain {
             assert_eq!(cut.about().statistics.longest_list, 6);
@@ -185,7 +185,7 @@ fn a_threshold_as_wide_as_the_grid_misses_nothing() {
     let (source, progress) = (Source::default(), EncodeProgress::default());
     let domain = Domain::Conforming(&conforming);
     let asset = encode(&device(), &solid, domain, &source, &options, &progress).expect("encodes");
-    assert!(asset.about().certificate.delta.is_some());
+    assert!(asset.about().certificate().delta().is_some());
     let go_on = |_| ControlFlow::Continue(());
     let report = verify(&asset, &VerifyOptions { samples: 3000, seed: 1 }, go_on).expect("a valid mesh");
     assert!(report.passed, "{report:#?}");

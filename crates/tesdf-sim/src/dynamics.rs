@@ -61,6 +61,14 @@ pub enum DynamicsError {
         /// How many there are.
         bodies: usize,
     },
+    /// Not as many states as bodies.
+    #[error("{found} states for {expected} bodies")]
+    States {
+        /// How many were given.
+        found: usize,
+        /// How many bodies there are.
+        expected: usize,
+    },
     /// A number that is not finite, in a state given or computed.
     #[error("the state of body {body} ({name}) is not finite: {found}")]
     NotFinite {

@@ -1,7 +1,8 @@
 //! Rigid bodies that touch: from a scene of encoded meshes and simple shapes to their motion.
 //!
 //! ```text
-//! scene.toml ──LoadedScene──▶ System, Newton ──simulate──▶ RunRecord, Summary ──save──▶ run.safetensors
+//! scene.toml ──LoadedScene──▶ System, Newton ──simulate──▶ RunRecord, Summary ──save──▶ run.tesrun
+//!                                                 └─after each step─▶ RunJournal ──▶ CutRun ──simulate_from──▶ …
 //! ```
 //!
 //! - [`MassProperties`]: mass, centre and inertia of a closed mesh or a simple shape, in `f64`.
@@ -24,6 +25,6 @@ mod system;
 
 pub use dynamics::{Dynamics, DynamicsError, StepReport};
 pub use mass::{MassError, MassProperties};
-pub use record::RunRecord;
-pub use simulate::{HiddenPair, Moment, SimulateError, Summary, simulate};
+pub use record::{CutRun, HiddenPair, RunJournal, RunOrigin, RunRecord};
+pub use simulate::{Moment, PartialRun, SimulateError, Summary, simulate, simulate_from};
 pub use system::{Body, Mass, State, System};

@@ -40,7 +40,8 @@ pub enum MassError {
 impl MassProperties {
     /// Of a shape of uniform density, kg/m³, with `scale` world units per unit of the shape.
     ///
-    /// A mesh counts by its winding number: what two of its shells share counts twice.
+    /// A mesh counts by its winding number: the volume that two of its shells share counts twice, and a volume where the surface is
+    /// inside out counts as negative.
     ///
     /// # Errors
     /// A density that is not positive, a plane, or a mesh without volume.

@@ -1,4 +1,6 @@
-//! Runs as safetensors files.
+//! Runs as files: safetensors when the run is complete, a [journal](RunJournal) as long as it grows.
+//!
+//! A complete run:
 //!
 //! | tensor | type | content |
 //! |---|---|---|
@@ -10,19 +12,37 @@
 //! | `contacts.points`, `contacts.normals` | `f32 [C, 3]` | `point_a` and `normal` of [`Contact`], world |
 //! | `contacts.distances` | `f32 [C]` | signed distance |
 //! | `contacts.ids` | `u32 [C, 4]` | body of the face, body of the field, face of a, face of b |
+//! | `hidden.steps` | `u64 [H]` | a row for each step and pair of bodies that overlapped at its beginning although no contact showed it |
+//! | `hidden.ids` | `u32 [H, 2]` | the bodies |
+//! | `hidden.depths` | `f64 [H]` | how deep, at least, m |
+//!
+//! The tensors `hidden.…` are left out when they have no rows.
 //!
 //! The metadata has one key, `tesdf_run`: JSON with `version`, `bodies` (names), `scene` (the scene as JSON), and `folder`, which the
 //! scene's paths are relative to.
+//!
+//! A run grows as a journal of steps under its final name, and the complete file replaces the journal at the end. [`RunRecord::open`] reads both;
+//! [`CutRun`] reads a journal so that the run goes on to the same bytes.
+mod hidden;
+mod journal;
+mod origin;
+
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
-use tesdf::asset::{AssetError, save_atomic};
 use tesdf::collide::{Contact, Pose};
 use tesdf::glam::{DQuat, DVec3};
+use tesdf::save::{SaveError, save_atomic};
 
 use crate::{State, System};
+
+use hidden::HiddenRows;
+pub use hidden::HiddenPair;
+pub use journal::{CutRun, RunJournal};
+pub use origin::RunOrigin;
 
 /// The version that is written and read.
 pub const RUN_VERSION: u32 = 1;
@@ -37,6 +57,8 @@ pub struct RunRecord {
     pub scene: serde_json::Value,
     /// What the scene's paths are relative to; empty: the folder of whoever reads.
     pub folder: String,
+    /// Steps that the run was to have; `None`: it has them.
+    planned: Option<u64>,
     times: Vec<f64>,
     poses: Vec<[f64; 7]>,
     velocities: Vec<[f64; 6]>,
@@ -46,6 +68,7 @@ pub struct RunRecord {
     normals: Vec<[f32; 3]>,
     distances: Vec<f32>,
     ids: Vec<[u32; 4]>,
+    hidden: HiddenRows,
 }
 
 /// A contact as it is kept.
@@ -66,9 +89,9 @@ pub struct RecordedContact {
 /// Why a run file cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The operating system.
+    /// The file cannot be written.
     #[error(transparent)]
-    Save(#[from] AssetError),
+    Save(#[from] SaveError),
     /// The operating system.
     #[error("cannot read {}: {source}", .path.display())]
     Read {
@@ -78,7 +101,7 @@ pub enum RecordError {
         source: std::io::Error,
     },
     /// No safetensors file.
-    #[error("not a safetensors file: {0}")]
+    #[error("not a run of tesdf: no safetensors file: {0}; `tesdf simulate` writes runs")]
     Container(#[from] SafeTensorError),
     /// No run.
     #[error("not a run of tesdf: {0}; `tesdf simulate` writes runs")]
@@ -89,6 +112,28 @@ pub enum RecordError {
         /// The version in the file.
         found: u32,
     },
+    /// Nothing is left to do.
+    #[error("the run is complete: it has all of its {steps} steps")]
+    Complete {
+        /// Its steps.
+        steps: u64,
+    },
+    /// Going on would not give the bits of a run that was never cut.
+    #[error("{what} is {found}, but the run was made with {expected}")]
+    Differs {
+        /// A key of the scene, `version` or `device`.
+        what: String,
+        /// Its value now.
+        found: String,
+        /// Its value when the run began.
+        expected: String,
+    },
+    /// A body is another one.
+    #[error("the geometry of body {body} is not the one that the run was made with")]
+    Geometry {
+        /// Its name.
+        body: String,
+    },
 }
 
 #[derive(Serialize, Deserialize)]
@@ -98,6 +143,8 @@ struct About {
     scene: serde_json::Value,
     #[serde(default)]
     folder: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    planned: Option<u64>,
 }
 
 impl RunRecord {
@@ -107,6 +154,46 @@ impl RunRecord {
         let mut record = Self { bodies, scene, contact_starts: vec![0], ..Self::default() };
         record.push(0.0, system);
         record
+    }
+
+    /// A record without a state.
+    fn of_about(about: About) -> Self {
+        let About { bodies, scene, folder, planned, .. } = about;
+        Self { bodies, scene, folder, planned, contact_starts: vec![0], ..Self::default() }
+    }
+
+    fn about(&self) -> About {
+        About {
+            version: RUN_VERSION,
+            bodies: self.bodies.clone(),
+            scene: self.scene.clone(),
+            folder: self.folder.clone(),
+            planned: self.planned,
+        }
+    }
+
+    /// Steps made.
+    pub fn steps(&self) -> u64 {
+        self.times.len().saturating_sub(1) as u64
+    }
+
+    /// The steps that the run was to have, when it was cut before or still grows; `None` of a complete run.
+    pub fn planned_steps(&self) -> Option<u64> {
+        self.planned
+    }
+
+    /// Says how many steps the run is to have, or that it has them.
+    pub(crate) fn plan(&mut self, steps: Option<u64>) {
+        self.planned = steps;
+    }
+
+    /// The states of all bodies after `step` steps, bit for bit; `None` when the run does not have them.
+    pub(crate) fn states(&self, step: usize) -> Option<Vec<State>> {
+        let state = |body| {
+            let [linear, angular] = self.velocity(step, body)?;
+            Some(State { pose: self.pose(step, body)?, linear, angular })
+        };
+        (0..self.bodies.len()).map(state).collect()
     }
 
     /// Adds the state of `system` at a time.
@@ -181,23 +268,23 @@ impl RunRecord {
             .map(move |(&step, range)| (step, (range[0] as usize..range[1] as usize).map(contact).collect()))
     }
 
+    /// Where the contacts of a step are, if they are kept.
+    fn contact_range(&self, step: u64) -> Option<Range<usize>> {
+        let at = self.contact_steps.binary_search(&step).ok()?;
+        Some(self.contact_starts[at] as usize..self.contact_starts[at + 1] as usize)
+    }
+
     /// The file's bytes; the same record gives the same bytes.
     ///
     /// # Errors
     /// Metadata larger than safetensors allows.
     pub fn to_bytes(&self) -> Result<Vec<u8>, RecordError> {
-        let about = About {
-            version: RUN_VERSION,
-            bodies: self.bodies.clone(),
-            scene: self.scene.clone(),
-            folder: self.folder.clone(),
-        };
-        let about = serde_json::to_string(&about).map_err(|e| RecordError::NotARun(e.to_string()))?;
+        let about = serde_json::to_string(&self.about()).map_err(|e| RecordError::NotARun(e.to_string()))?;
         // One key: the crate keeps metadata in a hash map, and the order of several would vary from run to run.
         let metadata = HashMap::from([(KEY.to_string(), about)]);
         let (states, bodies) = (self.times.len(), self.bodies.len());
         let contacts = self.distances.len();
-        let tensors = [
+        let mut tensors = vec![
             tensor("times", Dtype::F64, vec![states], &self.times)?,
             tensor("poses", Dtype::F64, vec![states, bodies, 7], self.poses.as_flattened())?,
             tensor("velocities", Dtype::F64, vec![states, bodies, 6], self.velocities.as_flattened())?,
@@ -208,6 +295,12 @@ impl RunRecord {
             tensor("contacts.distances", Dtype::F32, vec![contacts], &self.distances)?,
             tensor("contacts.ids", Dtype::U32, vec![contacts, 4], self.ids.as_flattened())?,
         ];
+        let HiddenRows { steps, ids, depths } = &self.hidden;
+        if !steps.is_empty() {
+            tensors.push(tensor("hidden.steps", Dtype::U64, vec![steps.len()], steps)?);
+            tensors.push(tensor("hidden.ids", Dtype::U32, vec![ids.len(), 2], ids.as_flattened())?);
+            tensors.push(tensor("hidden.depths", Dtype::F64, vec![depths.len()], depths)?);
+        }
         Ok(serialize(tensors, Some(metadata))?)
     }
 
@@ -224,20 +317,21 @@ impl RunRecord {
     /// # Errors
     /// As [`from_bytes`](Self::from_bytes), and what the operating system refused.
     pub fn open(path: &Path) -> Result<Self, RecordError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| RecordError::Read { path: path.to_path_buf(), source })?;
-        Self::from_bytes(&bytes)
+        Self::from_bytes(&read(path)?)
     }
 
-    /// A record from a file's bytes.
+    /// A record from a file's bytes; of a journal, up to its last whole step.
     ///
     /// # Errors
-    /// No safetensors file, no run, another version, or tensors that do not fit each other.
+    /// No run, another version, or tensors that do not fit each other.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecordError> {
+        if journal::is_journal(bytes) {
+            return Ok(CutRun::from_bytes(bytes.to_vec())?.run.record);
+        }
         let (_, header) = SafeTensors::read_metadata(bytes)?;
         let about = header.metadata().as_ref().and_then(|m| m.get(KEY));
         let about = about.ok_or_else(|| RecordError::NotARun(format!("the metadata has no {KEY}")))?;
-        let About { version, bodies, scene, folder } =
+        let About { version, bodies, scene, folder, planned } =
             serde_json::from_str(about).map_err(|e| RecordError::NotARun(format!("{KEY}: {e}")))?;
         if version != RUN_VERSION {
             return Err(RecordError::Version { found: version });
@@ -245,6 +339,14 @@ impl RunRecord {
         let file = SafeTensors::deserialize(bytes)?;
         let count = bodies.len();
         let times: Vec<f64> = values(&file, "times", Dtype::F64, &[])?;
+        let hidden = match file.tensor("hidden.steps") {
+            Ok(_) => HiddenRows {
+                steps: values(&file, "hidden.steps", Dtype::U64, &[])?,
+                ids: values(&file, "hidden.ids", Dtype::U32, &[2])?,
+                depths: values(&file, "hidden.depths", Dtype::F64, &[])?,
+            },
+            Err(_) => HiddenRows::default(),
+        };
         let record = Self {
             poses: values(&file, "poses", Dtype::F64, &[count, 7])?,
             velocities: values(&file, "velocities", Dtype::F64, &[count, 6])?,
@@ -254,10 +356,12 @@ impl RunRecord {
             normals: values(&file, "contacts.normals", Dtype::F32, &[3])?,
             distances: values(&file, "contacts.distances", Dtype::F32, &[])?,
             ids: values(&file, "contacts.ids", Dtype::U32, &[4])?,
+            hidden,
             times,
             bodies,
             scene,
             folder,
+            planned,
         };
         record.check()?;
         Ok(record)
@@ -273,12 +377,17 @@ impl RunRecord {
             && starts.len() == self.contact_steps.len() + 1
             && starts.first() == Some(&0)
             && starts.last() == Some(&(contacts as u64))
-            && starts.is_sorted();
+            && starts.is_sorted()
+            && self.hidden.fit(self.times.len() as u64, self.bodies.len());
         if fits {
             return Ok(());
         }
         Err(RecordError::NotARun("its tensors do not fit each other; it was damaged or made by hand".into()))
     }
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, RecordError> {
+    std::fs::read(path).map_err(|source| RecordError::Read { path: path.to_path_buf(), source })
 }
 
 fn nearest(steps: impl Iterator<Item = usize>, at: impl Fn(usize) -> f64, time: f64) -> Option<usize> {

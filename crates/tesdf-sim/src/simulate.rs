@@ -1,14 +1,12 @@
 //! A scene from its beginning to its end.
-use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::time::Duration;
 
 use serde::Serialize;
-use tesdf::collide::HiddenOverlap;
 
 use crate::criterion::{ScrewReport, ScrewTracker};
 use crate::scene_file::SceneFile;
-use crate::{Dynamics, DynamicsError, RunRecord, StepReport, System};
+use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
 
 /// Where a run is; given after each step.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +21,8 @@ pub struct Moment<'a> {
     pub report: StepReport,
     /// The bodies now.
     pub system: &'a System,
+    /// The run so far, this step included.
+    pub record: &'a RunRecord,
 }
 
 /// What a run came to.
@@ -60,27 +60,6 @@ pub struct Summary {
     pub passed: Option<bool>,
 }
 
-/// Two bodies that overlapped although no contact showed it, during a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct HiddenPair {
-    /// Names of the bodies.
-    pub bodies: [String; 2],
-    /// The first step at whose beginning they did, from 0.
-    pub first_step: u64,
-    /// The number of such steps.
-    pub steps: u64,
-    /// The greatest depth, m, at least.
-    pub depth: f64,
-}
-
-impl HiddenPair {
-    /// A sentence for people.
-    pub fn message(&self) -> String {
-        let Self { bodies: [a, b], first_step, depth, .. } = self;
-        format!("bodies {a} and {b} overlapped by {depth:.3e} m or more, from step {first_step} on, and no contact showed it")
-    }
-}
-
 /// Why a run ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
@@ -103,6 +82,32 @@ pub enum SimulateError {
     },
 }
 
+/// A run up to some step: the beginning of a new run, or a [`CutRun`](crate::CutRun) as it was read.
+#[derive(Clone, Debug)]
+pub struct PartialRun {
+    /// All states so far.
+    pub record: RunRecord,
+    pub(crate) totals: Totals,
+}
+
+impl PartialRun {
+    /// The beginning of a run of `scene`: the state of `system` now, at time 0. `folder` is what the scene's paths are relative to; empty: the
+    /// folder of whoever reads the run.
+    pub fn new(scene: &SceneFile, system: &System, folder: String) -> Self {
+        let mut record = RunRecord::new(system, serde_json::to_value(scene).unwrap_or_default());
+        record.folder = folder;
+        Self { record, totals: Totals::default() }
+    }
+
+    /// Puts the bodies of `system` where the last step left them.
+    ///
+    /// # Errors
+    /// The system has other bodies.
+    pub fn restore(&self, system: &mut System) -> Result<(), DynamicsError> {
+        system.set_states(self.record.states(self.record.steps() as usize).unwrap_or_default())
+    }
+}
+
 /// Runs `engine`, which was made for `scene`, for the scene's duration. `watch` is called after each step and may break off.
 ///
 /// # Errors
@@ -110,17 +115,29 @@ pub enum SimulateError {
 pub fn simulate(
     scene: &SceneFile,
     engine: &mut dyn Dynamics,
+    watch: impl FnMut(&Moment<'_>) -> ControlFlow<()>,
+) -> Result<(RunRecord, Summary), SimulateError> {
+    let run = PartialRun::new(scene, engine.system(), String::new());
+    simulate_from(scene, engine, run, watch)
+}
+
+/// As [`simulate`], from the last step of `run`, where `engine` is, too. Steps depend on the bodies' states alone, so the record is that of
+/// a run that was never cut, bit for bit.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from(
+    scene: &SceneFile,
+    engine: &mut dyn Dynamics,
+    run: PartialRun,
     mut watch: impl FnMut(&Moment<'_>) -> ControlFlow<()>,
 ) -> Result<(RunRecord, Summary), SimulateError> {
     let h = scene.time_step;
     let steps = ((scene.duration / h).round() as u64).max(1);
-    let json = serde_json::to_value(scene).unwrap_or_default();
-    let mut record = RunRecord::new(engine.system(), json);
-    let tracker = scene.criterion.screw.as_ref().map(|screw| ScrewTracker::new(screw, engine.system()));
-    let mut tracker = tracker.transpose().map_err(SimulateError::Criterion)?;
-    let energy = engine.system().kinetic_energy() + engine.system().potential_energy();
-    let mut totals = Totals::default();
-    for step in 0..steps {
+    let (mut tracker, energy) = replay(scene, engine.system(), &run.record)?;
+    let PartialRun { mut record, mut totals } = run;
+    record.plan(Some(steps));
+    for step in record.steps()..steps {
         let report = engine.step(h).map_err(|source| SimulateError::Step { step, source })?;
         let (system, time) = (engine.system(), (step + 1) as f64 * h);
         record.push(time, system);
@@ -132,44 +149,71 @@ pub fn simulate(
             tracker.observe(system, h);
         }
         totals.add(&report);
-        totals.add_hidden(step, engine.hidden(), system);
-        let moment = Moment { step: step + 1, steps, time, report, system };
+        record.push_hidden(step, engine.hidden(), system);
+        let moment = Moment { step: step + 1, steps, time, report, system, record: &record };
         if watch(&moment).is_break() {
             return Err(SimulateError::Interrupted { steps: step + 1 });
         }
     }
+    record.plan(None);
     let system = engine.system();
     let mut screw = tracker.map(|tracker| tracker.report(system));
+    let hidden = record.hidden_pairs();
     if let Some(screw) = &mut screw {
-        screw.failures.extend(totals.hidden.values().map(HiddenPair::message));
+        screw.failures.extend(hidden.iter().map(HiddenPair::message));
     }
+    let sums = totals.summary();
+    let depths = hidden.iter().map(|pair| pair.depth);
     let summary = Summary {
         seconds: steps as f64 * h,
         kinetic_energy: system.kinetic_energy(),
         released_energy: energy - system.potential_energy(),
         passed: screw.as_ref().map(|screw| screw.failures.is_empty()),
         screw,
-        ..totals.summary()
+        deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
+        hidden,
+        ..sums
     };
     Ok((record, summary))
 }
 
-#[derive(Default)]
-struct Totals {
+/// Follows the criterion along the steps that are made; with the energy at the beginning.
+fn replay(
+    scene: &SceneFile,
+    system: &System,
+    record: &RunRecord,
+) -> Result<(Option<ScrewTracker>, f64), SimulateError> {
+    let mut system = system.clone();
+    let show = |system: &mut System, step: u64| {
+        let states = record.states(step as usize).unwrap_or_default();
+        system.set_states(states).map_err(|source| SimulateError::Step { step, source })
+    };
+    show(&mut system, 0)?;
+    let energy = system.kinetic_energy() + system.potential_energy();
+    let Some(screw) = &scene.criterion.screw else { return Ok((None, energy)) };
+    let mut tracker = ScrewTracker::new(screw, &system).map_err(SimulateError::Criterion)?;
+    for step in 1..=record.steps() {
+        show(&mut system, step)?;
+        tracker.observe(&system, scene.time_step);
+    }
+    Ok((Some(tracker), energy))
+}
+
+/// Sums over the steps.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Totals {
     steps: u64,
     contacts: usize,
     most: usize,
     deepest: f64,
     iterations: u64,
     unconverged: u64,
-    /// By the numbers of the bodies.
-    hidden: BTreeMap<[usize; 2], HiddenPair>,
     detection: Duration,
     solution: Duration,
 }
 
 impl Totals {
-    fn add(&mut self, report: &StepReport) {
+    pub(crate) fn add(&mut self, report: &StepReport) {
         self.steps += 1;
         self.contacts += report.contacts;
         self.most = self.most.max(report.contacts);
@@ -180,19 +224,7 @@ impl Totals {
         self.solution += report.solution;
     }
 
-    fn add_hidden(&mut self, step: u64, overlaps: &[HiddenOverlap], system: &System) {
-        for &HiddenOverlap { instance_a, instance_b, depth } in overlaps {
-            let (Some(a), Some(b)) = (system.body_of(instance_a), system.body_of(instance_b)) else { continue };
-            let bodies = [a, b].map(|body| system.bodies()[body].name.clone());
-            let first = HiddenPair { bodies, first_step: step, steps: 0, depth };
-            let pair = self.hidden.entry([a, b]).or_insert(first);
-            pair.steps += 1;
-            pair.depth = pair.depth.max(depth);
-            self.deepest = self.deepest.max(depth);
-        }
-    }
-
-    fn summary(self) -> Summary {
+    fn summary(&self) -> Summary {
         let n = self.steps as f64;
         let ms = |d: Duration| d.as_secs_f64() * 1e3 / n;
         Summary {
@@ -204,7 +236,6 @@ impl Totals {
             unconverged_steps: self.unconverged,
             detection_ms: ms(self.detection),
             solution_ms: ms(self.solution),
-            hidden: self.hidden.into_values().collect(),
             ..Summary::default()
         }
     }

@@ -146,11 +146,14 @@ impl System {
         Ok(())
     }
 
-    /// Replaces all states, or none.
+    /// Replaces all states bit for bit, or none: rotations are taken as they are, of unit length.
     ///
     /// # Errors
-    /// As [`set_state`](Self::set_state).
-    pub(crate) fn set_states(&mut self, states: Vec<State>) -> Result<(), DynamicsError> {
+    /// [`DynamicsError::NotFinite`]; [`DynamicsError::States`] when there are not as many states as bodies.
+    pub fn set_states(&mut self, states: Vec<State>) -> Result<(), DynamicsError> {
+        if states.len() != self.bodies.len() {
+            return Err(DynamicsError::States { found: states.len(), expected: self.bodies.len() });
+        }
         states.iter().enumerate().try_for_each(|(body, state)| self.check(body, state))?;
         self.states = states;
         Ok(())

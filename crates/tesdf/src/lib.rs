@@ -42,6 +42,9 @@ pub mod inspect;
 pub mod mesh;
 pub mod query;
 mod sampling;
+pub mod save;
+#[cfg(test)]
+pub(crate) mod testing;
 pub mod verify;
 
 pub use asset::TeSdf;

@@ -3,10 +3,11 @@ mod support;
 
 use support::meshes::named;
 use support::random::Random;
+use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
 use tesdf::glam::DVec3;
-use tesdf::query::{Answer, AnswerColumns, Extent, Precision};
+use tesdf::query::{Answer, AnswerColumns, BatchError, Extent, Precision};
 
 struct Columns {
     signed_distance: Vec<f64>,
@@ -44,11 +45,16 @@ impl Columns {
     }
 }
 
+fn asset() -> TeSdf {
+    let solid = named("procedural/shaft_keyway.obj");
+    let options = EncodeOptions::preset(Preset::Fast);
+    encode(&solid, &Source::default(), &options, &EncodeProgress::default()).unwrap()
+}
+
 #[test]
 fn columns_are_the_answers() {
-    let solid = named("procedural/shaft_keyway.obj");
-    let (bounds, options) = (solid.mesh().bounds(), EncodeOptions::preset(Preset::Fast));
-    let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).unwrap();
+    let asset = asset();
+    let bounds = asset.bounds();
     let mut random = Random(1);
     // More than two tasks of a batch, and not a multiple of what goes through the stages together.
     let mut points: Vec<DVec3> =
@@ -59,11 +65,11 @@ fn columns_are_the_answers() {
     for precision in [Precision::F32, Precision::F64] {
         let batch = asset.query_batch(&points, precision);
         let mut everywhere = Columns::new(points.len());
-        asset.query_batch_into(&points, precision, Extent::Everywhere, everywhere.as_mut());
+        asset.query_batch_into(&points, precision, Extent::Everywhere, everywhere.as_mut()).unwrap();
         let mut domain = Columns::new(points.len());
-        asset.query_batch_into(&points, precision, Extent::Domain, domain.as_mut());
+        asset.query_batch_into(&points, precision, Extent::Domain, domain.as_mut()).unwrap();
         let mut distances = vec![7.0; points.len()];
-        asset.signed_distances_into(&points, precision, &mut distances);
+        asset.signed_distances_into(&points, precision, &mut distances).unwrap();
         for (i, answer) in batch.iter().enumerate() {
             assert!(everywhere.is(i, answer), "{precision:?} {i}: {answer:?}");
             assert_eq!(distances[i].to_bits(), answer.signed_distance.to_bits(), "{precision:?} {i}");
@@ -74,10 +80,31 @@ fn columns_are_the_answers() {
     }
     assert!((2000..2 * points.len() - 2000).contains(&asides), "{asides} answers are outside of the domain");
 
-    let mut short = Columns::new(20);
-    let columns = AnswerColumns { gradient: &mut [[0.0; 3]; 17], ..short.as_mut() };
-    asset.query_batch_into(&points, Precision::F64, Extent::Everywhere, columns);
-    let answered = short.signed_distance.iter().filter(|&&d| d != 7.0).count();
-    assert_eq!((answered, short.face[17]), (17, 7), "as many points as the shortest column");
-    asset.query_batch_into(&[], Precision::F64, Extent::Everywhere, short.as_mut());
+    assert_eq!(asset.query_batch_into(&[], Precision::F64, Extent::Everywhere, Columns::new(0).as_mut()), Ok(()));
+}
+
+/// Lengths that differ are an error that names the array, and no row is written.
+#[test]
+fn lengths_that_differ_are_an_error() {
+    let asset = asset();
+    let points = [DVec3::ZERO; 20];
+    for (column, rows) in [("signed_distance", 19), ("gradient", 21), ("closest_point", 0), ("face", 17)] {
+        let lengths = ["signed_distance", "gradient", "closest_point", "face"]
+            .map(|name| if name == column { rows } else { points.len() });
+        let [mut d, mut g, mut c, mut f] = lengths.map(Columns::new);
+        let columns = AnswerColumns {
+            signed_distance: &mut d.signed_distance,
+            gradient: &mut g.gradient,
+            closest_point: &mut c.closest_point,
+            face: &mut f.face,
+        };
+        let refused = asset.query_batch_into(&points, Precision::F64, Extent::Everywhere, columns).unwrap_err();
+        assert_eq!(refused, BatchError { column, found: rows, expected: 20 });
+        assert!(refused.to_string().contains(&format!("{column} has {rows} rows for 20 points")), "{refused}");
+        assert!(d.signed_distance.iter().all(|&d| d == 7.0) && f.face.iter().all(|&f| f == 7));
+    }
+    let mut distances = [7.0; 21];
+    let refused = asset.signed_distances_into(&points, Precision::F32, &mut distances).unwrap_err();
+    assert_eq!(refused, BatchError { column: "distances", found: 21, expected: 20 });
+    assert_eq!(distances, [7.0; 21]);
 }

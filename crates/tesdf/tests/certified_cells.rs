@@ -11,6 +11,7 @@ use support::well_formed::WellFormed;
 use tesdf::asset::about::Source;
 use tesdf::domain::Cell;
 use tesdf::encode::candidates::Pool;
+use tesdf::encode::chains::Chains;
 use tesdf::encode::filter::{Scratch, filter};
 use tesdf::encode::surface::{Surface, Touching};
 use tesdf::encode::tighten::tighten;
@@ -159,15 +160,16 @@ proptest! {
         let pool = Pool::new(&surface, &all, &cell);
         let candidates = pool.candidates();
         let mut scratch = Scratch::default();
-        let filtered = filter(&surface, &cell, &candidates, &mut scratch);
+        let filtered = filter(&surface, &cell, &candidates, Chains::NONE, &mut scratch);
         surface.isa = Isa::Baseline;
-        let scalar = filter(&surface, &cell, &candidates, &mut scratch);
+        let scalar = filter(&surface, &cell, &candidates, Chains::NONE, &mut scratch);
         prop_assert_eq!(&filtered.survivors, &scalar.survivors);
         let survivors: Vec<u32> = filtered.survivors.iter().map(|s| candidates.faces[s.index as usize]).collect();
         let mut required: Vec<_> = filtered.survivors.iter().map(|s| s.requirement).collect();
         required.sort_unstable();
         let cover = surface.cover(&required);
-        let tight = tighten(&surface, &cell, &cover, levels, &mut scratch);
+        let (tight, chains) = tighten(&surface, &cell, &cover, levels, filtered.chains, &mut scratch);
+        prop_assert!(filtered.chains <= chains && chains.used() <= Chains::BUDGET);
         prop_assert!(tight.windows(2).all(|w| w[0] < w[1]), "{:?}", tight);
 
         let least = |faces: &[u32], p: DVec3| {

@@ -250,35 +250,6 @@ fn writing_refuses_what_it_could_not_read() {
 }
 
 #[test]
-fn saving_replaces_whole_files_and_leaves_no_other() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("a.tesdf");
-    std::fs::write(&path, b"old").unwrap();
-    save_atomic(&path, b"new").unwrap();
-    assert_eq!(std::fs::read(&path).unwrap(), b"new");
-    assert!(save_atomic(folder.path(), b"x").is_err());
-    assert!(save_atomic(&folder.path().join("no/a.tesdf"), b"x").is_err());
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-}
-
-#[cfg(unix)]
-#[test]
-fn saved_files_have_normal_permissions_and_links_are_followed() {
-    use std::os::unix::fs::PermissionsExt;
-    let folder = tempfile::tempdir().unwrap();
-    let [normal, saved, link] = ["normal", "saved", "link"].map(|name| folder.path().join(name));
-    std::fs::write(&normal, b"").unwrap();
-    save_atomic(&saved, b"").unwrap();
-    let mode = |path: &Path| std::fs::metadata(path).unwrap().permissions().mode();
-    assert_eq!(mode(&saved), mode(&normal));
-    std::os::unix::fs::symlink(&saved, &link).unwrap();
-    save_atomic(&link, b"linked").unwrap();
-    assert!(link.is_symlink());
-    assert_eq!(std::fs::read(&saved).unwrap(), b"linked");
-    assert!(save_atomic(Path::new("/dev/null"), b"x").is_err());
-}
-
-#[test]
 fn types_cross_threads() {
     fn check<T: Send + Sync>() {}
     check::<Container>();

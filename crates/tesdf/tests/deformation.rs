@@ -55,7 +55,7 @@ fn lists_hold_again_after_re_encoding() {
         assert!(moved.inverted.is_empty());
         let before = verified(&asset);
         // Nothing is promised now, but the sides.
-        assert!(before.passed && asset.about().certificate.delta.is_none(), "{before:#?}");
+        assert!(before.passed && asset.about().certificate().delta().is_none(), "{before:#?}");
         errors.push(before.precisions[1].largest_error_beyond.expect("no promise"));
 
         let stale = asset.stale_cells().expect("a mesh");
@@ -64,7 +64,7 @@ fn lists_hold_again_after_re_encoding() {
         assert!(!stale.is_empty() && stale.len() < reencoded.cells);
         assert!(asset.stale_cells().expect("a mesh").is_empty());
         let after = verified(&asset);
-        assert!(after.passed && asset.about().certificate.delta.is_some(), "{after:#?}");
+        assert!(after.passed && asset.about().certificate().delta().is_some(), "{after:#?}");
         if options.max_entries.is_none() {
             assert!(after.precisions.iter().all(|p| p.largest_error_beyond.is_none()));
         }
@@ -259,7 +259,7 @@ fn nothing_is_lost_where_lists_are_cut() {
     let scene_of = |most| {
         let mut scene = Scene::new();
         let (block, ball) = (encoded(&block, most), encoded(&ball, most));
-        assert_eq!(ball.about().certificate.truncated, most.is_some());
+        assert_eq!(ball.about().certificate().truncated(), most.is_some());
         let (block, ball) =
             (scene.add_shape(block).expect("a shape"), scene.add_shape(ball).expect("a shape"));
         scene.add(Instance::new(block, Pose::IDENTITY)).expect("a pose");

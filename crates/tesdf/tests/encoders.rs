@@ -11,9 +11,10 @@ use tesdf::TeSdf;
 use tesdf::asset::CellKind;
 use tesdf::asset::about::Source;
 use tesdf::domain::ConformingMesh;
+use tesdf::encode::surface::Surface;
 use tesdf::encode::{
-    Deformation, Domain, EncodeError, EncodeOptions, EncodeProgress, Encoder, Preset, Refinement, Sampling,
-    Threshold, encode_in,
+    Deformation, Domain, EncodeError, EncodeOptions, EncodeProgress, Encoder, Preset, Refinement,
+    SampledCell, Sampler, Sampling, Threshold, encode_in, encode_with,
 };
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
@@ -95,7 +96,44 @@ fn sampling_with_a_threshold_as_wide_as_the_grid_misses_nothing() {
             let asset = encoded(&solid, domain, &options);
             let report = verified(&asset);
             assert!(report.passed && report.precisions[1].largest_error_beyond.is_none(), "{report:#?}");
-            assert!(asset.about().certificate.delta.is_some());
+            assert!(asset.about().certificate().delta().is_some());
+        }
+    }
+}
+
+/// Names one face a cell, whatever is asked.
+struct OneFace;
+
+impl Sampler for OneFace {
+    fn name(&self) -> String {
+        "sampled, one face".into()
+    }
+
+    fn sample(
+        &self,
+        _: &Surface,
+        cells: &[SampledCell],
+        _: &Sampling,
+        _: &EncodeProgress,
+    ) -> Result<Vec<Vec<f64>>, EncodeError> {
+        let only_first = |cell: &SampledCell| {
+            (0..cell.faces.len()).map(|at| if at == 0 { 0.0 } else { f64::INFINITY }).collect()
+        };
+        Ok(cells.iter().map(only_first).collect())
+    }
+}
+
+#[test]
+fn what_a_sampler_says_is_no_proof() {
+    let (solid, conforming) = block();
+    let (source, progress) = (Source::default(), EncodeProgress::default());
+    for most in [None, Some(3)] {
+        for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
+            let encoder = Encoder::Sampled(Sampling { resolution: 3, ..Sampling::SAFE });
+            let options = EncodeOptions { encoder, max_entries: most, ..fast() };
+            let asset = encode_with(&solid, domain, &source, &options, &OneFace, &progress).expect("encodes");
+            let certificate = asset.about().certificate();
+            assert_eq!((certificate.delta(), certificate.chains()), (None, None), "{certificate:?}");
         }
     }
 }
@@ -110,7 +148,7 @@ fn the_papers_sampling_misses_faces_where_the_grid_is_coarse() {
         let sampling = Sampling { resolution, ..Sampling::PAPER };
         let asset = encoded(&solid, Domain::Conforming(&conforming), &plain(Encoder::Sampled(sampling)));
         let report = verified(&asset);
-        assert!(report.passed && asset.about().certificate.delta.is_none(), "nothing is promised");
+        assert!(report.passed && asset.about().certificate().delta().is_none(), "nothing is promised");
         misses.push(report.precisions[1].largest_error_beyond.expect("nothing is promised"));
         // A sample is a point of the cell: what is closest there is in the certified list, or as close as what is.
         assert!(asset.about().statistics.entries <= certified.about().statistics.entries * 12 / 10);
@@ -131,13 +169,13 @@ fn a_truncated_asset_is_exact_up_to_its_exactness_distance() {
         for encoder in [Encoder::Certified, safe] {
             let options = EncodeOptions { encoder, max_entries: Some(most), ..fast() };
             let asset = encoded(solid, domain, &options);
-            let certificate = &asset.about().certificate;
-            assert!(certificate.truncated);
+            let certificate = asset.about().certificate();
+            assert!(certificate.truncated());
             let report = verified(&asset);
             assert!(report.passed, "{encoder:?}: {report:#?}");
             let beyond = report.precisions[1].largest_error_beyond;
             if encoder == Encoder::Certified {
-                let within = certificate.exactness_distance.expect("it is truncated");
+                let within = certificate.exactness_distance().expect("it is truncated");
                 assert!(within > 0.0, "the nearest faces are kept");
                 let points: usize = report.precisions[1].classes.iter().map(|c| c.points).sum();
                 assert!((100..3000).contains(&points), "{points} points nearer than {within}");

@@ -92,7 +92,7 @@ fn full_lists_have_no_error_and_truncated_ones_that_of_a_direct_loop() {
     assert!(reports[1].exactness_band < Some(1.0), "{:?}", reports[1]);
     assert!(reports[1].exactness_band <= reports[1].one_percent_band);
     // The certificate's distance is a lower bound of the band's width.
-    let promised = cut.about().certificate.exactness_distance.unwrap();
+    let promised = cut.about().certificate().exactness_distance().unwrap();
     assert!(reports[1].exactness_width >= promised, "{promised} {:?}", reports[1]);
     // One by one as together.
     assert_eq!(evaluate(&[&cut], &options, |_| {}).unwrap(), reports[1..]);

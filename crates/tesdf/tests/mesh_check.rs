@@ -222,7 +222,7 @@ fn a_moebius_strip_is_non_orientable() {
 }
 
 #[test]
-fn thin_folds_are_accepted_with_a_warning() {
+fn folds_are_accepted_with_a_warning() {
     // A unit cube whose lid is a fan around a vertex that lies beyond one side of it, above or below the lid.
     let folded = |height: f64| {
         let corner = |x: i32, y: i32, z: i32| DVec3::new(x.into(), y.into(), z.into());
@@ -241,9 +241,10 @@ fn thin_folds_are_accepted_with_a_warning() {
     for height in [1e-8, 0.2] {
         assert!(folded(height).is_simple(), "{}", folded(height));
     }
-    let thin = folded(-1e-8);
-    assert_eq!((thin.winding, thin.encodable), (Some([-1, 1]), true), "{thin}");
-    assert!(of_kind(&thin, NegativeWinding).iter().all(|d| d.severity == Severity::Warning), "{thin}");
-    let thick = folded(-0.2);
-    assert_eq!((thick.winding, thick.encodable), (Some([-1, 1]), false), "{thick}");
+    for height in [-1e-8, -0.2] {
+        let report = folded(height);
+        assert_eq!((report.winding, report.encodable), (Some([-1, 1]), true), "{report}");
+        let places = of_kind(&report, NegativeWinding);
+        assert!(!places.is_empty() && places.iter().all(|d| d.severity == Severity::Warning), "{report}");
+    }
 }

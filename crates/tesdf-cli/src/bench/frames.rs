@@ -9,13 +9,12 @@ use tesdf::collide::{Instance, InstanceId, Pose, Scene};
 use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
-use tesdf_sim::RunRecord;
 use tesdf_sim::scene_file::LoadedScene;
 
 use super::poses::{PoseFile, VERSION};
 use crate::progress::{interrupt_flag, watched};
 use crate::report::Failure;
-use crate::{asset_file, mesh_file};
+use crate::{asset_file, mesh_file, run_file};
 
 /// Bodies, and where they are in each frame.
 pub struct Frames {
@@ -53,7 +52,7 @@ impl Frames {
 
     fn of_run(path: &Path, most: usize) -> Result<Self, Failure> {
         let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
-        let record = RunRecord::open(path).map_err(|e| named(&e))?;
+        let record = run_file::open(path)?;
         let loaded = LoadedScene::of_run(&record, path).map_err(Failure::new)?;
         let start = Self::of_scene(&loaded)?;
         let steps = record.times().len();

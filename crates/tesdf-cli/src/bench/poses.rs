@@ -3,9 +3,9 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
-use tesdf::asset::save_atomic;
 use tesdf::glam::{DQuat, DVec3};
 
+use crate::output::{self, Consent};
 use crate::parse;
 use crate::report::{self, Failure, Outcome, count};
 
@@ -44,9 +44,12 @@ pub struct Args {
     /// What is posed
     #[arg(value_enum)]
     pub scene: Scene,
-    /// The file to write: JSON
+    /// The file to write: JSON; an existing one is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
     /// Frames
     #[arg(long, value_name = "N", default_value_t = 8)]
     pub frames: usize,
@@ -70,8 +73,9 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         std::path::absolute(&args.data).map_err(|e| Failure::new(format!("{}: {e}", args.data.display())))?;
     let mut file = args.scene.poses(&data, args.frames, &mut fastrand::Rng::with_seed(args.seed));
     file.contact_distance = args.contact_distance.unwrap_or(file.contact_distance);
+    let output = output::open(&args.output, &file.bodies, args.consent)?;
     let bytes = serde_json::to_vec(&file).map_err(Failure::new)?;
-    save_atomic(&args.output, &bytes).map_err(Failure::new)?;
+    output::write(&output, &bytes)?;
     let line = format!(
         "{}: {}, {}\n",
         args.output.display(),

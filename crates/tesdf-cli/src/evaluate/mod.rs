@@ -16,9 +16,11 @@ mod table4;
 use std::path::PathBuf;
 
 use meshes::Mesh;
+use output::Sink;
 use tesdf::evaluate::EvaluateOptions;
 
 use crate::devices::Choice;
+use crate::output::Consent;
 use crate::report::{Failure, Outcome};
 
 /// Arguments of `tesdf evaluate`.
@@ -68,6 +70,9 @@ pub struct TableArgs {
     /// Write the result in every form to this folder, which is made where it is not there, instead of printing it
     #[arg(short, long, value_name = "FOLDER", conflicts_with = "format")]
     pub output: Option<PathBuf>,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
 }
 
 /// Ways to cut space into tetrahedra.
@@ -110,15 +115,10 @@ impl TableArgs {
 /// # Errors
 /// A mesh cannot be read or encoded, Gmsh is not there or fails, or the result cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let (Table::Table1(table) | Table::Table4(table)) = &args.table;
-    if let Some(folder) = &table.output {
-        // Before the work of minutes to hours, whose result it takes.
-        std::fs::create_dir_all(folder)
-            .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", folder.display())))?;
-    }
+    // Files are opened before the work of minutes to hours, whose result they take.
     match &args.table {
-        Table::Table1(args) => table1::run(args)?,
-        Table::Table4(args) => table4::run(args)?,
+        Table::Table1(args) => table1::run(args, &Sink::open(args, "table1")?)?,
+        Table::Table4(args) => table4::run(args, &Sink::open(args, "table4")?)?,
     }
     Ok(Outcome::Good)
 }

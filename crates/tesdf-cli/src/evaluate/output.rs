@@ -1,9 +1,12 @@
 //! Tables as text.
 use serde::Serialize;
-use tesdf::asset::save_atomic;
+use tesdf::domain::tetrahedra_files;
 use tesdf::evaluate::BandReport;
+use tesdf::save::Destination;
 
+use super::meshes::MESHES;
 use super::{Format, TableArgs};
+use crate::output;
 use crate::report::{self, Failure};
 
 /// A table: the names of its columns, and its rows as text.
@@ -33,32 +36,49 @@ impl Text {
     }
 }
 
-/// Prints a table in the form that was asked for, or writes it to the folder in all of them. Markdown is as given, CSV and JSON have
-/// all figures.
-///
-/// # Errors
-/// stdout or a file cannot be written.
-pub fn print<T: Serialize>(
-    args: &TableArgs,
-    name: &str,
-    json: &T,
-    csv: &Text,
-    markdown: &str,
-) -> Result<(), Failure> {
-    let Some(folder) = &args.output else {
-        return match args.format {
-            Format::Json => report::json(json),
-            Format::Csv => report::result(&csv.csv()?),
-            Format::Md => report::result(markdown.as_bytes()),
-        };
-    };
-    let mut text =
-        serde_json::to_vec_pretty(json).map_err(|e| Failure::new(format!("cannot write JSON: {e}")))?;
-    text.push(b'\n');
-    for (extension, bytes) in [("json", text), ("csv", csv.csv()?), ("md", markdown.as_bytes().to_vec())] {
-        save_atomic(&folder.join(format!("{name}.{extension}")), &bytes).map_err(Failure::new)?;
+/// Where a table goes.
+pub enum Sink {
+    Stdout(Format),
+    /// JSON, CSV and Markdown.
+    Files([Destination; 3]),
+}
+
+impl Sink {
+    /// What the arguments ask for; the folder is made where it is not there.
+    ///
+    /// # Errors
+    /// A file cannot be written, or is one of the meshes.
+    pub fn open(args: &TableArgs, name: &str) -> Result<Self, Failure> {
+        let Some(folder) = &args.output else { return Ok(Self::Stdout(args.format)) };
+        std::fs::create_dir_all(folder)
+            .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", folder.display())))?;
+        let meshes: Vec<_> =
+            MESHES.iter().flat_map(|mesh| tetrahedra_files(&args.data.join(mesh.path))).collect();
+        let open =
+            |extension| output::open(&folder.join(format!("{name}.{extension}")), &meshes, args.consent);
+        Ok(Self::Files([open("json")?, open("csv")?, open("md")?]))
     }
-    Ok(())
+
+    /// Prints a table in the form that was asked for, or writes it in all of them. Markdown is as given, CSV and JSON have all
+    /// figures.
+    ///
+    /// # Errors
+    /// stdout or a file cannot be written.
+    pub fn print<T: Serialize>(&self, json: &T, csv: &Text, markdown: &str) -> Result<(), Failure> {
+        let files = match self {
+            Self::Stdout(Format::Json) => return report::json(json),
+            Self::Stdout(Format::Csv) => return report::result(&csv.csv()?),
+            Self::Stdout(Format::Md) => return report::result(markdown.as_bytes()),
+            Self::Files(files) => files,
+        };
+        let mut text =
+            serde_json::to_vec_pretty(json).map_err(|e| Failure::new(format!("cannot write JSON: {e}")))?;
+        text.push(b'\n');
+        for (file, bytes) in files.iter().zip([text, csv.csv()?, markdown.as_bytes().to_vec()]) {
+            output::write(file, &bytes)?;
+        }
+        Ok(())
+    }
 }
 
 /// At most three significant digits.

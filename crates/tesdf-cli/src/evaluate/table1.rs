@@ -10,7 +10,7 @@ use super::deformed::Bend;
 use super::domains::{Place, open};
 use super::measure::{Cells, Cost, Way, compare};
 use super::meshes::{Deforms, MESHES, Mesh, Quick};
-use super::output::{Text, band, error, or_dash, print, short, threshold};
+use super::output::{Sink, Text, band, error, or_dash, short, threshold};
 use super::{TableArgs, heading, paper};
 use crate::report::{Failure, note};
 
@@ -184,7 +184,7 @@ fn rows(mesh: &Mesh, place: &Place, made: &[Made], options: &EvaluateOptions) ->
 ///
 /// # Errors
 /// As [`run`](super::run).
-pub fn run(args: &TableArgs) -> Result<(), Failure> {
+pub fn run(args: &TableArgs, sink: &Sink) -> Result<(), Failure> {
     let options = args.evaluate_options();
     let sampler = args.device.sampler()?;
     let mut table = Table { table: 1, grid: options.fineness, max_entries: MAX_ENTRIES, rows: Vec::new() };
@@ -200,7 +200,7 @@ pub fn run(args: &TableArgs) -> Result<(), Failure> {
             measure(mesh, &place, args, &*sampler, &options, &mut table.rows)?;
         }
     }
-    print(args, "table1", &table, &csv(&table.rows), &markdown(&table))
+    sink.print(&table, &csv(&table.rows), &markdown(&table))
 }
 
 fn chosen(args: &TableArgs) -> Result<Vec<&'static Mesh>, Failure> {

@@ -7,7 +7,7 @@ use tesdf::evaluate::BandReport;
 use super::domains::open;
 use super::measure::{Cells, Cost, Way, compare};
 use super::meshes::{MESHES, SHAFT};
-use super::output::{Text, band, error, or_dash, print, short};
+use super::output::{Sink, Text, band, error, or_dash, short};
 use super::{TableArgs, heading, paper};
 use crate::report::{Failure, note};
 
@@ -81,7 +81,7 @@ fn paper_row() -> Row {
 ///
 /// # Errors
 /// As [`run`](super::run).
-pub fn run(args: &TableArgs) -> Result<(), Failure> {
+pub fn run(args: &TableArgs, sink: &Sink) -> Result<(), Failure> {
     let options = args.evaluate_options();
     let sampler = args.device.sampler()?;
     let mut table = Table { table: 4, grid: options.fineness, rows: vec![paper_row()] };
@@ -125,7 +125,7 @@ pub fn run(args: &TableArgs) -> Result<(), Failure> {
             table.rows.push(Row { from: "tesdf", domain: way.domain, encoder: way.encoder, columns });
         }
     }
-    print(args, "table4", &table, &csv(&table.rows), &markdown(&table))
+    sink.print(&table, &csv(&table.rows), &markdown(&table))
 }
 
 fn csv(rows: &[Row]) -> Text {

@@ -15,9 +15,9 @@ mod stage;
 
 use std::path::PathBuf;
 
-use tesdf::asset::save_atomic;
 use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::glam::DVec3;
+use tesdf::save::Destination;
 
 pub use body::{BodyName, body_name, open};
 pub use camera::View;
@@ -27,6 +27,7 @@ pub use overlay::ContactMark;
 pub use picture::{Scenery, render};
 pub use stage::{Drawn, Exposure};
 
+use crate::output::{self, Consent};
 use crate::parse;
 use crate::report::{Failure, Outcome};
 
@@ -62,9 +63,12 @@ pub struct Args {
     /// Instead of the geometry of a body of the run: a .tesdf file, or a mesh that is encoded; may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry)]
     pub geometries: Vec<(String, PathBuf)>,
-    /// The PNG file to write; an existing one is replaced
+    /// The PNG file to write; an existing one is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "PNG")]
     pub output: PathBuf,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
     /// Translation and rotation of a body, one option per body in their order [default: none is moved]
     #[arg(long = "pose", value_name = "tx ty tz qx qy qz qw", value_parser = parse::pose, allow_hyphen_values = true)]
     pub poses: Vec<Pose>,
@@ -133,7 +137,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         ("--contacts", args.contacts),
         ("--geometry", !args.geometries.is_empty()),
     ];
-    let Posed { shapes, placements, contacts } = match &args.run {
+    let (Posed { shapes, placements, contacts }, output) = match &args.run {
         Some(run) => run_file::posed(args, run)?,
         None => match of_run.iter().find(|(_, given)| *given) {
             Some((name, _)) => {
@@ -163,7 +167,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let scenery = Scenery { bodies: &bodies, cut: &cut, contacts: &contacts };
     let map = render(&scenery, &args.view(), args.size).map_err(Failure::new)?;
     let png = map.encode_png().map_err(|e| Failure::new(RenderError::Encode(e.to_string())))?;
-    save_atomic(&args.output, &png).map_err(Failure::new)?;
+    output::write(&output, &png)?;
     Ok(Outcome::Good)
 }
 
@@ -175,14 +179,19 @@ struct Posed {
     contacts: Vec<ContactMark>,
 }
 
-/// The bodies that the command line names.
-fn named(args: &Args) -> Result<Posed, Failure> {
+/// The bodies that the command line names, and the output, which is none of them.
+fn named(args: &Args) -> Result<(Posed, Destination), Failure> {
     if !args.poses.is_empty() && args.poses.len() != args.bodies.len() {
         let message = format!("--pose is given {} times for {} bodies", args.poses.len(), args.bodies.len());
         return Err(Failure::new(message).hint("give one for each body, in their order, or none"));
     }
+    let files = args.bodies.iter().filter_map(|body| match body {
+        BodyName::File(path) => Some(path.clone()),
+        BodyName::Simple(_) => None,
+    });
+    let output = output::open(&args.output, &files.collect::<Vec<_>>(), args.consent)?;
     let shapes = open(&args.bodies)?;
     let poses = args.poses.iter().copied().chain(std::iter::repeat(Pose::IDENTITY));
     let placements = poses.take(shapes.len()).map(|pose| Placement { pose, scale: 1.0 }).collect();
-    Ok(Posed { shapes, placements, contacts: Vec::new() })
+    Ok((Posed { shapes, placements, contacts: Vec::new() }, output))
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 use tesdf::collide::Placement;
 use tesdf::encode::EncodeProgress;
 use tesdf::glam::Vec3;
-use tesdf_sim::RunRecord;
+use tesdf::save::Destination;
 use tesdf_sim::record::RecordedContact;
 use tesdf_sim::scene_file::{LoadedScene, SceneError};
 
@@ -12,16 +12,20 @@ use super::{Args, ContactMark, Posed};
 use crate::progress::{interrupt_flag, watched};
 use crate::report::Failure;
 use crate::simulate::replace_geometries;
+use crate::{output, run_file};
 
-/// Reads a run and opens what its bodies are.
+/// Reads a run and opens what its bodies are; with the output, which is none of these files.
 ///
 /// # Errors
 /// No run, geometry that is not where it was, or no contacts where some are asked for.
-pub fn posed(args: &Args, run: &Path) -> Result<Posed, Failure> {
+pub fn posed(args: &Args, run: &Path) -> Result<(Posed, Destination), Failure> {
     let at = |reason: &dyn std::fmt::Display| Failure::new(format!("{}: {reason}", run.display()));
-    let record = RunRecord::open(run).map_err(|e| at(&e))?;
+    let record = run_file::open(run)?;
     let mut loaded = LoadedScene::of_run(&record, run).map_err(Failure::new)?;
     replace_geometries(&mut loaded, &args.geometries, run)?;
+    let mut inputs = loaded.geometry_files();
+    inputs.push(run.to_path_buf());
+    let output = output::open(&args.output, &inputs, args.consent)?;
     let (progress, interrupted) = (EncodeProgress::default(), interrupt_flag()?);
     let system = watched(&progress, &interrupted, || loaded.system(&progress)).map_err(|e| match e {
         SceneError::Body { name, reason, .. } => at(&format!("body {name}: {reason}"))
@@ -48,7 +52,7 @@ pub fn posed(args: &Args, run: &Path) -> Result<Posed, Failure> {
         let kept = record.contacts().find(|(kept, _)| *kept == step as u64);
         posed.contacts = kept.iter().flat_map(|(_, contacts)| contacts.iter().map(mark)).collect();
     }
-    Ok(posed)
+    Ok((posed, output))
 }
 
 /// On the body whose field it is, as the normal points away from it.

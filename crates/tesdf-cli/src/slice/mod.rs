@@ -13,7 +13,7 @@ pub(crate) mod ticks;
 
 use std::path::PathBuf;
 
-use tesdf::asset::{CellKind, save_atomic};
+use tesdf::asset::CellKind;
 use tesdf::evaluate::EvaluateOptions;
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
@@ -23,6 +23,7 @@ pub use cut::{Axis, View, cut_tetrahedron, cut_triangle};
 pub use error::{Deviation, draw_error};
 pub use picture::{PictureError, draw};
 
+use crate::output::{self, Consent};
 use crate::report::{Failure, Outcome};
 use crate::{asset_file, parse};
 
@@ -31,9 +32,12 @@ use crate::{asset_file, parse};
 pub struct Args {
     /// A .tesdf file
     pub file: PathBuf,
-    /// The PNG file to write; an existing one is replaced
+    /// The PNG file to write; an existing one is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "PNG")]
     pub output: PathBuf,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
     /// The plane is perpendicular to this axis
     #[arg(long, value_enum, default_value_t = Axis::Z)]
     pub axis: Axis,
@@ -68,6 +72,7 @@ impl Args {
 /// # Errors
 /// The asset cannot be opened, the size or the view cannot be drawn, or the file cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let output = output::open(&args.output, std::slice::from_ref(&args.file), args.consent)?;
     let asset = asset_file::open(&args.file)?;
     let about = asset.about();
     let view = args.view(asset_file::bounds(&asset), about.options.unit.as_deref().unwrap_or(""));
@@ -99,7 +104,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         draw(&view, &overlay, args.size, |p| asset.signed_distance(p, Precision::F32))
     }
     .map_err(Failure::new)?;
-    save_atomic(&args.output, &png).map_err(Failure::new)?;
+    output::write(&output, &png)?;
     Ok(Outcome::Good)
 }
 

@@ -1,8 +1,14 @@
 //! A folder of its own for each test, and the binary run in it.
 // Each test file is a crate of its own and uses a part of this.
 #![allow(dead_code)]
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+use tesdf::encode::EncodeProgress;
+use tesdf::save::{Destination, SaveOptions};
+use tesdf_sim::scene_file::LoadedScene;
+use tesdf_sim::{PartialRun, RunJournal, RunOrigin, simulate_from};
 
 pub struct Folder(tempfile::TempDir);
 
@@ -29,7 +35,7 @@ impl Folder {
     }
 
     pub fn command(&self, args: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_tesdf"));
+        let mut command = Command::new(BINARY);
         command.args(args).current_dir(self.0.path());
         command
     }
@@ -56,4 +62,51 @@ pub fn texts(out: Output) -> (Option<i32>, String, String) {
 /// The library's test data.
 pub fn data(name: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tesdf/tests/data").join(name).display().to_string()
+}
+
+/// The binary that is tested.
+pub const BINARY: &str = env!("CARGO_BIN_EXE_tesdf");
+
+/// A block of `n` × `n` × `n` cubes, as its surface.
+pub fn block(n: u32) -> String {
+    let mut text = String::new();
+    let mut corners = 0;
+    for axis in 0..3 {
+        for (side, i, j) in (0..2 * n * n).map(|k| (k % 2, k / 2 % n, k / 2 / n)) {
+            let corner = |u: u32, v: u32| {
+                let mut p = [side * n; 3];
+                (p[(axis + 1) % 3], p[(axis + 2) % 3]) = (i + u, j + v);
+                format!("v {} {} {}\n", p[0], p[1], p[2])
+            };
+            let mut around = [corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)];
+            if side == 0 {
+                around.reverse();
+            }
+            text += &around.concat();
+            text += &format!("f {} {} {} {}\n", corners + 1, corners + 2, corners + 3, corners + 4);
+            corners += 4;
+        }
+    }
+    text
+}
+
+/// The file of a run that was killed after `steps` steps.
+pub fn cut_run(folder: &Folder, scene: &str, steps: u64) -> Vec<u8> {
+    let loaded = LoadedScene::read(&folder.path(scene)).unwrap();
+    let system = loaded.system(&EncodeProgress::default()).unwrap();
+    let origin = RunOrigin::of(&system, "cpu").unwrap();
+    let run = PartialRun::new(&loaded.scene, &system, folder.0.path().display().to_string());
+    let mut engine = loaded.newton(system).unwrap();
+    let path = folder.path("run that is cut");
+    let destination = Destination::new(&path, &SaveOptions::default()).unwrap();
+    let mut journal = None;
+    let ended = simulate_from(&loaded.scene, &mut engine, run, |moment| {
+        let begin = || RunJournal::begin(&destination, moment.record, &origin).unwrap().unwrap();
+        journal.get_or_insert_with(begin).push(moment.record, &moment.report).unwrap();
+        if moment.step == steps { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(ended.is_err(), "the run was over before it was cut");
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    bytes
 }

@@ -70,6 +70,18 @@ impl LoadedScene {
         true
     }
 
+    /// All files that the geometries of the bodies are read from; of a mesh in several files, all of them.
+    pub fn geometry_files(&self) -> Vec<PathBuf> {
+        let of_body = |body: &Spanned<BodySection>| {
+            let BodySection { asset, mesh, .. } = body.get_ref();
+            let asset = asset.iter().map(|path| self.resolve(path));
+            asset
+                .chain(mesh.iter().flat_map(|path| tesdf::mesh::files(&self.resolve(path))))
+                .collect::<Vec<_>>()
+        };
+        self.scene.bodies.iter().flat_map(of_body).collect()
+    }
+
     /// Line of a byte of the text, from 1.
     pub(super) fn line(&self, byte: usize) -> usize {
         1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count()

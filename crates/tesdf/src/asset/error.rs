@@ -1,13 +1,18 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::save::SaveError;
+
 /// Why a `.tesdf` file cannot be written, opened or trusted.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
+    /// The file cannot be written.
+    #[error(transparent)]
+    Save(#[from] SaveError),
     /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried: `open`, `map`, `write`, …
+        /// What was tried: `open`, `map`, …
         action: &'static str,
         /// The file or folder.
         path: PathBuf,

@@ -162,7 +162,7 @@ impl TeSdf {
     /// Whether every list is proved to be exact where the vertices are now.
     pub(crate) fn has_exact_lists(&self) -> bool {
         let certificate = &self.about.certificate;
-        certificate.delta.is_some() && certificate.exactness_distance.is_none()
+        certificate.delta().is_some() && certificate.exactness_distance().is_none()
     }
 
     /// The whole file as it was opened, whatever has moved since.
@@ -178,9 +178,9 @@ impl TeSdf {
     /// Writes the file, replacing one at `path` atomically; with vertices and lists as they are now.
     ///
     /// # Errors
-    /// What the operating system refused; no half file is left.
+    /// As [`save_atomic`]; no half file is left.
     pub fn save(&self, path: &Path) -> Result<(), AssetError> {
-        save_atomic(path, &self.to_bytes()?)
+        Ok(save_atomic(path, &self.to_bytes()?)?)
     }
 
     /// The whole file, with vertices and lists as they are now. It does not say which lists are stale.

@@ -39,18 +39,36 @@ pub struct Twist {
     center: DVec3,
 }
 
+/// What is accepted in motions: squares and products of such numbers stay in the range of 64-bit floats.
+const LARGEST: f64 = 1e50;
+const EXPECTED: &str = "expected absolute values up to 1e50";
+
+fn in_range(v: DVec3) -> bool {
+    // NaN fails the comparison.
+    v.abs().cmple(DVec3::splat(LARGEST)).all()
+}
+
+impl Velocity {
+    /// Checks the numbers; says what is wrong.
+    pub(super) fn validate(&self) -> Result<(), String> {
+        let Self { linear, angular } = *self;
+        match in_range(linear) && in_range(angular) {
+            true => Ok(()),
+            false => Err(format!("velocity {linear:?}, angular {angular:?}; {EXPECTED}")),
+        }
+    }
+}
+
 impl Motion {
     /// Checks the numbers; says what is wrong.
     pub(super) fn validate(&self) -> Result<(), String> {
         match *self {
-            Self::Linear { velocity } if !(velocity.linear.is_finite() && velocity.angular.is_finite()) => {
-                Err(format!("velocity {velocity:?}; expected finite numbers"))
-            }
+            Self::Linear { velocity } => velocity.validate(),
             Self::Screw { point, angular_speed, pitch, .. }
-                if !(point.is_finite() && angular_speed.is_finite() && pitch.is_finite()) =>
+                if !(in_range(point) && in_range(DVec3::new(angular_speed, pitch, 0.0))) =>
             {
                 Err(format!(
-                    "screw about {point} with angular speed {angular_speed} and pitch {pitch}; expected finite numbers"
+                    "screw about {point} with angular speed {angular_speed:e} and pitch {pitch:e}; {EXPECTED}"
                 ))
             }
             Self::Screw { axis, .. } if axis.try_normalize().is_none() => {

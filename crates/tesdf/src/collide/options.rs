@@ -37,6 +37,11 @@ pub enum FaceMethod {
     },
 }
 
+impl FaceMethod {
+    /// Most iterations of [`FrankWolfe`](Self::FrankWolfe); the error falls with their number only, so more are of no use.
+    pub const MAX_ITERATIONS: u32 = 1 << 16;
+}
+
 /// How many contacts of a pair are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -85,8 +90,8 @@ impl CollideOptions {
         for (name, value) in
             [("contact_distance", self.contact_distance), ("speculative_time", self.speculative_time)]
         {
-            if !(value >= 0.0 && value.is_finite()) {
-                return refuse(name, value.to_string(), "a finite number, 0 or greater");
+            if !(0.0..=1e50).contains(&value) {
+                return refuse(name, format!("{value:e}"), "0 to 1e50");
             }
         }
         if let Some(cos) = self.cos_theta
@@ -99,6 +104,11 @@ impl CollideOptions {
             if !(value > 0.0 && value.is_finite()) {
                 return refuse("tolerance", value.to_string(), "a finite number greater than 0");
             }
+        }
+        if let Mode::Face(FaceMethod::FrankWolfe { iterations }) = self.mode
+            && iterations > FaceMethod::MAX_ITERATIONS
+        {
+            return refuse("iterations", iterations.to_string(), "at most 65536: from some hundred on nothing is gained");
         }
         if self.reduction == Reduction::PerPair(0) {
             return refuse("reduction", "0 contacts per pair".into(), "at least 1, or none");

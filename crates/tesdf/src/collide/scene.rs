@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use serde::Serialize;
 
+use super::shape::SIZE;
 use super::{CollideError, Placement, Pose, Shape};
 use crate::TeSdf;
 use crate::geometry::Aabb;
@@ -50,6 +51,10 @@ pub struct Velocity {
     /// About the body's origin.
     pub angular: DVec3,
 }
+
+/// How far from the origin an instance may be, in diagonals of its shape: there the rounding of coordinates is some 1e-4 of
+/// the diagonal.
+const FARTHEST: f64 = 1e12;
 
 /// A shape, placed in a world. Its state is all that it costs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -286,14 +291,23 @@ impl Scene {
 
     /// The instance with its rotation normalised.
     fn checked(&self, instance: &Instance) -> Result<Instance, String> {
-        self.shape(instance.shape).map_err(|e| e.to_string())?;
+        let shape = self.shape(instance.shape).map_err(|e| e.to_string())?;
         let Instance { pose, velocity, scale, .. } = instance;
         let pose = Pose::new(pose.translation, pose.rotation).map_err(|e| e.to_string())?;
-        if !velocity.linear.is_finite() || !velocity.angular.is_finite() {
-            return Err(format!("velocity {velocity:?}; expected finite numbers"));
-        }
+        velocity.validate()?;
         if !(*scale > 0.0 && scale.is_finite()) {
             return Err(format!("scale {scale}; expected a finite number greater than 0"));
+        }
+        let diagonal = shape.diagonal() * scale;
+        if !SIZE.contains(&diagonal) && !matches!(shape, Shape::Plane) {
+            return Err(format!("scale {scale} gives it a diagonal of {diagonal:e}; expected 1e-50 to 1e50"));
+        }
+        let farthest = (FARTHEST * diagonal).min(*SIZE.end());
+        if let Some(c) = pose.translation.to_array().into_iter().find(|c| c.abs() > farthest) {
+            return Err(format!(
+                "translation {c:e} is too far out: 64-bit floats place a body of diagonal {diagonal:e} to a share of its \
+                 size only up to {farthest:e}; expected it nearer to the origin"
+            ));
         }
         Ok(Instance { pose, ..*instance })
     }

@@ -8,6 +8,10 @@ use crate::TeSdf;
 use crate::asset::InnerBall;
 use crate::geometry::Aabb;
 
+/// Accepted sizes, and diagonals of placed shapes in the world's unit: as of meshes. Squares and cubes of them stay far from the ends of the
+/// range of 64-bit floats.
+pub(super) const SIZE: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+
 /// A body's geometry, in its own frame; shared by all instances.
 #[derive(Clone, Debug)]
 pub enum Shape {
@@ -40,7 +44,7 @@ impl Shape {
     /// # Errors
     /// [`CollideError::Shape`] names the shape and the size.
     pub fn validate(&self) -> Result<(), CollideError> {
-        let positive = |x: f64| x.is_finite() && x > 0.0;
+        let positive = |x: f64| SIZE.contains(&x);
         let (shape, found, good) = match *self {
             Self::Mesh(_) | Self::Plane => return Ok(()),
             Self::Box { half_extents: h } => {
@@ -56,7 +60,7 @@ impl Shape {
         if good {
             return Ok(());
         }
-        Err(CollideError::Shape { shape, found, expected: "finite numbers greater than 0" })
+        Err(CollideError::Shape { shape, found, expected: "numbers from 1e-50 to 1e50" })
     }
 
     /// Bounds in the shape's frame; those of a plane are infinite.

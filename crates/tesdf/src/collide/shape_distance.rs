@@ -2,16 +2,23 @@ use glam::DVec3;
 
 use super::Shape;
 use super::simple::Simple;
+use crate::geometry::length_and_direction;
 use crate::query::Precision;
 
+/// A point with a coordinate above this is farther out than any shape is large.
+const FAR: f64 = 1e100;
+
 impl Shape {
-    /// Distance from `p` to the surface, negative inside; in the shape's frame and unit. NaN for a point that is not finite.
+    /// Distance from `p` to the surface, negative inside; in the shape's frame and unit. NaN for a point that is not finite,
+    /// [`f64::MAX`] for a distance above it.
     ///
     /// `precision` is that of an encoded mesh; the others are formulas.
     pub fn signed_distance(&self, p: DVec3, precision: Precision) -> f64 {
         match *self {
             Self::Mesh(ref asset) => asset.signed_distance(p, precision),
             _ if !p.is_finite() => f64::NAN,
+            // Squares would overflow, and from so far out every shape but a plane is a point.
+            _ if p.abs().max_element() > FAR && !matches!(self, Self::Plane) => length_and_direction(p).0,
             ref simple => Simple::new(simple).value(p).distance,
         }
     }

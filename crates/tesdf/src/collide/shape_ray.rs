@@ -1,6 +1,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Shape;
+use crate::geometry::NearRay;
 
 /// Where a ray meets the surface of a shape first, in the shape's frame and unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +18,8 @@ impl Shape {
     /// The first point of the surface that `origin + t · direction` meets for `t` in `[0, limit]`, from either side; in
     /// the shape's frame and unit.
     ///
-    /// `None` when nothing is met, or when the ray is not finite or has no direction.
+    /// `None` when nothing is met, or when the ray is not finite or has no direction, or `t` would be above [`f64::MAX`]. As in
+    /// [`TeSdf::ray_cast`](crate::TeSdf::ray_cast), a ray that begins far out is taken from where it comes near the shape.
     pub fn ray_cast(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<ShapeHit> {
         if let Self::Mesh(asset) = self {
             let hit = asset.ray_cast(origin, direction, limit)?;
@@ -26,17 +28,28 @@ impl Shape {
         if !origin.is_finite() || !direction.is_finite() || direction == DVec3::ZERO {
             return None;
         }
+        if matches!(self, Self::Plane) {
+            let t = -origin.z / direction.z;
+            return (t.is_finite() && (0.0..=limit).contains(&t)).then_some(ShapeHit {
+                t,
+                normal: DVec3::Z,
+                face: None,
+            });
+        }
+        // From near by squares of coordinates do not overflow.
+        let ray = NearRay::new(origin, direction, DVec3::ZERO, self.diagonal())?;
         // The simple shapes are convex: the ray's line is inside over one interval.
-        let [enter, leave] = self.inside_of_line(origin, direction)?;
-        let t = [enter, leave].into_iter().find(|t| (0.0..=limit).contains(t))?;
-        Some(ShapeHit { t, normal: self.normal_at(origin + t * direction), face: None })
+        let [enter, leave] = self.inside_of_line(ray.origin, ray.direction)?;
+        let rest = ray.rest_of(limit);
+        let t = [enter, leave].into_iter().find(|t| (0.0..=rest).contains(t))?;
+        let normal = self.normal_at(ray.origin + t * ray.direction);
+        Some(ShapeHit { t: ray.total(t)?, normal, face: None })
     }
 
-    /// Where the line enters and leaves a simple shape; infinite where it never does.
+    /// Where the line enters and leaves a box, sphere or capsule.
     fn inside_of_line(&self, from: DVec3, along: DVec3) -> Option<[f64; 2]> {
         match *self {
-            Self::Mesh(_) => None,
-            Self::Plane => slab(from.z, along.z, f64::NEG_INFINITY, 0.0),
+            Self::Mesh(_) | Self::Plane => None,
             Self::Box { half_extents: h } => (0..3)
                 .map(|a| slab(from[a], along[a], -h[a], h[a]))
                 .try_fold([f64::NEG_INFINITY, f64::INFINITY], |a, b| common(a, b?)),

@@ -6,7 +6,7 @@ use super::simple::{Simple, plane_square};
 use super::{Mode, Placement, Shape};
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Triangle};
 
 /// A surface placed in the world, seen from the frame of a field.
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ impl Part {
         let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal: DVec3::ZERO };
         part.points[..points.len()].copy_from_slice(points);
         if let [a, b, c] = *points {
-            part.normal = (b - a).cross(c - a).normalize_or_zero();
+            part.normal = Triangle::new([a, b, c]).normal;
         }
         part
     }

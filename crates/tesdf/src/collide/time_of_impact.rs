@@ -12,8 +12,13 @@ pub struct TimeOfImpactOptions {
     pub tolerance: Length,
     /// Motion is followed from time 0 to this.
     pub end: f64,
-    /// Most steps; each measures one clearance.
+    /// Most steps, at most [`MAX_ITERATIONS`](Self::MAX_ITERATIONS); each measures one clearance.
     pub iterations: u32,
+}
+
+impl TimeOfImpactOptions {
+    /// Most steps that can be asked for.
+    pub const MAX_ITERATIONS: u32 = 1_000_000;
 }
 
 impl Default for TimeOfImpactOptions {
@@ -78,6 +83,10 @@ pub fn time_of_impact(
     if !(options.end >= 0.0 && options.end.is_finite()) {
         let (option, expected) = ("end", "a finite time, 0 or greater");
         return Err(CollideError::Option { option, found: options.end.to_string(), expected });
+    }
+    if options.iterations > TimeOfImpactOptions::MAX_ITERATIONS {
+        let (option, expected) = ("iterations", "at most 1000000");
+        return Err(CollideError::Option { option, found: options.iterations.to_string(), expected });
     }
     let speed = closing_speed([moving(&start.a, motion_a)?, moving(&start.b, motion_b)?]);
     // Small against the half of the tolerance that is kept.

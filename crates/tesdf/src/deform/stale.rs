@@ -3,11 +3,12 @@ use rayon::prelude::*;
 
 use crate::TeSdf;
 use crate::asset::SharedSection;
-use crate::asset::about::About;
+use crate::asset::about::{About, Proved};
 use crate::asset::layout::{Label, List, MAX_LIST_OFFSET, Node, TREE_LEAF};
 use crate::domain::Cell;
 use crate::encode::EncodeError;
 use crate::encode::candidates::Pool;
+use crate::encode::chains::Chains;
 use crate::encode::filter::{Scratch, filter};
 use crate::encode::lists::Lists;
 use crate::encode::sampled::lipschitz_candidates;
@@ -42,7 +43,13 @@ struct Stale {
     word: u32,
     label: Label,
     faces: Vec<u32>,
-    exact_within: f64,
+}
+
+/// A cell that was looked at.
+struct Checked {
+    /// Its new list, if the one that it has does not hold.
+    stale: Option<Stale>,
+    proved: Proved,
 }
 
 impl TeSdf {
@@ -55,8 +62,7 @@ impl TeSdf {
     /// [`EncodeError::Mesh`] when the moved mesh cannot be looked at.
     pub fn stale_cells(&self) -> Result<Vec<u32>, EncodeError> {
         let Some(motion) = &self.motion else { return Ok(Vec::new()) };
-        let (_, _, stale) = self.stale(motion)?;
-        Ok(stale.into_iter().map(|s| s.word).collect())
+        Ok(self.stale(motion)?.stale.into_iter().map(|s| s.word).collect())
     }
 
     /// Makes the lists of stale cells anew, with the options that the asset was encoded with, and leaves the others alone. The
@@ -66,21 +72,23 @@ impl TeSdf {
     /// [`EncodeError`] when the moved mesh cannot be looked at, or the lists outgrow what a file can name; nothing has changed then.
     pub fn reencode_stale(&mut self) -> Result<Reencoded, EncodeError> {
         let Some(mut motion) = self.motion.take() else { return Ok(Reencoded::default()) };
-        let reencoded = self.stale(&motion).and_then(|(cells, checked, stale)| {
-            let exact_within = self.replace_lists(&stale)?;
-            Ok((Reencoded { cells, checked, stale: stale.iter().map(|s| s.word).collect() }, exact_within))
+        let reencoded = self.stale(&motion).and_then(|found| {
+            self.replace_lists(&found.stale)?;
+            let stale = found.stale.iter().map(|s| s.word).collect();
+            Ok((Reencoded { cells: found.cells, checked: found.checked, stale }, found.proved))
         });
-        if let Ok((_, exact_within)) = &reencoded {
+        if let Ok((_, proved)) = &reencoded {
             motion.faces.fill(false);
             motion.tetrahedra.fill(false);
-            self.prove_again(*exact_within);
+            self.prove_again(*proved);
         }
         self.motion = Some(motion);
         reencoded.map(|(reencoded, _)| reencoded)
     }
 
-    fn stale(&self, motion: &Motion) -> Result<(usize, usize, Vec<Stale>), EncodeError> {
-        let Some(domain) = &self.conforming else { return Ok((0, 0, Vec::new())) };
+    fn stale(&self, motion: &Motion) -> Result<StaleCells, EncodeError> {
+        let known = self.about().certificate().proved();
+        let Some(domain) = &self.conforming else { return Ok(StaleCells::none(known)) };
         let local = |v: &[f64; 3]| self.frame.to_local(DVec3::from_array(*v));
         let mesh = TriangleMesh::new(self.vertices.iter().map(local).collect(), self.faces.to_vec())?;
         let surface = Surface::new(&mesh, self.cube.side(), Touching::Ignored);
@@ -100,16 +108,21 @@ impl TeSdf {
             tetrahedra: domain.tetrahedra(),
             moved_tree: AabbTree::build(&moved_boxes, TREE_LEAF),
             moved,
+            known: known.chains.unwrap_or(Chains::NONE),
         };
         let cells = self.listed_cells();
-        let found: Vec<Option<Option<Stale>>> = cells
+        let found: Vec<Option<Checked>> = cells
             .par_iter()
             .map_init(Scratch::default, |scratch, cell| search.check(cell, scratch))
             .collect();
-        let checked = found.iter().filter(|f| f.is_some()).count();
-        let mut stale: Vec<Stale> = found.into_iter().flatten().flatten().collect();
-        stale.sort_by_key(|s| s.word);
-        Ok((cells.len(), checked, stale))
+        let mut all = StaleCells { cells: cells.len(), ..StaleCells::none(known) };
+        for checked in found.into_iter().flatten() {
+            all.checked += 1;
+            all.proved = all.proved.and(checked.proved);
+            all.stale.extend(checked.stale);
+        }
+        all.stale.sort_by_key(|s| s.word);
+        Ok(all)
     }
 
     fn listed_cells(&self) -> Vec<Listed> {
@@ -126,7 +139,7 @@ impl TeSdf {
         cells
     }
 
-    fn replace_lists(&mut self, stale: &[Stale]) -> Result<f64, EncodeError> {
+    fn replace_lists(&mut self, stale: &[Stale]) -> Result<(), EncodeError> {
         let (mut nodes, mut lists) = (self.nodes.to_vec(), self.lists.to_vec());
         for s in stale {
             let raw: Vec<u8> = s.faces.iter().flat_map(|f| f.to_le_bytes()).collect();
@@ -142,19 +155,29 @@ impl TeSdf {
         }
         self.nodes = SharedSection::of_rows(&nodes);
         self.lists = SharedSection::of_rows(&lists);
-        Ok(stale.iter().map(|s| s.exact_within).fold(f64::INFINITY, f64::min))
+        Ok(())
     }
 
-    /// The certificate at rest, with the exactness distance of the new lists (local frame).
-    fn prove_again(&mut self, exact_within: f64) {
+    /// What was proved at rest holds again, less what the new lists are short of.
+    fn prove_again(&mut self, proved: Proved) {
         // Opening has read it.
         let Ok(rest) = About::from_metadata(self.container().metadata()) else { return };
-        let mut certificate = rest.certificate;
-        let within = exact_within * self.frame.inverse_scale();
-        let least = certificate.exactness_distance.unwrap_or(f64::INFINITY).min(within);
-        certificate.exactness_distance = least.is_finite().then_some(least);
-        certificate.truncated |= least.is_finite();
-        self.about_mut().certificate = certificate;
+        self.about_mut().certificate = rest.certificate.with(proved);
+    }
+}
+
+/// What has become of the lists since the vertices moved.
+struct StaleCells {
+    cells: usize,
+    checked: usize,
+    stale: Vec<Stale>,
+    /// Of all lists, the new ones included.
+    proved: Proved,
+}
+
+impl StaleCells {
+    fn none(proved: Proved) -> Self {
+        Self { cells: 0, checked: 0, stale: Vec::new(), proved }
     }
 }
 
@@ -167,15 +190,19 @@ struct Search<'a> {
     /// Faces that moved, and a tree over them.
     moved: Vec<u32>,
     moved_tree: AabbTree,
+    /// The chains of rule C that the lists rest on as they are.
+    known: Chains,
 }
 
 impl Search<'_> {
-    /// `None`: nothing that moved matters to the cell; `Some(None)`: its list holds all the same.
-    fn check(&self, listed: &Listed, scratch: &mut Scratch) -> Option<Option<Stale>> {
+    /// `None`: nothing that moved matters to the cell.
+    fn check(&self, listed: &Listed, scratch: &mut Scratch) -> Option<Checked> {
         let mut list: Vec<u32> = self.asset.with_list(listed.offset, |faces| faces.ids().to_vec());
         list.sort_unstable();
         let Lists { surface, tree, .. } = self.lists;
-        let candidates = if self.is_where_it_was(listed, &list) {
+        // Chains go on from those of the list, unless these have used up too much.
+        let go_on = 2 * self.known.used() <= Chains::BUDGET;
+        let (candidates, chains) = if go_on && self.is_where_it_was(listed, &list) {
             let mut all = self.newcomers(&listed.cell, &list);
             if all.is_empty() {
                 return None;
@@ -183,22 +210,24 @@ impl Search<'_> {
             // What is listed beats what is not, and has not moved.
             all.extend(&list);
             all.sort_unstable();
-            all
+            (all, self.known)
         } else {
-            lipschitz_candidates(surface, tree, &listed.cell)
+            (lipschitz_candidates(surface, tree, &listed.cell), Chains::NONE)
         };
         let pool = Pool::new(surface, &candidates, &listed.cell);
-        let filtered = filter(surface, &listed.cell, &pool.candidates(), scratch);
+        let filtered = filter(surface, &listed.cell, &pool.candidates(), chains, scratch);
         let has = |r| list.iter().any(|&face| surface.holds(face, r));
         if filtered.survivors.iter().all(|s| has(s.requirement)) {
-            return Some(None);
+            let proved = Proved { within: f64::INFINITY, chains: Some(filtered.chains) };
+            return Some(Checked { stale: None, proved });
         }
         let tetrahedron = self.tetrahedra.get(listed.root);
-        let (faces, exact_within) =
-            self.lists.of_cell(&listed.cell, tetrahedron, &candidates, false, scratch);
-        let holds = faces.iter().all(|face| list.binary_search(face).is_ok());
-        let stale = Stale { word: listed.word, label: listed.label, faces, exact_within };
-        Some((!holds).then_some(stale))
+        let made = self.lists.of_cell(&listed.cell, tetrahedron, &candidates, chains, scratch);
+        let holds = made.faces.iter().all(|face| list.binary_search(face).is_ok());
+        let within = made.exact_within * self.asset.frame.inverse_scale();
+        let stale = Stale { word: listed.word, label: listed.label, faces: made.faces };
+        let proved = Proved { within, chains: made.proof };
+        Some(Checked { stale: (!holds).then_some(stale), proved })
     }
 
     /// Whether neither the cell nor a face of its list has moved, and the list is a whole one.

@@ -109,6 +109,16 @@ impl Cell {
     pub fn volume(&self) -> f64 {
         crate::geometry::tetrahedron_volume(&self.corners)
     }
+
+    /// Whether the ball inside of the cell has a radius of at least a tenth of the longest edge: so do all cells of the bisection
+    /// domain.
+    pub fn is_fat(&self) -> bool {
+        let [a, b, c, d] = self.corners;
+        let twice_area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - a).length();
+        let around = twice_area(a, b, c) + twice_area(a, b, d) + twice_area(a, c, d) + twice_area(b, c, d);
+        // The radius is three times the volume over the area of the sides.
+        60.0 * self.volume() >= around * self.width()
+    }
 }
 
 /// A point as fixed-point barycentric coordinates of the cell that holds it; exact from cell to child.

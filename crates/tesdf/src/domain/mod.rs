@@ -18,5 +18,8 @@ pub use bisection::{Barycentric, Cell, MAX_DEPTH, ROOTS};
 pub use classes::Classes;
 pub use conforming::{ConformingError, ConformingMesh, MissingFace};
 pub use cube::DomainCube;
-pub use read::{LoadedTetrahedra, ReadTetrahedraError, Skipped, TetFormat, load_tetrahedra, read_tetrahedra};
+pub use read::{
+    LoadedTetrahedra, ReadTetrahedraError, Skipped, TetFormat, load_tetrahedra, read_tetrahedra,
+    tetrahedra_files,
+};
 pub use tet_mesh::{TetMesh, TetMeshError};

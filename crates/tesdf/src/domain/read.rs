@@ -131,6 +131,16 @@ pub fn load_tetrahedra(path: &Path) -> Result<LoadedTetrahedra, ReadTetrahedraEr
     Ok(LoadedTetrahedra { mesh, format, skipped: parsed.skipped })
 }
 
+/// The files that [`read_tetrahedra`] opens for `path`: the file itself, and the other file of TetGen's pair.
+pub fn tetrahedra_files(path: &Path) -> Vec<PathBuf> {
+    let other = match TetFormat::of_path(path) {
+        Ok(TetFormat::Node) => Some(beside(path, TetFormat::Ele)),
+        Ok(TetFormat::Ele) => Some(beside(path, TetFormat::Node)),
+        _ => None,
+    };
+    std::iter::once(path.to_path_buf()).chain(other).collect()
+}
+
 /// The other file of a pair, in upper case where the first is.
 fn beside(path: &Path, format: TetFormat) -> PathBuf {
     let upper = path.extension().is_some_and(|e| e.to_string_lossy().chars().all(char::is_uppercase));

@@ -365,6 +365,7 @@ mod tests {
     use crate::encode::surface::Touching;
     use crate::mesh::TriangleMesh;
     use crate::query::Isa;
+    use crate::testing::degenerate;
     use proptest::prelude::*;
 
     fn isas() -> Vec<Isa> {
@@ -382,34 +383,47 @@ mod tests {
     }
 
     proptest! {
+        /// Faces of degenerate shapes: the bits of the scalar code, which is exact.
+        #[test]
+        fn looks_at_degenerate_faces_like_the_scalar_code(
+            corners in prop::collection::vec(degenerate::face(), 1..20),
+            p in degenerate::face().prop_map(|corners| corners[0]),
+        ) {
+            let vertices: Vec<DVec3> = corners.into_iter().flatten().collect();
+            compare(vertices, p)?;
+        }
+
         /// Every instruction set sees the bits that the scalar code computes.
         #[test]
         fn looks_like_the_scalar_code(
             corners in prop::collection::vec([coordinate(), coordinate(), coordinate()], 9..40),
             p in [coordinate(), coordinate(), coordinate()],
         ) {
-            let vertices: Vec<DVec3> = corners.into_iter().map(DVec3::from).collect();
-            let faces = (0..vertices.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
-            let mut surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0, Touching::Kept);
-            let p = DVec3::from(p);
-            let cell = Cell { corners: [p, p + DVec3::X, p + DVec3::Y, p + DVec3::Z], depth: 0 };
-            let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
-            for isa in isas() {
-                surface.isa = isa;
-                let pool = Pool::new(&surface, &all, &cell);
-                let mut rows = Vec::new();
-                pool.candidates().look_from(&surface, p, &mut rows);
-                for (i, triangle) in surface.triangles.iter().enumerate() {
-                    let (closest, regions) = triangle.closest_and_regions(p);
-                    let at = |row: usize| rows[row * pool.stride + i];
-                    let point = DVec3::new(at(POINT), at(POINT + 1), at(POINT + 2));
-                    prop_assert_eq!((at(0), point), (closest.distance, closest.point), "{:?}", isa);
-                    prop_assert_eq!(at(REGIONS), f64::from(regions.0), "{:?}", isa);
-                    let gradient = DVec3::new(at(GRADIENT), at(GRADIENT + 1), at(GRADIENT + 2));
-                    let expected = (p - closest.point) / closest.distance;
-                    prop_assert!(closest.distance == 0.0 || gradient == expected, "{:?}", isa);
-                }
+            compare(corners.into_iter().map(DVec3::from).collect(), DVec3::from(p))?;
+        }
+    }
+
+    fn compare(vertices: Vec<DVec3>, p: DVec3) -> Result<(), TestCaseError> {
+        let faces = (0..vertices.len() as u32 / 3).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
+        let mut surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0, Touching::Kept);
+        let cell = Cell { corners: [p, p + DVec3::X, p + DVec3::Y, p + DVec3::Z], depth: 0 };
+        let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
+        for isa in isas() {
+            surface.isa = isa;
+            let pool = Pool::new(&surface, &all, &cell);
+            let mut rows = Vec::new();
+            pool.candidates().look_from(&surface, p, &mut rows);
+            for (i, triangle) in surface.triangles.iter().enumerate() {
+                let (closest, regions) = triangle.closest_and_regions(p);
+                let at = |row: usize| rows[row * pool.stride + i];
+                let point = DVec3::new(at(POINT), at(POINT + 1), at(POINT + 2));
+                prop_assert_eq!((at(0), point), (closest.distance, closest.point), "{:?}", isa);
+                prop_assert_eq!(at(REGIONS), f64::from(regions.0), "{:?}", isa);
+                let gradient = DVec3::new(at(GRADIENT), at(GRADIENT + 1), at(GRADIENT + 2));
+                let expected = (p - closest.point) / closest.distance;
+                prop_assert!(closest.distance == 0.0 || gradient == expected, "{:?}", isa);
             }
         }
+        Ok(())
     }
 }

@@ -1,6 +1,7 @@
 //! The certified filter: which faces can be closest somewhere in a cell.
 
 use super::candidates::{Candidates, Pool};
+use super::chains::Chains;
 use super::doubles::{Doubles, GROUP, dispatch};
 use super::plane_rule::{PlaneRule, Rivals, Verdict};
 use super::surface::{Requirement, Surface, Touching};
@@ -45,6 +46,8 @@ pub struct Filtered {
     pub distance: f64,
     /// The closest candidate, and what of it, at each corner and the centroid.
     pub closest: [(u32, Feature); 5],
+    /// The chains of rule C up to this cell, its own filter included.
+    pub chains: Chains,
 }
 
 /// Buffers that one thread uses again from cell to cell.
@@ -58,6 +61,8 @@ pub struct Scratch {
     rivals: Rivals,
     survivors: Vec<Survivor>,
     meeting: Vec<Survivor>,
+    /// By survivor: the weight of the longest chain of rule C that ends there.
+    chained: Vec<u32>,
     pools: Vec<Pool>,
     pub(super) settled: Settled,
 }
@@ -90,7 +95,15 @@ const MANY: usize = 1 << 12;
 /// See `docs/math.md` for the proofs. Rules A and B drop a face only for one that is closer in all of
 /// the cell by [`MARGIN`], a strict partial order, so that their sequence does not matter; rule C then
 /// goes through the rest in order. Faces that meet the cell are kept whole whatever the rules say.
-pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: &mut Scratch) -> Filtered {
+///
+/// `chains` are those of the filters that left the candidates: rule C stops where their budget is used up.
+pub fn filter(
+    surface: &Surface,
+    cell: &Cell,
+    candidates: &Candidates,
+    chains: Chains,
+    scratch: &mut Scratch,
+) -> Filtered {
     let m = cell.centroid();
     let n = candidates.faces.len();
     let radius = cell.radius();
@@ -104,7 +117,7 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: 
     let mut survivors = std::mem::take(&mut scratch.survivors);
     survivors.clear();
     let mut filtered =
-        Filtered { survivors, crossing: false, radius, distance: at_centroid.distance, closest };
+        Filtered { survivors, crossing: false, radius, distance: at_centroid.distance, closest, chains };
 
     scratch.alive.resize(candidates.stride / GROUP, 0);
     scratch.near.resize(candidates.stride / GROUP, 0);
@@ -159,7 +172,8 @@ pub fn filter(surface: &Surface, cell: &Cell, candidates: &Candidates, scratch: 
             scratch.meeting.push(survivor);
         }
     });
-    share_features(surface, candidates, &mut filtered.survivors);
+    filtered.chains =
+        share_features(surface, cell, candidates, chains, &mut filtered.survivors, &mut scratch.chained);
     filtered.survivors.extend_from_slice(&scratch.meeting);
     filtered
 }
@@ -223,21 +237,43 @@ fn point_rule_lanes<L: Doubles>(
 }
 
 /// Rule C: of the faces that are one and the same edge or vertex to the whole cell, one is enough.
-fn share_features(surface: &Surface, candidates: &Candidates, survivors: &mut Vec<Survivor>) {
+fn share_features(
+    surface: &Surface,
+    cell: &Cell,
+    candidates: &Candidates,
+    chains: Chains,
+    survivors: &mut Vec<Survivor>,
+    chained: &mut Vec<u32>,
+) -> Chains {
     if survivors.len() > MAX_SHARING {
-        return;
+        return chains;
     }
+    chained.clear();
+    chained.resize(survivors.len(), 0);
+    let mut heaviest = 0;
     let mut i = 0;
     while i < survivors.len() {
         let g = survivors[i];
-        let shared = !surface.is_face(g.requirement)
-            && survivors.iter().any(|h| {
-                h.index != g.index && surface.holds(candidates.faces[h.index as usize], g.requirement)
-            });
-        if shared {
+        let holder = (!surface.is_face(g.requirement))
+            .then(|| {
+                survivors.iter().position(|h| {
+                    h.index != g.index && surface.holds(candidates.faces[h.index as usize], g.requirement)
+                })
+            })
+            .flatten();
+        let link = holder.and_then(|at| {
+            let weight = chained[i]
+                + Chains::weight(surface, cell, g.requirement, candidates.faces[g.index as usize])?;
+            chains.allow(weight).then_some((at, weight))
+        });
+        if let Some((at, weight)) = link {
+            chained[at] = chained[at].max(weight);
+            heaviest = heaviest.max(weight);
             survivors.remove(i);
+            chained.remove(i);
         } else {
             i += 1;
         }
     }
+    chains.and(heaviest)
 }

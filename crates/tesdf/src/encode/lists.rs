@@ -2,14 +2,16 @@
 use rayon::prelude::*;
 
 use super::assemble::collect;
+use super::chains::Chains;
 use super::filter::{PAD, Scratch};
+use super::holds::holds;
 use super::rank::{Ranked, rank};
 use super::refine::{Leaf, Tree};
 use super::roots::Roots;
 use super::sampled::{SampledCell, Sampler, sample};
 use super::surface::Surface;
 use super::tighten::tighten;
-use super::{Deformation, EncodeError, EncodeOptions, EncodeProgress, Encoder, Sampling, Stage};
+use super::{Deformation, EncodeError, EncodeOptions, EncodeProgress, Encoder, Sampling, Stage, Threshold};
 use crate::asset::layout::{Label, Side};
 use crate::domain::Cell;
 use crate::geometry::{AabbTree, WindingNumber, triangle_meets_tetrahedron};
@@ -26,10 +28,36 @@ pub struct Lists<'a> {
     pub scale: f64,
 }
 
+/// The list of a cell, and what is known of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct List {
+    /// Face ids, ascending.
+    pub faces: Vec<u32>,
+    /// Distance from the surface within which the list is exact (local frame); infinite unless it was truncated.
+    pub exact_within: f64,
+    /// The chains of rule C that the proof of it rests on; `None`: nothing is proved.
+    pub proof: Option<Chains>,
+}
+
+/// The labels of all cells in depth-first order, and what is known of all lists.
+#[derive(Clone, Debug)]
+pub struct Finished {
+    /// The labels.
+    pub labels: Vec<Label>,
+    /// The least of all lists.
+    pub exact_within: f64,
+    /// The heaviest of all lists; `None` when one list is not proved.
+    pub proof: Option<Chains>,
+}
+
+/// Faces of a list before anything is added or dropped.
+struct Found {
+    ranked: Vec<Ranked>,
+    proof: Option<Chains>,
+}
+
 impl Lists<'_> {
-    /// Finishes the lists and labels the cells, in depth-first order. Also the distance from the surface within which
-    /// every list is exact (local frame): infinite unless lists were truncated. `winding` labels the bisection domain, `sampler` is of
-    /// the sampled encoder.
+    /// Finishes the lists and labels the cells. `winding` labels the bisection domain, `sampler` is of the sampled encoder.
     pub fn finish(
         &self,
         trees: &mut [Tree],
@@ -37,7 +65,7 @@ impl Lists<'_> {
         winding: &WindingNumber,
         sampler: &dyn Sampler,
         progress: &EncodeProgress,
-    ) -> Result<(Vec<Label>, f64), EncodeError> {
+    ) -> Result<Finished, EncodeError> {
         let mut cells = Vec::new();
         for (root, tree) in trees.iter_mut().enumerate() {
             place(tree, roots.cells[root], root, &mut cells);
@@ -48,11 +76,11 @@ impl Lists<'_> {
         }
         progress.begin(Stage::Tighten, leaves.len() as u64);
         let (sampled, step) = match &self.options.encoder {
-            Encoder::Certified => (vec![None; leaves.len()], 1),
+            Encoder::Certified => (leaves.iter().map(|_| None).collect(), 1),
             // Nearly all of the work is done then.
             Encoder::Sampled(sampling) => (self.sampled(&leaves, &cells, sampling, sampler, progress)?, 0),
         };
-        let finished: Option<Vec<(Label, f64)>> = leaves
+        let finished: Option<Vec<(Label, f64, Option<Chains>)>> = leaves
             .into_par_iter()
             .zip(cells)
             .zip(sampled)
@@ -62,43 +90,47 @@ impl Lists<'_> {
                     return None;
                 }
                 let mut exact_within = f64::INFINITY;
+                let mut proof = Some(Chains::NONE);
                 let mut crosses = false;
-                if let Leaf::Listed { faces, crossing } = leaf {
+                if let Leaf::Listed { faces, crossing, chains } = leaf {
                     crosses = *crossing;
-                    let ranked = sampled.unwrap_or_else(|| self.ranked(&cell, faces, scratch));
+                    let found = sampled.unwrap_or_else(|| self.found(&cell, faces, *chains, scratch));
                     let tetrahedron = roots.tetrahedra.get(root);
-                    (*faces, exact_within) = self.completed(&cell, tetrahedron, faces, crosses, ranked);
+                    let list = self.completed(&cell, tetrahedron, faces, crosses, found);
+                    (*faces, exact_within, proof) = (list.faces, list.exact_within, list.proof);
                 }
                 let label = match (&leaf, roots.sides.get(root)) {
                     (Leaf::Outside, _) | (_, Some(Side::Outside)) => Label::Outside,
                     (_, Some(Side::Inside)) => Label::Inside,
                     (_, None) => match (crosses, winding.at_perturbed(cell.centroid())) {
-                        // Read back as i32: folds thinner than the check sees may be negative.
+                        // Read back as i32: it is negative where the surface is inside out.
                         (true, w) => Label::Crossing(w as u32),
                         (false, w) if w >= 1 => Label::Inside,
                         _ => Label::Outside,
                     },
                 };
-                Some((label, exact_within))
+                Some((label, exact_within, proof))
             })
             .collect();
         let finished = finished.ok_or(EncodeError::Cancelled)?;
         let exact_within = finished.iter().map(|f| f.1).fold(f64::INFINITY, f64::min);
-        Ok((finished.into_iter().map(|f| f.0).collect(), exact_within))
+        let heavier = |a: Option<Chains>, b: Option<Chains>| Some(a?.max(b?));
+        let proof = finished.iter().map(|f| f.2).fold(Some(Chains::NONE), heavier);
+        Ok(Finished { labels: finished.into_iter().map(|f| f.0).collect(), exact_within, proof })
     }
 
     /// The list of a cell of a conforming domain's `tetrahedron`, or of no tetrahedron, from `faces`, among which are all that it
-    /// needs; and the distance within which it is exact (local frame).
+    /// needs; `chains` are those of the filters that left them.
     pub fn of_cell(
         &self,
         cell: &Cell,
         tetrahedron: Option<&[u32; 4]>,
         faces: &[u32],
-        crossing: bool,
+        chains: Chains,
         scratch: &mut Scratch,
-    ) -> (Vec<u32>, f64) {
-        let ranked = self.ranked(cell, faces, scratch);
-        self.completed(cell, tetrahedron, faces, crossing, ranked)
+    ) -> List {
+        let found = self.found(cell, faces, chains, scratch);
+        self.completed(cell, tetrahedron, faces, false, found)
     }
 
     /// What Alg. 1 finds in the listed cells, before anything is added or dropped; `None` for other leaves.
@@ -109,7 +141,7 @@ impl Lists<'_> {
         sampling: &Sampling,
         sampler: &dyn Sampler,
         progress: &EncodeProgress,
-    ) -> Result<Vec<Option<Vec<Ranked>>>, EncodeError> {
+    ) -> Result<Vec<Option<Found>>, EncodeError> {
         let mut found = Vec::with_capacity(leaves.len());
         for (leaves, cells) in leaves.chunks(SAMPLED_AT_ONCE).zip(cells.chunks(SAMPLED_AT_ONCE)) {
             let listed = leaves.par_iter().zip(cells).filter(|(leaf, _)| matches!(leaf, Leaf::Listed { .. }));
@@ -117,7 +149,12 @@ impl Lists<'_> {
                 .map(|(_, (cell, _))| SampledCell::new(self.surface, self.tree, *cell, sampling, self.scale))
                 .collect();
             let distances = sampler.sample(self.surface, &listed, sampling, progress)?;
-            let mut of_listed = listed.iter().zip(&distances).map(|(cell, least)| in_list(cell, least));
+            let of_cell = |scratch: &mut Scratch, (cell, least): (&SampledCell, &Vec<f64>)| {
+                self.sampled_found(cell, least, sampling, scratch)
+            };
+            let of_listed: Vec<Found> =
+                listed.par_iter().zip(&distances).map_init(Scratch::default, of_cell).collect();
+            let mut of_listed = of_listed.into_iter();
             found.extend(leaves.iter().map(|leaf| match leaf {
                 Leaf::Listed { .. } => of_listed.next(),
                 _ => None,
@@ -127,24 +164,53 @@ impl Lists<'_> {
         Ok(found)
     }
 
-    /// The faces of a cell's list, before anything is added or dropped.
-    fn ranked(&self, cell: &Cell, faces: &[u32], scratch: &mut Scratch) -> Vec<Ranked> {
+    /// The faces of a cell's list, before anything is added or dropped; `chains` are those of the filters that left `faces`.
+    fn found(&self, cell: &Cell, faces: &[u32], chains: Chains, scratch: &mut Scratch) -> Found {
         match &self.options.encoder {
             Encoder::Certified => {
                 let levels = self.options.tighten_levels;
-                let tight = match levels {
-                    0 => faces.to_vec(),
-                    _ => tighten(self.surface, cell, faces, levels, scratch),
+                let (tight, chains) = match levels {
+                    0 => (faces.to_vec(), chains),
+                    _ => tighten(self.surface, cell, faces, levels, chains, scratch),
                 };
-                match self.options.max_entries {
-                    Some(most) if tight.len() > most as usize => rank(self.surface, cell, &tight, scratch),
-                    _ => tight.into_iter().map(|face| Ranked { face, order: 0.0, distance: 0.0 }).collect(),
-                }
+                self.proved(cell, &tight, chains, scratch)
             }
             Encoder::Sampled(sampling) => {
                 let sampled = SampledCell::new(self.surface, self.tree, *cell, sampling, self.scale);
-                in_list(&sampled, &sample(self.surface, &sampled, sampling, scratch))
+                let least = sample(self.surface, &sampled, sampling, scratch);
+                self.sampled_found(&sampled, &least, sampling, scratch)
             }
+        }
+    }
+
+    /// An exact list, ranked where it is to be cut.
+    fn proved(&self, cell: &Cell, list: &[u32], chains: Chains, scratch: &mut Scratch) -> Found {
+        let (ranked, chains) = match self.options.max_entries {
+            Some(most) if list.len() > most as usize => rank(self.surface, cell, list, chains, scratch),
+            _ => (list.iter().map(|&face| Ranked { face, order: 0.0, distance: 0.0 }).collect(), chains),
+        };
+        Found { ranked, proof: Some(chains) }
+    }
+
+    /// E_t of Alg. 1: the candidates with a d_f.
+    ///
+    /// A threshold as wide as the grid makes it exact (docs/math.md, 3), if the samples were looked at as they should. What a [`Sampler`] says is
+    /// no proof: the certified filter has to agree, and only its own bounds say from what distance on a face is needed.
+    fn sampled_found(
+        &self,
+        cell: &SampledCell,
+        least: &[f64],
+        sampling: &Sampling,
+        scratch: &mut Scratch,
+    ) -> Found {
+        let found = cell.faces.iter().zip(least).filter(|(_, least)| least.is_finite());
+        let ranked: Vec<Ranked> =
+            found.map(|(&face, &distance)| Ranked { face, order: distance, distance }).collect();
+        let Threshold::CoveringRadius = sampling.threshold else { return Found { ranked, proof: None } };
+        let list: Vec<u32> = ranked.iter().map(|r| r.face).collect();
+        match holds(self.surface, &cell.cell, &cell.faces, &list, scratch) {
+            Some(chains) => self.proved(&cell.cell, &list, chains, scratch),
+            None => Found { ranked, proof: None },
         }
     }
 
@@ -155,8 +221,8 @@ impl Lists<'_> {
         tetrahedron: Option<&[u32; 4]>,
         faces: &[u32],
         crossing: bool,
-        mut ranked: Vec<Ranked>,
-    ) -> (Vec<u32>, f64) {
+        Found { mut ranked, proof }: Found,
+    ) -> List {
         if crossing {
             // The sign of a point is counted over these.
             let corners = |&face: &u32| self.surface.triangles[face as usize].corners;
@@ -169,18 +235,13 @@ impl Lists<'_> {
             let faces: Vec<u32> = around.flat_map(|v| self.surface.vertex_faces(v).iter().copied()).collect();
             raise(&mut ranked, faces.into_iter(), 0.0);
         }
-        truncated(ranked, self.options.max_entries)
+        let (faces, exact_within) = truncated(ranked, self.options.max_entries);
+        List { faces, exact_within, proof }
     }
 }
 
 /// Cells whose candidates are held at once, by the sampled encoder.
 const SAMPLED_AT_ONCE: usize = 1 << 10;
-
-/// E_t: the candidates with a d_f.
-fn in_list(cell: &SampledCell, least: &[f64]) -> Vec<Ranked> {
-    let found = cell.faces.iter().zip(least).filter(|(_, least)| least.is_finite());
-    found.map(|(&face, &distance)| Ranked { face, order: distance, distance }).collect()
-}
 
 /// Gives some faces an order, and a place in the list.
 fn raise(ranked: &mut Vec<Ranked>, faces: impl Iterator<Item = u32>, order: f64) {

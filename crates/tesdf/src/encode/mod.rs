@@ -7,10 +7,12 @@
 //! 4. [`assemble`]: lays the forest and its lists out as bytes.
 pub mod assemble;
 pub mod candidates;
+pub mod chains;
 mod choices;
 mod doubles;
 pub mod filter;
 pub mod hints;
+mod holds;
 pub mod lists;
 mod options;
 mod pipeline;

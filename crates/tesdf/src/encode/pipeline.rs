@@ -2,7 +2,7 @@ use rayon::prelude::*;
 
 use super::assemble::assemble;
 use super::hints::{Simplicity, sign_hints};
-use super::lists::Lists;
+use super::lists::{Finished, Lists};
 use super::refine::{ROOT_VOLUME, Refiner, Tree, Weights};
 use super::roots::Roots;
 use super::sampled::{Processor, Sampler, lipschitz_candidates};
@@ -13,6 +13,8 @@ use crate::asset::{AssetError, Section, TeSdf, about, write_container};
 use crate::domain::{ConformingMesh, DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, Child, LocalFrame, WindingNumber};
 use crate::mesh::{MeshError, SolidMesh, TriangleMesh};
+use crate::query::Precision;
+use crate::verify::{Worst, self_check};
 
 /// Why a solid cannot be encoded.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +48,18 @@ pub enum EncodeError {
     /// What looks at samples cannot.
     #[error("{0}")]
     Sampler(Box<dyn std::error::Error + Send + Sync>),
+    /// The finished file is wrong somewhere, although its lists count as proved: a bug of this library.
+    #[error(
+        "the encoded file is wrong: at ({}, {}, {}) it says {} in {precision:?}, and all faces say {}; \
+         this is a bug of tesdf, so please report it with the mesh and the options; nothing was written",
+        worst.point[0], worst.point[1], worst.point[2], worst.found, worst.expected
+    )]
+    SelfCheck {
+        /// What the query computed with.
+        precision: Precision,
+        /// The point that is off the most.
+        worst: Box<Worst>,
+    },
     /// The finished file does not open.
     #[error("the encoded asset is not valid: {0}")]
     Asset(#[from] AssetError),
@@ -172,7 +186,8 @@ pub fn encode_with(
         .ok_or(EncodeError::Cancelled)?;
 
     let lists = Lists { surface: &surface, tree: &tree, options, scale: frame.scale };
-    let (labels, exact_within) = lists.finish(&mut trees, &roots, &winding, sampler, progress)?;
+    let Finished { labels, exact_within, proof } =
+        lists.finish(&mut trees, &roots, &winding, sampler, progress)?;
 
     progress.begin(Stage::Assemble, 1);
     let simplicity = if solid.is_simple() { Simplicity::Simple } else { Simplicity::Involved };
@@ -218,8 +233,12 @@ pub fn encode_with(
     if faces.len() > 1 << 16 {
         sections.push(Section::new(layout::PALETTES_HIGH, &high));
     }
-    let certificate =
-        about::Certificate::of(options, &domain, sampler, diagonal, &roots.cube, exact_within / frame.scale);
+    let encoder = match options.encoder {
+        Encoder::Certified => "certified".into(),
+        Encoder::Sampled(_) => sampler.name(),
+    };
+    let proved = about::Proved { within: exact_within / frame.scale, chains: proof };
+    let certificate = about::Certificate::new(encoder, &domain, diagonal, &roots.cube, proved);
     let about = about::About {
         source: source.clone(),
         options: options.clone(),
@@ -227,7 +246,13 @@ pub fn encode_with(
         statistics: about::Statistics::of(&trees, &labels, &roots.cells, mesh, frame),
     };
     let bytes = write_container(&sections, &about.to_metadata())?;
-    Ok(TeSdf::from_bytes(&bytes)?)
+    let asset = TeSdf::from_bytes(&bytes)?;
+    if asset.about().certificate().delta().is_some()
+        && let Some((precision, worst)) = self_check(&asset)?
+    {
+        return Err(EncodeError::SelfCheck { precision, worst: Box::new(worst) });
+    }
+    Ok(asset)
 }
 
 /// Half width of the layer around the surface whose queries count full, as a share of the diagonal.

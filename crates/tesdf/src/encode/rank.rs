@@ -1,5 +1,6 @@
 //! From what distance on a cell needs each face of its list: Eq. (7), by bounds.
 use super::candidates::{Candidates, GRADIENT};
+use super::chains::Chains;
 use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
 use crate::domain::Cell;
@@ -25,12 +26,21 @@ const SMALL: f64 = 0.02;
 ///
 /// A point that is nearer to the surface than the bounds of all faces that are left out has its closest feature in the list: the
 /// feature survives in its sub-cell, so the face that has it, or stands in for it, has a bound of at most its distance.
-pub fn rank(surface: &Surface, cell: &Cell, list: &[u32], scratch: &mut Scratch) -> Vec<Ranked> {
-    let mut needs = Vec::new();
+///
+/// `chains` are those that the list rests on; what comes back besides are those that the bounds rest on.
+pub fn rank(
+    surface: &Surface,
+    cell: &Cell,
+    list: &[u32],
+    chains: Chains,
+    scratch: &mut Scratch,
+) -> (Vec<Ranked>, Chains) {
+    let mut needs = Needs { surface, found: Vec::new(), heaviest: chains };
     let mut pool = scratch.pool();
     pool.fill(surface, list, cell);
-    descend(surface, cell, &pool.candidates(), LEVELS, &mut needs, scratch);
+    needs.descend(cell, &pool.candidates(), LEVELS, chains, scratch);
     scratch.give_back(pool);
+    let Needs { found: mut needs, heaviest, .. } = needs;
     needs.sort_by(|a: &(Requirement, f64), b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     needs.dedup_by_key(|need| need.0);
     let mut distances = vec![f64::INFINITY; list.len()];
@@ -41,7 +51,7 @@ pub fn rank(surface: &Surface, cell: &Cell, list: &[u32], scratch: &mut Scratch)
     }
     stand_in(surface, list, parts, &mut distances);
     let ranked = |(&face, distance)| Ranked { face, order: distance, distance };
-    list.iter().zip(distances).map(ranked).collect()
+    (list.iter().zip(distances).map(ranked).collect(), heaviest)
 }
 
 /// Lets one face stand in for each edge or vertex: of those that have it the one that is needed nearest to the surface anyway. Were it all of
@@ -56,34 +66,48 @@ fn stand_in(surface: &Surface, list: &[u32], mut parts: Vec<(Requirement, f64)>,
     }
 }
 
-fn descend(
-    surface: &Surface,
-    cell: &Cell,
-    candidates: &Candidates,
-    levels: u32,
-    needs: &mut Vec<(Requirement, f64)>,
-    scratch: &mut Scratch,
-) {
-    let filtered = filter(surface, cell, candidates, scratch);
-    if levels == 0 || filtered.radius < SMALL * filtered.distance || filtered.survivors.len() == 1 {
-        let center = cell.centroid();
-        for s in &filtered.survivors {
-            let at = |row: usize| scratch.centroid[row * candidates.stride + s.index as usize];
-            let gradient = glam::DVec3::new(at(GRADIENT), at(GRADIENT + 1), at(GRADIENT + 2));
-            // The distance is convex: its tangent is below it. No tangent (NaN) on the face itself.
-            let below = cell.corners.iter().map(|c| gradient.dot(*c - center)).fold(f64::INFINITY, f64::min);
-            let least = if s.meets { 0.0 } else { (at(0) + below - surface.margin).max(0.0) };
-            needs.push((s.requirement, least));
+/// What sub-cells need, each with a lower bound of the distance where they do.
+struct Needs<'a> {
+    surface: &'a Surface,
+    found: Vec<(Requirement, f64)>,
+    /// The heaviest chains of rule C on a way down so far.
+    heaviest: Chains,
+}
+
+impl Needs<'_> {
+    fn descend(
+        &mut self,
+        cell: &Cell,
+        candidates: &Candidates,
+        levels: u32,
+        chains: Chains,
+        scratch: &mut Scratch,
+    ) {
+        let surface = self.surface;
+        let filtered = filter(surface, cell, candidates, chains, scratch);
+        let chains = filtered.chains;
+        self.heaviest = self.heaviest.max(chains);
+        if levels == 0 || filtered.radius < SMALL * filtered.distance || filtered.survivors.len() == 1 {
+            let center = cell.centroid();
+            for s in &filtered.survivors {
+                let at = |row: usize| scratch.centroid[row * candidates.stride + s.index as usize];
+                let gradient = glam::DVec3::new(at(GRADIENT), at(GRADIENT + 1), at(GRADIENT + 2));
+                // The distance is convex: its tangent is below it. No tangent (NaN) on the face itself.
+                let below =
+                    cell.corners.iter().map(|c| gradient.dot(*c - center)).fold(f64::INFINITY, f64::min);
+                let least = if s.meets { 0.0 } else { (at(0) + below - surface.margin).max(0.0) };
+                self.found.push((s.requirement, least));
+            }
+            scratch.reuse(filtered);
+            return;
         }
+        let mut pool = scratch.pool();
+        pool.narrow(surface, cell, candidates, &filtered.survivors);
         scratch.reuse(filtered);
-        return;
+        for side in 0..2 {
+            let below = pool.of_child(candidates, cell.child_corners(side));
+            self.descend(&cell.child(side), &below, levels - 1, chains, scratch);
+        }
+        scratch.give_back(pool);
     }
-    let mut pool = scratch.pool();
-    pool.narrow(surface, cell, candidates, &filtered.survivors);
-    scratch.reuse(filtered);
-    for side in 0..2 {
-        let below = pool.of_child(candidates, cell.child_corners(side));
-        descend(surface, &cell.child(side), &below, levels - 1, needs, scratch);
-    }
-    scratch.give_back(pool);
 }

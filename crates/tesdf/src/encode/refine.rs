@@ -2,6 +2,7 @@
 
 use super::EncodeProgress;
 use super::candidates::{Candidates, Pool};
+use super::chains::Chains;
 use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
 use crate::domain::Cell;
@@ -25,6 +26,8 @@ pub enum Leaf {
         faces: Vec<u32>,
         /// Whether the surface passes through the cell.
         crossing: bool,
+        /// The heaviest chains of rule C that the list rests on.
+        chains: Chains,
     },
     /// Far from the surface with a long list: the face tree answers, the cell knows the sign.
     Far,
@@ -49,6 +52,13 @@ pub struct Weights {
     pub far_distance: f64,
     /// List length that no refinement is expected to get below.
     pub floor: f64,
+}
+
+impl Weights {
+    /// What a cell of this weight costs that the face tree answers.
+    fn by_tree(&self, weight: f64) -> f64 {
+        weight * self.far_faces + self.byte * LEAF_BYTES
+    }
 }
 
 /// Bytes of a leaf besides its entries: two words of the tree, its share of headers and palettes.
@@ -84,20 +94,36 @@ struct Pruned {
     cost: f64,
     union: Option<Vec<Requirement>>,
     crossing: bool,
+    /// The heaviest chains of rule C that `union` rests on.
+    chains: Chains,
+}
+
+/// Requirements of one cell.
+struct Own {
+    requirements: Vec<Requirement>,
+    crossing: bool,
+    chains: Chains,
 }
 
 impl Refiner<'_> {
     /// Refines a root, whose lists can only name `faces`. `None` when cancelled.
     pub fn root(&self, cell: Cell, faces: &[u32]) -> Option<Tree> {
         let pool = Pool::new(self.surface, faces, &cell);
-        self.refine(cell, &pool.candidates(), &mut Scratch::default()).map(|p| p.tree)
+        self.refine(cell, &pool.candidates(), Chains::NONE, &mut Scratch::default()).map(|p| p.tree)
     }
 
-    fn refine(&self, cell: Cell, candidates: &Candidates, scratch: &mut Scratch) -> Option<Pruned> {
+    fn refine(
+        &self,
+        cell: Cell,
+        candidates: &Candidates,
+        chains: Chains,
+        scratch: &mut Scratch,
+    ) -> Option<Pruned> {
         if self.progress.is_cancelled() {
             return None;
         }
-        let filtered = filter(self.surface, &cell, candidates, scratch);
+        let filtered = filter(self.surface, &cell, candidates, chains, scratch);
+        let chains = filtered.chains;
         let centroid = cell.centroid();
         let nearest = filtered.distance - filtered.radius;
         let n = filtered.survivors.len();
@@ -113,7 +139,13 @@ impl Refiner<'_> {
             self.finish(&cell);
             scratch.reuse(filtered);
             let union = (n <= MAX_UNION).then_some(own);
-            return Some(Pruned { tree: Tree::Leaf(Leaf::Outside), cost: 0.0, union, crossing: false });
+            return Some(Pruned {
+                tree: Tree::Leaf(Leaf::Outside),
+                cost: 0.0,
+                union,
+                crossing: false,
+                chains,
+            });
         }
         let w = &self.weights;
         let weight = cell.volume() * w.per_volume * w.near / (filtered.distance + w.near);
@@ -128,9 +160,9 @@ impl Refiner<'_> {
 
         if !split {
             self.finish(&cell);
-            let crossing = filtered.crossing;
+            let own = Own { requirements: own, crossing: filtered.crossing, chains };
             scratch.reuse(filtered);
-            return Some(self.leaf(own, crossing, weight, unlisted));
+            return Some(self.leaf(own, weight, unlisted));
         }
         let mut pool = scratch.pool();
         pool.narrow(self.surface, &cell, candidates, &filtered.survivors);
@@ -138,70 +170,92 @@ impl Refiner<'_> {
         let (first, second) = (cell.child_corners(0), cell.child_corners(1));
         let (left, right) = if cell.depth < 14 {
             rayon::join(
-                || self.refine(cell.child(0), &pool.of_child(candidates, first), &mut Scratch::default()),
-                || self.refine(cell.child(1), &pool.of_child(candidates, second), &mut Scratch::default()),
+                || {
+                    self.refine(
+                        cell.child(0),
+                        &pool.of_child(candidates, first),
+                        chains,
+                        &mut Scratch::default(),
+                    )
+                },
+                || {
+                    self.refine(
+                        cell.child(1),
+                        &pool.of_child(candidates, second),
+                        chains,
+                        &mut Scratch::default(),
+                    )
+                },
             )
         } else {
-            let left = self.refine(cell.child(0), &pool.of_child(candidates, first), scratch);
-            (left, self.refine(cell.child(1), &pool.of_child(candidates, second), scratch))
+            let left = self.refine(cell.child(0), &pool.of_child(candidates, first), chains, scratch);
+            (left, self.refine(cell.child(1), &pool.of_child(candidates, second), chains, scratch))
         };
         scratch.give_back(pool);
         let (left, right) = (left?, right?);
-        Some(self.prune(left, right, own, weight, unlisted))
+        Some(self.prune(left, right, Own { requirements: own, crossing: false, chains }, weight, unlisted))
     }
 
-    fn leaf(&self, mut own: Vec<Requirement>, crossing: bool, weight: f64, unlisted: Option<Leaf>) -> Pruned {
+    fn leaf(&self, own: Own, weight: f64, unlisted: Option<Leaf>) -> Pruned {
+        let Own { requirements: mut own, crossing, chains } = own;
         let w = &self.weights;
         let faces = self.surface.cover(&own);
         let n = faces.len() as f64;
         let listed = weight * n + w.byte * (n + LEAF_BYTES);
-        let by_tree = weight * w.far_faces + w.byte * LEAF_BYTES;
+        let by_tree = w.by_tree(weight);
         own.truncate(if own.len() > MAX_UNION { 0 } else { own.len() });
         let union = (!own.is_empty()).then_some(own);
         if let Some(leaf) = unlisted
             && by_tree < listed
         {
-            return Pruned { tree: Tree::Leaf(leaf), cost: by_tree, union, crossing };
+            return Pruned { tree: Tree::Leaf(leaf), cost: by_tree, union, crossing, chains };
         }
-        Pruned { tree: Tree::Leaf(Leaf::Listed { faces, crossing }), cost: listed, union, crossing }
+        Pruned {
+            tree: Tree::Leaf(Leaf::Listed { faces, crossing, chains }),
+            cost: listed,
+            union,
+            crossing,
+            chains,
+        }
     }
 
     /// Keeps the split, or merges it when one cell costs less.
-    fn prune(
-        &self,
-        left: Pruned,
-        right: Pruned,
-        own: Vec<Requirement>,
-        weight: f64,
-        unlisted: Option<Leaf>,
-    ) -> Pruned {
+    fn prune(&self, left: Pruned, right: Pruned, own: Own, weight: f64, unlisted: Option<Leaf>) -> Pruned {
         let split = left.cost + right.cost;
         let crossing = left.crossing || right.crossing;
+        let below = left.chains.max(right.chains);
+        let most = own.requirements.len().min(MAX_UNION);
         let union = match (left.union, right.union) {
-            (Some(a), Some(b)) => Some(merged(a, b)).filter(|u| u.len() <= own.len().min(MAX_UNION)),
+            (Some(a), Some(b)) => Some(merged(a, b)).filter(|u| u.len() <= most),
             _ => None,
         };
-        let tightest = union.or((own.len() <= MAX_UNION).then_some(own));
+        let tightest = match union {
+            Some(requirements) => Some(Own { requirements, crossing, chains: below }),
+            None => (own.requirements.len() <= MAX_UNION).then_some(Own { crossing, ..own }),
+        };
         let both_outside =
             matches!((&left.tree, &right.tree), (Tree::Leaf(Leaf::Outside), Tree::Leaf(Leaf::Outside)));
         if both_outside {
-            return Pruned { tree: left.tree, cost: split, union: tightest, crossing: false };
+            let chains = tightest.as_ref().map_or(below, |t| t.chains);
+            let union = tightest.map(|t| t.requirements);
+            return Pruned { tree: left.tree, cost: split, union, crossing: false, chains };
         }
         if let Some(all) = tightest {
-            let merged = self.leaf(all, crossing, weight, unlisted);
+            let merged = self.leaf(all, weight, unlisted);
             if merged.cost <= split {
                 return merged;
             }
             let tree = Tree::Split(Box::new([left.tree, right.tree]));
             return Pruned { tree, cost: split, ..merged };
         }
-        if let Some(leaf) = unlisted {
-            let cost = weight * self.weights.far_faces + self.weights.byte * LEAF_BYTES;
-            if cost <= split {
-                return Pruned { tree: Tree::Leaf(leaf), cost, union: None, crossing };
+        let tree = match unlisted {
+            Some(leaf) if self.weights.by_tree(weight) <= split => {
+                let cost = self.weights.by_tree(weight);
+                return Pruned { tree: Tree::Leaf(leaf), cost, union: None, crossing, chains: below };
             }
-        }
-        Pruned { tree: Tree::Split(Box::new([left.tree, right.tree])), cost: split, union: None, crossing }
+            _ => Tree::Split(Box::new([left.tree, right.tree])),
+        };
+        Pruned { tree, cost: split, union: None, crossing, chains: below }
     }
 
     fn finish(&self, cell: &Cell) {

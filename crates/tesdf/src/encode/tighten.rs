@@ -1,6 +1,7 @@
 //! Shortens the list of a finished cell to what some point of it needs.
 
 use super::candidates::Candidates;
+use super::chains::Chains;
 use super::filter::{Scratch, filter};
 use super::surface::{Part, Requirement, Surface};
 use crate::domain::Cell;
@@ -11,18 +12,27 @@ use crate::geometry::Feature;
 /// The cells of the deeper levels are not kept: they only tell the faces apart. A requirement is
 /// settled once some probed point has it closest; bisection goes on only where a survivor is not
 /// settled yet, so that nearly all of the work goes to the faces in doubt.
-pub fn tighten(surface: &Surface, cell: &Cell, list: &[u32], levels: u32, scratch: &mut Scratch) -> Vec<u32> {
+///
+/// `chains` are those of the filters that left the list; what comes back besides it are those that the new list rests on.
+pub fn tighten(
+    surface: &Surface,
+    cell: &Cell,
+    list: &[u32],
+    levels: u32,
+    chains: Chains,
+    scratch: &mut Scratch,
+) -> (Vec<u32>, Chains) {
     let mut settled = std::mem::take(&mut scratch.settled);
     settled.start(surface);
-    let mut needed = Needed { surface, settled };
+    let mut needed = Needed { surface, settled, heaviest: chains };
     let mut pool = scratch.pool();
     pool.fill(surface, list, cell);
-    needed.descend(*cell, &pool.candidates(), levels, scratch);
+    needed.descend(*cell, &pool.candidates(), levels, chains, scratch);
     scratch.give_back(pool);
     needed.settled.list.sort_unstable();
     let tight = surface.cover(&needed.settled.list);
     scratch.settled = needed.settled;
-    tight
+    (tight, needed.heaviest)
 }
 
 /// A set of requirements, with what its faces imply.
@@ -36,10 +46,15 @@ pub struct Settled {
 
 impl Settled {
     /// Empties the set.
-    fn start(&mut self, surface: &Surface) {
+    pub(super) fn start(&mut self, surface: &Surface) {
         self.list.clear();
         self.mark.resize(surface.parts(), 0);
         self.round += 2;
+    }
+
+    /// Adds a whole face.
+    pub(super) fn settle_face(&mut self, surface: &Surface, face: u32) {
+        self.settle(surface, surface.requirement(face, Feature::Face));
     }
 
     fn settle(&mut self, surface: &Surface, requirement: Requirement) {
@@ -57,7 +72,7 @@ impl Settled {
     }
 
     /// Whether it, or a face that has it, is in the set.
-    fn holds(&self, requirement: Requirement) -> bool {
+    pub(super) fn holds(&self, requirement: Requirement) -> bool {
         self.mark[requirement.index()] >= self.round
     }
 }
@@ -65,16 +80,27 @@ impl Settled {
 struct Needed<'a> {
     surface: &'a Surface,
     settled: Settled,
+    /// The heaviest chains of rule C on a way down so far.
+    heaviest: Chains,
 }
 
 impl Needed<'_> {
-    fn descend(&mut self, cell: Cell, candidates: &Candidates, levels: u32, scratch: &mut Scratch) {
+    fn descend(
+        &mut self,
+        cell: Cell,
+        candidates: &Candidates,
+        levels: u32,
+        chains: Chains,
+        scratch: &mut Scratch,
+    ) {
         // Nothing below can add what these faces do not imply.
         if candidates.faces.iter().all(|&face| self.holds_whole(face)) {
             return;
         }
         let surface = self.surface;
-        let filtered = filter(surface, &cell, candidates, scratch);
+        let filtered = filter(surface, &cell, candidates, chains, scratch);
+        let chains = filtered.chains;
+        self.heaviest = self.heaviest.max(chains);
         for &(index, feature) in &filtered.closest {
             self.settled.settle(surface, surface.requirement(candidates.faces[index as usize], feature));
         }
@@ -91,7 +117,7 @@ impl Needed<'_> {
             scratch.reuse(filtered);
             for side in 0..2 {
                 let below = pool.of_child(candidates, cell.child_corners(side));
-                self.descend(cell.child(side), &below, levels - 1, scratch);
+                self.descend(cell.child(side), &below, levels - 1, chains, scratch);
             }
             scratch.give_back(pool);
         } else {

@@ -1,5 +1,7 @@
 use glam::DVec3;
 
+use super::is_flat;
+
 /// A part of a triangle: its interior, an edge or a corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feature {
@@ -111,8 +113,9 @@ impl Triangle {
         let longest_squared = longest.length_squared();
         // What is left of rounding along the longest edge would count with that edge's length in heights over the plane.
         normal -= longest * (normal.dot(longest) / longest_squared.max(f64::MIN_POSITIVE));
-        let flat = normal.length() <= FLAT * longest_squared;
-        let is_needle = normal.length() <= TIP * longest_squared;
+        let (twice_area, longest) = (normal.length(), longest_squared.sqrt());
+        let flat = is_flat(twice_area, longest, FLAT * longest);
+        let is_needle = is_flat(twice_area, longest, TIP * longest);
         let normal = if flat { DVec3::ZERO } else { normal.try_normalize().unwrap_or(DVec3::ZERO) };
         Self { corners, normal, is_needle }
     }
@@ -252,11 +255,40 @@ fn seen_from_nearer_ends(from: &[DVec3; 3], along: &[DVec3; 3], normal: DVec3) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::testing::{degenerate, exact};
     use proptest::prelude::*;
+
+    /// What a distance may lose, for coordinates up to 2: a face that is taken for its edges 1.8e-15 (half of 16 ε) times its length of up to 3.5.
+    const ROUNDING: f64 = 8e-15;
 
     fn point() -> impl Strategy<Value = DVec3> {
         // A coarse lattice, so that ties and degenerate triangles are common.
         (-3i32..4, -3i32..4, -3i32..4).prop_map(|(x, y, z)| DVec3::new(x as f64, y as f64, z as f64))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #[test]
+        fn degenerate_faces_are_exact((corners, p) in degenerate::face_and_point()) {
+            let triangle = Triangle::new(corners);
+            let found = triangle.closest(p);
+            let squared = exact::squared_distance(p, corners);
+            prop_assert!(exact::is_root(found.distance, &squared, ROUNDING), "{found:?} {triangle:?}");
+            prop_assert!((p.distance(found.point) - found.distance).abs() <= ROUNDING, "{found:?}");
+            let to_face = exact::squared_distance(found.point, corners);
+            prop_assert!(exact::is_root(0.0, &to_face, ROUNDING), "{found:?} is off the face");
+            prop_assert!(triangle.normal == DVec3::ZERO || (triangle.normal.length() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #[test]
+        fn tips_are_exact((corners, p) in degenerate::beyond_a_tip()) {
+            let found = Triangle::new(corners).closest(p);
+            let squared = exact::squared_distance(p, corners);
+            prop_assert!(exact::is_root(found.distance, &squared, 2e-15), "{found:?} {:?}", corners);
+        }
     }
 
     proptest! {

@@ -20,7 +20,7 @@ mod sniff;
 mod stl;
 pub(crate) mod text;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -141,6 +141,21 @@ pub fn read(path: &Path) -> Result<LoadedMesh, ReadError> {
     let bytes = std::fs::read(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(&bytes, format, Some(folder))
+}
+
+/// The files that [`read`] opens for `path`: the file itself, and the external buffers of a glTF file. Of a file that cannot
+/// be read, the path alone: [`read`] says why.
+pub fn files(path: &Path) -> Vec<PathBuf> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let buffers = match MeshFormat::of_path(path) {
+        // A pipe is left to `read`: its bytes come once.
+        Ok(format @ (MeshFormat::Gltf | MeshFormat::Glb)) if path.is_file() => {
+            let bytes = std::fs::read(path).unwrap_or_default();
+            gltf::external_files(&bytes, format, folder)
+        }
+        _ => Vec::new(),
+    };
+    std::iter::once(path.to_path_buf()).chain(buffers).collect()
 }
 
 /// Reads a mesh from bytes that are in memory. glTF buffers must be in the bytes too.

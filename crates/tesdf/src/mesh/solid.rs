@@ -7,11 +7,10 @@ use super::{CheckReport, Defect, DefectKind, Severity, TriangleMesh, check};
 ///
 /// - Every coordinate and the diagonal are in the accepted range.
 /// - Every directed edge is used as often as its reverse, so the winding number is an integer everywhere.
-/// - The winding number is somewhere 1 or more, and not negative but for thin folds, as far as
-///   [`check`](super::check) tests it.
+/// - The winding number is somewhere 1 or more.
 ///
-/// Inside is where the winding number is 1 or more. The surface may intersect itself, touch itself and have faces
-/// without area; [`warnings`](Self::warnings) then says so.
+/// Inside is where the winding number is 1 or more. The surface may intersect itself, touch itself, be inside out in
+/// places and have faces without area; [`warnings`](Self::warnings) then says so.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidMesh {
     mesh: TriangleMesh,

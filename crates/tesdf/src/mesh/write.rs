@@ -1,9 +1,9 @@
 //! [`TriangleMesh`] to a file: PLY and OBJ keep every bit, STL rounds to f32.
 use std::fmt::Write as _;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::TriangleMesh;
+use crate::save::{SaveError, save_atomic};
 
 /// A mesh file format that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,49 +57,31 @@ pub enum WriteError {
         /// The coordinate.
         value: f64,
     },
-    /// The disk does not take the file.
-    #[error("cannot write {}: {source}", path.display())]
-    Io {
-        /// The path asked for.
-        path: PathBuf,
-        /// What the operating system says.
-        source: io::Error,
-    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    Save(#[from] SaveError),
 }
 
 /// Writes `mesh` to `path`; the extension names the format (`.ply`, `.obj`, `.stl`).
 ///
-/// The bytes go to a temporary file in the same folder, which then replaces `path`: a reader
-/// never sees half a file.
-///
 /// # Errors
-/// [`WriteError`]; the file at `path` is then as it was.
+/// [`WriteError`]; a regular file at `path` is then as it was.
 pub fn write(path: &Path, mesh: &TriangleMesh) -> Result<WriteFormat, WriteError> {
     let format = WriteFormat::of_path(path)?;
-    let bytes = match format {
-        WriteFormat::Ply => ply(mesh),
-        WriteFormat::Obj => obj(mesh),
-        WriteFormat::Stl => stl(mesh)?,
-    };
-    replace(path, &bytes).map_err(|source| WriteError::Io { path: path.to_owned(), source })?;
+    save_atomic(path, &write_bytes(mesh, format)?)?;
     Ok(format)
 }
 
-fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    // A temporary file is private by default; this one becomes an ordinary file.
-    #[cfg(unix)]
-    let builder = {
-        use std::os::unix::fs::PermissionsExt;
-        let mode = std::fs::metadata(path).map_or(0o666, |m| m.permissions().mode() & 0o777);
-        builder.permissions(std::fs::Permissions::from_mode(mode))
-    };
-    let mut file = builder.prefix(".tesdf-").tempfile_in(folder)?;
-    file.write_all(bytes)?;
-    file.as_file().sync_all()?;
-    file.persist(path)?;
-    Ok(())
+/// The bytes of a file of `mesh`.
+///
+/// # Errors
+/// [`WriteError::BeyondF32`].
+pub fn write_bytes(mesh: &TriangleMesh, format: WriteFormat) -> Result<Vec<u8>, WriteError> {
+    match format {
+        WriteFormat::Ply => Ok(ply(mesh)),
+        WriteFormat::Obj => Ok(obj(mesh)),
+        WriteFormat::Stl => stl(mesh),
+    }
 }
 
 fn ply(mesh: &TriangleMesh) -> Vec<u8> {

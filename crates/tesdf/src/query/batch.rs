@@ -30,6 +30,24 @@ pub struct AnswerColumns<'a> {
     pub face: &'a mut [u32],
 }
 
+/// Why a batch is not answered.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{column} has {found} rows for {expected} points; expected one for each point")]
+pub struct BatchError {
+    /// The array.
+    pub column: &'static str,
+    /// Its rows.
+    pub found: usize,
+    /// Number of points.
+    pub expected: usize,
+}
+
+impl BatchError {
+    fn unless_equal(column: &'static str, found: usize, expected: usize) -> Result<(), Self> {
+        if found == expected { Ok(()) } else { Err(Self { column, found, expected }) }
+    }
+}
+
 impl TeSdf {
     /// Answers for many points, in order, on all threads of the current rayon pool.
     ///
@@ -49,24 +67,32 @@ impl TeSdf {
         answers
     }
 
-    /// As [`query_batch`](Self::query_batch), into arrays that are there. Answers as many points as the shortest of
-    /// `points` and the columns has rows; what is beyond stays as it is.
+    /// As [`query_batch`](Self::query_batch), into arrays that are there.
+    ///
+    /// # Errors
+    /// [`BatchError`]: a column has not as many rows as there are points. No row was changed then.
     pub fn query_batch_into(
         &self,
         points: &[DVec3],
         precision: Precision,
         extent: Extent,
         columns: AnswerColumns<'_>,
-    ) {
+    ) -> Result<(), BatchError> {
         let AnswerColumns { signed_distance, gradient, closest_point, face } = columns;
-        let rows = points.len().min(signed_distance.len()).min(gradient.len());
-        let rows = rows.min(closest_point.len()).min(face.len());
-        let tasks = signed_distance[..rows]
+        for (column, rows) in [
+            ("signed_distance", signed_distance.len()),
+            ("gradient", gradient.len()),
+            ("closest_point", closest_point.len()),
+            ("face", face.len()),
+        ] {
+            BatchError::unless_equal(column, rows, points.len())?;
+        }
+        let tasks = signed_distance
             .par_chunks_mut(TASK)
-            .zip(gradient[..rows].par_chunks_mut(TASK))
-            .zip(closest_point[..rows].par_chunks_mut(TASK))
-            .zip(face[..rows].par_chunks_mut(TASK));
-        self.each_flight(&points[..rows], precision, extent, tasks, |(((d, g), c), f), at, flight| {
+            .zip(gradient.par_chunks_mut(TASK))
+            .zip(closest_point.par_chunks_mut(TASK))
+            .zip(face.par_chunks_mut(TASK));
+        self.each_flight(points, precision, extent, tasks, |(((d, g), c), f), at, flight| {
             for (i, answer) in flight.iter().enumerate() {
                 d[at + i] = answer.signed_distance;
                 g[at + i] = answer.gradient.to_array();
@@ -74,16 +100,26 @@ impl TeSdf {
                 f[at + i] = answer.face;
             }
         });
+        Ok(())
     }
 
     /// As [`query_batch_into`](Self::query_batch_into), signed distances alone.
-    pub fn signed_distances_into(&self, points: &[DVec3], precision: Precision, distances: &mut [f64]) {
-        let rows = points.len().min(distances.len());
-        let tasks = distances[..rows].par_chunks_mut(TASK);
-        self.each_flight(&points[..rows], precision, Extent::Everywhere, tasks, |distances, at, flight| {
+    ///
+    /// # Errors
+    /// As [`query_batch_into`](Self::query_batch_into).
+    pub fn signed_distances_into(
+        &self,
+        points: &[DVec3],
+        precision: Precision,
+        distances: &mut [f64],
+    ) -> Result<(), BatchError> {
+        BatchError::unless_equal("distances", distances.len(), points.len())?;
+        let tasks = distances.par_chunks_mut(TASK);
+        self.each_flight(points, precision, Extent::Everywhere, tasks, |distances, at, flight| {
             let distances = distances[at..].iter_mut();
             distances.zip(flight).for_each(|(distance, answer)| *distance = answer.signed_distance);
         });
+        Ok(())
     }
 
     /// Answers flight by flight; `tasks` are the places of [`TASK`] answers each, and `put` has the place, the number of
@@ -133,7 +169,7 @@ impl TeSdf {
         for (i, answer) in answers.iter_mut().enumerate() {
             *answer = match (extent, places[i]) {
                 (Extent::Domain, Place::NotOfDomain) => Answer::NONE,
-                (_, place) => self.answer(locals[i], place, &faces[i], precision),
+                (_, place) => self.answer(points[i], locals[i], place, &faces[i], precision),
             };
         }
     }

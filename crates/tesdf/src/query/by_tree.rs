@@ -1,5 +1,6 @@
 use glam::DVec3;
 
+use super::far::is_near;
 use super::sign::hinted_side;
 use super::{Answer, ON_SURFACE_F32, ON_SURFACE_F64, Precision, Reads};
 use crate::TeSdf;
@@ -15,7 +16,7 @@ impl TeSdf {
     pub fn query_by_tree(&self, point: DVec3, precision: Precision) -> Answer {
         let local = self.frame.to_local(point);
         match precision {
-            _ if !local.is_finite() => Answer::NONE,
+            _ if !is_near(local) => self.answer_far(point),
             Precision::F32 => self.by_tree_f32(point, local),
             Precision::F64 => self.by_tree_f64(point, local),
         }
@@ -40,6 +41,9 @@ impl TeSdf {
             return self.by_tree_f64(point, local);
         };
         let triangle = record.triangle();
+        if triangle.normal == glam::DVec3::ZERO {
+            return self.by_tree_f64(point, local);
+        }
         let closest = match found.part() {
             0 => triangle.closest_in_plane(relative),
             edge => triangle.closest_on_edge(edge as usize - 1, relative),

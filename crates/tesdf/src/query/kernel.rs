@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3};
 use super::lanes::Lanes;
 
 use crate::asset::layout::SignHints;
-use crate::geometry::Triangle;
+use crate::geometry::{Triangle, is_flat};
 
 /// A face in `f32`, relative to the middle of the cube, in one cache line: corner a, b − a, c − a, unit normal,
 /// inverse squared lengths of b − a, c − a, c − b, and the bits of the sign hints.
@@ -32,7 +32,7 @@ impl FaceRecord {
         let [a, b, c] = triangle.corners.map(|p| (p - middle).as_vec3());
         let (u, v) = ((b - a).as_dvec3(), (c - a).as_dvec3());
         let longest = u.length().max(v.length()).max((u - v).length());
-        let flat = u.cross(v).dot(triangle.normal) < FLAT * longest;
+        let flat = is_flat(u.cross(v).dot(triangle.normal), longest, FLAT);
         let n = if flat { Vec3::NAN } else { triangle.normal.as_vec3() };
         let inverse = |v: Vec3| {
             let inverse = 1.0 / v.as_dvec3().length_squared();
@@ -252,17 +252,22 @@ fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
     let inside = ab.dot(turned).at_least(zero).and(zero.at_least(ac.dot(turned)));
     let inside = inside.and(bc.dot(bp.cross(n)).at_least(zero));
     let height = n.dot(ap);
+    let (at_ab, at_bc, at_ca) = (ab.dot(ap).mul(v[12]), bc.dot(bp).mul(v[14]), ac.dot(ap).mul(v[13]));
+    // Beyond the tip of a narrow face both of its long sides are within rounding. What is over the face is beside its longest edge.
+    let at_longest = v[14].less(v[12]).select(at_bc, at_ab);
+    let at_longest = v[13].less(v[12].min(v[14])).select(at_ca, at_longest);
+    let inside = inside.and(at_longest.at_least(zero)).and(L::splat(1.0).at_least(at_longest));
     let keep = L::from_bits([!PART; N]);
-    let to_ab = to_edge(ap, ab, v[12]).and(keep).or(L::from_bits([1; N]));
-    let to_bc = to_edge(bp, bc, v[14]).and(keep).or(L::from_bits([2; N]));
-    let to_ca = to_edge(ap, ac, v[13]).and(keep).or(L::from_bits([3; N]));
+    let to_ab = to_edge(ap, ab, at_ab).and(keep).or(L::from_bits([1; N]));
+    let to_bc = to_edge(bp, bc, at_bc).and(keep).or(L::from_bits([2; N]));
+    let to_ca = to_edge(ap, ac, at_ca).and(keep).or(L::from_bits([3; N]));
     inside.select(height.mul(height).and(keep), to_ab.min(to_bc).min(to_ca))
 }
 
-/// Squared distance to the segment from the origin of `from` to `along`.
+/// Squared distance to the segment from the origin of `from` to `along`, whose line is nearest `at` this multiple of `along`.
 #[inline(always)]
-fn to_edge<L: Lanes<N>, const N: usize>(from: V<L>, along: V<L>, inverse: L) -> L {
-    let t = along.dot(from).mul(inverse).max(L::splat(0.0)).min(L::splat(1.0));
+fn to_edge<L: Lanes<N>, const N: usize>(from: V<L>, along: V<L>, at: L) -> L {
+    let t = at.max(L::splat(0.0)).min(L::splat(1.0));
     let ([x, y, z], [u, v, w]) = (along.0, from.0);
     let to = V([x.neg_mul_add(t, u), y.neg_mul_add(t, v), z.neg_mul_add(t, w)]);
     to.dot(to)
@@ -295,5 +300,63 @@ impl<L> V<L> {
     {
         let ([a, b, c], [x, y, z]) = (self.0, o.0);
         Self([c.neg_mul_add(y, b.mul(z)), a.neg_mul_add(z, c.mul(x)), b.neg_mul_add(x, a.mul(y))])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{degenerate, exact};
+
+    /// What `f32` promises of a body with a diagonal of 0.5, the least that there is: 1e-6 of it.
+    const PROMISE: f64 = 5e-7;
+
+    fn isas() -> Vec<Isa> {
+        let mut isas = vec![Isa::Baseline];
+        #[cfg(target_arch = "x86_64")]
+        if Isa::detect() != Isa::Baseline {
+            isas.extend([Isa::Avx2, Isa::detect()]);
+        }
+        isas
+    }
+
+    /// Every kernel finds the distance to a face.
+    fn assert_exact(corners: [DVec3; 3], p: DVec3) -> Result<(), TestCaseError> {
+        let record = FaceRecord::new(&Triangle::new(corners), DVec3::ZERO, SignHints::default());
+        let squared = exact::squared_distance(p, corners);
+        for isa in isas() {
+            let found = nearest(isa, &[record], &[[0; LANES]], p.as_vec3(), Nearest::NONE);
+            let distance = f64::from(found.distance_squared).sqrt();
+            prop_assert!(exact::is_root(distance, &squared, PROMISE), "{isa:?}: {found:?} {record:?}");
+            let triangle = record.triangle();
+            let closest = match found.part() {
+                0 => triangle.closest_in_plane(p),
+                edge => triangle.closest_on_edge(edge as usize - 1, p),
+            };
+            prop_assert!(exact::is_root(closest.distance, &squared, PROMISE), "{isa:?}: {closest:?}");
+            let mut near = Vec::new();
+            within(isa, &[record], &[[0; LANES]], p.as_vec3(), found.distance_squared, &mut near);
+            prop_assert_eq!(near, [0]);
+        }
+        Ok(())
+    }
+
+    // Within a ball of a diameter of about 1, as bodies are.
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #[test]
+        fn degenerate_faces_are_edges((corners, p) in degenerate::face_and_point()) {
+            assert_exact(corners.map(|c| 0.25 * c), 0.25 * p)?;
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #[test]
+        fn tips_are_no_planes((corners, p) in degenerate::beyond_a_tip()) {
+            assert_exact(corners.map(|c| 0.5 * c), 0.5 * p)?;
+        }
     }
 }

@@ -5,6 +5,7 @@
 //! domain, or in a far cell) are answered from the tree over all faces, exactly too.
 mod batch;
 mod by_tree;
+mod far;
 mod kernel;
 mod lanes;
 mod locate;
@@ -16,7 +17,7 @@ use std::cell::RefCell;
 
 use glam::DVec3;
 
-pub use batch::{AnswerColumns, Extent};
+pub use batch::{AnswerColumns, BatchError, Extent};
 pub use kernel::{FaceRecord, Isa};
 pub use locate::Entries;
 pub(crate) use locate::{Faces, Place};
@@ -26,13 +27,15 @@ pub use ray::RayHit;
 use crate::TeSdf;
 use crate::asset::layout::{Label, Side};
 use crate::geometry::{Closest, Feature};
+use far::is_near;
 use sign::hinted_side;
 
 /// What a query computes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
     /// Faces rounded to `f32` in a local frame, several at a time: within 1e-6 × diagonal, the right sign
-    /// beyond that, gradients within 1e-3 rad from 1e-4 × diagonal on.
+    /// beyond that, gradients within 1e-3 rad from 1e-4 × diagonal on. Where faces are lower than 1e-6 × diagonal, gradients are off by
+    /// that length over the distance as well.
     F32,
     /// Faces as they are in the mesh: within 1e-12 × diagonal plus 4 ulp of the largest coordinate, signs by
     /// exact predicates, gradients within 1e-3 rad from 1e-9 × diagonal on.
@@ -42,7 +45,8 @@ pub enum Precision {
 /// The answer to a query, in the mesh's unit and frame.
 ///
 /// A point with a NaN or infinite coordinate has no answer: the numbers are NaN and the face is
-/// [`NO_FACE`](Self::NO_FACE).
+/// [`NO_FACE`](Self::NO_FACE). Every other point has one, however far out it is; a distance above [`f64::MAX`] is given
+/// as [`f64::MAX`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Distance to the nearest face, negative inside.
@@ -96,7 +100,7 @@ impl TeSdf {
     /// Answers for any point; `point` is in the mesh's unit.
     pub fn query(&self, point: DVec3, precision: Precision) -> Answer {
         let local = self.frame.to_local(point);
-        self.answer_alone(local, self.place(local), precision)
+        self.answer_alone(point, local, self.place(local), precision)
     }
 
     /// As [`query`](Self::query), but `None` outside of the domain: more than the band from the solid, give or
@@ -105,7 +109,7 @@ impl TeSdf {
         let local = self.frame.to_local(point);
         match self.place(local) {
             Place::NotOfDomain => None,
-            place => Some(self.answer_alone(local, place, precision)),
+            place => Some(self.answer_alone(point, local, place, precision)),
         }
     }
 
@@ -140,7 +144,7 @@ impl TeSdf {
     }
 
     #[inline]
-    fn answer_alone(&self, local: DVec3, place: Place, precision: Precision) -> Answer {
+    fn answer_alone(&self, point: DVec3, local: DVec3, place: Place, precision: Precision) -> Answer {
         thread_local! {
             static FACES: RefCell<Faces> = RefCell::default();
         }
@@ -148,7 +152,7 @@ impl TeSdf {
             if let Place::Listed { offset, .. } = place {
                 self.read_list(offset, faces);
             }
-            self.answer(local, place, faces, precision)
+            self.answer(point, local, place, faces, precision)
         })
     }
 
@@ -192,17 +196,24 @@ impl TeSdf {
         }
     }
 
-    /// `faces` are those of the place's list, if it has one.
+    /// `faces` are those of the place's list, if it has one. `local` is `point` in the local frame.
     #[inline]
-    fn answer(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Answer {
-        if local.is_finite() {
+    fn answer(
+        &self,
+        point: DVec3,
+        local: DVec3,
+        place: Place,
+        faces: &Faces,
+        precision: Precision,
+    ) -> Answer {
+        if is_near(local) {
             self.to_answer(self.find(local, place, faces, precision))
         } else {
-            Answer::NONE
+            self.answer_far(point)
         }
     }
 
-    /// As [`answer`](Self::answer), in the local frame; `local` is finite.
+    /// As [`answer`](Self::answer), in the local frame; `local` is finite and not far.
     #[inline]
     pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
         match precision {
@@ -238,6 +249,10 @@ impl TeSdf {
             return self.answer_f64(local, place, faces);
         };
         let triangle = record.triangle();
+        if triangle.normal == DVec3::ZERO {
+            // A segment in `f32` may be a narrow face in `f64`: the gradient would be off by its width over the distance.
+            return self.answer_f64(local, place, faces);
+        }
         // The kernel has found the part; in f64 the point on it is as good as the f32 corners allow.
         let closest = match found.part() {
             0 => triangle.closest_in_plane(relative),
@@ -253,10 +268,6 @@ impl TeSdf {
         };
         let on_surface = |d: f64| match place {
             _ if d >= ON_SURFACE_F32 => None,
-            Place::Listed { .. } if triangle.normal == DVec3::ZERO => {
-                let closest = Closest { point: closest.point + self.cube.middle(), ..closest };
-                Some(self.pseudonormal(faces, found.face, &closest))
-            }
             _ => Some(triangle.normal),
         };
         self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
@@ -278,7 +289,7 @@ impl TeSdf {
             _ if d >= ON_SURFACE_F64 => None,
             Place::Listed { .. } => Some(self.pseudonormal(faces, position, &closest)),
             // A cell that no list was worth its bytes for may touch the surface.
-            _ => Some(self.local_triangle(position as usize).normal),
+            _ => Some(self.face_normal(position)),
         };
         self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
     }
@@ -306,12 +317,25 @@ impl TeSdf {
         }
     }
 
+    /// The unit normal of a face; of a face that is a segment or a point some direction at right angles to it.
+    fn face_normal(&self, position: u32) -> DVec3 {
+        let triangle = self.local_triangle(position as usize);
+        if triangle.normal != DVec3::ZERO {
+            return triangle.normal;
+        }
+        let [a, b, c] = triangle.corners;
+        let longest = [c - b, a - c]
+            .into_iter()
+            .fold(b - a, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
+        longest.try_normalize().map_or(DVec3::Z, DVec3::any_orthonormal_vector)
+    }
+
     /// The normal of a feature: of the face, the sum over an edge's faces, or the angle-weighted sum around a
     /// vertex (Bærentzen and Aanæs 2005). The list names all of them when the feature is within the padding of the cell; the lists of
     /// a conforming domain need not, and there the face tree is asked.
     fn pseudonormal(&self, faces: &Faces, position: u32, closest: &Closest) -> DVec3 {
         let corners = self.faces[position as usize];
-        let own = self.local_triangle(position as usize).normal;
+        let own = self.face_normal(position);
         let held: &[u32] = match closest.feature {
             Feature::Face => return own,
             Feature::Edge(k) => &[corners[k as usize], corners[(k as usize + 1) % 3]],

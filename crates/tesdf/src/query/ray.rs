@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
-use crate::geometry::orientation;
+use crate::geometry::{NearRay, orientation};
 
 /// Where a ray meets the surface first.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,14 +21,26 @@ impl TeSdf {
     /// The first face that `origin + t · direction` meets for `t` in `[0, limit]`, from either side; in the mesh's
     /// unit. Rays through edges and corners hit: which side of an edge a ray passes is decided exactly.
     ///
-    /// `None` when nothing is met, or when the ray is not finite or has no direction.
+    /// `None` when nothing is met, or when the ray is not finite or has no direction, or `t` would be above [`f64::MAX`].
+    ///
+    /// A ray that begins far out is taken from where it comes near the body. The place is rounded to 1e-16 of the
+    /// distance, so from 1e16 diagonals on only rays along an axis are sure to hit their aim.
     pub fn ray_cast(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
         let valid = origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO && limit >= 0.0;
         if !valid {
             return None;
         }
+        // Half of the body's diagonal is at most half a unit of the local frame.
+        let ray = NearRay::new(origin, direction, self.bounds().center(), self.frame.inverse_scale())?;
+        let hit = self.near_ray_cast(ray.origin, ray.direction, ray.rest_of(limit))?;
+        Some(RayHit { t: ray.total(hit.t)?, ..hit })
+    }
+
+    /// As [`ray_cast`](Self::ray_cast), for an origin near the body and a direction of length 1 to 4.
+    fn near_ray_cast(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
         let from = self.frame.to_local(origin);
-        let along = direction * self.frame.scale;
+        // In the local frame distances are those of the mesh's unit times the scale, and the direction stays.
+        let (along, limit) = (direction, limit * self.frame.scale);
         let relative = from - self.cube.middle();
         let mut best: Option<(f64, u32, u32)> = None;
         let mut stack = vec![(0.0, TreeChild::Node(0))];
@@ -64,11 +76,10 @@ impl TeSdf {
                 }
             }
         }
-        best.map(|(t, face, position)| RayHit {
-            t,
-            point: origin + t * direction,
-            face,
-            normal: self.local_triangle(position as usize).normal,
+        best.map(|(t, face, position)| {
+            let t = t * self.frame.inverse_scale();
+            let normal = self.local_triangle(position as usize).normal;
+            RayHit { t, point: origin + t * direction, face, normal }
         })
     }
 }

@@ -11,6 +11,11 @@ pub(crate) struct BruteForce {
     scale: f64,
 }
 
+/// Faces whose height is a smaller share of their length are their edges.
+const FLAT: f64 = 4e-15;
+/// Faces smaller than this (scaled) are their edges.
+const SMALLEST: f64 = 1e-70;
+
 /// A face in scaled lengths.
 struct Facet {
     corners: [DVec3; 3],
@@ -18,6 +23,8 @@ struct Facet {
     along: [DVec3; 3],
     /// Inverse squared lengths of those; 0 for a length of 0.
     inverse: [f64; 3],
+    /// The longest edge: over the face is beside it.
+    longest: usize,
     /// Unit normal; `None` without area.
     normal: Option<DVec3>,
 }
@@ -48,7 +55,14 @@ impl Facet {
         let [a, b, c] = corners;
         let along = [b - a, c - b, a - c];
         let inverse = along.map(|e| if e == DVec3::ZERO { 0.0 } else { 1.0 / e.length_squared() });
-        Self { corners, along, inverse, normal: accurate_cross(along[0], along[1]).try_normalize() }
+        let longer = |i: usize, k: usize| if along[k].length() > along[i].length() { k } else { i };
+        let longest = longer(longer(0, 1), 2);
+        let length = along[longest].length();
+        let cross = accurate_cross(along[0], along[1]);
+        // Lower faces are rounding, and the squared area of smaller ones is not a number of full precision.
+        let has_plane = cross.length() > FLAT * length * length && length > SMALLEST;
+        let normal = has_plane.then_some(cross).and_then(DVec3::try_normalize);
+        Self { corners, along, inverse, longest, normal }
     }
 
     fn offset(&self, p: DVec3) -> DVec3 {
@@ -56,7 +70,8 @@ impl Facet {
             let from = self.corners.map(|c| p - c);
             // Beside a wrong "over the face" the foot is a rounding error away from the edge.
             let over = (0..3).all(|k| n.cross(self.along[k]).dot(from[k]) >= 0.0);
-            if over {
+            let at = from[self.longest].dot(self.along[self.longest]) * self.inverse[self.longest];
+            if over && (0.0..=1.0).contains(&at) {
                 return n.dot(from[0]) * n;
             }
         }
@@ -100,6 +115,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::testing::{degenerate, exact};
 
     fn point() -> impl Strategy<Value = DVec3> {
         prop::array::uniform3(-3i32..4).prop_map(|[x, y, z]| DVec3::new(x.into(), y.into(), z.into()))
@@ -120,6 +136,16 @@ mod tests {
             }
             prop_assert!(offset.length() <= least + 1e-12, "{} {}", offset, least);
             prop_assert!(near <= 0.2, "the closest point is {} off the triangle", near);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        #[test]
+        fn degenerate_faces_are_exact((corners, p) in degenerate::face_and_point()) {
+            let distance = Facet::new(corners).offset(p).length();
+            let squared = exact::squared_distance(p, corners);
+            prop_assert!(exact::is_root(distance, &squared, 2e-14), "{distance} at {p} from {corners:?}");
         }
     }
 

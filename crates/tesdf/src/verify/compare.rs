@@ -3,6 +3,7 @@ use serde::Serialize;
 
 use super::PointClass;
 use crate::asset::about::Certificate;
+use crate::geometry::is_flat;
 use crate::mesh::TriangleMesh;
 use crate::query::{Answer, Precision};
 
@@ -15,6 +16,8 @@ pub struct Promise {
     pub ulps: f64,
     /// Largest error of a gradient, radians.
     pub gradient: f64,
+    /// Added to it: this length over the distance, in the mesh's unit; 0 unless the precision takes narrow faces of the mesh for segments.
+    pub gradient_width: f64,
     /// Gradients closer to the surface than this share of the diagonal are only promised to be unit vectors.
     pub gradient_from: f64,
     /// Distances and gradients are promised nearer to the surface than this, in the mesh's unit; `None`: everywhere. Signs always are.
@@ -32,8 +35,26 @@ impl Promise {
             Precision::F64 => (1e-12, 4.0, 1e-9),
         };
         let diagonal = mesh.diagonal();
-        let within = certificate.delta.map_or(Some(0.0), |_| certificate.exactness_distance);
-        Self { of_diagonal, ulps, gradient: 1e-3, gradient_from, within, diagonal, largest_coordinate }
+        let within = certificate.delta().map_or(Some(0.0), |_| certificate.exactness_distance());
+        let gradient_width = match precision {
+            Precision::F32 if has_narrow_faces(mesh, of_diagonal * diagonal) => of_diagonal * diagonal,
+            _ => 0.0,
+        };
+        Self {
+            of_diagonal,
+            ulps,
+            gradient: 1e-3,
+            gradient_width,
+            gradient_from,
+            within,
+            diagonal,
+            largest_coordinate,
+        }
+    }
+
+    /// Largest error of a gradient at this distance, radians.
+    fn gradient_at(&self, distance: f64) -> f64 {
+        self.gradient + self.gradient_width / distance.abs()
     }
 
     /// Largest error of the distance at `p`, in the mesh's unit; also the distance up to which the sign is free.
@@ -41,6 +62,15 @@ impl Promise {
         let largest = self.largest_coordinate.max(p.abs().max_element());
         self.of_diagonal * self.diagonal + self.ulps * (largest.next_up() - largest)
     }
+}
+
+/// Whether a face is lower than this over its longest edge.
+fn has_narrow_faces(mesh: &TriangleMesh, height: f64) -> bool {
+    (0..mesh.faces().len()).any(|face| {
+        let [a, b, c] = mesh.triangle(face).map(|p| p / height);
+        let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+        is_flat((b - a).cross(c - a).length(), longest, 1.0)
+    })
 }
 
 /// A point where an answer was off, in the mesh's unit.
@@ -190,7 +220,7 @@ impl Comparison {
         self.error.add(error / bound, at);
         match gradient_error(p, expected, answer, offset, &self.promise) {
             Some(angle) => {
-                let right = angle <= self.promise.gradient;
+                let right = angle <= self.promise.gradient_at(expected);
                 self.gradient_mistakes += usize::from(!right);
                 self.gradient.add(angle, at);
             }
@@ -202,6 +232,11 @@ impl Comparison {
                 }
             }
         }
+    }
+
+    /// The point where the distance or else the sign is not as promised, if there is one.
+    pub(super) fn worst_mistake(self) -> Option<Worst> {
+        if self.error.value > 1.0 { self.error.at } else { self.sign.at }
     }
 
     pub(super) fn join(mut self, other: Self) -> Self {

@@ -6,6 +6,7 @@
 pub(crate) mod brute_force;
 mod compare;
 mod samples;
+mod self_check;
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -24,6 +25,7 @@ use compare::Comparison;
 pub use compare::{ClassErrors, PrecisionReport, Promise, Worst};
 pub use samples::PointClass;
 use samples::Sampler;
+pub(crate) use self_check::self_check;
 
 /// How much [`verify`] does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,7 +105,7 @@ pub fn verify(
     if !Topology::new(mesh.faces()).is_closed() {
         return Err(VerifyError::NotClosed);
     }
-    let certificate = &asset.about().certificate;
+    let certificate = asset.about().certificate();
     let winding = WindingNumber::new(&mesh);
     let sampler = Sampler::new(asset, &mesh, &winding, options.seed);
     let mut place = vec![None; ids.len()];

@@ -1,91 +1,92 @@
-use glam::DVec3;
+use std::collections::HashSet;
 
-use super::{edges::centroid, faces::FaceFlaws};
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{
+    edges::centroid,
+    faces::FaceFlaws,
+    regions::{self, Sample},
+};
 use crate::{
     geometry::{WindingNumber, perturbed_orientation},
     mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, topology::Edge},
 };
 
-/// How far from a face that meets others its sides are sampled, relative to the diagonal.
-const SAMPLE_DISTANCE: f64 = 1e-12;
+/// What points of intersections may be off by, relative to the largest coordinate: some hundred roundings of it.
+const ROUNDING: f64 = 2e-14;
 
-/// A negative winding number no farther from the face than this, relative to the diagonal, is that of a fold as
-/// rounding to 32-bit floats makes: a warning.
-const FOLD_THICKNESS: f64 = 1e-6;
+/// Regions of all faces together that are tested: a second or two. Of more, evenly chosen ones of each face are.
+const REGIONS: usize = 1 << 17;
+
+/// What is known of how the faces of a closed mesh meet.
+pub(super) struct Meetings<'a> {
+    pub flaws: &'a FaceFlaws,
+    /// Pairs that intersect.
+    pub intersections: &'a [[u32; 2]],
+    /// Pairs that touch along a collinear face, and may intersect elsewhere.
+    pub touching: &'a HashSet<(u32, u32)>,
+}
+
+/// The winding numbers in front of a face and behind it, at a place.
+#[derive(Clone, Copy)]
+struct Sides {
+    place: DVec3,
+    front: i32,
+    behind: i32,
+}
+
+impl Sides {
+    fn least(&self) -> i32 {
+        self.front.min(self.behind)
+    }
+
+    fn greatest(&self) -> i32 {
+        self.front.max(self.behind)
+    }
+}
 
 /// The least and greatest winding number of a closed mesh, and where it is negative or above 1.
 pub(super) fn winding_defects(
     mesh: &TriangleMesh,
     topology: &Topology,
-    flaws: &FaceFlaws,
-    intersections: &[[u32; 2]],
+    meetings: &Meetings,
 ) -> ([i32; 2], Vec<Defect>) {
-    let mut meets_others = vec![false; mesh.faces().len()];
-    let pairs = [intersections, &flaws.duplicates, &flaws.reversed_duplicates];
-    pairs.into_iter().flatten().flatten().for_each(|&f| meets_others[f as usize] = true);
-    let mut without_area = vec![false; mesh.faces().len()];
-    flaws.without_area().iter().for_each(|&f| without_area[f as usize] = true);
-    let excluded = |f: u32| meets_others[f as usize] || without_area[f as usize];
-
     let winding = WindingNumber::new(mesh);
-    let diagonal = mesh.diagonal();
-    let both_sides = |face: u32, distance: f64| {
-        let [a, b, c] = mesh.triangle(face as usize);
-        let (center, step) = (centroid(mesh, face), distance * (b - a).cross(c - a).normalize_or_zero());
-        [center + step, center - step].map(|x| winding.at_perturbed(x))
-    };
+    let mut without_area = vec![false; mesh.faces().len()];
+    meetings.flaws.without_area().iter().for_each(|&f| without_area[f as usize] = true);
+    let others = Others::new(meetings, &without_area);
+    let excluded = |f: u32| without_area[f as usize] || !others.of(f).is_empty();
+
     let mut range = [0, 0];
     let mut defects = Vec::new();
     let mut above_one: Vec<(u32, i32)> = Vec::new();
-    let mut record = |face: u32, sides: [i32; 2], extent: &str| {
-        let [low, high] = [sides[0].min(sides[1]), sides[0].max(sides[1])];
+    let mut record = |face: u32, least: &Sides, greatest: &Sides, extent: &str| {
+        let (low, high) = (least.least(), greatest.greatest());
         range = [range[0].min(low), range[1].max(high)];
         if low < 0 {
-            let side = if sides[0] == low { "in front of" } else { "behind" };
-            let is_fold = both_sides(face, FOLD_THICKNESS * diagonal).iter().all(|&w| w >= 0);
-            let (severity, what) = match is_fold {
-                true => (Severity::Warning, "a thin fold, inside is where it is 1 or more"),
-                false => (Severity::Error, "the surface is inside out there"),
-            };
-            let message = format!("the winding number is {low} {side} face {face}{extent}: {what}");
-            let defect = Defect::new(DefectKind::NegativeWinding, severity, centroid(mesh, face), message);
+            let side = if least.front == low { "in front of" } else { "behind" };
+            let message = format!(
+                "the winding number is {low} {side} face {face}{extent}: the surface is folded or inside out there, and \
+                 the place counts as outside"
+            );
+            let defect = Defect::new(DefectKind::NegativeWinding, Severity::Warning, least.place, message);
             defects.push(defect.faces([face]));
         }
         if high > 1 {
             above_one.push((face, high));
         }
     };
-
-    let uses = |edge: &Edge| topology.uses(edge).iter().all(|u| !excluded(u.face));
-    let (patch, patches) = topology.components(|edge| edge.is_manifold() && uses(edge));
-    // The tallest face of each patch stands for it: rounding moves its centre least, relative to its size.
-    let mut tallest: Vec<Option<(f64, u32)>> = vec![None; patches];
-    let mut sizes = vec![0usize; patches];
-    for f in (0..mesh.faces().len() as u32)
-        .filter(|&f| !excluded(f) && patch[f as usize] != Topology::NO_COMPONENT)
-    {
-        let number = patch[f as usize] as usize;
-        sizes[number] += 1;
-        let height = height(mesh.triangle(f as usize));
-        if tallest[number].is_none_or(|(h, _)| height > h) {
-            tallest[number] = Some((height, f));
-        }
-    }
-    for (number, face) in tallest.iter().enumerate().filter_map(|(i, t)| t.map(|(_, f)| (i, f))) {
-        let center = centroid(mesh, face);
-        let there = winding.at_perturbed(center);
-        let behind = perturbed_orientation(mesh.triangle(face as usize), center) > 0;
-        let sides = if behind { [there - 1, there] } else { [there, there + 1] };
-        let extent = match sizes[number] {
+    for patch in patches(mesh, topology, excluded) {
+        let extent = match patch.size {
             1 => String::new(),
             n => format!(" and the {} connected to it", n - 1),
         };
-        record(face, sides, &extent);
+        let found = sides(mesh, &winding, patch.face, centroid(mesh, patch.face), 1);
+        record(patch.face, &found, &found, &extent);
     }
-    for face in
-        (0..mesh.faces().len() as u32).filter(|&f| meets_others[f as usize] && !without_area[f as usize])
-    {
-        record(face, both_sides(face, SAMPLE_DISTANCE * diagonal), "");
+    for (face, least, greatest) in extremes(mesh, &winding, &others) {
+        record(face, &least, &greatest, "");
     }
 
     if let Some(&(face, value)) = above_one.iter().max_by_key(|&&(f, w)| (w, std::cmp::Reverse(f))) {
@@ -99,10 +100,102 @@ pub(super) fn winding_defects(
         defects.push(defect.faces(faces));
     }
     if range[1] < 1 {
-        let message = "no place has a winding number of 1 or more: the mesh has no inside".to_owned();
+        let why = if range[0] < 0 { "the surface is inside out" } else { "it encloses nothing" };
+        let message = format!("no place has a winding number of 1 or more: the mesh has no inside, {why}");
         defects.push(Defect::new(DefectKind::NoInside, Severity::Error, mesh.bounds().center(), message));
     }
     (range, defects)
+}
+
+/// The winding numbers on both sides of a face at a place of it; from front to back they rise by `jump`.
+///
+/// One of them is that of the place itself, on whichever side of the face rounding has put it: exact, unless another
+/// face passes between the place and the face.
+fn sides(mesh: &TriangleMesh, winding: &WindingNumber, face: u32, place: DVec3, jump: i32) -> Sides {
+    let there = winding.at_perturbed(place);
+    match perturbed_orientation(mesh.triangle(face as usize), place) > 0 {
+        true => Sides { place, front: there - jump, behind: there },
+        false => Sides { place, front: there, behind: there + jump },
+    }
+}
+
+/// Faces that are connected over manifold edges and meet no other face: the winding number is constant on each side.
+struct Patch {
+    /// The tallest face stands for all: rounding moves its centre least, relative to its size.
+    face: u32,
+    /// Number of faces.
+    size: usize,
+}
+
+fn patches(mesh: &TriangleMesh, topology: &Topology, excluded: impl Fn(u32) -> bool) -> Vec<Patch> {
+    let uses = |edge: &Edge| topology.uses(edge).iter().all(|u| !excluded(u.face));
+    let (patch, count) = topology.components(|edge| edge.is_manifold() && uses(edge));
+    let mut tallest: Vec<Option<(f64, Patch)>> = (0..count).map(|_| None).collect();
+    for face in (0..mesh.faces().len() as u32)
+        .filter(|&f| !excluded(f) && patch[f as usize] != Topology::NO_COMPONENT)
+    {
+        let known = &mut tallest[patch[face as usize] as usize];
+        let size = known.as_ref().map_or(0, |(_, patch)| patch.size) + 1;
+        let height = height(mesh.triangle(face as usize));
+        match known {
+            Some((most, patch)) if height <= *most => patch.size = size,
+            _ => *known = Some((height, Patch { face, size })),
+        }
+    }
+    tallest.into_iter().flatten().map(|(_, patch)| patch).collect()
+}
+
+/// Each face that meets others, with the least and the greatest winding number beside its regions. Of faces with the same
+/// corners the first stands for all.
+fn extremes(mesh: &TriangleMesh, winding: &WindingNumber, others: &Others) -> Vec<(u32, Sides, Sides)> {
+    let bounds = mesh.bounds();
+    let rounding = ROUNDING * bounds.min.abs().max(bounds.max.abs()).max_element();
+    let meets = |&f: &u32| !others.of(f).is_empty() && !others.repeats[f as usize];
+    let faces: Vec<u32> = (0..mesh.faces().len() as u32).filter(meets).collect();
+    let samples = |&face: &u32| (face, regions::samples(mesh, face, others.of(face), rounding));
+    let samples: Vec<(u32, Vec<Sample>)> = faces.par_iter().map(samples).collect();
+    let regions: usize = samples.iter().map(|(_, samples)| samples.len()).sum();
+    let every = regions.div_ceil(REGIONS).max(1);
+    let extremes_of = |(face, samples): &(u32, Vec<Sample>)| {
+        let tested = samples.iter().step_by(every);
+        let found: Vec<Sides> = tested.map(|s| sides(mesh, winding, *face, s.point, s.jump)).collect();
+        let least = *found.iter().min_by_key(|s| s.least())?;
+        let greatest = *found.iter().max_by_key(|s| s.greatest())?;
+        Some((*face, least, greatest))
+    };
+    samples.par_iter().filter_map(extremes_of).collect()
+}
+
+/// For each face with area the others with area that it meets, ascending.
+struct Others {
+    starts: Vec<usize>,
+    faces: Vec<u32>,
+    /// Whether an earlier face has the same corners.
+    repeats: Vec<bool>,
+}
+
+impl Others {
+    fn new(meetings: &Meetings, without_area: &[bool]) -> Self {
+        let FaceFlaws { duplicates, reversed_duplicates, .. } = meetings.flaws;
+        let listed = [meetings.intersections, duplicates, reversed_duplicates].into_iter().flatten().copied();
+        let pairs = listed.chain(meetings.touching.iter().map(|&(f, g)| [f, g]));
+        let mut directed: Vec<[u32; 2]> = pairs
+            .filter(|[f, g]| f != g && !without_area[*f as usize] && !without_area[*g as usize])
+            .flat_map(|[f, g]| [[f, g], [g, f]])
+            .collect();
+        directed.sort_unstable();
+        directed.dedup();
+        let mut starts = vec![0; without_area.len() + 1];
+        directed.iter().for_each(|[f, _]| starts[*f as usize + 1] += 1);
+        (1..starts.len()).for_each(|f| starts[f] += starts[f - 1]);
+        let mut repeats = vec![false; without_area.len()];
+        duplicates.iter().chain(reversed_duplicates).for_each(|[f, _]| repeats[*f as usize] = true);
+        Self { starts, faces: directed.into_iter().map(|[_, g]| g).collect(), repeats }
+    }
+
+    fn of(&self, face: u32) -> &[u32] {
+        &self.faces[self.starts[face as usize]..self.starts[face as usize + 1]]
+    }
 }
 
 /// Height of a triangle over its longest edge; NaN for a point.

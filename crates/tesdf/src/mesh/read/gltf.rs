@@ -11,7 +11,7 @@
 mod buffers;
 mod scene;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
 use gltf_json as json;
@@ -30,19 +30,7 @@ pub(super) fn parse(
     folder: Option<&Path>,
     hasher: &mut blake3::Hasher,
 ) -> Result<RawMesh, ReadError> {
-    let (json, binary) = if bytes.starts_with(b"glTF") {
-        split_glb(bytes, format)?
-    } else {
-        sniff::refuse_other_kinds(bytes, format)?;
-        sniff::refuse_binary(bytes, format)?;
-        (super::text::without_bom(bytes), None)
-    };
-    let root: json::Root = json::deserialize::from_slice(json).map_err(|error| ReadError::Malformed {
-        format,
-        place: Place::Line(error.line() as u64),
-        found: format!("the JSON is not glTF 2.0: {error}"),
-        help: EXPORT_AGAIN.into(),
-    })?;
+    let (root, binary) = read_root(bytes, format)?;
     validate(&root, format)?;
     let buffers = buffers::load(&root, binary, format, folder, hasher)?;
     let data = Data { root: &root, buffers: &buffers, format };
@@ -56,6 +44,30 @@ pub(super) fn parse(
         reader.raw.notes.push("skins and morph targets are not applied: the base shape is read".into());
     }
     Ok(reader.raw)
+}
+
+/// The files in `folder`, and below, that hold the buffers; none of a file that is not glTF.
+pub(super) fn external_files(bytes: &[u8], format: MeshFormat, folder: &Path) -> Vec<PathBuf> {
+    let root = read_root(bytes, format).map(|(root, _)| root);
+    root.map_or_else(|_| Vec::new(), |root| buffers::external_files(&root, folder).collect())
+}
+
+/// The JSON, and the binary chunk of a GLB file.
+fn read_root(bytes: &[u8], format: MeshFormat) -> Result<(json::Root, Option<&[u8]>), ReadError> {
+    let (json, binary) = if bytes.starts_with(b"glTF") {
+        split_glb(bytes, format)?
+    } else {
+        sniff::refuse_other_kinds(bytes, format)?;
+        sniff::refuse_binary(bytes, format)?;
+        (super::text::without_bom(bytes), None)
+    };
+    let root = json::deserialize::from_slice(json).map_err(|error| ReadError::Malformed {
+        format,
+        place: Place::Line(error.line() as u64),
+        found: format!("the JSON is not glTF 2.0: {error}"),
+        help: EXPORT_AGAIN.into(),
+    })?;
+    Ok((root, binary))
 }
 
 /// What geometry depends on. Other parts (materials, animations) may be as they are.

@@ -32,7 +32,7 @@ pub(super) fn load<'a>(
                     )
                 })?)
             }
-            Some(uri) if uri.starts_with("data:") => {
+            Some(uri) if is_inside(uri) => {
                 let Some((_, text)) = uri.split_once(";base64,") else {
                     return Err(error("a data: URI that is not base64".into(), "expected ';base64,'"));
                 };
@@ -71,6 +71,17 @@ pub(super) fn load<'a>(
         buffers.push(bytes);
     }
     Ok(buffers)
+}
+
+/// The files in `folder`, and below, that [`load`] opens.
+pub(super) fn external_files(root: &json::Root, folder: &Path) -> impl Iterator<Item = PathBuf> {
+    let uris = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
+    uris.filter(|uri| !is_inside(uri)).filter_map(local_path).map(|path| folder.join(path))
+}
+
+/// Whether a URI holds the bytes itself.
+fn is_inside(uri: &str) -> bool {
+    uri.starts_with("data:")
 }
 
 /// The relative path that a URI names, when it stays in the folder.

@@ -1,0 +1,303 @@
+//! A run as it grows: a file that gains a frame with each step, and that is readable up to its last whole frame.
+//!
+//! ```text
+//! byte 0   "tesdfrun", then the version of the journal, u32
+//!     12   frames: length n of the payload, u64; checksum, 16 bytes; payload, n bytes
+//! ```
+//!
+//! All numbers are little-endian. The checksum is the beginning of BLAKE3 of the frame's number (u64, from 0) and the payload. Frame 0 is
+//! JSON: what the metadata of a complete run hold, `planned` (steps in all) and `origin` ([`RunOrigin`]). Frame k + 1 is the state
+//! after k steps: a [`StateHead`], then poses, velocities, and the contacts at the beginning of the last step where they are kept: points, normals,
+//! distances, ids, in the types of the complete file; at last ids and depths of the overlaps at that beginning that no contact showed.
+//!
+//! A frame is written by one call, without waiting for the disk. So a process that is killed loses at most the step that it was at;
+//! a machine that loses power also loses what the system had not yet written. Reading stops at the first frame that is not whole.
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use bytemuck::{Pod, Zeroable};
+use serde::{Deserialize, Serialize};
+use tesdf::save::{Destination, GrowingFile, SaveError};
+
+use super::{About, RecordError, RunRecord};
+use crate::simulate::{PartialRun, Totals};
+use crate::{RunOrigin, StepReport};
+
+const MAGIC: &[u8; 8] = b"tesdfrun";
+/// The version that is written and read.
+const JOURNAL_VERSION: u32 = 1;
+const HEAD: usize = MAGIC.len() + size_of::<u32>();
+const CHECKSUM: usize = 16;
+/// Instead of a number of contacts: they are not kept.
+const NOT_KEPT: u64 = u64::MAX;
+
+/// A run that was cut, with everything that going on needs.
+#[derive(Clone, Debug)]
+pub struct CutRun {
+    /// Its steps so far.
+    pub run: PartialRun,
+    /// What the run was made with.
+    pub origin: RunOrigin,
+    /// The file up to its last whole frame.
+    whole: Vec<u8>,
+}
+
+/// The file of a run that grows. The file stays when this is dropped.
+#[derive(Debug)]
+pub struct RunJournal {
+    file: GrowingFile,
+    path: PathBuf,
+    frames: u64,
+    bytes: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+struct First {
+    #[serde(flatten)]
+    about: About,
+    origin: RunOrigin,
+}
+
+/// The numbers of a state, and of the step that led to it; those of the step are 0 in the first state.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct StateHead {
+    /// s.
+    time: f64,
+    /// The least signed distance; NaN without contacts.
+    deepest: f64,
+    contacts: u64,
+    /// ns.
+    detection: u64,
+    /// ns.
+    solution: u64,
+    /// Contacts in this frame, or [`NOT_KEPT`].
+    kept: u64,
+    /// Overlaps in this frame that no contact showed.
+    hidden: u64,
+    iterations: u32,
+    converged: u32,
+}
+
+const _: () = assert!(size_of::<StateHead>() == 64);
+
+/// Whether the bytes are those of a journal.
+pub(super) fn is_journal(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
+impl RunJournal {
+    /// Replaces the destination by a journal of the first state of `record`; `None` when the destination is no regular file.
+    ///
+    /// # Errors
+    /// What the operating system refused; the destination is then as it was.
+    pub fn begin(
+        destination: &Destination,
+        record: &RunRecord,
+        origin: &RunOrigin,
+    ) -> Result<Option<Self>, RecordError> {
+        let first = First { about: record.about(), origin: origin.clone() };
+        let first = serde_json::to_vec(&first).map_err(|e| RecordError::NotARun(e.to_string()))?;
+        let mut bytes = [&MAGIC[..], &JOURNAL_VERSION.to_le_bytes()].concat();
+        bytes.extend(frame(0, &first));
+        bytes.extend(frame(1, &state(record, 0, &StepReport::default())));
+        Self::write(destination, &bytes, 2)
+    }
+
+    /// Replaces the destination by the whole frames of a run that was cut, to which more are added; `None` as in [`begin`](Self::begin).
+    ///
+    /// # Errors
+    /// As [`begin`](Self::begin).
+    pub fn go_on(destination: &Destination, cut: &CutRun) -> Result<Option<Self>, RecordError> {
+        Self::write(destination, &cut.whole, 2 + cut.run.record.steps())
+    }
+
+    fn write(destination: &Destination, bytes: &[u8], frames: u64) -> Result<Option<Self>, RecordError> {
+        let Some(mut part) = destination.part()? else { return Ok(None) };
+        let path = destination.path().to_path_buf();
+        part.write_all(bytes).map_err(|source| failed(&path, source))?;
+        Ok(Some(Self { file: part.finish()?, path, frames, bytes: bytes.len() as u64 }))
+    }
+
+    /// Adds the last state of `record`, and what the step that led to it did.
+    ///
+    /// # Errors
+    /// What the operating system refused; the file then ends with the step before.
+    pub fn push(&mut self, record: &RunRecord, report: &StepReport) -> Result<(), RecordError> {
+        let frame = frame(self.frames, &state(record, record.steps() as usize, report));
+        self.file.write_all(&frame).map_err(|source| {
+            // Half a frame does no harm, but on a full disk its room may be needed.
+            let _ = self.file.cut(self.bytes);
+            failed(&self.path, source)
+        })?;
+        self.frames += 1;
+        self.bytes += frame.len() as u64;
+        Ok(())
+    }
+}
+
+fn failed(path: &Path, source: std::io::Error) -> RecordError {
+    RecordError::Save(SaveError::Io { action: "write", path: path.to_path_buf(), source })
+}
+
+impl CutRun {
+    /// Reads a run that was cut.
+    ///
+    /// # Errors
+    /// As [`RunRecord::open`]; [`RecordError::Complete`] when nothing is missing.
+    pub fn open(path: &Path) -> Result<Self, RecordError> {
+        let bytes = super::read(path)?;
+        if !is_journal(&bytes) {
+            let record = RunRecord::from_bytes(&bytes)?;
+            return Err(match record.planned_steps() {
+                None => RecordError::Complete { steps: record.steps() },
+                Some(_) => RecordError::NotARun("it was cut, but saved without its journal".into()),
+            });
+        }
+        Self::from_bytes(bytes)
+    }
+
+    /// As [`open`](Self::open), from the bytes of a journal. Bytes after the last whole frame are left out.
+    pub(super) fn from_bytes(mut bytes: Vec<u8>) -> Result<Self, RecordError> {
+        let version = bytes.get(MAGIC.len()..HEAD).and_then(|version| version.try_into().ok());
+        match version.map(u32::from_le_bytes) {
+            Some(JOURNAL_VERSION) => {}
+            Some(found) => return Err(RecordError::Version { found }),
+            None => return Err(RecordError::NotARun(NO_STATE.into())),
+        }
+        let mut frames = Frames { bytes: &bytes, at: HEAD, number: 0 };
+        let first = frames.next().ok_or_else(|| RecordError::NotARun(NO_STATE.into()))?;
+        let First { about, origin } = serde_json::from_slice(first)
+            .map_err(|e| RecordError::NotARun(format!("its first frame: {e}")))?;
+        let mut run = PartialRun { record: RunRecord::of_about(about), totals: Totals::default() };
+        while let Some(payload) = frames.next() {
+            read_state(payload, &mut run).ok_or_else(|| {
+                RecordError::NotARun(format!("frame {} does not fit its bodies", frames.number - 1))
+            })?;
+        }
+        if run.record.times.is_empty() {
+            return Err(RecordError::NotARun(NO_STATE.into()));
+        }
+        bytes.truncate(frames.at);
+        Ok(Self { run, origin, whole: bytes })
+    }
+}
+
+const NO_STATE: &str = "it was cut before its first state was written; simulate the scene again";
+
+/// The payloads of all frames up to the first that is not whole.
+struct Frames<'a> {
+    bytes: &'a [u8],
+    /// Where the next frame begins.
+    at: usize,
+    /// Its number.
+    number: u64,
+}
+
+impl<'a> Iterator for Frames<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let (length, rest) = self.bytes.get(self.at..)?.split_first_chunk()?;
+        let (expected, rest) = rest.split_first_chunk::<CHECKSUM>()?;
+        let payload = rest.get(..usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+        if checksum(self.number, payload) != *expected {
+            return None;
+        }
+        self.at += length.len() + CHECKSUM + payload.len();
+        self.number += 1;
+        Some(payload)
+    }
+}
+
+fn frame(number: u64, payload: &[u8]) -> Vec<u8> {
+    [&(payload.len() as u64).to_le_bytes()[..], &checksum(number, payload), payload].concat()
+}
+
+fn checksum(number: u64, payload: &[u8]) -> [u8; CHECKSUM] {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&number.to_le_bytes()).update(payload);
+    let mut checksum = [0; CHECKSUM];
+    hasher.finalize_xof().fill(&mut checksum);
+    checksum
+}
+
+/// The payload of the state after `step` steps.
+fn state(record: &RunRecord, step: usize, report: &StepReport) -> Vec<u8> {
+    let before = step.checked_sub(1).map(|before| before as u64);
+    let kept = before.and_then(|before| record.contact_range(before));
+    let hidden = before.map_or(0..0, |before| record.hidden.of_step(before));
+    let head = StateHead {
+        time: record.times[step],
+        deepest: report.deepest.unwrap_or(f64::NAN),
+        contacts: report.contacts as u64,
+        detection: nanoseconds(report.detection),
+        solution: nanoseconds(report.solution),
+        kept: kept.as_ref().map_or(NOT_KEPT, |range| range.len() as u64),
+        hidden: hidden.len() as u64,
+        iterations: report.iterations,
+        converged: report.converged.into(),
+    };
+    let bodies = record.bodies.len();
+    let (of_bodies, kept) = (step * bodies..(step + 1) * bodies, kept.unwrap_or_default());
+    [
+        bytemuck::bytes_of(&head),
+        bytemuck::cast_slice(&record.poses[of_bodies.clone()]),
+        bytemuck::cast_slice(&record.velocities[of_bodies]),
+        bytemuck::cast_slice(&record.points[kept.clone()]),
+        bytemuck::cast_slice(&record.normals[kept.clone()]),
+        bytemuck::cast_slice(&record.distances[kept.clone()]),
+        bytemuck::cast_slice(&record.ids[kept]),
+        bytemuck::cast_slice(&record.hidden.ids[hidden.clone()]),
+        bytemuck::cast_slice(&record.hidden.depths[hidden]),
+    ]
+    .concat()
+}
+
+fn nanoseconds(duration: std::time::Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// Adds a state to a run; `None` when the payload has another length than it says.
+fn read_state(mut payload: &[u8], run: &mut PartialRun) -> Option<()> {
+    let record = &mut run.record;
+    let (steps, bodies) = (record.times.len() as u64, record.bodies.len());
+    let head: StateHead = take(&mut payload, 1)?.pop()?;
+    record.times.push(head.time);
+    record.poses.extend(take::<[f64; 7]>(&mut payload, bodies)?);
+    record.velocities.extend(take::<[f64; 6]>(&mut payload, bodies)?);
+    if head.kept != NOT_KEPT {
+        let count = usize::try_from(head.kept).ok()?;
+        record.points.extend(take::<[f32; 3]>(&mut payload, count)?);
+        record.normals.extend(take::<[f32; 3]>(&mut payload, count)?);
+        record.distances.extend(take::<f32>(&mut payload, count)?);
+        record.ids.extend(take::<[u32; 4]>(&mut payload, count)?);
+        record.contact_steps.push(steps.checked_sub(1)?);
+        record.contact_starts.push(record.distances.len() as u64);
+    }
+    if head.hidden > 0 {
+        let count = usize::try_from(head.hidden).ok()?;
+        record.hidden.ids.extend(take::<[u32; 2]>(&mut payload, count)?);
+        record.hidden.depths.extend(take::<f64>(&mut payload, count)?);
+        record.hidden.steps.resize(record.hidden.ids.len(), steps.checked_sub(1)?);
+    }
+    if steps > 0 {
+        run.totals.add(&StepReport {
+            contacts: usize::try_from(head.contacts).ok()?,
+            deepest: Some(head.deepest).filter(|deepest| !deepest.is_nan()),
+            iterations: head.iterations,
+            converged: head.converged != 0,
+            detection: std::time::Duration::from_nanos(head.detection),
+            solution: std::time::Duration::from_nanos(head.solution),
+            ..StepReport::default()
+        });
+    }
+    payload.is_empty().then_some(())
+}
+
+/// The next `count` values of the payload; copied, as a file's numbers need not be aligned.
+fn take<T: Pod>(payload: &mut &[u8], count: usize) -> Option<Vec<T>> {
+    let (values, rest) = payload.split_at_checked(count.checked_mul(size_of::<T>())?)?;
+    *payload = rest;
+    Some(values.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
+}

@@ -1,0 +1,254 @@
+//! Runs that are cut: what is left of them, and that going on gives the bits of a run that was never cut.
+use std::fs;
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::Duration;
+
+use tesdf::encode::EncodeProgress;
+use tesdf::save::{Destination, SaveOptions};
+use tesdf_sim::record::{CutRun, RecordError, RunJournal, RunOrigin, RunRecord};
+use tesdf_sim::scene_file::LoadedScene;
+use tesdf_sim::{PartialRun, SimulateError, Summary, simulate, simulate_from};
+
+/// A wedge tumbles onto a floor and a brick; a screw is followed that neither of them is.
+const SCENE: &str = r#"
+time_step = 2e-3
+duration = 0.06
+
+[record]
+contacts_every = 3
+
+[criterion.screw]
+body = "wedge"
+axis = [0, 0, -1]
+pitch = 0.002
+min_turns = 0.1
+backlash = 1e-5
+
+[[bodies]]
+name = "floor"
+shape = "plane"
+fixed = true
+
+[[bodies]]
+name = "brick"
+shape = { box = { half_extents = [0.02, 0.02, 0.01] } }
+mass = 0.5
+translation = [0, 0, 0.0101]
+
+[[bodies]]
+name = "wedge"
+mesh = "wedge.obj"
+density = 1000
+translation = [0.012, 0.003, 0.022]
+angular_velocity = [3, 20, 1]
+"#;
+
+const WEDGE: &str = "v 0 0 0\nv .02 0 0\nv 0 .02 0\nv 0 0 .02\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+const STEPS: u64 = 30;
+
+struct Bench {
+    folder: tempfile::TempDir,
+    loaded: LoadedScene,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("wedge.obj"), WEDGE).unwrap();
+        let loaded = LoadedScene::parse(SCENE.into(), &folder.path().join("scene.toml")).unwrap();
+        Self { folder, loaded }
+    }
+
+    fn destination(&self) -> Destination {
+        Destination::new(&self.folder.path().join("run"), &SaveOptions::default()).unwrap()
+    }
+
+    fn system(&self) -> tesdf_sim::System {
+        self.loaded.system(&EncodeProgress::default()).unwrap()
+    }
+
+    fn origin(&self) -> RunOrigin {
+        RunOrigin::of(&self.system(), "cpu").unwrap()
+    }
+
+    /// Never cut.
+    fn whole(&self) -> (RunRecord, Summary) {
+        let mut engine = self.loaded.newton(self.system()).unwrap();
+        simulate(&self.loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap()
+    }
+
+    /// Up to a step, from the beginning or from a cut run; `None`: to the end.
+    fn run(&self, cut: Option<&CutRun>, until: Option<u64>) -> Result<(RunRecord, Summary), SimulateError> {
+        let mut system = self.system();
+        let run = match cut {
+            Some(cut) => {
+                cut.check(&self.loaded.scene, &self.origin()).unwrap();
+                cut.run.restore(&mut system).unwrap();
+                cut.run.clone()
+            }
+            None => PartialRun::new(&self.loaded.scene, &system, String::new()),
+        };
+        let mut engine = self.loaded.newton(system).unwrap();
+        let mut journal = cut.map(|cut| RunJournal::go_on(&self.destination(), cut).unwrap().unwrap());
+        simulate_from(&self.loaded.scene, &mut engine, run, |moment| {
+            let journal = journal.get_or_insert_with(|| {
+                RunJournal::begin(&self.destination(), moment.record, &self.origin()).unwrap().unwrap()
+            });
+            journal.push(moment.record, &moment.report).unwrap();
+            match Some(moment.step) == until {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            }
+        })
+    }
+
+    fn open(&self) -> CutRun {
+        CutRun::open(&self.folder.path().join("run")).unwrap()
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        fs::read(self.folder.path().join("run")).unwrap()
+    }
+}
+
+/// But for wall times, which no two runs share.
+fn timeless(summary: &Summary) -> Summary {
+    Summary { detection_ms: 0.0, solution_ms: 0.0, ..summary.clone() }
+}
+
+#[test]
+fn a_run_that_was_cut_at_any_step_goes_on_to_the_same_bytes() {
+    let bench = Bench::new();
+    let (whole, summary) = bench.whole();
+    let expected = whole.to_bytes().unwrap();
+    let last = whole.contacts().last().unwrap();
+    assert!(!last.1.is_empty() && last.0 == 27, "nothing touches: the scene tests nothing");
+    for at in [1, 2, 3, 11, STEPS - 1] {
+        let stopped = bench.run(None, Some(at));
+        assert!(matches!(stopped, Err(SimulateError::Interrupted { steps }) if steps == at));
+        let cut = bench.open();
+        assert_eq!((cut.run.record.steps(), cut.run.record.planned_steps()), (at, Some(STEPS)));
+        let (record, found) = bench.run(Some(&cut), None).unwrap();
+        assert!(record.to_bytes().unwrap() == expected, "cut at {at}: other bytes");
+        assert_eq!((&record, timeless(&found)), (&whole, timeless(&summary)), "cut at {at}");
+        assert!(found.detection_ms > 0.0 && found.solution_ms > 0.0);
+    }
+    // The whole journal is there, but the complete file is not: nothing is left but to write it.
+    let (record, _) = bench.run(Some(&bench.open()), None).unwrap();
+    assert!(record.to_bytes().unwrap() == expected);
+}
+
+#[test]
+fn a_run_may_be_cut_again_and_again() {
+    let bench = Bench::new();
+    assert!(bench.run(None, Some(4)).is_err());
+    for at in [5, 9, 10, 22] {
+        assert!(bench.run(Some(&bench.open()), Some(at)).is_err());
+    }
+    let (record, _) = bench.run(Some(&bench.open()), None).unwrap();
+    assert_eq!(record, bench.whole().0);
+}
+
+/// What a kill leaves: every prefix is no run yet, or a run up to a whole step that is that of the whole run.
+#[test]
+fn a_journal_is_read_up_to_its_last_whole_step() {
+    let bench = Bench::new();
+    bench.run(None, None).unwrap();
+    let (bytes, whole) = (bench.bytes(), bench.whole().0);
+    let mut steps = None;
+    for end in 0..=bytes.len() {
+        match RunRecord::from_bytes(&bytes[..end]) {
+            Ok(found) => {
+                assert!(Some(found.steps()) >= steps && found.planned_steps() == Some(STEPS));
+                if Some(found.steps()) == steps {
+                    continue;
+                }
+                steps = Some(found.steps());
+                for step in 0..found.times().len() {
+                    assert_eq!(found.pose(step, 2), whole.pose(step, 2), "{end} bytes");
+                    assert_eq!(found.velocity(step, 1), whole.velocity(step, 1), "{end} bytes");
+                }
+                assert!(found.contacts().eq(whole.contacts().take_while(|(step, _)| *step < found.steps())));
+            }
+            Err(_) => assert_eq!(steps, None, "{end} bytes"),
+        }
+    }
+    assert_eq!(steps, Some(STEPS));
+    // What a power cut leaves: blocks that were never written, then others.
+    for at in (0..bytes.len()).step_by(97) {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 0x10;
+        if let Ok(found) = RunRecord::from_bytes(&damaged) {
+            let intact = RunRecord::from_bytes(&bytes[..at]).map_or(0, |intact| intact.steps());
+            assert_eq!(found.steps(), intact, "byte {at}");
+        }
+    }
+}
+
+#[test]
+fn what_would_give_other_bits_is_refused() {
+    let bench = Bench::new();
+    assert!(bench.run(None, Some(2)).is_err());
+    let cut = bench.open();
+    let refusal = |change: &dyn Fn(&mut LoadedScene, &mut RunOrigin)| {
+        let (mut loaded, mut origin) = (bench.loaded.clone(), bench.origin());
+        change(&mut loaded, &mut origin);
+        cut.check(&loaded.scene, &origin).unwrap_err().to_string()
+    };
+    let run = ", but the run was made with ";
+    assert_eq!(refusal(&|loaded, _| loaded.scene.time_step = 1e-3), format!("time_step is 0.001{run}0.002"));
+    assert_eq!(
+        refusal(&|loaded, _| loaded.scene.solver.redetections = 7),
+        format!("solver.redetections is 7{run}{}", bench.loaded.scene.solver.redetections)
+    );
+    let heavier = refusal(&|loaded, _| loaded.scene.bodies[1].get_mut().mass = Some(0.75));
+    assert_eq!(heavier, format!("bodies[1].mass is 0.75{run}0.5"));
+    let fewer = refusal(&|loaded, _| drop(loaded.scene.bodies.pop()));
+    assert!(fewer.starts_with("bodies is [{") && fewer.contains('…') && fewer.len() < 400, "{fewer}");
+    assert_eq!(refusal(&|_, origin| origin.device = "gpu".into()), format!("device is \"gpu\"{run}\"cpu\""));
+    assert!(refusal(&|_, origin| origin.version = "9.9.9".into()).starts_with("version is \"9.9.9\""));
+    // Another mesh under the same name.
+    fs::write(bench.folder.path().join("wedge.obj"), WEDGE.replace(".02", ".03")).unwrap();
+    assert!(refusal(&|_, _| {}).starts_with("the geometry of body wedge is not the one"));
+    // The same mesh under another name.
+    fs::write(bench.folder.path().join("moved.obj"), WEDGE).unwrap();
+    let mut loaded = bench.loaded.clone();
+    assert!(loaded.replace_geometry("wedge", "moved.obj".into()));
+    let system = loaded.system(&EncodeProgress::default()).unwrap();
+    cut.check(&loaded.scene, &RunOrigin::of(&system, "cpu").unwrap()).unwrap();
+}
+
+#[test]
+fn a_complete_run_and_what_is_no_run_say_so() {
+    let bench = Bench::new();
+    let path = bench.folder.path().join("run");
+    let open = || CutRun::open(&path).unwrap_err();
+    bench.whole().0.save(&path).unwrap();
+    assert!(matches!(open(), RecordError::Complete { steps: STEPS }));
+    fs::write(&path, b"tesdfrun\x09\0\0\0").unwrap();
+    assert!(matches!(open(), RecordError::Version { found: 9 }));
+    for bytes in [&b"tesdfrun"[..], b"tesdfrun\x01\0\0\0", b"solid cube"] {
+        fs::write(&path, bytes).unwrap();
+        let text = open().to_string();
+        assert!(text.starts_with("not a run of tesdf: ") && text.contains("simulate"), "{text}");
+    }
+    assert!(matches!(CutRun::open(Path::new("none")), Err(RecordError::Read { .. })));
+}
+
+/// The record of a run that is not complete says so in every form.
+#[test]
+fn an_unfinished_record_is_marked() {
+    let bench = Bench::new();
+    let mut kept = None;
+    let mut engine = bench.loaded.newton(bench.system()).unwrap();
+    let ended = simulate(&bench.loaded.scene, &mut engine, |moment| {
+        assert!(moment.report.detection > Duration::ZERO);
+        kept = Some(moment.record.clone());
+        ControlFlow::Break(())
+    });
+    assert!(matches!(ended, Err(SimulateError::Interrupted { steps: 1 })));
+    let read = RunRecord::from_bytes(&kept.clone().unwrap().to_bytes().unwrap()).unwrap();
+    assert_eq!((read.steps(), read.planned_steps()), (1, Some(STEPS)));
+    assert_eq!(Some(read), kept);
+}

@@ -1,0 +1,122 @@
+//! Points and rays far out.
+use glam::DVec3;
+
+/// A ray with a direction of length 1 to 4 that begins near a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NearRay {
+    /// Where it begins.
+    pub origin: DVec3,
+    /// The direction given, divided by `unit`.
+    pub direction: DVec3,
+    /// A power of two.
+    pub unit: f64,
+    /// How far `origin` is along the ray given, in lengths of `direction`.
+    pub skipped: f64,
+}
+
+/// A ray that begins within this many sizes of the body stays as it is.
+const NEAR: f64 = 4.0;
+/// Where other rays begin: this many sizes before they pass the middle.
+const BEFORE: f64 = 2.0;
+/// Moves along a ray; each is off by the rounding of its length, so a few are enough.
+const MOVES: usize = 40;
+
+impl NearRay {
+    /// The ray `origin + t · direction`, of finite numbers, from where it comes near the ball of radius `size` around `middle`; `None` when it
+    /// never does.
+    ///
+    /// A point of the ray is rounded once per move and coordinate. So where the ray passes the body is off by 1e-16 of the
+    /// distance from the origin to there, and not at all across an axis that the ray runs along.
+    pub fn new(origin: DVec3, direction: DVec3, middle: DVec3, size: f64) -> Option<Self> {
+        let unit = power_of_two_below(direction.abs().max_element());
+        let mut ray = Self { origin, direction: direction / unit, unit, skipped: 0.0 };
+        if ray.is_within(middle, NEAR * size) {
+            return Some(ray);
+        }
+        let before = BEFORE * size / ray.direction.length();
+        for _ in 0..MOVES {
+            let to_middle = middle - ray.origin;
+            // Squares of large numbers would overflow.
+            let largest = to_middle.abs().max_element().max(f64::MIN_POSITIVE);
+            let along = (to_middle / largest).dot(ray.direction) / ray.direction.length_squared() * largest;
+            let step = along - before;
+            if ray.skipped == 0.0 && step <= 0.0 {
+                return None;
+            }
+            let moved = |axis: usize| step.mul_add(ray.direction[axis], ray.origin[axis]);
+            ray.origin = DVec3::new(moved(0), moved(1), moved(2));
+            ray.skipped += step;
+            if step.abs() <= before {
+                break;
+            }
+        }
+        ray.is_within(middle, NEAR * size).then_some(ray)
+    }
+
+    fn is_within(&self, middle: DVec3, reach: f64) -> bool {
+        // NaN fails the comparison.
+        (self.origin - middle).abs().cmple(DVec3::splat(reach)).all()
+    }
+
+    /// The part of `limit`, in lengths of the direction given, that is left from `origin` on, in lengths of `direction`.
+    pub fn rest_of(&self, limit: f64) -> f64 {
+        limit * self.unit - self.skipped
+    }
+
+    /// From lengths of `direction` to lengths of the direction given, counted from where that ray begins; `None` above [`f64::MAX`].
+    pub fn total(&self, t: f64) -> Option<f64> {
+        Some((self.skipped + t) / self.unit).filter(|t| t.is_finite())
+    }
+}
+
+/// A vector's length, at most [`f64::MAX`], and its direction; squares of its coordinates may overflow.
+pub fn length_and_direction(v: DVec3) -> (f64, DVec3) {
+    let largest = v.abs().max_element();
+    let scaled = v / largest;
+    ((scaled.length() * largest).min(f64::MAX), scaled.normalize())
+}
+
+/// The greatest power of two that is not above `x`, a finite number above 0.
+fn power_of_two_below(x: f64) -> f64 {
+    let bits = x.to_bits();
+    match x.is_normal() {
+        true => f64::from_bits(bits & 0x7ff0_0000_0000_0000),
+        false => f64::from_bits(1 << (63 - bits.leading_zeros())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn powers_of_two() {
+        for (x, expected) in [(1.0, 1.0), (1.99, 1.0), (0.75, 0.5), (1e300, 2f64.powi(996)), (5e-324, 5e-324)] {
+            assert_eq!(power_of_two_below(x), expected, "{x}");
+        }
+        assert!(power_of_two_below(f64::MAX) > f64::MAX / 2.0 && power_of_two_below(1.7e-308).is_subnormal());
+    }
+
+    #[test]
+    fn rays_along_an_axis_lose_nothing_across_it() {
+        for distance in [5.0, 1e3, 1e20, 1e200, 1e308] {
+            for unit in [1.0, 3.0, 1e-200, 1e200] {
+                let origin = DVec3::new(0.3, distance, -0.7);
+                let ray = NearRay::new(origin, DVec3::new(0.0, -unit, 0.0), DVec3::ZERO, 1.0).unwrap();
+                assert_eq!((ray.origin.x, ray.origin.z), (0.3, -0.7));
+                assert!((1.0..=NEAR).contains(&ray.origin.y), "{distance} {unit}: {ray:?}");
+                let away = NearRay::new(origin, DVec3::new(0.0, unit, 0.0), DVec3::ZERO, 1.0);
+                assert_eq!(away.is_some(), distance <= NEAR, "{distance}");
+                assert_eq!(NearRay::new(origin, DVec3::X, DVec3::ZERO, 1.0), None);
+            }
+        }
+    }
+
+    #[test]
+    fn rays_that_begin_near_stay_as_they_are() {
+        let (origin, direction) = (DVec3::new(0.1, 3.0, -0.3), DVec3::new(1e-3, 7e-3, -2e-3));
+        let ray = NearRay::new(origin, direction, DVec3::ZERO, 1.0).unwrap();
+        assert_eq!((ray.origin, ray.skipped, ray.direction * ray.unit), (origin, 0.0, direction));
+        assert_eq!(ray.total(ray.rest_of(0.7)), Some(0.7));
+    }
+}

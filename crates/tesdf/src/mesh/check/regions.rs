@@ -1,0 +1,335 @@
+//! The regions into which other faces cut a face, each with a point of it.
+use std::collections::HashMap;
+
+use glam::{DVec2, DVec3};
+
+use crate::{
+    geometry::{Aabb, AabbTree, normal_signs, orientation, self_overlaps},
+    mesh::{TriangleMesh, topology::DisjointSets},
+};
+
+/// A point in a region of a face.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sample {
+    /// The point, on the face up to rounding.
+    pub point: DVec3,
+    /// How much greater the winding number is behind the face than in front of it. It is 1, unless coplanar faces lie
+    /// there too.
+    pub jump: i32,
+}
+
+/// Faces that cut a face, at most: of more, evenly chosen ones do.
+const CUTS: usize = 1 << 12;
+/// Pieces of a face's segments, besides one per segment: where there are more, evenly chosen ones get samples.
+const PIECES: usize = 64;
+/// Segments of a leaf of the tree.
+const LEAF_SIZE: usize = 4;
+
+/// A point in each region into which the faces `others` cut `face`.
+///
+/// The other faces meet a face in segments. A region that is not the whole face has a piece of a segment on its border,
+/// where a piece ends at the next segment that crosses. So a point on each side of each piece is a point of each
+/// region. The point is half of the way from the middle of the piece to what comes next. Pieces that follow each
+/// other and end at no other piece have the same two regions, and get one point on each side together.
+///
+/// Which corners are on which side of a plane is decided exactly. Points of segments and samples are rounded:
+/// regions and pieces narrower than `rounding` get no sample. Where more than 4096 faces cut the face, or their segments are cut
+/// into more than two pieces each, not all regions get a sample.
+pub(super) fn samples(mesh: &TriangleMesh, face: u32, others: &[u32], rounding: f64) -> Vec<Sample> {
+    let corners = mesh.triangle(face as usize);
+    let Some(chart) = Chart::new(corners) else { return Vec::new() };
+    let mut segments = Vec::new();
+    let mut coplanar = Vec::new();
+    for &other in others.iter().step_by(others.len().div_ceil(CUTS).max(1)) {
+        match in_plane(corners, mesh.triangle(other as usize)) {
+            InPlane::Triangle(triangle) => {
+                let (flat, turn) = chart.flat_triangle(triangle);
+                segments.extend(edges(flat));
+                coplanar.push((flat, turn * chart.turn));
+            }
+            InPlane::Segment(ends) => segments.push(ends.map(|p| chart.flat(p))),
+            InPlane::Nothing => {}
+        }
+    }
+    let cuts: Vec<Segment> = segments.into_iter().filter_map(|s| chart.clip(s, rounding)).collect();
+    let sample = |q: DVec2| {
+        let jump = coplanar.iter().filter(|(t, _)| holds(t, q)).map(|(_, turn)| turn).sum::<i32>();
+        Sample { point: chart.lift(q), jump: 1 + jump }
+    };
+    let beside: Vec<Sample> = beside_cuts(cuts, &chart, rounding).into_iter().map(sample).collect();
+    if beside.is_empty() { vec![sample(chart.middle())] } else { beside }
+}
+
+/// What a triangle has in the plane of another one.
+enum InPlane {
+    Triangle([DVec3; 3]),
+    Segment([DVec3; 2]),
+    /// Nothing, or a corner alone.
+    Nothing,
+}
+
+fn in_plane([a, b, c]: [DVec3; 3], other: [DVec3; 3]) -> InPlane {
+    let signs = other.map(|p| orientation(a, b, c, p));
+    if signs == [0; 3] {
+        return InPlane::Triangle(other);
+    }
+    let normal = (b - a).cross(c - a);
+    let height = other.map(|p| normal.dot(p - a).abs());
+    let mut points = Vec::with_capacity(2);
+    for k in 0..3 {
+        let l = (k + 1) % 3;
+        if signs[k] == 0 {
+            points.push(other[k]);
+        }
+        if signs[k] * signs[l] < 0 {
+            let share = height[k] / (height[k] + height[l]);
+            // Rounding may have left nothing of both heights.
+            let share = if share.is_finite() { share } else { 0.5 };
+            points.push(other[k].lerp(other[l], share));
+        }
+    }
+    match points[..] {
+        [p, q] => InPlane::Segment([p, q]),
+        _ => InPlane::Nothing,
+    }
+}
+
+type Segment = [DVec2; 2];
+
+fn edges<T: Copy>([a, b, c]: [T; 3]) -> [[T; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+/// Whether a triangle that turns counter-clockwise holds a point.
+fn holds(triangle: &[DVec2; 3], q: DVec2) -> bool {
+    edges(*triangle).iter().all(|&[a, b]| (b - a).perp_dot(q - a) >= 0.0)
+}
+
+/// The plane of a face, seen along the axis that is nearest to its normal.
+struct Chart {
+    corners: [DVec3; 3],
+    /// The corners, counter-clockwise.
+    flat: [DVec2; 3],
+    /// The axis.
+    along: usize,
+    /// 1 when the face is counter-clockwise, -1 when `corners` and `flat` are turned over.
+    turn: i32,
+}
+
+impl Chart {
+    /// `None` when rounding leaves nothing of the area.
+    fn new([a, b, c]: [DVec3; 3]) -> Option<Self> {
+        let normal = (b - a).cross(c - a);
+        let along = normal.abs().max_position();
+        let turn = normal_signs(a, b, c)[along];
+        let corners = if turn > 0 { [a, b, c] } else { [a, c, b] };
+        let chart = Self { corners, flat: [DVec2::ZERO; 3], along, turn };
+        let chart = Self { flat: corners.map(|p| chart.flat(p)), ..chart };
+        (chart.double_area() > 0.0).then_some(chart)
+    }
+
+    fn flat(&self, p: DVec3) -> DVec2 {
+        DVec2::new(p[(self.along + 1) % 3], p[(self.along + 2) % 3])
+    }
+
+    /// A triangle of the plane, counter-clockwise, and -1 when it was turned over for that.
+    fn flat_triangle(&self, [a, b, c]: [DVec3; 3]) -> ([DVec2; 3], i32) {
+        let turn = normal_signs(a, b, c)[self.along];
+        let corners = if turn > 0 { [a, b, c] } else { [a, c, b] };
+        (corners.map(|p| self.flat(p)), turn)
+    }
+
+    fn double_area(&self) -> f64 {
+        let [a, b, c] = self.flat;
+        (b - a).perp_dot(c - a)
+    }
+
+    /// The point of the face that is seen at `q`.
+    fn lift(&self, q: DVec2) -> DVec3 {
+        let ([a, b, c], [p, u, v]) = (self.flat, self.corners);
+        let (s, t) = ((q - a).perp_dot(c - a), (b - a).perp_dot(q - a));
+        p + (s * (u - p) + t * (v - p)) / self.double_area()
+    }
+
+    /// A point inside, not the centroid: a corner of another face may touch that one.
+    fn middle(&self) -> DVec2 {
+        let [a, b, c] = self.flat;
+        0.346 * a + 0.331 * b + 0.323 * c
+    }
+
+    /// The part of a segment that is on the face; `None` when that is not longer than `rounding`.
+    fn clip(&self, [p, q]: Segment, rounding: f64) -> Option<Segment> {
+        let (mut from, mut to) = (0.0f64, 1.0f64);
+        for [a, b] in edges(self.flat) {
+            let (at_p, at_q) = ((b - a).perp_dot(p - a), (b - a).perp_dot(q - a));
+            let crossing = at_p / (at_p - at_q);
+            match (at_p < 0.0, at_q < 0.0) {
+                (true, true) => return None,
+                (true, false) => from = from.max(crossing),
+                (false, true) => to = to.min(crossing),
+                (false, false) => {}
+            }
+        }
+        let clipped = [p.lerp(q, from), p.lerp(q, to)];
+        (from < to && clipped[0].distance(clipped[1]) > rounding).then_some(clipped)
+    }
+}
+
+/// A part of a segment that no other segment crosses.
+#[derive(Clone, Copy)]
+struct Piece {
+    ends: Segment,
+}
+
+impl Piece {
+    fn middle(&self) -> DVec2 {
+        self.ends[0].midpoint(self.ends[1])
+    }
+
+    /// The direction along an axis to each of its sides, left and right of the way from its first end to its second.
+    ///
+    /// Along an axis, as the boxes of a tree that meet such a way are found without rounding.
+    fn across(&self) -> [DVec2; 2] {
+        let along = self.ends[1] - self.ends[0];
+        let left = match along.x.abs() >= along.y.abs() {
+            true => DVec2::Y * along.x.signum(),
+            false => DVec2::NEG_X * along.y.signum(),
+        };
+        [left, -left]
+    }
+}
+
+/// Points on both sides of pieces of segments that are on the face.
+fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
+    let count = cuts.len();
+    let mut segments = cuts;
+    segments.extend(edges(chart.flat));
+    let box_of = |[p, q]: &Segment| Aabb::of(&[p.extend(0.0), q.extend(0.0)]).grown(rounding);
+    let boxes: Vec<Aabb> = segments.iter().map(box_of).collect();
+    let tree = AabbTree::build(&boxes, LEAF_SIZE);
+    let mut pieces = pieces(&segments, count, &tree, &boxes, rounding);
+    let chain = if pieces.len() <= PIECES + 2 * count {
+        chains(&pieces, rounding)
+    } else {
+        let every = pieces.len().div_ceil(PIECES + count);
+        pieces = pieces.into_iter().step_by(every).collect();
+        (0..2 * pieces.len() as u32).collect()
+    };
+    // Of each side of a chain the point that is farthest from everything.
+    let mut best: Vec<Option<(f64, DVec2)>> = vec![None; chain.len()];
+    for (i, piece) in pieces.iter().enumerate() {
+        for (side, direction) in piece.across().into_iter().enumerate() {
+            let middle = piece.middle();
+            let known = &mut best[chain[2 * i + side] as usize];
+            if let Some(free) = clearance(&tree, &boxes, &segments, middle, direction, rounding)
+                && known.is_none_or(|(most, _)| free > most)
+            {
+                *known = Some((free, middle + 0.5 * free * direction));
+            }
+        }
+    }
+    best.into_iter().flatten().map(|(_, point)| point).collect()
+}
+
+/// The first `count` segments, cut where segments cross them.
+fn pieces(
+    segments: &[Segment],
+    count: usize,
+    tree: &AabbTree,
+    boxes: &[Aabb],
+    rounding: f64,
+) -> Vec<Piece> {
+    let mut crossings = vec![vec![0.0, 1.0]; count];
+    self_overlaps(tree, boxes, |i, j| {
+        let (i, j) = (i as usize, j as usize);
+        if j < count
+            && let Some([s, t]) = crossing(segments[i], segments[j], rounding)
+        {
+            crossings[i].push(s);
+            crossings[j].push(t);
+        }
+    });
+    let mut pieces = Vec::new();
+    for (shares, [p, q]) in crossings.iter_mut().zip(segments) {
+        shares.sort_unstable_by(f64::total_cmp);
+        let ends = shares.windows(2).map(|w| [w[0], w[1]].map(|share| p.lerp(*q, share)));
+        pieces.extend(ends.filter(|[a, b]| a.distance(*b) > rounding).map(|ends| Piece { ends }));
+    }
+    pieces
+}
+
+/// For the left side (`2 i`) and the right side (`2 i + 1`) of each piece the least side of the same chain of pieces.
+fn chains(pieces: &[Piece], rounding: f64) -> Vec<u32> {
+    // Ends of one point are in one cell of a grid or in two that touch.
+    let cell = |p: DVec2| (p / (8.0 * rounding)).round().to_array().map(|c| c as i64);
+    let mut ends: HashMap<[i64; 2], Vec<(u32, usize)>> = HashMap::new();
+    for (i, piece) in pieces.iter().enumerate() {
+        for (end, &p) in piece.ends.iter().enumerate() {
+            ends.entry(cell(p)).or_default().push((i as u32, end));
+        }
+    }
+    let mut sides = DisjointSets::new(2 * pieces.len());
+    for (i, piece) in pieces.iter().enumerate() {
+        for (end, &p) in piece.ends.iter().enumerate() {
+            let [x, y] = cell(p);
+            let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| [x + dx, y + dy]));
+            let here: Vec<(u32, usize)> = around.filter_map(|c| ends.get(&c)).flatten().copied().collect();
+            let others: Vec<_> = here.iter().filter(|e| **e != (i as u32, end)).collect();
+            if let [&(j, other)] = others[..]
+                && j != i as u32
+            {
+                // Left goes on as left where an end meets a beginning.
+                let turned = u32::from(end == other);
+                (0..2).for_each(|side| sides.join(2 * i as u32 + side, 2 * j + (side ^ turned)));
+            }
+        }
+    }
+    (0..2 * pieces.len() as u32).map(|side| sides.find(side)).collect()
+}
+
+/// Where two segments cross or touch, as shares of both; `None` for parallel segments.
+fn crossing([p, q]: Segment, [r, s]: Segment, rounding: f64) -> Option<[f64; 2]> {
+    let (along, other) = (q - p, s - r);
+    let turn = along.perp_dot(other);
+    let [t, u] = [(r - p).perp_dot(other) / turn, (r - p).perp_dot(along) / turn];
+    let within = |share: f64, length: f64| -rounding <= share * length && (share - 1.0) * length <= rounding;
+    let meet = turn != 0.0 && within(t, along.length()) && within(u, other.length());
+    meet.then(|| [t.clamp(0.0, 1.0), u.clamp(0.0, 1.0)])
+}
+
+/// How far it is from a point along an axis to the first segment beyond `rounding`; `None` when there is none.
+fn clearance(
+    tree: &AabbTree,
+    boxes: &[Aabb],
+    segments: &[Segment],
+    from: DVec2,
+    direction: DVec2,
+    rounding: f64,
+) -> Option<f64> {
+    let axis = direction.abs().max_position();
+    let (sign, aside) = (direction[axis], 1 - axis);
+    let at = from.extend(0.0);
+    let way = Aabb::of(&[at, at + direction.extend(0.0) * f64::MAX]);
+    let mut nearest: Option<f64> = None;
+    let mut meet = |[p, q]: Segment| {
+        let width = q[aside] - p[aside];
+        let share = (from[aside] - p[aside]) / width;
+        let ahead = |at: DVec2| sign * (at[axis] - from[axis]);
+        // A segment along the way is met at its nearer end.
+        let distance = match share.is_finite() && width.abs() > rounding {
+            true => ahead(p.lerp(q, share.clamp(0.0, 1.0))),
+            false => ahead(p).min(ahead(q)),
+        };
+        if distance > rounding && nearest.is_none_or(|n| distance < n) {
+            nearest = Some(distance);
+        }
+    };
+    tree.visit(
+        |bounds| bounds.overlaps(way),
+        |items| {
+            let met = items.iter().map(|&i| i as usize).filter(|&i| boxes[i].overlaps(way));
+            met.for_each(|i| meet(segments[i]));
+        },
+    );
+    nearest
+}

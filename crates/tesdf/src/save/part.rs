@@ -1,0 +1,162 @@
+use std::fs::{self, File, TryLockError};
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use super::SaveError;
+use super::links::folder_of;
+
+const PREFIX: &str = ".tesdf-";
+const SUFFIX: &str = ".part";
+
+/// A file that is being written beside the file that it will replace. Dropping it removes it.
+#[derive(Debug)]
+pub struct Part {
+    file: NamedTempFile,
+    /// What it will replace.
+    target: PathBuf,
+    /// The name of that for people.
+    name: PathBuf,
+}
+
+impl Part {
+    /// An empty file in the folder of `target`, which must not be a link. Part files of processes that are gone are removed first.
+    pub(super) fn new(target: &Path, name: &Path) -> Result<Self, SaveError> {
+        if is_locked(target) {
+            return Err(SaveError::Busy { path: name.to_path_buf() });
+        }
+        let folder = folder_of(target);
+        remove_abandoned(folder);
+        let failed = SaveError::io("create a file in", folder);
+        loop {
+            let file = create(target, folder).map_err(&failed)?;
+            // Where the system has no locks, it has none for `remove_abandoned`, which then removes nothing.
+            let _ = file.as_file().lock();
+            // Before it was locked, another process may have taken it for an abandoned file.
+            if file.path().exists() {
+                return Ok(Self { file, target: target.to_path_buf(), name: name.to_path_buf() });
+            }
+        }
+    }
+
+    /// Brings the bytes to the disk and gives the file its name.
+    ///
+    /// # Errors
+    /// What the operating system refused; the file with that name is then as it was.
+    pub fn finish(self) -> Result<GrowingFile, SaveError> {
+        let Self { file, target, name } = self;
+        if let Ok(replaced) = fs::metadata(&target) {
+            keep_owner_and_mode(file.as_file(), &replaced)
+                .map_err(SaveError::io("set the permissions of", &name))?;
+        }
+        file.as_file().sync_all().map_err(SaveError::io("write", &name))?;
+        let file = file.persist(&target).map_err(|e| SaveError::io("replace", &name)(e.error))?;
+        // The rename itself must reach the disk too; not every file system lets a folder be opened or synced.
+        #[cfg(unix)]
+        if let Ok(folder) = File::open(folder_of(&target)) {
+            let _ = folder.sync_all();
+        }
+        Ok(GrowingFile(file))
+    }
+}
+
+impl Write for Part {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// A file in its place that may still grow. No other process replaces it until it is dropped.
+#[derive(Debug)]
+pub struct GrowingFile(File);
+
+impl GrowingFile {
+    /// Cuts the file after `bytes`, where the next write goes on: takes back a write that failed halfway.
+    ///
+    /// # Errors
+    /// What the operating system refused.
+    pub fn cut(&mut self, bytes: u64) -> io::Result<()> {
+        self.0.set_len(bytes)?;
+        self.0.seek(SeekFrom::Start(bytes)).map(drop)
+    }
+}
+
+impl Write for GrowingFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+impl Drop for GrowingFile {
+    fn drop(&mut self) {
+        // Closing is not enough: a process that another thread starts right now has the file open, too, until it executes.
+        let _ = self.0.unlock();
+    }
+}
+
+/// A new file has the permissions of the file that it replaces from the beginning, so nobody else can read it meanwhile.
+fn create(target: &Path, folder: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PREFIX).suffix(SUFFIX);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // What the umask leaves of 0666 is an ordinary file.
+        let mode = fs::metadata(target).map_or(0o666, |m| m.permissions().mode() & 0o777);
+        builder.permissions(fs::Permissions::from_mode(mode));
+    }
+    #[cfg(not(unix))]
+    let _ = target;
+    builder.tempfile_in(folder)
+}
+
+#[cfg(unix)]
+fn keep_owner_and_mode(file: &File, replaced: &fs::Metadata) -> io::Result<()> {
+    use std::os::unix::fs::{MetadataExt, fchown};
+    let created = file.metadata()?;
+    if (created.uid(), created.gid()) != (replaced.uid(), replaced.gid()) {
+        // Only an administrator may give a file away; a group of one's own may be set.
+        let _ = fchown(file, Some(replaced.uid()), Some(replaced.gid()))
+            .or_else(|_| fchown(file, None, Some(replaced.gid())));
+    }
+    // After the owner, as a change of the owner clears bits.
+    file.set_permissions(replaced.permissions())
+}
+
+#[cfg(not(unix))]
+fn keep_owner_and_mode(_: &File, _: &fs::Metadata) -> io::Result<()> {
+    Ok(())
+}
+
+/// Whether a living process holds a lock on the file.
+fn is_locked(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|m| m.is_file())
+        && File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+}
+
+/// Removes part files that no process holds. A folder or file that cannot be read or removed is left alone.
+fn remove_abandoned(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for entry in entries.flatten() {
+        let name = entry.file_name();
+        let is_part = name.to_str().is_some_and(|name| name.starts_with(PREFIX) && name.ends_with(SUFFIX));
+        if !is_part || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            continue;
+        }
+        // The lock is held until the file is gone, so its process, if it has just begun, notices.
+        if let Ok(file) = File::open(entry.path())
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Distances in exact rational arithmetic.
+use glam::DVec3;
+use num_rational::BigRational;
+
+type Point = [BigRational; 3];
+
+fn number(x: f64) -> BigRational {
+    BigRational::from_float(x).expect("coordinates are finite")
+}
+
+fn point(p: DVec3) -> Point {
+    p.to_array().map(number)
+}
+
+fn minus(a: &Point, b: &Point) -> Point {
+    std::array::from_fn(|k| &a[k] - &b[k])
+}
+
+fn dot(a: &Point, b: &Point) -> BigRational {
+    &a[0] * &b[0] + &a[1] * &b[1] + &a[2] * &b[2]
+}
+
+fn cross(a: &Point, b: &Point) -> Point {
+    [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &a[i] * &b[j] - &a[j] * &b[i])
+}
+
+/// The squared distance between a point and a triangle of any shape, exact.
+pub fn squared_distance(p: DVec3, corners: [DVec3; 3]) -> BigRational {
+    let p = point(p);
+    let corners = corners.map(point);
+    let zero = number(0.0);
+    let edges: [Point; 3] = std::array::from_fn(|k| minus(&corners[(k + 1) % 3], &corners[k]));
+    let normal = cross(&edges[0], &edges[1]);
+    let area = dot(&normal, &normal);
+    let from: [Point; 3] = std::array::from_fn(|k| minus(&p, &corners[k]));
+    let is_over = |k: usize| dot(&cross(&edges[k], &from[k]), &normal) >= zero;
+    if area > zero && (0..3).all(is_over) {
+        let height = dot(&normal, &from[0]);
+        return &height * &height / area;
+    }
+    let to_edge = |k: usize| {
+        let (along, length) = (dot(&edges[k], &from[k]), dot(&edges[k], &edges[k]));
+        let start = dot(&from[k], &from[k]);
+        if along <= zero {
+            start
+        } else if along >= length {
+            let end = minus(&from[k], &edges[k]);
+            dot(&end, &end)
+        } else {
+            start - &along * &along / length
+        }
+    };
+    (0..3).map(to_edge).min().unwrap_or(zero)
+}
+
+/// Whether `distance` is the root of `squared` up to `tolerance`.
+pub fn is_root(distance: f64, squared: &BigRational, tolerance: f64) -> bool {
+    if !(distance.is_finite() && distance >= 0.0) {
+        return false;
+    }
+    let (distance, tolerance) = (number(distance), number(tolerance));
+    let low = (&distance - &tolerance).max(number(0.0));
+    let high = distance + tolerance;
+    &low * &low <= *squared && *squared <= &high * &high
+}

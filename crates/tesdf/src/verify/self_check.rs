@@ -1,0 +1,102 @@
+//! A new encoding against brute force, before it counts as proved.
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::brute_force::BruteForce;
+use super::compare::{Comparison, Worst};
+use super::{PointClass, mesh_of};
+use crate::TeSdf;
+use crate::asset::CellKind;
+use crate::geometry::WindingNumber;
+use crate::mesh::MeshError;
+use crate::query::Precision;
+use crate::sampling::Random;
+
+/// Points in cells of one kind. All together take 2 % of the time that encoding takes (docs/benchmarks.md).
+const POINTS: usize = 128;
+const SEED: u64 = 0x7e5d;
+const KINDS: [CellKind; 6] = [
+    CellKind::Outside,
+    CellKind::Inside,
+    CellKind::Crossing,
+    CellKind::FarOutside,
+    CellKind::FarInside,
+    CellKind::NotOfDomain,
+];
+
+/// Where an encoding is wrong, if it is: the point whose distance or sign is off the most, of points in cells of every kind.
+///
+/// The least distance over all faces and an exact winding number are the truth; nothing of the lists or the face tree is.
+pub(crate) fn self_check(asset: &TeSdf) -> Result<Option<(Precision, Worst)>, MeshError> {
+    let (mesh, _) = mesh_of(asset)?;
+    let (truth, winding) = (BruteForce::new(&mesh, mesh.diagonal()), WindingNumber::new(&mesh));
+    let certificate = asset.about().certificate();
+    let compare = |point: &DVec3| {
+        let distance = truth.distance(*point);
+        let expected = if winding.at_perturbed(*point) >= 1 { -distance } else { distance };
+        let of = |precision| {
+            let mut comparison = Comparison::new(precision, &mesh, certificate);
+            comparison.add(PointClass::Box, *point, expected, &asset.query(*point, precision), None);
+            Some(precision).zip(comparison.worst_mistake())
+        };
+        of(Precision::F64).or_else(|| of(Precision::F32))
+    };
+    let mistakes: Vec<(Precision, Worst)> = points(asset).par_iter().filter_map(compare).collect();
+    let error = |worst: &Worst| (worst.found - worst.expected).abs();
+    Ok(mistakes.into_iter().max_by(|a, b| error(&a.1).total_cmp(&error(&b.1))))
+}
+
+/// Points in cells of every kind, half of them on a border.
+fn points(asset: &TeSdf) -> Vec<DVec3> {
+    let mut cells: [Vec<[DVec3; 4]>; KINDS.len()] = Default::default();
+    asset.visit_cells(|cell| {
+        let kind = KINDS.iter().position(|&kind| kind == cell.kind).unwrap_or(0);
+        cells[kind].push(cell.corners);
+    });
+    let mut points = Vec::new();
+    for (kind, cells) in cells.iter().enumerate().filter(|(_, cells)| !cells.is_empty()) {
+        for index in 0..POINTS {
+            let random = &mut Random::new(SEED + kind as u64, index as u64);
+            let [a, b, c, d] = cells[random.below(cells.len())];
+            points.push(if index % 2 == 0 {
+                random.in_simplex(&[a, b, c, d])
+            } else {
+                random.in_simplex(&[a, b, c])
+            });
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::asset::SharedSection;
+    use crate::asset::about::Source;
+    use crate::asset::layout::{Label, Node};
+    use crate::encode::{EncodeOptions, EncodeProgress, encode};
+    use crate::mesh::{MeshFormat, SolidMesh, read_bytes};
+
+    #[test]
+    fn lists_of_other_cells_are_noticed() {
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+        let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj).expect("a mesh").mesh;
+        let solid = SolidMesh::new(mesh).expect("a solid");
+        let options = EncodeOptions::default();
+        let mut asset =
+            encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
+        assert_eq!(self_check(&asset), Ok(None));
+        // All cells outside get the list of the first.
+        let mut nodes = asset.nodes.to_vec();
+        let mut first = None;
+        for word in &mut nodes {
+            if let Node::Listed(Label::Outside, offset) = Node::decode(*word, &asset.lists) {
+                *word = Node::Listed(Label::Outside, *first.get_or_insert(offset)).encode();
+            }
+        }
+        asset.nodes = SharedSection::of_rows(&nodes);
+        let (precision, worst) = self_check(&asset).expect("a mesh").expect("it is wrong");
+        assert_eq!(precision, Precision::F64);
+        assert!((worst.found - worst.expected).abs() > 0.01, "{worst:?}");
+    }
+}

@@ -1,0 +1,34 @@
+//! Tetrahedra files of any bytes: the first byte chooses the format, the others are the file; of TetGen's two files the part after the first
+//! byte 0 is the second.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tesdf::domain::load_tetrahedra;
+
+fuzz_target!(|data: &[u8]| {
+    let Some((choice, bytes)) = data.split_first() else { return };
+    let folder = tempfile::tempdir().expect("a folder for temporary files");
+    let at = |extension: &str| folder.path().join("fuzz").with_extension(extension);
+    let write = |extension: &str, bytes: &[u8]| std::fs::write(at(extension), bytes).expect("room for a file");
+    let path = match choice % 3 {
+        0 => {
+            write("msh", bytes);
+            at("msh")
+        }
+        1 => {
+            write("vtu", bytes);
+            at("vtu")
+        }
+        _ => {
+            let split = bytes.iter().position(|&b| b == 0).unwrap_or(bytes.len());
+            write("node", &bytes[..split]);
+            write("ele", bytes.get(split + 1..).unwrap_or_default());
+            at("node")
+        }
+    };
+    if let Ok(loaded) = load_tetrahedra(&path) {
+        let vertices = loaded.mesh.vertices();
+        assert!(loaded.mesh.tetrahedra().iter().flatten().all(|&v| (v as usize) < vertices.len()));
+        assert!(vertices.iter().all(|p| p.is_finite()));
+    }
+});
