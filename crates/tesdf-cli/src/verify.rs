@@ -1,14 +1,18 @@
 //! `tesdf verify FILE`
+mod proof;
+
+use std::num::NonZeroU64;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::asset::{AssetError, Container, layout};
-use tesdf::verify::{PrecisionReport, VerifyOptions, VerifyReport, Worst, verify};
+use tesdf::verify::{PrecisionReport, ProveReport, VerifyError, VerifyOptions, VerifyReport, Worst, verify};
 
 use crate::asset_file;
-use crate::progress::Progress;
+use crate::progress::{Progress, interrupt_flag};
 use crate::report::{self, Failure, Outcome, count};
 
 /// Arguments of `tesdf verify`.
@@ -19,6 +23,18 @@ pub struct Args {
     /// Number of points that are compared with brute force
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     pub samples: u32,
+    /// Also prove, cell by cell and with code of its own, that the lists, the signs and the face tree are right
+    ///
+    /// For every cell: no face outside of the cell's list is closer than the list by more than the δ of the certificate, at any point of the
+    /// cell; and the sign is right in all of the cell. The proof shares the layout of the file, the corners of the cells and exact predicates with the
+    /// encoder, and neither rules nor trees. It does not cover single precision, the search for a point's cell, and the
+    /// sign hints of faces: the comparison with brute force is for these. A cell is proved, refuted (with a point where the list is
+    /// wrong) or undecided; the exit code is 0 only if all are proved.
+    #[arg(long)]
+    pub prove: bool,
+    /// Most pieces that --prove cuts one cell into before the cell is undecided [default: 1048576]
+    #[arg(long, value_name = "N", requires = "prove")]
+    pub pieces: Option<NonZeroU64>,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
@@ -34,6 +50,8 @@ struct Report {
     /// Why the file failed before the comparison.
     error: Option<String>,
     comparison: Option<VerifyReport>,
+    /// What `--prove` found.
+    prove: Option<ProveReport>,
 }
 
 /// Compares a file with its checksums, then its answers with brute force, and prints what was found.
@@ -51,23 +69,63 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         Err(e) => {
             return finish(
                 args,
-                Report { file, passed: false, intact: false, error: Some(e.to_string()), comparison: None },
+                Report {
+                    file,
+                    passed: false,
+                    intact: false,
+                    error: Some(e.to_string()),
+                    comparison: None,
+                    prove: None,
+                },
             );
         }
     };
-    let bar = Progress::new("comparing with brute force");
-    let options = VerifyOptions { samples: args.samples as usize, ..VerifyOptions::default() };
-    let found = verify(&asset, &options, |share| {
-        bar.set(share);
-        ControlFlow::Continue(())
-    });
-    drop(bar);
-    let (comparison, error) = match found {
+    let interrupted = interrupt_flag()?;
+    let (comparison, mut error) = match compare(args, &asset, &interrupted)? {
         Ok(found) => (Some(found), None),
         Err(e) => (None, Some(e.to_string())),
     };
-    let passed = comparison.as_ref().is_some_and(|c| c.passed);
-    finish(args, Report { file, passed, intact: true, error, comparison })
+    let mut passed = comparison.as_ref().is_some_and(|c| c.passed);
+    let mut prove = None;
+    if args.prove {
+        match proof::run(args, &asset, &interrupted)? {
+            Ok(found) => {
+                passed &= found.proved;
+                prove = Some(found);
+            }
+            Err(e) => {
+                passed = false;
+                error = error.or(Some(e.to_string()));
+            }
+        }
+    }
+    finish(args, Report { file, passed, intact: true, error, comparison, prove })
+}
+
+/// The comparison with brute force.
+fn compare(
+    args: &Args,
+    asset: &TeSdf,
+    interrupted: &AtomicBool,
+) -> Result<Result<VerifyReport, VerifyError>, Failure> {
+    let bar = Progress::new("comparing with brute force");
+    let options = VerifyOptions { samples: args.samples as usize, ..VerifyOptions::default() };
+    let found = verify(asset, &options, |share| go_on(&bar, share, interrupted));
+    uninterrupted(interrupted)?;
+    Ok(found)
+}
+
+/// Shows the share done, and says whether Ctrl-C was pressed.
+fn go_on(bar: &Progress, share: f64, interrupted: &AtomicBool) -> ControlFlow<()> {
+    bar.set(share);
+    if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+}
+
+fn uninterrupted(interrupted: &AtomicBool) -> Result<(), Failure> {
+    match interrupted.load(Ordering::Relaxed) {
+        true => Err(Failure::new("interrupted; nothing was found out")),
+        false => Ok(()),
+    }
 }
 
 /// Opens a file after every byte was compared with the checksums: what opening looks at more closely is then as written.
@@ -105,6 +163,9 @@ fn text(report: &Report) -> String {
             found.winding_disagreements
         );
         found.precisions.iter().for_each(|precision| text += &precision_text(precision));
+    }
+    if let Some(found) = &report.prove {
+        text += &proof::text(found);
     }
     text + if report.passed { "passed\n" } else { "not passed\n" }
 }

@@ -315,3 +315,27 @@ fn samples_on_a_device_are_in_32_bits_and_the_file_says_so() {
         (Some(2), "error: --device is of the sampled encoder; add --encoder sampled")
     );
 }
+
+#[test]
+fn a_file_is_proved_or_the_exit_code_says_so() {
+    let folder = cube();
+    folder.write("torus.obj", torus(24, 12));
+    folder.good(&["encode", "torus.obj", "-o", "torus.tesdf", "--preset", "fast"]);
+    let out = folder.good(&["verify", "torus.tesdf", "--prove", "--samples", "200", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let prove = &json["prove"];
+    assert_eq!((&json["passed"], &prove["proved"]), (&true.into(), &true.into()), "{out}");
+    assert_eq!(prove["distances"]["proved"], prove["distances"]["claims"]);
+    assert!(prove["pieces"].as_u64() > Some(100) && prove["faults"] == serde_json::json!([]));
+
+    let (code, out, _) =
+        folder.tesdf(&["verify", "torus.tesdf", "--prove", "--pieces", "1", "--samples", "200"]);
+    assert_eq!(code, Some(1), "{out}");
+    assert!(out.contains("NOT everything is proved") && out.ends_with("not passed\n"), "{out}");
+    assert!(out.contains("undecided: cell ") && out.contains("--pieces"), "{out}");
+
+    let without = folder.good(&["verify", "cube.tesdf", "--samples", "20", "--json"]);
+    assert!(serde_json::from_str::<serde_json::Value>(&without).unwrap()["prove"].is_null());
+    let (code, _, err) = folder.tesdf(&["verify", "cube.tesdf", "--pieces", "5"]);
+    assert_eq!(code, Some(2), "{err}");
+}

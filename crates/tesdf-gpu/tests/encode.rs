@@ -155,7 +155,7 @@ fn a_whole_asset_in_both_domains() {
         for (list, expected) in lists.iter().zip(&expected_lists) {
             assert!(expected.iter().all(|face| list.contains(face)), "{expected:?} are not all in {list:?}");
         }
-        let said = |asset: &TeSdf| asset.about().certificate().encoder().clone();
+        let said = |asset: &TeSdf| asset.about().certificate().encoder().to_string();
         assert_eq!(said(&asset), format!("sampled, f32, {}", device.info().kind));
         assert_eq!(said(&expected), "sampled");
         assert_eq!(asset.about().certificate().delta(), None);

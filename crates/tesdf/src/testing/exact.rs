@@ -63,3 +63,12 @@ pub fn is_root(distance: f64, squared: &BigRational, tolerance: f64) -> bool {
     let high = distance + tolerance;
     &low * &low <= *squared && *squared <= &high * &high
 }
+
+/// Whether `low` is at most the root of `squared`, and `high` at least.
+pub fn is_between(low: f64, squared: &BigRational, high: f64) -> bool {
+    let square = |x: f64| {
+        let x = number(x.max(0.0));
+        &x * &x
+    };
+    square(low) <= *squared && *squared <= square(high)
+}

@@ -5,6 +5,7 @@
 //! the asset holds.
 pub(crate) mod brute_force;
 mod compare;
+mod prove;
 mod samples;
 mod self_check;
 
@@ -23,6 +24,7 @@ use crate::query::Precision;
 use brute_force::BruteForce;
 use compare::Comparison;
 pub use compare::{ClassErrors, PrecisionReport, Promise, Worst};
+pub use prove::{Claim, Fault, ProveError, ProveOptions, ProveReport, Tally, Verdict, prove};
 pub use samples::PointClass;
 use samples::Sampler;
 pub(crate) use self_check::self_check;

@@ -1,0 +1,90 @@
+//! `tesdf verify --prove FILE`
+use std::sync::atomic::AtomicBool;
+
+use tesdf::TeSdf;
+use tesdf::verify::{Fault, ProveError, ProveOptions, ProveReport, Tally, Verdict, prove};
+
+use super::{Args, go_on, uninterrupted};
+use crate::progress::Progress;
+use crate::report::{Failure, count};
+
+/// Proves what the file says of itself.
+///
+/// # Errors
+/// Ctrl-C was pressed. That nothing can be proved is a result.
+pub fn run(
+    args: &Args,
+    asset: &TeSdf,
+    interrupted: &AtomicBool,
+) -> Result<Result<ProveReport, ProveError>, Failure> {
+    let bar = Progress::new("proving cell by cell");
+    let mut options = ProveOptions::default();
+    if let Some(pieces) = args.pieces {
+        options.pieces = pieces.get();
+    }
+    let found = prove(asset, &options, |share| go_on(&bar, share, interrupted));
+    uninterrupted(interrupted)?;
+    Ok(found)
+}
+
+/// What was found, for a person.
+pub fn text(report: &ProveReport) -> String {
+    let of = if report.certified {
+        "the certificate's"
+    } else {
+        "of the certified encoder; the file certifies nothing"
+    };
+    let mut text = format!(
+        "proof: {}\n  delta           {:.3e} = {:.2e} of the diagonal, {of}\n",
+        if report.proved { "everything is proved" } else { "NOT everything is proved" },
+        report.delta,
+        report.delta_of_diagonal,
+    );
+    if let Some(within) = report.within {
+        text += &format!("  only within     {within:e} of the surface, as lists are cut\n");
+    }
+    text += &tally("distances", "list", &report.distances);
+    text += &tally("signs", "label", &report.signs);
+    text += &tally("face tree", "tree", &report.face_tree);
+    text += &format!(
+        "  pieces          {}, at most {} of one cell\n",
+        count(report.pieces as usize, "piece"),
+        report.most_pieces
+    );
+    report.faults.iter().for_each(|fault| text += &fault_text(fault));
+    let undecided = report.distances.undecided + report.signs.undecided;
+    if undecided > 0 {
+        text += "  undecided is not wrong: --pieces with a larger number may tell\n";
+    }
+    text
+}
+
+fn tally(name: &str, what: &str, t: &Tally) -> String {
+    let Tally { claims, proved, refuted, undecided } = *t;
+    format!(
+        "  {name:<15} {proved} of {} proved, {refuted} refuted, {undecided} undecided\n",
+        count(claims, what)
+    )
+}
+
+fn fault_text(fault: &Fault) -> String {
+    let verdict = match fault.verdict {
+        Verdict::Refuted => "refuted",
+        Verdict::Undecided => "undecided",
+    };
+    let mut text = format!("  {verdict}: ");
+    if let Some(cell) = fault.cell {
+        text += &format!("cell {cell}: ");
+    }
+    text += &fault.reason;
+    if let Some(face) = fault.face {
+        text += &format!("; face {face} (0-based)");
+    }
+    if let Some([x, y, z]) = fault.point {
+        text += &format!("; at {x:?},{y:?},{z:?}");
+    }
+    if let (Some(list), Some(face)) = (fault.list_distance, fault.face_distance) {
+        text += &format!("; the list is at {list:?}, the face at {face:?}");
+    }
+    text + "\n"
+}

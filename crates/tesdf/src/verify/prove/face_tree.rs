@@ -1,0 +1,72 @@
+//! Whether the face tree can find every face: its leaves name each face once, and its boxes hold what is below them.
+use glam::DVec3;
+
+use super::exact::difference;
+use super::report::{Claim, Fault};
+use crate::TeSdf;
+use crate::asset::layout::TreeChild;
+use crate::geometry::Aabb;
+
+/// What is wrong with the face tree, or with the names of the faces.
+pub fn faults(asset: &TeSdf, triangles: &[[DVec3; 3]]) -> Vec<Fault> {
+    let mut check = Check { asset, triangles, named: vec![0; triangles.len()], faults: Vec::new() };
+    check.node(0);
+    if let Some(face) = check.named.iter().position(|&times| times != 1) {
+        let times = check.named[face];
+        let reason = format!("the leaves of the face tree name the face {times} times; expected once");
+        check.faults.push(Fault::refuted(Claim::FaceTree, reason).face(asset, face as u32));
+    }
+    let mut ids = vec![false; triangles.len()];
+    for (face, &id) in (0..).zip(asset.face_ids.iter()) {
+        if std::mem::replace(&mut ids[id as usize], true) {
+            let reason = format!("two faces of the file have the id {id}");
+            check.faults.push(Fault::refuted(Claim::FaceTree, reason).face(asset, face));
+            break;
+        }
+    }
+    check.faults
+}
+
+struct Check<'a> {
+    asset: &'a TeSdf,
+    triangles: &'a [[DVec3; 3]],
+    /// How often each face is named.
+    named: Vec<u32>,
+    faults: Vec<Fault>,
+}
+
+impl Check<'_> {
+    /// Bounds of the faces below a node. Opening has checked that the tree is no deeper than a stack can be.
+    fn node(&mut self, node: u32) -> Aabb {
+        let boxes = self.asset.tree_boxes[node as usize];
+        let children = self.asset.tree_children[node as usize].map(TreeChild::decode);
+        let mut all = Aabb::EMPTY;
+        for (side, child) in children.into_iter().enumerate() {
+            let bounds = match child {
+                TreeChild::Node(below) => self.node(below),
+                TreeChild::Leaf(start, count) => (start..start + count).fold(Aabb::EMPTY, |bounds, face| {
+                    self.named[face as usize] += 1;
+                    bounds.union(Aabb::of(&self.triangles[face as usize]))
+                }),
+            };
+            let middle = self.asset.cube.middle();
+            let holds = (0..3).all(|k| {
+                let (low, high) = (f64::from(boxes[6 * side + k]), f64::from(boxes[6 * side + 3 + k]));
+                is_at_most(low, bounds.min[k], middle[k]) && is_at_most(-high, -bounds.max[k], -middle[k])
+            });
+            if !holds {
+                let reason =
+                    format!("box {side} of node {node} of the face tree does not hold the faces below it");
+                self.faults.push(Fault::refuted(Claim::FaceTree, reason));
+            }
+            all = all.union(bounds);
+        }
+        all
+    }
+}
+
+/// Whether `bound <= x - middle`, exact.
+fn is_at_most(bound: f64, x: f64, middle: f64) -> bool {
+    let (rounded, lost) = difference(x, middle);
+    bound < rounded || (bound == rounded && lost >= 0.0)
+}

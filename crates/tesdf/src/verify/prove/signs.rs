@@ -1,0 +1,115 @@
+//! Whether the label of a cell is right all over the cell: the winding number at its centroid, and no face that passes through.
+use glam::DVec3;
+
+use super::apart::{are_apart, common_point};
+use super::parts::rounding;
+use super::report::{Claim, Fault};
+use super::surface::Surface;
+use super::winding::Rays;
+use crate::TeSdf;
+use crate::asset::layout::{Label, Node, Side};
+use crate::domain::Cell;
+
+/// What looks at the labels of the cells of a bisection domain.
+pub struct Signs<'a> {
+    pub asset: &'a TeSdf,
+    pub surface: &'a Surface,
+    pub rays: Rays<'a>,
+    /// How near to a cell a face counts as passing through it: more than a point can miss its cell by.
+    pub gap: f64,
+}
+
+impl Signs<'_> {
+    /// What is wrong with the sign of a cell. `near` are the faces near it, `list` is its list.
+    pub fn fault(&self, word: u32, cell: &Cell, node: Node, list: &[u32], near: &[u32]) -> Option<Fault> {
+        let fault = self.located(word, cell).or_else(|| self.label(cell, node));
+        let fault = fault.or_else(|| {
+            // Where the surface passes, the sign is counted over the faces of the list.
+            let counted: &[u32] =
+                if matches!(node, Node::Listed(Label::Crossing(_), _)) { list } else { &[] };
+            self.passing(cell, near, counted)
+        });
+        fault.map(|f| f.cell(word))
+    }
+
+    /// A query at the centroid must arrive at the cell.
+    pub fn located(&self, word: u32, cell: &Cell) -> Option<Fault> {
+        let centroid = cell.centroid();
+        let (_, found) = self.asset.place_and_word(centroid);
+        (found != word as usize).then(|| {
+            Fault::refuted(Claim::Sign, "a query at the centroid of the cell arrives at another cell")
+                .at(self.asset, centroid)
+        })
+    }
+
+    fn label(&self, cell: &Cell, node: Node) -> Option<Fault> {
+        let centroid = cell.centroid();
+        let winding = self.rays.at(centroid);
+        let wrong = |says: String| {
+            let reason = format!("the label says {says}; the winding number at the centroid is {winding}");
+            Some(Fault::refuted(Claim::Sign, reason).at(self.asset, centroid))
+        };
+        match node {
+            Node::Listed(Label::Crossing(w), _) if w as i32 != winding => wrong(format!("{}", w as i32)),
+            Node::Listed(Label::Crossing(_), _) | Node::Split(_) => None,
+            _ => {
+                let inside = side_of(node) == Side::Inside;
+                (inside != (winding >= 1)).then_some(())?;
+                wrong((if inside { "inside" } else { "outside" }).into())
+            }
+        }
+    }
+
+    /// A face that comes into the cell, besides the `counted` ones.
+    fn passing(&self, cell: &Cell, near: &[u32], counted: &[u32]) -> Option<Fault> {
+        let middle = cell.centroid();
+        let corners = cell.corners.map(|c| c - middle);
+        let radius = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
+        let reach = radius + self.gap + 2.0 * self.surface.error;
+        let comes_near = |face: u32| {
+            let bound = self.surface.triangles[face as usize].low(middle, self.surface.error);
+            bound.distance <= reach && !counted.contains(&face)
+        };
+        for face in near.iter().copied().filter(|&face| comes_near(face)) {
+            let local = self.surface.triangles[face as usize].corners.map(|c| c - middle);
+            let error = rounding(local.iter().map(|c| c.length()).fold(radius, f64::max) + radius);
+            if are_apart(&corners, &local, self.gap, error) {
+                continue;
+            }
+            let says = if counted.is_empty() {
+                "a face passes through the cell, whose label says that none does"
+            } else {
+                "a face passes through the cell and is not in its list, so the sign is counted without it"
+            };
+            return Some(
+                match common_point(&corners, &local) {
+                    Some(p) => Fault::refuted(Claim::Sign, says).at(self.asset, p + middle),
+                    None => {
+                        let reason =
+                            format!("a face comes so near to the cell that it may pass through it: {says}");
+                        Fault::undecided(Claim::Sign, reason).at(self.asset, middle)
+                    }
+                }
+                .face(self.asset, face),
+            );
+        }
+        None
+    }
+
+    /// Outside of the cube everything counts as outside: no face may be there.
+    pub fn beyond_cube(&self) -> Option<Fault> {
+        let (low, side) = (self.asset.cube.origin(), self.asset.cube.side());
+        let is_beyond = |p: &DVec3| !(p.cmpge(low).all() && p.cmple(low + side).all());
+        let at = self.surface.points.iter().find(|p| is_beyond(p))?;
+        let reason = "a vertex lies outside of the cube, where every query says outside";
+        Some(Fault::refuted(Claim::Sign, reason).at(self.asset, *at))
+    }
+}
+
+/// The side that the label of a cell says; of one that the surface passes through, the outside.
+pub fn side_of(node: Node) -> Side {
+    match node {
+        Node::Listed(Label::Inside, _) | Node::Far(Side::Inside) => Side::Inside,
+        _ => Side::Outside,
+    }
+}

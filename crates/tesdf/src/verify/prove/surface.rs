@@ -1,0 +1,87 @@
+//! The surface of an asset as the proof sees it: vertices told apart by where they are, and a ball around each face.
+use std::collections::HashMap;
+
+use glam::DVec3;
+
+use super::ProveError;
+use super::exact::difference;
+use super::parts::{Face, rounding};
+use crate::geometry::LocalFrame;
+
+/// Farther from the origin of the local frame no vertex and no cell may be: rounding is counted for such lengths.
+pub const FARTHEST: f64 = 64.0;
+
+/// All faces, in the local frame and the order of the file.
+pub struct Surface {
+    /// Positions, each once.
+    pub points: Vec<DVec3>,
+    /// Corners of the faces: places in `points`.
+    pub faces: Vec<[u32; 3]>,
+    /// The faces themselves.
+    pub triangles: Vec<Face>,
+    /// A point of each face, and a radius around it that holds the face.
+    balls: Vec<(DVec3, f64)>,
+    /// Bound on the error of a distance between points that are [`FARTHEST`] from the origin.
+    pub error: f64,
+}
+
+impl Surface {
+    /// The mesh of an asset.
+    ///
+    /// # Errors
+    /// When the way to the local frame rounds a vertex, or leads too far from its origin.
+    pub fn new(vertices: &[[f64; 3]], faces: &[[u32; 3]], frame: LocalFrame) -> Result<Self, ProveError> {
+        let is_exact = |v: DVec3| (0..3).all(|k| difference(v[k], frame.offset[k]).1 == 0.0);
+        let mut places = HashMap::new();
+        let mut points = Vec::new();
+        let mut place_of = Vec::with_capacity(vertices.len());
+        for (vertex, &v) in vertices.iter().enumerate() {
+            let v = DVec3::from_array(v);
+            let p = frame.to_local(v);
+            let back = p / frame.scale;
+            if !(is_exact(v) && back == v - frame.offset && p.abs().max_element() <= FARTHEST) {
+                return Err(ProveError::Frame { vertex });
+            }
+            // -0 is 0.
+            let bits = (p + 0.0).to_array().map(f64::to_bits);
+            place_of.push(*places.entry(bits).or_insert_with(|| {
+                points.push(p + 0.0);
+                points.len() as u32 - 1
+            }));
+        }
+        let faces: Vec<[u32; 3]> = faces.iter().map(|f| f.map(|v| place_of[v as usize])).collect();
+        let triangles: Vec<Face> =
+            faces.iter().map(|f| Face::new(f.map(|v| points[v as usize]), 0.0)).collect();
+        let ball = |face: &Face| {
+            let [a, b, c] = face.corners;
+            let middle = (a + b + c) / 3.0;
+            (middle, face.corners.iter().map(|p| p.distance(middle)).fold(0.0, f64::max))
+        };
+        let balls = triangles.iter().map(ball).collect();
+        Ok(Self { points, faces, triangles, balls, error: rounding(4.0 * FARTHEST) })
+    }
+
+    /// Keeps those of `faces` that can be closest to a point within `radius` of `center`.
+    ///
+    /// Of a face that is left out, every point of that ball is at least as far as from some face that is kept.
+    pub fn retain_near(&self, center: DVec3, radius: f64, faces: &[u32]) -> Vec<u32> {
+        let ball = |face: u32| {
+            let (middle, reach) = self.balls[face as usize];
+            (middle.distance(center), reach)
+        };
+        let mut high = faces.iter().map(|&f| ball(f).0).fold(f64::INFINITY, f64::min) + self.error;
+        for &face in faces {
+            let (distance, reach) = ball(face);
+            if distance - reach <= high {
+                high = high.min(self.triangles[face as usize].high(center, self.error).distance);
+            }
+        }
+        let limit = high + 2.0 * radius + 2.0 * self.error;
+        let is_near = |face: &u32| {
+            let (distance, reach) = ball(*face);
+            distance - reach <= limit
+                && self.triangles[*face as usize].low(center, self.error).distance <= limit
+        };
+        faces.iter().copied().filter(is_near).collect()
+    }
+}
