@@ -264,7 +264,9 @@ impl Drop for LiveProgress<'_> {
 fn warn_of(hidden: &[HiddenPair], mode: DetectorMode) {
     hidden.iter().for_each(|pair| report::warning(&pair.message()));
     if !hidden.is_empty() && mode == DetectorMode::Node {
-        report::hint("the mode node tests vertices alone: use --mode face or --mode exact, or mesh the bodies more finely");
+        report::hint(
+            "the mode node tests vertices alone: use --mode face or --mode exact, or mesh the bodies more finely",
+        );
     }
 }
 

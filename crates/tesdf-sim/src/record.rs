@@ -39,8 +39,8 @@ use tesdf::save::{SaveError, save_atomic};
 
 use crate::{State, System};
 
-use hidden::HiddenRows;
 pub use hidden::HiddenPair;
+use hidden::HiddenRows;
 pub use journal::{CutRun, RunJournal};
 pub use origin::RunOrigin;
 

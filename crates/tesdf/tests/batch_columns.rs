@@ -80,7 +80,10 @@ fn columns_are_the_answers() {
     }
     assert!((2000..2 * points.len() - 2000).contains(&asides), "{asides} answers are outside of the domain");
 
-    assert_eq!(asset.query_batch_into(&[], Precision::F64, Extent::Everywhere, Columns::new(0).as_mut()), Ok(()));
+    assert_eq!(
+        asset.query_batch_into(&[], Precision::F64, Extent::Everywhere, Columns::new(0).as_mut()),
+        Ok(())
+    );
 }
 
 /// Lengths that differ are an error that names the array, and no row is written.
@@ -98,9 +101,13 @@ fn lengths_that_differ_are_an_error() {
             closest_point: &mut c.closest_point,
             face: &mut f.face,
         };
-        let refused = asset.query_batch_into(&points, Precision::F64, Extent::Everywhere, columns).unwrap_err();
+        let refused =
+            asset.query_batch_into(&points, Precision::F64, Extent::Everywhere, columns).unwrap_err();
         assert_eq!(refused, BatchError { column, found: rows, expected: 20 });
-        assert!(refused.to_string().contains(&format!("{column} has {rows} rows for 20 points")), "{refused}");
+        assert!(
+            refused.to_string().contains(&format!("{column} has {rows} rows for 20 points")),
+            "{refused}"
+        );
         assert!(d.signed_distance.iter().all(|&d| d == 7.0) && f.face.iter().all(|&f| f == 7));
     }
     let mut distances = [7.0; 21];

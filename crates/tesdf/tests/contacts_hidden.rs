@@ -36,7 +36,8 @@ fn bodies(a: Arc<Body>, b: Arc<Body>, to: Placement) -> Scene {
 }
 
 fn found(scene: &Scene, mode: Mode) -> Contacts {
-    detect(scene, &CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode) }).expect("good")
+    detect(scene, &CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode) })
+        .expect("good")
 }
 
 /// The depth of the hidden overlap of the first two instances.
@@ -99,7 +100,8 @@ fn bars_that_cross_like_a_plus_sign() {
         let tall = block(DVec3::new(1.0, 5.0, height));
         let scene = bodies(along(5.0, thickness), tall, at(2.0, -2.0, 0.5 * (1.0 - height)));
         assert_eq!(deepest(&found(&scene, NODE)), 0.0, "no node is inside");
-        let depth = -clearance(&scene, IDS[0], IDS[1], &ClearanceOptions::default()).expect("a pair").distance;
+        let depth =
+            -clearance(&scene, IDS[0], IDS[1], &ClearanceOptions::default()).expect("a pair").distance;
         let told = hidden(&scene, NODE).expect("nothing hidden");
         assert!((0.7 * depth..depth * (1.0 + 1e-6)).contains(&told), "{told} of {depth}");
     }
@@ -119,8 +121,10 @@ fn a_capsule_across_a_bar() {
 #[test]
 fn bodies_that_touch_or_are_apart_have_no_hidden_overlap() {
     let turned = DQuat::from_axis_angle(DVec3::Z, 0.25 * std::f64::consts::PI);
-    let on_edge =
-        Placement { pose: Pose { translation: DVec3::new(1.0 + 0.5f64.sqrt(), 0.0, 0.0), rotation: turned }, scale: 1.0 };
+    let on_edge = Placement {
+        pose: Pose { translation: DVec3::new(1.0 + 0.5f64.sqrt(), 0.0, 0.0), rotation: turned },
+        scale: 1.0,
+    };
     let small = Placement { scale: 0.1, ..at(1.0, 0.3, 0.3) };
     for mode in MODES {
         for to in [
@@ -140,7 +144,10 @@ fn bodies_that_touch_or_are_apart_have_no_hidden_overlap() {
         }
         // A plate as thin as a thousandth, on another, turned.
         let plate = block(DVec3::new(1.0, 1.0, 1e-3));
-        let to = Placement { pose: Pose { translation: DVec3::new(0.5, 0.0, 1e-3), rotation: turned }, scale: 1.0 };
+        let to = Placement {
+            pose: Pose { translation: DVec3::new(0.5, 0.0, 1e-3), rotation: turned },
+            scale: 1.0,
+        };
         assert_eq!(hidden(&bodies(plate.clone(), plate, to), mode), None);
     }
 }
@@ -149,10 +156,15 @@ fn bodies_that_touch_or_are_apart_have_no_hidden_overlap() {
 fn nodes_that_show_an_overlap_hide_none() {
     // A corner and an edge in a face, a small cube inside of a large one.
     let corner = Placement {
-        pose: Pose { translation: DVec3::new(0.5, 0.5, 0.8), rotation: DQuat::from_rotation_arc(DVec3::ONE.normalize(), DVec3::Z) },
+        pose: Pose {
+            translation: DVec3::new(0.5, 0.5, 0.8),
+            rotation: DQuat::from_rotation_arc(DVec3::ONE.normalize(), DVec3::Z),
+        },
         scale: 1.0,
     };
-    for to in [corner, Placement { scale: 0.2, ..at(0.4, 0.4, 0.4) }, Placement { scale: 0.5, ..at(0.9, 0.2, 0.2) }] {
+    for to in
+        [corner, Placement { scale: 0.2, ..at(0.4, 0.4, 0.4) }, Placement { scale: 0.5, ..at(0.9, 0.2, 0.2) }]
+    {
         let scene = bodies(cube(), cube(), to);
         assert!(deepest(&found(&scene, NODE)) > 0.05);
         assert_eq!(hidden(&scene, NODE), None, "{to:?}");
@@ -207,7 +219,13 @@ fn hidden_overlaps_are_those_of_the_exact_clearance() {
             }
             let middle = placed[0].at.to_world(placed[0].body.center());
             let off = 0.3 * random.unit() * placed[0].diagonal() * random.direction();
-            let at = Placed { at: Placement { pose: Pose { rotation: rotation(&mut random), ..Pose::IDENTITY }, scale: placed[1].at.scale }, ..placed[1].clone() };
+            let at = Placed {
+                at: Placement {
+                    pose: Pose { rotation: rotation(&mut random), ..Pose::IDENTITY },
+                    scale: placed[1].at.scale,
+                },
+                ..placed[1].clone()
+            };
             let to = middle + off - at.at.to_world(at.body.center());
             placed[1] = at.moved(Pose::at(to));
         }

@@ -28,10 +28,10 @@ fn scaled(asset: &TeSdf, scale: f64, shift: DVec3) -> TeSdf {
     let corners = (0..asset.face_count()).flat_map(|f| asset.face_corners(f).map(|p| p * scale + shift));
     let faces = (0..asset.face_count() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
     let mesh = TriangleMesh::new(corners.collect(), faces).unwrap();
-    let welded = tesdf::mesh::repair(&mesh, &tesdf::mesh::RepairOptions {
-        weld_tolerance: Some(1e-9 * mesh.diagonal()),
-        ..Default::default()
-    });
+    let welded = tesdf::mesh::repair(
+        &mesh,
+        &tesdf::mesh::RepairOptions { weld_tolerance: Some(1e-9 * mesh.diagonal()), ..Default::default() },
+    );
     encoded(&SolidMesh::new(welded.unwrap().mesh).unwrap())
 }
 
@@ -73,7 +73,10 @@ fn points_have_right_answers_however_far_out_they_are() {
                     ] {
                         let expected = length(p - answer.closest_point);
                         let Answer { signed_distance, gradient, closest_point, face } = answer;
-                        assert!((signed_distance - expected).abs() <= 4.0 * f64::EPSILON * expected, "{p}: {answer:?}");
+                        assert!(
+                            (signed_distance - expected).abs() <= 4.0 * f64::EPSILON * expected,
+                            "{p}: {answer:?}"
+                        );
                         assert!(gradient.distance(away) < 1e-7, "{p}: {answer:?}");
                         let depth = away.dot(closest_point - middle);
                         let tolerance = 3e-7 * diagonal + 4.0 * f64::EPSILON * middle.length();
@@ -101,12 +104,8 @@ fn the_ends_of_the_range() {
         }
         let (mut d, mut f) = ([0.0; 2], [0; 2]);
         let (mut g, mut c) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
-        let columns = AnswerColumns {
-            signed_distance: &mut d,
-            gradient: &mut g,
-            closest_point: &mut c,
-            face: &mut f,
-        };
+        let columns =
+            AnswerColumns { signed_distance: &mut d, gradient: &mut g, closest_point: &mut c, face: &mut f };
         let points = [DVec3::new(1e200, 0.0, 0.0), DVec3::NAN];
         KEY.query_batch_into(&points, precision, Extent::Everywhere, columns).unwrap();
         assert_eq!((d[0], g[0][0], d[1].is_nan()), (1e200, 1.0, true));
@@ -156,7 +155,8 @@ fn rays_through_meshes_of_any_size_miss_what_is_beside_them() {
             let outside = bounds.max + 0.1 * bounds.extent();
             assert_eq!(asset.ray_cast(outside, DVec3::X * unit, f64::INFINITY), None, "{scale} {unit}");
             assert_eq!(asset.ray_cast(outside, -DVec3::X * unit, f64::INFINITY), None, "{scale} {unit}");
-            let hit = asset.ray_cast(bounds.center() - bounds.extent(), bounds.extent() * unit, f64::INFINITY);
+            let hit =
+                asset.ray_cast(bounds.center() - bounds.extent(), bounds.extent() * unit, f64::INFINITY);
             assert!(hit.is_some_and(|h| h.t * unit > 0.1 && h.t * unit < 1.0), "{scale} {unit}: {hit:?}");
         }
     }
@@ -221,11 +221,16 @@ fn poses_far_out_have_no_contacts_or_are_refused() {
                 let options = TimeOfImpactOptions { end: 10.0, ..TimeOfImpactOptions::default() };
                 match time_of_impact(&scene, ids[1], ids[0], motion, Motion::Rest, &options) {
                     Ok(Some(impact)) => {
-                        assert!(impact.time.is_finite() && impact.clearance.distance.is_finite(), "{impact:?}");
+                        assert!(
+                            impact.time.is_finite() && impact.clearance.distance.is_finite(),
+                            "{impact:?}"
+                        );
                         assert!((impact.time * speed / r - 1.0).abs() < 1e-3, "{r} {speed}: {impact:?}");
                     }
                     Ok(None) => panic!("{r} {speed}: they meet"),
-                    Err(e) => assert!(speed > 1e100 && e.to_string().contains("up to 1e50"), "{r} {speed}: {e}"),
+                    Err(e) => {
+                        assert!(speed > 1e100 && e.to_string().contains("up to 1e50"), "{r} {speed}: {e}")
+                    }
                 }
             }
         }

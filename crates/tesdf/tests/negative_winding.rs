@@ -103,7 +103,10 @@ fn assert_exact(mesh: &TriangleMesh, asset: &TeSdf) {
             let found = asset.signed_distance(p, precision);
             let beside = distance <= tolerance * mesh.diagonal();
             let error = if beside { found.abs() - distance } else { found - expected };
-            assert!(error.abs() <= tolerance * mesh.diagonal(), "{p}: {found}, expected {expected}, winding {w}");
+            assert!(
+                error.abs() <= tolerance * mesh.diagonal(),
+                "{p}: {found}, expected {expected}, winding {w}"
+            );
         }
         assert_eq!(asset.is_inside(p), w >= 1, "{p}");
     }

@@ -61,7 +61,16 @@ impl Products {
     /// Names and bytes of all.
     pub fn account(&self) -> Vec<(&'static str, usize)> {
         let Self {
-            directions, maps, blocks, meshlets, polygons, contact_words, contact_rows, depths, groups, ..
+            directions,
+            maps,
+            blocks,
+            meshlets,
+            polygons,
+            contact_words,
+            contact_rows,
+            depths,
+            groups,
+            ..
         } = self;
         let own = [directions, maps, blocks, meshlets, polygons, contact_words, contact_rows, depths, groups];
         let members = self.members.as_ref().map(Members::buffers);

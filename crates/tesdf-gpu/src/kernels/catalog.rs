@@ -11,7 +11,8 @@ use cubecl_environment::stream::StreamId;
 
 use super::assets::AssetsLaunch;
 use super::{
-    broad, choice, clip, deform, exact, hidden, members, narrow, outside, pairs, products, query, reduce, sample,
+    broad, choice, clip, deform, exact, hidden, members, narrow, outside, pairs, products, query, reduce,
+    sample,
 };
 
 use crate::cuda::Count;

@@ -196,7 +196,8 @@ pub fn narrow_exact(
             while i < faces.count {
                 let position = list_face(assets, d.shape_b, faces, i);
                 let at = (entry(assets, d.shape_b, RECORDS) + position * comptime!(ROWS as u32)) as usize;
-                let apart = polygon_to_face(surface, weights, item, n, up, center, radius, face(&assets.rows, at));
+                let apart =
+                    polygon_to_face(surface, weights, item, n, up, center, radius, face(&assets.rows, at));
                 let lower = apart.distance < mine;
                 mine = select(lower, apart.distance, mine);
                 s = select(lower, apart.s, s);

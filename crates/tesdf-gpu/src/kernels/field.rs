@@ -81,8 +81,7 @@ pub fn value_of(assets: &Assets, shape: u32, word: u32, p: V3, nearest: Nearest)
     }
     let sign = select(inside, -1.0f32, 1.0f32);
     let away = distance > ON_EDGE;
-    let along =
-        pick(away, scaled(sign / select(away, distance, 1.0f32), c.outward), across(f));
+    let along = pick(away, scaled(sign / select(away, distance, 1.0f32), c.outward), across(f));
     // In the plane of a face the height knows the direction better than the difference of two points.
     let normal =
         scaled(select(c.feature == 0u32 && !same(c.height < 0.0f32, inside), -1.0f32, 1.0f32), f.normal);

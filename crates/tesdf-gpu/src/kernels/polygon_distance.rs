@@ -65,8 +65,11 @@ fn between_segments(p: V3, q: V3, r: V3, s: V3) -> Apart {
     let across = cross(u, v);
     let denominator = dot(across, across);
     let parallel = denominator <= PARALLEL * a * e;
-    let start =
-        select(parallel, 0.0f32, (dot(cross(v, w), across) / denominator.max(1e-30f32)).clamp(0.0f32, 1.0f32));
+    let start = select(
+        parallel,
+        0.0f32,
+        (dot(cross(v, w), across) / denominator.max(1e-30f32)).clamp(0.0f32, 1.0f32),
+    );
     let t = select(e > 0.0f32, ((b * start + f) / e.max(1e-30f32)).clamp(0.0f32, 1.0f32), 0.0f32);
     let start = select(a > 0.0f32, ((b * t - c) / a.max(1e-30f32)).clamp(0.0f32, 1.0f32), 0.0f32);
     Apart { distance: length(minus(plus_scaled(p, start, u), plus_scaled(r, t, v))), s: start, t }

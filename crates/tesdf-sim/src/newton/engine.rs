@@ -2,7 +2,9 @@ use std::time::Instant;
 
 use nalgebra::Vector6;
 use rayon::prelude::*;
-use tesdf::collide::{CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, Pose, Scene};
+use tesdf::collide::{
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, Pose, Scene,
+};
 
 use super::NewtonOptions;
 use super::integrate::{free_velocity, moved, unpack, velocity};

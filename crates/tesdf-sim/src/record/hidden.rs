@@ -24,7 +24,9 @@ impl HiddenPair {
     /// A sentence for people.
     pub fn message(&self) -> String {
         let Self { bodies: [a, b], first_step, depth, .. } = self;
-        format!("bodies {a} and {b} overlapped by {depth:.3e} m or more, first at step {first_step}, and no contact showed it")
+        format!(
+            "bodies {a} and {b} overlapped by {depth:.3e} m or more, first at step {first_step}, and no contact showed it"
+        )
     }
 }
 

@@ -30,9 +30,9 @@ pub use crate::save::save_atomic;
 pub use arrays::Arrays;
 pub use cells::{CellKind, CellView};
 pub(crate) use conforming::Conforming;
-pub(crate) use inner_ball::{InnerBall, corner_reach};
 pub use container::{Container, SharedSection, write_container};
 pub use error::AssetError;
+pub(crate) use inner_ball::{InnerBall, corner_reach};
 pub use section::{Element, Presence, Section, SectionSpec};
 pub use te_sdf::TeSdf;
 

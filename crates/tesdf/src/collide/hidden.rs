@@ -136,11 +136,14 @@ impl Looks<'_> {
         let mut stack = vec![surface.whole()];
         while let Some(child) = stack.pop() {
             match child {
-                TreeChild::Leaf(start, count) => (start..start + count).for_each(|f| self.at_face(surface, f)),
+                TreeChild::Leaf(start, count) => {
+                    (start..start + count).for_each(|f| self.at_face(surface, f))
+                }
                 TreeChild::Node(node) => {
                     for branch in surface.halves(node).into_iter().flatten() {
                         let is_fine = surface.corner_reach(branch.child) <= self.wanted(HiddenOverlap::SURE);
-                        let is_out = self.core.distance_squared(branch.center) > branch.radius * branch.radius;
+                        let is_out =
+                            self.core.distance_squared(branch.center) > branch.radius * branch.radius;
                         if !is_fine
                             && !is_out
                             && self.look(branch.center) + branch.radius > self.wanted(HiddenOverlap::FINE)
@@ -164,13 +167,19 @@ impl Looks<'_> {
         let before = self.looks;
         let mut stack = vec![corners];
         while let Some(corners) = stack.pop() {
-            if self.looks >= HiddenOverlap::MOST_LOOKS || !Aabb::of(&corners).grown(part.radius).overlaps(self.core) {
+            if self.looks >= HiddenOverlap::MOST_LOOKS
+                || !Aabb::of(&corners).grown(part.radius).overlaps(self.core)
+            {
                 continue;
             }
             let (middle, reach) = middle(corners);
             let depth = self.look(middle) + part.radius;
             self.deepest = self.deepest.max(depth);
-            let wanted = self.wanted(if self.looks - before <= HiddenOverlap::FINE_LOOKS { HiddenOverlap::FINE } else { HiddenOverlap::SURE });
+            let wanted = self.wanted(if self.looks - before <= HiddenOverlap::FINE_LOOKS {
+                HiddenOverlap::FINE
+            } else {
+                HiddenOverlap::SURE
+            });
             // What a piece this small holds is as deep as its middle, but for a quarter.
             if depth + reach > wanted && reach > 0.25 * wanted {
                 stack.extend(quarters(corners));

@@ -108,7 +108,11 @@ impl CollideOptions {
         if let Mode::Face(FaceMethod::FrankWolfe { iterations }) = self.mode
             && iterations > FaceMethod::MAX_ITERATIONS
         {
-            return refuse("iterations", iterations.to_string(), "at most 65536: from some hundred on nothing is gained");
+            return refuse(
+                "iterations",
+                iterations.to_string(),
+                "at most 65536: from some hundred on nothing is gained",
+            );
         }
         if self.reduction == Reduction::PerPair(0) {
             return refuse("reduction", "0 contacts per pair".into(), "at least 1, or none");

@@ -91,7 +91,8 @@ mod tests {
 
     #[test]
     fn powers_of_two() {
-        for (x, expected) in [(1.0, 1.0), (1.99, 1.0), (0.75, 0.5), (1e300, 2f64.powi(996)), (5e-324, 5e-324)] {
+        for (x, expected) in [(1.0, 1.0), (1.99, 1.0), (0.75, 0.5), (1e300, 2f64.powi(996)), (5e-324, 5e-324)]
+        {
             assert_eq!(power_of_two_below(x), expected, "{x}");
         }
         assert!(power_of_two_below(f64::MAX) > f64::MAX / 2.0 && power_of_two_below(1.7e-308).is_subnormal());

@@ -232,13 +232,7 @@ fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
 }
 
 /// The first `count` segments, cut where segments cross them.
-fn pieces(
-    segments: &[Segment],
-    count: usize,
-    tree: &AabbTree,
-    boxes: &[Aabb],
-    rounding: f64,
-) -> Vec<Piece> {
+fn pieces(segments: &[Segment], count: usize, tree: &AabbTree, boxes: &[Aabb], rounding: f64) -> Vec<Piece> {
     let mut crossings = vec![vec![0.0, 1.0]; count];
     self_overlaps(tree, boxes, |i, j| {
         let (i, j) = (i as usize, j as usize);

@@ -10,6 +10,9 @@ use super::parts::Bound;
 use super::piece::{Cut, Piece};
 use super::problem::{Item, Problem};
 
+/// A piece that so many cuts lead to is not cut: the search calls itself, and the stack has an end.
+const DEEPEST: u32 = 2000;
+
 /// Pieces are halved this often before they are cut along the faces of the list.
 const HALVED_FIRST: u32 = 8;
 /// Share of `delta` that the drift of the pieces may cost.
@@ -256,7 +259,7 @@ impl<'a> Search<'a> {
             let face = problem.faces[self.faces[own.faces].at as usize].position;
             Err(Open::Undecided { reason, at: piece.ball().0, face })
         };
-        if self.pieces >= self.most_pieces {
+        if self.pieces >= self.most_pieces || piece.depth >= DEEPEST {
             return undecided(Reason::Pieces);
         }
         if piece.drift > DRIFT * problem.delta {

@@ -91,10 +91,16 @@ pub enum ProveError {
         /// How far it reaches.
         reach: f64,
     },
+    /// The system gives no more threads.
+    #[error("the system refused threads with a stack of {} MiB each; ask for fewer threads", STACK >> 20)]
+    Threads,
     /// `progress` said so.
     #[error("the proof was cancelled")]
     Cancelled,
 }
+
+/// Room for the deepest search of a cell, some 8 KiB for each cut, in the profile of the tests too.
+const STACK: usize = 64 << 20;
 
 /// Proves that an asset answers as its certificate says, from all threads of the current rayon pool.
 ///
@@ -140,8 +146,13 @@ pub fn prove(
         cancelled: AtomicBool::new(false),
     };
     let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
-    let cells = (0..roots.len()).into_par_iter().map(|root| walk.root(root, &all));
-    let mut found = cells.reduce(Found::default, Found::join);
+    let cells = || (0..roots.len()).into_par_iter().map(|root| walk.root(root, &all));
+    // The search calls itself for each cut.
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).stack_size(STACK);
+    let mut found = match threads.build() {
+        Ok(threads) => threads.install(|| cells().reduce(Found::default, Found::join)),
+        Err(_) => return Err(ProveError::Threads),
+    };
     if walk.is_cancelled() {
         return Err(ProveError::Cancelled);
     }
