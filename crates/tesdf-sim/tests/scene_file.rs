@@ -70,7 +70,7 @@ fn errors_say_where() {
         (change("shape = \"plane\"", "mesh = \"none.obj\""), vec!["line 8", "none.obj"]),
         (change("shape = \"plane\"", "asset = \"none.tesdf\""), vec!["line 8", "none.tesdf"]),
         (change("shape = \"plane\"", "shape = \"plain\""), vec!["line 10", "plain"]),
-        (change("0.02, 0.03", "-0.02, 0.03"), vec!["line 13", "brick", "greater than 0"]),
+        (change("0.02, 0.03", "-0.02, 0.03"), vec!["line 13", "brick", "numbers from 1e-50 to 1e50"]),
         (change("[0, 0, 0.031]", "[0, 0, nan]"), vec!["line 13", "brick", "finite"]),
         (change("mass = 0.5", "mass = 0.5\nrotation = [0, 0, 0, 2]"), vec!["brick", "length 1"]),
         (change("time_step = 1e-3", "time_step = 0"), vec!["time_step", "above 0"]),
