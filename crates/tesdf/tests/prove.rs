@@ -186,8 +186,9 @@ fn verdicts_agree_with_a_lattice_of_points() {
         let asset = changed(&asset, layout::LISTS, |bytes| bytes[at] = other);
         let report = proved(&asset);
         if is_wrong_somewhere(&solid, &asset, 1e-9) {
-            assert!(report.distances.refuted > 0, "{report:#?}");
-            wrong += 1;
+            // Never proved; refuted unless rounding ends the search first.
+            assert!(report.distances.proved < report.distances.claims, "{report:#?}");
+            wrong += usize::from(report.distances.refuted > 0);
         } else {
             right += usize::from(report.distances.proved == report.distances.claims);
         }

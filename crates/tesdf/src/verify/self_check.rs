@@ -73,13 +73,13 @@ mod tests {
     use super::*;
     use crate::asset::SharedSection;
     use crate::asset::about::Source;
-    use crate::asset::layout::Node;
+    use crate::asset::layout::{Label, Node, Side};
     use crate::encode::{EncodeOptions, EncodeProgress, encode};
     use crate::mesh::{MeshFormat, SolidMesh, read_bytes};
 
     #[test]
-    fn lists_of_other_cells_are_noticed() {
-        // An octahedron: twice as many faces as a cell inside may need.
+    fn cells_with_a_wrong_side_are_noticed() {
+        // An octahedron.
         let obj = "v 1 0 0\nv 0 1 0\nv -1 0 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\nf 2 1 6\nf 3 2 6\n\
                    f 4 3 6\nf 1 4 6\n";
         let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj).expect("a mesh").mesh;
@@ -88,13 +88,14 @@ mod tests {
         let mut asset =
             encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
         assert_eq!(self_check(&asset), Ok(None));
-        // All cells get the list of the first.
+        // All cells are outside.
         let mut nodes = asset.nodes.to_vec();
-        let mut first = None;
         for word in &mut nodes {
-            if let Node::Listed(label, offset) = Node::decode(*word, &asset.lists) {
-                *word = Node::Listed(label, *first.get_or_insert(offset)).encode();
-            }
+            *word = match Node::decode(*word, &asset.lists) {
+                Node::Listed(_, offset) => Node::Listed(Label::Outside, offset).encode(),
+                Node::Far(_) => Node::Far(Side::Outside).encode(),
+                _ => *word,
+            };
         }
         asset.nodes = SharedSection::of_rows(&nodes);
         let (precision, worst) = self_check(&asset).expect("a mesh").expect("it is wrong");
