@@ -127,6 +127,8 @@ class Certificate:
     """whether lists were cut to a largest length"""
     exactness_distance: Optional[float]
     """distance from the surface within which every cell is exact; None: everywhere"""
+    chains: Optional[int]
+    """how much of the budget for rounding the lists have used, of 400; None: nothing is proved"""
 
 
 @dataclass(frozen=True)
@@ -239,6 +241,8 @@ class Promise:
     of_diagonal: float
     ulps: float
     gradient: float
+    gradient_width: float
+    """added to `gradient`: this length over the distance; 0 unless the precision takes narrow faces for segments"""
     gradient_from: float
     within: Optional[float]
     """distances and gradients are promised nearer to the surface than this; None: everywhere"""
