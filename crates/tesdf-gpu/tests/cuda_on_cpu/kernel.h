@@ -43,3 +43,9 @@ static inline float min(float a, float b) { return __builtin_fminf(a, b); }
 static inline float max(float a, float b) { return __builtin_fmaxf(a, b); }
 static inline float sqrt(float x) { return __builtin_sqrtf(x); }
 static inline float fabs(float x) { return __builtin_fabsf(x); }
+
+static inline unsigned cuda_fetch_max(unsigned *at, unsigned value) {
+    unsigned old = __atomic_load_n(at, __ATOMIC_RELAXED);
+    while (old < value && !__atomic_compare_exchange_n(at, &old, value, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {}
+    return old;
+}
