@@ -73,8 +73,7 @@ pub(crate) struct Proved {
 impl Proved {
     /// Of the lists of both.
     pub fn and(self, other: Self) -> Self {
-        let chains = self.chains.zip(other.chains).map(|(a, b)| a.max(b));
-        Self { within: self.within.min(other.within), chains }
+        Self { within: self.within.min(other.within), chains: Chains::of_both(self.chains, other.chains) }
     }
 }
 

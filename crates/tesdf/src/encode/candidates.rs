@@ -368,15 +368,6 @@ mod tests {
     use crate::testing::degenerate;
     use proptest::prelude::*;
 
-    fn isas() -> Vec<Isa> {
-        let mut isas = vec![Isa::Baseline];
-        #[cfg(target_arch = "x86_64")]
-        if Isa::detect() != Isa::Baseline {
-            isas.extend([Isa::Avx2, Isa::detect()]);
-        }
-        isas
-    }
-
     fn coordinate() -> impl Strategy<Value = f64> {
         // A coarse lattice, so that ties and degenerate triangles are common, and needles beside it.
         prop_oneof![3 => (-3i32..4).prop_map(f64::from), 1 => -3.0..3.0f64, 1 => (0i32..4).prop_map(|x| 1e-3 * f64::from(x))]
@@ -408,7 +399,7 @@ mod tests {
         let mut surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0, Touching::Kept);
         let cell = Cell { corners: [p, p + DVec3::X, p + DVec3::Y, p + DVec3::Z], depth: 0 };
         let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
-        for isa in isas() {
+        for isa in Isa::all_here() {
             surface.isa = isa;
             let pool = Pool::new(&surface, &all, &cell);
             let mut rows = Vec::new();

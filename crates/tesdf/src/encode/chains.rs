@@ -41,6 +41,11 @@ impl Chains {
         Self(self.0 + weight)
     }
 
+    /// The heavier of two proofs' chains; `None` where one of the two proves nothing.
+    pub(crate) fn of_both(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        Some(a?.max(b?))
+    }
+
     /// What a link weighs that drops `face` as all that the cell sees of it is one edge or vertex; `None` where Δ has no bound.
     pub(super) fn weight(surface: &Surface, cell: &Cell, requirement: Requirement, face: u32) -> Option<u32> {
         let Part::Vertex(vertex) = surface.part(requirement) else { return Some(PLAIN) };

@@ -54,7 +54,7 @@ fn descend(
     for side in 0..2 {
         let below = pool.of_child(candidates, cell.child_corners(side));
         let found = descend(surface, cell.child(side), &below, listed, (levels - 1, chains), scratch);
-        heaviest = heaviest.zip(found).map(|(a, b)| a.max(b));
+        heaviest = Chains::of_both(heaviest, found);
     }
     scratch.give_back(pool);
     heaviest

@@ -114,8 +114,7 @@ impl Lists<'_> {
             .collect();
         let finished = finished.ok_or(EncodeError::Cancelled)?;
         let exact_within = finished.iter().map(|f| f.1).fold(f64::INFINITY, f64::min);
-        let heavier = |a: Option<Chains>, b: Option<Chains>| Some(a?.max(b?));
-        let proof = finished.iter().map(|f| f.2).fold(Some(Chains::NONE), heavier);
+        let proof = finished.iter().map(|f| f.2).fold(Some(Chains::NONE), Chains::of_both);
         Ok(Finished { labels: finished.into_iter().map(|f| f.0).collect(), exact_within, proof })
     }
 

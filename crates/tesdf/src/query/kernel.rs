@@ -121,6 +121,17 @@ impl Isa {
         }
         Self::Baseline
     }
+
+    /// All that this processor has, for tests of each.
+    #[cfg(test)]
+    pub(crate) fn all_here() -> Vec<Self> {
+        let mut all = vec![Self::Baseline];
+        #[cfg(target_arch = "x86_64")]
+        if Self::detect() != Self::Baseline {
+            all.extend([Self::Avx2, Self::detect()]);
+        }
+        all
+    }
 }
 
 /// Lanes of the widest kernel: lists of faces are filled up to a multiple of it by repeating their last face.
@@ -313,20 +324,11 @@ mod tests {
     /// What `f32` promises of a body with a diagonal of 0.5, the least that there is: 1e-6 of it.
     const PROMISE: f64 = 5e-7;
 
-    fn isas() -> Vec<Isa> {
-        let mut isas = vec![Isa::Baseline];
-        #[cfg(target_arch = "x86_64")]
-        if Isa::detect() != Isa::Baseline {
-            isas.extend([Isa::Avx2, Isa::detect()]);
-        }
-        isas
-    }
-
     /// Every kernel finds the distance to a face.
     fn assert_exact(corners: [DVec3; 3], p: DVec3) -> Result<(), TestCaseError> {
         let record = FaceRecord::new(&Triangle::new(corners), DVec3::ZERO, SignHints::default());
         let squared = exact::squared_distance(p, corners);
-        for isa in isas() {
+        for isa in Isa::all_here() {
             let found = nearest(isa, &[record], &[[0; LANES]], p.as_vec3(), Nearest::NONE);
             let distance = f64::from(found.distance_squared).sqrt();
             prop_assert!(exact::is_root(distance, &squared, PROMISE), "{isa:?}: {found:?} {record:?}");
