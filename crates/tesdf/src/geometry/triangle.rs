@@ -66,7 +66,7 @@ pub struct Triangle {
 const NEEDLE: f64 = 1e-3;
 
 /// Height, as a share of the longest edge, up to which the sides are looked at again from their nearer ends.
-const TIP: f64 = 1e-2;
+const TIP: f64 = 0.1;
 
 /// Height, as a share of the longest edge, up to which a triangle is no more than its edges: which side of them a point
 /// is on is rounding then.
