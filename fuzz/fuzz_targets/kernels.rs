@@ -32,7 +32,7 @@ fuzz_target!(|data: &[u8]| {
     assert!(exact::is_root(found.distance, &squared, ROUNDING), "{found:?} {triangle:?} {p}");
     let to_face = exact::squared_distance(found.point, [a, b, c]);
     assert!(exact::is_root(0.0, &to_face, ROUNDING), "{found:?} {triangle:?} {p}");
-    assert_ne!(triangle.regions(p).0, 0);
+    assert_ne!(triangle.regions(p).0, 0, "{triangle:?} {p:?}");
 
     let normal = Triangle::new([p, q, r]).normal;
     let (distance, at) = polygon_to_triangle(&[p, q, r], normal, &triangle, f64::INFINITY).expect("no limit");

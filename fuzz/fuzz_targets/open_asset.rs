@@ -19,6 +19,6 @@ fuzz_target!(|data: &[u8]| {
             asset.query(p, precision);
         }
         asset.is_inside(p);
-        asset.ray_cast(p, DVec3::new(1.0, share, -0.5));
+        asset.ray_cast(p, DVec3::new(1.0, share, -0.5), f64::INFINITY);
     }
 });

@@ -198,7 +198,8 @@ impl Triangle {
             regions |= u8::from(relative.side[k] <= 0.0 && start[k] >= 0.0 && end[k] <= 0.0) << (1 + k);
             regions |= u8::from(start[k] <= 0.0 && end[(k + 2) % 3] >= 0.0) << (4 + k);
         }
-        Regions(regions)
+        // On a side that is not the same from both ends, by rounding.
+        if regions == 0 { Regions::FACE } else { Regions(regions) }
     }
 }
 
@@ -264,6 +265,13 @@ mod tests {
     fn point() -> impl Strategy<Value = DVec3> {
         // A coarse lattice, so that ties and degenerate triangles are common.
         (-3i32..4, -3i32..4, -3i32..4).prop_map(|(x, y, z)| DVec3::new(x as f64, y as f64, z as f64))
+    }
+
+    #[test]
+    fn a_point_on_a_side_that_rounding_sees_differently_from_its_ends_is_in_a_region() {
+        let a = DVec3::new(0.5, -2.4999999999999997e-34, 0.0);
+        let (b, c) = (DVec3::new(0.75, 1e-19, 5e-36), DVec3::new(-0.5, -0.25, -2.5e-19));
+        assert_ne!(Triangle::new([a, b, c]).regions(DVec3::new(0.0, -0.15, -0.9)).0, 0);
     }
 
     proptest! {
