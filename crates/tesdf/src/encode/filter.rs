@@ -61,8 +61,7 @@ pub struct Scratch {
     rivals: Rivals,
     survivors: Vec<Survivor>,
     meeting: Vec<Survivor>,
-    /// By survivor: the weight of the longest chain of rule C that ends there.
-    chained: Vec<u32>,
+    sharing: Sharing,
     pools: Vec<Pool>,
     pub(super) settled: Settled,
 }
@@ -84,8 +83,11 @@ impl Scratch {
     }
 }
 
-/// Rule C compares all pairs; cells with more survivors than this are bisected anyway, and compared below.
+/// Cells with more survivors than this are bisected anyway: below, rule C looks at them again.
 const MAX_SHARING: usize = 256;
+/// Vertices with more faces than this are looked at in such cells too: where the vertex is the closest point of all of its faces,
+/// bisecting drops none of them.
+const LARGE_FAN: usize = 512;
 
 /// More candidates than this are only thinned out by rule A.
 const MANY: usize = 1 << 12;
@@ -172,8 +174,7 @@ pub fn filter(
             scratch.meeting.push(survivor);
         }
     });
-    filtered.chains =
-        share_features(surface, cell, candidates, chains, &mut filtered.survivors, &mut scratch.chained);
+    filtered.chains = share_features(surface, cell, candidates, chains, &mut filtered.survivors, &mut scratch.sharing);
     filtered.survivors.extend_from_slice(&scratch.meeting);
     filtered
 }
@@ -236,44 +237,66 @@ fn point_rule_lanes<L: Doubles>(
     }
 }
 
+/// What rule C knows of the survivors of a cell; survivors are numbered from 1.
+#[derive(Debug, Default)]
+struct Sharing {
+    /// By part: the last survivor that has it. Holds what an earlier cell left where no survivor of this one has the part.
+    last: Vec<u32>,
+    /// By part: the last of those kept so far that has it; all 0 between cells.
+    kept: Vec<u32>,
+    /// By survivor: the weight of the longest chain that ends there.
+    chained: Vec<u32>,
+}
+
 /// Rule C: of the faces that are one and the same edge or vertex to the whole cell, one is enough.
+///
+/// Goes through the survivors in order, and drops one when another that is still there has what the cell needs of it: the last
+/// of all that have it, or else the last that has been kept. So chains stay short.
 fn share_features(
     surface: &Surface,
     cell: &Cell,
     candidates: &Candidates,
     chains: Chains,
     survivors: &mut Vec<Survivor>,
-    chained: &mut Vec<u32>,
+    sharing: &mut Sharing,
 ) -> Chains {
-    if survivors.len() > MAX_SHARING {
+    if survivors.iter().all(|s| surface.is_face(s.requirement)) {
         return chains;
     }
+    let face = |s: &Survivor| candidates.faces[s.index as usize];
+    let Sharing { last, kept, chained } = sharing;
+    last.resize(surface.parts(), 0);
+    kept.resize(surface.parts(), 0);
     chained.clear();
     chained.resize(survivors.len(), 0);
+    for (number, s) in (1..).zip(survivors.iter()) {
+        surface.implied(face(s)).iter().for_each(|part| last[part.index()] = number);
+    }
+    let many = survivors.len() > MAX_SHARING;
     let mut heaviest = 0;
-    let mut i = 0;
-    while i < survivors.len() {
-        let g = survivors[i];
-        let holder = (!surface.is_face(g.requirement))
-            .then(|| {
-                survivors.iter().position(|h| {
-                    h.index != g.index && surface.holds(candidates.faces[h.index as usize], g.requirement)
-                })
-            })
-            .flatten();
-        let link = holder.and_then(|at| {
-            let weight = chained[i]
-                + Chains::weight(surface, cell, g.requirement, candidates.faces[g.index as usize])?;
-            chains.allow(weight).then_some((at, weight))
-        });
-        if let Some((at, weight)) = link {
-            chained[at] = chained[at].max(weight);
+    let mut number = 0;
+    survivors.retain(|g| {
+        number += 1;
+        let part = g.requirement;
+        let looked_at = !surface.is_face(part) && (!many || surface.faces_of(part).len() > LARGE_FAN);
+        let link = looked_at
+            .then(|| if last[part.index()] > number { last[part.index()] } else { kept[part.index()] })
+            .filter(|&holder| holder > 0)
+            .and_then(|holder| {
+                let weight = chained[number as usize - 1] + Chains::weight(surface, cell, part, face(g))?;
+                chains.allow(weight).then_some((holder, weight))
+            });
+        if let Some((holder, weight)) = link {
+            let chain = &mut chained[holder as usize - 1];
+            *chain = (*chain).max(weight);
             heaviest = heaviest.max(weight);
-            survivors.remove(i);
-            chained.remove(i);
         } else {
-            i += 1;
+            surface.implied(face(g)).iter().for_each(|part| kept[part.index()] = number);
         }
+        link.is_none()
+    });
+    for s in survivors.iter() {
+        surface.implied(face(s)).iter().for_each(|part| kept[part.index()] = 0);
     }
     chains.and(heaviest)
 }

@@ -176,27 +176,43 @@ impl Surface {
     /// Faces are taken as they are; then each edge that none of them has takes the one of its faces that
     /// meets most of what is still open; then vertices likewise.
     pub fn cover(&self, requirements: &[Requirement]) -> Vec<u32> {
-        let mut kept: Vec<u32> = Vec::with_capacity(requirements.len());
-        let mut open: Vec<Requirement> = Vec::new();
-        for &r in requirements {
-            match self.part(r) {
-                Part::Face(f) => kept.push(f),
-                _ => open.push(r),
+        let first_part = requirements.partition_point(|&r| self.is_face(r));
+        let mut kept: Vec<u32> = requirements[..first_part].iter().map(|r| r.0).collect();
+        // What no face that is kept has, ascending; whole faces are in `kept`, ascending too.
+        let mut open = requirements[first_part..].to_vec();
+        let whole = kept.len();
+        open.retain(|&r| {
+            let taken = |face: &u32| kept[..whole].binary_search(face).is_ok();
+            !self.faces_of(r).iter().any(taken)
+        });
+        let mut is_open = vec![true; open.len()];
+        for first in 0..open.len() {
+            if !is_open[first] {
+                continue;
             }
-        }
-        open.retain(|&r| !kept.iter().any(|&f| self.holds(f, r)));
-        while let Some(&first) = open.first() {
-            let gain = |face: u32| open.iter().filter(|&&r| self.holds(face, r)).count();
-            let own: &[u32] = match self.part(first) {
-                Part::Face(_) => &[],
-                Part::Edge(e) => &self.edge_faces[e as usize],
-                Part::Vertex(v) => &self.vertex_faces[v as usize],
+            let gain = |face: u32| {
+                let meets = |r: &Requirement| open.binary_search(r).is_ok_and(|at| is_open[at]);
+                self.implied(face).iter().filter(|r| meets(r)).count()
             };
+            let own = self.faces_of(open[first]);
             let Some(&best) = own.iter().max_by_key(|&&f| (gain(f), std::cmp::Reverse(f))) else { break };
             kept.push(best);
-            open.retain(|&r| !self.holds(best, r));
+            for r in self.implied(best) {
+                if let Ok(at) = open.binary_search(&r) {
+                    is_open[at] = false;
+                }
+            }
         }
         kept.sort_unstable();
         kept
+    }
+
+    /// The faces that hold an edge or a vertex.
+    pub fn faces_of(&self, requirement: Requirement) -> &[u32] {
+        match self.part(requirement) {
+            Part::Face(_) => &[],
+            Part::Edge(e) => &self.edge_faces[e as usize],
+            Part::Vertex(v) => &self.vertex_faces[v as usize],
+        }
     }
 }
