@@ -3,14 +3,14 @@ use rayon::prelude::*;
 use super::assemble::assemble;
 use super::hints::{Simplicity, sign_hints};
 use super::lists::{Finished, Lists};
-use super::refine::{ROOT_VOLUME, Refiner, Tree, Weights};
+use super::refine::{Effort, ROOT_VOLUME, Refiner, Tree, Weights};
 use super::roots::Roots;
 use super::sampled::{Processor, Sampler, lipschitz_candidates};
 use super::surface::{Surface, Touching};
 use super::{Deformation, EncodeOptions, EncodeProgress, Encoder, Refinement, Stage, Threshold};
 use crate::asset::layout::{self, TREE_LEAF, TreeChild};
 use crate::asset::{AssetError, Section, TeSdf, about, write_container};
-use crate::domain::{ConformingMesh, DomainCube, MAX_DEPTH};
+use crate::domain::{Cell, ConformingMesh, DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, Child, LocalFrame, WindingNumber};
 use crate::mesh::{MeshError, SolidMesh, TriangleMesh};
 use crate::query::Precision;
@@ -41,6 +41,19 @@ pub enum EncodeError {
         found: usize,
         /// The most that fits.
         limit: usize,
+    },
+    /// Lists of faces that are near each other all over the domain, and no bisection makes them shorter.
+    #[error(
+        "the faces have no short lists: {compared} comparisons of faces with cells were not enough to tell them apart. Face \
+         {face} is {slenderness:.1e} times as long as it is high; `tesdf check` lists faces like it, remesh them, or split the mesh"
+    )]
+    NoShortLists {
+        /// The face that is longest for its height, 0-based.
+        face: u32,
+        /// Its longest edge over its height.
+        slenderness: f64,
+        /// Comparisons that were made.
+        compared: u64,
     },
     /// The mesh does not fit the local frame.
     #[error(transparent)]
@@ -145,17 +158,18 @@ pub fn encode_with(
     let tree = AabbTree::build(&boxes, TREE_LEAF);
     let near = NEAR * diagonal_local;
 
-    progress.begin(Stage::Refine, roots.cells.len() as u64 * ROOT_VOLUME);
+    let unlimited = Effort::new(u64::MAX);
     let mut refiner = Refiner {
         surface: &surface,
         weights: Weights {
             byte: options.byte_worth / surface.faces.len() as f64,
             near,
-            per_volume: 1.0 / (surface.area * 4.0 * near),
+            per_volume: 1.0 / (surface.area.max(near * diagonal_local) * 4.0 * near),
             far_faces: FAR_FACES,
             far_list: FAR_LIST,
             far_distance: FAR_DISTANCE * diagonal_local,
             floor: FLOOR,
+            long_faces: 0.0,
         },
         band,
         bounds: local.bounds(),
@@ -163,27 +177,21 @@ pub fn encode_with(
         inside: &|p| winding.at(p) >= 1,
         max_depth: MAX_DEPTH,
         progress,
+        effort: &unlimited,
     };
-    if let Domain::Conforming(_) = domain {
-        // All of it is the domain, and every cell gets a list.
-        refiner.band = f64::INFINITY;
-        refiner.weights.far_list = usize::MAX;
-        if options.refinement == Refinement::None {
-            refiner.max_depth = 0;
+    let mut trees = match domain {
+        Domain::Bisection => refine_within_effort(refiner, &roots.cells)?,
+        Domain::Conforming(_) => {
+            // All of it is the domain, and every cell gets a list.
+            refiner.band = f64::INFINITY;
+            refiner.weights.far_list = usize::MAX;
+            if options.refinement == Refinement::None {
+                refiner.max_depth = 0;
+            }
+            let candidates = |cell: &Cell| lipschitz_candidates(&surface, &tree, cell);
+            refine(&refiner, &roots.cells, candidates).ok_or(EncodeError::Cancelled)?
         }
-    }
-    let mut trees = roots
-        .cells
-        .par_iter()
-        .map(|&cell| {
-            let candidates = match domain {
-                Domain::Bisection => (0..surface.faces.len() as u32).collect(),
-                Domain::Conforming(_) => lipschitz_candidates(&surface, &tree, &cell),
-            };
-            refiner.root(cell, &candidates)
-        })
-        .collect::<Option<Vec<Tree>>>()
-        .ok_or(EncodeError::Cancelled)?;
+    };
 
     let lists = Lists { surface: &surface, tree: &tree, options, scale: frame.scale };
     let Finished { labels, exact_within, proof } =
@@ -254,6 +262,48 @@ pub fn encode_with(
     }
     Ok(asset)
 }
+
+/// Refines all roots; `None` when cancelled, or the effort is exceeded.
+fn refine(refiner: &Refiner, cells: &[Cell], candidates: impl Fn(&Cell) -> Vec<u32> + Sync) -> Option<Vec<Tree>> {
+    refiner.progress.begin(Stage::Refine, cells.len() as u64 * ROOT_VOLUME);
+    cells.par_iter().map(|cell| refiner.root(*cell, &candidates(cell))).collect()
+}
+
+/// Refines the bisection domain with an effort in proportion to the faces: the more long faces there are, the earlier cells that list
+/// many are left as they are.
+fn refine_within_effort(mut refiner: Refiner, cells: &[Cell]) -> Result<Vec<Tree>, EncodeError> {
+    let surface = refiner.surface;
+    let faces = surface.faces.len() as u32;
+    let limit = EFFORT_PER_FACE * (u64::from(faces) + SMALL_MESH);
+    if surface.needleness() > NEEDLES {
+        refiner.weights.long_faces = (surface.needleness() / WORTH_A_BYTE).powi(2);
+    }
+    for _ in 0..ATTEMPTS {
+        let effort = Effort::new(limit);
+        let attempt = Refiner { weights: refiner.weights.clone(), effort: &effort, ..refiner };
+        if let Some(trees) = refine(&attempt, cells, |_| (0..faces).collect()) {
+            return Ok(trees);
+        }
+        if refiner.progress.is_cancelled() {
+            return Err(EncodeError::Cancelled);
+        }
+        refiner.weights.long_faces = (8.0 * refiner.weights.long_faces).max(1.0);
+    }
+    let (face, slenderness) = surface.most_slender();
+    Err(EncodeError::NoShortLists { face, slenderness, compared: limit })
+}
+
+/// Faces held against cells while refining, for each face of the mesh. A bolt of 25,000 faces takes 1,783, a gear of 20,000 needles 4,789.
+const EFFORT_PER_FACE: u64 = 10_000;
+/// Faces that a small mesh counts as in addition.
+const SMALL_MESH: u64 = 1000;
+/// The [`needleness`](Surface::needleness) from which cells with many long faces are held back from the start.
+const NEEDLES: f64 = 15.0;
+/// The needleness at which such a cell has to be worth a byte. (At 18 to 97, fans of 1,000 to 20,000 faces, the effort is 4,000 to
+/// 7,500 a face with this, and grows with the number of faces without.)
+const WORTH_A_BYTE: f64 = 20.0;
+/// Times that refining begins anew, with cells held back eight times as much, before it is given up.
+const ATTEMPTS: u32 = 5;
 
 /// Half width of the layer around the surface whose queries count full, as a share of the diagonal.
 const NEAR: f64 = 0.01;

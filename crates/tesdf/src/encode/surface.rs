@@ -56,6 +56,9 @@ pub struct Surface {
     vertex_faces: Vec<Vec<u32>>,
     /// Total area, local frame.
     pub area: f64,
+    /// Longest edge of each face, local frame.
+    longest: Vec<f64>,
+    needleness: f64,
     /// What a distance must be less by to count as less: [`MARGIN`] times the size of the domain.
     pub margin: f64,
     /// What becomes of faces that come near to a cell.
@@ -92,11 +95,14 @@ impl Surface {
                 vertex_faces[v as usize].push(face as u32);
             }
         }
-        let area = triangles
+        let area: f64 = triangles
             .iter()
             .map(|t| 0.5 * (t.corners[1] - t.corners[0]).cross(t.corners[2] - t.corners[0]).length())
             .sum();
+        let sum: f64 = triangles.iter().map(longest_edge).sum();
         Self {
+            needleness: sum / (area * faces.len() as f64).sqrt(),
+            longest: triangles.iter().map(longest_edge).collect(),
             triangles,
             faces,
             edges,
@@ -108,6 +114,27 @@ impl Surface {
             touching,
             isa: Isa::detect(),
         }
+    }
+
+    /// Length of the longest edge of a face, local frame.
+    pub fn longest(&self, face: u32) -> f64 {
+        self.longest[face as usize]
+    }
+
+    /// How much the faces are needles: their mean longest edge over the root of their mean area. 1.5 for a mesh of
+    /// equilateral triangles, 2 to 4 for most meshes, 14 for a gear of 20,000 faces each as long as it is thick.
+    pub fn needleness(&self) -> f64 {
+        self.needleness
+    }
+
+    /// The face whose longest edge is the most times its height, the first of equals, and how many.
+    pub fn most_slender(&self) -> (u32, f64) {
+        let slenderness = |face: usize| {
+            let [a, b, c] = self.triangles[face].corners;
+            self.longest[face].powi(2) / (b - a).cross(c - a).length()
+        };
+        let faces = (0..self.faces.len()).map(|face| (face as u32, slenderness(face)));
+        faces.fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
     }
 
     /// The requirement of a face's feature.
@@ -215,4 +242,9 @@ impl Surface {
             Part::Vertex(v) => &self.vertex_faces[v as usize],
         }
     }
+}
+
+fn longest_edge(t: &Triangle) -> f64 {
+    let [a, b, c] = t.corners;
+    a.distance(b).max(b.distance(c)).max(c.distance(a))
 }
