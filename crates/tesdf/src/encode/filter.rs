@@ -61,7 +61,8 @@ pub struct Scratch {
     rivals: Rivals,
     survivors: Vec<Survivor>,
     meeting: Vec<Survivor>,
-    sharing: Sharing,
+    /// By survivor: the weight of the longest chain of rule C that ends there, or [`DROPPED`].
+    chained: Vec<u32>,
     pools: Vec<Pool>,
     pub(super) settled: Settled,
 }
@@ -88,6 +89,9 @@ const MAX_SHARING: usize = 256;
 /// Vertices with more faces than this are looked at in such cells too: where the vertex is the closest point of all of its faces,
 /// bisecting drops none of them.
 const LARGE_FAN: usize = 512;
+
+/// Marks survivors that rule C has dropped; no chain weighs so much.
+const DROPPED: u32 = u32::MAX;
 
 /// More candidates than this are only thinned out by rule A.
 const MANY: usize = 1 << 12;
@@ -174,7 +178,8 @@ pub fn filter(
             scratch.meeting.push(survivor);
         }
     });
-    filtered.chains = share_features(surface, cell, candidates, chains, &mut filtered.survivors, &mut scratch.sharing);
+    filtered.chains =
+        share_features(surface, cell, candidates, chains, &mut filtered.survivors, &mut scratch.chained);
     filtered.survivors.extend_from_slice(&scratch.meeting);
     filtered
 }
@@ -237,66 +242,45 @@ fn point_rule_lanes<L: Doubles>(
     }
 }
 
-/// What rule C knows of the survivors of a cell; survivors are numbered from 1.
-#[derive(Debug, Default)]
-struct Sharing {
-    /// By part: the last survivor that has it. Holds what an earlier cell left where no survivor of this one has the part.
-    last: Vec<u32>,
-    /// By part: the last of those kept so far that has it; all 0 between cells.
-    kept: Vec<u32>,
-    /// By survivor: the weight of the longest chain that ends there.
-    chained: Vec<u32>,
-}
-
 /// Rule C: of the faces that are one and the same edge or vertex to the whole cell, one is enough.
 ///
 /// Goes through the survivors in order, and drops one when another that is still there has what the cell needs of it: the last
-/// of all that have it, or else the last that has been kept. So chains stay short.
+/// such one, so that chains stay short.
 fn share_features(
     surface: &Surface,
     cell: &Cell,
     candidates: &Candidates,
     chains: Chains,
     survivors: &mut Vec<Survivor>,
-    sharing: &mut Sharing,
+    chained: &mut Vec<u32>,
 ) -> Chains {
-    if survivors.iter().all(|s| surface.is_face(s.requirement)) {
-        return chains;
-    }
-    let face = |s: &Survivor| candidates.faces[s.index as usize];
-    let Sharing { last, kept, chained } = sharing;
-    last.resize(surface.parts(), 0);
-    kept.resize(surface.parts(), 0);
+    let many = survivors.len() > MAX_SHARING;
     chained.clear();
     chained.resize(survivors.len(), 0);
-    for (number, s) in (1..).zip(survivors.iter()) {
-        surface.implied(face(s)).iter().for_each(|part| last[part.index()] = number);
-    }
-    let many = survivors.len() > MAX_SHARING;
     let mut heaviest = 0;
-    let mut number = 0;
-    survivors.retain(|g| {
-        number += 1;
+    // The faces of a fan ask one after the other for the same vertex.
+    let mut before = None;
+    for (i, g) in survivors.iter().enumerate() {
         let part = g.requirement;
-        let looked_at = !surface.is_face(part) && (!many || surface.faces_of(part).len() > LARGE_FAN);
-        let link = looked_at
-            .then(|| if last[part.index()] > number { last[part.index()] } else { kept[part.index()] })
-            .filter(|&holder| holder > 0)
-            .and_then(|holder| {
-                let weight = chained[number as usize - 1] + Chains::weight(surface, cell, part, face(g))?;
-                chains.allow(weight).then_some((holder, weight))
-            });
-        if let Some((holder, weight)) = link {
-            let chain = &mut chained[holder as usize - 1];
-            *chain = (*chain).max(weight);
-            heaviest = heaviest.max(weight);
-        } else {
-            surface.implied(face(g)).iter().for_each(|part| kept[part.index()] = number);
+        if surface.is_face(part) || (many && surface.faces_of(part).len() <= LARGE_FAN) {
+            continue;
         }
-        link.is_none()
-    });
-    for s in survivors.iter() {
-        surface.implied(face(s)).iter().for_each(|part| kept[part.index()] = 0);
+        let face = |at: usize| candidates.faces[survivors[at].index as usize];
+        let found = before.filter(|&(asked, at)| asked == part && at > i).or_else(|| {
+            let holds = |&at: &usize| at != i && chained[at] != DROPPED && surface.holds(face(at), part);
+            Some((part, (0..survivors.len()).rev().find(holds)?))
+        });
+        let Some((_, at)) = found else { continue };
+        before = found;
+        let Some(link) = Chains::weight(surface, cell, part, face(i)) else { continue };
+        let weight = chained[i] + link;
+        if chains.allow(weight) {
+            chained[at] = chained[at].max(weight);
+            chained[i] = DROPPED;
+            heaviest = heaviest.max(weight);
+        }
     }
+    let mut left = chained.iter().map(|&weight| weight != DROPPED);
+    survivors.retain(|_| left.next() == Some(true));
     chains.and(heaviest)
 }

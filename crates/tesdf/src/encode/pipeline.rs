@@ -264,7 +264,11 @@ pub fn encode_with(
 }
 
 /// Refines all roots; `None` when cancelled, or the effort is exceeded.
-fn refine(refiner: &Refiner, cells: &[Cell], candidates: impl Fn(&Cell) -> Vec<u32> + Sync) -> Option<Vec<Tree>> {
+fn refine(
+    refiner: &Refiner,
+    cells: &[Cell],
+    candidates: impl Fn(&Cell) -> Vec<u32> + Sync,
+) -> Option<Vec<Tree>> {
     refiner.progress.begin(Stage::Refine, cells.len() as u64 * ROOT_VOLUME);
     cells.par_iter().map(|cell| refiner.root(*cell, &candidates(cell))).collect()
 }

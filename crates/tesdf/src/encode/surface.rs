@@ -1,5 +1,6 @@
 //! The mesh as the encoder sees it: triangles, edges, incident faces, and the parts that a cell can need.
 
+use std::cmp::Reverse;
 use std::collections::HashMap;
 
 use super::filter::MARGIN;
@@ -198,35 +199,37 @@ impl Surface {
         [a, b, c, d, e, f]
     }
 
-    /// The fewest faces, greedily, that hold all of `requirements` (sorted), in ascending order.
+    /// The fewest faces, greedily, that hold all of `requirements` (sorted, some of them more than once), in ascending order.
     ///
     /// Faces are taken as they are; then each edge that none of them has takes the one of its faces that
     /// meets most of what is still open; then vertices likewise.
     pub fn cover(&self, requirements: &[Requirement]) -> Vec<u32> {
         let first_part = requirements.partition_point(|&r| self.is_face(r));
         let mut kept: Vec<u32> = requirements[..first_part].iter().map(|r| r.0).collect();
-        // What no face that is kept has, ascending; whole faces are in `kept`, ascending too.
-        let mut open = requirements[first_part..].to_vec();
         let whole = kept.len();
-        open.retain(|&r| {
-            let taken = |face: &u32| kept[..whole].binary_search(face).is_ok();
-            !self.faces_of(r).iter().any(taken)
-        });
-        let mut is_open = vec![true; open.len()];
-        for first in 0..open.len() {
-            if !is_open[first] {
+        let mut open = Open::default();
+        for asked in requirements[first_part..].chunk_by(|a, b| a == b) {
+            let faces = self.faces_of(asked[0]);
+            // Whole faces ascend too.
+            let held = if faces.len() < whole {
+                faces.iter().any(|face| kept.binary_search(face).is_ok())
+            } else {
+                kept.iter().any(|&face| self.holds(face, asked[0]))
+            };
+            if !held {
+                open.parts.push(asked[0]);
+                open.times.push(asked.len());
+            }
+        }
+        for first in 0..open.parts.len() {
+            if open.times[first] == 0 {
                 continue;
             }
-            let gain = |face: u32| {
-                let meets = |r: &Requirement| open.binary_search(r).is_ok_and(|at| is_open[at]);
-                self.implied(face).iter().filter(|r| meets(r)).count()
-            };
-            let own = self.faces_of(open[first]);
-            let Some(&best) = own.iter().max_by_key(|&&f| (gain(f), std::cmp::Reverse(f))) else { break };
+            let Some(best) = self.most_shared(&open, first) else { break };
             kept.push(best);
             for r in self.implied(best) {
-                if let Ok(at) = open.binary_search(&r) {
-                    is_open[at] = false;
+                if let Ok(at) = open.parts.binary_search(&r) {
+                    open.times[at] = 0;
                 }
             }
         }
@@ -234,7 +237,30 @@ impl Surface {
         kept
     }
 
-    /// The faces that hold an edge or a vertex.
+    /// Of the faces that hold the part at `first`, the one that holds most of what is open; the least of equals.
+    fn most_shared(&self, open: &Open, first: usize) -> Option<u32> {
+        let part = open.parts[first];
+        let own = self.faces_of(part);
+        if own.len() <= SMALL_FAN {
+            let times = |r: &Requirement| open.parts.binary_search(r).map_or(0, |at| open.times[at]);
+            let gain = |face: u32| self.implied(face).iter().map(times).sum::<usize>();
+            return own.iter().copied().max_by_key(|&f| (gain(f), Reverse(f)));
+        }
+        // Few of them hold anything else: found from what else is open. Earlier parts are not.
+        let others = open.parts.iter().zip(&open.times).skip(first + 1).filter(|(_, times)| **times > 0);
+        let mut shared: Vec<(u32, usize)> = others
+            .flat_map(|(&other, &times)| self.faces_of(other).iter().map(move |&face| (face, times)))
+            .filter(|&(face, _)| self.holds(face, part))
+            .collect();
+        shared.sort_unstable();
+        let gains =
+            shared.chunk_by(|a, b| a.0 == b.0).map(|run| (run[0].0, run.iter().map(|s| s.1).sum::<usize>()));
+        gains
+            .max_by_key(|&(face, gain)| (gain, Reverse(face)))
+            .map_or(own.first().copied(), |(face, _)| Some(face))
+    }
+
+    /// The faces that hold an edge or a vertex, ascending.
     pub fn faces_of(&self, requirement: Requirement) -> &[u32] {
         match self.part(requirement) {
             Part::Face(_) => &[],
@@ -243,6 +269,18 @@ impl Surface {
         }
     }
 }
+
+/// Edges and vertices that no face has been kept for yet.
+#[derive(Default)]
+struct Open {
+    /// Ascending, each once.
+    parts: Vec<Requirement>,
+    /// How often each is asked for; 0 once a kept face has it.
+    times: Vec<usize>,
+}
+
+/// Faces of a vertex that are each asked what else they hold.
+const SMALL_FAN: usize = 32;
 
 fn longest_edge(t: &Triangle) -> f64 {
     let [a, b, c] = t.corners;

@@ -3,9 +3,7 @@ use std::collections::HashSet;
 use super::edges::centroid;
 use super::fans::pairs_that_may_meet;
 use crate::{
-    geometry::{
-        Aabb, normal_signs, orientation, segment_meets_triangle, surely_apart, triangles_meet,
-    },
+    geometry::{Aabb, normal_signs, orientation, segment_meets_triangle, surely_apart, triangles_meet},
     mesh::{Defect, DefectKind, Severity, TriangleMesh},
 };
 
