@@ -40,20 +40,20 @@ pub fn sign_hints(surface: &Surface, tree: &AabbTree, simplicity: Simplicity) ->
         return vec![SignHints::default(); surface.faces.len()];
     }
     let fans = large_fans(surface);
-    let folded: Vec<bool> =
+    let delicate: Vec<bool> =
         (0..surface.faces.len()).into_par_iter().map(|f| is_delicate(surface, tree, &fans, f)).collect();
     let corners: Vec<Corner> =
-        (0..surface.vertex_count() as u32).into_par_iter().map(|v| corner(surface, v, &folded)).collect();
+        (0..surface.vertex_count() as u32).into_par_iter().map(|v| corner(surface, v, &delicate)).collect();
     (0..surface.faces.len() as u32)
         .into_par_iter()
         .map(|face| {
             let mut hints = SignHints::default();
-            if folded[face as usize] {
+            if delicate[face as usize] {
                 return hints;
             }
             hints.set(0, SignHint::Plane);
             for k in 0..3 {
-                hints.set(1 + k, edge_hint(surface, face, k));
+                hints.set(1 + k, edge_hint(surface, face, k, &delicate));
                 hints.set(4 + k, vertex_hint(surface, face, k, &corners));
             }
             hints
@@ -172,9 +172,13 @@ fn within(a: &Triangle, b: &Triangle, distance: f64) -> bool {
         || eb.iter().any(|&e| separated(e.cross(b.normal))))
 }
 
-fn edge_hint(surface: &Surface, face: u32, k: usize) -> SignHint {
+fn edge_hint(surface: &Surface, face: u32, k: usize, delicate: &[bool]) -> SignHint {
     let [f, g] = surface.edge_faces(surface.edges[face as usize][k]) else { return SignHint::Winding };
     let other = if *f == face { *g } else { *f };
+    // A sliver's normal may be noise, and its other edges are as near as this one.
+    if delicate[other as usize] {
+        return SignHint::Winding;
+    }
     let (t, o) = (&surface.triangles[face as usize], &surface.triangles[other as usize]);
     let cosine = t.normal.dot(o.normal);
     if cosine > FLAT {

@@ -305,7 +305,7 @@ const SMALL_MESH: u64 = 1000;
 const NEEDLES: f64 = 15.0;
 /// The needleness at which such a cell has to be worth a byte. (At 18 to 97, fans of 1,000 to 20,000 faces, the effort is 4,000 to
 /// 7,500 a face with this, and grows with the number of faces without.)
-const WORTH_A_BYTE: f64 = 20.0;
+const WORTH_A_BYTE: f64 = 12.0;
 /// Times that refining begins anew, with cells held back eight times as much, before it is given up.
 const ATTEMPTS: u32 = 5;
 
