@@ -186,9 +186,8 @@ fn vertices_far_away_and_thin_plates() {
 /// Face 7 is 5e-60 high: a segment, once rounded. Seen from a point that is nearest to that segment, its normal used to count.
 #[test]
 fn a_segment_between_two_faces_tells_no_side() {
-    let mut vertices: Vec<DVec3> = (0..8)
-        .map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)))
-        .collect();
+    let mut vertices: Vec<DVec3> =
+        (0..8).map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();
     vertices[1] = DVec3::new(1.2731877562933331, 0.15, 8.500000000000001e-10);
     vertices[5] = DVec3::new(0.775, 0.0, 0.85);
     vertices[7] = DVec3::new(0.25, 1.0, 5e-60);

@@ -1,9 +1,8 @@
-use rayon::prelude::*;
-
 use super::assemble::assemble;
+use super::effort::{EFFORT_PER_FACE, Effort, refine, refine_within_effort};
 use super::hints::{Simplicity, sign_hints};
 use super::lists::{Finished, Lists};
-use super::refine::{Effort, ROOT_VOLUME, Refiner, Tree, Weights};
+use super::refine::{Refiner, Weights};
 use super::roots::Roots;
 use super::sampled::{Processor, Sampler, lipschitz_candidates};
 use super::surface::{Surface, Touching};
@@ -180,7 +179,7 @@ pub fn encode_with(
         effort: &unlimited,
     };
     let mut trees = match domain {
-        Domain::Bisection => refine_within_effort(refiner, &roots.cells)?,
+        Domain::Bisection => refine_within_effort(refiner, &roots.cells, EFFORT_PER_FACE)?,
         Domain::Conforming(_) => {
             // All of it is the domain, and every cell gets a list.
             refiner.band = f64::INFINITY;
@@ -262,52 +261,6 @@ pub fn encode_with(
     }
     Ok(asset)
 }
-
-/// Refines all roots; `None` when cancelled, or the effort is exceeded.
-fn refine(
-    refiner: &Refiner,
-    cells: &[Cell],
-    candidates: impl Fn(&Cell) -> Vec<u32> + Sync,
-) -> Option<Vec<Tree>> {
-    refiner.progress.begin(Stage::Refine, cells.len() as u64 * ROOT_VOLUME);
-    cells.par_iter().map(|cell| refiner.root(*cell, &candidates(cell))).collect()
-}
-
-/// Refines the bisection domain with an effort in proportion to the faces: the more long faces there are, the earlier cells that list
-/// many are left as they are.
-fn refine_within_effort(mut refiner: Refiner, cells: &[Cell]) -> Result<Vec<Tree>, EncodeError> {
-    let surface = refiner.surface;
-    let faces = surface.faces.len() as u32;
-    let limit = EFFORT_PER_FACE * (u64::from(faces) + SMALL_MESH);
-    if surface.needleness() > NEEDLES {
-        refiner.weights.long_faces = (surface.needleness() / WORTH_A_BYTE).powi(2);
-    }
-    for _ in 0..ATTEMPTS {
-        let effort = Effort::new(limit);
-        let attempt = Refiner { weights: refiner.weights.clone(), effort: &effort, ..refiner };
-        if let Some(trees) = refine(&attempt, cells, |_| (0..faces).collect()) {
-            return Ok(trees);
-        }
-        if refiner.progress.is_cancelled() {
-            return Err(EncodeError::Cancelled);
-        }
-        refiner.weights.long_faces = (8.0 * refiner.weights.long_faces).max(1.0);
-    }
-    let (face, slenderness) = surface.most_slender();
-    Err(EncodeError::NoShortLists { face, slenderness, compared: limit })
-}
-
-/// Faces held against cells while refining, for each face of the mesh. A bolt of 25,000 faces takes 1,783, a gear of 20,000 needles 4,789.
-const EFFORT_PER_FACE: u64 = 10_000;
-/// Faces that a small mesh counts as in addition.
-const SMALL_MESH: u64 = 1000;
-/// The [`needleness`](Surface::needleness) from which cells with many long faces are held back from the start.
-const NEEDLES: f64 = 15.0;
-/// The needleness at which such a cell has to be worth a byte. (At 18 to 97, fans of 1,000 to 20,000 faces, the effort is 4,000 to
-/// 7,500 a face with this, and grows with the number of faces without.)
-const WORTH_A_BYTE: f64 = 12.0;
-/// Times that refining begins anew, with cells held back eight times as much, before it is given up.
-const ATTEMPTS: u32 = 5;
 
 /// Half width of the layer around the surface whose queries count full, as a share of the diagonal.
 const NEAR: f64 = 0.01;

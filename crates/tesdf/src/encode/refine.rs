@@ -1,10 +1,9 @@
 //! Over-refines the domain and prunes it while unwinding.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use super::EncodeProgress;
 use super::candidates::{Candidates, Pool};
 use super::chains::Chains;
+use super::effort::Effort;
 use super::filter::{Scratch, Survivor, filter};
 use super::surface::{Requirement, Surface};
 use crate::domain::Cell;
@@ -96,31 +95,6 @@ pub struct Refiner<'a> {
     pub progress: &'a EncodeProgress,
     /// What the roots together may cost.
     pub effort: &'a Effort,
-}
-
-/// How many faces a refinement has held against cells, and how many it may.
-///
-/// Whether it is too much depends on the mesh alone: the sum over all cells does, and only grows.
-#[derive(Debug)]
-pub struct Effort {
-    spent: AtomicU64,
-    limit: u64,
-}
-
-impl Effort {
-    /// None spent.
-    pub fn new(limit: u64) -> Self {
-        Self { spent: AtomicU64::new(0), limit }
-    }
-
-    /// Whether more was asked for than there is.
-    pub fn is_exceeded(&self) -> bool {
-        self.spent.load(Ordering::Relaxed) > self.limit
-    }
-
-    fn spend(&self, faces: usize) {
-        self.spent.fetch_add(faces as u64, Ordering::Relaxed);
-    }
 }
 
 struct Pruned {

@@ -156,3 +156,85 @@ impl Seen {
 fn box_of(mesh: &TriangleMesh, face: u32) -> Aabb {
     Aabb::of(&mesh.triangle(face as usize))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::geometry::segment_meets_triangle;
+
+    fn found(mesh: &TriangleMesh) -> BTreeSet<[u32; 2]> {
+        let faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
+        let mut pairs = BTreeSet::new();
+        pairs_that_may_meet(mesh, &faces, |f, g| {
+            assert!(f < g && pairs.insert([f, g]), "{f} and {g} come twice or turned round");
+        });
+        pairs
+    }
+
+    /// A prism over a polygon of n sides, each end a fan around one of its corners.
+    fn prism(n: u32) -> TriangleMesh {
+        let at = |k: u32, z: f64| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(n);
+            DVec3::new(angle.cos(), angle.sin(), z)
+        };
+        let vertices = (0..n).map(|k| at(k, 0.0)).chain((0..n).map(|k| at(k, 0.5))).collect();
+        let sides = (0..n).flat_map(|k| {
+            let next = (k + 1) % n;
+            [[k, next, n + next], [k, n + next, n + k]]
+        });
+        let ends = (1..n - 1).flat_map(|k| [[0, k + 1, k], [n, n + k, n + k + 1]]);
+        TriangleMesh::new(vertices, sides.chain(ends).collect()).expect("valid ids")
+    }
+
+    #[test]
+    fn pairs_of_a_large_fan_grow_with_its_faces() {
+        for n in [1000, 4000] {
+            let pairs = found(&prism(n)).len();
+            assert!(pairs < 40 * n as usize, "{pairs} of the {} pairs of one end", n * n / 2);
+        }
+    }
+
+    fn meet_beside_a_shared_corner(mesh: &TriangleMesh, f: u32, g: u32) -> bool {
+        let at = |v: u32| mesh.vertices()[v as usize];
+        let (t, u) = (mesh.faces()[f as usize], mesh.faces()[g as usize]);
+        // The sides of one, but for those at the corner, against the other.
+        let sides_meet = |t: [u32; 3], u: [u32; 3]| {
+            let sides = [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
+            let mut apart = sides.into_iter().filter(|side| side.iter().all(|v| !u.contains(v)));
+            apart.any(|[p, q]| segment_meets_triangle(at(p), at(q), u.map(at)))
+        };
+        sides_meet(t, u) || sides_meet(u, t)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        /// Fans that fold, cross themselves and each other, hold faces of no area, and loose faces all around.
+        #[test]
+        fn all_that_meet_are_found(seed in prop::collection::vec(-1.0..1.0_f64, 90), flat in any::<bool>(), shared in any::<bool>()) {
+            let mut numbers = seed.iter().copied().cycle().enumerate().map(|(k, x)| (x * (k as f64 + 1.0) * 17.3).fract());
+            let mut point = || {
+                let mut next = || numbers.next().unwrap_or(0.0);
+                DVec3::new(next(), next(), if flat { 0.0 } else { next() })
+            };
+            // Two fans of 150 faces; the second around a rim vertex of the first, or apart.
+            let mut vertices: Vec<DVec3> = (0..400).map(|_| point()).collect();
+            vertices[7] = vertices[8];
+            let second = if shared { 5 } else { 200 };
+            let mut faces: Vec<[u32; 3]> = (1..151).map(|k| [0, k, k + 1]).collect();
+            faces.extend((201..351).map(|k| [second, k, k + 1]));
+            faces.extend((0..60).map(|k| [k * 6, k * 6 + 1, k * 6 + 2]));
+            let mesh = TriangleMesh::new(vertices, faces).expect("valid ids");
+            let found = found(&mesh);
+            for f in 0..mesh.faces().len() as u32 {
+                for g in f + 1..mesh.faces().len() as u32 {
+                    let meet = meet_beside_a_shared_corner(&mesh, f, g);
+                    prop_assert!(!meet || found.contains(&[f, g]), "{f} and {g}");
+                }
+            }
+        }
+    }
+}
