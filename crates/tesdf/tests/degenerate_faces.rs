@@ -183,6 +183,24 @@ fn vertices_far_away_and_thin_plates() {
     }
 }
 
+/// Face 7 is 5e-60 high: a segment, once rounded. Seen from a point that is nearest to that segment, its normal used to count.
+#[test]
+fn a_segment_between_two_faces_tells_no_side() {
+    let mut vertices: Vec<DVec3> =
+        (0..8).map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();
+    vertices[1] = DVec3::new(1.2731877562933331, 0.15, 8.500000000000001e-10);
+    vertices[5] = DVec3::new(0.775, 0.0, 0.85);
+    vertices[7] = DVec3::new(0.25, 1.0, 5e-60);
+    let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let faces = sides.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let asset = encoded(vertices, faces);
+    assert_right(&asset);
+    for precision in [Precision::F32, Precision::F64] {
+        let answer = asset.query(DVec3::new(0.1882258779474606, 1.232421875, -0.232421875), precision);
+        assert!((answer.signed_distance - 0.2324_f64.hypot(0.2324)).abs() < 1e-3, "{answer:?}");
+    }
+}
+
 #[test]
 fn clearance_sees_no_planes_of_points() {
     let (vertices, mut faces) = cube();

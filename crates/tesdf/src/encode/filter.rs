@@ -61,7 +61,7 @@ pub struct Scratch {
     rivals: Rivals,
     survivors: Vec<Survivor>,
     meeting: Vec<Survivor>,
-    /// By survivor: the weight of the longest chain of rule C that ends there.
+    /// By survivor: the weight of the longest chain of rule C that ends there, or [`DROPPED`].
     chained: Vec<u32>,
     pools: Vec<Pool>,
     pub(super) settled: Settled,
@@ -84,8 +84,14 @@ impl Scratch {
     }
 }
 
-/// Rule C compares all pairs; cells with more survivors than this are bisected anyway, and compared below.
+/// Cells with more survivors than this are bisected anyway: below, rule C looks at them again.
 const MAX_SHARING: usize = 256;
+/// Vertices with more faces than this are looked at in such cells too: where the vertex is the closest point of all of its faces,
+/// bisecting drops none of them.
+const LARGE_FAN: usize = 512;
+
+/// Marks survivors that rule C has dropped; no chain weighs so much.
+const DROPPED: u32 = u32::MAX;
 
 /// More candidates than this are only thinned out by rule A.
 const MANY: usize = 1 << 12;
@@ -237,6 +243,9 @@ fn point_rule_lanes<L: Doubles>(
 }
 
 /// Rule C: of the faces that are one and the same edge or vertex to the whole cell, one is enough.
+///
+/// Goes through the survivors in order, and drops one when another that is still there has what the cell needs of it: the last
+/// such one, so that chains stay short.
 fn share_features(
     surface: &Surface,
     cell: &Cell,
@@ -245,35 +254,33 @@ fn share_features(
     survivors: &mut Vec<Survivor>,
     chained: &mut Vec<u32>,
 ) -> Chains {
-    if survivors.len() > MAX_SHARING {
-        return chains;
-    }
+    let many = survivors.len() > MAX_SHARING;
     chained.clear();
     chained.resize(survivors.len(), 0);
     let mut heaviest = 0;
-    let mut i = 0;
-    while i < survivors.len() {
-        let g = survivors[i];
-        let holder = (!surface.is_face(g.requirement))
-            .then(|| {
-                survivors.iter().position(|h| {
-                    h.index != g.index && surface.holds(candidates.faces[h.index as usize], g.requirement)
-                })
-            })
-            .flatten();
-        let link = holder.and_then(|at| {
-            let weight = chained[i]
-                + Chains::weight(surface, cell, g.requirement, candidates.faces[g.index as usize])?;
-            chains.allow(weight).then_some((at, weight))
+    // The faces of a fan ask one after the other for the same vertex.
+    let mut before = None;
+    for (i, g) in survivors.iter().enumerate() {
+        let part = g.requirement;
+        if surface.is_face(part) || (many && surface.faces_of(part).len() <= LARGE_FAN) {
+            continue;
+        }
+        let face = |at: usize| candidates.faces[survivors[at].index as usize];
+        let found = before.filter(|&(asked, at)| asked == part && at > i).or_else(|| {
+            let holds = |&at: &usize| at != i && chained[at] != DROPPED && surface.holds(face(at), part);
+            Some((part, (0..survivors.len()).rev().find(holds)?))
         });
-        if let Some((at, weight)) = link {
+        let Some((_, at)) = found else { continue };
+        before = found;
+        let Some(link) = Chains::weight(surface, cell, part, face(i)) else { continue };
+        let weight = chained[i] + link;
+        if chains.allow(weight) {
             chained[at] = chained[at].max(weight);
+            chained[i] = DROPPED;
             heaviest = heaviest.max(weight);
-            survivors.remove(i);
-            chained.remove(i);
-        } else {
-            i += 1;
         }
     }
+    let mut left = chained.iter().map(|&weight| weight != DROPPED);
+    survivors.retain(|_| left.next() == Some(true));
     chains.and(heaviest)
 }

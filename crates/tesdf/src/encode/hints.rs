@@ -1,5 +1,7 @@
 //! How the closest feature tells the sign, where it does so beyond doubt.
 
+use std::cell::Cell;
+
 use glam::DVec3;
 
 use super::surface::Surface;
@@ -37,56 +39,100 @@ pub fn sign_hints(surface: &Surface, tree: &AabbTree, simplicity: Simplicity) ->
     if simplicity == Simplicity::Involved {
         return vec![SignHints::default(); surface.faces.len()];
     }
-    let folded: Vec<bool> =
-        (0..surface.faces.len()).into_par_iter().map(|f| is_delicate(surface, tree, f)).collect();
+    let fans = large_fans(surface);
+    let delicate: Vec<bool> =
+        (0..surface.faces.len()).into_par_iter().map(|f| is_delicate(surface, tree, &fans, f)).collect();
+    let corners: Vec<Corner> =
+        (0..surface.vertex_count() as u32).into_par_iter().map(|v| corner(surface, v, &delicate)).collect();
     (0..surface.faces.len() as u32)
         .into_par_iter()
         .map(|face| {
             let mut hints = SignHints::default();
-            if folded[face as usize] {
+            if delicate[face as usize] {
                 return hints;
             }
             hints.set(0, SignHint::Plane);
             for k in 0..3 {
-                hints.set(1 + k, edge_hint(surface, face, k));
-                hints.set(4 + k, vertex_hint(surface, face, k, &folded));
+                hints.set(1 + k, edge_hint(surface, face, k, &delicate));
+                hints.set(4 + k, vertex_hint(surface, face, k, &corners));
             }
             hints
         })
         .collect()
 }
 
+/// What is known of a face from its corners with more than [`MAX_RING`] faces, without a look at pairs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum LargeFan {
+    /// It has no such corner.
+    None,
+    /// No two faces around this vertex fold back onto each other.
+    Open(u32),
+    /// Faces may.
+    MayFold,
+}
+
+/// Cosine to their middle up to which no two normals are as far apart as [`FOLDED`]: of 71.3 degrees, half of 142.7.
+const OPEN: f64 = 0.32;
+
+fn large_fans(surface: &Surface) -> Vec<LargeFan> {
+    let mut fans = vec![LargeFan::None; surface.faces.len()];
+    for vertex in 0..surface.vertex_count() as u32 {
+        let around = surface.vertex_faces(vertex);
+        if around.len() <= MAX_RING {
+            continue;
+        }
+        let normal = |&f: &u32| surface.triangles[f as usize].normal;
+        let middle = around.iter().map(normal).sum::<DVec3>().normalize_or_zero();
+        let fan = match around.iter().all(|f| normal(f).dot(middle) > OPEN) {
+            true => LargeFan::Open(vertex),
+            false => LargeFan::MayFold,
+        };
+        for &face in around {
+            let known = &mut fans[face as usize];
+            if fan == LargeFan::MayFold || *known == LargeFan::None {
+                *known = fan;
+            }
+        }
+    }
+    fans
+}
+
 /// A sliver, or so near to another sheet that rounding could confuse them.
-fn is_delicate(surface: &Surface, tree: &AabbTree, face: usize) -> bool {
+fn is_delicate(surface: &Surface, tree: &AabbTree, fans: &[LargeFan], face: usize) -> bool {
+    let fan = fans[face];
     let triangle = &surface.triangles[face];
     let [a, b, c] = triangle.corners;
     let longest = (b - a).length().max((c - b).length()).max((a - c).length());
     let height = (b - a).cross(c - a).length() / longest;
-    if height < SLIVER * longest || height < THIN {
+    if height < SLIVER * longest || height < THIN || fan == LargeFan::MayFold {
         return true;
     }
     let corners = surface.faces[face];
     let reach = Aabb::of(&triangle.corners).grown(THIN);
-    let mut delicate = false;
+    let delicate = Cell::new(false);
     tree.visit(
-        |bounds| bounds.overlaps(reach),
+        |bounds| !delicate.get() && bounds.overlaps(reach),
         |leaf| {
             for &other in leaf {
-                if other as usize == face {
+                // Most of the boxes around the faces of a large fan overlap.
+                let same_fan = fan != LargeFan::None && fans[other as usize] == fan;
+                if same_fan || other as usize == face {
                     continue;
                 }
                 let o = &surface.triangles[other as usize];
                 let shared = surface.faces[other as usize].iter().filter(|v| corners.contains(v)).count();
                 let cosine = triangle.normal.dot(o.normal);
-                delicate |= match shared {
+                let found = match shared {
                     0 => Aabb::of(&o.corners).overlaps(reach) && within(triangle, o, THIN),
                     1 => cosine < FOLDED && narrow_fold(surface, face, other as usize),
                     _ => cosine < FOLDED,
                 };
+                delicate.set(delicate.get() || found);
             }
         },
     );
-    delicate
+    delicate.get()
 }
 
 /// Whether two faces that share one vertex come within some 17 degrees of each other beside it.
@@ -126,9 +172,13 @@ fn within(a: &Triangle, b: &Triangle, distance: f64) -> bool {
         || eb.iter().any(|&e| separated(e.cross(b.normal))))
 }
 
-fn edge_hint(surface: &Surface, face: u32, k: usize) -> SignHint {
+fn edge_hint(surface: &Surface, face: u32, k: usize, delicate: &[bool]) -> SignHint {
     let [f, g] = surface.edge_faces(surface.edges[face as usize][k]) else { return SignHint::Winding };
     let other = if *f == face { *g } else { *f };
+    // A sliver's normal may be noise, and its other edges are as near as this one.
+    if delicate[other as usize] {
+        return SignHint::Winding;
+    }
     let (t, o) = (&surface.triangles[face as usize], &surface.triangles[other as usize]);
     let cosine = t.normal.dot(o.normal);
     if cosine > FLAT {
@@ -150,33 +200,66 @@ fn edge_hint(surface: &Surface, face: u32, k: usize) -> SignHint {
 /// Slack of "on or below" for the ring of a vertex, as a share of the ring edge's length.
 const RING: f64 = 1e-12;
 
-fn vertex_hint(surface: &Surface, face: u32, k: usize, delicate: &[bool]) -> SignHint {
-    let vertex = surface.faces[face as usize][k];
+/// The shape of the surface around a vertex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Corner {
+    /// Delicate faces, or more than [`MAX_RING`].
+    Unknown,
+    /// All faces are on or below the planes of the others.
+    Convex,
+    /// The same, with inside and outside swapped.
+    Concave,
+    /// Anything else.
+    Other,
+}
+
+/// Vertices with more faces are left to the winding number: what tells their shape compares pairs.
+const MAX_RING: usize = 1024;
+
+fn corner(surface: &Surface, vertex: u32, delicate: &[bool]) -> Corner {
     let around = surface.vertex_faces(vertex);
-    if around.iter().any(|&f| delicate[f as usize]) {
-        return SignHint::Winding;
+    if around.len() > MAX_RING || around.iter().any(|&f| delicate[f as usize]) {
+        return Corner::Unknown;
     }
-    let normal = surface.triangles[face as usize].normal;
-    if around.iter().all(|&f| surface.triangles[f as usize].normal.dot(normal) > FLAT) {
-        return SignHint::Plane;
-    }
-    let apex = surface.triangles[face as usize].corners[k];
     // Heights of all ring vertices over all planes around the vertex.
     let (mut below, mut above) = (true, true);
     for &f in around {
-        let n = surface.triangles[f as usize].normal;
+        let t = &surface.triangles[f as usize];
+        let k = surface.faces[f as usize].iter().position(|&v| v == vertex).unwrap_or(0);
+        let apex = t.corners[k];
         for &g in around {
             for c in surface.triangles[g as usize].corners {
-                let height = n.dot(c - apex);
+                let height = t.normal.dot(c - apex);
                 let slack = RING * (c - apex).length();
                 below &= height <= slack;
                 above &= height >= -slack;
             }
         }
+        if !below && !above {
+            break;
+        }
     }
     match (below, above) {
-        (true, false) => SignHint::Outside,
-        (false, true) => SignHint::Inside,
+        (true, false) => Corner::Convex,
+        (false, true) => Corner::Concave,
+        _ => Corner::Other,
+    }
+}
+
+fn vertex_hint(surface: &Surface, face: u32, k: usize, corners: &[Corner]) -> SignHint {
+    let vertex = surface.faces[face as usize][k];
+    let shape = corners[vertex as usize];
+    if shape == Corner::Unknown {
+        return SignHint::Winding;
+    }
+    let normal = surface.triangles[face as usize].normal;
+    let mut around = surface.vertex_faces(vertex).iter();
+    if around.all(|&f| surface.triangles[f as usize].normal.dot(normal) > FLAT) {
+        return SignHint::Plane;
+    }
+    match shape {
+        Corner::Convex => SignHint::Outside,
+        Corner::Concave => SignHint::Inside,
         _ => SignHint::Winding,
     }
 }

@@ -10,7 +10,7 @@ use super::refine::{Leaf, Tree};
 use super::roots::Roots;
 use super::sampled::{SampledCell, Sampler, sample};
 use super::surface::Surface;
-use super::tighten::tighten;
+use super::tighten::{Levels, tighten};
 use super::{Deformation, EncodeError, EncodeOptions, EncodeProgress, Encoder, Sampling, Stage, Threshold};
 use crate::asset::layout::{Label, Side};
 use crate::domain::Cell;
@@ -74,6 +74,9 @@ impl Lists<'_> {
         for tree in trees.iter_mut() {
             collect(tree, &mut |leaf| leaves.push(leaf));
         }
+        let length = |leaf: &&mut Leaf| if let Leaf::Listed { faces, .. } = leaf { faces.len() } else { 0 };
+        let entries = leaves.iter().map(length).sum();
+        let levels = Levels::new(self.options.tighten_levels, entries, self.surface.faces.len());
         progress.begin(Stage::Tighten, leaves.len() as u64);
         let (sampled, step) = match &self.options.encoder {
             Encoder::Certified => (leaves.iter().map(|_| None).collect(), 1),
@@ -94,8 +97,13 @@ impl Lists<'_> {
                 let mut crosses = false;
                 if let Leaf::Listed { faces, crossing, chains } = leaf {
                     crosses = *crossing;
-                    let found = sampled.unwrap_or_else(|| self.found(&cell, faces, *chains, scratch));
                     let tetrahedron = roots.tetrahedra.get(root);
+                    let levels = match tetrahedron {
+                        None => levels.of(faces),
+                        // Wide ones have long lists that shorten well.
+                        Some(_) => self.options.tighten_levels,
+                    };
+                    let found = sampled.unwrap_or_else(|| self.found(&cell, faces, levels, *chains, scratch));
                     let list = self.completed(&cell, tetrahedron, faces, crosses, found);
                     (*faces, exact_within, proof) = (list.faces, list.exact_within, list.proof);
                 }
@@ -128,7 +136,7 @@ impl Lists<'_> {
         chains: Chains,
         scratch: &mut Scratch,
     ) -> List {
-        let found = self.found(cell, faces, chains, scratch);
+        let found = self.found(cell, faces, self.options.tighten_levels, chains, scratch);
         self.completed(cell, tetrahedron, faces, false, found)
     }
 
@@ -164,10 +172,9 @@ impl Lists<'_> {
     }
 
     /// The faces of a cell's list, before anything is added or dropped; `chains` are those of the filters that left `faces`.
-    fn found(&self, cell: &Cell, faces: &[u32], chains: Chains, scratch: &mut Scratch) -> Found {
+    fn found(&self, cell: &Cell, faces: &[u32], levels: u32, chains: Chains, scratch: &mut Scratch) -> Found {
         match &self.options.encoder {
             Encoder::Certified => {
-                let levels = self.options.tighten_levels;
                 let (tight, chains) = match levels {
                     0 => (faces.to_vec(), chains),
                     _ => tighten(self.surface, cell, faces, levels, chains, scratch),

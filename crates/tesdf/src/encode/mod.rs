@@ -10,6 +10,7 @@ pub mod candidates;
 pub mod chains;
 mod choices;
 mod doubles;
+mod effort;
 pub mod filter;
 pub mod hints;
 mod holds;

@@ -1,16 +1,15 @@
-use rayon::prelude::*;
-
 use super::assemble::assemble;
+use super::effort::{EFFORT_PER_FACE, Effort, refine, refine_within_effort};
 use super::hints::{Simplicity, sign_hints};
 use super::lists::{Finished, Lists};
-use super::refine::{ROOT_VOLUME, Refiner, Tree, Weights};
+use super::refine::{Refiner, Weights};
 use super::roots::Roots;
 use super::sampled::{Processor, Sampler, lipschitz_candidates};
 use super::surface::{Surface, Touching};
 use super::{Deformation, EncodeOptions, EncodeProgress, Encoder, Refinement, Stage, Threshold};
 use crate::asset::layout::{self, TREE_LEAF, TreeChild};
 use crate::asset::{AssetError, Section, TeSdf, about, write_container};
-use crate::domain::{ConformingMesh, DomainCube, MAX_DEPTH};
+use crate::domain::{Cell, ConformingMesh, DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, Child, LocalFrame, WindingNumber};
 use crate::mesh::{MeshError, SolidMesh, TriangleMesh};
 use crate::query::Precision;
@@ -41,6 +40,19 @@ pub enum EncodeError {
         found: usize,
         /// The most that fits.
         limit: usize,
+    },
+    /// Lists of faces that are near each other all over the domain, and no bisection makes them shorter.
+    #[error(
+        "the faces have no short lists: {compared} comparisons of faces with cells were not enough to tell them apart. Face \
+         {face} is {slenderness:.1e} times as long as it is high; `tesdf check` lists faces like it, remesh them, or split the mesh"
+    )]
+    NoShortLists {
+        /// The face that is longest for its height, 0-based.
+        face: u32,
+        /// Its longest edge over its height.
+        slenderness: f64,
+        /// Comparisons that were made.
+        compared: u64,
     },
     /// The mesh does not fit the local frame.
     #[error(transparent)]
@@ -145,17 +157,18 @@ pub fn encode_with(
     let tree = AabbTree::build(&boxes, TREE_LEAF);
     let near = NEAR * diagonal_local;
 
-    progress.begin(Stage::Refine, roots.cells.len() as u64 * ROOT_VOLUME);
+    let unlimited = Effort::new(u64::MAX);
     let mut refiner = Refiner {
         surface: &surface,
         weights: Weights {
             byte: options.byte_worth / surface.faces.len() as f64,
             near,
-            per_volume: 1.0 / (surface.area * 4.0 * near),
+            per_volume: 1.0 / (surface.area.max(near * diagonal_local) * 4.0 * near),
             far_faces: FAR_FACES,
             far_list: FAR_LIST,
             far_distance: FAR_DISTANCE * diagonal_local,
             floor: FLOOR,
+            long_faces: 0.0,
         },
         band,
         bounds: local.bounds(),
@@ -163,27 +176,21 @@ pub fn encode_with(
         inside: &|p| winding.at(p) >= 1,
         max_depth: MAX_DEPTH,
         progress,
+        effort: &unlimited,
     };
-    if let Domain::Conforming(_) = domain {
-        // All of it is the domain, and every cell gets a list.
-        refiner.band = f64::INFINITY;
-        refiner.weights.far_list = usize::MAX;
-        if options.refinement == Refinement::None {
-            refiner.max_depth = 0;
+    let mut trees = match domain {
+        Domain::Bisection => refine_within_effort(refiner, &roots.cells, EFFORT_PER_FACE)?,
+        Domain::Conforming(_) => {
+            // All of it is the domain, and every cell gets a list.
+            refiner.band = f64::INFINITY;
+            refiner.weights.far_list = usize::MAX;
+            if options.refinement == Refinement::None {
+                refiner.max_depth = 0;
+            }
+            let candidates = |cell: &Cell| lipschitz_candidates(&surface, &tree, cell);
+            refine(&refiner, &roots.cells, candidates).ok_or(EncodeError::Cancelled)?
         }
-    }
-    let mut trees = roots
-        .cells
-        .par_iter()
-        .map(|&cell| {
-            let candidates = match domain {
-                Domain::Bisection => (0..surface.faces.len() as u32).collect(),
-                Domain::Conforming(_) => lipschitz_candidates(&surface, &tree, &cell),
-            };
-            refiner.root(cell, &candidates)
-        })
-        .collect::<Option<Vec<Tree>>>()
-        .ok_or(EncodeError::Cancelled)?;
+    };
 
     let lists = Lists { surface: &surface, tree: &tree, options, scale: frame.scale };
     let Finished { labels, exact_within, proof } =

@@ -3,7 +3,8 @@
 use super::EncodeProgress;
 use super::candidates::{Candidates, Pool};
 use super::chains::Chains;
-use super::filter::{Scratch, filter};
+use super::effort::Effort;
+use super::filter::{Scratch, Survivor, filter};
 use super::surface::{Requirement, Surface};
 use crate::domain::Cell;
 use crate::geometry::Aabb;
@@ -52,6 +53,8 @@ pub struct Weights {
     pub far_distance: f64,
     /// List length that no refinement is expected to get below.
     pub floor: f64,
+    /// How many stored bytes a cell must weigh to be bisected where it lists many faces that are longer than it.
+    pub long_faces: f64,
 }
 
 impl Weights {
@@ -65,6 +68,9 @@ impl Weights {
 const LEAF_BYTES: f64 = 14.0;
 /// Requirement sets longer than this are not merged: such a cell is never worth keeping.
 const MAX_UNION: usize = 256;
+
+/// More faces than this that are longer than their cell are many.
+const MANY_LONG: usize = 64;
 
 /// Progress of a whole root.
 pub const ROOT_VOLUME: u64 = 1 << 40;
@@ -87,6 +93,8 @@ pub struct Refiner<'a> {
     pub max_depth: u32,
     /// Told of the volume done, in units of 2^-40 of a root; asked whether to stop.
     pub progress: &'a EncodeProgress,
+    /// What the roots together may cost.
+    pub effort: &'a Effort,
 }
 
 struct Pruned {
@@ -106,7 +114,7 @@ struct Own {
 }
 
 impl Refiner<'_> {
-    /// Refines a root, whose lists can only name `faces`. `None` when cancelled.
+    /// Refines a root, whose lists can only name `faces`. `None` when cancelled, or the effort is exceeded.
     pub fn root(&self, cell: Cell, faces: &[u32]) -> Option<Tree> {
         let pool = Pool::new(self.surface, faces, &cell);
         self.refine(cell, &pool.candidates(), Chains::NONE, &mut Scratch::default()).map(|p| p.tree)
@@ -119,7 +127,8 @@ impl Refiner<'_> {
         chains: Chains,
         scratch: &mut Scratch,
     ) -> Option<Pruned> {
-        if self.progress.is_cancelled() {
+        self.effort.spend(candidates.faces.len());
+        if self.progress.is_cancelled() || self.effort.is_exceeded() {
             return None;
         }
         let filtered = filter(self.surface, &cell, candidates, chains, scratch);
@@ -150,7 +159,9 @@ impl Refiner<'_> {
         let w = &self.weights;
         let weight = cell.volume() * w.per_volume * w.near / (filtered.distance + w.near);
         let could_pay = weight * (n as f64 - w.floor) > w.byte * (LEAF_BYTES + w.floor);
-        let split = cell.depth < self.max_depth && could_pay;
+        let split = cell.depth < self.max_depth
+            && could_pay
+            && self.long_faces_pay(&cell, candidates, &filtered.survivors, weight);
         let far = n >= w.far_list && nearest > w.far_distance && !filtered.crossing;
         let unlisted = match (beyond, far) {
             (true, _) => Some(Leaf::Outside),
@@ -194,6 +205,26 @@ impl Refiner<'_> {
         scratch.give_back(pool);
         let (left, right) = (left?, right?);
         Some(self.prune(left, right, Own { requirements: own, crossing: false, chains }, weight, unlisted))
+    }
+
+    /// Whether a bisection can pay for what it makes of faces that are longer than the cell.
+    ///
+    /// Of cells half as wide, each such face is in two or more: lists get shorter by half, and there are twice as many entries, where
+    /// lists of small faces get shorter to a quarter, at no more entries. So a cell with n of them gives n bytes away to gain n / 2 times its
+    /// weight. Near the vertex of a fan of n faces this would go on and on, for n² entries in all.
+    fn long_faces_pay(
+        &self,
+        cell: &Cell,
+        candidates: &Candidates,
+        survivors: &[Survivor],
+        weight: f64,
+    ) -> bool {
+        if survivors.len() <= MANY_LONG || weight >= self.weights.byte * self.weights.long_faces {
+            return true;
+        }
+        let width = cell.width();
+        let is_long = |s: &&Survivor| self.surface.longest(candidates.faces[s.index as usize]) > width;
+        survivors.iter().filter(is_long).count() <= MANY_LONG
     }
 
     fn leaf(&self, own: Own, weight: f64, unlisted: Option<Leaf>) -> Pruned {

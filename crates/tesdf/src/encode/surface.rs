@@ -1,5 +1,6 @@
 //! The mesh as the encoder sees it: triangles, edges, incident faces, and the parts that a cell can need.
 
+use std::cmp::Reverse;
 use std::collections::HashMap;
 
 use super::filter::MARGIN;
@@ -56,6 +57,9 @@ pub struct Surface {
     vertex_faces: Vec<Vec<u32>>,
     /// Total area, local frame.
     pub area: f64,
+    /// Longest edge of each face, local frame.
+    longest: Vec<f64>,
+    needleness: f64,
     /// What a distance must be less by to count as less: [`MARGIN`] times the size of the domain.
     pub margin: f64,
     /// What becomes of faces that come near to a cell.
@@ -92,11 +96,14 @@ impl Surface {
                 vertex_faces[v as usize].push(face as u32);
             }
         }
-        let area = triangles
+        let area: f64 = triangles
             .iter()
             .map(|t| 0.5 * (t.corners[1] - t.corners[0]).cross(t.corners[2] - t.corners[0]).length())
             .sum();
+        let sum: f64 = triangles.iter().map(longest_edge).sum();
         Self {
+            needleness: sum / (area * faces.len() as f64).sqrt(),
+            longest: triangles.iter().map(longest_edge).collect(),
             triangles,
             faces,
             edges,
@@ -108,6 +115,27 @@ impl Surface {
             touching,
             isa: Isa::detect(),
         }
+    }
+
+    /// Length of the longest edge of a face, local frame.
+    pub fn longest(&self, face: u32) -> f64 {
+        self.longest[face as usize]
+    }
+
+    /// How much the faces are needles: their mean longest edge over the root of their mean area. 1.5 for a mesh of
+    /// equilateral triangles, 2 to 4 for most meshes, 14 for a gear of 20,000 faces each as long as it is thick.
+    pub fn needleness(&self) -> f64 {
+        self.needleness
+    }
+
+    /// The face whose longest edge is the most times its height, the first of equals, and how many.
+    pub fn most_slender(&self) -> (u32, f64) {
+        let slenderness = |face: usize| {
+            let [a, b, c] = self.triangles[face].corners;
+            self.longest[face].powi(2) / (b - a).cross(c - a).length()
+        };
+        let faces = (0..self.faces.len()).map(|face| (face as u32, slenderness(face)));
+        faces.fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
     }
 
     /// The requirement of a face's feature.
@@ -171,32 +199,90 @@ impl Surface {
         [a, b, c, d, e, f]
     }
 
-    /// The fewest faces, greedily, that hold all of `requirements` (sorted), in ascending order.
+    /// The fewest faces, greedily, that hold all of `requirements` (sorted, some of them more than once), in ascending order.
     ///
     /// Faces are taken as they are; then each edge that none of them has takes the one of its faces that
     /// meets most of what is still open; then vertices likewise.
     pub fn cover(&self, requirements: &[Requirement]) -> Vec<u32> {
-        let mut kept: Vec<u32> = Vec::with_capacity(requirements.len());
-        let mut open: Vec<Requirement> = Vec::new();
-        for &r in requirements {
-            match self.part(r) {
-                Part::Face(f) => kept.push(f),
-                _ => open.push(r),
+        let first_part = requirements.partition_point(|&r| self.is_face(r));
+        let mut kept: Vec<u32> = requirements[..first_part].iter().map(|r| r.0).collect();
+        let whole = kept.len();
+        let mut open = Open::default();
+        for asked in requirements[first_part..].chunk_by(|a, b| a == b) {
+            let faces = self.faces_of(asked[0]);
+            // Whole faces ascend too.
+            let held = if faces.len() < whole {
+                faces.iter().any(|face| kept.binary_search(face).is_ok())
+            } else {
+                kept.iter().any(|&face| self.holds(face, asked[0]))
+            };
+            if !held {
+                open.parts.push(asked[0]);
+                open.times.push(asked.len());
             }
         }
-        open.retain(|&r| !kept.iter().any(|&f| self.holds(f, r)));
-        while let Some(&first) = open.first() {
-            let gain = |face: u32| open.iter().filter(|&&r| self.holds(face, r)).count();
-            let own: &[u32] = match self.part(first) {
-                Part::Face(_) => &[],
-                Part::Edge(e) => &self.edge_faces[e as usize],
-                Part::Vertex(v) => &self.vertex_faces[v as usize],
-            };
-            let Some(&best) = own.iter().max_by_key(|&&f| (gain(f), std::cmp::Reverse(f))) else { break };
+        for first in 0..open.parts.len() {
+            if open.times[first] == 0 {
+                continue;
+            }
+            let Some(best) = self.most_shared(&open, first) else { break };
             kept.push(best);
-            open.retain(|&r| !self.holds(best, r));
+            for r in self.implied(best) {
+                if let Ok(at) = open.parts.binary_search(&r) {
+                    open.times[at] = 0;
+                }
+            }
         }
         kept.sort_unstable();
         kept
     }
+
+    /// Of the faces that hold the part at `first`, the one that holds most of what is open; the least of equals.
+    fn most_shared(&self, open: &Open, first: usize) -> Option<u32> {
+        let part = open.parts[first];
+        let own = self.faces_of(part);
+        if own.len() <= SMALL_FAN {
+            let times = |r: &Requirement| open.parts.binary_search(r).map_or(0, |at| open.times[at]);
+            let gain = |face: u32| self.implied(face).iter().map(times).sum::<usize>();
+            return own.iter().copied().max_by_key(|&f| (gain(f), Reverse(f)));
+        }
+        // Few of them hold anything else: found from what else is open. Earlier parts are not.
+        let others = open.parts.iter().zip(&open.times).skip(first + 1).filter(|(_, times)| **times > 0);
+        let mut shared: Vec<(u32, usize)> = others
+            .flat_map(|(&other, &times)| self.faces_of(other).iter().map(move |&face| (face, times)))
+            .filter(|&(face, _)| self.holds(face, part))
+            .collect();
+        shared.sort_unstable();
+        let gains =
+            shared.chunk_by(|a, b| a.0 == b.0).map(|run| (run[0].0, run.iter().map(|s| s.1).sum::<usize>()));
+        gains
+            .max_by_key(|&(face, gain)| (gain, Reverse(face)))
+            .map_or(own.first().copied(), |(face, _)| Some(face))
+    }
+
+    /// The faces that hold an edge or a vertex, ascending.
+    pub fn faces_of(&self, requirement: Requirement) -> &[u32] {
+        match self.part(requirement) {
+            Part::Face(_) => &[],
+            Part::Edge(e) => &self.edge_faces[e as usize],
+            Part::Vertex(v) => &self.vertex_faces[v as usize],
+        }
+    }
+}
+
+/// Edges and vertices that no face has been kept for yet.
+#[derive(Default)]
+struct Open {
+    /// Ascending, each once.
+    parts: Vec<Requirement>,
+    /// How often each is asked for; 0 once a kept face has it.
+    times: Vec<usize>,
+}
+
+/// Faces of a vertex that are each asked what else they hold.
+const SMALL_FAN: usize = 32;
+
+fn longest_edge(t: &Triangle) -> f64 {
+    let [a, b, c] = t.corners;
+    a.distance(b).max(b.distance(c)).max(c.distance(a))
 }

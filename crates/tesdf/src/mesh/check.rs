@@ -7,6 +7,7 @@ use super::{Defect, DefectKind, Severity, Topology, TriangleMesh};
 
 mod edges;
 mod faces;
+mod fans;
 mod intersections;
 mod range;
 mod regions;

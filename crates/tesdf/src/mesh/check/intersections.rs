@@ -1,15 +1,11 @@
 use std::collections::HashSet;
 
 use super::edges::centroid;
+use super::fans::pairs_that_may_meet;
 use crate::{
-    geometry::{
-        Aabb, AabbTree, normal_signs, orientation, segment_meets_triangle, self_overlaps, triangles_meet,
-    },
+    geometry::{Aabb, normal_signs, orientation, segment_meets_triangle, surely_apart, triangles_meet},
     mesh::{Defect, DefectKind, Severity, TriangleMesh},
 };
-
-/// Faces of a leaf of the tree.
-const LEAF_SIZE: usize = 4;
 
 /// Pairs of faces, lower first and ascending, that meet in more than the corners or the edge that they share.
 ///
@@ -22,10 +18,8 @@ pub(crate) fn self_intersections(
 ) -> Vec<[u32; 2]> {
     let faces: Vec<u32> =
         (0..mesh.faces().len() as u32).filter(|f| without_area.binary_search(f).is_err()).collect();
-    let boxes: Vec<Aabb> = faces.iter().map(|&f| Aabb::of(&mesh.triangle(f as usize))).collect();
     let mut pairs = Vec::new();
-    self_overlaps(&AabbTree::build(&boxes, LEAF_SIZE), &boxes, |i, j| {
-        let (f, g) = (faces[i as usize], faces[j as usize]);
+    pairs_that_may_meet(mesh, &faces, |f, g| {
         if meet_beyond_shared(mesh, f, g) && !touching.contains(&(f, g)) && !touching.contains(&(g, f)) {
             pairs.push([f, g]);
         }
@@ -41,16 +35,16 @@ fn meet_beyond_shared(mesh: &TriangleMesh, f: u32, g: u32) -> bool {
     let in_g = corners.map(|v| others.contains(&v));
     let in_f = others.map(|v| corners.contains(&v));
     match in_g.iter().filter(|&&shared| shared).count() {
-        0 => triangles_meet(t, u),
+        0 => !surely_apart(t, u, false) && triangles_meet(t, u),
         1 => {
-            // What they share besides the corner would reach the edge of one of them that is opposite to it.
-            let opposite = |t: [glam::DVec3; 3], shared: [bool; 3]| {
+            let from_shared = |t: [glam::DVec3; 3], shared: [bool; 3]| {
                 let k = shared.iter().position(|&s| s).unwrap_or(0);
-                (t[(k + 1) % 3], t[(k + 2) % 3])
+                [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
             };
-            let (p, q) = opposite(u, in_f);
-            let (r, s) = opposite(t, in_g);
-            segment_meets_triangle(p, q, t) || segment_meets_triangle(r, s, u)
+            let (t, u) = (from_shared(t, in_g), from_shared(u, in_f));
+            // What they share besides the corner would reach the edge of one of them that is opposite to it.
+            !surely_apart(t, u, true)
+                && (segment_meets_triangle(u[1], u[2], t) || segment_meets_triangle(t[1], t[2], u))
         }
         2 => {
             // Only when folded flat onto each other.
