@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 }
 
 /// Largest resident size of this process so far.
-fn peak_resident_kib() -> Result<u64, Failure> {
+pub fn peak_resident_kib() -> Result<u64, Failure> {
     let path = "/proc/self/status";
     let text = fs::read_to_string(path).map_err(|e| format!("cannot read {path}, which Linux has: {e}"))?;
     let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"));

@@ -25,6 +25,7 @@ mod reencode;
 mod reference;
 mod scaling;
 mod screw;
+mod slender;
 mod timing;
 
 use input::MeshesAndPoints;
@@ -57,6 +58,8 @@ enum Command {
     Curve(curve::Args),
     /// Largest errors and sign mistakes against brute force
     Exactness(MeshesAndPoints),
+    /// Time and size of fans, needles and stray vertices, against another mesh
+    Slender(slender::Args),
     /// A nut on a bolt: travel, energy, penetration and time by clearance, time step and detector
     Screw(screw::Args),
     /// Time of a detection as a scene grows: instances in a row, worlds side by side
@@ -78,6 +81,7 @@ fn main() -> ExitCode {
         Command::Algorithm1(args) => algorithm_1::run(args),
         Command::Curve(args) => curve::run(args),
         Command::Exactness(args) => exactness::run(args),
+        Command::Slender(args) => slender::run(args),
         Command::Screw(args) => screw::run(args),
         Command::Scaling(args) => scaling::run(args),
         Command::Reencode(args) => reencode::run(args),
