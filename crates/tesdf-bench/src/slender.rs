@@ -58,7 +58,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let mut unit = None;
     let mut row = |name: String, mesh: TriangleMesh| -> Result<(), Failure> {
         let faces = mesh.faces().len();
-        let per_face = pool.install(|| one(&name, mesh, args.preset, unit).map_err(|e| format!("{name}: {e}")))?;
+        let per_face =
+            pool.install(|| one(&name, mesh, args.preset, unit).map_err(|e| format!("{name}: {e}")))?;
         unit = unit.or(Some(per_face / faces as f64));
         Ok(())
     };
@@ -82,7 +83,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 fn one(name: &str, mesh: TriangleMesh, preset: Preset, unit: Option<f64>) -> Result<f64, Failure> {
     let faces = mesh.faces().len();
     // Forgets the largest size so far.
-    fs::write("/proc/self/clear_refs", "5").map_err(|e| format!("cannot write /proc/self/clear_refs, which Linux has: {e}"))?;
+    fs::write("/proc/self/clear_refs", "5")
+        .map_err(|e| format!("cannot write /proc/self/clear_refs, which Linux has: {e}"))?;
     let start = Instant::now();
     let solid = SolidMesh::new(mesh)?;
     let checked = start.elapsed().as_secs_f64();

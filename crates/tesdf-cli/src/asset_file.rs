@@ -1,11 +1,14 @@
 //! Opening a `.tesdf` file the way every command does.
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use tesdf::TeSdf;
 use tesdf::asset::AssetError;
+use tesdf::asset::unit::is_same_unit;
 use tesdf::geometry::Aabb;
 
-use crate::report::Failure;
+use crate::report::{self, Failure};
 
 /// Opens an asset; the message names the file.
 ///
@@ -13,6 +16,54 @@ use crate::report::Failure;
 /// As [`TeSdf::open`].
 pub fn open(path: &Path) -> Result<TeSdf, Failure> {
     TeSdf::open(path).map_err(|e| failure(path, &e))
+}
+
+/// Assets by their files, so that a file that is named twice is opened once.
+#[derive(Default)]
+pub struct Assets(BTreeMap<PathBuf, Arc<TeSdf>>);
+
+impl Assets {
+    /// Opens an asset, or gives the one that was opened.
+    ///
+    /// # Errors
+    /// As [`open`].
+    pub fn open(&mut self, path: &Path) -> Result<Arc<TeSdf>, Failure> {
+        // A pipe has no such path, and gives its bytes once.
+        let file = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        if let Some(asset) = self.0.get(&file) {
+            return Ok(asset.clone());
+        }
+        let asset = Arc::new(open(path)?);
+        self.0.insert(file, asset.clone());
+        Ok(asset)
+    }
+}
+
+/// Whether the coordinates of assets fit together: units that differ are an error, and a unit that is recorded for some of them alone is a
+/// warning.
+///
+/// # Errors
+/// Names two files and their units.
+pub fn check_units<'a>(assets: impl IntoIterator<Item = (&'a Path, &'a TeSdf)>) -> Result<(), Failure> {
+    let (mut known, mut without): (Option<(&Path, &str)>, Option<&Path>) = (None, None);
+    for (path, asset) in assets {
+        match (asset.unit(), known) {
+            (None, _) => without = without.or(Some(path)),
+            (Some(unit), Some((other, of_other))) if !is_same_unit(unit, of_other) => {
+                let [path, other] = [path, other].map(Path::display);
+                return Err(Failure::new(format!(
+                    "{other} is in {of_other} and {path} in {unit}: their coordinates do not fit together"
+                ))
+                .hint("encode both meshes in one unit; `tesdf encode --unit` records its name and scales nothing"));
+            }
+            (Some(unit), _) => known = known.or(Some((path, unit))),
+        }
+    }
+    if let (Some((path, unit)), Some(without)) = (known, without) {
+        let [path, without] = [path, without].map(Path::display);
+        report::warning(&format!("{without} records no unit and is taken to be in {unit}, as {path} is"));
+    }
+    Ok(())
 }
 
 /// The error with the file's name.

@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use tesdf::mesh::{CheckReport, LoadReport, check};
+use tesdf::mesh::{CheckReport, LoadReport, RepairOptions, TriangleMesh, check, repair};
 
 use crate::mesh_file;
 use crate::report::{self, Failure, Outcome};
@@ -37,11 +37,26 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         report::json(&Report { file, load: &loaded.report, check: &found })?;
     } else {
         let text = mesh_file::describe(&args.mesh, &loaded.report);
-        report::result(format!("{text}{found}\n").as_bytes())?;
+        report::text(&format!("{text}{found}\n"))?;
     }
     if found.encodable {
         return Ok(Outcome::Good);
     }
-    report::hint(&format!("tesdf repair {} -o FILE.ply mends what needs no guessing", args.mesh.display()));
+    report::hint(&next(args, &loaded.mesh));
     Ok(Outcome::NotGood)
+}
+
+/// What to do about a mesh that is not encodable: `tesdf repair`, where that changes something.
+fn next(args: &Args, mesh: &TriangleMesh) -> String {
+    let command = format!("tesdf repair {} -o FILE.ply", args.mesh.display());
+    match repair(mesh, &RepairOptions::default()) {
+        Ok(repaired) if repaired.report.encodable => format!("{command} makes it encodable"),
+        Ok(repaired) if repaired.report.changes_something() => {
+            format!("{command} mends a part of it; mend the rest where the mesh was made")
+        }
+        _ => format!(
+            "nothing of it can be mended without guessing: mend the mesh where it was made; where cracks are open, {command} \
+             --weld-tolerance T closes those up to T wide"
+        ),
+    }
 }

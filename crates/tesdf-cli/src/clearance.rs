@@ -41,7 +41,12 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 
 /// What people see of a clearance.
 pub fn rows(found: &Clearance, [a, b]: [InstanceId; 2]) -> Vec<(&'static str, String)> {
-    let what = if found.distance < 0.0 { "deep in each other" } else { "apart" };
+    let what = match (found.distance < 0.0, found.overlap) {
+        (true, _) => "deep in each other",
+        (false, true) => "they overlap: their surfaces lie on each other, with both bodies on the same side",
+        (false, false) if found.distance == 0.0 => "they touch",
+        (false, false) => "apart",
+    };
     let normal = found.normal;
     let mut rows = vec![
         ("clearance", format!("{:e} ({what})", found.distance)),

@@ -1,9 +1,11 @@
 //! `tesdf collide A.tesdf B.tesdf`
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::ValueEnum;
 use serde::Serialize;
+use tesdf::TeSdf;
 use tesdf::collide::{
     CollideOptions, Contact, Contacts, FaceMethod, HiddenOverlap, Instance, InstanceId, Mode, PairReduction,
     Pose, Reduction, Scene, Statistics, detect,
@@ -12,9 +14,10 @@ use tesdf::encode::Length;
 
 use tesdf_sim::newton::Detect as _;
 
+use crate::asset_file::{Assets, check_units};
 use crate::devices::{Choice, OnDevice};
 use crate::report::{self, Failure, Outcome, count};
-use crate::{asset_file, parse, why};
+use crate::{parse, why};
 
 /// Two placed bodies: arguments that several commands share.
 #[derive(clap::Args, Debug)]
@@ -35,14 +38,17 @@ impl Bodies {
     /// A scene of the two, and their ids.
     ///
     /// # Errors
-    /// A file that cannot be opened.
+    /// A file that cannot be opened, units that differ, or a pose that is too far out.
     pub fn scene(&self) -> Result<(Scene, [InstanceId; 2]), Failure> {
+        let mut assets = Assets::default();
+        let [a, b] = [assets.open(&self.a)?, assets.open(&self.b)?];
+        check_units([(self.a.as_path(), &*a), (self.b.as_path(), &*b)])?;
         let mut scene = Scene::new();
-        let mut add = |file: &Path, pose: Pose| {
-            let shape = scene.add_shape(asset_file::open(file)?).map_err(Failure::new)?;
+        let mut add = |asset: Arc<TeSdf>, pose: Pose| {
+            let shape = scene.add_shape(asset).map_err(Failure::new)?;
             scene.add(Instance::new(shape, pose)).map_err(Failure::new)
         };
-        let ids = [add(&self.a, self.pose_a)?, add(&self.b, self.pose_b)?];
+        let ids = [add(a, self.pose_a)?, add(b, self.pose_b)?];
         Ok((scene, ids))
     }
 }
@@ -82,7 +88,7 @@ pub struct Args {
     /// Most contacts to keep of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
-    /// Where contacts are found: cpu, gpu, or a device by number or name; not in the mode `exact`
+    /// Where contacts are found: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why")]
     pub device: Choice,
     /// Say instead why contacts are or are not there: what each stage made of all candidates, or of one face (in the mode `node`, node) of
@@ -171,7 +177,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     } else if args.json {
         report::json(&found.contacts)?;
     } else {
-        report::result(text(&found).as_bytes())?;
+        report::text(&text(&found))?;
     }
     Ok(Outcome::Good)
 }

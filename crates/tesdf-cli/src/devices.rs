@@ -153,7 +153,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
                 row.most_buffer_bytes >> 20
             );
         }
-        report::result(text.as_bytes())?;
+        report::text(&text)?;
     }
     Ok(Outcome::Good)
 }

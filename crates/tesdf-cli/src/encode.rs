@@ -1,5 +1,5 @@
 //! `tesdf encode MESH -o FILE`
-use std::num::{NonZeroU32, NonZeroUsize};
+use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -50,7 +50,7 @@ pub struct Args {
     /// How much farther than the closest face a listed one may be at a sample: a length, or `safe` for so much that nothing is missing
     #[arg(long, value_name = "LENGTH|safe", value_parser = choices::threshold)]
     pub threshold: Option<Threshold>,
-    /// Where samples are looked at: cpu in 64 bits, gpu in 32 bits, or so on a device by number or name
+    /// Where samples are looked at: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
     pub device: Choice,
     /// Cut lists to this many faces, those that are needed nearest to the surface
@@ -72,8 +72,8 @@ pub struct Args {
     #[arg(long, value_name = "NAME")]
     pub unit: Option<String>,
     /// Number of threads; the file is the same for every number [default: one per core]
-    #[arg(long, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
@@ -113,7 +113,7 @@ struct Report<'a> {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut pool = ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
-        pool = pool.num_threads(threads.get());
+        pool = pool.num_threads(threads.into());
     }
     let pool = pool.build().map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;
     let output = output::open(&args.output, &args.inputs(), args.consent)?;

@@ -10,6 +10,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod abort;
 pub mod asset_file;
 pub mod bench;
 pub mod check;
@@ -65,6 +66,10 @@ pub enum Command {
     /// Contacts between two bodies
     Collide(collide::Args),
     /// How far two bodies are apart, or how deep they are in each other
+    ///
+    /// A positive clearance is the least distance between the two surfaces. A negative one says that the bodies overlap: its size is how
+    /// deep the deepest point of either surface is inside of the other body. Bodies whose surfaces lie on each other have clearance 0;
+    /// `overlap` in the JSON result, and the text, say whether they share volume.
     Clearance(clearance::Args),
     /// When two moving bodies first touch
     Toi(toi::Args),
@@ -86,11 +91,11 @@ pub enum Command {
 
 /// Runs the command that the arguments of this process ask for.
 pub fn main() -> ExitCode {
+    abort::give_exit_code();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
-            // Also --help and --version, which go to stdout and give 0.
-            let _ = e.print();
+            report::usage(&e);
             return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
         }
     };

@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         report::json(&Report { file, output: output.clone(), load: &loaded.report, repair: found })?;
     } else {
         let text = mesh_file::describe(&args.mesh, &loaded.report);
-        report::result(format!("{text}{found}\nwritten to {output}\n").as_bytes())?;
+        report::text(&format!("{text}{found}\nwritten to {output}\n"))?;
     }
     if !found.encodable {
         report::hint(match args.weld_tolerance {

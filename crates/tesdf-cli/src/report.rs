@@ -1,4 +1,5 @@
 //! What a person or a program sees: results on stdout, everything else on stderr.
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,9 +35,53 @@ impl Failure {
     }
 }
 
+/// Characters of a line of a message: a longer one is cut in its middle, where a long value is.
+const LONGEST: usize = 1200;
+
+/// Text that may come from a file, for a terminal: characters that control it, or that change the direction of text, are
+/// escaped. Only ends of lines stay.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let directs =
+        |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let controls =
+        |c: char| c != '\n' && (c.is_control() || directs(c) || matches!(c, '\u{2028}' | '\u{2029}'));
+    if !text.contains(controls) {
+        return Cow::Borrowed(text);
+    }
+    let mut clean = String::with_capacity(text.len());
+    for c in text.chars() {
+        if controls(c) { clean.extend(c.escape_default()) } else { clean.push(c) }
+    }
+    Cow::Owned(clean)
+}
+
+/// A message as it is printed: [`printable`], and no line longer than some hundred words.
+pub fn message(text: &str) -> String {
+    let cut = |line: &str| {
+        let count = line.chars().count();
+        if count <= LONGEST {
+            return line.to_string();
+        }
+        let part = |from: usize, length: usize| line.chars().skip(from).take(length).collect::<String>();
+        let (head, tail) = (LONGEST * 3 / 4, LONGEST / 4);
+        let left_out = count - head - tail;
+        format!("{}… ({left_out} characters) …{}", part(0, head), part(count - tail, tail))
+    };
+    printable(text).split('\n').map(cut).collect::<Vec<_>>().join("\n")
+}
+
 fn line(label: &str, colour: &str, text: &str) {
+    let text = message(text);
     // Nothing is left to do when stderr is closed. The colour goes when stderr is not a terminal.
     let _ = writeln!(anstream::stderr(), "\x1b[1;{colour}m{label}:\x1b[0m {text}");
+}
+
+/// Prints what clap says: help and version on stdout; bad usage, which may repeat long arguments, on stderr.
+pub fn usage(found: &clap::Error) {
+    let plain = found.render().to_string();
+    let clean = message(&plain);
+    // Nothing is left to do when stdout or stderr is closed.
+    let _ = if clean == plain { found.print() } else { writeln!(io::stderr(), "{clean}") };
 }
 
 /// Prints `error:` and `hint:` lines.
@@ -87,6 +132,14 @@ pub fn result(bytes: &[u8]) -> Result<(), Failure> {
     }
 }
 
+/// Writes a result for people to stdout.
+///
+/// # Errors
+/// As [`result`].
+pub fn text(text: &str) -> Result<(), Failure> {
+    result(printable(text).as_bytes())
+}
+
 /// Writes `value` to stdout as indented JSON.
 ///
 /// # Errors
@@ -104,11 +157,10 @@ pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
 /// As [`result`].
 pub fn table<N: AsRef<str>, V: fmt::Display>(rows: &[(N, V)]) -> Result<(), Failure> {
     let width = rows.iter().map(|(name, _)| name.as_ref().chars().count()).max().unwrap_or(0);
-    let text: String = rows
-        .iter()
-        .map(|(name, value)| format!("{:<width$}  {value}", name.as_ref()).trim_end().to_string() + "\n")
-        .collect();
-    result(text.as_bytes())
+    // A value from a file may have ends of lines, which would look like rows.
+    let row =
+        |name: &str, value: &V| format!("{name:<width$}  {value}").trim_end().replace('\n', "\\n") + "\n";
+    text(&rows.iter().map(|(name, value)| row(name.as_ref(), value)).collect::<String>())
 }
 
 /// A number with the word for it: `1 face`, `2 faces`.
@@ -138,6 +190,27 @@ pub fn size(bytes: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_controls_a_terminal_is_escaped() {
+        let hostile = "a\u{1b}[31mb\u{7}\r\u{9b}0m\u{202e}txt\u{0}é\n…";
+        let clean = printable(hostile);
+        assert_eq!(clean, "a\\u{1b}[31mb\\u{7}\\r\\u{9b}0m\\u{202e}txt\\u{0}é\n…");
+        assert!(matches!(printable("µm, 3 × 4\n"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn long_lines_lose_their_middle() {
+        let long = format!("field {} is unknown\nexpected another", "é".repeat(100_000));
+        let cut = message(&long);
+        assert!(
+            cut.len() < 4000
+                && cut.starts_with("field éé")
+                && cut.ends_with("é is unknown\nexpected another")
+        );
+        assert!(cut.contains("98817 characters"), "{cut}");
+        assert_eq!(message("short"), "short");
+    }
 
     #[test]
     fn numbers_have_their_words() {

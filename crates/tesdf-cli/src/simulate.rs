@@ -51,7 +51,7 @@ pub struct Args {
     /// Instead of the geometry of a body: a .tesdf file, or a mesh that is encoded; may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = geometry)]
     pub geometries: Vec<(String, PathBuf)>,
-    /// Where contacts are found: cpu, gpu, or a device by number or name; not in the mode `exact`
+    /// Where contacts are found: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
     pub device: Choice,
     /// Print the result as JSON
@@ -185,6 +185,13 @@ fn load(args: &Args, cut: Option<&CutRun>) -> Result<LoadedScene, Failure> {
     let scene = &mut loaded.scene;
     scene.time_step = args.time_step.unwrap_or(scene.time_step);
     scene.duration = args.duration.unwrap_or(scene.duration);
+    let given = [("--time-step", args.time_step), ("--duration", args.duration)];
+    let given = given.iter().filter_map(|(option, value)| Some(format!("{option} {:?}", (*value)?)));
+    let given: Vec<String> = given.collect();
+    if !given.is_empty() {
+        // The scene's error would name a line of the file.
+        scene.steps().map_err(|e| Failure::new(format!("{}: {e}", given.join(" "))))?;
+    }
     if let Some(mode) = args.mode {
         scene.detector.mode = match mode {
             Mode::Node => DetectorMode::Node,

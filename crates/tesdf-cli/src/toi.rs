@@ -66,7 +66,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         return Ok(Outcome::Good);
     }
     let Some(impact) = impact else {
-        report::result(format!("no impact up to time {}\n", args.end).as_bytes())?;
+        report::text(&format!("no impact up to time {}\n", args.end))?;
         return Ok(Outcome::Good);
     };
     let what = match impact {

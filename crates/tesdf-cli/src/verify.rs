@@ -21,7 +21,7 @@ pub struct Args {
     /// A .tesdf file
     pub file: PathBuf,
     /// Number of points that are compared with brute force
-    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub samples: u32,
     /// Also prove, cell by cell and with code of its own, that the lists, the signs and the face tree are right
     ///
@@ -63,7 +63,12 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let file = args.file.display().to_string();
     let asset = match open_intact(&args.file) {
         Ok(asset) => asset,
-        Err(e @ (AssetError::Io { .. } | AssetError::NotTesdf { .. } | AssetError::Version { .. })) => {
+        Err(
+            e @ (AssetError::Io { .. }
+            | AssetError::Memory { .. }
+            | AssetError::NotTesdf { .. }
+            | AssetError::Version { .. }),
+        ) => {
             return Err(asset_file::failure(&args.file, &e));
         }
         Err(e) => {
@@ -130,15 +135,17 @@ fn uninterrupted(interrupted: &AtomicBool) -> Result<(), Failure> {
 
 /// Opens a file after every byte was compared with the checksums: what opening looks at more closely is then as written.
 fn open_intact(path: &Path) -> Result<TeSdf, AssetError> {
-    Container::open(path, &layout::SECTIONS)?.verify_checksums()?;
-    TeSdf::open(path)
+    // Opened once: a pipe gives its bytes once, and a file could be replaced in between.
+    let container = Container::open(path, &layout::SECTIONS)?;
+    container.verify_checksums()?;
+    TeSdf::from_container(container)
 }
 
 fn finish(args: &Args, report: Report) -> Result<Outcome, Failure> {
     if args.json {
         report::json(&report)?;
     } else {
-        report::result(text(&report).as_bytes())?;
+        report::text(&text(&report))?;
     }
     Ok(if report.passed { Outcome::Good } else { Outcome::NotGood })
 }

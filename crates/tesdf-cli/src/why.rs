@@ -34,7 +34,7 @@ pub fn run(
         report::json(&reports)?;
     } else {
         let text: String = reports.iter().map(|r| text(r, options)).collect();
-        report::result(text.as_bytes())?;
+        report::text(&text)?;
     }
     Ok(Outcome::Good)
 }

@@ -27,7 +27,7 @@ mod hidden;
 mod journal;
 mod origin;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, TryReserveError};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -35,6 +35,7 @@ use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView, seria
 use serde::{Deserialize, Serialize};
 use tesdf::collide::{Contact, Pose};
 use tesdf::glam::{DQuat, DVec3};
+use tesdf::input;
 use tesdf::save::{SaveError, save_atomic};
 
 use crate::{State, System};
@@ -180,6 +181,15 @@ impl RunRecord {
     /// The steps that the run was to have, when it was cut before or still grows; `None` of a complete run.
     pub fn planned_steps(&self) -> Option<u64> {
         self.planned
+    }
+
+    /// Makes room for the states of a run of `steps` steps.
+    pub(crate) fn reserve(&mut self, steps: u64) -> Result<(), TryReserveError> {
+        let more = usize::try_from(steps.saturating_sub(self.steps())).unwrap_or(usize::MAX);
+        let states = more.saturating_mul(self.bodies.len());
+        self.times.try_reserve_exact(more)?;
+        self.poses.try_reserve_exact(states)?;
+        self.velocities.try_reserve_exact(states)
     }
 
     /// Says how many steps the run is to have, or that it has them.
@@ -382,12 +392,14 @@ impl RunRecord {
         if fits {
             return Ok(());
         }
-        Err(RecordError::NotARun("its tensors do not fit each other; it was damaged or made by hand".into()))
+        Err(RecordError::NotARun(
+            "its tensors do not fit each other, as it was damaged or made by hand".into(),
+        ))
     }
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, RecordError> {
-    std::fs::read(path).map_err(|source| RecordError::Read { path: path.to_path_buf(), source })
+    input::read(path).map_err(|source| RecordError::Read { path: path.to_path_buf(), source })
 }
 
 fn nearest(steps: impl Iterator<Item = usize>, at: impl Fn(usize) -> f64, time: f64) -> Option<usize> {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::criterion::{ScrewReport, ScrewTracker};
-use crate::scene_file::SceneFile;
+use crate::scene_file::{LimitError, SceneFile};
 use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
 
 /// Where a run is; given after each step.
@@ -71,6 +71,9 @@ pub enum SimulateError {
         /// Why.
         source: DynamicsError,
     },
+    /// The scene is too large.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
     /// The criterion does not fit the bodies.
     #[error("criterion: {0}")]
     Criterion(String),
@@ -133,9 +136,10 @@ pub fn simulate_from(
     mut watch: impl FnMut(&Moment<'_>) -> ControlFlow<()>,
 ) -> Result<(RunRecord, Summary), SimulateError> {
     let h = scene.time_step;
-    let steps = ((scene.duration / h).round() as u64).max(1);
+    let steps = scene.steps()?;
     let (mut tracker, energy) = replay(scene, engine.system(), &run.record)?;
     let PartialRun { mut record, mut totals } = run;
+    record.reserve(steps).map_err(|_| LimitError::memory(steps, record.bodies.len()))?;
     record.plan(Some(steps));
     for step in record.steps()..steps {
         let report = engine.step(h).map_err(|source| SimulateError::Step { step, source })?;

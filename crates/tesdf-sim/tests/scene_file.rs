@@ -2,10 +2,12 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use tesdf::encode::EncodeProgress;
+use tesdf::asset::about::Source;
+use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
 use tesdf::glam::DVec3;
+use tesdf::mesh::{SolidMesh, TriangleMesh, write};
 use tesdf_sim::record::{RecordError, RunRecord};
-use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene, MOST_BODIES, SceneError};
 use tesdf_sim::{Mass, SimulateError, simulate};
 
 const DROP: &str = r#"
@@ -146,4 +148,122 @@ fn a_run_can_be_broken_off() {
     };
     let ended = simulate(&loaded.scene, &mut engine, stop);
     assert!(matches!(ended, Err(SimulateError::Interrupted { steps: 3 })));
+}
+
+#[test]
+fn what_a_scene_asks_for_is_bounded() {
+    let change = |from: &str, to: &str| refusal(&DROP.replacen(from, to, 1));
+    for (error, expected) in [
+        (
+            change("time_step = 1e-3", "time_step = 1e-318"),
+            "drop.toml, line 3: duration: 0.05 s in steps of 1e-318 s; expected at most 100000000 steps",
+        ),
+        (
+            change("duration = 0.05", "duration = 1e305"),
+            "line 3: duration: 1e305 s in steps of 0.001 s; expected",
+        ),
+        (
+            change("duration = 0.05", "duration = 9e4"),
+            "line 3: duration: 90000000 steps of 2 bodies make a run of 18720000208 bytes; expected at most 17179869184",
+        ),
+        (
+            change("[record]", "[solver]\nmax_iterations = 1000000000\n[record]"),
+            "line 6: solver.max_iterations: 1000000000; expected 1 to 10000",
+        ),
+        (
+            change("[record]", "[solver]\ndense_bodies = 1000000000\n[record]"),
+            "line 6: solver.dense_bodies: 1000000000; expected at most 256",
+        ),
+        (
+            change("[record]", "[detector]\nmode = \"face\"\niterations = 1000000000\n[record]"),
+            "line 7: detector.iterations: 1000000000; expected at most 65536",
+        ),
+    ] {
+        assert!(error.contains(expected), "no {expected:?} in {error}");
+    }
+    let bodies: String = (0..=MOST_BODIES)
+        .map(|k| format!("[[bodies]]\nname = \"{k}\"\nshape = \"plane\"\nfixed = true\n"))
+        .collect();
+    let error = refusal(&format!("time_step = 1\nduration = 1\n{bodies}"));
+    assert!(error.contains("bodies: 65537; expected at most 65536"), "{error}");
+    let error = refusal(&" ".repeat(66_000_000));
+    assert!(error.contains("66000000 bytes; expected a scene of at most 65536000"), "{error}");
+}
+
+/// A scene of bodies of one mesh, and assets with a unit.
+fn cubes(bodies: &str) -> (tempfile::TempDir, LoadedScene) {
+    let folder = tempfile::tempdir().unwrap();
+    let corner = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
+    let faces = [
+        [0, 2, 1],
+        [1, 2, 3],
+        [4, 5, 6],
+        [5, 7, 6],
+        [0, 1, 4],
+        [1, 5, 4],
+        [2, 6, 3],
+        [3, 6, 7],
+        [0, 4, 2],
+        [2, 4, 6],
+        [1, 3, 5],
+        [3, 7, 5],
+    ];
+    let mesh = TriangleMesh::new((0..8).map(corner).collect(), faces.to_vec()).unwrap();
+    let solid = SolidMesh::new(mesh.clone()).unwrap();
+    write(&folder.path().join("cube.ply"), &mesh).unwrap();
+    for (name, unit) in [("mm", "mm"), ("inch", "inches"), ("furlong", "furlong")] {
+        let options = EncodeOptions { unit: Some(unit.into()), ..EncodeOptions::preset(Preset::Fast) };
+        let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).unwrap();
+        asset.save(&folder.path().join(name).with_extension("tesdf")).unwrap();
+    }
+    let text = format!("time_step = 1e-3\nduration = 1\n{bodies}");
+    let loaded = LoadedScene::parse(text, &folder.path().join("cubes.toml")).unwrap();
+    (folder, loaded)
+}
+
+#[test]
+fn a_mesh_of_a_thousand_bodies_is_loaded_once() {
+    let bodies: String = (0..1000)
+        .map(|k| {
+            let way = ["", "./", "../"][k % 3];
+            let way = if k % 3 == 2 { format!("{way}FOLDER/") } else { way.to_string() };
+            format!("[[bodies]]\nname = \"{k}\"\nmesh = \"{way}cube.ply\"\ndensity = 1\n")
+        })
+        .collect();
+    let (folder, mut loaded) = cubes(&bodies);
+    let name = folder.path().file_name().unwrap().to_str().unwrap().to_string();
+    for body in &mut loaded.scene.bodies {
+        let mesh = body.get_mut().mesh.as_mut().unwrap();
+        *mesh = mesh.to_str().unwrap().replace("FOLDER", &name).into();
+    }
+    let system = loaded.system(&EncodeProgress::default()).unwrap();
+    let shape = |body: &tesdf_sim::Body| system.scene().instance(body.instance).unwrap().shape;
+    assert_eq!(system.bodies().len(), 1000);
+    assert!(system.bodies().iter().all(|body| shape(body) == shape(&system.bodies()[0])));
+}
+
+#[test]
+fn units_that_differ_need_scales_that_make_them_one() {
+    let system = |assets: [(&str, f64); 2]| {
+        let body = |(asset, scale)| {
+            format!(
+                "[[bodies]]\nname = \"{asset}\"\nasset = \"{asset}.tesdf\"\nscale = {scale:?}\ndensity = 1\n"
+            )
+        };
+        let (_folder, loaded) = cubes(&assets.map(body).concat());
+        loaded.system(&EncodeProgress::default()).map(|_| ()).map_err(|e| e.to_string())
+    };
+    for good in
+        [[("mm", 1e-3), ("inch", 0.0254)], [("mm", 1.0), ("inch", 25.4)], [("mm", 1.0), ("furlong", 3.0)]]
+    {
+        assert_eq!(system(good), Ok(()));
+    }
+    let error = system([("mm", 1e-3), ("inch", 1e-3)]).unwrap_err();
+    assert!(error.contains("line 8, body inch: "), "{error}");
+    assert!(
+        error.contains("0.0254 m")
+            && error.contains("body mm is 0.001 m")
+            && error.contains("scale = 0.0254"),
+        "{error}"
+    );
 }

@@ -38,6 +38,7 @@ pub mod domain;
 pub mod encode;
 pub mod evaluate;
 pub mod geometry;
+pub mod input;
 pub mod inspect;
 pub mod mesh;
 pub mod query;

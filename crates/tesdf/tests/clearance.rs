@@ -320,3 +320,37 @@ fn what_has_no_clearance_is_an_error() {
     scene.remove(&[c]).expect("it was there");
     assert_eq!(refused(&scene, a, c, options), CollideError::NoInstance(c));
 }
+
+/// Boxes of edge 1 with their lowest corners on the x axis.
+fn boxes(at: &[f64]) -> Arc<TeSdf> {
+    let add = |shape: Surface, &x: &f64| shape.add_box(x * DVec3::X, x * DVec3::X + DVec3::ONE, 1);
+    asset(&at.iter().fold(Surface::default(), add).solid())
+}
+
+#[test]
+fn surfaces_on_each_other_overlap_where_the_bodies_are_on_one_side() {
+    let at = |x: f64| Pose { translation: x * DVec3::X, ..Pose::IDENTITY };
+    let overlap = |a: (Shape, Pose, f64), b: (Shape, Pose, f64)| {
+        let (found, back) = (between(a.clone(), b.clone()), between(b, a));
+        assert_eq!(found.overlap, back.overlap);
+        (found.distance, found.overlap)
+    };
+    let body = |corners: &[f64], x: f64| placed(boxes(corners), at(x), 1.0);
+    for (a, b, expected) in [
+        (&[0.0][..], &[0.0][..], true),
+        // One box of two is in one place with one of two others.
+        (&[0.0, 10.0], &[10.0, 20.0], true),
+        (&[0.0, 10.0], &[11.0, 20.0], false),
+        (&[0.0], &[1.0], false),
+    ] {
+        let (distance, overlap) = overlap(body(a, 0.0), body(b, 0.0));
+        assert!(distance.abs() < 1e-6 && overlap == expected, "{a:?} {b:?}: {distance} {overlap}");
+    }
+    let ball = |x: f64| placed(Shape::Sphere { radius: 1.0 }, at(x), 1.0);
+    assert_eq!([ball(0.0), ball(2.0)].map(|b| overlap(ball(0.0), b).1), [true, false]);
+    assert!(overlap(body(&[0.0], 0.0), body(&[0.0], 0.5)).1);
+    assert_eq!(overlap(body(&[0.0], 0.0), body(&[0.0], 3.0)), (2.0, false));
+    let plane = placed(Shape::Plane, Pose::IDENTITY, 1.0);
+    let on_plane = [ball(0.0), body(&[0.0], 0.0)].map(|body| overlap(plane.clone(), body).1);
+    assert_eq!(on_plane, [true, false]);
+}

@@ -238,3 +238,20 @@ fn cycles_are_refused() {
         assert!(e.contains("tree.children"), "{children:?}: {e}");
     }
 }
+
+/// Lists in each other would let a small file ask for the work of a large one.
+#[test]
+fn lists_that_overlap_are_refused() {
+    let asset = small();
+    let place = |name: &str| ranges(&asset).into_iter().find(|r| r.0 == name).expect("the section").1;
+    let (nodes, lists) = (place(layout::NODES.name), place(layout::LISTS.name));
+    // Each third byte begins the slots of one list, and is a slot of others; all are of palette 0.
+    const COUNT: u8 = 36;
+    let mut bytes = asset.as_bytes().to_vec();
+    bytes[lists.clone()].iter_mut().enumerate().for_each(|(i, b)| *b = if i % 3 == 2 { COUNT } else { 0 });
+    let offsets = (0..lists.len() as u32 - 3 - u32::from(COUNT)).step_by(3).cycle();
+    let listed = bytes[nodes].chunks_exact_mut(4).filter(|word| matches!(word[3] >> 4, 8..=13));
+    listed.zip(offsets).for_each(|(word, offset)| word.copy_from_slice(&(1 << 31 | offset).to_le_bytes()));
+    let error = TeSdf::from_bytes(&bytes).unwrap_err().to_string();
+    assert!(error.contains("domain.nodes") && error.contains("it overlaps others"), "{error}");
+}

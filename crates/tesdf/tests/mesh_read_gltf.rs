@@ -130,3 +130,21 @@ fn faults_name_the_element() {
     let message = read(&path).unwrap_err().to_string();
     assert!(message.contains("buffers[0]") && message.contains("../x.bin"), "{message}");
 }
+
+#[test]
+fn a_mesh_that_is_shown_too_often_is_refused() {
+    // 8192 faces that all name one vertex; a file of kilobytes, which would make 10 GB.
+    let shows = |times: usize| {
+        let text = json("", &vec![NODE; times].join(",")).replace(r#""count":12"#, r#""count":24576"#);
+        let text = text.replace(r#""byteLength":60"#, r#""byteLength":24624"#);
+        let text = text.replace(r#""byteLength":12"#, r#""byteLength":24576"#);
+        let nodes: Vec<String> = (0..times).map(|node| node.to_string()).collect();
+        let text = text.replace(r#""nodes":[0]"#, &format!(r#""nodes":[{}]"#, nodes.join(",")));
+        let buffer = [&tetrahedron_buffer()[..48], &[0; 24576]].concat();
+        read_bytes(&glb(&text, &buffer), MeshFormat::Glb).unwrap_err().to_string()
+    };
+    let error = shows(5462);
+    for part in ["meshes[0]", "134234112 corners of faces", "expected at most 134217728"] {
+        assert!(error.contains(part), "no {part:?} in {error}");
+    }
+}

@@ -1,6 +1,9 @@
 //! Reading tetrahedra: each format against the same mesh, and what is at fault in files that are not.
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
 use tesdf::asset::layout::Side;
 use tesdf::domain::{
     Classes, ConformingError, ConformingMesh, MissingFace, ReadTetrahedraError, Skipped, TetFormat, TetMesh,
@@ -214,4 +217,34 @@ fn tetgen_errors_name_the_line() {
         let error = read(node, ele).unwrap_err();
         assert!(error.starts_with(expected), "{error}");
     }
+}
+
+/// A VTU file of one piece whose points are the appended bytes.
+fn vtu_of_points(points: &[u8]) -> Vec<u8> {
+    let head = "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\" header_type=\"UInt32\" \
+                compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\">\n\
+                <Points>\n<DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/>\n</Points>\n\
+                </Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_";
+    [head.as_bytes(), points, b"\n</AppendedData>\n</VTKFile>\n"].concat()
+}
+
+#[test]
+fn bytes_that_unpack_to_gigabytes_are_refused_before() {
+    const BLOCK: u32 = 1 << 25;
+    let mut packer = ZlibEncoder::new(Vec::new(), Compression::best());
+    packer.write_all(&vec![0; BLOCK as usize]).unwrap();
+    let packed = packer.finish().unwrap();
+    let bomb = |blocks: u32| {
+        let sizes = vec![packed.len() as u32; blocks as usize];
+        let header = [&[blocks, BLOCK, 0][..], &sizes].concat();
+        let header = header.into_iter().flat_map(u32::to_le_bytes).collect::<Vec<u8>>();
+        error_of("bomb.vtu", &vtu_of_points(&[header, packed.repeat(blocks as usize)].concat()))
+    };
+    // 2 GiB in 2 MB.
+    let error = bomb(64);
+    assert!(error.starts_with("VTU, line 5: "), "{error}");
+    assert!(error.contains("to 301989888 bytes") && error.contains("at most 100 times"), "{error}");
+    // A file of a size that meshes have is judged by what is in it.
+    let error = bomb(1);
+    assert!(!error.contains("unpack"), "{error}");
 }

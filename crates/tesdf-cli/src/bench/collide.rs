@@ -19,7 +19,7 @@ pub struct Args {
     /// A scene (.toml), a run (.tesrun) whose poses are replayed, or a file of poses (.json)
     #[arg(value_name = "SCENE|RUN|POSES")]
     pub source: PathBuf,
-    /// Where contacts are found: cpu, gpu, or a device by number or name
+    /// Where contacts are found: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Best)]
     pub device: Choice,
     /// What is tested against the other body's field
@@ -47,7 +47,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 16)]
     pub frames: usize,
     /// Measurements of each frame
-    #[arg(long, value_name = "N", default_value_t = 5)]
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: u32,
     /// Threads that work on a polygon
     #[arg(long, value_enum, default_value_t = LanesName::Group)]
@@ -274,7 +274,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.json {
         report::json(&report)?;
     } else {
-        report::result(text(&report).as_bytes())?;
+        report::text(&text(&report))?;
     }
     Ok(Outcome::Good)
 }

@@ -1,4 +1,5 @@
 //! Where the frames of a benchmark come from: a scene, a run, a file of poses.
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -8,13 +9,19 @@ use tesdf::asset::about::Source;
 use tesdf::collide::{Instance, InstanceId, Pose, Scene};
 use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
 use tesdf::glam::{DQuat, DVec3};
+use tesdf::input;
 use tesdf::mesh::SolidMesh;
-use tesdf_sim::scene_file::LoadedScene;
+use tesdf_sim::scene_file::{LoadedScene, MOST_BODIES};
 
 use super::poses::{PoseFile, VERSION};
 use crate::progress::{interrupt_flag, watched};
 use crate::report::Failure;
 use crate::{asset_file, mesh_file, run_file};
+
+/// Most instances in all worlds.
+const MOST_INSTANCES: usize = 1 << 20;
+/// What to do about a file of poses that is refused.
+const WRITES_POSES: &str = "`tesdf bench poses` writes files of poses";
 
 /// Bodies, and where they are in each frame.
 pub struct Frames {
@@ -66,18 +73,32 @@ impl Frames {
 
     fn of_poses(path: &Path, most: usize, max_entries: Option<u32>) -> Result<Self, Failure> {
         let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
-        let text = std::fs::read(path).map_err(|e| named(&e))?;
-        let file: PoseFile = serde_json::from_slice(&text).map_err(|e| named(&e))?;
+        let named = |e: &dyn std::fmt::Display| named(e).hint(WRITES_POSES);
+        let text = input::read(path).map_err(|e| named(&e))?;
+        let file: PoseFile =
+            serde_json::from_slice(&text).map_err(|e| named(&format!("not a file of poses: {e}")))?;
         if file.tesdf_poses != VERSION {
             return Err(named(&format!("version {}; this build reads {VERSION}", file.tesdf_poses)));
         }
+        if file.bodies.len() > MOST_BODIES || file.instances.len() > MOST_BODIES {
+            let [bodies, instances] = [file.bodies.len(), file.instances.len()];
+            let found =
+                format!("{bodies} bodies, {instances} instances; expected at most {MOST_BODIES} each");
+            return Err(named(&found));
+        }
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut scene = Scene::new();
-        let mut shapes = Vec::new();
+        let (mut shapes, mut opened) = (Vec::new(), BTreeMap::new());
         let interrupted = interrupt_flag()?;
         for body in &file.bodies {
-            let asset = geometry(&folder.join(body), max_entries, &interrupted)?;
-            shapes.push(scene.add_shape(asset).map_err(Failure::new)?);
+            let path = folder.join(body);
+            let file = path.canonicalize().unwrap_or_else(|_| path.clone());
+            let shape = match opened.get(&file) {
+                Some(&shape) => shape,
+                None => scene.add_shape(geometry(&path, max_entries, &interrupted)?).map_err(Failure::new)?,
+            };
+            opened.insert(file, shape);
+            shapes.push(shape);
         }
         let pose = |[x, y, z, i, j, k, w]: [f64; 7]| {
             Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| named(&e))
@@ -102,6 +123,12 @@ impl Frames {
     fn in_worlds(self, worlds: u32) -> Result<Self, Failure> {
         if worlds <= 1 {
             return Ok(self);
+        }
+        let instances = self.scene.instances().len().saturating_mul(worlds as usize);
+        if instances > MOST_INSTANCES {
+            return Err(Failure::new(format!(
+                "--worlds {worlds} makes {instances} instances; expected at most {MOST_INSTANCES}: take fewer worlds"
+            )));
         }
         let Self { mut scene, poses, contact_distance } = self;
         let instances: Vec<Instance> = scene.instances().map(|(_, instance)| *instance).collect();

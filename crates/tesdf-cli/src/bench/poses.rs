@@ -51,8 +51,8 @@ pub struct Args {
     #[command(flatten)]
     pub consent: Consent,
     /// Frames
-    #[arg(long, value_name = "N", default_value_t = 8)]
-    pub frames: usize,
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
     /// The same input gives the same poses
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub seed: u64,
@@ -71,7 +71,7 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let data =
         std::path::absolute(&args.data).map_err(|e| Failure::new(format!("{}: {e}", args.data.display())))?;
-    let mut file = args.scene.poses(&data, args.frames, &mut fastrand::Rng::with_seed(args.seed));
+    let mut file = args.scene.poses(&data, args.frames as usize, &mut fastrand::Rng::with_seed(args.seed));
     file.contact_distance = args.contact_distance.unwrap_or(file.contact_distance);
     let output = output::open(&args.output, &file.bodies, args.consent)?;
     let bytes = serde_json::to_vec(&file).map_err(Failure::new)?;
@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         count(file.instances.len(), "instance"),
         count(file.frames.len(), "frame")
     );
-    report::result(line.as_bytes())?;
+    report::text(&line)?;
     Ok(Outcome::Good)
 }
 

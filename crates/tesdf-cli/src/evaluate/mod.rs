@@ -52,7 +52,7 @@ pub struct TableArgs {
     /// Q of the sampled encoder: samples per edge of a tetrahedron [default: 32; with --quick 4; on a device the paper's of each mesh]
     #[arg(long, value_name = "Q")]
     pub resolution: Option<u32>,
-    /// Where samples are looked at: cpu in 64 bits, gpu in 32 bits, or so on a device by number or name
+    /// Where samples are looked at: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
     pub device: Choice,
     /// A coarse grid, few samples, and in Table I the smaller meshes alone

@@ -68,7 +68,7 @@ impl Sink {
         let files = match self {
             Self::Stdout(Format::Json) => return report::json(json),
             Self::Stdout(Format::Csv) => return report::result(&csv.csv()?),
-            Self::Stdout(Format::Md) => return report::result(markdown.as_bytes()),
+            Self::Stdout(Format::Md) => return report::text(markdown),
             Self::Files(files) => files,
         };
         let mut text =

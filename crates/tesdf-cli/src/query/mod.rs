@@ -1,10 +1,10 @@
 //! `tesdf query FILE --points PTS.csv`
 mod points;
 
-use std::fs::File;
 use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
+use tesdf::input;
 use tesdf::query::Precision;
 
 pub use points::{HEADER, PointsError, read, write};
@@ -34,9 +34,9 @@ const CHUNK: usize = 1 << 15;
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let asset = asset_file::open(&args.file)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.points.display()));
-    let file = File::open(&args.points).map_err(|e| at(&e))?;
+    let bytes = input::read(&args.points).map_err(|e| at(&e))?;
     let points =
-        read(file).map_err(|e| at(&e).hint("expected a CSV file whose header has the columns x, y, z"))?;
+        read(&bytes).map_err(|e| at(&e).hint("expected a CSV file whose header has the columns x, y, z"))?;
     // Rows that run over the terminal show the progress themselves.
     let bar = (!io::stdout().is_terminal()).then(|| Progress::new("querying"));
     report::result(HEADER.as_bytes())?;

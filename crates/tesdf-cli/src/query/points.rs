@@ -1,5 +1,5 @@
 //! Points in, answers out, as CSV.
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 
 use tesdf::glam::DVec3;
 use tesdf::query::Answer;
@@ -32,6 +32,19 @@ pub enum PointsError {
         /// Number of fields needed.
         expected: usize,
     },
+    /// A row has fields that belong to no column.
+    #[error(
+        "line {line}: {fields} fields under {columns} columns; expected a field for each column: numbers need a decimal point, as a \
+         comma ends a field"
+    )]
+    Long {
+        /// Line, 1-based.
+        line: usize,
+        /// Number of fields found.
+        fields: usize,
+        /// Number of columns of the header.
+        columns: usize,
+    },
     /// A field is not a number.
     #[error("line {line}, column {column}: {found:?} is not a number")]
     Number {
@@ -42,9 +55,6 @@ pub enum PointsError {
         /// The field.
         found: String,
     },
-    /// The file cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
     /// The file is not CSV.
     #[error(transparent)]
     Csv(#[from] csv::Error),
@@ -56,14 +66,12 @@ const SHOWN: usize = 80;
 
 /// The points of a CSV file, by the columns `x`, `y`, `z` of its header, in any order and case; other columns are ignored.
 ///
-/// A byte-order mark, CRLF, quotes and blank lines are accepted. `nan` and `inf` are numbers here.
+/// A byte-order mark, CRLF, quotes, blank lines and empty fields at the end of a row are accepted. `nan` and `inf` are numbers here.
 ///
 /// # Errors
 /// [`PointsError`] names line and column.
-pub fn read(mut input: impl Read) -> Result<Vec<DVec3>, PointsError> {
-    let mut bytes = Vec::new();
-    input.read_to_end(&mut bytes)?;
-    let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(&bytes[..]);
+pub fn read(bytes: &[u8]) -> Result<Vec<DVec3>, PointsError> {
+    let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(bytes);
     let header = reader.byte_headers()?.clone();
     if header.is_empty() {
         return Err(PointsError::Empty);
@@ -83,7 +91,11 @@ pub fn read(mut input: impl Read) -> Result<Vec<DVec3>, PointsError> {
     let mut points = Vec::new();
     let mut row = csv::ByteRecord::new();
     while reader.read_byte_record(&mut row)? {
-        let line = || line_of(&bytes, row.position().map_or(0, csv::Position::byte));
+        let line = || line_of(bytes, row.position().map_or(0, csv::Position::byte));
+        let fields = row.iter().rposition(|field| !field.is_empty()).map_or(0, |last| last + 1);
+        if fields > header.len() {
+            return Err(PointsError::Long { line: line(), fields: row.len(), columns: header.len() });
+        }
         let mut p = DVec3::ZERO;
         for (axis, (at, column)) in places.into_iter().zip(COLUMNS).enumerate() {
             let field = row.get(at).ok_or_else(|| PointsError::Short {
@@ -149,7 +161,7 @@ mod tests {
         for text in [
             &b"x,y,z\n1,2,3\n-4e-3,5,6e7\n"[..],
             b"\xef\xbb\xbfx,y,z\r\n1,2,3\r\n-4e-3,5,6e7",
-            b"name, Z ,\"X\",y\n\"a, b\",3,1,2\n\n\xff,6e7,-4e-3,+5,more\n",
+            b"name, Z ,\"X\",y\n\"a, b\",3,1,2\n\n\xff,6e7,-4e-3,+5,,\n",
         ] {
             assert_eq!(points(text), expected, "{:?}", String::from_utf8_lossy(text));
         }
@@ -164,6 +176,11 @@ mod tests {
             (b"x;y;z\n1;2;3", "line 1: the column x is there 0 times; expected once; the header is: x;y;z"),
             (b"x,y,Y,z\n", "line 1: the column y is there 2 times; expected once; the header is: x,y,Y,z"),
             (b"x,y,z\n1,2,3\n\n1,2\n", "line 4: 2 fields, so none for the column z; expected at least 3"),
+            (
+                b"x,y,z\n1,2,3\n1,5,2,5,3,5\n",
+                "line 3: 6 fields under 3 columns; expected a field for each column: numbers need a decimal point, as a comma \
+                 ends a field",
+            ),
             (b"x,y,z\r\n1,,3\r\n", "line 2, column y: \"\" is not a number"),
             (b"i,x,y,z\n\"a\nb\",1,2,3\n4,5,six,7\n", "line 4, column y: \"six\" is not a number"),
         ] {

@@ -1,12 +1,12 @@
 //! Bodies as they are named on the command line.
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::PathBuf;
 
 use tesdf::collide::Shape;
 use tesdf::glam::DVec3;
 
+use crate::asset_file::{Assets, check_units};
+use crate::parse;
 use crate::report::Failure;
-use crate::{asset_file, parse};
 
 /// A body's geometry: a file, or a simple shape.
 #[derive(Clone, Debug)]
@@ -44,23 +44,19 @@ pub fn body_name(text: &str) -> Result<BodyName, String> {
 /// The shapes of bodies; a file that is named twice is opened once.
 ///
 /// # Errors
-/// A file cannot be opened.
+/// A file cannot be opened, or units differ.
 pub fn open(names: &[BodyName]) -> Result<Vec<Shape>, Failure> {
-    let mut opened: Vec<(&Path, Shape)> = Vec::new();
-    names
-        .iter()
-        .map(|name| match name {
-            BodyName::Simple(shape) => Ok(shape.clone()),
-            BodyName::File(path) => match opened.iter().find(|(other, _)| other == path) {
-                Some((_, shape)) => Ok(shape.clone()),
-                None => {
-                    let shape = Shape::Mesh(Arc::new(asset_file::open(path)?));
-                    opened.push((path, shape.clone()));
-                    Ok(shape)
-                }
-            },
-        })
-        .collect()
+    let mut assets = Assets::default();
+    let shape = |name: &BodyName| match name {
+        BodyName::Simple(shape) => Ok(shape.clone()),
+        BodyName::File(path) => assets.open(path).map(Shape::Mesh),
+    };
+    let shapes: Vec<Shape> = names.iter().map(shape).collect::<Result<_, _>>()?;
+    check_units(names.iter().zip(&shapes).filter_map(|(name, shape)| match (name, shape) {
+        (BodyName::File(path), Shape::Mesh(asset)) => Some((path.as_path(), &**asset)),
+        _ => None,
+    }))?;
+    Ok(shapes)
 }
 
 #[cfg(test)]

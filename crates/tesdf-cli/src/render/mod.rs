@@ -37,6 +37,9 @@ pub enum RenderError {
     /// The picture cannot have this size.
     #[error("a picture of {}x{} pixels; expected {min} to {max} each", .0[0], .0[1], min = picture::SIZES.start(), max = picture::SIZES.end())]
     Size([u32; 2]),
+    /// The memory does not hold the picture while it is drawn.
+    #[error("no memory is left for a picture of {}x{} pixels; draw a smaller one", .0[0], .0[1])]
+    Memory([u32; 2]),
     /// There are only planes, or coordinates that overflow.
     #[error("nothing to fit the picture to; add a body that is no plane")]
     Nothing,

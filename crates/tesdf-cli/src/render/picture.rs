@@ -49,22 +49,16 @@ pub fn render(scenery: &Scenery, view: &View, size: [u32; 2]) -> Result<Pixmap, 
     let artist = Artist { stage: &stage, camera: &camera, lights: &lights, size };
 
     let [width, height] = size.map(|side| side as usize);
-    let coarse: Vec<Sample> = (0..width * height)
-        .into_par_iter()
-        .map(|i| artist.sample(pixel(i, width), DVec2::splat(0.5)))
-        .collect();
-    let colours: Vec<[u8; 3]> = (0..width * height)
-        .into_par_iter()
-        .with_min_len(64)
-        .map(|i| {
-            if is_plain(&coarse, i, width, height) {
-                srgb(coarse[i].light)
-            } else {
-                artist.fine(pixel(i, width))
-            }
-        })
-        .collect();
-    let mut map = Pixmap::new(size[0], size[1]).ok_or_else(|| RenderError::Encode("out of memory".into()))?;
+    // Before the work; the largest picture takes 4 GB.
+    let (mut coarse, mut colours) = (Vec::<Sample>::new(), Vec::<[u8; 3]>::new());
+    let memory = coarse.try_reserve_exact(width * height).and(colours.try_reserve_exact(width * height));
+    let map = memory.ok().and_then(|()| Pixmap::new(size[0], size[1]));
+    let mut map = map.ok_or(RenderError::Memory(size))?;
+    let pixels = || (0..width * height).into_par_iter();
+    coarse.par_extend(pixels().map(|i| artist.sample(pixel(i, width), DVec2::splat(0.5))));
+    colours.par_extend(pixels().with_min_len(64).map(|i| {
+        if is_plain(&coarse, i, width, height) { srgb(coarse[i].light) } else { artist.fine(pixel(i, width)) }
+    }));
     for (pixel, [r, g, b]) in map.pixels_mut().iter_mut().zip(colours) {
         if let Some(colour) = PremultipliedColorU8::from_rgba(r, g, b, 255) {
             *pixel = colour;

@@ -13,6 +13,9 @@ pub enum PictureError {
     /// The picture cannot have this size.
     #[error("a picture of {0} pixels; expected {min} to {max}", min = SIZES.start(), max = SIZES.end())]
     Size(u32),
+    /// The memory does not hold the picture while it is drawn.
+    #[error("no memory is left for a picture of {0} pixels; draw a smaller one")]
+    Memory(u32),
     /// The view is empty, not finite or too small for its place.
     #[error("the view from {min:?} to {max:?} has no area; give a plane that cuts the domain")]
     View {
@@ -28,6 +31,8 @@ pub enum PictureError {
 
 /// Pixels of the picture's longer side.
 const SIZES: std::ops::RangeInclusive<u32> = 256..=8192;
+/// What a pixel takes while a picture is drawn.
+const BYTES_PER_PIXEL: usize = 32;
 /// The layout below is drawn for this size and scaled.
 const REFERENCE: f32 = 1200.0;
 const LEFT: f32 = 28.0;
@@ -106,6 +111,11 @@ impl Frame {
         let plot = [extent.x, extent.y].map(|e| (e / pixel).round().max(1.0) as u32);
         let picture = [0, 1].map(|i| plot[i] + margin[i].round() as u32);
         let origin = [LEFT, TOP].map(|m| (m * scale).round() as u32);
+        // Asked for and given back: values, colours, and the copies that the PNG is made from.
+        let memory = picture[0] as usize * picture[1] as usize * BYTES_PER_PIXEL;
+        if Vec::<u8>::new().try_reserve_exact(memory).is_err() {
+            return Err(PictureError::Memory(size));
+        }
         Ok(Self { picture, origin, plot, corner: DVec2::new(view.min.x, view.max.y), pixel, scale })
     }
 

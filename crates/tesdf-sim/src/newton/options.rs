@@ -21,13 +21,16 @@ pub struct NewtonOptions {
     /// Contacts are taken ahead of time as far as the motion of this many steps can close. With a fixed distance instead a
     /// peg of 50 µm clearance tunnelled at steps of 5 ms.
     pub speculation: f64,
-    /// Islands of up to so many free bodies are solved by dense Cholesky, larger ones by conjugate gradients.
+    /// Islands of up to so many free bodies, at most 256, are solved by dense Cholesky, larger ones by conjugate gradients.
     pub dense_bodies: usize,
     /// A solve ends when the decrease that its next iteration promises is below the square of this, as a share of the energy.
     pub tolerance: f64,
-    /// Iterations after which a solve ends anyway.
+    /// Iterations after which a solve ends anyway, at most 10000.
     pub max_iterations: u32,
 }
+
+const MOST_ITERATIONS: u32 = 10_000;
+const MOST_DENSE_BODIES: usize = 256;
 
 impl Default for NewtonOptions {
     fn default() -> Self {
@@ -76,7 +79,18 @@ impl NewtonOptions {
                 self.tolerance > 0.0 && self.tolerance < 1.0,
                 "greater than 0, less than 1",
             ),
-            ("max_iterations", f64::from(self.max_iterations), self.max_iterations > 0, "at least 1"),
+            (
+                "max_iterations",
+                f64::from(self.max_iterations),
+                (1..=MOST_ITERATIONS).contains(&self.max_iterations),
+                "1 to 10000",
+            ),
+            (
+                "dense_bodies",
+                self.dense_bodies as f64,
+                self.dense_bodies <= MOST_DENSE_BODIES,
+                "at most 256: the matrix grows with the square of their number",
+            ),
         ];
         match checks.into_iter().find(|&(_, _, good, _)| !good) {
             Some((option, found, _, expected)) => Err(DynamicsError::Option { option, found, expected }),

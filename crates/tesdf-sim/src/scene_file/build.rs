@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,9 +13,10 @@ use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{self, LoadedMesh, SolidMesh};
 
 use super::read::LoadedScene;
+use super::units::Measure;
 use super::{BodySection, DetectorMode, DetectorSection, SceneError, ShapeSection};
 use crate::newton::{Detect, Newton};
-use crate::{Mass, MassProperties, System};
+use crate::{DynamicsError, Mass, MassProperties, System};
 
 /// Share of the smallest free body's diagonal up to which contacts are taken by default.
 const CONTACT_DISTANCE: f64 = 5e-3;
@@ -27,27 +28,26 @@ impl LoadedScene {
     /// The body at fault, with its line; or [`SceneError::Cancelled`].
     pub fn system(&self, progress: &EncodeProgress) -> Result<System, SceneError> {
         let scene = &self.scene;
-        for (key, value) in [("time_step", scene.time_step), ("duration", scene.duration)] {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(self.value(key, format!("{value}; expected a number of seconds above 0")));
-            }
-        }
+        scene.steps().map_err(|e| self.value(e.key, e.reason))?;
         let gravity = DVec3::from_array(scene.gravity);
         if !gravity.is_finite() {
             return Err(self.value("gravity", format!("{gravity}; expected finite numbers, in m/s²")));
         }
         let mut system = System::new(gravity);
-        let mut shapes = Shapes::default();
+        let (mut shapes, mut names, mut first) = (Shapes::default(), BTreeSet::new(), None);
         for (k, body) in scene.bodies.iter().enumerate() {
             let at = |reason: String| self.body_error(k, reason);
             let section = body.get_ref();
-            if scene.bodies[..k].iter().any(|other| other.get_ref().name == section.name) {
+            if !names.insert(&section.name) {
                 return Err(at("the name is used twice; give each body its own".into()));
             }
             let shape = shapes.get(self, section, &mut system, progress).map_err(|e| match e {
                 ShapeFailure::Cancelled => SceneError::Cancelled,
                 ShapeFailure::Reason(reason) => at(reason),
             })?;
+            if let Some(measure) = Measure::of(&system, section, shape) {
+                measure.check(first.get_or_insert(measure)).map_err(at)?;
+            }
             let mass = mass(&system, section, shape).map_err(at)?;
             let instance = instance(section, shape).map_err(at)?;
             system.add(&section.name, instance, mass).map_err(|e| self.body_error(k, instance_reason(e)))?;
@@ -72,13 +72,23 @@ impl LoadedScene {
     /// As [`newton`](Self::newton).
     pub fn newton_with(&self, system: System, detector: impl Detect + 'static) -> Result<Newton, SceneError> {
         let collide = collide_options(&self.scene.detector, &system);
-        collide.validate().map_err(|e| self.value("detector", e))?;
+        collide.validate().map_err(|e| match e {
+            CollideError::Option { option, found, expected } => {
+                self.value(&format!("detector.{option}"), format!("{found}; expected {expected}"))
+            }
+            e => self.value("detector", e),
+        })?;
         let solver = self.scene.solver;
         match self.scene.detector.mode {
             DetectorMode::Off => Newton::new(system, nothing, collide, solver),
             _ => Newton::new(system, detector, collide, solver),
         }
-        .map_err(|e| self.value("solver", e))
+        .map_err(|e| match e {
+            DynamicsError::Option { option, found, expected } => {
+                self.value(&format!("solver.{option}"), format!("{found}; expected {expected}"))
+            }
+            e => self.value("solver", e),
+        })
     }
 
     fn body_error(&self, body: usize, reason: String) -> SceneError {
@@ -140,7 +150,9 @@ impl Shapes {
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
                 let file = scene.resolve(file);
-                if let Some(&shape) = self.0.get(&file) {
+                // One file under several names is still opened once.
+                let key = file.canonicalize().unwrap_or_else(|_| file.clone());
+                if let Some(&shape) = self.0.get(&key) {
                     return Ok(shape);
                 }
                 let opened = match body.asset {
@@ -149,7 +161,7 @@ impl Shapes {
                     None => encode_mesh(&file, progress)?,
                 };
                 let shape = add_shape(system, Shape::Mesh(Arc::new(opened)))?;
-                self.0.insert(file, shape);
+                self.0.insert(key, shape);
                 return Ok(shape);
             }
             (None, None, Some(shape)) => shape.to_shape(),

@@ -20,10 +20,12 @@ pub enum SceneError {
         message: String,
     },
     /// A value that makes no sense.
-    #[error("{}: {key}: {reason}", .path.display())]
+    #[error("{}{}: {key}: {reason}", .path.display(), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
     Value {
         /// The scene file.
         path: PathBuf,
+        /// Where the field is, from 1; `None` when the file does not have it.
+        line: Option<usize>,
         /// The field.
         key: String,
         /// What was found and what was expected.

@@ -20,11 +20,14 @@
 //! mode = "exact"                        # node, face, exact, or off
 //! ```
 //!
-//! Paths are relative to the scene's folder.
+//! Paths are relative to the scene's folder. Lengths are metres: a body's `scale` says how many metres a unit of its mesh has. When assets record
+//! different units, scales that do not make one unit of them are an error.
 
 mod build;
 mod error;
+mod limits;
 mod read;
+mod units;
 
 use std::path::PathBuf;
 
@@ -32,6 +35,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 pub use error::SceneError;
+pub use limits::{LimitError, MOST_BODIES, MOST_STATE_BYTES, MOST_STEPS};
 pub use read::LoadedScene;
 
 use crate::criterion::ScrewCriterion;
@@ -43,7 +47,7 @@ use crate::newton::NewtonOptions;
 pub struct SceneFile {
     /// s.
     pub time_step: f64,
-    /// s; rounded to whole steps.
+    /// s; rounded to whole steps, at most [`MOST_STEPS`].
     pub duration: f64,
     /// m/s².
     #[serde(default = "earth")]
@@ -60,7 +64,7 @@ pub struct SceneFile {
     /// What makes the run a success.
     #[serde(default)]
     pub criterion: CriterionSection,
-    /// The bodies.
+    /// The bodies, at most [`MOST_BODIES`].
     pub bodies: Vec<Spanned<BodySection>>,
 }
 

@@ -1,9 +1,13 @@
 use std::path::{Path, PathBuf};
 
 use toml::Spanned;
+use toml::de::DeTable;
 
-use super::{BodySection, SceneError, SceneFile};
+use super::{BodySection, MOST_BODIES, SceneError, SceneFile};
 use crate::RunRecord;
+
+/// Most bytes of a scene: a thousand per body.
+const MOST_TEXT: usize = 1000 * MOST_BODIES;
 
 /// A scene file with what its errors and paths refer to.
 #[derive(Clone, Debug)]
@@ -21,7 +25,7 @@ impl LoadedScene {
     /// # Errors
     /// [`SceneError::Read`], [`SceneError::Parse`].
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text = std::fs::read_to_string(path)
+        let text = tesdf::input::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.to_path_buf(), source })?;
         Self::parse(text, path)
     }
@@ -31,6 +35,10 @@ impl LoadedScene {
     /// # Errors
     /// [`SceneError::Parse`].
     pub fn parse(text: String, path: &Path) -> Result<Self, SceneError> {
+        if text.len() > MOST_TEXT {
+            let message = format!("{} bytes; expected a scene of at most {MOST_TEXT}", text.len());
+            return Err(SceneError::Parse { path: path.to_path_buf(), message });
+        }
         let scene = toml::from_str(&text).map_err(|e| SceneError::Parse {
             path: path.to_path_buf(),
             message: e.to_string().trim_end().to_string(),
@@ -93,6 +101,21 @@ impl LoadedScene {
     }
 
     pub(super) fn value(&self, key: &str, reason: impl std::fmt::Display) -> SceneError {
-        SceneError::Value { path: self.path.clone(), key: key.into(), reason: reason.to_string() }
+        let (path, line) = (self.path.clone(), self.line_of(key));
+        SceneError::Value { path, line, key: key.into(), reason: reason.to_string() }
+    }
+
+    /// Line of a field, such as `criterion.screw`, or of the section that it would be in.
+    fn line_of(&self, key: &str) -> Option<usize> {
+        let document = DeTable::parse(&self.text).ok()?;
+        let (mut table, mut line) = (Some(document.get_ref()), None);
+        for part in key.split('.') {
+            let Some((name, value)) = table.and_then(|t| t.iter().find(|(name, _)| name.get_ref() == part))
+            else {
+                break;
+            };
+            (table, line) = (value.get_ref().as_table(), Some(self.line(name.span().start)));
+        }
+        line
     }
 }

@@ -10,9 +10,13 @@ use memmap2::Mmap;
 
 use super::header::{self, DIGITS, Line, SECTION_CHECKSUM, Shape};
 use super::{AssetError, Presence, Section, SectionSpec};
+use crate::input;
 
 #[cfg(target_endian = "big")]
 compile_error!("sections are read in place and are little-endian; this target is big-endian");
+
+/// Bytes that tell whether what comes from a pipe is a `.tesdf` file.
+const PREFIX: u64 = 512;
 
 /// Sections and metadata as the bytes of a `.tesdf` file; the same input gives the same bytes.
 ///
@@ -113,7 +117,8 @@ impl Container {
     ///
     /// The file must not be changed in place while it is open: a reader would see the change, and after a truncation the
     /// operating system ends the process (SIGBUS). Replacing it by a rename, as [`save_atomic`](super::save_atomic) does,
-    /// is safe. A pipe is read into memory. For a file that others may write to, read it and use [`from_bytes`](Self::from_bytes).
+    /// is safe. What comes from a pipe or a device is held in memory; see [`input::read`](crate::input::read). For a file that
+    /// others may write to, read it and use [`from_bytes`](Self::from_bytes).
     ///
     /// # Errors
     /// [`AssetError`] names what was found, in which section, and what was expected.
@@ -124,7 +129,14 @@ impl Container {
         if !kind.is_file() || kind.len() == 0 {
             // A pipe cannot be mapped, an empty file not on every system, and a folder cannot be read.
             let mut bytes = Vec::new();
-            file.read_to_end(&mut bytes).map_err(io("read"))?;
+            file.by_ref().take(PREFIX).read_to_end(&mut bytes).map_err(io("read"))?;
+            if let Err(e @ (AssetError::NotTesdf { .. } | AssetError::Version { .. })) =
+                header::read_prefix(&bytes)
+            {
+                // It may never end.
+                return Err(e);
+            }
+            input::read_rest(&mut file, &mut bytes).map_err(io("read"))?;
             return Self::from_bytes(&bytes, table);
         }
         // SAFETY: nothing in this process writes to the mapping; what other processes may do is documented above.
@@ -137,7 +149,10 @@ impl Container {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn from_bytes(bytes: &[u8], table: &[SectionSpec]) -> Result<Self, AssetError> {
-        let mut words = vec![0_u64; bytes.len().div_ceil(size_of::<u64>())];
+        let mut words = Vec::new();
+        let count = bytes.len().div_ceil(size_of::<u64>());
+        words.try_reserve_exact(count).map_err(|_| AssetError::Memory { bytes: bytes.len() })?;
+        words.resize(count, 0_u64);
         bytemuck::cast_slice_mut(&mut words)[..bytes.len()].copy_from_slice(bytes);
         Self::new(Storage::Owned { words, length: bytes.len() }, table)
     }

@@ -19,6 +19,12 @@ pub enum AssetError {
         /// The operating system's answer.
         source: io::Error,
     },
+    /// The memory does not hold the file, or what is made of it.
+    #[error("no memory is left for {bytes} bytes; free some, or open the file where there is more")]
+    Memory {
+        /// Bytes asked for.
+        bytes: usize,
+    },
     /// The bytes are of another format.
     #[error("this is {found}, not a .tesdf file; {next}")]
     NotTesdf {

@@ -25,6 +25,7 @@ mod inner_ball;
 pub mod layout;
 mod section;
 mod te_sdf;
+pub mod unit;
 
 pub use crate::save::save_atomic;
 pub use arrays::Arrays;

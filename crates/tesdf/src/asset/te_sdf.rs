@@ -76,7 +76,7 @@ impl TeSdf {
     /// # Errors
     /// [`AssetError`] names the section at fault.
     pub fn open(path: &Path) -> Result<Self, AssetError> {
-        Self::new(Container::open(path, &layout::SECTIONS)?)
+        Self::from_container(Container::open(path, &layout::SECTIONS)?)
     }
 
     /// As [`open`](Self::open), from bytes, which are copied.
@@ -84,10 +84,14 @@ impl TeSdf {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, AssetError> {
-        Self::new(Container::from_bytes(bytes, &layout::SECTIONS)?)
+        Self::from_container(Container::from_bytes(bytes, &layout::SECTIONS)?)
     }
 
-    fn new(container: Container) -> Result<Self, AssetError> {
+    /// As [`open`](Self::open), from a container that was opened with [`layout::SECTIONS`].
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn from_container(container: Container) -> Result<Self, AssetError> {
         let about = About::from_metadata(container.metadata())?;
         let placed: SharedSection<f64> = container.shared_section(layout::FRAME.name)?;
         let (frame, cube) = frame_and_cube(&placed)?;
@@ -132,15 +136,24 @@ impl TeSdf {
         if asset.conforming.is_none() {
             asset.entries = Entries::new(&asset.nodes);
         }
-        asset.records = (0..asset.faces.len())
-            .map(|f| FaceRecord::new(&asset.local_triangle(f), middle, SignHints(asset.sign_hints[f])))
-            .collect();
+        let count = asset.faces.len();
+        let bytes = count * size_of::<FaceRecord>();
+        asset.records.try_reserve_exact(count).map_err(|_| AssetError::Memory { bytes })?;
+        for f in 0..count {
+            let hints = SignHints(asset.sign_hints[f]);
+            asset.records.push(FaceRecord::new(&asset.local_triangle(f), middle, hints));
+        }
         Ok(asset)
     }
 
     /// Where the asset came from, what was asked for, what was proved.
     pub fn about(&self) -> &About {
         &self.about
+    }
+
+    /// Name of the mesh's unit as it was recorded, if it was; see [`unit`](super::unit).
+    pub fn unit(&self) -> Option<&str> {
+        self.about.options.unit.as_deref().map(str::trim).filter(|unit| !unit.is_empty())
     }
 
     pub(crate) fn about_mut(&mut self) -> &mut About {
@@ -348,6 +361,8 @@ impl TeSdf {
         }
         let mut depth = vec![u8::MAX; n];
         depth[..roots].fill(0);
+        // Many cells may have one list, which is looked at once; no two lists share a part.
+        let (mut known, mut listed) = (vec![0_u64; self.lists.len() / 64 + 1], 0);
         for (i, &word) in self.nodes.iter().enumerate() {
             let bad = |reason: String| wrong(layout::NODES, format!("word {i}: {reason}"));
             if depth[i] == u8::MAX {
@@ -366,8 +381,18 @@ impl TeSdf {
                     depth[c..c + 2].fill(below);
                 }
                 Node::Listed(_, offset) => {
-                    if let Err(reason) = self.check_list(offset) {
-                        return bad(format!("list at byte {offset}: {reason}"));
+                    let bit = 1 << (offset % 64);
+                    if known.get(offset as usize / 64).is_some_and(|bits| bits & bit != 0) {
+                        continue;
+                    }
+                    match self.check_list(offset) {
+                        Err(reason) => return bad(format!("list at byte {offset}: {reason}")),
+                        Ok(entries) => listed += entries,
+                    }
+                    // A list that is not empty begins within the section.
+                    known[offset as usize / 64] |= bit;
+                    if listed > self.lists.len() {
+                        return bad(format!("list at byte {offset}: it overlaps others"));
                     }
                 }
                 Node::Far(_) | Node::NotOfDomain => {}
@@ -376,7 +401,8 @@ impl TeSdf {
         Ok(())
     }
 
-    fn check_list(&self, offset: u32) -> Result<(), String> {
+    /// The number of faces of a list, each of which exists.
+    fn check_list(&self, offset: u32) -> Result<usize, String> {
         let list = List::decode(&self.lists, offset).ok_or("it runs out of the section")?;
         if list.is_empty() {
             return Err("it is empty".into());
@@ -389,14 +415,14 @@ impl TeSdf {
                 };
                 match slots.iter().find(|&&s| u32::from(s) >= end - start) {
                     Some(s) => Err(format!("slot {s} of a palette of {}", end - start)),
-                    None => Ok(()),
+                    None => Ok(list.len()),
                 }
             }
             List::Faces(bytes) => {
                 let faces = bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
                 match faces.into_iter().find(|&f| f as usize >= self.faces.len()) {
                     Some(f) => Err(format!("face {f} of {}", self.faces.len())),
-                    None => Ok(()),
+                    None => Ok(list.len()),
                 }
             }
         }

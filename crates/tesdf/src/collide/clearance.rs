@@ -1,4 +1,5 @@
 use glam::DVec3;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::field::FieldBody;
@@ -7,6 +8,7 @@ use super::narrow::Search;
 use super::surface::SurfaceBody;
 use super::{CollideError, CollideOptions, FaceMethod, InstanceId, Mode, Placement, Scene, Shape};
 use crate::encode::Length;
+use crate::query::Precision;
 
 /// How exactly a clearance is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,6 +46,10 @@ pub struct Clearance {
     pub field: InstanceId,
     /// Whether the error is within the tolerance; false when the search in a hard spot deep inside was cut short.
     pub converged: bool,
+    /// Whether the two solids share volume. Where `distance` is negative they do, up to the tolerance. Where it is 0, up to the
+    /// tolerance, they do when their surfaces lie on each other with both solids on one side, as of a body and itself in one place:
+    /// then no point of a surface is inside of the other body, and yet they overlap.
+    pub overlap: bool,
 }
 
 /// The clearance of two instances, whatever their worlds, groups and exclusions.
@@ -155,7 +161,7 @@ impl<'a> Pair<'a> {
         let first = self.first();
         let found = self.apart(tolerance)?;
         if matches!(self.a.shape, Shape::Plane) || matches!(self.b.shape, Shape::Plane) {
-            return Ok(found);
+            return Ok(Clearance { overlap: found.distance < -tolerance, ..found });
         }
         // Apart, no surface is nearer than this to the other: what is lower the other way around is at most its negative.
         let limit = if found.distance > 0.0 { tolerance - found.distance } else { found.distance };
@@ -164,7 +170,51 @@ impl<'a> Pair<'a> {
             Surface::B => Surface::A,
         };
         let other = self.one_way(second, tolerance, limit).filter(|o| o.distance < found.distance);
-        Ok(other.unwrap_or(found))
+        let found = other.unwrap_or(found);
+        let overlap = match found.distance {
+            d if d < -tolerance => true,
+            d if d > tolerance => false,
+            _ => self.shares_volume(tolerance),
+        };
+        Ok(Clearance { overlap, ..found })
+    }
+
+    /// Whether bodies whose surfaces touch up to the tolerance share volume: whether a point behind a face of one, by more than
+    /// the tolerance, is inside of both.
+    ///
+    /// No face of one is inside of the other then, so a part of one that overlaps the other has its surface in common with it, and a point
+    /// behind any face of that part tells.
+    fn shares_volume(&self, tolerance: f64) -> bool {
+        let deep = |body: &Body, p: DVec3, depth: f64| {
+            let scale = body.placement.scale;
+            body.shape.signed_distance(body.placement.to_shape(p), Precision::F64) * scale < -0.5 * depth
+        };
+        let size = |body: &Body| body.shape.diagonal() * body.placement.scale;
+        // Within a wall that is thicker than that, and clear of what the tolerance and rounding leave open.
+        let depths = [1e-2, 1e-3, 1e-4].map(|share| share * size(&self.a).min(size(&self.b)));
+        let behind = self.behind_faces();
+        depths.into_iter().filter(|&depth| depth > 8.0 * tolerance).any(|depth| {
+            let point = |&(p, inward): &(DVec3, DVec3)| p + depth * inward;
+            behind.par_iter().map(point).any(|p| deep(&self.a, p, depth) && deep(&self.b, p, depth))
+        })
+    }
+
+    /// For each face of *a* a point of it and the direction inward; the world's frame. Of a simple shape one place is enough, as it is convex.
+    fn behind_faces(&self) -> Vec<(DVec3, DVec3)> {
+        let Body { shape, placement, .. } = &self.a;
+        let turn = |n: DVec3| placement.pose.rotation * n;
+        let of_face = |[a, b, c]: [DVec3; 3]| {
+            let normal = (b - a).cross(c - a).try_normalize()?;
+            Some((placement.to_world((a + b + c) / 3.0), turn(-normal)))
+        };
+        match shape {
+            Shape::Mesh(asset) => {
+                (0..asset.face_count()).filter_map(|f| of_face(asset.face_corners(f))).collect()
+            }
+            Shape::Plane => Vec::new(),
+            // From the middle of its upper side down.
+            simple => vec![(placement.to_world(DVec3::Z * simple.bounds().max.z), turn(DVec3::NEG_Z))],
+        }
     }
 
     /// One way, which is the clearance when neither body is inside of the other.
@@ -213,6 +263,8 @@ impl<'a> Pair<'a> {
             Surface::B => (on_field, on_surface, -away, face_field, face_surface),
         };
         let distance = distance * field.unit();
-        Some(Clearance { distance, point_a, point_b, normal, face_a, face_b, field: of_field.id, converged })
+        let field = of_field.id;
+        let overlap = distance < -tolerance;
+        Some(Clearance { distance, point_a, point_b, normal, face_a, face_b, field, converged, overlap })
     }
 }

@@ -43,6 +43,15 @@ pub enum CollideError {
         /// What was expected.
         expected: &'static str,
     },
+    /// More instances on top of each other than can be looked at.
+    #[error(
+        "more than {limit} pairs of instances come near each other; expected fewer: spread them out, or keep them apart by worlds, \
+         groups or exclusions"
+    )]
+    TooManyPairs {
+        /// The most that are looked at.
+        limit: usize,
+    },
     /// Two instances that have no distance.
     #[error("instances {a} and {b} have no clearance: {reason}")]
     NoClearance {

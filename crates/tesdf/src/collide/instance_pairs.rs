@@ -29,10 +29,13 @@ const ULPS: f64 = 8.0;
 /// Worlds of more instances than this get a tree.
 const FEW: usize = 16;
 
+/// Most pairs of a scene: with what is made of each for the detection they take some GB.
+pub const MOST_PAIRS: usize = 1 << 22;
+
 /// All pairs that can touch, sorted by world and ids.
 ///
 /// # Errors
-/// Names an instance whose shape is gone.
+/// Names an instance whose shape is gone; [`CollideError::TooManyPairs`].
 pub fn instance_pairs(
     scene: &Scene,
     contact_distance: f64,
@@ -57,30 +60,39 @@ pub fn instance_pairs(
         let mut offer = |i: usize, j: usize| {
             let (a, b) = (&entries[i.min(j)], &entries[i.max(j)]);
             let meet = |id| scene.instance(id).map(|instance| (id, instance));
-            let (Ok(x), Ok(y)) = (meet(a.id), meet(b.id)) else { return };
+            let (Ok(x), Ok(y)) = (meet(a.id), meet(b.id)) else { return pairs.len() };
             if a.bounds.overlaps(b.bounds) && !(a.is_plane && b.is_plane) && scene.may_meet(x, y) {
                 let contact_distance = contact_distance + a.motion + b.motion;
                 pairs.push(InstancePair { first: a.id, second: b.id, contact_distance });
             }
+            pairs.len()
+        };
+        let within = |found: usize| match found <= MOST_PAIRS {
+            true => Ok(()),
+            false => Err(CollideError::TooManyPairs { limit: MOST_PAIRS }),
         };
         let planes: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].is_plane).collect();
         let bodies: Vec<usize> = (0..entries.len()).filter(|&i| !entries[i].is_plane).collect();
-        planes.iter().for_each(|&i| bodies.iter().for_each(|&j| offer(i, j)));
+        for &i in &planes {
+            bodies.iter().try_for_each(|&j| within(offer(i, j)))?;
+        }
         if bodies.len() <= FEW {
             for (k, &i) in bodies.iter().enumerate() {
-                bodies[k + 1..].iter().for_each(|&j| offer(i, j));
+                bodies[k + 1..].iter().try_for_each(|&j| within(offer(i, j)))?;
             }
         } else {
             let boxes: Vec<Aabb> = bodies.iter().map(|&i| entries[i].bounds).collect();
             let tree = AabbTree::build(&boxes, 4);
             for (k, bounds) in boxes.iter().enumerate() {
+                let mut found = 0;
                 let later = |items: &[u32]| {
                     items
                         .iter()
                         .filter(|&&l| l as usize > k)
-                        .for_each(|&l| offer(bodies[k], bodies[l as usize]));
+                        .for_each(|&l| found = offer(bodies[k], bodies[l as usize]));
                 };
                 tree.visit(|node| node.overlaps(*bounds), later);
+                within(found)?;
             }
         }
         pairs[first..].sort_unstable_by_key(|p| (p.first, p.second));
@@ -104,4 +116,23 @@ impl Instance {
 /// Greatest distance from the origin to a point of a box.
 fn reach(bounds: Aabb) -> f64 {
     bounds.min.abs().max(bounds.max.abs()).length()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collide::{Pose, Scene};
+
+    #[test]
+    fn more_pairs_than_the_memory_holds_are_refused() {
+        let mut scene = Scene::new();
+        let shape = scene.add_shape(Shape::Sphere { radius: 1.0 }).unwrap();
+        // 2897 · 2896 / 2 pairs are just more than 2²².
+        let ids: Vec<_> =
+            (0..2897).map(|_| scene.add(Instance::new(shape, Pose::IDENTITY)).unwrap()).collect();
+        let error = instance_pairs(&scene, 0.0, 0.0).unwrap_err();
+        assert_eq!(error, CollideError::TooManyPairs { limit: MOST_PAIRS });
+        scene.remove(&ids[..1]).unwrap();
+        assert_eq!(instance_pairs(&scene, 0.0, 0.0).unwrap().len(), 2896 * 2895 / 2);
+    }
 }

@@ -118,7 +118,7 @@ pub fn read_tetrahedra(path: &Path) -> Result<TetMesh, ReadTetrahedraError> {
 pub fn load_tetrahedra(path: &Path) -> Result<LoadedTetrahedra, ReadTetrahedraError> {
     let format = TetFormat::of_path(path)?;
     let bytes = |path: &Path| {
-        std::fs::read(path).map_err(|source| ReadTetrahedraError::Open { path: path.to_owned(), source })
+        crate::input::read(path).map_err(|source| ReadTetrahedraError::Open { path: path.to_owned(), source })
     };
     let parsed = match format {
         TetFormat::Msh => gmsh::parse(&bytes(path)?),

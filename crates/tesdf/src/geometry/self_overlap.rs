@@ -1,14 +1,19 @@
+use std::ops::ControlFlow;
+
 use super::{Aabb, AabbTree, Child};
 
-/// Calls `pair` once with each two items, lower first, whose closed boxes share a point.
+/// Calls `pair` once with each two items, lower first, whose closed boxes share a point, until it breaks off.
 ///
 /// `boxes` are those that the tree was built from. The order of the calls depends on the boxes alone.
-pub fn self_overlaps(tree: &AabbTree, boxes: &[Aabb], mut pair: impl FnMut(u32, u32)) {
+pub fn self_overlaps(
+    tree: &AabbTree,
+    boxes: &[Aabb],
+    mut pair: impl FnMut(u32, u32) -> ControlFlow<()>,
+) -> ControlFlow<()> {
     let items = |start: u32, end: u32| &tree.order()[start as usize..end as usize];
-    let mut report = |i: u32, j: u32| {
-        if boxes[i as usize].overlaps(boxes[j as usize]) {
-            pair(i.min(j), i.max(j));
-        }
+    let mut report = |i: u32, j: u32| match boxes[i as usize].overlaps(boxes[j as usize]) {
+        true => pair(i.min(j), i.max(j)),
+        false => ControlFlow::Continue(()),
     };
     // Each entry stands for all pairs of items of two subtrees; of one subtree when both are the same.
     let mut stack = vec![(tree.root(), tree.root())];
@@ -24,7 +29,7 @@ pub fn self_overlaps(tree: &AabbTree, boxes: &[Aabb], mut pair: impl FnMut(u32, 
             (Child::Leaf { start, end }, Child::Leaf { start: other, end: other_end }) => {
                 for (k, &i) in items(start, end).iter().enumerate() {
                     let rest = if start == other { k + 1 } else { 0 };
-                    items(other, other_end)[rest..].iter().for_each(|&j| report(i, j));
+                    items(other, other_end)[rest..].iter().try_for_each(|&j| report(i, j))?;
                 }
             }
             // The larger of two different subtrees is opened; a leaf cannot be.
@@ -35,6 +40,7 @@ pub fn self_overlaps(tree: &AabbTree, boxes: &[Aabb], mut pair: impl FnMut(u32, 
             (Child::Node(_), Child::Leaf { .. }) => {}
         }
     }
+    ControlFlow::Continue(())
 }
 
 fn larger(a: Aabb, b: Aabb) -> bool {
@@ -62,7 +68,11 @@ mod tests {
                 })
                 .collect();
             let mut found = Vec::new();
-            self_overlaps(&AabbTree::build(&boxes, leaf), &boxes, |i, j| found.push((i, j)));
+            let all = self_overlaps(&AabbTree::build(&boxes, leaf), &boxes, |i, j| {
+                found.push((i, j));
+                ControlFlow::Continue(())
+            });
+            prop_assert_eq!(all, ControlFlow::Continue(()));
             found.sort_unstable();
             let n = boxes.len() as u32;
             let brute: Vec<_> = (0..n)

@@ -37,7 +37,7 @@ pub struct CheckReport {
     pub shells: usize,
     /// Open edges chained into loops, or paths where they do not close.
     pub boundary_loops: Vec<BoundaryLoop>,
-    /// Least and greatest winding number found; `None` when it is not an integer everywhere.
+    /// Least and greatest winding number found; `None` when it is not an integer everywhere, or was not tested.
     pub winding: Option<[i32; 2]>,
     /// Whether the mesh has a well-defined inside: there is no error.
     pub encodable: bool,
@@ -82,7 +82,8 @@ pub(crate) const T_JUNCTION_TOLERANCE: f64 = 1e-9;
 /// There is a bound on the work: where more than 4096 faces cut a face, or cross each other more than once each on it, or where
 /// there are more than 131072 regions in all, evenly chosen regions are tested.
 ///
-/// When a value is [out of range](DefectKind::OutOfRange) nothing else is tested.
+/// When a value is [out of range](DefectKind::OutOfRange) nothing else is tested. When more than a million pairs of faces intersect, and
+/// more than two for each face, that is an error, the pairs are not listed, and winding numbers are not tested.
 pub fn check(mesh: &TriangleMesh) -> CheckReport {
     let topology = Topology::new(mesh.faces());
     let bounds = mesh.bounds();
@@ -115,7 +116,8 @@ pub fn check(mesh: &TriangleMesh) -> CheckReport {
     let touching = junctions.touching(mesh, &topology);
     let pairs = self_intersections(mesh, &flaws.without_area(), &touching);
     defects.extend(intersections::defects(mesh, &pairs, lenient));
-    if closed {
+    // With pairs missing, a patch of faces could be cut by others.
+    if closed && pairs.len() < intersections::most_pairs(mesh) {
         let meetings = winding::Meetings { flaws: &flaws, intersections: &pairs, touching: &touching };
         let (range, found) = winding::winding_defects(mesh, &topology, &meetings);
         report.winding = Some(range);

@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::TriangleMesh;
+use crate::input;
 use assemble::{Places, RawMesh, assemble};
 pub use error::{Place, ReadError};
 
@@ -138,7 +139,7 @@ pub struct LoadReport {
 /// [`ReadError`] names what is at fault, the line, byte or element, and what to do.
 pub fn read(path: &Path) -> Result<LoadedMesh, ReadError> {
     let format = MeshFormat::of_path(path)?;
-    let bytes = std::fs::read(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
+    let bytes = input::read(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     parse(&bytes, format, Some(folder))
 }

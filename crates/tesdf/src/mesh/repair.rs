@@ -73,6 +73,19 @@ pub struct RepairReport {
     pub warnings: Vec<Defect>,
 }
 
+impl RepairReport {
+    /// Whether the repaired mesh is another one than the one given.
+    pub fn changes_something(&self) -> bool {
+        !(self.welded_vertices.is_empty()
+            && self.collapsed_faces.is_empty()
+            && self.duplicate_faces.is_empty()
+            && self.split_edges.is_empty()
+            && self.vanished_faces.is_empty()
+            && self.reversed_faces.is_empty()
+            && self.unused_vertices == 0)
+    }
+}
+
 /// An edge that was split.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SplitEdge {

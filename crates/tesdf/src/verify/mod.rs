@@ -77,6 +77,9 @@ pub enum VerifyError {
     /// The mesh in the asset is a point.
     #[error("the mesh in the file has the diagonal {0}; expected a positive length")]
     Diagonal(f64),
+    /// No points were asked for.
+    #[error("0 points to compare; expected at least 1")]
+    NoSamples,
     /// `progress` said so.
     #[error("the comparison was cancelled")]
     Cancelled,
@@ -99,6 +102,9 @@ pub fn verify(
     options: &VerifyOptions,
     progress: impl Fn(f64) -> ControlFlow<()> + Sync,
 ) -> Result<VerifyReport, VerifyError> {
+    if options.samples == 0 {
+        return Err(VerifyError::NoSamples);
+    }
     let (mesh, ids) = mesh_of(asset)?;
     let diagonal = mesh.diagonal();
     if !(diagonal.is_finite() && diagonal > 0.0) {

@@ -6,7 +6,7 @@ mod array;
 mod bytes;
 
 use super::{Parsed, ReadTetrahedraError, Skipped, TetFormat, malformed};
-use crate::mesh::Place;
+use crate::mesh::{Place, text::shown};
 use array::{Arrays, Values};
 
 type Result<T> = std::result::Result<T, ReadTetrahedraError>;
@@ -33,10 +33,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed> {
     let root = document.root_element();
     let kind = root.attribute("type").unwrap_or_default();
     if root.tag_name().name() != "VTKFile" || kind != "UnstructuredGrid" {
-        let found = format!("a {} of the type '{kind}'", root.tag_name().name());
+        let name = root.tag_name().name();
+        let found = format!("a {} of the type {}", shown(name.as_bytes()), shown(kind.as_bytes()));
         return Err(at(&root, found, "expected a VTKFile of the type UnstructuredGrid"));
     }
-    let arrays = Arrays::new(&root, appended)?;
+    let arrays = Arrays::new(&root, appended, bytes.len())?;
     let grid = child(&root, "UnstructuredGrid")?;
     let mut parsed = Parsed::default();
     for piece in grid.children().filter(|n| n.has_tag_name("Piece")) {
@@ -85,7 +86,8 @@ fn child<'a, 'input>(node: &Node<'a, 'input>, name: &str) -> Result<Node<'a, 'in
 
 fn count(node: &Node<'_, '_>, name: &str) -> Result<usize> {
     let value = node.attribute(name).unwrap_or_default();
-    value.trim().parse().map_err(|_| at(node, format!("{name}=\"{value}\""), "expected a count"))
+    let error = |_| at(node, format!("{name} is {}", shown(value.as_bytes())), "expected a count");
+    value.trim().parse().map_err(error)
 }
 
 fn read_piece(piece: &Node<'_, '_>, arrays: &Arrays<'_>, parsed: &mut Parsed) -> Result<()> {

@@ -5,6 +5,7 @@
 //! can meet.
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use glam::DVec3;
 
@@ -19,28 +20,39 @@ const LEAF_SIZE: usize = 4;
 /// A vertex with more faces makes a large fan.
 const LARGE: usize = 128;
 
-/// Calls `pair` once with each two of `faces` (ascending), lower first, that may meet: all that do are among them.
+/// Calls `pair` once with each two of `faces` (ascending), lower first, that may meet, until it breaks off: all that do are among them.
 ///
 /// The order of the calls depends on the mesh alone.
-pub(super) fn pairs_that_may_meet(mesh: &TriangleMesh, faces: &[u32], mut pair: impl FnMut(u32, u32)) {
+pub(super) fn pairs_that_may_meet(
+    mesh: &TriangleMesh,
+    faces: &[u32],
+    mut pair: impl FnMut(u32, u32) -> ControlFlow<()>,
+) -> ControlFlow<()> {
     let mut pair = |f: u32, g: u32| pair(f.min(g), f.max(g));
     let (rest, fans) = large_fans(mesh, faces);
     let boxes: Vec<Aabb> = rest.iter().map(|&f| box_of(mesh, f)).collect();
     self_overlaps(&AabbTree::build(&boxes, LEAF_SIZE), &boxes, |i, j| {
-        pair(rest[i as usize], rest[j as usize]);
-    });
+        pair(rest[i as usize], rest[j as usize])
+    })?;
     let around_fans: Vec<Aabb> = fans.iter().map(|fan| fan.bounds).collect();
     let tree = AabbTree::build(&around_fans, LEAF_SIZE);
     for (number, fan) in fans.iter().enumerate() {
-        self_overlaps(&fan.tree, &fan.arcs, |i, j| pair(fan.faces[i as usize], fan.faces[j as usize]));
-        fan.faces.iter().for_each(|&f| meet_fans(mesh, f, &tree, &fans[..number], &mut pair));
+        self_overlaps(&fan.tree, &fan.arcs, |i, j| pair(fan.faces[i as usize], fan.faces[j as usize]))?;
+        for &face in &fan.faces {
+            in_fans(mesh, face, &tree, &fans[..number])
+                .into_iter()
+                .try_for_each(|other| pair(face, other))?;
+        }
     }
-    rest.iter().for_each(|&f| meet_fans(mesh, f, &tree, &fans, &mut pair));
+    rest.iter().try_for_each(|&face| {
+        in_fans(mesh, face, &tree, &fans).into_iter().try_for_each(|other| pair(face, other))
+    })
 }
 
-/// The pairs of a face with those of the first `fans` of a tree; it is in none of them.
-fn meet_fans(mesh: &TriangleMesh, face: u32, tree: &AabbTree, fans: &[Fan], pair: &mut impl FnMut(u32, u32)) {
+/// The faces of the first `fans` of a tree that may meet a face; it is in none of them.
+fn in_fans(mesh: &TriangleMesh, face: u32, tree: &AabbTree, fans: &[Fan]) -> Vec<u32> {
     let bounds = box_of(mesh, face);
+    let mut found = Vec::new();
     tree.visit(
         |around| around.overlaps(bounds),
         |numbers| {
@@ -51,12 +63,13 @@ fn meet_fans(mesh: &TriangleMesh, face: u32, tree: &AabbTree, fans: &[Fan], pair
                     |arcs| seen.may_meet(arcs),
                     |items| {
                         let others = items.iter().map(|&i| fan.faces[i as usize]);
-                        others.filter(|&f| box_of(mesh, f).overlaps(bounds)).for_each(|f| pair(face, f));
+                        found.extend(others.filter(|&f| box_of(mesh, f).overlaps(bounds)));
                     },
                 );
             }
         },
     );
+    found
 }
 
 /// The faces around a vertex of many.
@@ -169,9 +182,11 @@ mod tests {
     fn found(mesh: &TriangleMesh) -> BTreeSet<[u32; 2]> {
         let faces: Vec<u32> = (0..mesh.faces().len() as u32).collect();
         let mut pairs = BTreeSet::new();
-        pairs_that_may_meet(mesh, &faces, |f, g| {
+        let all = pairs_that_may_meet(mesh, &faces, |f, g| {
             assert!(f < g && pairs.insert([f, g]), "{f} and {g} come twice or turned round");
+            ControlFlow::Continue(())
         });
+        assert!(all.is_continue());
         pairs
     }
 

@@ -1,4 +1,5 @@
 use std::collections::HashSet;
+use std::ops::ControlFlow;
 
 use super::edges::centroid;
 use super::fans::pairs_that_may_meet;
@@ -7,7 +8,18 @@ use crate::{
     mesh::{Defect, DefectKind, Severity, TriangleMesh},
 };
 
-/// Pairs of faces, lower first and ascending, that meet in more than the corners or the edge that they share.
+/// Most pairs that are looked for in a mesh of few faces, and for each face in a mesh of many. A surface of a solid has far fewer;
+/// faces that all meet each other have the square of their number, which fits no memory.
+const MOST_PAIRS: usize = 1 << 20;
+const MOST_PAIRS_PER_FACE: usize = 2;
+
+/// The number of intersecting pairs from which on a mesh is refused.
+pub(crate) fn most_pairs(mesh: &TriangleMesh) -> usize {
+    MOST_PAIRS.max(MOST_PAIRS_PER_FACE * mesh.faces().len())
+}
+
+/// Pairs of faces, lower first and ascending, that meet in more than the corners or the edge that they share; the search ends at
+/// [`most_pairs`] of them.
 ///
 /// Exact. Left out are faces without area (`without_area`, ascending), pairs with the same three corners, and the
 /// pairs of `touching`, which meet in a T-junction or along a collinear face.
@@ -18,11 +30,13 @@ pub(crate) fn self_intersections(
 ) -> Vec<[u32; 2]> {
     let faces: Vec<u32> =
         (0..mesh.faces().len() as u32).filter(|f| without_area.binary_search(f).is_err()).collect();
-    let mut pairs = Vec::new();
-    pairs_that_may_meet(mesh, &faces, |f, g| {
+    let (mut pairs, most) = (Vec::new(), most_pairs(mesh));
+    // Broken off or not, the number of pairs tells.
+    let _ = pairs_that_may_meet(mesh, &faces, |f, g| {
         if meet_beyond_shared(mesh, f, g) && !touching.contains(&(f, g)) && !touching.contains(&(g, f)) {
             pairs.push([f, g]);
         }
+        if pairs.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     });
     pairs.sort_unstable();
     pairs
@@ -64,6 +78,15 @@ fn meet_beyond_shared(mesh: &TriangleMesh, f: u32, g: u32) -> bool {
 }
 
 pub(super) fn defects(mesh: &TriangleMesh, pairs: &[[u32; 2]], lenient: Severity) -> Vec<Defect> {
+    if pairs.len() >= most_pairs(mesh) {
+        let [f, g] = pairs[0];
+        let message = format!(
+            "{} pairs of faces intersect, such as faces {f} and {g}, and perhaps more: too many for the surface of a solid",
+            pairs.len()
+        );
+        let defect = Defect::new(DefectKind::SelfIntersection, Severity::Error, centroid(mesh, f), message);
+        return vec![defect.faces([f, g])];
+    }
     pairs
         .iter()
         .map(|&[f, g]| {

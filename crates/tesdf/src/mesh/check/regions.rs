@@ -1,5 +1,6 @@
 //! The regions into which other faces cut a face, each with a point of it.
 use std::collections::HashMap;
+use std::ops::ControlFlow;
 
 use glam::{DVec2, DVec3};
 
@@ -234,7 +235,8 @@ fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
 /// The first `count` segments, cut where segments cross them.
 fn pieces(segments: &[Segment], count: usize, tree: &AabbTree, boxes: &[Aabb], rounding: f64) -> Vec<Piece> {
     let mut crossings = vec![vec![0.0, 1.0]; count];
-    self_overlaps(tree, boxes, |i, j| {
+    // Never broken off.
+    let _ = self_overlaps(tree, boxes, |i, j| {
         let (i, j) = (i as usize, j as usize);
         if j < count
             && let Some([s, t]) = crossing(segments[i], segments[j], rounding)
@@ -242,6 +244,7 @@ fn pieces(segments: &[Segment], count: usize, tree: &AabbTree, boxes: &[Aabb], r
             crossings[i].push(s);
             crossings[j].push(t);
         }
+        ControlFlow::Continue(())
     });
     let mut pieces = Vec::new();
     for (shares, [p, q]) in crossings.iter_mut().zip(segments) {

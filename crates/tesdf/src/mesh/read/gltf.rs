@@ -9,6 +9,7 @@
 //! in files next to it. Nodes that mirror flip their faces, so outward stays outward. Skins and
 //! morph targets are not applied.
 mod buffers;
+mod limits;
 mod scene;
 
 use std::path::{Path, PathBuf};
@@ -18,8 +19,8 @@ use gltf_json as json;
 use json::mesh::{Mode, Primitive, Semantic};
 use json::validation::{Checked, Error as Defect, Validate};
 
+use super::text::shown;
 use super::{MeshFormat, Place, Places, RawMesh, ReadError, sniff};
-use crate::mesh::{MeshError, TriangleMesh};
 use buffers::Data;
 
 const EXPORT_AGAIN: &str = "export the file again, or as another format";
@@ -36,7 +37,9 @@ pub(super) fn parse(
     let data = Data { root: &root, buffers: &buffers, format };
     let mut reader =
         Reader { data, raw: RawMesh::new(Places::Elements(Vec::new()), 0), skipped: 0, deformable: false };
-    scene::instances(&root, format)?.into_iter().try_for_each(|(mesh, pose)| reader.mesh(mesh, &pose))?;
+    let instances = scene::instances(&root, format)?;
+    limits::check(&data, instances.iter().map(|&(mesh, _)| mesh))?;
+    instances.into_iter().try_for_each(|(mesh, pose)| reader.mesh(mesh, &pose))?;
     if reader.skipped > 0 {
         reader.raw.notes.push(format!("{} primitives of points or lines skipped", reader.skipped));
     }
@@ -81,7 +84,12 @@ fn validate(root: &json::Root, format: MeshFormat) -> Result<(), ReadError> {
     let unknown = |name: &&String| !LOOKS.iter().any(|prefix| name.starts_with(prefix));
     if let Some(name) = root.extensions_required.iter().find(unknown) {
         let help = "export the file without it, uncompressed";
-        return Err(fault(format, "extensionsRequired", format!("the extension '{name}' is not read"), help));
+        return Err(fault(
+            format,
+            "extensionsRequired",
+            format!("the extension {} is not read", shown(name.as_bytes())),
+            help,
+        ));
     }
     // `gltf-json` 1.4.1 looks this accessor up before it checks the index.
     for (m, mesh) in root.meshes.iter().enumerate() {
@@ -210,10 +218,7 @@ impl Reader<'_> {
         };
         let positions = self.data.positions(positions.value())?;
         let base = self.raw.positions.len();
-        if base + positions.len() > 3 * TriangleMesh::MAX_ELEMENTS {
-            let limit = 3 * TriangleMesh::MAX_ELEMENTS;
-            return Err(MeshError::TooLarge { what: "vertices", found: base + positions.len(), limit }.into());
-        }
+        room(&mut self.raw.positions, positions.len(), "vertices", format, &element)?;
         let indices = match primitive.indices {
             Some(accessor) => self.data.indices(accessor.value())?,
             None => (0..positions.len() as u64).collect(),
@@ -229,6 +234,10 @@ impl Reader<'_> {
             let found = format!("{} corners are not whole triangles", indices.len());
             return Err(fault(format, element, found, "expected a multiple of 3"));
         }
+        // A strip or fan has three corners for each of its own.
+        let corners_per_index = if mode == Mode::Triangles { 1 } else { 3 };
+        let more = indices.len().saturating_mul(corners_per_index);
+        room(&mut self.raw.corners, more, "corners of faces", format, &element)?;
         let first_face = self.raw.ends.len();
         if let Places::Elements(parts) = &mut self.raw.places {
             parts.push((base, first_face, element));
@@ -265,6 +274,20 @@ impl Reader<'_> {
         }
         Ok(())
     }
+}
+
+/// Makes room for `more` elements.
+fn room<T>(
+    elements: &mut Vec<T>,
+    more: usize,
+    what: &str,
+    format: MeshFormat,
+    element: &str,
+) -> Result<(), ReadError> {
+    elements.try_reserve(more).map_err(|_| {
+        let found = format!("no memory is left for {more} more {what}");
+        fault(format, element, found, "free memory, or read the file where there is more")
+    })
 }
 
 /// An f32 of the JSON as the decimal number that was most likely written: a scale of 0.001 is to

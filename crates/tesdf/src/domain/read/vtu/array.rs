@@ -3,7 +3,7 @@ use std::str::FromStr;
 
 use roxmltree::Node;
 
-use super::bytes::{Block, Bytes};
+use super::bytes::{Block, Budget, Bytes};
 use super::{Appended, Result, at, child};
 use crate::mesh::text::{shown, words};
 
@@ -17,6 +17,7 @@ pub(super) enum Values {
 pub(super) struct Arrays<'a> {
     appended: Option<(Appended<'a>, Encoding)>,
     block: Block,
+    budget: Budget,
 }
 
 #[derive(Clone, Copy)]
@@ -26,19 +27,22 @@ enum Encoding {
 }
 
 impl<'a> Arrays<'a> {
-    pub fn new(root: &Node<'_, '_>, appended: Option<Appended<'a>>) -> Result<Self> {
+    /// `file` is the number of its bytes.
+    pub fn new(root: &Node<'_, '_>, appended: Option<Appended<'a>>, file: usize) -> Result<Self> {
         let big_endian = match root.attribute("byte_order") {
             None | Some("LittleEndian") => false,
             Some("BigEndian") => true,
             Some(other) => {
-                return Err(at(root, format!("byte_order '{other}'"), "expected LittleEndian or BigEndian"));
+                let found = format!("byte_order {}", shown(other.as_bytes()));
+                return Err(at(root, found, "expected LittleEndian or BigEndian"));
             }
         };
         let word = match root.attribute("header_type") {
             None | Some("UInt32") => 4,
             Some("UInt64") => 8,
             Some(other) => {
-                return Err(at(root, format!("header_type '{other}'"), "expected UInt32 or UInt64"));
+                let found = format!("header_type {}", shown(other.as_bytes()));
+                return Err(at(root, found, "expected UInt32 or UInt64"));
             }
         };
         let zlib = match root.attribute("compressor") {
@@ -46,7 +50,7 @@ impl<'a> Arrays<'a> {
             Some("vtkZLibDataCompressor") => true,
             Some(other) => {
                 let help = "expected vtkZLibDataCompressor: save with zlib, or not compressed";
-                return Err(at(root, format!("the compressor '{other}'"), help));
+                return Err(at(root, format!("the compressor {}", shown(other.as_bytes())), help));
             }
         };
         let appended = match appended {
@@ -57,12 +61,13 @@ impl<'a> Arrays<'a> {
                     Some("raw") => Some((data, Encoding::Raw)),
                     None | Some("base64") => Some((data, Encoding::Base64)),
                     Some(other) => {
-                        return Err(at(&tag, format!("encoding '{other}'"), "expected raw or base64"));
+                        let found = format!("encoding {}", shown(other.as_bytes()));
+                        return Err(at(&tag, found, "expected raw or base64"));
                     }
                 }
             }
         };
-        Ok(Self { appended, block: Block { big_endian, word, zlib } })
+        Ok(Self { appended, block: Block { big_endian, word, zlib }, budget: Budget::new(file) })
     }
 
     pub fn read(&self, array: &Node<'_, '_>) -> Result<Values> {
@@ -71,7 +76,8 @@ impl<'a> Arrays<'a> {
             Some("ascii") => return ascii(array, kind),
             Some("binary") => {
                 let text = text_of(array);
-                self.block.read(Bytes::base64(text.as_bytes()), |found, help| at(array, found, help))?
+                let error = |found: String, help: &str| at(array, found, help);
+                self.block.read(Bytes::base64(text.as_bytes()), &self.budget, error)?
             }
             Some("appended") => {
                 let Some((data, encoding)) = self.appended else {
@@ -84,7 +90,7 @@ impl<'a> Arrays<'a> {
                 let offset = array.attribute("offset").unwrap_or_default();
                 let place = offset.trim().parse().ok().and_then(|n: usize| Some((n, data.bytes.get(n..)?)));
                 let Some((offset, rest)) = place else {
-                    let found = format!("offset=\"{offset}\"");
+                    let found = format!("offset is {}", shown(offset.as_bytes()));
                     let help = format!("expected at most {}: is the file cut short?", data.bytes.len());
                     return Err(at(array, found, help));
                 };
@@ -94,10 +100,10 @@ impl<'a> Arrays<'a> {
                     Encoding::Base64 => Bytes::base64(rest),
                 };
                 let error = |found: String, help: &str| at(array, format!("at byte {start}: {found}"), help);
-                self.block.read(bytes, error)?
+                self.block.read(bytes, &self.budget, error)?
             }
             other => {
-                let found = format!("the format '{}'", other.unwrap_or_default());
+                let found = format!("the format {}", shown(other.unwrap_or_default().as_bytes()));
                 return Err(at(array, found, "expected ascii, binary or appended"));
             }
         };
@@ -107,37 +113,46 @@ impl<'a> Arrays<'a> {
     fn numbers(&self, array: &Node<'_, '_>, kind: &str, bytes: Vec<u8>) -> Result<Values> {
         let big = self.block.big_endian;
         macro_rules! numbers {
-            ($t:ty) => {{
+            ($t:ty as $wide:ty) => {{
                 const N: usize = size_of::<$t>();
                 let (chunks, left) = bytes.as_chunks::<N>();
                 if !left.is_empty() {
                     let found = format!("{} bytes of {kind}", bytes.len());
                     return Err(at(array, found, format!("expected a multiple of {N}")));
                 }
-                let number = |&chunk: &[u8; N]| {
-                    if big { <$t>::from_be_bytes(chunk) } else { <$t>::from_le_bytes(chunk) }
-                };
-                chunks.iter().map(number)
+                let mut numbers = Vec::<$wide>::new();
+                if numbers.try_reserve_exact(chunks.len()).is_err() {
+                    let found = format!("no memory is left for {} numbers", chunks.len());
+                    return Err(at(array, found, "free memory, or read the file where there is more"));
+                }
+                numbers.extend(chunks.iter().map(|&chunk: &[u8; N]| {
+                    <$wide>::from(if big { <$t>::from_be_bytes(chunk) } else { <$t>::from_le_bytes(chunk) })
+                }));
+                numbers
             }};
         }
         Ok(match kind {
-            "Float32" => Values::Float(numbers!(f32).map(f64::from).collect()),
-            "Float64" => Values::Float(numbers!(f64).collect()),
-            "Int8" => Values::Whole(numbers!(i8).map(i64::from).collect()),
-            "UInt8" => Values::Whole(numbers!(u8).map(i64::from).collect()),
-            "Int16" => Values::Whole(numbers!(i16).map(i64::from).collect()),
-            "UInt16" => Values::Whole(numbers!(u16).map(i64::from).collect()),
-            "Int32" => Values::Whole(numbers!(i32).map(i64::from).collect()),
-            "UInt32" => Values::Whole(numbers!(u32).map(i64::from).collect()),
+            "Float32" => Values::Float(numbers!(f32 as f64)),
+            "Float64" => Values::Float(numbers!(f64 as f64)),
+            "Int8" => Values::Whole(numbers!(i8 as i64)),
+            "UInt8" => Values::Whole(numbers!(u8 as i64)),
+            "Int16" => Values::Whole(numbers!(i16 as i64)),
+            "UInt16" => Values::Whole(numbers!(u16 as i64)),
+            "Int32" => Values::Whole(numbers!(i32 as i64)),
+            "UInt32" => Values::Whole(numbers!(u32 as i64)),
             // Ids beyond 63 bits become negative, and are refused as ids.
-            "Int64" | "UInt64" => Values::Whole(numbers!(i64).collect()),
+            "Int64" | "UInt64" => Values::Whole(numbers!(i64 as i64)),
             _ => return Err(unknown(array, kind)),
         })
     }
 }
 
 fn unknown(array: &Node<'_, '_>, kind: &str) -> super::ReadTetrahedraError {
-    at(array, format!("the type '{kind}'"), "expected Float32, Float64, or a type such as Int32")
+    at(
+        array,
+        format!("the type {}", shown(kind.as_bytes())),
+        "expected Float32, Float64, or a type such as Int32",
+    )
 }
 
 /// The text of an array, without that of the elements in it: VTK puts ranges there.
@@ -161,7 +176,8 @@ fn parse<T: FromStr>(array: &Node<'_, '_>, text: &str) -> Result<Vec<T>> {
         let parsed = std::str::from_utf8(word).ok().and_then(|w| w.parse().ok());
         parsed.ok_or_else(|| {
             let name = array.attribute("Name").unwrap_or("Points");
-            at(array, format!("{} in the array {name}", shown(word)), "expected numbers of its type")
+            let found = format!("{} in the array {}", shown(word), shown(name.as_bytes()));
+            at(array, found, "expected numbers of its type")
         })
     };
     words(text.as_bytes()).map(number).collect()

@@ -1,4 +1,5 @@
 //! The bytes of an array: base64 or raw, with a header of sizes, perhaps compressed.
+use std::cell::Cell;
 use std::io::Read;
 
 use base64::{Engine, prelude::BASE64_STANDARD};
@@ -69,13 +70,59 @@ pub(super) struct Block {
 
 const CUT: &str = "is the file cut short?";
 
+/// What the arrays of a file may take together.
+///
+/// Zlib packs at most 1032 to 1, so a file of 2 MB can hold 2 GB; and many arrays can name the same appended bytes. Numbers of meshes are
+/// packed 20 to 1 at best.
+#[derive(Debug)]
+pub(super) struct Budget {
+    /// Bytes of the file.
+    file: u64,
+    /// Bytes taken from the file so far, and bytes that they gave.
+    taken: Cell<[u64; 2]>,
+}
+
+/// Bytes that the arrays may give whatever they are packed to.
+const SMALL: u64 = 1 << 28;
+/// Bytes that they may give per byte that they take, beyond that.
+const RATIO: u64 = 100;
+/// Times that they may take all bytes of the file.
+const TIMES: u64 = 4;
+
+impl Budget {
+    /// For a file of so many bytes.
+    pub fn new(file: usize) -> Self {
+        Self { file: file as u64, taken: Cell::new([0; 2]) }
+    }
+
+    /// Takes `packed` bytes of the file, which give `unpacked`; an error says what is too much.
+    fn spend(&self, packed: usize, unpacked: usize) -> std::result::Result<(), String> {
+        let [all, given] = self.taken.get();
+        let (all, given) = (all.saturating_add(packed as u64), given.saturating_add(unpacked as u64));
+        self.taken.set([all, given]);
+        if all > TIMES * self.file {
+            return Err(format!("the arrays up to here take {all} bytes of a file of {}", self.file));
+        }
+        if given > SMALL.max(RATIO * all) {
+            return Err(format!("the arrays up to here unpack from {all} to {given} bytes"));
+        }
+        Ok(())
+    }
+}
+
 impl Block {
     /// The bytes of an array. `error` makes an error of what was found and a hint.
     pub fn read(
         &self,
         mut bytes: Bytes<'_>,
+        budget: &Budget,
         error: impl Fn(String, &str) -> ReadTetrahedraError,
     ) -> Result<Vec<u8>> {
+        let spend = |packed: usize, unpacked: usize| {
+            budget.spend(packed, unpacked).map_err(|found| {
+                error(found, "expected at most 100 times as many, each byte used once: is the file damaged?")
+            })
+        };
         let size = |bytes: &mut Bytes<'_>| -> Result<usize> {
             let word = bytes
                 .take(self.word)
@@ -93,7 +140,8 @@ impl Block {
         };
         let first = size(&mut bytes)?;
         if !self.zlib {
-            return take(&mut bytes, first);
+            let array = take(&mut bytes, first)?;
+            return spend(first, first).map(|()| array);
         }
         let (whole, last) = (size(&mut bytes)?, size(&mut bytes)?);
         let mut sizes = Vec::new();
@@ -105,6 +153,7 @@ impl Block {
             let expected = if block + 1 == first && last != 0 { last } else { whole };
             let before = out.len();
             let packed = take(&mut bytes, compressed)?;
+            spend(compressed, expected)?;
             // One byte more than expected shows that there are too many, and no more are unpacked.
             let mut unpacked = ZlibDecoder::new(packed.as_slice()).take((expected as u64).saturating_add(1));
             unpacked

@@ -10,6 +10,7 @@ use json::accessor::{ComponentType, GenericComponentType, Type};
 use json::validation::Checked;
 
 use super::{MeshFormat, ReadError, fault};
+use crate::mesh::text::shown;
 
 /// Gets the bytes of all buffers. Bytes of files next to the glTF file go into `hasher`.
 pub(super) fn load<'a>(
@@ -44,20 +45,21 @@ pub(super) fn load<'a>(
             }
             Some(uri) => {
                 let Some(folder) = folder else {
-                    let found = format!("the external file '{uri}'");
+                    let found = format!("the external file {}", shown(uri.as_bytes()));
                     return Err(error(
                         found,
                         "bytes in memory need their buffers inside: use GLB, or read from a path",
                     ));
                 };
-                let path = folder.join(local_path(uri).ok_or_else(|| {
+                let path = local_path(uri).ok_or_else(|| {
                     error(
-                        format!("the uri '{uri}'"),
+                        format!("the uri {}", shown(uri.as_bytes())),
                         "expected a file next to the glTF file, or below its folder",
                     )
-                })?);
-                let bytes = std::fs::read(&path).map_err(|e| {
-                    error(format!("{}: {e}", path.display()), "put the file there, or export GLB")
+                })?;
+                let bytes = crate::input::read(&folder.join(&path)).map_err(|e| {
+                    let name = shown(path.as_os_str().as_encoded_bytes());
+                    error(format!("the file {name}: {e}"), "put the file there, or export GLB")
                 })?;
                 hasher.update(&bytes);
                 Cow::Owned(bytes)

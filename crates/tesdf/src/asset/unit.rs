@@ -1,0 +1,52 @@
+//! Names of units of length, as people record them.
+
+/// Metres of a unit by its name or sign, such as `mm`, `millimetre` or `inches`; `None` for a name that is not known.
+pub fn metres(name: &str) -> Option<f64> {
+    let name = name.trim().to_lowercase();
+    // `metres`, `meter` and `meters` are `metre`.
+    let name = name.strip_suffix('s').unwrap_or(&name).replace("meter", "metre");
+    Some(match name.as_str() {
+        "nm" | "nanometre" => 1e-9,
+        "um" | "µm" | "μm" | "micron" | "micrometre" => 1e-6,
+        "mm" | "millimetre" => 1e-3,
+        "cm" | "centimetre" => 1e-2,
+        "dm" | "decimetre" => 1e-1,
+        "m" | "metre" => 1.0,
+        "km" | "kilometre" => 1e3,
+        "mil" | "thou" => 2.54e-5,
+        "in" | "inch" | "inche" | "\"" => 0.0254,
+        "ft" | "foot" | "feet" | "'" => 0.3048,
+        "yd" | "yard" => 0.9144,
+        _ => return None,
+    })
+}
+
+/// Whether two names are of one unit: of the same length, or, where one is not known, the same in any case.
+pub fn is_same_unit(a: &str, b: &str) -> bool {
+    match (metres(a), metres(b)) {
+        (Some(a), Some(b)) => a == b,
+        _ => a.trim().to_lowercase() == b.trim().to_lowercase(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_one_unit_are_the_same() {
+        for names in [
+            &["mm", " MM ", "millimetres", "Millimeter"][..],
+            &["in", "inch", "Inches"],
+            &["furlong", "Furlong "],
+        ] {
+            for (a, b) in names.iter().zip(names.iter().skip(1)) {
+                assert!(is_same_unit(a, b), "{a} {b}");
+            }
+        }
+        for (a, b) in [("mm", "m"), ("m", "metric"), ("furlong", "m"), ("mil", "mm"), ("", "m")] {
+            assert!(!is_same_unit(a, b), "{a} {b}");
+        }
+        assert_eq!((metres("meters"), metres("µm"), metres("parsec")), (Some(1.0), Some(1e-6), None));
+    }
+}

@@ -1,0 +1,50 @@
+//! How much the instances of meshes may come to: a file of some kilobytes can show a mesh as often as it likes.
+use gltf_json::mesh::{Mesh, Mode, Semantic};
+use gltf_json::validation::Checked;
+
+use super::buffers::Data;
+use super::{ReadError, fault};
+
+/// Most vertices, and most corners of faces, of all instances together; the encoder takes fewer.
+const MOST: usize = 1 << 27;
+
+/// Refuses instances that have too many vertices or corners of faces; `meshes` are those that they show.
+pub(super) fn check(data: &Data<'_>, meshes: impl Iterator<Item = usize>) -> Result<(), ReadError> {
+    let elements: Vec<_> = data.root.meshes.iter().map(|mesh| elements(data, mesh)).collect();
+    let mut sums = [0_usize; 2];
+    for mesh in meshes {
+        for ((sum, more), what) in sums.iter_mut().zip(elements[mesh]).zip(["vertices", "corners of faces"]) {
+            *sum = sum.saturating_add(more);
+            if *sum > MOST {
+                let found = format!("with this instance of it the scene has {sum} {what}");
+                let help = format!("expected at most {MOST}: split the scene");
+                return Err(fault(data.format, format!("meshes[{mesh}]"), found, help));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Vertices, and corners of faces, of an instance of a mesh.
+fn elements(data: &Data<'_>, mesh: &Mesh) -> [usize; 2] {
+    let bytes = data.buffers.iter().map(|buffer| buffer.len()).sum();
+    // A count that does not fit the bytes is refused where the values are read.
+    let count = |accessor: usize| {
+        let count = data.root.accessors.get(accessor).map_or(0, |accessor| accessor.count.0);
+        usize::try_from(count).unwrap_or(usize::MAX).min(bytes)
+    };
+    let mut sums = [0_usize; 2];
+    for primitive in &mesh.primitives {
+        let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+        let vertices = positions.map_or(0, |accessor| count(accessor.value()));
+        let indices = primitive.indices.map_or(vertices, |accessor| count(accessor.value()));
+        // A strip or a fan has a face for each index but two.
+        let corners = if primitive.mode == Checked::Valid(Mode::Triangles) {
+            indices
+        } else {
+            indices.saturating_mul(3)
+        };
+        sums = [sums[0].saturating_add(vertices), sums[1].saturating_add(corners)];
+    }
+    sums
+}
