@@ -67,6 +67,35 @@ fn time_of_impact_of_two_cubes() {
 }
 
 #[test]
+fn an_overlap_that_no_contact_shows_is_told() {
+    let folder = cube();
+    // The cube has edges of 2: moved by 0.4, no node of either is inside of the other.
+    let shifted = ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0 0 0.4 0 0 0 1"];
+    let run = |more: &[&str]| {
+        let (code, out, err) = folder.tesdf(&[&shifted[..], more].concat());
+        assert_eq!(code, Some(0), "{out}{err}");
+        (out, err)
+    };
+    let warning = "instances 0 and 1 overlap by";
+    let (_, err) = run(&["--mode", "node"]);
+    assert!(err.contains(warning) && err.contains("use --mode face or --mode exact"), "{err}");
+    // The array stays as it was; an object has more.
+    let (out, err) = run(&["--mode", "node", "--json"]);
+    assert!(serde_json::from_str::<serde_json::Value>(&out).unwrap().is_array() && err.contains(warning));
+    let (out, _) = run(&["--mode", "node", "--json", "--report"]);
+    let report: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(
+        (&report["hidden"][0]["instance_a"], &report["hidden"][0]["instance_b"]),
+        (&0.into(), &1.into())
+    );
+    assert!(report["hidden"][0]["depth"].as_f64().unwrap() > 0.29, "{report}");
+    assert!(report["contacts"].is_array() && report["statistics"]["candidates"].is_number(), "{report}");
+    let (_, err) = run(&["--mode", "exact"]);
+    assert!(!err.contains(warning), "{err}");
+    assert_eq!(folder.tesdf(&[&shifted[..], &["--report"]].concat()).0, Some(2), "a report is JSON");
+}
+
+#[test]
 fn why_contacts_are_or_are_not_there() {
     let folder = cube();
     let why = |more: &[&str]| {

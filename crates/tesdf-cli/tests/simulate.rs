@@ -83,3 +83,51 @@ fn errors_leave_no_file() {
     }
     assert_eq!(folder.names(), ["drop.toml", "good.toml"]);
 }
+
+/// Two equal boxes, one over the other: no node of either is ever inside of the other.
+const TWINS: &str = r#"
+time_step = 2e-3
+duration = 0.2
+
+[detector]
+mode = "node"
+contact_distance = 1e-6
+
+[[bodies]]
+name = "below"
+shape = { box = { half_extents = [0.01, 0.01, 0.01] } }
+fixed = true
+
+[[bodies]]
+name = "above"
+shape = { box = { half_extents = [0.01, 0.01, 0.01] } }
+mass = 0.1
+translation = [0, 0, 0.016]
+"#;
+
+#[test]
+fn an_overlap_that_no_contact_shows_is_told_and_meets_no_criterion() {
+    let folder = Folder::new();
+    folder.write("twins.toml", TWINS);
+    let (code, out, err) = folder.tesdf(&["simulate", "twins.toml", "-o", "run", "--json"]);
+    assert_eq!(code, Some(0), "{out}{err}");
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let pair = &json["hidden"][0];
+    assert_eq!((&pair["bodies"][0], &pair["bodies"][1]), (&"below".into(), &"above".into()), "{json}");
+    assert_eq!(pair["first_step"], 0);
+    let depth = pair["depth"].as_f64().unwrap();
+    assert!(depth > 2e-3 && json["deepest_penetration"].as_f64().unwrap() >= depth, "{json}");
+    assert!(err.contains("bodies below and above overlapped by") && err.contains("--mode face"), "{err}");
+    // The record has it, too.
+    let record = RunRecord::open(&folder.path("run")).unwrap();
+    assert_eq!(serde_json::to_value(record.hidden_pairs()).unwrap(), json["hidden"]);
+
+    folder.write("judged.toml", TWINS.to_string() + &SCREW.replace("ball", "above"));
+    let (code, out, err) = folder.tesdf(&["simulate", "judged.toml", "-o", "run"]);
+    assert_eq!(code, Some(1), "{out}{err}");
+    assert!(out.contains("bodies below and above overlapped by"), "{out}");
+
+    let shown = folder.good(&["simulate", "twins.toml", "-o", "run", "--mode", "face", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&shown).unwrap();
+    assert_eq!(json["hidden"], serde_json::json!([]), "faces show it");
+}

@@ -244,11 +244,17 @@ fn simple_records(shape: &Shape) -> Vec<[f32; 16]> {
     parts.iter().enumerate().map(record).collect()
 }
 
-/// Without NaN, as shaders may assume that there is none, and with the corners that are the record's own.
-fn with_owned(mut record: [f32; 16], owned: impl Iterator<Item = usize>) -> [f32; 16] {
+/// With a normal of zero instead of NaN, as shaders may assume that there is none.
+pub(crate) fn without_nan(mut record: [f32; 16]) -> [f32; 16] {
     if record[9].is_nan() {
         record[9..12].fill(0.0);
     }
+    record
+}
+
+/// Without NaN, and with the corners that are the record's own.
+fn with_owned(record: [f32; 16], owned: impl Iterator<Item = usize>) -> [f32; 16] {
+    let mut record = without_nan(record);
     let hints = record[15].to_bits() & 0xFFFF;
     let owned: u32 = owned.map(|k| 1 << (assets::OWNED_CORNERS + k as u32)).sum();
     record[15] = f32::from_bits(assets::HINTS | hints | owned);

@@ -22,6 +22,11 @@ mod instances;
 mod kernels;
 mod placed;
 mod query;
+// What the kernels of the processor are compared with.
+#[cfg(test)]
+#[path = "../../tesdf/src/testing/mod.rs"]
+#[allow(dead_code, reason = "other crates use the rest")]
+mod testing;
 
 pub use arrays::{DeviceAnswers, DeviceArray, query_arrays};
 pub use detector::{

@@ -242,3 +242,24 @@ fn what_makes_no_sense_is_refused() {
     let state = State::at_rest(Pose::IDENTITY);
     assert_eq!(engine.set_state(0, state), Err(DynamicsError::NoBody { body: 0, bodies: 0 }));
 }
+
+/// A brick that is on the edges of its twin has no node inside of it: it falls through, and the engine says so at every step.
+#[test]
+fn a_fall_through_a_twin_is_told() {
+    let mut system = System::new(GRAVITY);
+    let shape = system.add_shape(BRICK).unwrap();
+    system.add("fixed", Instance::new(shape, Pose::IDENTITY), Mass::Fixed).unwrap();
+    let falling = add_free(&mut system, BRICK, Pose::at(0.061 * DVec3::Z), Velocity::default());
+    let mut engine = Newton::new(system, detect, nodes(1e-5), NewtonOptions::default()).unwrap();
+    let mut told = 0;
+    for _ in 0..150 {
+        let before = engine.system().states()[falling].pose.translation;
+        engine.step(1e-3).unwrap();
+        // The bricks are 0.06 high and 0.02 wide, and nothing less deep than 0.05 · 0.01 is told.
+        let is_deep = before.x.abs().max(before.y.abs()) < 1e-9 && (0.001..0.059).contains(&before.z.abs());
+        assert!(!is_deep || engine.hidden().len() == 1, "nothing is told at {before}");
+        told += engine.hidden().len();
+    }
+    let fell = engine.system().states()[falling].pose.translation.z < 0.0;
+    assert!(told > 20 || !fell, "{told} steps told");
+}

@@ -61,8 +61,11 @@ impl CandidateFace {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::kernels::sample::{ROUNDING, squared_distance};
+    use crate::testing::{degenerate, exact};
 
     /// Numbers from −1 to 1.
     struct Random(u64);
@@ -107,5 +110,23 @@ mod tests {
         // The bound is no idle one.
         assert!(worst > DISTANCE / 40.0, "{worst}");
         println!("off by {:.2} ulp of R + d", worst * f64::from(1 << 24));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        /// Within the same bound, in cells of any size around the point.
+        #[test]
+        fn degenerate_faces_are_edges(
+            (corners, p) in degenerate::face_and_point(), size in -6.0..0.0f64, way in prop::array::uniform3(-0.5..0.5f64),
+        ) {
+            let radius = 10f64.powf(size);
+            let offset = (radius * DVec3::from_array(way)).as_vec3();
+            let center = p - offset.as_dvec3();
+            let face = CandidateFace::new(&Triangle::new(corners)).candidate(center);
+            let squared = squared_distance(face, V3 { x: offset.x, y: offset.y, z: offset.z });
+            let found = f64::from(squared).sqrt();
+            let exact = exact::squared_distance(center + offset.as_dvec3(), corners);
+            prop_assert!(exact::is_root(found, &exact, DISTANCE * (radius + found)), "{found}, cell of {radius}");
+        }
     }
 }

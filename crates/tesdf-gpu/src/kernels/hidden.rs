@@ -216,3 +216,34 @@ pub fn hidden(
         tell_if_broken_off(counters, select(count > 0u32, 2u32, 0u32));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::degenerate;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        /// What both promise of a face: all of it is within the reach of its corners, and in the ball around its middle.
+        #[test]
+        fn all_of_a_face_is_within_reach(corners in degenerate::face()) {
+            let corners = corners.map(|p| p.as_vec3());
+            let [a, b, c] = corners.map(|p| v3(p.x, p.y, p.z));
+            let part = Part { a, b, c, count: 3, owned: 0 };
+            let (reach, ball) = (corner_reach(part), middle(part));
+            let center = DVec3::new(ball.center.x.into(), ball.center.y.into(), ball.center.z.into());
+            let corners = corners.map(|p| p.as_dvec3());
+            for (s, t) in (0..=16).flat_map(|i| (0..=16 - i).map(move |j| (f64::from(i) / 16.0, f64::from(j) / 16.0))) {
+                let p = corners[0] + s * (corners[1] - corners[0]) + t * (corners[2] - corners[0]);
+                let nearest = corners.map(|q| q.distance(p)).into_iter().fold(9.0, f64::min);
+                prop_assert!(nearest <= f64::from(reach) * (1.0 + 1e-5) + 1e-6, "{nearest} > {reach}");
+                prop_assert!(center.distance(p) <= f64::from(ball.radius) * (1.0 + 1e-5) + 1e-6);
+            }
+            let longest = [0, 1, 2].map(|k| corners[k].distance(corners[(k + 1) % 3])).into_iter().fold(0.0, f64::max);
+            prop_assert!(f64::from(reach) <= 0.58 * longest + 1e-6 && f64::from(ball.radius) <= 0.87 * longest + 1e-6);
+        }
+    }
+}

@@ -201,3 +201,89 @@ pub fn polygon_to_face(
     }
     Apart { distance, s: best_s, t: best_t }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use proptest::prelude::*;
+
+    use super::super::vector::v3;
+    use super::*;
+
+    fn rounded(p: DVec3) -> DVec3 {
+        p.as_vec3().as_dvec3()
+    }
+
+    fn of(p: DVec3) -> V3 {
+        v3(p.x as f32, p.y as f32, p.z as f32)
+    }
+
+    fn point() -> impl Strategy<Value = DVec3> {
+        prop::array::uniform3(-0.5..0.5f64).prop_map(DVec3::from_array)
+    }
+
+    fn to_segment(p: DVec3, [r, s]: [DVec3; 2]) -> f64 {
+        let along = s - r;
+        let t = (along.dot(p - r) / along.length_squared()).clamp(0.0, 1.0);
+        p.distance(r + if t.is_nan() { 0.0 } else { t } * along)
+    }
+
+    /// The least over the ends of both, and the crossing where there is one.
+    fn between([p, q]: [DVec3; 2], [r, s]: [DVec3; 2]) -> f64 {
+        let ends =
+            [to_segment(p, [r, s]), to_segment(q, [r, s]), to_segment(r, [p, q]), to_segment(s, [p, q])];
+        let least = ends.into_iter().fold(f64::INFINITY, f64::min);
+        let (u, v, w) = (q - p, s - r, r - p);
+        let across = u.cross(v);
+        let [on_first, on_second] = [w.cross(v), w.cross(u)].map(|n| n.dot(across) / across.length_squared());
+        let crosses = (0.0..=1.0).contains(&on_first) && (0.0..=1.0).contains(&on_second);
+        if crosses { least.min((p + on_first * u).distance(r + on_second * v)) } else { least }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        /// Points, tiny segments, and segments that cross at any angle.
+        #[test]
+        fn segments_of_every_kind(
+            (p, u, turn) in (point(), point(), point()), angle in -9.0..0.0f64, (size, other) in (-20.0..0.0f64, -20.0..0.0f64),
+            (s, t) in (-0.5..1.5f64, -0.5..1.5f64), apart in -9.0..-0.5f64, kind in 0u8..4,
+        ) {
+            let (size, other) = match kind {
+                0 => (1.0, 1.0),
+                1 => (1.0, 10f64.powf(other)),
+                2 => (10f64.powf(size), 10f64.powf(other)),
+                _ => (0.0, 1.0),
+            };
+            let v = u + 10f64.powf(angle) * turn;
+            let first = [p, p + size * u].map(rounded);
+            let start = first[0] + s * size * u - t * other * v + 10f64.powf(apart) * u.cross(turn);
+            let second = [start, start + other * v].map(rounded);
+            let expected = between(first, second);
+            let found = between_segments(of(first[0]), of(first[1]), of(second[0]), of(second[1]));
+            prop_assert!((0.0..=1.0).contains(&found.s), "{}", found.s);
+            prop_assert!((f64::from(found.distance) - expected).abs() < 1e-6, "{} instead of {expected}", found.distance);
+            let there = first[0] + f64::from(found.s) * (first[1] - first[0]);
+            prop_assert!((to_segment(there, second) - expected).abs() < 1e-6, "{there} is not the nearest");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        /// Needles and caps as thin as a plane can be told.
+        #[test]
+        fn weights_lead_back_to_the_point(
+            (a, u, v) in (point(), point(), point()), thin in -6.0..0.0f64, (s, t) in (0.0..1.0f64, 0.0..1.0f64), along in 0.0..1.0f64,
+        ) {
+            let t = t * (1.0 - s);
+            let c = a + along * u + 10f64.powf(thin) * v;
+            let [a, b, c] = [a, a + u, c].map(rounded);
+            let face = super::super::triangle::record_of(of(a), of(b), of(c));
+            prop_assume!(!super::super::triangle::is_flat(face));
+            let part = Part { a: of(a), b: of(b), c: of(c), count: 3, owned: 0 };
+            let x = rounded(a + s * (b - a) + t * (c - a));
+            let found = weights_of(part, face.normal, of(x));
+            let back = a + f64::from(found.s) * (b - a) + f64::from(found.t) * (c - a);
+            prop_assert!(back.distance(x) < 2e-6, "{back} instead of {x}");
+        }
+    }
+}

@@ -1,5 +1,6 @@
 //! The distance from a point to a face, as `tesdf`'s `f32` kernel computes it: the same record, the same formulas.
 use cubecl::prelude::*;
+use tesdf::query::FaceRecord;
 
 use super::vector::{V3, cross, dot, minus, pick, plus, plus_scaled, scaled, v3};
 
@@ -24,7 +25,7 @@ pub struct Face {
 }
 
 /// Faces of less height than this (local frame) are no more than their edges, as in `tesdf`.
-const FLAT: f32 = 7e-7;
+const FLAT: f32 = FaceRecord::LEAST_HEIGHT as f32;
 
 /// The unit normal of a face; zero for one that is no more than its edges.
 ///
@@ -185,9 +186,78 @@ pub fn corner(f: Face, k: u32) -> V3 {
 #[cfg(test)]
 mod tests {
     use glam::{DVec3, Vec3};
+    use proptest::prelude::*;
+    use tesdf::asset::layout::SignHints;
     use tesdf::geometry::Triangle;
 
     use super::*;
+    use crate::images::without_nan;
+    use crate::testing::{degenerate, exact};
+
+    /// What `f32` promises of a body with a diagonal of 0.5, the least that there is: 1e-6 of it.
+    const PROMISE: f64 = 5e-7;
+
+    /// The face as an image of an asset has it, and as moved vertices make it.
+    fn faces(corners: [DVec3; 3]) -> [Face; 2] {
+        let record = FaceRecord::new(&Triangle::new(corners), DVec3::ZERO, SignHints::default());
+        let r = without_nan(*record.as_array());
+        let at = |k: usize| v3(r[k], r[k + 1], r[k + 2]);
+        let image = Face { a: at(0), ab: at(3), ac: at(6), normal: at(9), inverse: at(12), hints: 0 };
+        let [a, b, c] = corners.map(|p| v3(p.x as f32, p.y as f32, p.z as f32));
+        [image, record_of(a, b, c)]
+    }
+
+    /// The distance and the closest point are those of a triangle, a segment or a point.
+    fn assert_exact(corners: [DVec3; 3], p: DVec3) -> Result<(), TestCaseError> {
+        let squared = exact::squared_distance(p, corners);
+        let at = v3(p.x as f32, p.y as f32, p.z as f32);
+        for face in faces(corners) {
+            let n = f64_of(face.normal);
+            prop_assert!(n == DVec3::ZERO || (n.length() - 1.0).abs() < 1e-6, "{n}");
+            let found = distance_squared(face, at);
+            prop_assert!(exact::is_root(f64::from(found).sqrt(), &squared, PROMISE), "{found:e} of {n}");
+            let nearest = closest(face, at, found.to_bits() & PART);
+            let (point, outward) = (f64_of(nearest.point), f64_of(nearest.outward));
+            prop_assert!(exact::is_root(outward.length(), &squared, PROMISE), "{outward}");
+            let off = exact::squared_distance(point, corners);
+            prop_assert!(exact::is_root(0.0, &off, 2.0 * PROMISE), "{point} is off the face");
+            let away = f64_of(across(face));
+            prop_assert!((away.length() - 1.0).abs() < 1e-6, "{away}");
+        }
+        Ok(())
+    }
+
+    // Within a ball of a diameter of about 1, as bodies are.
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #[test]
+        fn degenerate_faces_are_edges((corners, p) in degenerate::face_and_point()) {
+            assert_exact(corners.map(|c| 0.25 * c), 0.25 * p)?;
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #[test]
+        fn tips_are_no_planes((corners, p) in degenerate::beyond_a_tip()) {
+            assert_exact(corners.map(|c| 0.5 * c), 0.5 * p)?;
+        }
+    }
+
+    #[test]
+    fn of_a_flat_face_and_its_neighbour_the_neighbour_is_the_nearest() {
+        let [corner, side] = [DVec3::ZERO, 0.3 * DVec3::X];
+        let [neighbour, _] = faces([corner, side, 0.3 * DVec3::Y]);
+        for flat in [[corner; 3], [corner, side, side], [side, corner, 0.5 * side]] {
+            for flat in faces(flat) {
+                assert!(is_flat(flat));
+                for p in [corner, side, 0.5 * side] {
+                    let p = v3(p.x as f32, p.y as f32, p.z as f32);
+                    assert!(distance_squared(neighbour, p) < distance_squared(flat, p));
+                }
+            }
+        }
+    }
 
     fn f64_of(v: V3) -> DVec3 {
         Vec3::new(v.x, v.y, v.z).as_dvec3()

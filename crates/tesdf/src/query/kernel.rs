@@ -22,17 +22,17 @@ pub struct FaceRecord(Record);
 type Record = [f32; 16];
 const HINTS: usize = 15;
 
-/// Faces of less height than this (local frame) are no more than their edges: rounding may have turned them over, and
-/// then no prism stands on them. Half of it is within what `f32` promises, 1e-6 × diagonal.
-const FLAT: f64 = 7e-7;
-
 impl FaceRecord {
+    /// Faces of less height than this (local frame) are no more than their edges: rounding may have turned them over, and
+    /// then no prism stands on them. Half of it is within what `f32` promises, 1e-6 × diagonal.
+    pub const LEAST_HEIGHT: f64 = 7e-7;
+
     /// Rounds a triangle of the local frame.
     pub fn new(triangle: &Triangle, middle: DVec3, hints: SignHints) -> Self {
         let [a, b, c] = triangle.corners.map(|p| (p - middle).as_vec3());
         let (u, v) = ((b - a).as_dvec3(), (c - a).as_dvec3());
         let longest = u.length().max(v.length()).max((u - v).length());
-        let flat = is_flat(u.cross(v).dot(triangle.normal), longest, FLAT);
+        let flat = is_flat(u.cross(v).dot(triangle.normal), longest, Self::LEAST_HEIGHT);
         let n = if flat { Vec3::NAN } else { triangle.normal.as_vec3() };
         let inverse = |v: Vec3| {
             let inverse = 1.0 / v.as_dvec3().length_squared();
