@@ -11,7 +11,7 @@ use support::shapes::{FAMILIES, Shape as Faces};
 use support::tetrahedra::{bare_beam, beam};
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::collide::{Instance, Placement, Pose, Reduction, Scene, Shape};
+use tesdf::collide::{FaceMethod, Instance, Mode, Placement, Pose, Reduction, Scene, Shape};
 use tesdf::domain::ConformingMesh;
 use tesdf::encode::{Domain, EncodeOptions, EncodeProgress, Preset, Refinement, encode, encode_in};
 use tesdf::geometry::Triangle;
@@ -140,7 +140,7 @@ fn distances_and_gradients() {
 #[test]
 fn contacts_are_those_of_the_host() {
     let mut random = Random(6);
-    let mut compared = Compared::default();
+    let (mut sure, mut frank_wolfe) = (Compared::default(), Compared::default());
     for (k, (name, solid)) in solids().into_iter().enumerate() {
         let (asset, diagonal) = (encoded(&solid), solid.mesh().diagonal());
         let mut scene = Scene::new();
@@ -156,7 +156,10 @@ fn contacts_are_those_of_the_host() {
         for options in &modes[..if k % 4 == 0 { 4 } else { 3 }] {
             let one = hold(&scene, options, diagonal);
             println!("{name}, {:?}: {one:?}", options.mode);
-            compared.add(one);
+            match options.mode {
+                Mode::Face(FaceMethod::FrankWolfe { .. }) => frank_wolfe.add(one),
+                _ => sure.add(one),
+            }
         }
         let reduced = tesdf::collide::CollideOptions { reduction: Reduction::PerPair(8), ..modes[0] };
         let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("fits");
@@ -167,7 +170,10 @@ fn contacts_are_those_of_the_host() {
             "{name}"
         );
     }
-    compared.is_good(500);
+    sure.is_good(200);
+    // Its steps go another way at ties, of which these shapes are full.
+    assert!(frank_wolfe.touching > 500 && frank_wolfe.others * 20 < frank_wolfe.touching, "{frank_wolfe:?}");
+    assert!(frank_wolfe.differing * 50 < frank_wolfe.cells, "{frank_wolfe:?}");
 }
 
 /// Vertices that move on the device until faces and tetrahedra are points and segments.

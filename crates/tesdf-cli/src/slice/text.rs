@@ -1,5 +1,7 @@
+use skrifa::instance::{LocationRef, Size};
+use skrifa::outline::{DrawSettings, OutlinePen};
+use skrifa::{FontRef, GlyphId, MetadataProvider};
 use tiny_skia::{Color, FillRule, Paint, Path, PathBuilder, Pixmap, Transform};
-use ttf_parser::{Face, OutlineBuilder};
 
 /// Latin-1 of DejaVu Sans, so that no font of the system is needed; licence in `assets/`.
 const FONT: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
@@ -15,18 +17,25 @@ pub enum Anchor {
 
 /// Draws single lines of text.
 pub struct Lettering {
-    face: Face<'static>,
+    font: FontRef<'static>,
+    units_per_em: f32,
 }
 
 impl Lettering {
     /// The built-in font.
     pub fn new() -> Option<Self> {
-        Face::parse(FONT, 0).ok().map(|face| Self { face })
+        let font = FontRef::new(FONT).ok()?;
+        let units_per_em = font.metrics(Size::unscaled(), LocationRef::default()).units_per_em;
+        Some(Self { font, units_per_em: f32::from(units_per_em) })
     }
 
     fn advance(&self, c: char) -> f32 {
-        let glyph = self.face.glyph_index(c).unwrap_or_default();
-        f32::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) / f32::from(self.face.units_per_em())
+        let metrics = self.font.glyph_metrics(Size::unscaled(), LocationRef::default());
+        metrics.advance_width(self.glyph(c)).unwrap_or(0.0) / self.units_per_em
+    }
+
+    fn glyph(&self, c: char) -> GlyphId {
+        self.font.charmap().map(c).unwrap_or_default()
     }
 
     /// Width of `text` in pixels, `size` pixels per em.
@@ -53,15 +62,18 @@ impl Lettering {
 
     /// The outline of `text` with its baseline at `y`.
     pub fn outline(&self, text: &str, size: f32, [x, y]: [f32; 2], anchor: Anchor) -> Option<Path> {
-        let scale = size / f32::from(self.face.units_per_em());
+        let scale = size / self.units_per_em;
         let mut pen = x - match anchor {
             Anchor::Start => 0.0,
             Anchor::Middle => 0.5 * self.width(text, size),
         };
+        let outlines = self.font.outline_glyphs();
         let mut glyphs = Glyphs { path: PathBuilder::new(), x: 0.0, y, scale };
         for c in text.chars() {
             glyphs.x = pen;
-            self.face.outline_glyph(self.face.glyph_index(c).unwrap_or_default(), &mut glyphs);
+            let settings = DrawSettings::unhinted(Size::unscaled(), LocationRef::default());
+            // A space has no outline.
+            let _ = outlines.get(self.glyph(c)).map(|outline| outline.draw(settings, &mut glyphs));
             pen += self.advance(c) * size;
         }
         glyphs.path.finish()
@@ -91,7 +103,7 @@ impl Glyphs {
     }
 }
 
-impl OutlineBuilder for Glyphs {
+impl OutlinePen for Glyphs {
     fn move_to(&mut self, x: f32, y: f32) {
         let (x, y) = self.at(x, y);
         self.path.move_to(x, y);

@@ -134,11 +134,25 @@ pub fn crossing(p: V3, q: V3, a: V3, b: V3, c: V3) -> i32 {
     let q_over = dot(normal, minus(q, a)) >= 0.0f32;
     let way = minus(q, p);
     let (pa, pb, pc) = (minus(a, p), minus(b, p), minus(c, p));
-    let ab = dot(way, cross(pa, pb)) >= 0.0f32;
-    let bc = dot(way, cross(pb, pc)) >= 0.0f32;
-    let ca = dot(way, cross(pc, pa)) >= 0.0f32;
+    let ab = is_left(way, pa, pb);
+    let bc = is_left(way, pb, pc);
+    let ca = is_left(way, pc, pa);
     let through = !same(p_over, q_over) && same(ab, bc) && same(bc, ca);
     select(through, select(p_over, -1i32, 1i32), 0i32)
+}
+
+/// Whether the origin is on the left of the way from `a` to `b`, seen along `way`; never both of that and of the way back.
+///
+/// Two faces at an edge ask for either: the same number has to tell both, or a segment through the edge would meet none of them, or both. Where the
+/// number is 0, as in bodies with symmetries, a direction does in which the segment is thought to be moved a little.
+#[cube]
+fn is_left(way: V3, a: V3, b: V3) -> bool {
+    let swapped = b.x < a.x || (b.x == a.x && (b.y < a.y || (b.y == a.y && b.z < a.z)));
+    let (first, second) = (pick(swapped, b, a), pick(swapped, a, b));
+    let turn = dot(way, cross(first, second));
+    let moved = v3(0.54f32, 0.21f32, 0.81f32);
+    let tie = dot(cross(moved, way), minus(second, first)) >= 0.0f32;
+    !same(select(turn == 0.0f32, tie, turn > 0.0f32), swapped)
 }
 
 /// A cell and its middle.

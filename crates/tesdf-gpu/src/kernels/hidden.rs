@@ -20,8 +20,8 @@ use super::vector::{V3, cross, length, minus, pick, plus, scaled, v3};
 const SURE: f32 = HiddenOverlap::SURE as f32;
 const FINE: f32 = HiddenOverlap::FINE as f32;
 const FINE_LOOKS: u32 = HiddenOverlap::FINE_LOOKS;
-/// Looks at a face after which its search gives up.
-const MOST_LOOKS: u32 = 1 << 10;
+/// Looks at a face after which its search gives up. Four times as many are more than Mesa's llvmpipe lets a thread take.
+const MOST_LOOKS: u32 = 1 << 8;
 /// Quarters of quarters, at most: what a path of 32 bits holds.
 const LEVELS: u32 = 12;
 

@@ -5,7 +5,7 @@ use super::nearest::FAR;
 use super::products::POLYGON_ROWS;
 use super::surface::{Part, at_weights};
 use super::triangle::{Face, PART, closest, corner, distance_squared};
-use super::vector::{V3, cross, dot, length, minus, pick, plus, plus_scaled, scaled};
+use super::vector::{V3, cross, dot, length, minus, pick, plus_scaled};
 
 /// A distance, and where on the polygon, as weights of the face that it was cut from.
 #[derive(CubeType, Clone, Copy)]
@@ -103,19 +103,26 @@ fn holds(
     n > 2u32 && (left || right) && length(minus(x, center)) <= radius
 }
 
-/// Weights of a point of the part's plane. What rounding makes of them for a narrow part is taken away once more.
+/// Weights of a point of the part's plane.
+///
+/// The height over the longest side is rounding for a needle, and then counts with the needle's height; where along the longest side the point is
+/// takes account of it.
 #[cube]
 fn weights_of(part: Part, normal: V3, x: V3) -> Apart {
-    let u = minus(part.b, part.a);
-    let v = minus(part.c, part.a);
-    let area = dot(cross(u, v), normal);
-    let inverse = 1.0f32 / select(area.abs() > 1e-30f32, area, 1.0f32);
-    let w = minus(x, part.a);
-    let s = inverse * dot(cross(w, v), normal);
-    let t = inverse * dot(cross(u, w), normal);
-    let left = minus(w, plus(scaled(s, u), scaled(t, v)));
-    let s = s + inverse * dot(cross(left, v), normal);
-    let t = t + inverse * dot(cross(u, left), normal);
+    let (ab, bc, ca) = (minus(part.b, part.a), minus(part.c, part.b), minus(part.a, part.c));
+    let (u, v, w) = (dot(ab, ab), dot(bc, bc), dot(ca, ca));
+    let by_ab = u >= v && u >= w;
+    let by_bc = v >= w;
+    let start = pick(by_ab, part.a, pick(by_bc, part.b, part.c));
+    let along = pick(by_ab, ab, pick(by_bc, bc, ca));
+    let third = minus(pick(by_ab, part.c, pick(by_bc, part.a, part.b)), start);
+    let to = minus(x, start);
+    let area = dot(cross(along, third), normal);
+    let third_weight = dot(cross(along, to), normal) / select(area.abs() > 1e-30f32, area, 1.0f32);
+    let end_weight = (dot(to, along) - third_weight * dot(third, along)) / u.max(v).max(w).max(1e-30f32);
+    let start_weight = 1.0f32 - end_weight - third_weight;
+    let s = select(by_ab, end_weight, select(by_bc, start_weight, third_weight));
+    let t = select(by_ab, third_weight, select(by_bc, end_weight, start_weight));
     Apart { distance: FAR, s, t }
 }
 

@@ -106,9 +106,20 @@ fn with_part(squared: f32, part: u32) -> f32 {
     f32::reinterpret((u32::reinterpret(squared) & 4294967292u32) | part)
 }
 
-/// The squared distance, with the part of the face in its low bits.
+/// Squared distances to the parts of a face.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Parts {
+    /// Whether the point is over the face, so that the plane is nearest.
+    pub inside: bool,
+    pub to_plane: f32,
+    pub to_ab: f32,
+    pub to_bc: f32,
+    pub to_ca: f32,
+}
+
 #[cube]
-pub fn distance_squared(f: Face, p: V3) -> f32 {
+fn parts(f: Face, p: V3) -> Parts {
     let ap = minus(p, f.a);
     let bp = minus(ap, f.ab);
     let bc = minus(f.ac, f.ab);
@@ -128,11 +139,21 @@ pub fn distance_squared(f: Face, p: V3) -> f32 {
         && !flat;
     let height = dot(f.normal, ap);
     let after = select(flat, AFTER, 0.0f32);
-    let to_ab = with_part(to_edge(ap, f.ab, on_ab) + after, 1u32);
-    let to_bc = with_part(to_edge(bp, bc, on_bc) + after, 2u32);
-    let to_ca = with_part(to_edge(ap, f.ac, on_ac) + after, 3u32);
-    let to_edges = to_ab.min(to_bc).min(to_ca);
-    select(inside, with_part(height * height, 0u32), to_edges)
+    Parts {
+        inside,
+        to_plane: height * height,
+        to_ab: to_edge(ap, f.ab, on_ab) + after,
+        to_bc: to_edge(bp, bc, on_bc) + after,
+        to_ca: to_edge(ap, f.ac, on_ac) + after,
+    }
+}
+
+/// The squared distance, with the part of the face in its low bits.
+#[cube]
+pub fn distance_squared(f: Face, p: V3) -> f32 {
+    let to = parts(f, p);
+    let to_edges = with_part(to.to_ab, 1u32).min(with_part(to.to_bc, 2u32)).min(with_part(to.to_ca, 3u32));
+    select(to.inside, with_part(to.to_plane, 0u32), to_edges)
 }
 
 /// Where a face is nearest to a point.
@@ -172,7 +193,8 @@ pub fn closest(f: Face, p: V3, part: u32) -> Closest {
 pub fn across(f: Face) -> V3 {
     let along = pick(f.inverse.x > 0.0f32, f.ab, f.ac);
     let flat_part = along.x * along.x + along.y * along.y;
-    let is_steep = flat_part <= 0.01f32 * along.z * along.z;
+    // Squares of less are no longer exact; a point has no direction to be square to.
+    let is_steep = flat_part <= (0.01f32 * along.z * along.z).max(1e-30f32);
     let inverse = 1.0f32 / select(is_steep, 1.0f32, flat_part).sqrt();
     pick(is_steep, v3(1.0f32, 0.0f32, 0.0f32), v3(-inverse * along.y, inverse * along.x, 0.0f32))
 }
@@ -207,6 +229,16 @@ mod tests {
         [image, record_of(a, b, c)]
     }
 
+    /// The squared distance and the part of the face that it is to, as [`distance_squared`] has them in one number, which takes a device.
+    fn nearest(face: Face, p: V3) -> (f32, u32) {
+        let to = parts(face, p);
+        if to.inside {
+            return (to.to_plane, 0);
+        }
+        let edges = [(to.to_ab, 1), (to.to_bc, 2), (to.to_ca, 3)];
+        edges.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("three edges")
+    }
+
     /// The distance and the closest point are those of a triangle, a segment or a point.
     fn assert_exact(corners: [DVec3; 3], p: DVec3) -> Result<(), TestCaseError> {
         let squared = exact::squared_distance(p, corners);
@@ -214,10 +246,10 @@ mod tests {
         for face in faces(corners) {
             let n = f64_of(face.normal);
             prop_assert!(n == DVec3::ZERO || (n.length() - 1.0).abs() < 1e-6, "{n}");
-            let found = distance_squared(face, at);
+            let (found, part) = nearest(face, at);
             prop_assert!(exact::is_root(f64::from(found).sqrt(), &squared, PROMISE), "{found:e} of {n}");
-            let nearest = closest(face, at, found.to_bits() & PART);
-            let (point, outward) = (f64_of(nearest.point), f64_of(nearest.outward));
+            let there = closest(face, at, part);
+            let (point, outward) = (f64_of(there.point), f64_of(there.outward));
             prop_assert!(exact::is_root(outward.length(), &squared, PROMISE), "{outward}");
             let off = exact::squared_distance(point, corners);
             prop_assert!(exact::is_root(0.0, &off, 2.0 * PROMISE), "{point} is off the face");
@@ -253,7 +285,7 @@ mod tests {
                 assert!(is_flat(flat));
                 for p in [corner, side, 0.5 * side] {
                     let p = v3(p.x as f32, p.y as f32, p.z as f32);
-                    assert!(distance_squared(neighbour, p) < distance_squared(flat, p));
+                    assert!(nearest(neighbour, p).0 < nearest(flat, p).0);
                 }
             }
         }
