@@ -51,6 +51,16 @@ fn duplicates_and_collapsed_faces_are_dropped() {
     assert!(solid(&fixed).is_simple());
 }
 
+/// A tetrahedron, one of its faces twice and once reversed.
+#[test]
+fn a_duplicate_that_closes_the_surface_stays() {
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].to_vec();
+    let faces = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3], [1, 2, 3], [1, 3, 2]];
+    let mesh = TriangleMesh::new(corners, faces).expect("valid ids");
+    let repaired = repaired(&mesh);
+    assert!(repaired.report.duplicate_faces.is_empty() && repaired.report.encodable, "{:?}", repaired.report);
+}
+
 #[test]
 fn t_junctions_are_split() {
     let fixed = repaired(&load("bad/t_junction.obj"));

@@ -212,3 +212,23 @@ proptest! {
         }
     }
 }
+
+/// Two sheets 2.5e-43 apart: a place on one is rounded to beyond the other, which used to look like an inside.
+#[test]
+fn a_solid_inside_out_with_sheets_nearer_than_rounding() {
+    let vertices = [
+        (0.0, 0.0, 0.0),
+        (1e-5, -0.9, -0.9),
+        (0.0, 1.0, 0.0),
+        (1.0, 1.0, 0.0),
+        (0.0, 0.0, 1.0),
+        (1.0, 0.0, 1.0),
+        (-0.25, 0.25, 0.0),
+        (-0.25, -0.25, -2.5e-43),
+    ];
+    let squares = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let faces = squares.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    let mesh = TriangleMesh::new(vertices.map(DVec3::from).to_vec(), faces).expect("valid ids");
+    let report = check(&mesh);
+    assert!(report.of_severity(Severity::Error).any(|d| d.kind == DefectKind::NoInside), "{report:?}");
+}

@@ -58,6 +58,11 @@ impl WindingNumber {
         sum
     }
 
+    /// The tree over the faces.
+    pub(crate) fn tree(&self) -> &AabbTree {
+        &self.tree
+    }
+
     /// Calls `crossed` with each face that the segment from the far point to `p + (e, e^2, e^3)` crosses, and
     /// the change of the winding number there: what [`at_perturbed`](Self::at_perturbed) adds up.
     pub(crate) fn for_each_crossing_to(&self, p: DVec3, mut crossed: impl FnMut(u32, i32)) {

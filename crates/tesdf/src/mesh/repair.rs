@@ -7,7 +7,7 @@ use super::count::count;
 use super::{
     Defect, MeshError, Severity, TriangleMesh, check,
     check::{T_JUNCTION_TOLERANCE, out_of_range, write_defects},
-    topology::has_repeated_corner,
+    topology::{Topology, has_repeated_corner},
 };
 
 mod orient;
@@ -129,6 +129,7 @@ pub enum RepairError {
 }
 
 /// A mesh being repaired.
+#[derive(Clone)]
 struct Draft {
     vertices: Vec<DVec3>,
     faces: Vec<[u32; 3]>,
@@ -139,7 +140,8 @@ struct Draft {
 /// Makes a mesh encodable where that needs no guess, and says what it did.
 ///
 /// In this order: merges vertices within the weld tolerance, if one is given; drops faces with two
-/// equal corners and faces that repeat another with the same orientation; splits faces at vertices that lie on
+/// equal corners and faces that repeat another with the same orientation, unless those close the surface, as where a face is there
+/// twice and once reversed; splits faces at vertices that lie on
 /// their open edges, and a collinear face goes when that leaves nothing of it; reverses faces so that those of a
 /// connected surface agree; reverses closed shells so that each is outward or, inside an odd number of others,
 /// inward. Shells that meet others are not reversed as a whole: whether they were meant as solids or cavities
@@ -177,7 +179,13 @@ pub fn repair(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Repaired, 
         let (collapsed, faces) = (report.collapsed_faces.len(), mesh.faces().len());
         return Err(RepairError::NoFaceLeft { collapsed, faces });
     }
+    let closed = Topology::new(&draft.faces).is_closed();
+    let with_duplicates = draft.clone();
     report.duplicate_faces = draft.drop_duplicates();
+    if closed && !report.duplicate_faces.is_empty() && !Topology::new(&draft.faces).is_closed() {
+        draft = with_duplicates;
+        report.duplicate_faces.clear();
+    }
     let relative = options.t_junction_tolerance * mesh.diagonal();
     split::split(&mut draft, relative.max(options.weld_tolerance.unwrap_or(0.0)), &mut report);
     if draft.faces.is_empty() {

@@ -9,7 +9,7 @@ use super::{
     regions::{self, Sample},
 };
 use crate::{
-    geometry::{WindingNumber, perturbed_orientation},
+    geometry::{Aabb, Triangle, WindingNumber, perturbed_orientation},
     mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, topology::Edge},
 };
 
@@ -77,7 +77,7 @@ pub(super) fn winding_defects(
             above_one.push((face, high));
         }
     };
-    for patch in patches(mesh, topology, excluded) {
+    for patch in patches(mesh, topology, &winding, excluded) {
         let extent = match patch.size {
             1 => String::new(),
             n => format!(" and the {} connected to it", n - 1),
@@ -121,35 +121,66 @@ fn sides(mesh: &TriangleMesh, winding: &WindingNumber, face: u32, place: DVec3, 
 
 /// Faces that are connected over manifold edges and meet no other face: the winding number is constant on each side.
 struct Patch {
-    /// The tallest face stands for all: rounding moves its centre least, relative to its size.
+    /// The tallest face stands for all: rounding moves its centre least, relative to its size. No other face comes as near to its centre
+    /// as rounding, unless that is so of each face.
     face: u32,
     /// Number of faces.
     size: usize,
 }
 
-fn patches(mesh: &TriangleMesh, topology: &Topology, excluded: impl Fn(u32) -> bool) -> Vec<Patch> {
+fn patches(
+    mesh: &TriangleMesh,
+    topology: &Topology,
+    winding: &WindingNumber,
+    excluded: impl Fn(u32) -> bool,
+) -> Vec<Patch> {
     let uses = |edge: &Edge| topology.uses(edge).iter().all(|u| !excluded(u.face));
     let (patch, count) = topology.components(|edge| edge.is_manifold() && uses(edge));
-    let mut tallest: Vec<Option<(f64, Patch)>> = (0..count).map(|_| None).collect();
-    for face in (0..mesh.faces().len() as u32)
-        .filter(|&f| !excluded(f) && patch[f as usize] != Topology::NO_COMPONENT)
+    let mut faces: Vec<Vec<u32>> = vec![Vec::new(); count];
+    for (face, &patch) in
+        (0..).zip(&patch).filter(|&(face, &p)| !excluded(face) && p != Topology::NO_COMPONENT)
     {
-        let known = &mut tallest[patch[face as usize] as usize];
-        let size = known.as_ref().map_or(0, |(_, patch)| patch.size) + 1;
-        let height = height(mesh.triangle(face as usize));
-        match known {
-            Some((most, patch)) if height <= *most => patch.size = size,
-            _ => *known = Some((height, Patch { face, size })),
-        }
+        faces[patch as usize].push(face);
     }
-    tallest.into_iter().flatten().map(|(_, patch)| patch).collect()
+    let reach = rounding(mesh);
+    let tallest = |faces: &mut dyn Iterator<Item = u32>| {
+        let heights = faces.map(|face| (height(mesh.triangle(face as usize)), face));
+        heights.max_by(|(a, f), (b, g)| a.total_cmp(b).then(g.cmp(f))).map(|(_, face)| face)
+    };
+    let of = |faces: Vec<u32>| {
+        let first = tallest(&mut faces.iter().copied())?;
+        let alone = |face: u32| is_alone(mesh, winding, face, reach);
+        let face = match alone(first) {
+            true => first,
+            false => tallest(&mut faces.iter().copied().filter(|&face| alone(face))).unwrap_or(first),
+        };
+        Some(Patch { face, size: faces.len() })
+    };
+    faces.into_iter().filter_map(of).collect()
+}
+
+/// Whether no other face has a point within `reach` of the centre of a face.
+fn is_alone(mesh: &TriangleMesh, winding: &WindingNumber, face: u32, reach: f64) -> bool {
+    let place = centroid(mesh, face);
+    let (around, mut alone) = (Aabb::of(&[place]).grown(reach), true);
+    let is_far = |f: u32| Triangle::new(mesh.triangle(f as usize)).closest(place).distance > reach;
+    winding.tree().visit(
+        |bounds| bounds.overlaps(around),
+        |leaf| alone &= leaf.iter().all(|&f| f == face || is_far(f)),
+    );
+    alone
+}
+
+/// What places on a face may be off by.
+fn rounding(mesh: &TriangleMesh) -> f64 {
+    let bounds = mesh.bounds();
+    ROUNDING * bounds.min.abs().max(bounds.max.abs()).max_element()
 }
 
 /// Each face that meets others, with the least and the greatest winding number beside its regions. Of faces with the same
 /// corners the first stands for all.
 fn extremes(mesh: &TriangleMesh, winding: &WindingNumber, others: &Others) -> Vec<(u32, Sides, Sides)> {
-    let bounds = mesh.bounds();
-    let rounding = ROUNDING * bounds.min.abs().max(bounds.max.abs()).max_element();
+    let rounding = rounding(mesh);
     let meets = |&f: &u32| !others.of(f).is_empty() && !others.repeats[f as usize];
     let faces: Vec<u32> = (0..mesh.faces().len() as u32).filter(meets).collect();
     let samples = |&face: &u32| (face, regions::samples(mesh, face, others.of(face), rounding));
