@@ -2,14 +2,24 @@ use glam::DVec3;
 
 use crate::mesh::TriangleMesh;
 
-/// All faces of a mesh, without anything that finds the near ones fast.
+/// All faces of a mesh, one after the other. A face is passed over when a ball around it is farther than the nearest so far.
 ///
 /// Written apart from [`Triangle`](crate::geometry::Triangle), which queries use, so that an error in one shows against
 /// the other. Lengths are scaled by a power of two, so that no product leaves the range of `f64`.
 pub(crate) struct BruteForce {
     facets: Vec<Facet>,
+    balls: Vec<Ball>,
     scale: f64,
 }
+
+/// Around a face.
+struct Ball {
+    center: DVec3,
+    radius: f64,
+}
+
+/// More than the rounding of a radius and a distance, as a share.
+const ROUNDING: f64 = 1e-14;
 
 /// Faces whose height is a smaller share of their length are their edges.
 const FLAT: f64 = 4e-15;
@@ -34,14 +44,21 @@ impl BruteForce {
     pub(crate) fn new(mesh: &TriangleMesh, diagonal: f64) -> Self {
         let scale = (-diagonal.log2().floor()).clamp(-1000.0, 1000.0).exp2();
         let facets = (0..mesh.faces().len()).map(|f| Facet::new(mesh.triangle(f).map(|p| p * scale)));
-        Self { facets: facets.collect(), scale }
+        let facets: Vec<Facet> = facets.collect();
+        Self { balls: facets.iter().map(Facet::ball).collect(), facets, scale }
     }
 
     /// Distance from `p` to the nearest of all faces, mesh unit.
     pub(crate) fn distance(&self, p: DVec3) -> f64 {
         let p = p * self.scale;
-        let least = self.facets.iter().map(|f| f.offset(p).length_squared()).fold(f64::INFINITY, f64::min);
-        least.sqrt() / self.scale
+        let mut least = f64::INFINITY;
+        for (facet, ball) in self.facets.iter().zip(&self.balls) {
+            let reach = (least + ball.radius) * (1.0 + ROUNDING);
+            if p.distance_squared(ball.center) <= reach * reach {
+                least = least.min(facet.offset(p).length());
+            }
+        }
+        least / self.scale
     }
 
     /// From the closest point of one face to `p`, mesh unit.
@@ -63,6 +80,13 @@ impl Facet {
         let has_plane = cross.length() > FLAT * length * length && length > SMALLEST;
         let normal = has_plane.then_some(cross).and_then(DVec3::try_normalize);
         Self { corners, along, inverse, longest, normal }
+    }
+
+    fn ball(&self) -> Ball {
+        let [a, b, c] = self.corners;
+        let center = 0.5 * (a.min(b).min(c) + a.max(b).max(c));
+        let radius = self.corners.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+        Ball { center, radius: radius * (1.0 + ROUNDING) }
     }
 
     fn offset(&self, p: DVec3) -> DVec3 {
