@@ -328,3 +328,34 @@ pub fn value(assets: &Assets, shape: u32, p: V3) -> Value {
     }
     value_in_cell(assets, shape, word, p)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::vector::v3;
+    use super::*;
+
+    /// Segments through edges and corners of a cube, as its symmetry makes them, enter it once, and leave it once.
+    #[test]
+    fn a_segment_through_an_edge_or_a_corner_crosses_once() {
+        let corner = |k: u32| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit as f32 * 2.0 - 1.0);
+        let squares = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let faces = squares.map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).concat();
+        let sum = |p: V3, q: V3| -> i32 {
+            let of = |f: &[u32; 3]| f.map(corner).map(|[x, y, z]| v3(x, y, z));
+            faces.iter().map(of).map(|[a, b, c]| crossing(p, q, a, b, c)).sum()
+        };
+        let steps = [-3.0, -2.0, -1.5, 0.0, 1.5, 2.0, 3.0f32];
+        for x in steps {
+            for y in steps {
+                for z in steps {
+                    if x == 0.0 && y == 0.0 && z == 0.0 {
+                        continue;
+                    }
+                    let (out, middle) = (v3(x, y, z), v3(0.0, 0.0, 0.0));
+                    assert_eq!((sum(out, middle), sum(middle, out)), (-1, 1), "{x} {y} {z}");
+                    assert_eq!(sum(out, v3(-x, -y, -z)), 0, "{x} {y} {z}, to the other side");
+                }
+            }
+        }
+    }
+}
