@@ -2,11 +2,13 @@
 
 /// From now on the process ends with exit code 2 and a hint where it would be aborted.
 ///
-/// Where a file or an option says how much memory is wanted, a failed allocation is an error like others. Collections that grow with the work
-/// are not checked everywhere. When one of them gets no memory, the standard library prints how many bytes it asked for, and aborts.
+/// Where a file or an option says how much memory is wanted, a failed allocation is an error like
+/// others. Collections that grow with the work are not checked everywhere. When one of them gets no
+/// memory, the standard library prints how many bytes it asked for, and aborts.
 pub fn give_exit_code() {
     #[cfg(unix)]
-    // SAFETY: the handler calls nothing but `write` and `_exit`, which POSIX lists as safe in signal handlers.
+    // SAFETY: the handler calls nothing but `write` and `_exit`, which POSIX lists as safe in signal
+    // handlers.
     unsafe {
         let handler = on_abort as extern "C" fn(libc::c_int);
         libc::signal(libc::SIGABRT, handler as libc::sighandler_t);

@@ -39,8 +39,8 @@ impl Assets {
     }
 }
 
-/// Whether the coordinates of assets fit together: units that differ are an error, and a unit that is recorded for some of them alone is a
-/// warning.
+/// Whether the coordinates of assets fit together. Units that differ are an error; a unit that is
+/// recorded for some of them alone is a warning.
 ///
 /// # Errors
 /// Names two files and their units.

@@ -15,7 +15,7 @@ use tesdf::encode::Length;
 use tesdf_sim::newton::Detect as _;
 
 use crate::asset_file::{Assets, check_units};
-use crate::devices::{Choice, OnDevice};
+use crate::devices::{self, Choice, OnDevice};
 use crate::report::{self, Failure, Outcome, count};
 use crate::{parse, why};
 
@@ -88,8 +88,8 @@ pub struct Args {
     /// Most contacts to keep of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
-    /// Where contacts are found: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why")]
+    /// Where contacts are found
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = devices::help("contacts are found"))]
     pub device: Choice,
     /// Say instead why contacts are or are not there: what each stage made of all candidates, or of one face (in the mode `node`, node) of
     /// instance 0, or as INSTANCE:FACE of one of either

@@ -18,6 +18,14 @@ pub struct Args {
     pub json: bool,
 }
 
+/// The help of `--device`: where `what` is done.
+pub fn help(what: &str) -> String {
+    format!(
+        "Where {what}: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part \
+         of its name"
+    )
+}
+
 /// What `--device` says.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Choice {

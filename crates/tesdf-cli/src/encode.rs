@@ -13,7 +13,7 @@ use tesdf::encode::{Domain, DomainChoice, EncodeOptions, EncodeProgress, Encoder
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 
-use crate::devices::Choice;
+use crate::devices::{self, Choice};
 use crate::output::Consent;
 use crate::progress::{interrupt_flag, watched};
 use crate::report::{self, Failure, Outcome};
@@ -50,8 +50,8 @@ pub struct Args {
     /// How much farther than the closest face a listed one may be at a sample: a length, or `safe` for so much that nothing is missing
     #[arg(long, value_name = "LENGTH|safe", value_parser = choices::threshold)]
     pub threshold: Option<Threshold>,
-    /// Where samples are looked at: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
+    /// Where samples are looked at
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = devices::help("samples are looked at"))]
     pub device: Choice,
     /// Cut lists to this many faces, those that are needed nearest to the surface
     #[arg(long, value_name = "N")]

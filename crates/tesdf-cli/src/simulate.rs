@@ -13,7 +13,7 @@ use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{CutRun, HiddenPair, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
-use crate::devices::{Choice, OnDevice};
+use crate::devices::{self, Choice, OnDevice};
 use crate::output::{self, Consent};
 use crate::progress::{interrupt_flag, watched};
 use crate::report::{self, Failure, Outcome};
@@ -51,8 +51,8 @@ pub struct Args {
     /// Instead of the geometry of a body: a .tesdf file, or a mesh that is encoded; may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = geometry)]
     pub geometries: Vec<(String, PathBuf)>,
-    /// Where contacts are found: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
+    /// Where contacts are found
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = devices::help("contacts are found"))]
     pub device: Choice,
     /// Print the result as JSON
     #[arg(long)]

@@ -9,7 +9,7 @@ use tesdf::collide::{CollideOptions, FaceMethod, Mode, Reduction, detect};
 use tesdf_gpu::{Counting, Detector, DetectorOptions, Exchange, Lanes, Memory, Pruning};
 
 use super::frames::Frames;
-use crate::devices::Choice;
+use crate::devices::{self, Choice};
 use crate::parse;
 use crate::report::{self, Failure, Outcome, size};
 
@@ -19,8 +19,8 @@ pub struct Args {
     /// A scene (.toml), a run (.tesrun) whose poses are replayed, or a file of poses (.json)
     #[arg(value_name = "SCENE|RUN|POSES")]
     pub source: PathBuf,
-    /// Where contacts are found: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Best)]
+    /// Where contacts are found
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Best, help = devices::help("contacts are found"))]
     pub device: Choice,
     /// What is tested against the other body's field
     #[arg(long, value_enum, default_value_t = ModeName::Face)]

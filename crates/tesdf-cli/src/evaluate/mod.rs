@@ -19,7 +19,7 @@ use meshes::Mesh;
 use output::Sink;
 use tesdf::evaluate::EvaluateOptions;
 
-use crate::devices::Choice;
+use crate::devices::{self, Choice};
 use crate::output::Consent;
 use crate::report::{Failure, Outcome};
 
@@ -52,8 +52,8 @@ pub struct TableArgs {
     /// Q of the sampled encoder: samples per edge of a tetrahedron [default: 32; with --quick 4; on a device the paper's of each mesh]
     #[arg(long, value_name = "Q")]
     pub resolution: Option<u32>,
-    /// Where samples are looked at: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part of its name
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor)]
+    /// Where samples are looked at
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = devices::help("samples are looked at"))]
     pub device: Choice,
     /// A coarse grid, few samples, and in Table I the smaller meshes alone
     #[arg(long)]

@@ -179,10 +179,10 @@ pub fn repair(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Repaired, 
         let (collapsed, faces) = (report.collapsed_faces.len(), mesh.faces().len());
         return Err(RepairError::NoFaceLeft { collapsed, faces });
     }
-    let closed = Topology::new(&draft.faces).is_closed();
     let with_duplicates = draft.clone();
     report.duplicate_faces = draft.drop_duplicates();
-    if closed && !report.duplicate_faces.is_empty() && !Topology::new(&draft.faces).is_closed() {
+    let is_closed = |draft: &Draft| Topology::new(&draft.faces).is_closed();
+    if !report.duplicate_faces.is_empty() && is_closed(&with_duplicates) && !is_closed(&draft) {
         draft = with_duplicates;
         report.duplicate_faces.clear();
     }
