@@ -1,16 +1,17 @@
-//! Reading files whole, whatever they are.
+//! Reads whole files. Pipes and devices are accepted too.
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Most bytes that are taken from a pipe or a device, which may never end: 4 GiB.
+/// Largest number of bytes that are read from a pipe or a device, which may never end: 4 GiB.
 pub const MOST_STREAMED: u64 = 1 << 32;
 
-/// All bytes of a file, a pipe or a device. A regular file may be of any size that the memory holds.
+/// Reads all bytes of a file, a pipe or a device. A regular file may be as large as memory allows.
 ///
 /// # Errors
-/// What the operating system says; [`io::ErrorKind::OutOfMemory`]; [`io::ErrorKind::FileTooLarge`] when more than [`MOST_STREAMED`] bytes
-/// come from what is no regular file.
+/// The error of the operating system; [`io::ErrorKind::OutOfMemory`] when the file does not fit
+/// into memory; [`io::ErrorKind::FileTooLarge`] when a pipe or a device gives more than
+/// [`MOST_STREAMED`] bytes.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut file = File::open(path)?;
     let mut bytes = Vec::new();
@@ -18,10 +19,10 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// As [`read`], as text.
+/// Reads a file as [`read`] does and returns it as text.
 ///
 /// # Errors
-/// As [`read`]; [`io::ErrorKind::InvalidData`] when the bytes are not UTF-8.
+/// As [`read`]; [`io::ErrorKind::InvalidData`], with the line, when the bytes are not UTF-8.
 pub fn read_to_string(path: &Path) -> io::Result<String> {
     String::from_utf8(read(path)?).map_err(|e| {
         let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count();
@@ -29,11 +30,11 @@ pub fn read_to_string(path: &Path) -> io::Result<String> {
     })
 }
 
-/// Appends what is left of an open file.
+/// Appends the remaining bytes of an open file to `bytes`.
 pub(crate) fn read_rest(file: &mut File, bytes: &mut Vec<u8>) -> io::Result<()> {
     let metadata = file.metadata()?;
     let length = metadata.len();
-    // Files of the kernel have a length of 0 and content all the same.
+    // Files of the kernel (such as those in `/proc`) report a length of 0 but have content.
     if metadata.is_file() && length > 0 {
         bytes.try_reserve_exact(usize::try_from(length).unwrap_or(usize::MAX))?;
         file.read_to_end(bytes)?;

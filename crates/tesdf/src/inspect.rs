@@ -1,4 +1,4 @@
-//! What an asset costs and what a query of it reads.
+//! Reports what an asset costs in memory and how much a query of it reads.
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -9,10 +9,11 @@ use crate::domain::Classes;
 use crate::geometry::{Aabb, Triangle, tetrahedron_volume};
 use crate::sampling::{Random, Weighted};
 
-/// How [`inspect`] samples.
+/// How many random points [`inspect`] takes, and their seed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InspectOptions {
-    /// Points near the surface, and points in the cells that the face tree answers.
+    /// Number of points near the surface. As many points are taken in cells that the face tree
+    /// answers.
     pub samples: usize,
     /// The same seed gives the same points.
     pub seed: u64,
@@ -24,22 +25,22 @@ impl Default for InspectOptions {
     }
 }
 
-/// What [`inspect`] found.
+/// The result of [`inspect`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inspection {
-    /// How many there are of what.
+    /// Numbers of faces, vertices, cells and list entries.
     pub counts: Counts,
-    /// Of a conforming domain: how many there are of each class.
+    /// Number of tetrahedra in each class; `None` when the domain is not conforming.
     pub classes: Option<Classes>,
-    /// Lengths of the lists, each cell counted once.
+    /// Statistics of the list lengths. Each cell counts once.
     pub lists: ListLengths,
-    /// What queries read.
+    /// Mean number of faces and nodes that a query reads.
     pub reads: MeanReads,
-    /// What is resident while the asset is open, in bytes.
+    /// Memory of the open asset, in bytes.
     pub memory: Memory,
 }
 
-/// How many there are of what.
+/// Numbers of faces, vertices, cells and list entries.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts {
     /// Faces of the mesh.
@@ -48,79 +49,83 @@ pub struct Counts {
     pub vertices: usize,
     /// Cells with a list.
     pub listed_cells: usize,
-    /// Of those, cells that the surface comes into or close to.
+    /// Cells with a list that the surface enters or comes close to.
     pub crossing_cells: usize,
-    /// Cells of the domain that the face tree answers.
+    /// Cells of the domain without a list: the face tree answers their points.
     pub far_cells: usize,
-    /// Cells of the cube that are not of the domain.
+    /// Cells of the cube that do not belong to the domain.
     pub outside_cells: usize,
-    /// Bisections from a sixth of the cube to the deepest cell.
+    /// Number of bisections from a root tetrahedron to the deepest cell.
     pub depth: u32,
     /// Sum of the lengths of the lists of all cells.
     pub entries: usize,
 }
 
-/// Lengths of the lists, each cell counted once.
+/// Statistics of the list lengths. Each cell counts once.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ListLengths {
     /// Mean over the cells.
     pub mean: f64,
-    /// Half of the lists are at most this long.
+    /// Median: half of the lists are at most this long.
     pub p50: usize,
-    /// Nine of ten are at most this long.
+    /// 90 % of the lists are at most this long.
     pub p90: usize,
-    /// 99 of 100 are at most this long.
+    /// 99 % of the lists are at most this long.
     pub p99: usize,
-    /// The longest.
+    /// Length of the longest list.
     pub longest: usize,
 }
 
-/// Faces and nodes that a query reads on average.
+/// Mean number of faces and nodes that a query reads.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MeanReads {
-    /// Within 2 % of the diagonal from the surface: random points of the surface, moved along the normal.
+    /// Mean over points within 2 % of the diagonal from the surface. The points are random points
+    /// of the surface, moved along the normal.
     pub near_surface: f64,
-    /// Share of those points that the face tree answers.
+    /// Fraction of these points that the face tree answers.
     pub near_surface_fallback: f64,
-    /// In the domain, by volume, those answered by the face tree included.
+    /// Mean over the volume of the domain, including the part that the face tree answers.
     pub volume_weighted: f64,
-    /// Share of the domain's volume that the face tree answers.
+    /// Fraction of the domain's volume that the face tree answers.
     pub fallback_volume: f64,
-    /// Where the face tree answers, by volume.
+    /// Mean over the volume that the face tree answers.
     pub fallback: f64,
-    /// Points sampled for the mean near the surface, and for the face tree.
+    /// Number of points sampled near the surface. As many are sampled where the face tree answers.
     pub samples: usize,
 }
 
-/// What is resident while an asset is open, in bytes.
+/// Memory of an open asset, in bytes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Memory {
-    /// Each part of the file, and what opening makes besides.
+    /// Name and size of each part: header and sections of the file, then the data that opening
+    /// computes.
     pub parts: Vec<(String, usize)>,
-    /// The file.
+    /// Size of the file.
     pub file: usize,
-    /// All of it: the file and what opening makes.
+    /// Total: the file and the data that opening computes.
     pub whole: usize,
-    /// `whole` over the number of faces.
+    /// `whole` divided by the number of faces.
     pub whole_per_face: f64,
-    /// What finds and lists the faces of a point: the sections `domain.` and `lists.` and the table of entries.
+    /// Data that locates a point and lists its faces: the sections `domain.*` and `lists.*`, and
+    /// the table of entries.
     pub lists_and_tree: usize,
-    /// The same as the literature counts it: 4 bytes for each list entry and 16 for each tetrahedron with a list.
+    /// Memory as the paper counts it: 4 bytes for each list entry and 16 bytes for each cell with a
+    /// list.
     pub paper: usize,
     /// `paper` in MiB.
     pub paper_mib: f64,
 }
 
-/// Half width of the layer that counts as near the surface, as a share of the diagonal.
+/// Half width of the layer that counts as near the surface, as a fraction of the diagonal.
 const NEAR: f64 = 0.02;
 
-/// Counts, samples and adds up; the same for the same asset and options.
+/// Measures an asset. The same asset and options always give the same result.
 pub fn inspect(asset: &TeSdf, options: &InspectOptions) -> Inspection {
     let mut counts =
         Counts { faces: asset.face_count(), vertices: asset.vertices.len(), ..Counts::default() };
     let mut far: Vec<[DVec3; 4]> = Vec::new();
     let mut lengths = Vec::new();
-    // Volumes in the local frame do not leave the range of f64.
+    // In the local frame, volumes stay within the range of f64.
     let volume = |cell: &CellView| tetrahedron_volume(&cell.corners.map(|p| asset.frame.to_local(p))).abs();
     let (mut listed_volume, mut weighted_length) = (0.0, 0.0);
     asset.visit_cells(|cell| {
@@ -191,7 +196,7 @@ fn mean_fallback_reads(
     reads as f64 / options.samples.max(1) as f64
 }
 
-/// Mean reads, and the share of points without a list.
+/// Mean number of reads near the surface, and the fraction of points without a list.
 fn near_surface(asset: &TeSdf, options: &InspectOptions) -> (f64, f64) {
     let triangle = |face: usize| asset.local_triangle(face);
     let area = |t: &Triangle| {

@@ -1,16 +1,17 @@
-//! Random points that are the same on every machine and for every number of threads.
+//! Random points that are the same on every machine and for any number of threads.
 use glam::DVec3;
 
 use crate::geometry::Aabb;
 
-/// Random numbers of one sample: a function of the seed and the sample's number alone.
+/// Random number generator of one sample. Its numbers depend on the seed and the index of the
+/// sample alone.
 ///
 /// SplitMix64 (Steele, Lea, Flood 2014).
 #[derive(Clone, Debug)]
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// The numbers of sample `index`.
+    /// The generator of sample `index`.
     pub(crate) fn new(seed: u64, index: u64) -> Self {
         let mut random = Self(seed ^ index.wrapping_mul(0xd1b5_4a32_d192_ed03));
         // Neighbouring states give unrelated numbers only after one scramble.
@@ -35,7 +36,7 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// `low` to `high`, uniform in the logarithm.
+    /// Between `low` and `high`, uniform in the logarithm.
     pub(crate) fn log_between(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }
@@ -45,7 +46,7 @@ impl Random {
         if self.bits() >> 63 == 0 { 1.0 } else { -1.0 }
     }
 
-    /// 0 to `count` - 1, for `count` from 1.
+    /// Uniform integer from 0 to `count` - 1; `count` is at least 1.
     pub(crate) fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.bits()) * count as u128) >> 64) as usize
     }
@@ -64,31 +65,31 @@ impl Random {
         DVec3::new(r * cos, r * sin, z)
     }
 
-    /// Uniform in the simplex of `N` corners: their weights, of sum 1.
+    /// Barycentric weights of a point that is uniform in a simplex of `N` corners. Their sum is 1.
     pub(crate) fn weights<const N: usize>(&mut self) -> [f64; N] {
-        // Gaps of an exponential process are uniform on the simplex.
+        // Normalised gaps of a Poisson process are uniform on the simplex.
         let gaps: [f64; N] = std::array::from_fn(|_| -(1.0 - self.unit()).ln());
         let sum: f64 = gaps.iter().sum();
         if sum > 0.0 { gaps.map(|g| g / sum) } else { [1.0 / N as f64; N] }
     }
 
-    /// Uniform in the simplex of these corners.
+    /// A point that is uniform in the simplex of these corners.
     pub(crate) fn in_simplex<const N: usize>(&mut self, corners: &[DVec3; N]) -> DVec3 {
         let weights = self.weights::<N>();
-        // Relative to the first corner, which loses nothing far from the origin.
+        // Computed relative to the first corner, which keeps precision far from the origin.
         let [first, ..] = corners.as_slice() else { return DVec3::ZERO };
         *first + corners.iter().zip(weights).map(|(c, w)| w * (*c - *first)).sum::<DVec3>()
     }
 }
 
-/// Picks things in proportion to their weight.
+/// Picks indices with probabilities proportional to their weights.
 #[derive(Clone, Debug)]
 pub(crate) struct Weighted {
     sums: Vec<f64>,
 }
 
 impl Weighted {
-    /// From weights, none of them negative.
+    /// `weights` must not be negative.
     pub(crate) fn new(weights: impl Iterator<Item = f64>) -> Self {
         let mut sum = 0.0;
         Self {
@@ -101,7 +102,7 @@ impl Weighted {
         }
     }
 
-    /// The number of one; `None` when all weights are 0.
+    /// A random index; `None` when all weights are 0.
     pub(crate) fn pick(&self, random: &mut Random) -> Option<usize> {
         let total = self.total();
         let at = random.unit() * total;

@@ -5,25 +5,28 @@ use crate::TeSdf;
 use crate::asset::CellKind;
 use crate::geometry::Aabb;
 
-/// Most voxels along the diagonal: 2^48 points at most then fit a domain of 8 diagonals.
+/// Largest number of voxels along the diagonal. With this limit, a domain of 8 diagonals has at
+/// most 2^48 points.
 pub const MAX_FINENESS: u32 = 1 << 13;
 
-/// The centres of the voxels that cover a domain. The middle of the mesh's bounds is a corner of voxels.
+/// The centres of the voxels that cover a domain. The centre of the mesh's bounds is a corner of
+/// voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {
-    /// The point with the lowest coordinates, mesh unit.
+    /// The grid point with the lowest coordinates, in the mesh's unit.
     pub origin: DVec3,
-    /// Side of a voxel, mesh unit.
+    /// Side length of a voxel, in the mesh's unit.
     pub voxel: f64,
     /// Number of points along each axis.
     pub counts: [u64; 3],
 }
 
 impl Grid {
-    /// The grid over the domains of `assets`, which are of the same mesh, with `fineness` voxels along its diagonal.
+    /// The grid over the domains of `assets`, which encode the same mesh. `fineness` is the number
+    /// of voxels along the diagonal of the mesh's bounds.
     ///
     /// # Errors
-    /// The fineness is out of range, or there is no asset.
+    /// `fineness` is out of range, or `assets` is empty.
     pub fn of(assets: &[&TeSdf], fineness: u32) -> Result<Self, EvaluateError> {
         if !(1..=MAX_FINENESS).contains(&fineness) {
             return Err(EvaluateError::Fineness { found: fineness });
@@ -43,12 +46,12 @@ impl Grid {
         self.counts.iter().product()
     }
 
-    /// Whether it has no point.
+    /// Whether the grid has no point.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// A point; each index is below its count.
+    /// Position of a point, in the mesh's unit. Each index is smaller than the count of its axis.
     pub fn point(&self, index: [u64; 3]) -> DVec3 {
         self.origin + self.voxel * DVec3::from_array(index.map(|i| i as f64))
     }

@@ -1,11 +1,13 @@
-//! Encoded distances against exact ones on a regular grid, as in Tables I and IV of the paper.
+//! Compares encoded distances with exact distances on a regular grid, as in Tables I and IV of the
+//! paper.
 //!
-//! Comes in: one or several assets of the same mesh, and how fine the grid is. Goes out: for each asset a [`BandReport`], with
-//! the largest error and the bands around the surface in which there is none.
+//! Input: one or more assets of the same mesh, and the fineness of the grid. Output: for each asset
+//! a [`BandReport`] with the largest error and the error-free bands around the surface.
 //!
-//! The exact distance is found once per point for all assets, from a tree over all faces of the mesh and with another routine
-//! for triangles than queries use; nothing of lists, cells or the assets' own trees is part of it. The grid is streamed:
-//! nothing is stored per point. The same reports on any number of threads.
+//! The exact distance is computed once per point for all assets. It comes from a tree over all
+//! faces of the mesh and from another triangle routine than that of queries. It uses no lists, no
+//! cells and none of the assets' own trees. The grid is streamed: nothing is stored per point. The
+//! reports are the same for any number of threads.
 mod grid;
 mod reference;
 mod report;
@@ -24,12 +26,12 @@ use reference::Reference;
 pub use report::BandReport;
 use report::Tally;
 
-/// How fine [`evaluate`] looks.
+/// Fineness of the grid and tolerance of [`evaluate`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EvaluateOptions {
     /// Voxels along the diagonal of the mesh's bounds.
     pub fineness: u32,
-    /// Errors up to this share of the diagonal count as none.
+    /// Errors up to this fraction of the diagonal count as zero.
     pub exact: f64,
 }
 
@@ -43,34 +45,36 @@ impl Default for EvaluateOptions {
 /// Why assets cannot be evaluated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum EvaluateError {
-    /// There is none.
+    /// `assets` is empty.
     #[error("there is no asset to evaluate; give one or more of the same mesh")]
     Empty,
-    /// The assets are not of one mesh.
+    /// The assets encode different meshes.
     #[error(
         "asset {asset} (0-based) has another mesh than asset 0; evaluate assets of different meshes apart"
     )]
     OtherMesh {
-        /// The first asset that differs, 0-based.
+        /// Index of the first asset whose mesh differs, 0-based.
         asset: usize,
     },
-    /// The grid has no meaning.
+    /// The fineness is out of range.
     #[error("a grid of {found} voxels along the diagonal; expected 1 to {MAX_FINENESS}")]
     Fineness {
-        /// The number found.
+        /// The fineness found.
         found: u32,
     },
     /// The mesh in an asset is not valid.
     #[error("the mesh in the asset is not valid: {0}")]
     Mesh(#[from] MeshError),
-    /// The mesh in an asset has no inside.
+    /// The mesh in an asset is not closed, so it has no inside.
     #[error("the mesh in the asset is not closed: the directed edges do not balance, so nothing has a sign")]
     NotClosed,
 }
 
-/// Compares each asset with the exact signed distance of its mesh at all points of a grid that lie in its domain, in `f64`.
+/// Compares each asset with the exact signed distance of its mesh, in `f64`, at all grid points
+/// that lie in its domain.
 ///
-/// `progress` is told the share done, 0 to 1, from any thread. Runs in the current rayon pool.
+/// `progress` receives the completed fraction, 0 to 1, from any thread. Runs in the current rayon
+/// pool.
 ///
 /// # Errors
 /// [`EvaluateError`].
@@ -112,19 +116,20 @@ pub fn evaluate(
     Ok(tallies.into_iter().zip(&fields).map(report).collect())
 }
 
-/// Faces by id in the source: truncation and encoders do not change them, their order in the file may.
+/// Faces sorted by their id in the source. Truncation and the choice of the encoder may change the
+/// order of faces in the file, but not the faces.
 fn sorted_faces(asset: &TeSdf) -> Vec<(u32, [u32; 3])> {
     let mut faces: Vec<_> = asset.face_ids.iter().copied().zip(asset.faces.iter().copied()).collect();
     faces.sort_unstable();
     faces
 }
 
-/// An asset, and its cells in which there was an error.
+/// An asset and the set of its cells with an error.
 struct Field<'a> {
     asset: &'a TeSdf,
-    /// Largest error that counts as none, mesh unit.
+    /// Largest error that counts as zero, in the mesh's unit.
     exact: f64,
-    /// By word of the forest.
+    /// For each word of the forest: whether its cell has an error.
     wrong: Vec<AtomicBool>,
 }
 
@@ -136,14 +141,15 @@ impl<'a> Field<'a> {
 }
 
 impl Field<'_> {
-    /// At a point of the local frame, as its place in the domain answers it, in the mesh's unit.
+    /// Signed distance at a point of the local frame that is located at `place`, in the mesh's
+    /// unit.
     fn signed_distance(&self, local: DVec3, place: Place) -> f64 {
         let found = self.asset.found_at(local, place, Precision::F64);
         found.signed_distance * self.asset.frame.inverse_scale()
     }
 }
 
-/// All points with one z, row by row.
+/// Compares all points with one z, row by row.
 fn slab(grid: &Grid, z: u64, reference: &Reference, fields: &[Field]) -> Vec<Tally> {
     let mut tallies = vec![Tally::default(); fields.len()];
     for y in 0..grid.counts[1] {

@@ -4,18 +4,19 @@ use crate::geometry::{Aabb, AabbTree, WindingNumber};
 use crate::mesh::{MeshError, TriangleMesh};
 use crate::verify::brute_force::BruteForce;
 
-/// The exact signed distance of a mesh: a tree over all faces, triangles as brute force has them, and winding numbers.
+/// The exact signed distance of a mesh, from a tree over all faces, the triangle routine of brute
+/// force, and winding numbers.
 pub(super) struct Reference {
-    /// In lengths scaled by a power of two, so that no square leaves the range of `f64`.
+    /// Lengths are scaled by a power of two, so that squares stay within the range of `f64`.
     faces: BruteForce,
     tree: AabbTree,
     scale: f64,
     winding: WindingNumber,
 }
 
-/// Faces in a leaf.
+/// Largest number of faces in a leaf.
 const LEAF: usize = 4;
-/// Bounds of distances from those at a point nearby are off by less than this share.
+/// Relative rounding error allowed in bounds that come from the distance at a nearby point.
 const ROUNDING: f64 = 1e-9;
 
 impl Reference {
@@ -33,12 +34,13 @@ impl Reference {
         })
     }
 
-    /// Points one after the other, quicker where each is near the one before.
+    /// Begins a sequence of points. It is faster where each point is near the point before.
     pub fn walk(&self) -> Walk<'_> {
         Walk { reference: self, last: None }
     }
 
-    /// The distance, which is known to be at most `limit`; scaled.
+    /// The distance at `p`, which should be at most `limit`; `None` when no face is that near.
+    /// Lengths are scaled.
     fn distance(&self, p: DVec3, limit: f64) -> Option<f64> {
         let squared = |face: u32| self.faces.offset(face as usize, p).length_squared();
         let (squared, _) = self.tree.nearest_within(p, limit * limit, squared)?;
@@ -48,17 +50,17 @@ impl Reference {
 
 pub(super) struct Walk<'a> {
     reference: &'a Reference,
-    /// The point before and its signed distance, scaled.
+    /// The previous point and its signed distance, scaled.
     last: Option<(DVec3, f64)>,
 }
 
 impl Walk<'_> {
-    /// The signed distance at `p`, mesh unit.
+    /// The signed distance at `p`, in the mesh's unit.
     pub fn signed_distance(&mut self, p: DVec3) -> f64 {
         let Reference { scale, winding, .. } = self.reference;
         let scaled = p * *scale;
         let limit = match self.last {
-            // The distance changes by no more than the way from point to point.
+            // The distance changes by at most the length of the segment between the points.
             Some((q, d)) => (d.abs() + q.distance(scaled)) * (1.0 + ROUNDING),
             None => f64::INFINITY,
         };
@@ -67,7 +69,7 @@ impl Walk<'_> {
             .distance(scaled, limit)
             .or_else(|| self.reference.distance(scaled, f64::INFINITY))
             .unwrap_or(f64::NAN);
-        // A way that is shorter than the distance at one of its ends does not meet the surface.
+        // A segment that is shorter than the distance at one of its ends does not meet the surface.
         let inside = match self.last {
             Some((q, d)) if q.distance(scaled) * (1.0 + ROUNDING) < distance.max(d.abs()) => d < 0.0,
             _ => winding.at_perturbed(p) >= 1,
@@ -95,7 +97,7 @@ mod tests {
             let start = bounds.min - 0.1 * bounds.extent();
             let (y, z) = (f64::from(row % 7) / 6.0, f64::from(row) / 39.0);
             for x in 0..60 {
-                // Long steps, too.
+                // Every third row takes long steps.
                 let x = if row % 3 == 0 { f64::from(x * 37 % 60) } else { f64::from(x) };
                 let p = start + DVec3::new(x / 59.0, y, z) * 1.2 * bounds.extent();
                 let d = walk.signed_distance(p);

@@ -3,50 +3,52 @@ use serde::Serialize;
 
 use super::Grid;
 
-/// How exact an asset is, at the points of a grid that lie in its domain.
+/// How exact an asset is at those points of a grid that lie in its domain.
 ///
-/// Lengths are in the mesh's unit. Points that are in no cell are left out and counted. Points of cells without a list are
-/// answered by the asset's own face tree; they count like all others.
+/// Lengths are in the mesh's unit. Points in no cell are only counted. Points of cells without a
+/// list are answered by the asset's own face tree and count like all others.
 ///
-/// A *band* is a share of [`max_inside`](Self::max_inside): the largest, at most 1, such that the error is within a
-/// bound at all points nearer to the surface, on either side of it.
+/// A *band* is a fraction of [`max_inside`](Self::max_inside), at most 1. It is the largest
+/// fraction such that the error stays within a bound at all points nearer to the surface than that,
+/// on both sides.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BandReport {
-    /// Side of a voxel.
+    /// Side length of a voxel.
     pub voxel: f64,
-    /// Points of the grid in the domain: those that were compared.
+    /// Grid points in the domain; these are compared.
     pub points: u64,
-    /// Of those, points inside of the solid.
+    /// Compared points inside the solid.
     pub points_inside: u64,
-    /// Of those in the domain, points that the asset's face tree answers.
+    /// Compared points that the asset's face tree answers.
     pub points_by_tree: u64,
-    /// Points of the grid that are in no cell of the domain.
+    /// Grid points in no cell of the domain.
     pub points_outside: u64,
     /// Points with an error above [`exact`](Self::exact).
     pub points_inexact: u64,
-    /// Cells in which there is such a point.
+    /// Cells that contain such a point.
     pub cells_inexact: usize,
-    /// Errors up to this count as none.
+    /// Errors up to this value count as zero.
     pub exact: f64,
-    /// Largest exact |φ| of the points inside.
+    /// Largest exact |φ| of the compared points inside.
     pub max_inside: f64,
-    /// Largest exact |φ| of all points.
+    /// Largest exact |φ| of all compared points.
     pub max_domain: f64,
     /// Largest |φ of the asset − exact φ|.
     pub max_error: f64,
-    /// The first point with that error.
+    /// The first point with the largest error.
     pub max_error_at: Option<DVec3>,
-    /// `max_error` in percent of `max_inside`; `None` when no point is inside: the grid is too coarse.
+    /// `max_error` in percent of `max_inside`; `None` when the grid is so coarse that no point is
+    /// inside.
     pub max_error_percent: Option<f64>,
     /// `max_error` in percent of `max_domain`.
     pub max_error_percent_of_domain: Option<f64>,
     /// Band in which no error is above [`exact`](Self::exact).
     pub exactness_band: Option<f64>,
-    /// Its width on each side of the surface.
+    /// Width of the exactness band on each side of the surface.
     pub exactness_width: f64,
     /// Band in which no error is above 1 % of `max_inside`.
     pub one_percent_band: Option<f64>,
-    /// Its width on each side of the surface.
+    /// Width of the 1 % band on each side of the surface.
     pub one_percent_width: f64,
 }
 
@@ -80,7 +82,7 @@ impl BandReport {
     }
 }
 
-/// What a part of the grid adds up to. Parts are joined in the order of the grid.
+/// Sums and maxima over a part of the grid. Parts are joined in the order of the grid.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Tally {
     points: u64,
@@ -96,12 +98,12 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// A point in no cell.
+    /// Counts a point in no cell.
     pub fn outside(&mut self) {
         self.points_outside += 1;
     }
 
-    /// A point of the domain, with its exact signed distance.
+    /// Adds a point of the domain with its exact signed distance.
     pub fn add(&mut self, p: DVec3, exact: f64, error: f64, by_tree: bool) {
         self.points += 1;
         self.points_by_tree += u64::from(by_tree);
@@ -115,7 +117,7 @@ impl Tally {
         }
     }
 
-    /// The same point, when its error counts.
+    /// Adds the same point to the inexact points.
     pub fn add_inexact(&mut self, exact: f64, error: f64) {
         self.points_inexact += 1;
         self.front.insert(exact.abs(), error);
@@ -137,9 +139,11 @@ impl Tally {
     }
 }
 
-/// Distances from the surface and errors of those points that are nearer than all with as large an error; both ascend.
+/// Pareto front of (distance from the surface, error): a point is kept when no nearer point has an
+/// error at least as large. Both values ascend.
 ///
-/// What 1 % is known only at the end, so the least distance is kept for every bound of the error.
+/// The 1 % bound is known only at the end, so the front gives the least distance for every error
+/// bound.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Front(Vec<(f64, f64)>);
 
@@ -154,7 +158,8 @@ impl Front {
         self.0.splice(from..from + beaten, [(distance, error)]);
     }
 
-    /// The least distance from the surface with an error above `bound`; infinite when there is none.
+    /// The least distance from the surface with an error above `bound`; infinite when there is
+    /// none.
     fn least_distance(&self, bound: f64) -> f64 {
         let at = self.0.partition_point(|&(_, e)| e <= bound);
         self.0.get(at).map_or(f64::INFINITY, |&(d, _)| d)

@@ -8,23 +8,24 @@ use super::{Part, SaveError};
 /// Whether a read-only file may be replaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ReadOnly {
-    /// It is refused.
+    /// A read-only file is an error.
     #[default]
     Keep,
-    /// It is replaced, and its permissions are kept.
+    /// A read-only file is replaced, and its permissions are kept.
     Replace,
 }
 
-/// What a [`Destination`] must respect.
+/// The restrictions of a [`Destination`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SaveOptions<'a> {
-    /// Files that the work reads; none of them may be the output.
+    /// Files that the work reads. The output must not be one of them.
     pub inputs: &'a [&'a Path],
     /// Whether a read-only file may be replaced.
     pub read_only: ReadOnly,
 }
 
-/// Where the result of some work goes: checked before the work, so that an output that cannot be written costs nothing.
+/// The output of some work. It is checked before the work begins, so an output that cannot be
+/// written is found before time is spent.
 #[derive(Debug)]
 pub struct Destination {
     path: PathBuf,
@@ -33,7 +34,7 @@ pub struct Destination {
 
 #[derive(Debug)]
 enum Kind {
-    /// A regular file, there already or not, at this path, which is no link.
+    /// A regular file at this path, which is not a link. The file need not exist yet.
     File(PathBuf),
     /// A pipe, a device or an open descriptor.
     Stream(File),
@@ -42,11 +43,13 @@ enum Kind {
 }
 
 impl Destination {
-    /// Checks that `path` can be written: it is none of the inputs, no folder, not read-only, in a folder where files can
-    /// be created, and no other process is writing it. A pipe is opened, which waits for its reader.
+    /// Checks that `path` can be written. It must not be an input, a folder or a read-only file.
+    /// Its folder must accept new files, and no other process may be writing it. A pipe is opened,
+    /// which waits for its reader.
     ///
     /// # Errors
-    /// [`SaveError`] says which of these it is. Nothing was changed, but abandoned part files are gone.
+    /// [`SaveError`] says which condition fails. Nothing is changed, except that abandoned part
+    /// files are removed.
     pub fn new(path: &Path, options: &SaveOptions<'_>) -> Result<Self, SaveError> {
         if let Some(input) = options.inputs.iter().find(|input| is_same_file(path, input)) {
             return Err(SaveError::Input { output: path.to_path_buf(), input: input.to_path_buf() });
@@ -77,13 +80,13 @@ impl Destination {
         if !folder.is_dir() {
             return Err(SaveError::NoFolder { path: path.to_path_buf(), folder: folder.to_path_buf() });
         }
-        // Created and removed again: the only way to know that files can be created.
+        // Creates a file and removes it again: no other test shows that the folder accepts files.
         drop(Part::new(&target, path)?);
         Ok(Kind::File(target))
     }
 
     fn stream(target: &Path, path: &Path) -> Result<Kind, SaveError> {
-        // At the end of what is there: a descriptor may be of a file that holds bytes already.
+        // Appends, because the descriptor may belong to a file that already holds bytes.
         let file = OpenOptions::new().append(true).open(target).map_err(SaveError::io("open", path))?;
         Ok(Kind::Stream(file))
     }
@@ -93,13 +96,14 @@ impl Destination {
         &self.path
     }
 
-    /// Whether the bytes go to the standard output of this process, where no other text should go then.
+    /// Whether the bytes go to the standard output of this process. No other text should be written
+    /// there then.
     pub fn is_stdout(&self) -> bool {
         matches!(self.kind, Kind::Stdout)
     }
 
-    /// The regular file that [`write`](Self::write) replaces; `None` when it replaces none, but writes to a pipe, a device or an
-    /// open descriptor.
+    /// The regular file that [`write`](Self::write) replaces; `None` when the destination is a
+    /// pipe, a device or an open descriptor.
     pub fn file_path(&self) -> Option<&Path> {
         match &self.kind {
             Kind::File(target) => Some(target),
@@ -107,18 +111,19 @@ impl Destination {
         }
     }
 
-    /// A file to be written piece by piece; `None` when [`file_path`](Self::file_path) is.
+    /// Opens a part file to be written piece by piece; `None` when [`file_path`](Self::file_path)
+    /// is `None`.
     ///
     /// # Errors
-    /// What the operating system refused; another process that has begun to write the file.
+    /// The operating system refuses, or another process is writing the file.
     pub fn part(&self) -> Result<Option<Part>, SaveError> {
         self.file_path().map(|target| Part::new(target, &self.path)).transpose()
     }
 
-    /// Writes all of the bytes.
+    /// Writes all of `bytes`.
     ///
     /// # Errors
-    /// What the operating system refused; a regular file is then as it was and no part file is left.
+    /// The operating system refuses. A regular file is then unchanged, and no part file is left.
     pub fn write(&self, bytes: &[u8]) -> Result<(), SaveError> {
         let failed = SaveError::io("write", &self.path);
         match &self.kind {
@@ -136,7 +141,8 @@ impl Destination {
     }
 }
 
-/// By its permission bits, also for an administrator; or because the system does not let this process write it.
+/// Whether the permission bits forbid writing, even for an administrator, or the system does not
+/// let this process write the file.
 fn is_read_only(target: &Path, found: &fs::Metadata) -> bool {
     let refused = || OpenOptions::new().append(true).open(target).err();
     found.permissions().readonly() || refused().is_some_and(|e| e.kind() == io::ErrorKind::PermissionDenied)

@@ -1,20 +1,20 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Why an output is refused or cannot be written. A regular file that was at its path is then as it was.
+/// Why an output is refused or cannot be written. A regular file at its path is then unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
     /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried: `write`, `replace`, …
+        /// The attempted action: `write`, `replace`, …
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// The operating system's answer.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// The output is one of the inputs, under the same name or another.
+    /// The output is one of the inputs, possibly under another name.
     #[error("the output {} is the input {} itself: writing it would destroy the input", output.display(), input.display())]
     Input {
         /// The output as it was given.
@@ -22,13 +22,13 @@ pub enum SaveError {
         /// The input as it was given.
         input: PathBuf,
     },
-    /// The output is there and may not be written.
+    /// The output exists and is read-only.
     #[error("{} is read-only", path.display())]
     ReadOnly {
         /// The output.
         path: PathBuf,
     },
-    /// The folder of the output is missing.
+    /// The folder of the output does not exist.
     #[error("cannot write {}: there is no folder {}", path.display(), folder.display())]
     NoFolder {
         /// The output.
@@ -42,7 +42,8 @@ pub enum SaveError {
         /// The output.
         path: PathBuf,
     },
-    /// Another process holds a lock on the output, as `tesdf simulate` does while the run grows.
+    /// Another process holds a lock on the output. `tesdf simulate` holds one while it appends to a
+    /// run.
     #[error("another process is writing {}", path.display())]
     Busy {
         /// The output.
@@ -51,7 +52,7 @@ pub enum SaveError {
 }
 
 impl SaveError {
-    /// For `map_err`: what was tried, and with which file.
+    /// For `map_err`: adds the attempted action and the file.
     pub(super) fn io(action: &'static str, path: &Path) -> impl Fn(io::Error) -> Self {
         move |source| Self::Io { action, path: path.to_path_buf(), source }
     }

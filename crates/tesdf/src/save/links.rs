@@ -1,28 +1,30 @@
-//! Which file a path means.
+//! Finds the file that a path refers to.
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What a path means once its links are followed.
+/// What a path refers to after its links are followed.
 #[derive(Debug)]
 pub(super) enum Meant {
-    /// A path that is no link; there need not be a file.
+    /// A path that is not a link. The file need not exist.
     Path(PathBuf),
     /// A descriptor that a process holds open, such as `/dev/stdout`.
     Descriptor(PathBuf),
 }
 
-/// As many as Linux follows.
+/// The same limit as that of Linux.
 const MOST_LINKS: usize = 40;
 
-/// Follows the links of the last component. Renaming over a link would replace the link instead of its file.
+/// Follows the links of the last component. Renaming over a link would replace the link instead of
+/// its file.
 ///
 /// # Errors
-/// Links in a circle.
+/// The links form a circle.
 pub(super) fn follow(path: &Path) -> io::Result<Meant> {
     let mut path = path.to_path_buf();
     for _ in 0..MOST_LINKS {
-        // A link of /proc names a file that may be renamed or gone: the descriptor is what is meant.
+        // A link in /proc may name a file that was renamed or removed, so the descriptor itself is
+        // used.
         if is_descriptor(&path) {
             return Ok(Meant::Descriptor(path));
         }
@@ -40,18 +42,18 @@ fn is_descriptor(path: &Path) -> bool {
     })
 }
 
-/// The folder that the last component of a path is in.
+/// The folder that contains the last component of a path.
 pub(super) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Whether two paths lead to one file, by its identity on the disk: under other names, and through hard and symbolic
-/// links, too. `false` when one of them leads to no file.
+/// Whether two paths refer to the same file on the disk. Names may differ, and hard and symbolic
+/// links are followed. `false` when a path refers to no file.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     #[cfg(unix)]
     {
         use std::os::unix::fs::MetadataExt;
-        // Nothing is opened: opening a pipe would wait for its other end.
+        // Reads metadata only: opening a pipe would wait for its other end.
         let identity = |path| fs::metadata(path).map(|m| (m.dev(), m.ino()));
         identity(a).is_ok_and(|a| identity(b).is_ok_and(|b| a == b))
     }

@@ -10,18 +10,19 @@ use super::links::folder_of;
 const PREFIX: &str = ".tesdf-";
 const SUFFIX: &str = ".part";
 
-/// A file that is being written beside the file that it will replace. Dropping it removes it.
+/// A new file that is being written beside the file that it will replace. Dropping it removes it.
 #[derive(Debug)]
 pub struct Part {
     file: NamedTempFile,
-    /// What it will replace.
+    /// The file that it will replace.
     target: PathBuf,
-    /// The name of that for people.
+    /// The name of the target in messages.
     name: PathBuf,
 }
 
 impl Part {
-    /// An empty file in the folder of `target`, which must not be a link. Part files of processes that are gone are removed first.
+    /// Creates an empty file in the folder of `target`, which must not be a link. Part files of
+    /// ended processes are removed first.
     pub(super) fn new(target: &Path, name: &Path) -> Result<Self, SaveError> {
         if is_locked(target) {
             return Err(SaveError::Busy { path: name.to_path_buf() });
@@ -31,19 +32,20 @@ impl Part {
         let failed = SaveError::io("create a file in", folder);
         loop {
             let file = create(target, folder).map_err(&failed)?;
-            // Where the system has no locks, it has none for `remove_abandoned`, which then removes nothing.
+            // An error is ignored: on a file system without locks, `remove_abandoned` cannot lock
+            // either and removes nothing.
             let _ = file.as_file().lock();
-            // Before it was locked, another process may have taken it for an abandoned file.
+            // Before the file was locked, another process may have removed it as abandoned.
             if file.path().exists() {
                 return Ok(Self { file, target: target.to_path_buf(), name: name.to_path_buf() });
             }
         }
     }
 
-    /// Brings the bytes to the disk and gives the file its name.
+    /// Writes the bytes to the disk and renames the file to its target.
     ///
     /// # Errors
-    /// What the operating system refused; the file with that name is then as it was.
+    /// The operating system refuses. The file at the target is then unchanged.
     pub fn finish(self) -> Result<GrowingFile, SaveError> {
         let Self { file, target, name } = self;
         if let Ok(replaced) = fs::metadata(&target) {
@@ -52,7 +54,8 @@ impl Part {
         }
         file.as_file().sync_all().map_err(SaveError::io("write", &name))?;
         let file = file.persist(&target).map_err(|e| SaveError::io("replace", &name)(e.error))?;
-        // The rename itself must reach the disk too; not every file system lets a folder be opened or synced.
+        // The rename itself must reach the disk too. Errors are ignored, as some file systems do
+        // not let a folder be opened or synced.
         #[cfg(unix)]
         if let Ok(folder) = File::open(folder_of(&target)) {
             let _ = folder.sync_all();
@@ -71,15 +74,17 @@ impl Write for Part {
     }
 }
 
-/// A file in its place that may still grow. No other process replaces it until it is dropped.
+/// A file at its final path that may still grow. This crate refuses to replace it until it is
+/// dropped.
 #[derive(Debug)]
 pub struct GrowingFile(File);
 
 impl GrowingFile {
-    /// Cuts the file after `bytes`, where the next write goes on: takes back a write that failed halfway.
+    /// Truncates the file to `bytes` and continues writing there. This undoes a write that failed
+    /// halfway.
     ///
     /// # Errors
-    /// What the operating system refused.
+    /// The operating system refuses.
     pub fn cut(&mut self, bytes: u64) -> io::Result<()> {
         self.0.set_len(bytes)?;
         self.0.seek(SeekFrom::Start(bytes)).map(drop)
@@ -98,19 +103,21 @@ impl Write for GrowingFile {
 
 impl Drop for GrowingFile {
     fn drop(&mut self) {
-        // Closing is not enough: a process that another thread starts right now has the file open, too, until it executes.
+        // Closing is not enough. A child process that another thread is starting also holds the
+        // file open until it executes its program.
         let _ = self.0.unlock();
     }
 }
 
-/// A new file has the permissions of the file that it replaces from the beginning, so nobody else can read it meanwhile.
+/// Creates the file with the permissions of the file that it replaces, so nobody else can read it
+/// meanwhile.
 fn create(target: &Path, folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // What the umask leaves of 0666 is an ordinary file.
+        // The umask turns 0666 into the mode of an ordinary file.
         let mode = fs::metadata(target).map_or(0o666, |m| m.permissions().mode() & 0o777);
         builder.permissions(fs::Permissions::from_mode(mode));
     }
@@ -124,11 +131,12 @@ fn keep_owner_and_mode(file: &File, replaced: &fs::Metadata) -> io::Result<()> {
     use std::os::unix::fs::{MetadataExt, fchown};
     let created = file.metadata()?;
     if (created.uid(), created.gid()) != (replaced.uid(), replaced.gid()) {
-        // Only an administrator may give a file away; a group of one's own may be set.
+        // Only an administrator may change the owner. A user may set a group that the user belongs
+        // to.
         let _ = fchown(file, Some(replaced.uid()), Some(replaced.gid()))
             .or_else(|_| fchown(file, None, Some(replaced.gid())));
     }
-    // After the owner, as a change of the owner clears bits.
+    // Set after the owner, because changing the owner clears mode bits.
     file.set_permissions(replaced.permissions())
 }
 
@@ -143,7 +151,8 @@ fn is_locked(path: &Path) -> bool {
         && File::open(path).is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
 }
 
-/// Removes part files that no process holds. A folder or file that cannot be read or removed is left alone.
+/// Removes part files that no process locks. Folders and files that cannot be read or removed are
+/// left alone.
 fn remove_abandoned(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -152,7 +161,8 @@ fn remove_abandoned(folder: &Path) {
         if !is_part || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
-        // The lock is held until the file is gone, so its process, if it has just begun, notices.
+        // The lock is held until the file is removed. A process that has just created the file
+        // waits for the lock and then sees that its file is gone.
         if let Ok(file) = File::open(entry.path())
             && file.try_lock().is_ok()
         {

@@ -1,8 +1,8 @@
-//! Faces of degenerate shapes of every kind and size, and points where these shapes do harm.
+//! Degenerate faces of every kind and size, and points where they cause numerical trouble.
 use glam::DVec3;
 use proptest::prelude::*;
 
-/// A face within a cube with sides of 2 around the origin.
+/// A face inside the cube [-1, 1]³.
 pub fn face() -> impl Strategy<Value = [DVec3; 3]> {
     let size = (-150.0..0.0f64).prop_map(|e| 10f64.powf(e));
     let width = (-18.0..-1.0f64).prop_map(|e| 10f64.powf(e));
@@ -13,13 +13,14 @@ pub fn face() -> impl Strategy<Value = [DVec3; 3]> {
                 0 => [p; 3],
                 1 => [p, p, q],
                 2 => [p, q, p],
-                // On a line, exactly and up to rounding.
+                // Collinear corners, exactly and up to rounding.
                 3 => [0.25 * at, 0.25 * (at + u), 0.25 * (at - 2.0 * u)],
                 4 => [p, q, p + 0.3 * (q - p)],
                 // Needles and caps.
                 5 => [p, q, p + width * r],
                 6 => [p, q, p + 0.4 * (q - p) + width * r],
-                // Small: around the origin of full shape, elsewhere as rounding leaves it.
+                // Small faces: with full relative precision at the origin; elsewhere rounding
+                // distorts their shape.
                 7 => [size * p, size * q, size * r],
                 8 => [p, p + size.sqrt().max(1e-12) * q, p + size.sqrt().max(1e-12) * r],
                 _ => [0.25 * at, 0.25 * u, 0.25 * v],
@@ -50,7 +51,7 @@ fn anywhere() -> impl Strategy<Value = DVec3> {
     [-1.0..1.0f64, -1.0..1.0, -1.0..1.0].prop_map(DVec3::from_array)
 }
 
-/// Small whole numbers, so that coordinates are often equal.
+/// Small integers, so that coordinates are often equal.
 fn lattice() -> impl Strategy<Value = DVec3> {
     [-2i32..3, -2..3, -2..3].prop_map(|p| DVec3::from_array(p.map(f64::from)))
 }
@@ -60,8 +61,9 @@ pub fn face_and_point() -> impl Strategy<Value = ([DVec3; 3], DVec3)> {
     face().prop_flat_map(|corners| (Just(corners), point_beside(corners)))
 }
 
-/// A narrow face whose longest edge is about 1, and a point beyond one of its tips, near the plane and nearly in line with its sides: both sides
-/// are as near there as rounding.
+/// A narrow face whose longest edge is about 1, and a point beyond one of its tips. The point lies
+/// near the plane and nearly in line with the two long sides: their distances differ only by about
+/// the rounding error.
 pub fn beyond_a_tip() -> impl Strategy<Value = ([DVec3; 3], DVec3)> {
     let power = |low: f64, high: f64| (low..high).prop_map(|e| 10f64.powf(e));
     let shape = (0.0..1.0f64, power(-7.0, 0.0), any::<bool>());
@@ -74,7 +76,7 @@ pub fn beyond_a_tip() -> impl Strategy<Value = ([DVec3; 3], DVec3)> {
             let at = 0.5 * at;
             let foot = if is_cap { foot } else { 1.0 };
             let corners = [at, at + along, at + foot * along + width * beside];
-            // From the tip outwards, between the directions of its two sides.
+            // Points from the tip outwards, between the directions of its two sides.
             let side = along.lerp(corners[2] - corners[0], across).normalize_or(along);
             let p = at - beyond * side + above * along.cross(beside);
             let mut corners = corners;

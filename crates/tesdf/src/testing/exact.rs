@@ -24,7 +24,7 @@ fn cross(a: &Point, b: &Point) -> Point {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| &a[i] * &b[j] - &a[j] * &b[i])
 }
 
-/// The squared distance between a point and a triangle of any shape, exact.
+/// The exact squared distance between a point and a triangle of any shape.
 pub fn squared_distance(p: DVec3, corners: [DVec3; 3]) -> BigRational {
     let p = point(p);
     let corners = corners.map(point);
@@ -53,7 +53,7 @@ pub fn squared_distance(p: DVec3, corners: [DVec3; 3]) -> BigRational {
     (0..3).map(to_edge).min().unwrap_or(zero)
 }
 
-/// Whether `distance` is the root of `squared` up to `tolerance`.
+/// Whether `distance` is the square root of `squared` up to `tolerance`.
 pub fn is_root(distance: f64, squared: &BigRational, tolerance: f64) -> bool {
     if !(distance.is_finite() && distance >= 0.0) {
         return false;
@@ -64,7 +64,7 @@ pub fn is_root(distance: f64, squared: &BigRational, tolerance: f64) -> bool {
     &low * &low <= *squared && *squared <= &high * &high
 }
 
-/// Whether `low` is at most the root of `squared`, and `high` at least.
+/// Whether `low` ≤ √`squared` ≤ `high`.
 pub fn is_between(low: f64, squared: &BigRational, high: f64) -> bool {
     let square = |x: f64| {
         let x = number(x.max(0.0));

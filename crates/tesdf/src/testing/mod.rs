@@ -1,3 +1,3 @@
-//! What tests of several stages compare with: exact arithmetic, and faces of degenerate shapes.
+//! References that tests of several stages compare with: exact arithmetic and degenerate faces.
 pub mod degenerate;
 pub mod exact;
