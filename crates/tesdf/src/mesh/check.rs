@@ -20,70 +20,83 @@ pub(crate) use range::{coordinate_in_range, out_of_range};
 pub(crate) use t_junctions::{TJunctions, t_junctions};
 pub(crate) use winding::height;
 
-/// What [`check`] found.
+/// The result of [`check`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CheckReport {
     /// Number of vertices.
     pub vertices: usize,
     /// Number of faces.
     pub faces: usize,
-    /// Least corner of the bounds of the used vertices, in the mesh's unit.
+    /// Lowest corner of the bounds of the used vertices, in the mesh's unit.
     pub min: [f64; 3],
-    /// Greatest corner.
+    /// Highest corner of these bounds.
     pub max: [f64; 3],
     /// Length of the diagonal of the bounds, in the mesh's unit.
     pub diagonal: f64,
-    /// Number of pieces that are connected over edges.
+    /// Number of connected components, where faces are connected over shared edges.
     pub shells: usize,
-    /// Open edges chained into loops, or paths where they do not close.
+    /// Open edges, chained into closed loops or open paths.
     pub boundary_loops: Vec<BoundaryLoop>,
-    /// Least and greatest winding number found; `None` when it is not an integer everywhere, or was not tested.
+    /// Least and greatest winding number found; `None` when it is not an integer everywhere or was
+    /// not tested.
     pub winding: Option<[i32; 2]>,
-    /// Whether the mesh has a well-defined inside: there is no error.
+    /// Whether the mesh has a well-defined inside, that is, no defect is an error.
     pub encodable: bool,
-    /// All defects, by kind, then by place in the mesh.
+    /// All defects, sorted by kind.
     pub defects: Vec<Defect>,
 }
 
 /// A chain of edges where the surface is open.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BoundaryLoop {
-    /// Vertices in order, along the direction of the faces, 0-based.
+    /// Vertices in order, 0-based. The order follows the direction of the faces.
     pub vertices: Vec<u32>,
-    /// Whether the last vertex is connected to the first.
+    /// Whether an edge connects the last vertex to the first.
     pub closed: bool,
     /// Length, in the mesh's unit.
     pub length: f64,
 }
 
-/// A vertex closer than this to an open edge, relative to the diagonal, makes a T-junction.
+/// A vertex closer than this to an open edge makes a T-junction. Relative to the diagonal.
 pub(crate) const T_JUNCTION_TOLERANCE: f64 = 1e-9;
 
-/// Finds everything that [`DefectKind`] names.
+/// Finds every defect that [`DefectKind`] names.
 ///
-/// # What makes an error
-/// The winding number is an integer everywhere exactly when the directed edges balance: for each two vertices a
-/// and b, as many faces run from a to b as from b to a. (The winding number is the solid angle over 4 pi. A cone of
-/// triangles from any point to all directed edges closes the surface, and its triangles cancel in pairs when the
-/// edges balance; where they do not, the solid angle of what is left changes continuously with the point.) That
-/// is a matter of counting: no tolerance. When the edges balance, self-intersections, non-manifold edges and
-/// vertices, duplicate faces and faces without area are warnings, as they leave the inside (winding number
-/// 1 or more) well defined; otherwise they are errors, like open edges. A negative winding number is a warning too:
-/// such a place counts as outside. When no place has a winding number of 1 or more, that is an error.
+/// # Errors and warnings
+/// The winding number is an integer everywhere exactly when the directed edges balance: for any two
+/// vertices a and b, as many faces run from a to b as from b to a. This is a matter of counting and
+/// needs no tolerance.
+///
+/// Why: the winding number is the solid angle divided by 4 pi. Triangles from any point to all
+/// directed edges close the surface. Where the edges balance, these triangles cancel in pairs.
+/// Where they do not, the solid angle of the remaining triangles changes continuously with the
+/// point.
+///
+/// When the edges balance, the inside (winding number 1 or more) is well defined.
+/// Self-intersections, non-manifold edges and vertices, duplicate faces and faces without area are
+/// then warnings. Otherwise they are errors, like open edges. A negative winding number is a
+/// warning too: such a place counts as outside. A mesh whose winding number is nowhere 1 or more is
+/// an error.
 ///
 /// # How far the winding number is tested
-/// The winding number is constant on each side of a patch of faces that are connected over manifold edges and
-/// meet no other face; one test per patch covers it. A face that meets others is cut by them into regions, and the
-/// winding number is constant on each side of a region; a test in each region covers the face.
+/// A patch is a set of faces that are connected over manifold edges and meet no other face. The
+/// winding number is constant on each side of a patch, so one test covers it. A face that meets
+/// other faces is cut by them into regions. The winding number is constant on each side of a
+/// region, so one test in each region covers the face.
 ///
-/// A test is exact for its point: the winding number there, and the side of the face that the point is on. The points are
-/// rounded to 64-bit floats. So a test may miss a place, or say its winding number of another face, only where
-/// two faces are as near to each other as rounding, some 1e-14 of the largest coordinate, or where a region is narrower.
-/// There is a bound on the work: where more than 4096 faces cut a face, or cross each other more than once each on it, or where
-/// there are more than 131072 regions in all, evenly chosen regions are tested.
+/// A test is exact for its point: it finds the winding number there and on which side of the face
+/// the point lies. The points themselves are rounded to 64-bit floats. So a test may miss a place,
+/// or report the winding number next to another face, only in two cases: two faces are nearer to
+/// each other than the rounding error (some 1e-14 of the largest coordinate), or a region is
+/// narrower than that.
 ///
-/// When a value is [out of range](DefectKind::OutOfRange) nothing else is tested. When more than a million pairs of faces intersect, and
-/// more than two for each face, that is an error, the pairs are not listed, and winding numbers are not tested.
+/// The work is bounded. Only evenly chosen regions are tested in these cases: more than 4096 faces
+/// cut one face; the cuts on a face cross each other so often that they form more than two pieces
+/// per cut and 64 more; there are more than 131072 regions in all.
+///
+/// When a value is [out of range](DefectKind::OutOfRange), nothing else is tested. When more than a
+/// million pairs of faces intersect, and more than two per face, the mesh gets one error without a
+/// list of the pairs, and winding numbers are not tested.
 pub fn check(mesh: &TriangleMesh) -> CheckReport {
     let topology = Topology::new(mesh.faces());
     let bounds = mesh.bounds();
@@ -116,7 +129,7 @@ pub fn check(mesh: &TriangleMesh) -> CheckReport {
     let touching = junctions.touching(mesh, &topology);
     let pairs = self_intersections(mesh, &flaws.without_area(), &touching);
     defects.extend(intersections::defects(mesh, &pairs, lenient));
-    // With pairs missing, a patch of faces could be cut by others.
+    // When pairs are missing, unknown faces could cut a patch.
     if closed && pairs.len() < intersections::most_pairs(mesh) {
         let meetings = winding::Meetings { flaws: &flaws, intersections: &pairs, touching: &touching };
         let (range, found) = winding::winding_defects(mesh, &topology, &meetings);
@@ -131,14 +144,15 @@ pub fn check(mesh: &TriangleMesh) -> CheckReport {
 }
 
 impl CheckReport {
-    /// Defects of one severity.
+    /// The defects of one severity.
     pub fn of_severity(&self, severity: Severity) -> impl Iterator<Item = &Defect> {
         self.defects.iter().filter(move |d| d.severity == severity)
     }
 
-    /// Whether the surface is an embedded manifold: every edge has two faces that run along it in
-    /// opposite directions, every used vertex one fan, no face lacks area or repeats, no two meet elsewhere than in
-    /// shared corners and edges, and the winding number is 0 or 1 everywhere.
+    /// Whether the surface is an embedded manifold. Then every edge has two faces that run along it
+    /// in opposite directions, and the faces around every used vertex form one fan. No face lacks
+    /// area or repeats another face. Faces meet only in shared corners and edges. The winding
+    /// number is 0 or 1 everywhere.
     pub fn is_simple(&self) -> bool {
         use DefectKind::*;
         self.encodable
@@ -149,7 +163,7 @@ impl CheckReport {
     }
 }
 
-/// Defects of each kind that people see at first; the report has all.
+/// Number of defects of each kind in the text for people. The report has all of them.
 const SHOWN: usize = 5;
 
 impl fmt::Display for CheckReport {
@@ -186,7 +200,7 @@ impl fmt::Display for CheckReport {
     }
 }
 
-/// The first few defects of each kind, with the total where there are more.
+/// Writes the first few defects of each kind, and the total where there are more.
 pub(crate) fn write_defects(f: &mut fmt::Formatter<'_>, defects: &[Defect]) -> fmt::Result {
     let mut kinds: BTreeMap<(DefectKind, Severity), Vec<&Defect>> = BTreeMap::new();
     defects.iter().for_each(|d| kinds.entry((d.kind, d.severity)).or_default().push(d));

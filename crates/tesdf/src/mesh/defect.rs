@@ -3,32 +3,32 @@ use std::fmt;
 use glam::DVec3;
 use serde::Serialize;
 
-/// Something about a mesh that a person may want to know, with the place where it is.
+/// A property of a mesh that a person may want to know, with its place.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Defect {
-    /// What it is.
+    /// The kind of defect.
     pub kind: DefectKind,
-    /// What it means for the mesh as a solid.
+    /// The consequence for the mesh as a solid.
     pub severity: Severity,
     /// Faces concerned, 0-based.
     pub faces: Vec<u32>,
-    /// Vertices concerned, 0-based; the two ends for an edge.
+    /// Vertices concerned, 0-based. For an edge, its two ends.
     pub vertices: Vec<u32>,
-    /// A point where it is, in the mesh's unit.
+    /// A point at the defect, in the mesh's unit.
     pub place: [f64; 3],
     /// One line for people, with 0-based ids.
     pub message: String,
 }
 
-/// What a defect means for the mesh as a solid.
+/// The consequence of a defect for the mesh as a solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
-    /// The mesh has no well-defined inside: it cannot be encoded.
+    /// The mesh has no well-defined inside, so it cannot be encoded.
     Error,
-    /// The inside is well defined all the same; worth a look.
+    /// The inside is well defined, but the place is worth a look.
     Warning,
-    /// Without consequence.
+    /// No consequence.
     Note,
 }
 
@@ -36,11 +36,11 @@ pub enum Severity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DefectKind {
-    /// A coordinate or the size of the mesh is outside of the range in which computations are exact.
+    /// A coordinate or the size of the mesh is outside the range in which computations are exact.
     OutOfRange,
-    /// A face with the corners of another, in the same orientation.
+    /// A face with the corners of another face, in the same orientation.
     DuplicateFace,
-    /// A face with the corners of another, in the opposite orientation.
+    /// A face with the corners of another face, in the opposite orientation.
     ReversedDuplicateFace,
     /// A vertex lies on an open edge of a face that does not use it.
     TJunction,
@@ -48,29 +48,31 @@ pub enum DefectKind {
     OpenEdge,
     /// An edge with two faces that run along it in the same direction.
     InconsistentOrientation,
-    /// A surface with one side, such as a Moebius strip.
+    /// A one-sided surface, such as a Moebius strip.
     NonOrientable,
     /// An edge with more than two faces.
     NonManifoldEdge,
-    /// A vertex where surfaces touch that share no edge there.
+    /// A vertex where parts of the surface touch that share no edge there.
     NonManifoldVertex,
     /// A face with two equal corners.
     RepeatedCorner,
-    /// A face whose three different corners are on one line, exactly.
+    /// A face with three different corners that lie exactly on one line.
     ZeroArea,
-    /// Two faces that meet in more than a shared corner or edge.
+    /// Two faces that meet in more than the corner or edge that they share.
     SelfIntersection,
-    /// A place with a negative winding number: a surface that is inside out.
+    /// A place with a negative winding number: the surface is inside out there.
     NegativeWinding,
     /// No place has a positive winding number.
     NoInside,
-    /// A place with a winding number above 1: solids that overlap, or a cavity that is inside out.
+    /// A place with a winding number above 1: solids overlap, or a cavity is inside out.
     WindingAboveOne,
     /// A face whose height is less than a millionth of its longest edge.
     NeedleFace,
-    /// The mesh is so far from the origin that 32-bit floats cannot hold its coordinates.
+    /// The mesh is so far from the origin that 32-bit floats would move its vertices by more than
+    /// 1e-6 of the diagonal.
     FarFromOrigin,
-    /// The mesh is so large or small that squares of lengths leave the range of 32-bit floats.
+    /// The mesh is so large or so small that the square of its diagonal leaves the range of 32-bit
+    /// floats.
     ExtremeScale,
     /// A vertex that no face uses.
     UnusedVertex,

@@ -1,4 +1,4 @@
-//! From a mesh file to a solid that can be encoded.
+//! Reads, checks, repairs and writes meshes. The product is a [`SolidMesh`], which can be encoded.
 mod check;
 mod count;
 mod defect;

@@ -1,30 +1,32 @@
-//! Triangulation of one polygon of a mesh file.
+//! Triangulates one polygon of a mesh file.
 //!
-//! In: the corner positions of a polygon in 3-D, in order. Out: triangles by corner number, all
-//! oriented as the polygon. Every corner is a corner of some triangle, flat ones (on the line
-//! between their neighbours) too: a neighbour face uses them, and leaving them out would open a
-//! T-junction. That is why no earcut crate is used here: `earcut` 0.4.8 and `earcutr` 0.5.0 filter
-//! flat corners out before they clip (`filter_points`), and leave it to the caller to check the
-//! result (`deviation`).
+//! Input: the positions of the polygon's corners in 3-D, in order. Output: triangles of corner
+//! indices, oriented as the polygon.
+//!
+//! Every corner becomes a corner of some triangle, also a flat corner (on the line between its
+//! neighbours). A neighbour face uses that corner, so dropping it would open a T-junction. For this
+//! reason no earcut crate is used: `earcut` 0.4.8 and `earcutr` 0.5.0 remove flat corners before
+//! they clip (`filter_points`), and leave it to the caller to check the result (`deviation`).
 use glam::{DVec2, DVec3};
 use robust::{Coord, orient2d};
 
-/// What a polygon proved to be, seen along its normal.
+/// The shape of a polygon, seen along its normal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shape {
-    /// Convex: a fan from its first corner.
+    /// Convex. When no corner next to the first is flat, the triangles are a fan around the first
+    /// corner.
     Convex,
-    /// Simple, not convex: ear clipping; the triangles do not overlap.
+    /// Simple but not convex. Ear clipping gives triangles that do not overlap.
     Concave,
-    /// No area, or its outline crosses itself, or it is so intricate that [`EarClipper`] stopped
-    /// looking: some triangle is flat or flipped.
+    /// The polygon has no area, its outline crosses itself, or it is so intricate that
+    /// [`EarClipper`] reached its step limit. Some triangle is flat or flipped.
     Irregular,
 }
 
 /// Splits a polygon of three or more corners and appends its `corners.len() - 2` triangles.
 ///
 /// Orientation is decided exactly (`robust`) on the coordinate plane most nearly parallel to the
-/// polygon's Newell plane: to drop a coordinate rounds nothing.
+/// polygon's Newell plane. Projecting by dropping a coordinate causes no rounding.
 pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> Shape {
     let n = corners.len();
     if n < 3 {
@@ -36,7 +38,7 @@ pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> S
     }
     let flat = project(corners);
     let turn = |a: usize, b: usize, c: usize| orient(flat[a], flat[b], flat[c]);
-    // The third condition keeps a locally convex outline that goes round more than once out.
+    // The third condition excludes a locally convex outline that goes round more than once.
     let fan = (1..n - 1).all(|i| turn(0, i, i + 1) > 0.0)
         && (0..n).all(|i| turn(i, (i + 1) % n, (i + 2) % n) >= 0.0)
         && (2..n).all(|i| turn(0, 1, i) >= 0.0);
@@ -51,8 +53,8 @@ pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> S
         let [a, b, c] = t.map(|v| v as usize);
         turn(a, b, c) > 0.0
     });
-    // The triangles' oriented outlines add up to the polygon's outline. So when all are positive,
-    // each point inside a simple polygon is covered once.
+    // The oriented outlines of the triangles add up to the polygon's outline. So when all triangles
+    // are positive, each point inside a simple polygon is covered once.
     match (positive, convex) {
         (false, _) => Shape::Irregular,
         (true, true) => Shape::Convex,
@@ -60,7 +62,7 @@ pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> S
     }
 }
 
-/// Drops the coordinate in which the Newell normal is largest, keeping counter-clockwise order.
+/// Drops the coordinate in which the Newell normal is largest, and keeps counter-clockwise order.
 fn project(corners: &[DVec3]) -> Vec<DVec2> {
     let origin = corners[0];
     let mut normal = DVec3::ZERO;
@@ -98,18 +100,18 @@ struct EarClipper<'a> {
     points: &'a [DVec2],
     next: Vec<u32>,
     previous: Vec<u32>,
-    /// Corners that were not strictly convex when last looked at; only these can block an ear.
+    /// Corners that were not strictly convex when last tested. Only these can block an ear.
     blockers: Vec<u32>,
     blocks: Vec<bool>,
-    /// For each corner one that lay in its ear when last looked for.
+    /// For each corner, the corner that was found inside its ear last.
     blocked_by: Vec<Option<u32>>,
-    /// Steps left before any corner is clipped, free or not.
+    /// Steps left. At 0, every corner is clipped without a test.
     steps: u64,
 }
 
-/// Steps for each corner of a polygon. Ear clipping can take the cube of the number of corners;
-/// this keeps hostile files linear in their size. Combs and spirals of 30,000 corners, which are
-/// simple, stay below it (1.1 s and 1.4 s); 30,000 random corners, which are not, stop there (4 s).
+/// Step limit per corner of a polygon. Ear clipping can take cubic time; the limit keeps hostile
+/// files linear in their size. Combs and spirals of 30,000 corners, which are simple, stay below it
+/// (1.1 s and 1.4 s). 30,000 random corners, which cross, reach it (4 s).
 const STEPS_PER_CORNER: u64 = 1 << 16;
 
 impl<'a> EarClipper<'a> {
@@ -142,8 +144,8 @@ impl<'a> EarClipper<'a> {
         [self.previous[i as usize], i, self.next[i as usize]]
     }
 
-    /// Whether no other corner lies in or on the ear at `i`. Corners at the position of one of
-    /// the ear's own do not count: the two sides of a bridge to a hole coincide.
+    /// Whether no other corner lies in or on the ear at `i`. Corners at the position of one of the
+    /// ear's own corners do not count: the two sides of a bridge to a hole coincide.
     fn is_free(&mut self, i: u32) -> bool {
         let ear = self.ear(i);
         let [a, b, c] = ear.map(|v| self.points[v as usize]);
@@ -159,7 +161,7 @@ impl<'a> EarClipper<'a> {
                 && orient(b, c, p) >= 0.0
                 && orient(c, a, p) >= 0.0
         };
-        // The corner that blocked this ear before mostly still does.
+        // The corner that blocked this ear before usually still blocks it.
         if self.blocked_by[i as usize].as_ref().is_some_and(inside) {
             return false;
         }
@@ -174,8 +176,8 @@ impl<'a> EarClipper<'a> {
         let mut at = 0;
         let mut tried = 0;
         while left > 3 {
-            // An outline that crosses itself can have no free ear: then any strictly convex
-            // corner is taken, and when there is none either, any corner.
+            // An outline that crosses itself can have no free ear. Then any strictly convex corner
+            // is clipped, or any corner when there is none.
             self.steps = self.steps.saturating_sub(1);
             let take = if self.steps == 0 {
                 true
@@ -206,7 +208,7 @@ impl<'a> EarClipper<'a> {
                     }
                 }
             }
-            // Going on two corners further gives rounder triangles than a fan around `before`.
+            // Skipping two corners gives rounder triangles than a fan around `before`.
             at = self.next[after as usize];
             if left.is_multiple_of(64) {
                 self.blockers.retain(|&v| self.blocks[v as usize]);
@@ -224,7 +226,7 @@ mod tests {
         points.iter().map(|&(x, y)| DVec3::new(x, 2.0 * x - y, y)).collect()
     }
 
-    /// Triangles, their shape, and their summed area over the polygon's own.
+    /// Triangles, their shape, and their summed area divided by the polygon's area.
     fn split(corners: &[DVec3]) -> (Vec<[u32; 3]>, Shape, f64) {
         let mut triangles = Vec::new();
         let shape = triangulate(corners, &mut triangles);

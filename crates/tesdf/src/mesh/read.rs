@@ -1,14 +1,15 @@
-//! Mesh files to [`TriangleMesh`]: STL, OBJ, PLY, OFF, glTF and GLB.
+//! Reads mesh files into a [`TriangleMesh`]: STL, OBJ, PLY, OFF, glTF and GLB.
 //!
-//! Each format has a parser that turns bytes into polygons with a place (line, byte, accessor)
-//! for each vertex and face; everything after that is common: index check, finiteness, welding,
-//! triangulation. Nothing is allocated by a count in a header, only by bytes that are there.
+//! Each format has a parser that turns bytes into polygons with a place (line, byte, accessor) for
+//! each vertex and face. The steps after that are common: index check, finiteness, welding,
+//! triangulation. Memory is allocated only for bytes that are present, never by a count in a
+//! header.
 //!
-//! The STL, OBJ, PLY and OFF parsers are our own because an error must name the line or element
-//! at fault. `tobj` 4.0.5 has neither in its `LoadError`; `stl_io` 0.11.0 gives an `io::Error`
-//! without the line; `ply-rs-bw` 4.0.1 names the line that does not parse, but its rows do not say
-//! where they stand, so an index out of range has no place, and data after the last row go
-//! unnoticed. glTF's JSON is parsed and validated by `gltf-json`, which names the path
+//! The STL, OBJ, PLY and OFF parsers are our own because an error must name the line or element at
+//! fault. `tobj` 4.0.5 has neither in its `LoadError`. `stl_io` 0.11.0 gives an `io::Error` without
+//! the line. `ply-rs-bw` 4.0.1 names a line that does not parse, but its rows do not carry their
+//! position: an index out of range has no place, and data after the last row remain unnoticed.
+//! glTF's JSON is parsed and validated by `gltf-json`, which names the path
 //! (`meshes[0].primitives[0].indices`).
 mod assemble;
 mod error;
@@ -48,13 +49,13 @@ pub enum MeshFormat {
 }
 
 impl MeshFormat {
-    /// All formats, in the order in which messages list them.
+    /// All formats, in the order of messages.
     pub const ALL: [Self; 6] = [Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Gltf, Self::Glb];
 
-    /// The format that a file's extension names, in upper or lower case.
+    /// The format that the extension of `path` names, in upper or lower case.
     ///
     /// # Errors
-    /// [`ReadError::UnknownExtension`] lists the extensions there are.
+    /// [`ReadError::UnknownExtension`] lists the known extensions.
     pub fn of_path(path: &Path) -> Result<Self, ReadError> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         Self::ALL
@@ -89,54 +90,54 @@ impl std::fmt::Display for MeshFormat {
     }
 }
 
-/// A mesh that was read, and what reading did to it.
+/// A mesh read from a file, with a report of the changes made while reading.
 #[derive(Clone, Debug)]
 pub struct LoadedMesh {
-    /// The mesh. Faces are in file order, polygons expanded in place.
+    /// The mesh. Faces are in file order, and each polygon is replaced by its triangles.
     pub mesh: TriangleMesh,
-    /// What was found and changed.
+    /// Statistics and changes.
     pub report: LoadReport,
-    /// Where the mesh's vertices and faces come from.
+    /// For each vertex and face of the mesh, its source in the file.
     pub origin: Origin,
 }
 
-/// Where the vertices and faces of a [`LoadedMesh`] come from.
+/// The sources in the file of the vertices and faces of a [`LoadedMesh`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
-    /// For each vertex of the mesh the first vertex of the file at its position, 0-based.
+    /// For each vertex of the mesh, the first vertex of the file at its position, 0-based.
     pub vertices: Vec<u32>,
-    /// For each face of the mesh the polygon of the file that it is a part of, 0-based.
+    /// For each face of the mesh, its polygon in the file, 0-based.
     pub faces: Vec<u32>,
 }
 
-/// What reading found and changed. `vertices_in_file` is the mesh's number of vertices plus
-/// `welded_vertices` plus `unused_vertices`.
+/// Statistics of a file and changes made while reading. `vertices_in_file` is the number of
+/// vertices of the mesh plus `welded_vertices` plus `unused_vertices`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct LoadReport {
     /// The file's format.
     pub format: MeshFormat,
-    /// Vertices in the file; an STL file has three for each facet.
+    /// Vertices in the file. An STL file has three for each facet.
     pub vertices_in_file: usize,
     /// Polygons in the file.
     pub faces_in_file: usize,
-    /// Polygons of more than three corners, which were split into triangles.
+    /// Polygons of more than three corners, which are split into triangles.
     pub triangulated_polygons: usize,
-    /// Those of them that are not convex.
+    /// Polygons among these that are not convex.
     pub concave_polygons: usize,
-    /// Used vertices that were merged into an earlier one with bitwise the same position.
+    /// Used vertices that are merged into an earlier vertex with bitwise the same position.
     pub welded_vertices: usize,
-    /// Vertices that were dropped because no face uses them.
+    /// Vertices that are dropped because no face uses them.
     pub unused_vertices: usize,
-    /// What a person should know, one sentence each.
+    /// Notes for people, one sentence each.
     pub notes: Vec<String>,
     /// BLAKE3 of the file's bytes (and of external glTF buffers, in order), in hexadecimal.
     pub source_blake3: String,
 }
 
-/// Reads the mesh file at `path`; its extension names the format.
+/// Reads the mesh file at `path`. The extension names the format.
 ///
 /// # Errors
-/// [`ReadError`] names what is at fault, the line, byte or element, and what to do.
+/// [`ReadError`] names the cause, the line, byte or element, and what to do.
 pub fn read(path: &Path) -> Result<LoadedMesh, ReadError> {
     let format = MeshFormat::of_path(path)?;
     let bytes = input::read(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
@@ -144,12 +145,12 @@ pub fn read(path: &Path) -> Result<LoadedMesh, ReadError> {
     parse(&bytes, format, Some(folder))
 }
 
-/// The files that [`read`] opens for `path`: the file itself, and the external buffers of a glTF file. Of a file that cannot
-/// be read, the path alone: [`read`] says why.
+/// The files that [`read`] opens for `path`: the file itself and the external buffers of a glTF
+/// file. For a file that cannot be read, only `path`; [`read`] then gives the reason.
 pub fn files(path: &Path) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let buffers = match MeshFormat::of_path(path) {
-        // A pipe is left to `read`: its bytes come once.
+        // A pipe is not opened here, because its bytes can be read only once.
         Ok(format @ (MeshFormat::Gltf | MeshFormat::Glb)) if path.is_file() => {
             let bytes = std::fs::read(path).unwrap_or_default();
             gltf::external_files(&bytes, format, folder)
@@ -159,10 +160,7 @@ pub fn files(path: &Path) -> Vec<PathBuf> {
     std::iter::once(path.to_path_buf()).chain(buffers).collect()
 }
 
-/// Reads a mesh from bytes that are in memory. glTF buffers must be in the bytes too.
-///
-/// # Errors
-/// As [`read`].
+/// Reads a mesh from bytes in memory. The buffers of a glTF file must be in these bytes too.
 pub fn read_bytes(bytes: &[u8], format: MeshFormat) -> Result<LoadedMesh, ReadError> {
     parse(bytes, format, None)
 }

@@ -14,18 +14,20 @@ mod orient;
 mod split;
 mod weld;
 
-/// What [`repair`] may change beyond what leaves the surface where it is.
+/// Changes that [`repair`] may make although they move the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RepairOptions {
-    /// Merge vertices up to this far apart, and take a vertex up to this far from an open edge as being on it; a
-    /// length in the mesh's unit. `None`: vertices stay, and only `t_junction_tolerance` counts.
+    /// Merge vertices up to this far apart, and treat a vertex up to this far from an open edge as
+    /// lying on it; a length in the mesh's unit. With `None`, no vertices are merged, and
+    /// `t_junction_tolerance` alone applies.
     pub weld_tolerance: Option<f64>,
-    /// How far a vertex may be from an open edge to be taken as being on it, relative to the diagonal.
+    /// Largest distance between an open edge and a vertex that is treated as lying on it, relative
+    /// to the diagonal.
     pub t_junction_tolerance: f64,
 }
 
 impl RepairOptions {
-    /// No welding, and T-junctions to a billionth of the diagonal, which is rounding.
+    /// No welding; T-junctions to a billionth of the diagonal, which is about the rounding error.
     pub const DEFAULT: Self = Self { weld_tolerance: None, t_junction_tolerance: T_JUNCTION_TOLERANCE };
 }
 
@@ -35,46 +37,47 @@ impl Default for RepairOptions {
     }
 }
 
-/// A mesh after [`repair`].
+/// The result of [`repair`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Repaired {
-    /// The mesh, encodable when the report says so.
+    /// The repaired mesh. It is encodable when the report says so.
     pub mesh: TriangleMesh,
-    /// Every change, and what is left to be done.
+    /// All changes, and the remaining defects.
     pub report: RepairReport,
 }
 
-/// Every change that [`repair`] made, in the order in which it makes them.
+/// All changes that [`repair`] made, in the order in which it makes them.
 ///
-/// Ids are 0-based and those of the mesh given, except in `remaining`, `warnings`.
+/// Ids are 0-based. They are ids of the input mesh, except in `remaining` and `warnings`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct RepairReport {
-    /// Vertices merged, each with the one that took its place.
+    /// Merged vertices: [merged vertex, vertex that replaces it].
     pub welded_vertices: Vec<[u32; 2]>,
-    /// Faces dropped as two of their corners are equal.
+    /// Faces dropped because two of their corners are equal.
     pub collapsed_faces: Vec<u32>,
-    /// Faces dropped as they repeat another with the same orientation, with that one.
+    /// Faces dropped because they repeat an earlier face with the same orientation: [dropped face,
+    /// earlier face].
     pub duplicate_faces: Vec<[u32; 2]>,
     /// Open edges split at the vertices that lie on them.
     pub split_edges: Vec<SplitEdge>,
-    /// Collinear faces that vanished as their neighbours were split.
+    /// Collinear faces of which nothing was left after the splits.
     pub vanished_faces: Vec<u32>,
-    /// Faces reversed, to agree with their neighbours or as their shell was inside out.
+    /// Faces reversed because they disagreed with their neighbours or their shell was inside out.
     pub reversed_faces: Vec<u32>,
-    /// Shells that meet others, whose orientation was left as it is: one face of each of two shells.
+    /// Pairs of shells that meet, so their orientation was not changed: one face of each shell.
     pub crossing_shells: Vec<[u32; 2]>,
-    /// Number of vertices dropped as no face uses them.
+    /// Number of vertices dropped because no face uses them.
     pub unused_vertices: usize,
-    /// Whether the mesh is now encodable.
+    /// Whether the repaired mesh is encodable.
     pub encodable: bool,
-    /// Errors left; ids are those of the repaired mesh.
+    /// Remaining errors. Ids are those of the repaired mesh.
     pub remaining: Vec<Defect>,
     /// Warnings about the repaired mesh; ids are those of the repaired mesh.
     pub warnings: Vec<Defect>,
 }
 
 impl RepairReport {
-    /// Whether the repaired mesh is another one than the one given.
+    /// Whether the repaired mesh differs from the input mesh.
     pub fn changes_something(&self) -> bool {
         !(self.welded_vertices.is_empty()
             && self.collapsed_faces.is_empty()
@@ -86,10 +89,10 @@ impl RepairReport {
     }
 }
 
-/// An edge that was split.
+/// An edge that was split at vertices.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SplitEdge {
-    /// Its ends.
+    /// Its two ends.
     pub edge: [u32; 2],
     /// The vertices on it, from the first end to the second.
     pub at: Vec<u32>,
@@ -99,13 +102,13 @@ pub struct SplitEdge {
     pub distance: f64,
 }
 
-/// Why [`repair`] did not begin or has nothing to give.
+/// Why [`repair`] gives no mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RepairError {
     /// A tolerance is not a finite positive number.
     #[error("the {name} is {value}; expected a finite number above 0")]
     Tolerance {
-        /// Which tolerance.
+        /// Name of the tolerance.
         name: &'static str,
         /// The value found.
         value: f64,
@@ -113,14 +116,14 @@ pub enum RepairError {
     /// A coordinate or the diagonal is out of range.
     #[error("{0}")]
     OutOfRange(String),
-    /// All faces were dropped.
+    /// No face is left.
     #[error(
         "no face is left: {collapsed} of {faces} faces have two equal corners; use a smaller weld tolerance, if any"
     )]
     NoFaceLeft {
-        /// Faces dropped as two of their corners are equal.
+        /// Faces dropped because two of their corners are equal.
         collapsed: usize,
-        /// Faces given.
+        /// Faces of the input mesh.
         faces: usize,
     },
     /// Splitting made more vertices or faces than 32-bit ids can name.
@@ -128,28 +131,33 @@ pub enum RepairError {
     Mesh(#[from] MeshError),
 }
 
-/// A mesh being repaired.
+/// A mesh under repair.
 #[derive(Clone)]
 struct Draft {
     vertices: Vec<DVec3>,
     faces: Vec<[u32; 3]>,
-    /// For each face, the face given that it comes from.
+    /// For each face, the face of the input mesh that it comes from.
     origin: Vec<u32>,
 }
 
-/// Makes a mesh encodable where that needs no guess, and says what it did.
+/// Makes a mesh encodable where this needs no guess, and reports every change.
 ///
-/// In this order: merges vertices within the weld tolerance, if one is given; drops faces with two
-/// equal corners and faces that repeat another with the same orientation, unless those close the surface, as where a face is there
-/// twice and once reversed; splits faces at vertices that lie on
-/// their open edges, and a collinear face goes when that leaves nothing of it; reverses faces so that those of a
-/// connected surface agree; reverses closed shells so that each is outward or, inside an odd number of others,
-/// inward. Shells that meet others are not reversed as a whole: whether they were meant as solids or cavities
-/// cannot be told.
+/// The steps, in this order:
+/// - Merge vertices within the weld tolerance, if one is given.
+/// - Drop faces with two equal corners.
+/// - Drop faces that repeat another face with the same orientation. Duplicates stay when the mesh
+///   is closed only with them, for example where a face is there twice and once reversed.
+/// - Split faces at vertices that lie on their open edges. A collinear face vanishes when nothing
+///   of it is left.
+/// - Reverse faces so that the faces of a connected surface agree.
+/// - Reverse closed shells: a shell inside an odd number of others faces inward, any other shell
+///   outward. Shells that meet others are not reversed, because they could be meant as solids or as
+///   cavities.
 ///
 /// # Errors
-/// [`RepairError`] when a tolerance or coordinate is out of range or no face would be left. A mesh that is not
-/// encodable after all is no error here: [`RepairReport::remaining`] says why.
+/// [`RepairError`] when a tolerance or coordinate is out of range, or when no face would be left. A
+/// mesh that is still not encodable is not an error here: [`RepairReport::remaining`] gives the
+/// reasons.
 pub fn repair(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Repaired, RepairError> {
     let tolerances = [
         ("weld tolerance", options.weld_tolerance),
@@ -203,7 +211,7 @@ pub fn repair(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Repaired, 
 }
 
 impl Draft {
-    /// Keeps the faces that `keep` accepts; the origins of the others.
+    /// Keeps the faces that `keep` accepts. Returns the origins of the other faces.
     fn retain(&mut self, mut keep: impl FnMut(u32, [u32; 3]) -> bool) -> Vec<u32> {
         let kept: Vec<bool> = self.faces.iter().zip(&self.origin).map(|(&f, &o)| keep(o, f)).collect();
         let dropped = self.origin.iter().zip(&kept).filter(|(_, k)| !**k).map(|(&o, _)| o).collect();
@@ -231,7 +239,7 @@ impl Draft {
         duplicates
     }
 
-    /// Drops vertices that no face uses; their number.
+    /// Drops vertices that no face uses. Returns their number.
     fn drop_unused(&mut self) -> usize {
         let mut used = vec![false; self.vertices.len()];
         self.faces.iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -261,7 +269,7 @@ impl RepairReport {
     }
 }
 
-/// Ids that people see at first; the report has all.
+/// Number of ids in the text for people. The report has all of them.
 const SHOWN: usize = 8;
 
 impl fmt::Display for RepairReport {

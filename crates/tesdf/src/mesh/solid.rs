@@ -3,14 +3,17 @@ use std::{collections::BTreeMap, fmt};
 use super::count::count;
 use super::{CheckReport, Defect, DefectKind, Severity, TriangleMesh, check};
 
-/// A mesh with a well-defined inside: what the encoder accepts, valid by construction.
+/// A mesh with a well-defined inside. The encoder accepts only this type, and every value of it is
+/// valid.
 ///
 /// - Every coordinate and the diagonal are in the accepted range.
-/// - Every directed edge is used as often as its reverse, so the winding number is an integer everywhere.
-/// - The winding number is somewhere 1 or more.
+/// - Every directed edge is used as often as its reverse, so the winding number is an integer
+///   everywhere.
+/// - The winding number is 1 or more somewhere.
 ///
-/// Inside is where the winding number is 1 or more. The surface may intersect itself, touch itself, be inside out in
-/// places and have faces without area; [`warnings`](Self::warnings) then says so.
+/// A point is inside where the winding number is 1 or more. The surface may intersect or touch
+/// itself, be inside out in places, and have faces without area; [`warnings`](Self::warnings) lists
+/// such places.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidMesh {
     mesh: TriangleMesh,
@@ -19,7 +22,7 @@ pub struct SolidMesh {
 }
 
 impl SolidMesh {
-    /// Checks the mesh as [`check`](super::check) does.
+    /// Checks the mesh with [`check`](super::check).
     ///
     /// # Errors
     /// [`NotSolid`] has all errors, and says whether repair with default options would help.
@@ -40,18 +43,18 @@ impl SolidMesh {
         &self.mesh
     }
 
-    /// What is worth a look, warnings and notes, although the inside is well defined.
+    /// Warnings and notes of the check. The inside is well defined nevertheless.
     pub fn warnings(&self) -> &[Defect] {
         &self.warnings
     }
 
-    /// Whether the surface is an embedded manifold with winding number 0 or 1 everywhere, see
+    /// Whether the surface is an embedded manifold with winding number 0 or 1 everywhere; see
     /// [`CheckReport::is_simple`].
     pub fn is_simple(&self) -> bool {
         self.simple
     }
 
-    /// The mesh back.
+    /// Returns the mesh itself.
     pub fn into_mesh(self) -> TriangleMesh {
         self.mesh
     }
@@ -65,12 +68,12 @@ pub struct NotSolid {
 }
 
 impl NotSolid {
-    /// All that was found.
+    /// The full report of the check.
     pub fn report(&self) -> &CheckReport {
         &self.report
     }
 
-    /// Whether [`repair`](super::repair()) with default options makes it a solid.
+    /// Whether [`repair`](super::repair()) with default options makes the mesh a solid.
     pub fn is_repairable(&self) -> bool {
         self.repairable
     }
@@ -78,7 +81,7 @@ impl NotSolid {
 
 impl std::error::Error for NotSolid {}
 
-/// Kinds of errors that the message names, and errors of each.
+/// Largest number of kinds of errors in the message, and of errors per kind.
 const NAMED: [usize; 2] = [3, 2];
 
 impl fmt::Display for NotSolid {

@@ -1,9 +1,9 @@
 use std::ops::Range;
 
-/// How the faces of a mesh hang together: its edges with the faces on each, and what is connected.
+/// Connectivity of a mesh: its edges, the faces on each edge, and connected components.
 ///
-/// Faces with two equal corners take no part: they use each of their edges once in both directions or not
-/// at all, so leaving them out changes no balance.
+/// Faces with two equal corners are left out. Such a face uses each of its edges once in both
+/// directions or not at all, so leaving it out changes no balance.
 #[derive(Clone, Debug)]
 pub struct Topology {
     faces: Vec<[u32; 3]>,
@@ -17,13 +17,13 @@ pub struct Edge {
     /// Its two vertices, lower first, 0-based.
     pub vertices: [u32; 2],
     uses: Range<u32>,
-    /// Faces that run from the lower vertex to the higher.
+    /// Number of faces that run from the lower vertex to the higher.
     pub forward: u32,
-    /// Faces that run from the higher vertex to the lower.
+    /// Number of faces that run from the higher vertex to the lower.
     pub backward: u32,
 }
 
-/// One face on an edge.
+/// The use of an edge by one face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EdgeUse {
     /// Face, 0-based.
@@ -33,13 +33,13 @@ pub struct EdgeUse {
 }
 
 impl Edge {
-    /// Whether as many faces run along the edge in one direction as in the other. The winding number is an
-    /// integer everywhere exactly when all edges are balanced.
+    /// Whether as many faces run along the edge in one direction as in the other. The winding
+    /// number is an integer everywhere exactly when all edges are balanced.
     pub fn is_balanced(&self) -> bool {
         self.forward == self.backward
     }
 
-    /// Whether the edge has two faces with the same orientation.
+    /// Whether the edge has exactly two faces, and they run along it in opposite directions.
     pub fn is_manifold(&self) -> bool {
         (self.forward, self.backward) == (1, 1)
     }
@@ -51,10 +51,10 @@ impl Edge {
 }
 
 impl Topology {
-    /// Component of a face with two equal corners.
+    /// Component number of a face with two equal corners.
     pub const NO_COMPONENT: u32 = u32::MAX;
 
-    /// Finds the edges of `faces`, ordered by their vertices.
+    /// Finds the edges of `faces`. The edges are ordered by their vertices.
     pub fn new(faces: &[[u32; 3]]) -> Self {
         let mut half_edges = Vec::with_capacity(3 * faces.len());
         for (f, corners) in faces.iter().enumerate().filter(|(_, c)| !has_repeated_corner(**c)) {
@@ -90,13 +90,14 @@ impl Topology {
         &self.uses[edge.uses.start as usize..edge.uses.end as usize]
     }
 
-    /// Whether all edges are balanced, see [`Edge::is_balanced`].
+    /// Whether all edges are balanced; see [`Edge::is_balanced`].
     pub fn is_closed(&self) -> bool {
         self.edges.iter().all(Edge::is_balanced)
     }
 
-    /// Component of each face and their number, where faces are connected over the edges that `across` accepts.
-    /// Components are numbered by their lowest face; faces with a repeated corner have [`NO_COMPONENT`](Self::NO_COMPONENT).
+    /// The component number of each face, and the number of components. Faces are connected over
+    /// the edges that `across` accepts. Components are numbered by their lowest face. Faces with a
+    /// repeated corner have [`NO_COMPONENT`](Self::NO_COMPONENT).
     pub fn components(&self, across: impl Fn(&Edge) -> bool) -> (Vec<u32>, usize) {
         let mut sets = DisjointSets::new(self.faces.len());
         for edge in self.edges.iter().filter(|e| across(e)) {
@@ -120,8 +121,8 @@ impl Topology {
         ((0..self.faces.len()).map(component).collect(), count as usize)
     }
 
-    /// Number of fans around each vertex: groups of its faces connected over edges at the vertex. 0 where
-    /// no face uses it, 1 at a vertex of a manifold.
+    /// Number of fans around each vertex. A fan is a group of faces of the vertex that are
+    /// connected over edges at the vertex. An unused vertex has 0 fans, a vertex of a manifold 1.
     pub fn fans(&self, vertices: usize) -> Vec<u32> {
         let corner_of = |face: u32, v: u32| {
             let k = self.faces[face as usize].iter().position(|&w| w == v).unwrap_or(0);
@@ -145,9 +146,12 @@ impl Topology {
         fans
     }
 
-    /// For each face, whether it must be reversed so that over every edge with exactly two faces they run in
-    /// opposite directions; in each component the fewest faces are reversed. Where that cannot be (a
-    /// non-orientable surface) none of the component's faces is, and the conflicting edge is in the list.
+    /// Finds the faces to reverse so that the two faces of every edge with exactly two faces run
+    /// along it in opposite directions. Returns a flag for each face, and the conflicting edges.
+    ///
+    /// In each component the fewest possible faces are reversed. In a component without an
+    /// orientation (a non-orientable surface) no face is reversed, and the lowest conflicting edge
+    /// is returned.
     pub fn consistent_orientation(&self) -> (Vec<bool>, Vec<usize>) {
         let mut across = vec![Vec::new(); self.faces.len()];
         for (e, edge) in self.edges.iter().enumerate().filter(|(_, e)| e.face_count() == 2) {
@@ -198,12 +202,12 @@ pub fn has_repeated_corner([a, b, c]: [u32; 3]) -> bool {
     a == b || b == c || c == a
 }
 
-/// Disjoint sets whose representative is the lowest member.
+/// Disjoint sets (union-find). The representative of a set is its lowest member.
 #[derive(Clone, Debug)]
 pub struct DisjointSets(Vec<u32>);
 
 impl DisjointSets {
-    /// `n` sets of one member.
+    /// `n` sets with one member each.
     pub fn new(n: usize) -> Self {
         Self((0..n as u32).collect())
     }

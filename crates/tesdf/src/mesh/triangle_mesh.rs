@@ -2,10 +2,11 @@ use glam::DVec3;
 
 use crate::geometry::Aabb;
 
-/// An indexed triangle mesh whose indices are in range and whose used vertices are finite.
+/// An indexed triangle mesh. All indices are in range, and all coordinates are finite.
 ///
-/// Coordinates are in the mesh's own unit. A face is outward by the right-hand rule. Nothing
-/// else is promised: the mesh may be open, self-intersecting or wrongly oriented.
+/// Coordinates are in the mesh's own unit. The corners of a face are counter-clockwise seen from
+/// outside (right-hand rule). Nothing else is guaranteed: the mesh may be open, self-intersecting
+/// or wrongly oriented.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TriangleMesh {
     vertices: Vec<DVec3>,
@@ -38,20 +39,20 @@ pub enum MeshError {
     /// There is no face.
     #[error("the mesh has no faces; expected at least one triangle")]
     Empty,
-    /// More vertices or faces than 32-bit ids can name.
+    /// There are more vertices or faces than 32-bit ids can name.
     #[error("{found} {what} are more than the {limit} that 32-bit ids can name; split the mesh")]
     TooLarge {
         /// `vertices` or `faces`.
         what: &'static str,
-        /// Number found.
+        /// The number found.
         found: usize,
-        /// Largest number accepted.
+        /// The largest accepted number.
         limit: usize,
     },
 }
 
 impl TriangleMesh {
-    /// Largest number of vertices and of faces.
+    /// Largest accepted number of vertices, and of faces.
     pub const MAX_ELEMENTS: usize = (1 << 29) - 1;
 
     /// Checks indices and coordinates.
@@ -96,7 +97,7 @@ impl TriangleMesh {
         &self.faces
     }
 
-    /// Corner positions of face `face`.
+    /// Corner positions of face `face`, in the mesh's unit.
     ///
     /// # Panics
     /// When `face` is not smaller than the number of faces.
@@ -104,12 +105,13 @@ impl TriangleMesh {
         self.faces[face].map(|v| self.vertices[v as usize])
     }
 
-    /// Bounds of the vertices that faces use.
+    /// Bounds of the used vertices, in the mesh's unit.
     pub fn bounds(&self) -> Aabb {
         (0..self.faces.len()).fold(Aabb::EMPTY, |b, f| b.union(Aabb::of(&self.triangle(f))))
     }
 
-    /// Length of the diagonal of [`bounds`](Self::bounds): the length that tolerances refer to.
+    /// Length of the diagonal of [`bounds`](Self::bounds), in the mesh's unit. Relative tolerances
+    /// refer to it.
     pub fn diagonal(&self) -> f64 {
         self.bounds().extent().length()
     }

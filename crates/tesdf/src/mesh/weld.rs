@@ -1,28 +1,29 @@
-//! Merging of vertices at the same position.
+//! Merges vertices at the same position.
 use std::collections::HashMap;
 
 use glam::DVec3;
 
-/// The distinct positions of `used` vertices, and where each vertex went.
+/// The distinct positions of the used vertices, and the position of each vertex.
 pub(super) struct Welded {
-    /// Distinct positions, in the order in which they first come; `-0.0` is written as `0.0`.
+    /// Distinct positions, in the order of their first vertices; `-0.0` becomes `0.0`.
     pub positions: Vec<DVec3>,
     /// For each distinct position, the first vertex there.
     pub first: Vec<u32>,
-    /// For each vertex its position's number, or `None` when it is not used.
+    /// For each vertex the index of its position; `None` when it is not used.
     pub target: Vec<Option<u32>>,
 }
 
-/// Merges vertices whose coordinates are bitwise equal, where `-0.0` equals `0.0`.
+/// Merges vertices whose coordinates are bitwise equal; `-0.0` equals `0.0`.
 ///
-/// There is no tolerance: on parts of a few mm in metres any fixed one is wrong.
+/// There is no tolerance: any fixed tolerance would be wrong for small parts, such as a part of a
+/// few millimetres given in metres.
 pub(super) fn weld_equal(positions: &[DVec3], used: &[bool]) -> Welded {
     let mut welded =
         Welded { positions: Vec::new(), first: Vec::new(), target: Vec::with_capacity(positions.len()) };
     let mut ids: HashMap<[u64; 3], u32> = HashMap::with_capacity(positions.len() / 4);
     for (i, (&p, &is_used)) in positions.iter().zip(used).enumerate() {
         welded.target.push(is_used.then(|| {
-            // Adding +0.0 turns -0.0 into 0.0 and leaves everything else as it is.
+            // Adding +0.0 turns -0.0 into 0.0 and changes no other value.
             let p = p + DVec3::ZERO;
             *ids.entry(p.to_array().map(f64::to_bits)).or_insert_with(|| {
                 welded.positions.push(p);

@@ -1,4 +1,4 @@
-//! [`TriangleMesh`] to a file: PLY and OBJ keep every bit, STL rounds to f32.
+//! Writes a [`TriangleMesh`] to a file. PLY and OBJ keep every bit; STL rounds to f32.
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -8,19 +8,19 @@ use crate::save::{SaveError, save_atomic};
 /// A mesh file format that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WriteFormat {
-    /// Binary little-endian PLY with `double` coordinates: keeps every bit.
+    /// Binary little-endian PLY with `double` coordinates. Keeps every bit.
     Ply,
-    /// OBJ with the shortest decimals that give the same f64 again: keeps every bit.
+    /// OBJ with the shortest decimals that read back as the same f64. Keeps every bit.
     Obj,
-    /// Binary STL: coordinates are rounded to f32 and vertices are no longer shared.
+    /// Binary STL. Coordinates are rounded to f32, and vertices are no longer shared.
     Stl,
 }
 
 impl WriteFormat {
-    /// The format that a file's extension names, in upper or lower case.
+    /// The format that the extension of `path` names, in upper or lower case.
     ///
     /// # Errors
-    /// [`WriteError::UnknownExtension`] lists the extensions there are.
+    /// [`WriteError::UnknownExtension`] lists the known extensions.
     pub fn of_path(path: &Path) -> Result<Self, WriteError> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {
@@ -31,14 +31,14 @@ impl WriteFormat {
         }
     }
 
-    /// Whether reading the file gives the same coordinates again, bit for bit. STL does not:
-    /// rounding to f32 moves vertices by up to 6e-8 of their coordinates.
+    /// Whether reading the file gives the same coordinates, bit for bit. STL does not: rounding to
+    /// f32 moves vertices by up to 6e-8 of their coordinates.
     pub fn is_exact(self) -> bool {
         self != Self::Stl
     }
 }
 
-/// Why a mesh was not written. The file at the path is then as it was.
+/// Why a mesh was not written. The file at the path is then unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The extension names no format that can be written.
@@ -47,7 +47,7 @@ pub enum WriteError {
         /// The path asked for.
         path: PathBuf,
     },
-    /// A coordinate is beyond f32, so STL cannot hold it.
+    /// A coordinate is too large for f32, so STL cannot hold it.
     #[error(
         "vertex {vertex} (0-based) has the coordinate {value}, beyond the 3.4e38 of STL's f32; write .ply or .obj"
     )]
@@ -62,17 +62,18 @@ pub enum WriteError {
     Save(#[from] SaveError),
 }
 
-/// Writes `mesh` to `path`; the extension names the format (`.ply`, `.obj`, `.stl`).
+/// Writes `mesh` to `path`. The extension names the format (`.ply`, `.obj`, `.stl`), which is
+/// returned.
 ///
 /// # Errors
-/// [`WriteError`]; a regular file at `path` is then as it was.
+/// [`WriteError`]. A regular file at `path` is then unchanged.
 pub fn write(path: &Path, mesh: &TriangleMesh) -> Result<WriteFormat, WriteError> {
     let format = WriteFormat::of_path(path)?;
     save_atomic(path, &write_bytes(mesh, format)?)?;
     Ok(format)
 }
 
-/// The bytes of a file of `mesh`.
+/// The bytes of a mesh file in the given format.
 ///
 /// # Errors
 /// [`WriteError::BeyondF32`].
@@ -105,7 +106,7 @@ fn ply(mesh: &TriangleMesh) -> Vec<u8> {
 fn obj(mesh: &TriangleMesh) -> Vec<u8> {
     let mut out = String::new();
     for p in mesh.vertices() {
-        // Debug gives the shortest decimal that reads back as the same f64, and exponents where
+        // Debug gives the shortest decimal that reads back as the same f64. It uses exponents where
         // Display would print hundreds of zeros. Writing to a String cannot fail.
         let _ = writeln!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z);
     }
@@ -122,7 +123,7 @@ fn stl(mesh: &TriangleMesh) -> Result<Vec<u8>, WriteError> {
         }
     }
     let mut out = vec![0; 80];
-    // It must not begin with `solid`, which is how ASCII files begin.
+    // The header must not begin with `solid`: ASCII files begin that way.
     out[..20].copy_from_slice(b"binary STL by tesdf ");
     out.extend((mesh.faces().len() as u32).to_le_bytes());
     for face in 0..mesh.faces().len() {

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::BoundaryLoop;
 use crate::mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh};
 
-/// Open, non-manifold and inconsistently oriented edges, and surfaces that have no orientation.
+/// Finds open, non-manifold and inconsistently oriented edges, and non-orientable surfaces.
 pub(super) fn edge_defects(mesh: &TriangleMesh, topology: &Topology, lenient: Severity) -> Vec<Defect> {
     let mut defects = Vec::new();
     let middle = |[a, b]: [u32; 2]| 0.5 * (mesh.vertices()[a as usize] + mesh.vertices()[b as usize]);
@@ -59,7 +59,7 @@ pub(super) fn edge_defects(mesh: &TriangleMesh, topology: &Topology, lenient: Se
     defects
 }
 
-/// Vertices where more than one fan of faces meet.
+/// Finds vertices where more than one fan of faces meet.
 pub(super) fn vertex_defects(mesh: &TriangleMesh, topology: &Topology, lenient: Severity) -> Vec<Defect> {
     let fans = topology.fans(mesh.vertices().len());
     let mut faces: BTreeMap<u32, Vec<u32>> =
@@ -88,7 +88,7 @@ pub(super) fn vertex_defects(mesh: &TriangleMesh, topology: &Topology, lenient: 
     faces.into_iter().map(defect).collect()
 }
 
-/// Open edges chained into loops.
+/// Chains the open edges into loops and paths.
 pub(super) fn boundary_loops(mesh: &TriangleMesh, topology: &Topology) -> Vec<BoundaryLoop> {
     let open = topology.edges().iter().filter(|e| e.face_count() == 1);
     let directed = open.map(|e| {
@@ -107,8 +107,9 @@ pub(super) fn boundary_loops(mesh: &TriangleMesh, topology: &Topology) -> Vec<Bo
         .collect()
 }
 
-/// Chains directed edges end to end; true where a chain closes. Deterministic: each chain begins at the lowest
-/// vertex left, at the start of a path where there is one, and takes the lowest next vertex.
+/// Chains directed edges end to end. The flag says whether a chain closes. Deterministic: a chain
+/// begins at the start of a path if there is one, at the lowest remaining vertex, and always takes
+/// the lowest next vertex.
 fn directed_loops(edges: impl Iterator<Item = [u32; 2]>) -> Vec<(Vec<u32>, bool)> {
     let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     let mut balance: BTreeMap<u32, i64> = BTreeMap::new();
@@ -141,7 +142,7 @@ fn directed_loops(edges: impl Iterator<Item = [u32; 2]>) -> Vec<(Vec<u32>, bool)
     loops
 }
 
-/// Middle of a face.
+/// Centroid of a face.
 pub(super) fn centroid(mesh: &TriangleMesh, face: u32) -> DVec3 {
     let [a, b, c] = mesh.triangle(face as usize);
     (a + b + c) / 3.0

@@ -8,25 +8,25 @@ use crate::{
     mesh::{Defect, DefectKind, Severity, TriangleMesh, topology::has_repeated_corner},
 };
 
-/// Height over longest edge below which a face is a needle.
+/// A face whose height divided by its longest edge is below this value is a needle.
 const NEEDLE: f64 = 1e-6;
 
-/// Faces that are flawed in themselves.
+/// Faces with a defect of their own.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct FaceFlaws {
     /// Faces with two equal corners.
     pub repeated_corner: Vec<u32>,
     /// Faces with three different, exactly collinear corners.
     pub zero_area: Vec<u32>,
-    /// Faces of very small height, with height over longest edge.
+    /// Faces of very small height, with the ratio of height to longest edge.
     pub needles: Vec<(u32, f64)>,
-    /// Faces with the corners and orientation of an earlier one, with that one.
+    /// Faces with the corners and orientation of an earlier face: [face, earlier face].
     pub duplicates: Vec<[u32; 2]>,
-    /// Faces with the corners of an earlier one but the opposite orientation, with that one.
+    /// Faces with the corners of an earlier face in the opposite orientation: [face, earlier face].
     pub reversed_duplicates: Vec<[u32; 2]>,
 }
 
-/// Finds them.
+/// Finds all [`FaceFlaws`] of a mesh.
 pub(crate) fn face_flaws(mesh: &TriangleMesh) -> FaceFlaws {
     let mut flaws = FaceFlaws::default();
     let mut first_with: HashMap<[u32; 3], u32> = HashMap::with_capacity(mesh.faces().len());
@@ -46,7 +46,7 @@ pub(crate) fn face_flaws(mesh: &TriangleMesh) -> FaceFlaws {
         }
         let [a, b, c] = mesh.triangle(f);
         let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-        // Above the limit rounding cannot hide a zero; below it the exact test decides.
+        // Above the limit, rounding cannot hide a zero. Below it the exact test decides.
         let ratio = (b - a).cross(c - a).length() / longest;
         if ratio.is_nan() || ratio < NEEDLE {
             if normal_signs(a, b, c) == [0; 3] {
@@ -59,13 +59,13 @@ pub(crate) fn face_flaws(mesh: &TriangleMesh) -> FaceFlaws {
     flaws
 }
 
-/// Whether the corners run in the same sense as their ids in ascending order.
+/// Whether the cyclic order of the corners is that of their ids in ascending order.
 fn is_even([a, b, c]: [u32; 3]) -> bool {
     (a < b) ^ (b < c) ^ (a < c)
 }
 
 impl FaceFlaws {
-    /// Faces without area, ascending.
+    /// Faces without area, in ascending order.
     pub(crate) fn without_area(&self) -> Vec<u32> {
         let mut faces = [self.repeated_corner.as_slice(), &self.zero_area].concat();
         faces.sort_unstable();
@@ -107,7 +107,7 @@ impl FaceFlaws {
     }
 }
 
-/// The corner of a collinear face that is between the other two: (it, the two).
+/// The corner of a collinear face that lies between the other two, and the other two.
 pub(crate) fn middle_corner(corners: [u32; 3], positions: [DVec3; 3]) -> (u32, [u32; 2]) {
     let [a, b, c] = corners;
     let [pa, pb, pc] = positions;

@@ -1,8 +1,9 @@
-//! Pairs of faces that may meet, where many faces are around one vertex.
+//! Finds pairs of faces that may meet, also where many faces surround one vertex.
 //!
-//! The box of a long face that runs along no axis holds much besides the face: of a fan of n faces nearly all n² / 2 pairs of boxes overlap.
-//! Seen from the vertex of the fan its faces are arcs, and few boxes of arcs do. What the other faces are seen as tells which arcs they
-//! can meet.
+//! The box of a long face that is not parallel to an axis is much larger than the face. In a fan of
+//! n faces nearly all n² / 2 pairs of boxes overlap. Seen from the vertex of the fan, its faces are
+//! arcs, and few boxes of arcs overlap. The directions in which another face is seen show which
+//! arcs it can meet.
 
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
@@ -14,13 +15,14 @@ use crate::{
     mesh::TriangleMesh,
 };
 
-/// Items of a leaf of the trees.
+/// Largest number of items in a leaf of the trees.
 const LEAF_SIZE: usize = 4;
 
-/// A vertex with more faces makes a large fan.
+/// A vertex with more faces than this makes a large fan.
 const LARGE: usize = 128;
 
-/// Calls `pair` once with each two of `faces` (ascending), lower first, that may meet, until it breaks off: all that do are among them.
+/// Calls `pair` once for each two of `faces` (ascending) that may meet, lower face first, until it
+/// breaks off. All pairs that meet are among the calls.
 ///
 /// The order of the calls depends on the mesh alone.
 pub(super) fn pairs_that_may_meet(
@@ -49,7 +51,8 @@ pub(super) fn pairs_that_may_meet(
     })
 }
 
-/// The faces of the first `fans` of a tree that may meet a face; it is in none of them.
+/// The faces in `fans` that may meet `face`, which is in none of them. `tree` holds the bounds of
+/// all fans; `fans` are the first of them.
 fn in_fans(mesh: &TriangleMesh, face: u32, tree: &AabbTree, fans: &[Fan]) -> Vec<u32> {
     let bounds = box_of(mesh, face);
     let mut found = Vec::new();
@@ -72,13 +75,14 @@ fn in_fans(mesh: &TriangleMesh, face: u32, tree: &AabbTree, fans: &[Fan]) -> Vec
     found
 }
 
-/// The faces around a vertex of many.
+/// The faces around a vertex with many faces.
 struct Fan {
     center: DVec3,
     faces: Vec<u32>,
-    /// Around all faces.
+    /// Bounds of all faces.
     bounds: Aabb,
-    /// A box around the directions in which each face is seen from the center, and a tree of these.
+    /// For each face, a box around the directions in which it is seen from the centre. `tree` holds
+    /// these boxes.
     arcs: Vec<Aabb>,
     tree: AabbTree,
 }
@@ -96,7 +100,7 @@ impl Fan {
                 width = last.map_or(0.0, |last: DVec3| last.distance_squared(d));
                 last = Some(d);
             }
-            // An arc rises over its chord by no more than the square of half of the chord.
+            // The height of an arc over its chord is at most the square of half of the chord.
             seen.grown(0.25 * width + ROUNDING)
         };
         let arcs: Vec<Aabb> = faces.iter().map(arc).collect();
@@ -105,7 +109,8 @@ impl Fan {
     }
 }
 
-/// The faces of no large fan, and the large fans by vertex. A face of several is in that of the first of its corners.
+/// The faces that are in no large fan, and the large fans by vertex. A face with several such
+/// vertices belongs to the fan of the first of its corners.
 fn large_fans(mesh: &TriangleMesh, faces: &[u32]) -> (Vec<u32>, Vec<Fan>) {
     let mut count = vec![0usize; mesh.vertices().len()];
     faces.iter().flat_map(|&f| mesh.faces()[f as usize]).for_each(|v| count[v as usize] += 1);
@@ -120,24 +125,24 @@ fn large_fans(mesh: &TriangleMesh, faces: &[u32]) -> (Vec<u32>, Vec<Fan>) {
     (rest, fans.into_iter().map(|(v, faces)| Fan::new(mesh, v, faces)).collect())
 }
 
-/// More than the rounding of a direction.
+/// More than the rounding error of a direction.
 const ROUNDING: f64 = 1e-14;
 
-/// A unit vector.
+/// Unit vector from one point to another.
 fn direction(from: DVec3, to: DVec3) -> DVec3 {
     let d = to - from;
     (d / d.abs().max_element()).normalize_or_zero()
 }
 
-/// A triangle as seen from a point: the planes through the point and its sides.
+/// A triangle seen from a point: the planes through the point and its sides.
 struct Seen {
-    /// Normals of the planes, outward, and how far the triangle may be beyond each, over the length of its directions. None where the
-    /// triangle spans nearly a half-space or more.
+    /// The outward normal of each plane, and a bound of how far a direction of the triangle may lie
+    /// beyond the plane. `None` when the triangle spans nearly a half-space or more.
     planes: Option<[(DVec3, f64); 3]>,
 }
 
-/// With a greatest cosine like this between the corners and their middle, a unit vector inside is a sum of them with weights that add up
-/// to no more than 3 / 0.1.
+/// When all cosines between the corners and their sum exceed this value, a unit vector inside is a
+/// weighted sum of the corners, with weights that add up to at most 3 / 0.1.
 const LEAST_COSINE: f64 = 0.1;
 
 impl Seen {
@@ -156,7 +161,7 @@ impl Seen {
         Self { planes: Some([0, 1, 2].map(plane)) }
     }
 
-    /// Whether it may be seen in a direction of the box.
+    /// Whether the triangle may be seen in a direction of the box.
     fn may_meet(&self, arcs: Aabb) -> bool {
         let beyond = |&(normal, limit): &(DVec3, f64)| {
             let least = DVec3::select(normal.cmpgt(DVec3::ZERO), arcs.min, arcs.max);
@@ -190,7 +195,7 @@ mod tests {
         pairs
     }
 
-    /// A prism over a polygon of n sides, each end a fan around one of its corners.
+    /// A prism over a regular polygon with n sides. Each end is a fan around one of its corners.
     fn prism(n: u32) -> TriangleMesh {
         let at = |k: u32, z: f64| {
             let angle = std::f64::consts::TAU * f64::from(k) / f64::from(n);
@@ -216,7 +221,7 @@ mod tests {
     fn meet_beside_a_shared_corner(mesh: &TriangleMesh, f: u32, g: u32) -> bool {
         let at = |v: u32| mesh.vertices()[v as usize];
         let (t, u) = (mesh.faces()[f as usize], mesh.faces()[g as usize]);
-        // The sides of one, but for those at the corner, against the other.
+        // Tests the sides of one face, except those at the shared corner, against the other face.
         let sides_meet = |t: [u32; 3], u: [u32; 3]| {
             let sides = [[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]];
             let mut apart = sides.into_iter().filter(|side| side.iter().all(|v| !u.contains(v)));
@@ -227,7 +232,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
-        /// Fans that fold, cross themselves and each other, hold faces of no area, and loose faces all around.
+        /// Fans that fold and cross themselves and each other, with faces without area, surrounded
+        /// by loose faces.
         #[test]
         fn all_that_meet_are_found(seed in prop::collection::vec(-1.0..1.0_f64, 90), flat in any::<bool>(), shared in any::<bool>()) {
             let mut numbers = seed.iter().copied().cycle().enumerate().map(|(k, x)| (x * (k as f64 + 1.0) * 17.3).fract());
@@ -235,7 +241,7 @@ mod tests {
                 let mut next = || numbers.next().unwrap_or(0.0);
                 DVec3::new(next(), next(), if flat { 0.0 } else { next() })
             };
-            // Two fans of 150 faces; the second around a rim vertex of the first, or apart.
+            // Two fans of 150 faces. The second is around a rim vertex of the first, or separate.
             let mut vertices: Vec<DVec3> = (0..400).map(|_| point()).collect();
             vertices[7] = vertices[8];
             let second = if shared { 5 } else { 200 };

@@ -8,21 +8,23 @@ use crate::{
     mesh::{Defect, DefectKind, Severity, TriangleMesh},
 };
 
-/// Most pairs that are looked for in a mesh of few faces, and for each face in a mesh of many. A surface of a solid has far fewer;
-/// faces that all meet each other have the square of their number, which fits no memory.
+/// Largest number of pairs that the search returns in a small mesh, and per face in a large mesh.
+/// The surface of a solid has far fewer. If all faces meet each other, the number of pairs is
+/// quadratic and fits no memory.
 const MOST_PAIRS: usize = 1 << 20;
 const MOST_PAIRS_PER_FACE: usize = 2;
 
-/// The number of intersecting pairs from which on a mesh is refused.
+/// A mesh with at least this number of intersecting pairs is refused.
 pub(crate) fn most_pairs(mesh: &TriangleMesh) -> usize {
     MOST_PAIRS.max(MOST_PAIRS_PER_FACE * mesh.faces().len())
 }
 
-/// Pairs of faces, lower first and ascending, that meet in more than the corners or the edge that they share; the search ends at
-/// [`most_pairs`] of them.
+/// Finds pairs of faces that meet in more than the corners or the edge that they share. Pairs are
+/// ascending, with the lower face first. The search ends at [`max_pairs`] pairs.
 ///
-/// Exact. Left out are faces without area (`without_area`, ascending), pairs with the same three corners, and the
-/// pairs of `touching`, which meet in a T-junction or along a collinear face.
+/// The test is exact. It leaves out faces without area (`without_area`, ascending), pairs with the
+/// same three corners, and the pairs in `touching`, which meet in a T-junction or along a collinear
+/// face.
 pub(crate) fn self_intersections(
     mesh: &TriangleMesh,
     without_area: &[u32],
@@ -31,7 +33,7 @@ pub(crate) fn self_intersections(
     let faces: Vec<u32> =
         (0..mesh.faces().len() as u32).filter(|f| without_area.binary_search(f).is_err()).collect();
     let (mut pairs, most) = (Vec::new(), most_pairs(mesh));
-    // Broken off or not, the number of pairs tells.
+    // The number of pairs shows whether the search was broken off.
     let _ = pairs_that_may_meet(mesh, &faces, |f, g| {
         if meet_beyond_shared(mesh, f, g) && !touching.contains(&(f, g)) && !touching.contains(&(g, f)) {
             pairs.push([f, g]);
@@ -56,12 +58,13 @@ fn meet_beyond_shared(mesh: &TriangleMesh, f: u32, g: u32) -> bool {
                 [t[k], t[(k + 1) % 3], t[(k + 2) % 3]]
             };
             let (t, u) = (from_shared(t, in_g), from_shared(u, in_f));
-            // What they share besides the corner would reach the edge of one of them that is opposite to it.
+            // Any common point besides the shared corner extends to the edge opposite to that
+            // corner in one of the two faces.
             !surely_apart(t, u, true)
                 && (segment_meets_triangle(u[1], u[2], t) || segment_meets_triangle(t[1], t[2], u))
         }
         2 => {
-            // Only when folded flat onto each other.
+            // They meet elsewhere only when they are folded flat onto each other.
             let apex =
                 |t: [glam::DVec3; 3], shared: [bool; 3]| t[shared.iter().position(|&s| !s).unwrap_or(0)];
             let (c, d) = (apex(t, in_g), apex(u, in_f));
@@ -106,7 +109,8 @@ mod tests {
 
     use super::*;
 
-    /// A triangle without a thin strip at the corners `shared`, as triangles; the coordinates stay exact.
+    /// A triangle without a thin strip at the corners `shared`, split into triangles. The
+    /// coordinates stay exact.
     fn trimmed(t: [DVec3; 3], shared: [bool; 3]) -> Vec<[DVec3; 3]> {
         let off = |from: DVec3, to: DVec3| from + (to - from) / 1024.0;
         match shared.iter().filter(|&&s| s).count() {
@@ -126,7 +130,8 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(400))]
-        /// Two faces meet beyond what they share exactly when they meet without thin strips along that.
+        /// Two faces meet beyond what they share exactly when they still meet after thin strips
+        /// along the shared part are removed.
         #[test]
         fn equals_all_pairs_trimmed(faces in prop::collection::vec(prop::array::uniform3(0u32..27), 2..16)) {
             let vertices = (0..27).map(|v| DVec3::new((v % 3).into(), (v / 3 % 3).into(), (v / 9).into())).collect();

@@ -1,12 +1,13 @@
 use crate::mesh::{Defect, DefectKind, Severity, TriangleMesh};
 
-/// Accepted diagonals, in any unit. Squares and cubes of lengths in this range, and differences of them at
-/// full precision, stay far from the ends of the range of 64-bit floats (1e-308 to 1e308).
+/// Accepted range of the diagonal, in any unit. Squares and cubes of such lengths, and their
+/// differences at full precision, stay far from the ends of the range of 64-bit floats (1e-308 to
+/// 1e308).
 const DIAGONAL: [f64; 2] = [1e-50, 1e50];
 
-/// Accepted absolute values of coordinates other than 0. Numbers of at least 1e-90 are multiples of 2^-352, so that
-/// products of three differences of coordinates are multiples of 2^-1056, which 64-bit floats can hold:
-/// predicates stay exact.
+/// Accepted range of absolute values of coordinates other than 0. Numbers of at least 1e-90 are
+/// multiples of 2^-352. So products of three coordinate differences are multiples of 2^-1056, which
+/// 64-bit floats can hold, and predicates stay exact.
 const COORDINATE: [f64; 2] = [1e-90, 1e50];
 
 /// Whether a coordinate is in the range in which predicates are exact.
@@ -14,7 +15,7 @@ pub(crate) fn coordinate_in_range(c: f64) -> bool {
     c == 0.0 || (COORDINATE[0]..=COORDINATE[1]).contains(&c.abs())
 }
 
-/// Values outside of the accepted range.
+/// Finds values outside the accepted range.
 pub(crate) fn out_of_range(mesh: &TriangleMesh) -> Vec<Defect> {
     let mut used = vec![false; mesh.vertices().len()];
     mesh.faces().iter().flatten().for_each(|&v| used[v as usize] = true);
@@ -42,13 +43,14 @@ pub(crate) fn out_of_range(mesh: &TriangleMesh) -> Vec<Defect> {
     defects
 }
 
-/// Warnings about sizes and places that 32-bit floats do not hold, and unused vertices.
+/// Warns about sizes and positions that 32-bit floats cannot hold, and notes unused vertices.
 pub(super) fn scale_defects(mesh: &TriangleMesh) -> Vec<Defect> {
     let mut defects = Vec::new();
     let bounds = mesh.bounds();
     let diagonal = mesh.diagonal();
     let largest = bounds.min.abs().max(bounds.max.abs()).max_element();
-    // Rounding to 24 bits would move vertices by more than the accuracy of 32-bit storage, 1e-6 of the diagonal.
+    // Rounding to 24 bits would move vertices by more than 1e-6 of the diagonal, the accuracy of
+    // 32-bit storage.
     let rounding = largest * f64::from(f32::EPSILON) / 2.0;
     if rounding > 1e-6 * diagonal {
         let message = format!(

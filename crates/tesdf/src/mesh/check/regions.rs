@@ -1,4 +1,4 @@
-//! The regions into which other faces cut a face, each with a point of it.
+//! Finds the regions into which other faces cut a face, with a sample point in each.
 use std::collections::HashMap;
 use std::ops::ControlFlow;
 
@@ -12,30 +12,34 @@ use crate::{
 /// A point in a region of a face.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
-    /// The point, on the face up to rounding.
+    /// The point. It lies on the face up to rounding.
     pub point: DVec3,
-    /// How much greater the winding number is behind the face than in front of it. It is 1, unless coplanar faces lie
-    /// there too.
+    /// Winding number behind the face minus winding number in front of it. It is 1 unless coplanar
+    /// faces cover the point too.
     pub jump: i32,
 }
 
-/// Faces that cut a face, at most: of more, evenly chosen ones do.
+/// Largest number of faces that are used to cut a face. When there are more, evenly chosen faces
+/// are used.
 const CUTS: usize = 1 << 12;
-/// Pieces of a face's segments, besides one per segment: where there are more, evenly chosen ones get samples.
+/// Largest number of pieces of a face's segments, besides two per segment. When there are more,
+/// evenly chosen pieces get samples.
 const PIECES: usize = 64;
-/// Segments of a leaf of the tree.
+/// Largest number of segments in a leaf of the tree.
 const LEAF_SIZE: usize = 4;
 
-/// A point in each region into which the faces `others` cut `face`.
+/// Sample points in the regions into which the faces `others` cut `face`.
 ///
-/// The other faces meet a face in segments. A region that is not the whole face has a piece of a segment on its border,
-/// where a piece ends at the next segment that crosses. So a point on each side of each piece is a point of each
-/// region. The point is half of the way from the middle of the piece to what comes next. Pieces that follow each
-/// other and end at no other piece have the same two regions, and get one point on each side together.
+/// The other faces meet the face in segments, and each segment ends a piece where another segment
+/// crosses it. Every region other than the whole face has a piece on its border. So points on both
+/// sides of every piece reach every region. Such a point lies halfway between the middle of the
+/// piece and the next segment in the direction of an axis. Pieces in a chain, where no other piece
+/// ends, have the same two regions. They share one point on each side.
 ///
-/// Which corners are on which side of a plane is decided exactly. Points of segments and samples are rounded:
-/// regions and pieces narrower than `rounding` get no sample. Where more than 4096 faces cut the face, or their segments are cut
-/// into more than two pieces each, not all regions get a sample.
+/// The side of a plane on which a corner lies is decided exactly. Points of segments and samples
+/// are rounded, so regions and pieces narrower than `rounding` get no sample. Not all regions get a
+/// sample when more than 4096 faces cut the face, or when there are more than two pieces per
+/// segment and 64 more.
 pub(super) fn samples(mesh: &TriangleMesh, face: u32, others: &[u32], rounding: f64) -> Vec<Sample> {
     let corners = mesh.triangle(face as usize);
     let Some(chart) = Chart::new(corners) else { return Vec::new() };
@@ -61,11 +65,11 @@ pub(super) fn samples(mesh: &TriangleMesh, face: u32, others: &[u32], rounding: 
     if beside.is_empty() { vec![sample(chart.middle())] } else { beside }
 }
 
-/// What a triangle has in the plane of another one.
+/// The part of a triangle in the plane of another triangle.
 enum InPlane {
     Triangle([DVec3; 3]),
     Segment([DVec3; 2]),
-    /// Nothing, or a corner alone.
+    /// Nothing, or only a corner.
     Nothing,
 }
 
@@ -84,7 +88,7 @@ fn in_plane([a, b, c]: [DVec3; 3], other: [DVec3; 3]) -> InPlane {
         }
         if signs[k] * signs[l] < 0 {
             let share = height[k] / (height[k] + height[l]);
-            // Rounding may have left nothing of both heights.
+            // Both heights may be rounded to 0.
             let share = if share.is_finite() { share } else { 0.5 };
             points.push(other[k].lerp(other[l], share));
         }
@@ -101,24 +105,25 @@ fn edges<T: Copy>([a, b, c]: [T; 3]) -> [[T; 2]; 3] {
     [[a, b], [b, c], [c, a]]
 }
 
-/// Whether a triangle that turns counter-clockwise holds a point.
+/// Whether a counter-clockwise triangle contains a point.
 fn holds(triangle: &[DVec2; 3], q: DVec2) -> bool {
     edges(*triangle).iter().all(|&[a, b]| (b - a).perp_dot(q - a) >= 0.0)
 }
 
-/// The plane of a face, seen along the axis that is nearest to its normal.
+/// The plane of a face, projected along the axis that is nearest to its normal.
 struct Chart {
     corners: [DVec3; 3],
-    /// The corners, counter-clockwise.
+    /// The projected corners, counter-clockwise.
     flat: [DVec2; 3],
-    /// The axis.
+    /// The axis of the projection.
     along: usize,
-    /// 1 when the face is counter-clockwise, -1 when `corners` and `flat` are turned over.
+    /// 1 when the projected face is counter-clockwise. -1 when two corners were swapped in
+    /// `corners` and `flat`.
     turn: i32,
 }
 
 impl Chart {
-    /// `None` when rounding leaves nothing of the area.
+    /// `None` when the area is 0 after rounding.
     fn new([a, b, c]: [DVec3; 3]) -> Option<Self> {
         let normal = (b - a).cross(c - a);
         let along = normal.abs().max_position();
@@ -133,7 +138,8 @@ impl Chart {
         DVec2::new(p[(self.along + 1) % 3], p[(self.along + 2) % 3])
     }
 
-    /// A triangle of the plane, counter-clockwise, and -1 when it was turned over for that.
+    /// Projects a triangle of the plane and makes it counter-clockwise. The sign is -1 when two
+    /// corners were swapped.
     fn flat_triangle(&self, [a, b, c]: [DVec3; 3]) -> ([DVec2; 3], i32) {
         let turn = normal_signs(a, b, c)[self.along];
         let corners = if turn > 0 { [a, b, c] } else { [a, c, b] };
@@ -145,20 +151,21 @@ impl Chart {
         (b - a).perp_dot(c - a)
     }
 
-    /// The point of the face that is seen at `q`.
+    /// The point of the face whose projection is `q`.
     fn lift(&self, q: DVec2) -> DVec3 {
         let ([a, b, c], [p, u, v]) = (self.flat, self.corners);
         let (s, t) = ((q - a).perp_dot(c - a), (b - a).perp_dot(q - a));
         p + (s * (u - p) + t * (v - p)) / self.double_area()
     }
 
-    /// A point inside, not the centroid: a corner of another face may touch that one.
+    /// A point inside the face. It is not the centroid, because a corner of another face may touch
+    /// the centroid.
     fn middle(&self) -> DVec2 {
         let [a, b, c] = self.flat;
         0.346 * a + 0.331 * b + 0.323 * c
     }
 
-    /// The part of a segment that is on the face; `None` when that is not longer than `rounding`.
+    /// The part of a segment that lies on the face; `None` when it is not longer than `rounding`.
     fn clip(&self, [p, q]: Segment, rounding: f64) -> Option<Segment> {
         let (mut from, mut to) = (0.0f64, 1.0f64);
         for [a, b] in edges(self.flat) {
@@ -187,9 +194,11 @@ impl Piece {
         self.ends[0].midpoint(self.ends[1])
     }
 
-    /// The direction along an axis to each of its sides, left and right of the way from its first end to its second.
+    /// Directions to the left and to the right side, seen along the piece from its first end to its
+    /// second.
     ///
-    /// Along an axis, as the boxes of a tree that meet such a way are found without rounding.
+    /// They are parallel to an axis, because the boxes of a tree that meet such a ray are found
+    /// without rounding.
     fn across(&self) -> [DVec2; 2] {
         let along = self.ends[1] - self.ends[0];
         let left = match along.x.abs() >= along.y.abs() {
@@ -200,7 +209,7 @@ impl Piece {
     }
 }
 
-/// Points on both sides of pieces of segments that are on the face.
+/// Points on the face on both sides of the pieces.
 fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
     let count = cuts.len();
     let mut segments = cuts;
@@ -216,7 +225,7 @@ fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
         pieces = pieces.into_iter().step_by(every).collect();
         (0..2 * pieces.len() as u32).collect()
     };
-    // Of each side of a chain the point that is farthest from everything.
+    // For each side of a chain, the point with the largest clearance.
     let mut best: Vec<Option<(f64, DVec2)>> = vec![None; chain.len()];
     for (i, piece) in pieces.iter().enumerate() {
         for (side, direction) in piece.across().into_iter().enumerate() {
@@ -232,10 +241,10 @@ fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
     best.into_iter().flatten().map(|(_, point)| point).collect()
 }
 
-/// The first `count` segments, cut where segments cross them.
+/// The first `count` segments, cut where other segments cross them.
 fn pieces(segments: &[Segment], count: usize, tree: &AabbTree, boxes: &[Aabb], rounding: f64) -> Vec<Piece> {
     let mut crossings = vec![vec![0.0, 1.0]; count];
-    // Never broken off.
+    // The closure never breaks off.
     let _ = self_overlaps(tree, boxes, |i, j| {
         let (i, j) = (i as usize, j as usize);
         if j < count
@@ -255,9 +264,10 @@ fn pieces(segments: &[Segment], count: usize, tree: &AabbTree, boxes: &[Aabb], r
     pieces
 }
 
-/// For the left side (`2 i`) and the right side (`2 i + 1`) of each piece the least side of the same chain of pieces.
+/// For the left side (index `2 i`) and the right side (`2 i + 1`) of each piece, the lowest index
+/// among the sides on the same side of its chain.
 fn chains(pieces: &[Piece], rounding: f64) -> Vec<u32> {
-    // Ends of one point are in one cell of a grid or in two that touch.
+    // Ends at one point lie in one cell of the grid or in two cells that touch.
     let cell = |p: DVec2| (p / (8.0 * rounding)).round().to_array().map(|c| c as i64);
     let mut ends: HashMap<[i64; 2], Vec<(u32, usize)>> = HashMap::new();
     for (i, piece) in pieces.iter().enumerate() {
@@ -275,7 +285,7 @@ fn chains(pieces: &[Piece], rounding: f64) -> Vec<u32> {
             if let [&(j, other)] = others[..]
                 && j != i as u32
             {
-                // Left goes on as left where an end meets a beginning.
+                // When an end meets a beginning, the left side continues as the left side.
                 let turned = u32::from(end == other);
                 (0..2).for_each(|side| sides.join(2 * i as u32 + side, 2 * j + (side ^ turned)));
             }
@@ -284,7 +294,8 @@ fn chains(pieces: &[Piece], rounding: f64) -> Vec<u32> {
     (0..2 * pieces.len() as u32).map(|side| sides.find(side)).collect()
 }
 
-/// Where two segments cross or touch, as shares of both; `None` for parallel segments.
+/// The point where two segments cross or touch, as fractions of both lengths; `None` for parallel
+/// segments or when they do not meet.
 fn crossing([p, q]: Segment, [r, s]: Segment, rounding: f64) -> Option<[f64; 2]> {
     let (along, other) = (q - p, s - r);
     let turn = along.perp_dot(other);
@@ -294,7 +305,8 @@ fn crossing([p, q]: Segment, [r, s]: Segment, rounding: f64) -> Option<[f64; 2]>
     meet.then(|| [t.clamp(0.0, 1.0), u.clamp(0.0, 1.0)])
 }
 
-/// How far it is from a point along an axis to the first segment beyond `rounding`; `None` when there is none.
+/// Distance from a point along an axis to the first segment beyond `rounding`; `None` when there is
+/// none.
 fn clearance(
     tree: &AabbTree,
     boxes: &[Aabb],
@@ -312,7 +324,7 @@ fn clearance(
         let width = q[aside] - p[aside];
         let share = (from[aside] - p[aside]) / width;
         let ahead = |at: DVec2| sign * (at[axis] - from[axis]);
-        // A segment along the way is met at its nearer end.
+        // A segment parallel to the ray is met at its nearer end.
         let distance = match share.is_finite() && width.abs() > rounding {
             true => ahead(p.lerp(q, share.clamp(0.0, 1.0))),
             false => ahead(p).min(ahead(q)),

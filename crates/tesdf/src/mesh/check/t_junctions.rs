@@ -8,20 +8,20 @@ use crate::{
     mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh},
 };
 
-/// Edges whose faces do not balance, with the vertices that lie on them.
+/// Unbalanced edges with the vertices that lie on them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct TJunctions {
-    /// Index of an edge of the topology, and the vertices strictly between its ends, from the lower end to the
-    /// higher.
+    /// Index of an edge of the topology, and the vertices strictly between its ends, ordered from
+    /// the lower end to the higher.
     pub edges: Vec<(usize, Vec<u32>)>,
-    /// For each corner that is the middle of a collinear face: it and the opposite edge, lower vertex first.
+    /// For each collinear face: its middle corner and the opposite edge, lower vertex first.
     collinear: Vec<(u32, [u32; 2])>,
 }
 
-/// Vertices at most `tolerance` from an unbalanced edge that is not theirs.
+/// Finds vertices at most `tolerance` away from an unbalanced edge that does not end there.
 ///
-/// Only ends of other unbalanced edges are looked at: around any other vertex the surface is complete, so that
-/// putting the vertex on the edge could not close a gap.
+/// Only ends of other unbalanced edges are tested. Around any other vertex the surface is complete,
+/// so splitting the edge at that vertex could not close a gap.
 pub(crate) fn t_junctions(vertices: &[DVec3], topology: &Topology, tolerance: f64) -> TJunctions {
     let open: Vec<usize> =
         (0..topology.edges().len()).filter(|&e| !topology.edges()[e].is_balanced()).collect();
@@ -87,7 +87,7 @@ impl TJunctions {
         defects
     }
 
-    /// Pairs of faces that touch because a corner of one lies on an edge of the other.
+    /// Pairs of faces that touch because a corner of one face lies on an edge of the other.
     pub(crate) fn touching(&self, mesh: &TriangleMesh, topology: &Topology) -> HashSet<(u32, u32)> {
         let mut on_edges: Vec<(usize, u32)> =
             self.edges.iter().flat_map(|(e, on)| on.iter().map(|&v| (*e, v))).collect();

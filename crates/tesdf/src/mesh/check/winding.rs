@@ -13,18 +13,20 @@ use crate::{
     mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, topology::Edge},
 };
 
-/// What points of intersections may be off by, relative to the largest coordinate: some hundred roundings of it.
+/// Bound of the rounding error of intersection points, relative to the largest coordinate: about a
+/// hundred roundings.
 const ROUNDING: f64 = 2e-14;
 
-/// Regions of all faces together that are tested: a second or two. Of more, evenly chosen ones of each face are.
+/// Largest number of tested regions in all faces together; the tests take a second or two. When
+/// there are more, evenly chosen regions of each face are tested.
 const REGIONS: usize = 1 << 17;
 
-/// What is known of how the faces of a closed mesh meet.
+/// The ways in which the faces of a closed mesh meet.
 pub(super) struct Meetings<'a> {
     pub flaws: &'a FaceFlaws,
-    /// Pairs that intersect.
+    /// Pairs of faces that intersect.
     pub intersections: &'a [[u32; 2]],
-    /// Pairs that touch along a collinear face, and may intersect elsewhere.
+    /// Pairs of faces that touch along a collinear face, and may intersect elsewhere.
     pub touching: &'a HashSet<(u32, u32)>,
 }
 
@@ -46,7 +48,8 @@ impl Sides {
     }
 }
 
-/// The least and greatest winding number of a closed mesh, and where it is negative or above 1.
+/// The least and greatest winding number of a closed mesh, and the places where it is negative or
+/// above 1.
 pub(super) fn winding_defects(
     mesh: &TriangleMesh,
     topology: &Topology,
@@ -107,10 +110,12 @@ pub(super) fn winding_defects(
     (range, defects)
 }
 
-/// The winding numbers on both sides of a face at a place of it; from front to back they rise by `jump`.
+/// The winding numbers on both sides of a face at a place of it. From front to back they rise by
+/// `jump`.
 ///
-/// One of them is that of the place itself, on whichever side of the face rounding has put it: exact, unless another
-/// face passes between the place and the face.
+/// The winding number of the place itself is one of them. Rounding decides on which side of the
+/// face the place lies, and the result is exact for that side, unless another face passes between
+/// the place and the face.
 fn sides(mesh: &TriangleMesh, winding: &WindingNumber, face: u32, place: DVec3, jump: i32) -> Sides {
     let there = winding.at_perturbed(place);
     match perturbed_orientation(mesh.triangle(face as usize), place) > 0 {
@@ -119,10 +124,12 @@ fn sides(mesh: &TriangleMesh, winding: &WindingNumber, face: u32, place: DVec3, 
     }
 }
 
-/// Faces that are connected over manifold edges and meet no other face: the winding number is constant on each side.
+/// Faces that are connected over manifold edges and meet no other face. The winding number is
+/// constant on each side.
 struct Patch {
-    /// The tallest face stands for all: rounding moves its centre least, relative to its size. No other face comes as near to its centre
-    /// as rounding, unless that is so of each face.
+    /// The tallest face represents the patch: relative to its size, rounding moves its centroid
+    /// least. Another face comes within the rounding error of this centroid only when that holds
+    /// for every face of the patch.
     face: u32,
     /// Number of faces.
     size: usize,
@@ -159,7 +166,7 @@ fn patches(
     faces.into_iter().filter_map(of).collect()
 }
 
-/// Whether no other face has a point within `reach` of the centre of a face.
+/// Whether no other face has a point within `reach` of the centroid of a face.
 fn is_alone(mesh: &TriangleMesh, winding: &WindingNumber, face: u32, reach: f64) -> bool {
     let place = centroid(mesh, face);
     let (around, mut alone) = (Aabb::of(&[place]).grown(reach), true);
@@ -171,14 +178,14 @@ fn is_alone(mesh: &TriangleMesh, winding: &WindingNumber, face: u32, reach: f64)
     alone
 }
 
-/// What places on a face may be off by.
+/// Bound of the rounding error of places on a face.
 fn rounding(mesh: &TriangleMesh) -> f64 {
     let bounds = mesh.bounds();
     ROUNDING * bounds.min.abs().max(bounds.max.abs()).max_element()
 }
 
-/// Each face that meets others, with the least and the greatest winding number beside its regions. Of faces with the same
-/// corners the first stands for all.
+/// Each face that meets others, with the places of least and greatest winding number beside its
+/// regions. The first of several faces with the same corners represents them all.
 fn extremes(mesh: &TriangleMesh, winding: &WindingNumber, others: &Others) -> Vec<(u32, Sides, Sides)> {
     let rounding = rounding(mesh);
     let meets = |&f: &u32| !others.of(f).is_empty() && !others.repeats[f as usize];
@@ -197,7 +204,7 @@ fn extremes(mesh: &TriangleMesh, winding: &WindingNumber, others: &Others) -> Ve
     samples.par_iter().filter_map(extremes_of).collect()
 }
 
-/// For each face with area the others with area that it meets, ascending.
+/// For each face with area, the other faces with area that it meets, ascending.
 struct Others {
     starts: Vec<usize>,
     faces: Vec<u32>,
@@ -229,7 +236,7 @@ impl Others {
     }
 }
 
-/// Height of a triangle over its longest edge; NaN for a point.
+/// Height of a triangle over its longest edge; NaN when the triangle is a point.
 pub(crate) fn height([a, b, c]: [DVec3; 3]) -> f64 {
     let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a)).sqrt();
     (b - a).cross(c - a).length() / longest

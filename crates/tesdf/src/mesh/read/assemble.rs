@@ -1,4 +1,4 @@
-//! What all formats have in common once the bytes are polygons.
+//! The common steps of all formats, after the bytes have become polygons.
 use glam::DVec3;
 
 use super::{LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError};
@@ -6,26 +6,26 @@ use crate::mesh::polygon::{Shape, triangulate};
 use crate::mesh::weld::weld_equal;
 use crate::mesh::{MeshError, TriangleMesh};
 
-/// Vertices and polygons as a file gives them. Indices are 0-based and not checked yet.
+/// Vertices and polygons as the file gives them. Indices are 0-based and not checked yet.
 pub(super) struct RawMesh {
     pub positions: Vec<DVec3>,
-    /// Corners of all polygons, one after the other.
+    /// Corners of all polygons, concatenated.
     pub corners: Vec<u64>,
-    /// For each polygon where its corners end.
+    /// For each polygon, the end of its corners in `corners`.
     pub ends: Vec<usize>,
     pub places: Places,
-    /// What the format counts vertices from; for messages only.
+    /// First vertex number of the format; used in messages only.
     pub base: u64,
     pub notes: Vec<String>,
 }
 
-/// Where vertices and polygons stand in the file.
+/// The places of vertices and polygons in the file.
 pub(super) enum Places {
     /// Line numbers.
     Lines { vertices: Vec<u64>, faces: Vec<u64> },
     /// Byte offsets.
     Bytes { vertices: Vec<u64>, faces: Vec<u64> },
-    /// Elements, each with the number of its first vertex and of its first face, ascending.
+    /// Elements, each with the index of its first vertex and of its first face, ascending.
     Elements(Vec<(usize, usize, String)>),
 }
 
@@ -68,7 +68,7 @@ impl RawMesh {
         Self::new(Places::Bytes { vertices: Vec::new(), faces: Vec::new() }, 0)
     }
 
-    /// Adds a vertex that stands at line or byte `at`.
+    /// Adds a vertex at line or byte `at`.
     pub fn push_vertex(&mut self, position: DVec3, at: u64) {
         self.positions.push(position);
         match &mut self.places {
@@ -77,7 +77,7 @@ impl RawMesh {
         }
     }
 
-    /// Ends a polygon, which has the corners pushed since the last one, at line or byte `at`.
+    /// Ends a polygon at line or byte `at`. Its corners are those pushed since the polygon before.
     pub fn end_face(&mut self, at: u64) {
         self.ends.push(self.corners.len());
         match &mut self.places {
@@ -86,13 +86,13 @@ impl RawMesh {
         }
     }
 
-    /// Corners pushed since the last polygon ended.
+    /// Number of corners pushed since the last polygon ended.
     pub fn open_corners(&self) -> usize {
         self.corners.len() - self.ends.last().copied().unwrap_or(0)
     }
 
-    /// Adds the triangles of a strip at line or byte `at`. Triangles with two equal corners
-    /// turn the strip, they are no faces.
+    /// Adds the triangles of a strip at line or byte `at`. Triangles with two equal corners only
+    /// turn the strip; they are not faces.
     pub fn push_strip(&mut self, strip: &[u64], at: u64) {
         for (i, t) in strip.windows(3).enumerate() {
             if t[0] != t[1] && t[1] != t[2] && t[2] != t[0] {
@@ -103,7 +103,7 @@ impl RawMesh {
     }
 }
 
-/// Checks indices and coordinates, welds, drops what no face uses, and triangulates.
+/// Checks indices and coordinates, welds, drops unused vertices, and triangulates.
 pub(super) fn assemble(
     raw: RawMesh,
     format: MeshFormat,
@@ -158,7 +158,7 @@ pub(super) fn assemble(
     let mut counts = PolygonCounts::default();
     let (mut outline, mut triangles) = (Vec::new(), Vec::new());
     for (face, polygon) in polygons().enumerate() {
-        // In range and used, so each corner has a target.
+        // Every corner is in range and used, so it has a target.
         let ids = |corner: u32| welded.target[polygon[corner as usize] as usize].unwrap_or_default();
         if polygon.len() == 3 {
             faces.push([ids(0), ids(1), ids(2)]);

@@ -25,15 +25,15 @@ impl fmt::Display for Place {
     }
 }
 
-/// Why a file does not give a mesh.
+/// Why a file gives no mesh.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
     /// The file cannot be read from disk.
     #[error("cannot read {}: {source}", path.display())]
     Open {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The extension names no mesh format.
@@ -43,21 +43,21 @@ pub enum ReadError {
         MeshFormat::ALL.map(|f| format!(".{}", f.extension())).join(", ")
     )]
     UnknownExtension {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
     },
     /// There are no bytes.
     #[error("the file is empty (0 bytes); expected {format} data: export or copy it again")]
     Empty {
-        /// The format asked for.
+        /// The requested format.
         format: MeshFormat,
     },
     /// The content is of another kind than the extension says.
     #[error("the content is not {format}: it {looks}; {help}")]
     WrongContent {
-        /// The format asked for.
+        /// The requested format.
         format: MeshFormat,
-        /// What it looks like, as `is a PNG picture`.
+        /// The kind of the content, such as `is a PNG picture`.
         looks: String,
         /// What to do.
         help: &'static str,
@@ -67,11 +67,11 @@ pub enum ReadError {
     Malformed {
         /// The format.
         format: MeshFormat,
-        /// Where.
+        /// The place of the fault.
         place: Place,
         /// What was found there.
         found: String,
-        /// What is expected, or what to do.
+        /// What was expected, or what to do.
         help: String,
     },
     /// A face uses a vertex that the file does not have.
@@ -83,15 +83,15 @@ pub enum ReadError {
     IndexOutOfRange {
         /// The format.
         format: MeshFormat,
-        /// Where the face is.
+        /// The place of the face.
         place: Place,
         /// Polygon of the file, 0-based.
         face: usize,
-        /// The index as the file writes it.
+        /// The index, counted from `base`.
         index: u64,
         /// Number of vertices in the file.
         vertices: u64,
-        /// What the format counts from: 1 for OBJ, otherwise 0.
+        /// First vertex number of the format: 1 for OBJ, otherwise 0.
         base: u64,
     },
     /// A vertex that a face uses has a coordinate that is NaN or infinite.
@@ -102,11 +102,11 @@ pub enum ReadError {
     NonFinite {
         /// The format.
         format: MeshFormat,
-        /// Where the vertex is.
+        /// The place of the vertex.
         place: Place,
         /// Vertex of the file, counted from `base`.
         vertex: u64,
-        /// What the format counts from: 1 for OBJ, otherwise 0.
+        /// First vertex number of the format: 1 for OBJ, otherwise 0.
         base: u64,
         /// The first polygon that uses the vertex, 0-based.
         face: usize,
@@ -125,7 +125,7 @@ pub enum ReadError {
         /// Number of vertices found.
         vertices: usize,
     },
-    /// The mesh is larger than ids can name.
+    /// The mesh has more vertices or faces than ids can name.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }

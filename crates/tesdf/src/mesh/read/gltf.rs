@@ -1,13 +1,13 @@
-//! glTF 2.0, as JSON and as GLB.
+//! Reads glTF 2.0, as JSON and as GLB.
 //!
-//! `gltf-json` (of the `gltf` crate) parses the JSON and validates it, and names the path at fault.
-//! The container and the accessors are read here: `gltf` 1.4.1 subtracts 12 from the length in
-//! the GLB header unchecked, and its accessor iterators do not say which bytes are missing.
+//! `gltf-json` (of the `gltf` crate) parses and validates the JSON, and names the path at fault.
+//! This module reads the container and the accessors: `gltf` 1.4.1 subtracts 12 from the length in
+//! the GLB header without a check, and its accessor iterators do not say which bytes are missing.
 //!
-//! Read: the triangles, strips and fans of the default scene (else the first scene, else all root
-//! nodes, else all meshes), with the nodes' transforms; buffers in the file, as `data:` URIs, or
-//! in files next to it. Nodes that mirror flip their faces, so outward stays outward. Skins and
-//! morph targets are not applied.
+//! The reader takes triangles, strips and fans of the default scene with the transforms of the
+//! nodes. Without a default scene it takes the first scene, else all root nodes, else all meshes.
+//! Buffers may be in the file, in `data:` URIs, or in files next to it. Nodes that mirror flip
+//! their faces, so outward stays outward. Skins and morph targets are not applied.
 mod buffers;
 mod limits;
 mod scene;
@@ -49,7 +49,7 @@ pub(super) fn parse(
     Ok(reader.raw)
 }
 
-/// The files in `folder`, and below, that hold the buffers; none of a file that is not glTF.
+/// The files in `folder` or below it that hold the buffers. Empty when the bytes are not glTF.
 pub(super) fn external_files(bytes: &[u8], format: MeshFormat, folder: &Path) -> Vec<PathBuf> {
     let root = read_root(bytes, format).map(|(root, _)| root);
     root.map_or_else(|_| Vec::new(), |root| buffers::external_files(&root, folder).collect())
@@ -73,11 +73,12 @@ fn read_root(bytes: &[u8], format: MeshFormat) -> Result<(json::Root, Option<&[u
     Ok((root, binary))
 }
 
-/// What geometry depends on. Other parts (materials, animations) may be as they are.
+/// Parts of the JSON on which the geometry depends. Faults in other parts (materials, animations)
+/// are ignored.
 const GEOMETRY: [&str; 8] =
     ["asset", "scene", "scenes", "nodes", "meshes", "accessors", "bufferViews", "buffers"];
 
-/// Required extensions that change how a mesh looks, not its shape.
+/// Prefixes of required extensions that change the look of a mesh but not its shape.
 const LOOKS: [&str; 4] = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"];
 
 fn validate(root: &json::Root, format: MeshFormat) -> Result<(), ReadError> {
@@ -106,8 +107,8 @@ fn validate(root: &json::Root, format: MeshFormat) -> Result<(), ReadError> {
     root.validate(root, json::Path::new, &mut |path, defect| {
         let path = path().to_string();
         let part = path.split(['[', '.', ' ']).next().unwrap_or_default();
-        // Many exporters leave the required bounds out; values without bytes are refused where
-        // they are needed.
+        // Many exporters leave out the required bounds. Values without bytes are refused where they
+        // are needed.
         let is_bound = path.ends_with(".min") || path.ends_with(".max");
         let is_view = defect == Defect::Missing && path.ends_with("].bufferView");
         if first.is_none() && GEOMETRY.contains(&part) && !is_bound && !is_view {
@@ -234,7 +235,7 @@ impl Reader<'_> {
             let found = format!("{} corners are not whole triangles", indices.len());
             return Err(fault(format, element, found, "expected a multiple of 3"));
         }
-        // A strip or fan has three corners for each of its own.
+        // A strip or fan has up to three corners per index.
         let corners_per_index = if mode == Mode::Triangles { 1 } else { 3 };
         let more = indices.len().saturating_mul(corners_per_index);
         room(&mut self.raw.corners, more, "corners of faces", format, &element)?;
@@ -242,7 +243,8 @@ impl Reader<'_> {
         if let Places::Elements(parts) = &mut self.raw.places {
             parts.push((base, first_face, element));
         }
-        // A NaN in one coordinate is to be reported in that one, and would spread.
+        // A NaN in one coordinate would spread to the others, but must be reported for that
+        // coordinate.
         let placed = |p: &DVec3| if p.is_finite() { pose.transform_point3(*p) } else { *p };
         self.raw.positions.extend(positions.iter().map(placed));
         let mirrored = pose.matrix3.determinant() < 0.0;
@@ -276,7 +278,7 @@ impl Reader<'_> {
     }
 }
 
-/// Makes room for `more` elements.
+/// Reserves memory for `more` elements.
 fn room<T>(
     elements: &mut Vec<T>,
     more: usize,
@@ -290,9 +292,9 @@ fn room<T>(
     })
 }
 
-/// An f32 of the JSON as the decimal number that was most likely written: a scale of 0.001 is to
-/// be 0.001 and not 0.0010000000474974513. The shortest decimal that rounds to the f32 is it
-/// whenever up to six digits were written.
+/// An f32 of the JSON as the decimal number that was most likely written: a scale of 0.001 should
+/// be 0.001 and not 0.0010000000474974513. The shortest decimal that rounds to the f32 is that
+/// number whenever it has up to six digits.
 fn decimal(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }

@@ -1,8 +1,8 @@
-//! Wavefront OBJ as found in the wild.
+//! Reads Wavefront OBJ as found in practice.
 //!
-//! Read: `v` (with weight or colours, which are dropped) and `f` (with texture and normal
-//! indices, which are dropped; relative indices). Everything else is skipped; what could be
-//! geometry (`l`, `p`, free-form surfaces) is named in a note.
+//! The reader takes `v` (without weight and colours) and `f` (without texture and normal indices;
+//! indices may be relative). Other statements are skipped. A note names those that may be geometry
+//! (`l`, `p`, free-form surfaces).
 use glam::DVec3;
 
 use super::text::{Lines, integer, malformed, number, shown, without_comment, words};
@@ -10,15 +10,15 @@ use super::{MeshFormat, RawMesh, ReadError, sniff};
 
 const OBJ: MeshFormat = MeshFormat::Obj;
 
-/// Statements that end at the line's end even when that is a backslash: they take names, and a
+/// Statements that end at the end of the line even after a backslash. They take names, and a
 /// Windows folder (`mtllib C:\parts\`) must not swallow the next line.
 const NAMED: &[&[u8]] = &[b"o", b"g", b"s", b"mg", b"usemtl", b"mtllib", b"usemap", b"maplib"];
 
-/// Statements that say nothing about the shape.
+/// Statements that do not affect the shape.
 const SILENT: &[&[u8]] =
     &[b"vt", b"vn", b"bevel", b"c_interp", b"d_interp", b"lod", b"shadow_obj", b"trace_obj"];
 
-/// Unknown statements named in notes; more are only counted.
+/// Number of unknown keywords named in notes. Further ones are only counted.
 const NOTED_KEYWORDS: usize = 8;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
@@ -64,7 +64,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
     Ok(raw)
 }
 
-/// The line without the backslash that continues it.
+/// The line without the trailing backslash; `None` when no backslash continues the line.
 fn continued(line: &[u8]) -> Option<&[u8]> {
     line.trim_ascii_end().strip_suffix(b"\\")
 }
@@ -83,7 +83,7 @@ fn vertex<'a>(
         }
         count += 1;
     }
-    // x y z, then a weight, a colour, or both; alpha makes eight.
+    // x y z, then a weight, a colour, or both. With alpha there are eight numbers.
     if !matches!(count, 3 | 4 | 6 | 7 | 8) {
         let found = format!("vertex {} (1-based) has {count} numbers", raw.positions.len() + 1);
         return Err(malformed(OBJ, line, found, "expected x y z, and perhaps a weight or a colour"));
@@ -110,7 +110,8 @@ fn face<'a>(
         }
         let vertices = raw.positions.len();
         let resolved = match index {
-            // A later vertex may be meant, so the upper bound is checked when all are there.
+            // The index may refer to a later vertex, so the upper bound is checked after the last
+            // line.
             1.. => Some(index as u64 - 1),
             0 => None,
             _ => (vertices as u64).checked_sub(index.unsigned_abs()),

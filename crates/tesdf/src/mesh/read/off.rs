@@ -1,4 +1,5 @@
-//! OFF: `OFF`, and `COFF`, `NOFF`, `STOFF` and their mixtures, whose extra numbers are dropped.
+//! Reads OFF: `OFF`, `COFF`, `NOFF`, `STOFF` and their combinations. Their extra numbers are
+//! dropped.
 use glam::DVec3;
 
 use super::text::{Lines, integer, malformed, number, shown, without_comment, words};
@@ -6,7 +7,7 @@ use super::{MeshFormat, RawMesh, ReadError, sniff};
 
 const OFF: MeshFormat = MeshFormat::Off;
 
-/// x y z, four of normal or colour each, and two of texture are the most a vertex can have.
+/// Largest count of numbers in a vertex: x y z, four of normal or colour each, and two of texture.
 const MOST_VERTEX_NUMBERS: usize = 12;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
@@ -65,8 +66,8 @@ fn ends_early(bytes: &[u8], found: String) -> ReadError {
     malformed(OFF, last, found, "expected as many lines as the header says: is the file cut short?")
 }
 
-/// Numbers of vertices and faces. The keyword is optional, and the counts may follow it on its
-/// line, even without a space (`OFF490 518 0` in a much used data set).
+/// Reads the numbers of vertices and faces. The keyword is optional. The counts may follow it on
+/// its line, even without a space (`OFF490 518 0` in a widely used data set).
 fn header(lines: &mut Lines<'_>) -> Result<[u64; 2], ReadError> {
     let mut content = content_lines(lines);
     let missing = |line: u64| malformed(OFF, line, "no counts", "expected the numbers of vertices and faces");
@@ -121,7 +122,7 @@ fn face(text: &[u8], line: u64, raw: &mut RawMesh) -> Result<(), ReadError> {
             malformed(OFF, line, found, "vertices count from 0")
         })?);
     }
-    // What follows is a colour.
+    // The rest of the line is a colour.
     raw.end_face(line);
     Ok(())
 }

@@ -1,7 +1,8 @@
-//! PLY: ASCII and binary of either byte order, any scalar types, extra properties and elements.
+//! Reads PLY: ASCII and binary of either byte order, all scalar types, extra properties and
+//! elements.
 //!
-//! `header.rs` reads the header, `rows.rs` gives the values of the data in order, whatever the
-//! encoding; here they become vertices, polygons and triangle strips.
+//! `header.rs` reads the header. `rows.rs` gives the values of the data in order, whatever the
+//! encoding. This module turns them into vertices, polygons and triangle strips.
 mod header;
 mod rows;
 
@@ -14,7 +15,7 @@ use rows::Rows;
 
 const PLY: MeshFormat = MeshFormat::Ply;
 
-/// What a property is for.
+/// The use of a property.
 #[derive(Clone, Copy, PartialEq)]
 enum Role {
     Coordinate(usize),
@@ -38,7 +39,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
 }
 
 fn read_element(element: &Element, rows: &mut Rows<'_>, raw: &mut RawMesh) -> Result<(), ReadError> {
-    // Rows without a property take no bytes and no line, however many the header says.
+    // Rows without a property take no bytes and no line, whatever their number in the header.
     if element.properties.is_empty() {
         return Ok(());
     }
@@ -103,7 +104,7 @@ fn read_element(element: &Element, rows: &mut Rows<'_>, raw: &mut RawMesh) -> Re
 }
 
 fn vertex_index(value: f64) -> Option<u64> {
-    // Up to 2^53 all whole numbers are exact; more vertices than that are in no file.
+    // All integers up to 2^53 are exact, and no file has that many vertices.
     let is_index = (0.0..9.0e15).contains(&value) && value.fract() == 0.0;
     is_index.then_some(value as u64)
 }

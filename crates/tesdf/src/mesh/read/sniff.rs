@@ -1,11 +1,11 @@
-//! Content that contradicts the extension.
+//! Recognises content that contradicts the extension.
 use super::text::without_bom;
 use super::{MeshFormat, ReadError};
 
 const EXPORT: &str = "export the mesh again, or check the path";
 const RENAME: &str = "give the file the extension of its content";
 
-/// First bytes that tell a kind of file, what it is called, and what to do about it.
+/// First bytes of a kind of file, its description, and what to do about it.
 const KINDS: &[(&[u8], &str, &str)] = &[
     (b"\x89PNG", "is a PNG picture", EXPORT),
     (b"\xFF\xD8\xFF", "is a JPEG picture", EXPORT),
@@ -33,7 +33,7 @@ const FORMATS: &[(&[u8], MeshFormat, &str)] = &[
     (b"OFF\r", MeshFormat::Off, "is an OFF file"),
 ];
 
-/// Refuses content that is known to be something else.
+/// Refuses content that is known to be of another kind.
 pub(super) fn refuse_other_kinds(bytes: &[u8], format: MeshFormat) -> Result<(), ReadError> {
     let text = without_bom(bytes);
     for &(magic, looks, help) in KINDS {
@@ -49,7 +49,7 @@ pub(super) fn refuse_other_kinds(bytes: &[u8], format: MeshFormat) -> Result<(),
     Ok(())
 }
 
-/// Refuses a text file with a zero byte.
+/// Refuses a text file that contains a zero byte.
 pub(super) fn refuse_binary(bytes: &[u8], format: MeshFormat) -> Result<(), ReadError> {
     match bytes.iter().position(|b| *b == 0) {
         None => Ok(()),

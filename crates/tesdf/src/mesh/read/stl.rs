@@ -1,7 +1,7 @@
-//! STL, binary and ASCII.
+//! Reads STL, binary and ASCII.
 //!
-//! Whether a file is binary is told by its size, 84 + 50 × count, because many binary files
-//! begin with `solid` too.
+//! A file is binary when its size is 84 + 50 × count. The first word does not decide, because many
+//! binary files begin with `solid` too.
 use glam::DVec3;
 
 use super::text::{Lines, malformed, number, shown, words};
@@ -48,7 +48,7 @@ fn parse_binary(facets: &[u8]) -> RawMesh {
     let mut raw = RawMesh::with_bytes();
     for (face, facet) in facets.chunks_exact(FACET).enumerate() {
         let at = (HEADER + face * FACET) as u64;
-        // The normal (12 bytes) and the attribute (2 bytes) say nothing that the corners do not.
+        // The normal (12 bytes) and the attribute (2 bytes) add nothing to the corners.
         for (corner, p) in facet[12..48].chunks_exact(12).enumerate() {
             let value = |i: usize| f64::from(f32::from_le_bytes([p[i], p[i + 1], p[i + 2], p[i + 3]]));
             raw.corners.push(raw.positions.len() as u64);
@@ -59,7 +59,7 @@ fn parse_binary(facets: &[u8]) -> RawMesh {
     raw
 }
 
-/// A word with its line, and whether it is the first of its line.
+/// A line number and a word of that line.
 type Word<'a> = (u64, &'a [u8]);
 
 fn parse_ascii(bytes: &[u8]) -> Result<RawMesh, ReadError> {
@@ -120,8 +120,8 @@ fn parse_ascii(bytes: &[u8]) -> Result<RawMesh, ReadError> {
     Ok(raw)
 }
 
-/// Skips the name that may follow on the line of `solid` and `endsolid`. Whole files on one line
-/// exist, so the name ends where `stop` comes too.
+/// Skips the name that may follow `solid` or `endsolid` on the same line. Some files are a single
+/// line, so the name also ends at `stop`.
 fn skip_name<'a>(words: &mut std::iter::Peekable<impl Iterator<Item = Word<'a>>>, line: u64, stop: &[u8]) {
     let in_name = |&(n, word): &Word<'_>| {
         n == line && !word.eq_ignore_ascii_case(stop) && !word.eq_ignore_ascii_case(b"endsolid")
@@ -137,8 +137,8 @@ fn keyword((line, word): Word<'_>, expected: &str, face: usize) -> Result<(), Re
     Err(malformed(MeshFormat::Stl, line, found, format!("expected '{expected}'")))
 }
 
-/// The normal is not used, but a decimal comma in it tells about the file. Exporters write
-/// `-nan(ind)` and `1.#QNAN` for flat facets.
+/// Checks a component of the normal. The normal is not used, but a decimal comma in it reveals the
+/// locale of the file. Exporters write `-nan(ind)` and `1.#QNAN` for flat facets.
 fn normal_component(word: &[u8], line: u64) -> Result<(), ReadError> {
     let undefined =
         word.eq_ignore_ascii_case(b"-nan(ind)") || word.windows(2).any(|w| w == b"#Q" || w == b"#I");

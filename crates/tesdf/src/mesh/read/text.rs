@@ -1,8 +1,8 @@
-//! Lines, words and numbers of text files whose encoding is not known.
+//! Lines, words and numbers of text files of unknown encoding.
 use super::{MeshFormat, Place, ReadError};
 
-/// Lines with their 1-based numbers; ends are LF, CR LF or a lone CR. A UTF-8 byte-order mark at
-/// the start is skipped.
+/// Lines with their 1-based numbers. A line ends at LF, CR LF or a lone CR. A UTF-8 byte-order mark
+/// at the start is skipped.
 pub(crate) struct Lines<'a> {
     rest: &'a [u8],
     number: u64,
@@ -13,17 +13,17 @@ impl<'a> Lines<'a> {
         Self { rest: without_bom(bytes), number: 0 }
     }
 
-    /// The lines of `rest`, which comes after line `number`.
+    /// The lines of `rest`, which begins after line `number`.
     pub fn after(rest: &'a [u8], number: u64) -> Self {
         Self { rest, number }
     }
 
-    /// The number of the line that was given last; 0 before the first.
+    /// The number of the line that was returned last; 0 before the first.
     pub fn number(&self) -> u64 {
         self.number
     }
 
-    /// What follows the line that was given last.
+    /// The bytes after the line that was returned last.
     pub fn rest(&self) -> &'a [u8] {
         self.rest
     }
@@ -51,7 +51,7 @@ pub(crate) fn without_bom(bytes: &[u8]) -> &[u8] {
 
 /// The words of a line.
 pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    // Vertical tab and form feed are white space to C's isspace, so exporters may write them.
+    // Vertical tab and form feed are white space for C's isspace, so exporters may write them.
     line.split(|b| b.is_ascii_whitespace() || *b == 0x0B).filter(|w| !w.is_empty())
 }
 
@@ -60,14 +60,14 @@ pub(crate) fn without_comment(line: &[u8]) -> &[u8] {
     line.split(|b| *b == b'#').next().unwrap_or(line)
 }
 
-/// A word as it is shown in a message: at most 40 characters, control characters escaped.
+/// A word as shown in messages: at most 40 bytes, with control characters escaped.
 pub(crate) fn shown(word: &[u8]) -> String {
     let cut = &word[..word.len().min(40)];
     let dots = if cut.len() < word.len() { "…" } else { "" };
     format!("'{}{dots}'", cut.escape_ascii())
 }
 
-/// A number; NaN and infinities are numbers here, what they may be used for is decided later.
+/// Parses a number. NaN and infinities are accepted here and checked later.
 pub(super) fn number(word: &[u8], format: MeshFormat, line: u64) -> Result<f64, ReadError> {
     std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()).ok_or_else(|| {
         if word.contains(&b',') {
@@ -80,7 +80,7 @@ pub(super) fn number(word: &[u8], format: MeshFormat, line: u64) -> Result<f64, 
     })
 }
 
-/// A whole number that may be negative.
+/// Parses an integer, which may be negative.
 pub(super) fn integer(word: &[u8], format: MeshFormat, line: u64) -> Result<i64, ReadError> {
     std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()).ok_or_else(|| {
         malformed(

@@ -12,7 +12,8 @@ use crate::{
     },
 };
 
-/// Makes neighbouring faces agree, then turns closed shells outward or inward by the parity of those around.
+/// Orients neighbouring faces consistently. Then orients each closed shell outward or inward, by
+/// the parity of the number of shells around it.
 pub(super) fn orient(draft: &mut Draft, report: &mut RepairReport) {
     let (mut reversed, _) = Topology::new(&draft.faces).consistent_orientation();
     for (face, _) in draft.faces.iter_mut().zip(&reversed).filter(|(_, r)| **r) {
@@ -27,7 +28,7 @@ fn orient_shells(draft: &mut Draft, reversed: &mut [bool], report: &mut RepairRe
     let topology = Topology::new(&draft.faces);
     let (shell, count) = shells(&topology);
     let closed = closed_shells(&topology, &shell, count);
-    // The faces of closed shells as a mesh of their own.
+    // The faces of the closed shells as a mesh of their own.
     let kept: Vec<u32> =
         (0..draft.faces.len() as u32).filter(|&f| closed[shell[f as usize] as usize]).collect();
     let faces = kept.iter().map(|&f| draft.faces[f as usize]).collect();
@@ -58,8 +59,9 @@ fn orient_shells(draft: &mut Draft, reversed: &mut [bool], report: &mut RepairRe
         let own = windings.remove(&number).unwrap_or(0);
         let depth = windings.values().filter(|w| *w % 2 != 0).count();
         let behind = if perturbed_orientation(triangle, center) > 0 { own } else { own + 1 };
-        // Of an embedded shell, one side of each face has the winding number 0. Where a shell meets itself, such
-        // as flaps of a careless triangulation, one place does not tell; its volume does, if it has any.
+        // In an embedded shell, one side of each face has the winding number 0, so one place
+        // decides. A shell that meets itself (such as flaps of a careless triangulation) is decided
+        // by its volume, if it has any.
         let outward = if crossing_themselves.contains(&number) {
             let volume = volume(&mesh, |f| shell_of(f) == number);
             if volume == 0.0 {
@@ -79,8 +81,9 @@ fn orient_shells(draft: &mut Draft, reversed: &mut [bool], report: &mut RepairRe
     }
 }
 
-/// Shell of each face and their number: patches that are connected over edges with two faces, and joined where
-/// they only balance together at an edge with more.
+/// The shell of each face, and an upper bound of the shell numbers. A shell is a patch of faces
+/// that are connected over edges with two faces. Patches are joined where they balance only
+/// together at an edge with more faces.
 fn shells(topology: &Topology) -> (Vec<u32>, usize) {
     let (patch, count) = topology.components(|edge| edge.face_count() == 2);
     let mut sets = DisjointSets::new(count);
@@ -102,21 +105,22 @@ fn closed_shells(topology: &Topology, shell: &[u32], count: usize) -> Vec<bool> 
     closed
 }
 
-/// Uses forward minus uses backward, for each owner.
+/// For each owner, the forward uses minus the backward uses.
 fn balance(uses: impl Iterator<Item = (u32, bool)>) -> BTreeMap<u32, i32> {
     let mut balance = BTreeMap::new();
     uses.for_each(|(owner, forward)| *balance.entry(owner).or_default() += if forward { 1 } else { -1 });
     balance
 }
 
-/// Pairs of shells that meet, each with a face of either; and the shells that meet themselves.
+/// Pairs of shells that meet, each with one face of both shells, and the shells that meet
+/// themselves.
 fn crossing_shells(
     mesh: &TriangleMesh,
     shell_of: impl Fn(u32) -> u32,
 ) -> (BTreeMap<[u32; 2], [u32; 2]>, BTreeSet<u32>) {
     let topology = Topology::new(mesh.faces());
     let flaws = face_flaws(mesh);
-    // Closed shells have no open edges to lie on.
+    // Closed shells have no open edges for a vertex to lie on.
     let touching = TJunctions::default().with_collinear(mesh, &flaws.zero_area).touching(mesh, &topology);
     let pairs = self_intersections(mesh, &flaws.without_area(), &touching);
     let (mut crossing, mut themselves) = (BTreeMap::new(), BTreeSet::new());
@@ -131,7 +135,7 @@ fn crossing_shells(
     (crossing, themselves)
 }
 
-/// Signed volume of some faces, relative to the middle of the mesh.
+/// Six times the signed volume of the faces that `of` accepts, relative to the centre of the mesh.
 fn volume(mesh: &TriangleMesh, of: impl Fn(u32) -> bool) -> f64 {
     let middle = mesh.bounds().center();
     let term = |f: u32| {

@@ -9,17 +9,20 @@ use crate::mesh::{
     topology::has_repeated_corner,
 };
 
-/// Splitting an edge can bring another vertex within reach of one of its parts.
+/// Limit on the rounds. Splitting an edge can bring another vertex within reach of one of its
+/// parts.
 const MAX_ROUNDS: usize = 4;
 
 /// Splits faces at the vertices that lie within `tolerance` of their open edges.
 ///
-/// An edge is split in all of its faces at once. Its directed uses then become those of its parts, as often as
-/// before, and new edges inside a face are used once in each direction: balanced edges stay balanced. A face
-/// whose third corner is on the edge leaves only parts with two equal corners; it vanishes.
+/// An edge is split in all of its faces at once. The parts are then used as often in each direction
+/// as the edge was, and new edges inside a face are used once in each direction. So balanced edges
+/// stay balanced. A face whose third corner lies on the edge leaves only parts with two equal
+/// corners, so it vanishes.
 ///
-/// Splits are kept only when they make the open edges shorter in total, and are not tried when vertices lie on more
-/// than two open edges each: then the tolerance is wider than the details of the mesh, and splitting would not end.
+/// Splits are kept only when they make the open edges shorter in total. They are not tried when
+/// there are more than two vertices per open edge on average: then the tolerance is wider than the
+/// details of the mesh, and splitting would not end.
 pub(super) fn split(draft: &mut Draft, tolerance: f64, report: &mut RepairReport) {
     let mut vanished = BTreeSet::new();
     let mut topology = Topology::new(&draft.faces);
@@ -38,7 +41,8 @@ pub(super) fn split(draft: &mut Draft, tolerance: f64, report: &mut RepairReport
         let split = Topology::new(&faces);
         let (before, after) =
             (open_lengths(&draft.vertices, &topology), open_lengths(&draft.vertices, &split));
-        // Parts of an edge are as long as the whole: less than that much shorter is rounding.
+        // The parts of an edge are as long as the edge itself, so a smaller change than this is
+        // rounding.
         let shorter = |k: usize| after[k] < before[k] * (1.0 - 1e-9);
         let longer = |k: usize| after[k] > before[k] * (1.0 + 1e-9);
         if !shorter(0) && (longer(0) || !shorter(1)) {
@@ -53,8 +57,8 @@ pub(super) fn split(draft: &mut Draft, tolerance: f64, report: &mut RepairReport
     report.vanished_faces = vanished.into_iter().collect();
 }
 
-/// Total length of the edges with an odd number of faces, which no orientation of the faces could balance, and that
-/// of all unbalanced edges, each as often as it is out of balance.
+/// Two total lengths. The first sums the edges with an odd number of faces, which no orientation of
+/// the faces can balance. The second sums all unbalanced edges, each multiplied by its imbalance.
 fn open_lengths(vertices: &[DVec3], topology: &Topology) -> [f64; 2] {
     topology.edges().iter().filter(|e| !e.is_balanced()).fold([0.0, 0.0], |sum, edge| {
         let [a, b] = edge.vertices.map(|v| vertices[v as usize]);
@@ -63,7 +67,7 @@ fn open_lengths(vertices: &[DVec3], topology: &Topology) -> [f64; 2] {
     })
 }
 
-/// The faces after splitting, and the face given that each comes from.
+/// The faces after splitting, and for each the face of the input mesh that it comes from.
 fn split_all(draft: &Draft, topology: &Topology, junctions: &TJunctions) -> (Vec<[u32; 3]>, Vec<u32>) {
     let chains: HashMap<[u32; 2], &[u32]> = junctions
         .edges
@@ -98,9 +102,10 @@ fn record(draft: &Draft, topology: &Topology, junctions: &TJunctions, report: &m
     }
 }
 
-/// The parts of one face, with those that have two equal corners left out.
+/// Appends the parts of one face, except parts with two equal corners.
 fn split_face(face: [u32; 3], chains: &HashMap<[u32; 2], &[u32]>, parts: &mut Vec<[u32; 3]>) {
-    // Each part, and which of its edges (from corner k to k + 1) are whole edges of the face, still to be split.
+    // Each part with a flag per edge (from corner k to k + 1): whether it is a whole edge of the
+    // face, still to be split.
     let mut todo = vec![(face, [true; 3])];
     while let Some((corners, whole)) = todo.pop() {
         let found = (0..3).filter(|&k| whole[k]).find_map(|k| {

@@ -4,14 +4,14 @@ use glam::DVec3;
 
 use super::Draft;
 
-/// Merges vertices; each merged vertex with the one that took its place.
+/// Merges vertices. Returns pairs of the merged vertex and the vertex that replaces it.
 ///
-/// In ascending order, a vertex goes to the nearest earlier vertex that stayed and is within `tolerance`, or else
-/// stays. So no vertex moves by more than the tolerance, and the result does not depend on anything but
-/// the order of the vertices.
+/// Vertices are visited in ascending order. A vertex is merged into the nearest earlier vertex that
+/// was kept and is within `tolerance`; otherwise it is kept. So no vertex moves by more than the
+/// tolerance, and the result depends only on the order of the vertices.
 pub(super) fn weld(draft: &mut Draft, tolerance: f64) -> Vec<[u32; 2]> {
     let largest = draft.vertices.iter().fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
-    // Cells may be larger than the tolerance, and then their numbers fit into 64 bits.
+    // A cell may be larger than the tolerance, so that cell indices fit into 64 bits.
     let cell = tolerance.max(largest * 2f64.powi(-40));
     let key = |p: DVec3| (p / cell).floor().as_i64vec3();
     let mut cells: HashMap<_, Vec<u32>> = HashMap::new();

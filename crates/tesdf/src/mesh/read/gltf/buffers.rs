@@ -1,4 +1,4 @@
-//! The bytes behind a glTF file's accessors.
+//! Reads the bytes behind the accessors of a glTF file.
 use std::borrow::Cow;
 use std::path::{Component, Path, PathBuf};
 
@@ -12,7 +12,7 @@ use json::validation::Checked;
 use super::{MeshFormat, ReadError, fault};
 use crate::mesh::text::shown;
 
-/// Gets the bytes of all buffers. Bytes of files next to the glTF file go into `hasher`.
+/// Loads the bytes of all buffers. Bytes of external files also go into `hasher`.
 pub(super) fn load<'a>(
     root: &json::Root,
     binary: Option<&'a [u8]>,
@@ -75,18 +75,18 @@ pub(super) fn load<'a>(
     Ok(buffers)
 }
 
-/// The files in `folder`, and below, that [`load`] opens.
+/// The files in `folder` or below it that [`load`] opens.
 pub(super) fn external_files(root: &json::Root, folder: &Path) -> impl Iterator<Item = PathBuf> {
     let uris = root.buffers.iter().filter_map(|buffer| buffer.uri.as_deref());
     uris.filter(|uri| !is_inside(uri)).filter_map(local_path).map(|path| folder.join(path))
 }
 
-/// Whether a URI holds the bytes itself.
+/// Whether a URI contains the bytes itself.
 fn is_inside(uri: &str) -> bool {
     uri.starts_with("data:")
 }
 
-/// The relative path that a URI names, when it stays in the folder.
+/// The relative path that a URI names; `None` when it leaves the folder.
 fn local_path(uri: &str) -> Option<PathBuf> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.bytes();
@@ -104,7 +104,7 @@ fn local_path(uri: &str) -> Option<PathBuf> {
     is_local.then_some(path)
 }
 
-/// Accessors over loaded buffers.
+/// Access to accessors over loaded buffers.
 #[derive(Clone, Copy)]
 pub(super) struct Data<'a> {
     pub root: &'a json::Root,
@@ -112,7 +112,7 @@ pub(super) struct Data<'a> {
     pub format: MeshFormat,
 }
 
-/// A run of equally spaced items in a buffer.
+/// A sequence of equally spaced items in a buffer.
 struct Items<'a> {
     bytes: &'a [u8],
     stride: usize,
@@ -199,7 +199,7 @@ impl<'a> Data<'a> {
     }
 
     fn dense(&self, json: &json::Accessor, size: usize, element: &str) -> Result<Items<'a>, ReadError> {
-        // Without a view all values are zero, as many as the count says: that is a header's count.
+        // Without a view all values are zero, and only the count in the JSON would say how many.
         let Some(view) = json.buffer_view else {
             return Err(fault(self.format, element, "no bufferView", "values without bytes are not read"));
         };

@@ -1,14 +1,16 @@
-//! How much the instances of meshes may come to: a file of some kilobytes can show a mesh as often as it likes.
+//! Limits the total size of all mesh instances: a file of some kilobytes can show a mesh any number
+//! of times.
 use gltf_json::mesh::{Mesh, Mode, Semantic};
 use gltf_json::validation::Checked;
 
 use super::buffers::Data;
 use super::{ReadError, fault};
 
-/// Most vertices, and most corners of faces, of all instances together; the encoder takes fewer.
+/// Largest number of vertices, and of face corners, of all instances together. The encoder accepts
+/// fewer.
 const MOST: usize = 1 << 27;
 
-/// Refuses instances that have too many vertices or corners of faces; `meshes` are those that they show.
+/// Refuses a scene with too many vertices or face corners. `meshes` has the mesh of each instance.
 pub(super) fn check(data: &Data<'_>, meshes: impl Iterator<Item = usize>) -> Result<(), ReadError> {
     let elements: Vec<_> = data.root.meshes.iter().map(|mesh| elements(data, mesh)).collect();
     let mut sums = [0_usize; 2];
@@ -25,10 +27,10 @@ pub(super) fn check(data: &Data<'_>, meshes: impl Iterator<Item = usize>) -> Res
     Ok(())
 }
 
-/// Vertices, and corners of faces, of an instance of a mesh.
+/// Numbers of vertices and of face corners in one instance of a mesh.
 fn elements(data: &Data<'_>, mesh: &Mesh) -> [usize; 2] {
     let bytes = data.buffers.iter().map(|buffer| buffer.len()).sum();
-    // A count that does not fit the bytes is refused where the values are read.
+    // A count that exceeds the bytes is refused later, when the values are read.
     let count = |accessor: usize| {
         let count = data.root.accessors.get(accessor).map_or(0, |accessor| accessor.count.0);
         usize::try_from(count).unwrap_or(usize::MAX).min(bytes)

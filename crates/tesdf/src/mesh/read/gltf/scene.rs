@@ -1,10 +1,10 @@
-//! Which meshes a glTF file shows, and where.
+//! Finds the meshes that a glTF file shows, with their poses.
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf_json as json;
 
 use super::{MeshFormat, ReadError, decimal, decimals, fault};
 
-/// Meshes with their poses, nodes in depth-first order.
+/// Meshes with their poses, in the depth-first order of their nodes.
 pub(super) fn instances(root: &json::Root, format: MeshFormat) -> Result<Vec<(usize, DAffine3)>, ReadError> {
     if root.nodes.is_empty() {
         return Ok((0..root.meshes.len()).map(|mesh| (mesh, DAffine3::IDENTITY)).collect());
@@ -58,7 +58,7 @@ fn local_pose(node: &json::Node) -> DAffine3 {
     }
     let scale = node.scale.map_or(DVec3::ONE, decimals);
     let translation = node.translation.map_or(DVec3::ZERO, decimals);
-    // Rounded to f32 it is not quite a unit quaternion any more.
+    // After rounding to f32, it is not exactly a unit quaternion.
     let rotation = node.rotation.map_or(DQuat::IDENTITY, |q| DQuat::from_array(q.0.map(decimal)).normalize());
     DAffine3::from_scale_rotation_translation(scale, rotation, translation)
 }

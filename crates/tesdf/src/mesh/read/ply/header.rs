@@ -1,4 +1,4 @@
-//! The header of a PLY file.
+//! Reads the header of a PLY file.
 use super::super::text::{Lines, malformed, shown, words};
 use super::{PLY, ReadError, Rows};
 
@@ -36,7 +36,7 @@ pub(super) struct Element {
     pub name: Vec<u8>,
     pub count: u64,
     pub properties: Vec<Property>,
-    /// Where the header declares it.
+    /// Line of the declaration in the header.
     pub line: u64,
 }
 
@@ -45,7 +45,7 @@ pub(super) struct Header {
     pub elements: Vec<Element>,
 }
 
-/// Reads the header; the rows begin after it.
+/// Reads the header. The returned rows begin after it.
 pub(super) fn header(bytes: &[u8]) -> Result<(Header, Rows<'_>), ReadError> {
     let mut lines = Lines::new(bytes);
     match lines.next() {
@@ -120,8 +120,8 @@ pub(super) fn header(bytes: &[u8]) -> Result<(Header, Rows<'_>), ReadError> {
     let Some(encoding) = encoding else {
         return Err(malformed(PLY, lines.number(), "the header has no 'format' line", "expected one"));
     };
-    // `Lines` takes a line feed after a carriage return with it. When the header's lines end with
-    // a lone carriage return, that byte is the first of the data.
+    // `Lines` treats a line feed after a carriage return as part of the line end. When the header's
+    // lines end with a lone carriage return, that line feed is the first byte of the data.
     let mut data = lines.rest();
     let first_end = bytes.iter().position(|b| matches!(b, b'\n' | b'\r')).unwrap_or(0);
     let lone_returns = bytes.get(first_end) == Some(&b'\r') && bytes.get(first_end + 1) != Some(&b'\n');

@@ -1,12 +1,12 @@
-//! The data of a PLY file as rows of numbers.
+//! Reads the data of a PLY file as rows of numbers.
 use super::super::text::{Lines, malformed, number, shown};
 use super::header::{Element, Encoding, Scalar};
 use super::{PLY, Place, ReadError};
 
-/// Gives one value after the other; all scalar types are exact in f64.
+/// Returns the values one after the other. All scalar types are exact in f64.
 pub(super) struct Rows<'a> {
     source: Source<'a>,
-    /// The row begun last, for messages.
+    /// The current row, for messages.
     element: String,
     row: u64,
     count: u64,
@@ -15,7 +15,7 @@ pub(super) struct Rows<'a> {
 enum Source<'a> {
     Ascii {
         lines: Lines<'a>,
-        /// What is left of the current line.
+        /// The rest of the current line.
         line: &'a [u8],
     },
     Binary {
@@ -34,7 +34,7 @@ impl<'a> Rows<'a> {
         Self { source, element: String::new(), row: 0, count: 0 }
     }
 
-    /// Begins a row and gives its line or byte.
+    /// Begins a row and returns its line or byte.
     pub fn begin(&mut self, element: &Element, row: u64) -> Result<u64, ReadError> {
         if row == 0 {
             self.element = String::from_utf8_lossy(&element.name).into_owned();
@@ -95,7 +95,7 @@ impl<'a> Rows<'a> {
         })
     }
 
-    /// Ends a row; a text row must have been read to its end.
+    /// Ends a row. A text row must have been read completely.
     pub fn end(&self) -> Result<(), ReadError> {
         match &self.source {
             Source::Ascii { line, .. } if !line.trim_ascii().is_empty() => Err(self.malformed(
@@ -111,7 +111,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Checks that nothing but white space and zero bytes follows.
+    /// Checks that only white space and zero bytes follow.
     pub fn finish(mut self) -> Result<(), ReadError> {
         const HELP: &str = "expected the end of the file: are the counts in the header right?";
         let is_padding = |b: &u8| b.is_ascii_whitespace() || *b == 0;
@@ -148,7 +148,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// The first value of `bytes`, and its size.
+/// The first value of `bytes`, and its size in bytes.
 fn take<const N: usize, T>(bytes: &[u8], big_endian: bool, from_le: fn([u8; N]) -> T) -> Option<(T, usize)> {
     let mut value: [u8; N] = bytes.get(..N)?.try_into().ok()?;
     if big_endian {
