@@ -1,24 +1,24 @@
 use glam::DVec3;
 
-/// An axis-aligned box; empty when `min > max` on some axis.
+/// An axis-aligned bounding box. It is empty when `min > max` on some axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
-    /// Least corner.
+    /// Lowest corner.
     pub min: DVec3,
-    /// Greatest corner.
+    /// Highest corner.
     pub max: DVec3,
 }
 
 impl Aabb {
-    /// The box that holds nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self { min: DVec3::INFINITY, max: DVec3::NEG_INFINITY };
 
-    /// The least box around `points`.
+    /// The smallest box around `points`.
     pub fn of(points: &[DVec3]) -> Self {
         points.iter().fold(Self::EMPTY, |b, &p| Self { min: b.min.min(p), max: b.max.max(p) })
     }
 
-    /// The least box around both.
+    /// The smallest box around both boxes.
     pub fn union(self, other: Self) -> Self {
         Self { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
@@ -33,12 +33,13 @@ impl Aabb {
         self.max - self.min
     }
 
-    /// Centre.
+    /// Centre of the box.
     pub fn center(self) -> DVec3 {
         0.5 * (self.min + self.max)
     }
 
-    /// The box in `f32`, relative to `middle`, rounded outward: least corner, greatest corner.
+    /// The box in `f32`, relative to `middle` and rounded outward: lowest corner, then highest
+    /// corner.
     pub fn rounded_from(self, middle: DVec3) -> [f32; 6] {
         let (low, high) = (self.min - middle, self.max - middle);
         std::array::from_fn(|k| match k {
@@ -52,7 +53,7 @@ impl Aabb {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
     }
 
-    /// Whether the closed box holds `p`.
+    /// Whether the closed box contains `p`.
     pub fn contains(self, p: DVec3) -> bool {
         self.min.cmple(p).all() && p.cmple(self.max).all()
     }

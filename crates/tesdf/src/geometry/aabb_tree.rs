@@ -4,24 +4,24 @@ use glam::DVec3;
 
 use super::Aabb;
 
-/// What hangs below one side of a node of an [`AabbTree`].
+/// A child of a node of an [`AabbTree`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
-    /// Another node, always with a greater index than its parent.
+    /// Another node. Its index is always greater than that of its parent.
     Node(u32),
-    /// `order()[start..end]`.
+    /// The items `order()[start..end]`.
     Leaf {
         /// First position in the order.
         start: u32,
-        /// One past the last.
+        /// One past the last position.
         end: u32,
     },
 }
 
-/// A static binary tree of boxes over items, built by binned surface-area heuristic.
+/// A static binary tree of boxes over items, built with the binned surface-area heuristic.
 ///
-/// Deterministic: it depends on the boxes alone. Items of a leaf are contiguous in
-/// [`order`](Self::order), and so are those of any subtree.
+/// Deterministic: the tree depends on the boxes alone. The items of a leaf are contiguous in
+/// [`order`](Self::order), and so are the items of any subtree.
 #[derive(Clone, Debug)]
 pub struct AabbTree {
     order: Vec<u32>,
@@ -30,14 +30,14 @@ pub struct AabbTree {
 }
 
 const BINS: usize = 16;
-/// Past this depth splits go to the median, so that no input makes a deep tree.
+/// Below this depth, nodes are split at the median, so that no input makes a deep tree.
 const MEDIAN_DEPTH: usize = 40;
 
 impl AabbTree {
     /// Largest depth of any tree: 40 levels by cost, then at most 29 halvings of 2^29 items.
     pub const MAX_DEPTH: usize = MEDIAN_DEPTH + 30;
 
-    /// Builds the tree; leaves hold up to `leaf_size` items (at least 1).
+    /// Builds the tree. Leaves hold up to `leaf_size` items (at least 1).
     pub fn build(boxes: &[Aabb], leaf_size: usize) -> Self {
         let mut tree = Self {
             order: (0..boxes.len() as u32).collect(),
@@ -51,7 +51,7 @@ impl AabbTree {
         tree
     }
 
-    /// Items in leaf order.
+    /// Item indices in leaf order.
     pub fn order(&self) -> &[u32] {
         &self.order
     }
@@ -66,7 +66,8 @@ impl AabbTree {
         self.root
     }
 
-    /// Fits the box of one child, 2 · node + side, to items and boxes below; tells whether it has changed.
+    /// Recomputes the box of the child `slot` = 2 · node + side from the items or boxes below it.
+    /// Returns whether the box changed.
     pub fn refit(&mut self, slot: u32, box_of: impl Fn(u32) -> Aabb) -> bool {
         let (node, side) = (slot as usize / 2, slot as usize % 2);
         let fitted = self.fitted(self.nodes[node][side].1, box_of);
@@ -75,7 +76,7 @@ impl AabbTree {
         changed
     }
 
-    /// Fits the box of the whole tree, when all below is fitted.
+    /// Recomputes the box of the whole tree, after all boxes below are up to date.
     pub fn refit_root(&mut self, box_of: impl Fn(u32) -> Aabb) {
         self.root.0 = self.fitted(self.root.1, box_of);
     }
@@ -89,7 +90,8 @@ impl AabbTree {
         }
     }
 
-    /// Calls `leaf` with the items of each leaf whose box, and whose ancestors' boxes, `enter` accepts.
+    /// Calls `leaf` with the items of each leaf. `enter` must accept the boxes of the leaf and of
+    /// all its ancestors.
     pub fn visit(&self, mut enter: impl FnMut(Aabb) -> bool, mut leaf: impl FnMut(&[u32])) {
         let mut stack = vec![self.root];
         while let Some((bounds, child)) = stack.pop() {
@@ -105,12 +107,13 @@ impl AabbTree {
 
     /// The least `distance_squared(item)`, with its item; on ties the lowest item.
     ///
-    /// `distance_squared` must be at least the squared distance from `p` to the item's box.
+    /// `distance_squared` must not be less than the squared distance from `p` to the item's box.
     pub fn nearest(&self, p: DVec3, distance_squared: impl FnMut(u32) -> f64) -> Option<(f64, u32)> {
         self.nearest_within(p, f64::INFINITY, distance_squared)
     }
 
-    /// As [`nearest`](Self::nearest), of items whose squared distance is at most `limit`: quicker when that is known to be close.
+    /// As [`nearest`](Self::nearest), but only for items whose squared distance is at most `limit`.
+    /// A tight limit makes the search faster.
     pub fn nearest_within(
         &self,
         p: DVec3,
@@ -169,7 +172,7 @@ impl AabbTree {
     }
 }
 
-/// Reorders `items` and returns where the right side begins, in `1..items.len()`.
+/// Reorders `items` and returns the start of the right side, in `1..items.len()`.
 fn split(boxes: &[Aabb], items: &mut [u32], depth: usize) -> usize {
     let center = |i: u32| boxes[i as usize].center();
     let spread = items.iter().fold(Aabb::EMPTY, |b, &i| b.union(Aabb::of(&[center(i)])));
@@ -178,7 +181,7 @@ fn split(boxes: &[Aabb], items: &mut [u32], depth: usize) -> usize {
         .then(|| (0..3).filter(|&a| extent[a] > 0.0).filter_map(|a| best_bin(boxes, items, spread, a)))
         .and_then(|costs| costs.min_by(|a, b| a.0.total_cmp(&b.0)));
     if let Some((_, axis, bin)) = by_cost {
-        // A stable partition keeps the result independent of everything but the boxes.
+        // A stable partition makes the result depend on the boxes alone.
         let (mut left, right): (Vec<u32>, Vec<u32>) =
             items.iter().partition(|&&i| bin_of(center(i)[axis], spread, axis) <= bin);
         let at = left.len();
@@ -202,7 +205,7 @@ fn bin_of(center: f64, spread: Aabb, axis: usize) -> usize {
     ((t * BINS as f64) as usize).min(BINS - 1)
 }
 
-/// The cheapest split of one axis: (cost, axis, last bin of the left side).
+/// The cheapest split along one axis: (cost, axis, last bin of the left side).
 fn best_bin(boxes: &[Aabb], items: &[u32], spread: Aabb, axis: usize) -> Option<(f64, usize, usize)> {
     let mut bins = [(Aabb::EMPTY, 0usize); BINS];
     for &i in items {

@@ -1,9 +1,11 @@
 use glam::{DMat3, DVec3};
 
-/// Barycentric coordinates of `p` in a tetrahedron: they add up to 1, and are all at least 0 inside. Not finite for a flat one.
+/// Barycentric coordinates of `p` in a tetrahedron. Their sum is 1, and inside the tetrahedron all
+/// are at least 0. They are not finite when the tetrahedron is flat.
 ///
-/// One step of refinement makes the point that they name again `p` up to the rounding of its coordinates, in slivers too, where
-/// the coordinates themselves are badly determined.
+/// One step of iterative refinement makes the weighted sum of the corners equal `p` up to the
+/// rounding of its coordinates. This holds in slivers too, where the coordinates themselves are
+/// ill-conditioned.
 pub fn barycentric(corners: &[DVec3; 4], p: DVec3) -> [f64; 4] {
     let [a, b, c, d] = *corners;
     let edges = DMat3::from_cols(b - a, c - a, d - a);

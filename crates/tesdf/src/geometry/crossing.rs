@@ -1,42 +1,45 @@
 use glam::DVec3;
 use robust::{Coord, Coord3D};
 
-/// By how much the winding number changes where the segment from `x` to `p'` passes through one triangle:
-/// for a closed surface and any `x` that is not on it,
+/// The change of the winding number where the segment from `x` to `p'` passes through one triangle.
+/// For a closed surface and any `x` that is not on it:
 ///
 /// ```text
 /// winding(x) = winding(p') + sum over the triangles of signed_crossing(x, p, triangle)
 /// p' = p + (e, e^2, e^3), e > 0 infinitesimal
 /// ```
 ///
-/// The result is in {-1, 0, 1}: 1 where the segment leaves through the front (counter-clockwise) side.
-/// It is exact: no tolerance, no rounding, for coordinates whose products neither overflow nor underflow.
-/// `p` may lie anywhere, on the surface too. When `x` is on the triangle the answer is 0.
+/// The result is in {-1, 0, 1}. It is 1 where the segment leaves through the front
+/// (counter-clockwise) side. It is exact, without tolerance or rounding, for coordinates whose
+/// products neither overflow nor underflow. `p` may lie anywhere, also on the surface. When `x` is
+/// on the triangle, the result is 0.
 ///
 /// # Why the sum is right
 /// Write `[u v w]` for the determinant. All decisions are signs of
 ///
 /// - the side of `x`: `[a-x b-x c-x]`,
 /// - the side of `p'`: `[a-p' b-p' c-p'] = [a-p b-p c-p] - (e, e^2, e^3) . n`, `n = (b-a) x (c-a)`,
-/// - the turn about each edge: `[p'-x a-x b-x] = [p-x a-x b-x] + (e, e^2, e^3) . m`, `m = (a-x) x (b-x)`.
+/// - the turn about each edge: `[p'-x a-x b-x] = [p-x a-x b-x] + (e, e^2, e^3) . m`, `m = (a-x) x
+///   (b-x)`.
 ///
-/// Each is a polynomial in `e`, so for every small enough `e > 0` its sign is that of its first
-/// coefficient that is not 0: the determinant, then the x, y and z component of `-n` or `m`. These
-/// components are planar determinants of the corners, so all of them are found exactly, and what is
-/// decided is what holds for one true point `p'` close to `p`. For it:
+/// Each of these is a polynomial in `e`. For every small enough `e > 0` its sign is that of its
+/// first nonzero coefficient: the determinant, then the x, y and z component of `-n` or `m`. These
+/// components are planar determinants of the corners, so all coefficients have exact signs. The
+/// decisions therefore hold for one true point `p'` close to `p`. For this point:
 ///
-/// - An edge that is not in line with `x` has `m != 0`: the line through `x` and `p'` misses it. An
-///   edge in line with `x` does not hold `x`, which is not on the surface, and meets that line only in `x`.
-///   So the segment meets no edge. The turn changes sign with the edge's direction, as it is one determinant
-///   with two rows swapped: neighbours agree on which of them is crossed.
-/// - A triangle of area 0 is made of its edges: 0. For it the side of `x` is 0.
-/// - A triangle whose plane holds `x`: `n != 0` keeps `p'` off the plane, so the segment meets
-///   the plane only in `x`, which is not on the triangle: 0.
-/// - Any other triangle is crossed, in its inside, exactly when `x` and `p'` are on different
-///   sides and the turns about its three edges are equal.
+/// - An edge that is not in line with `x` has `m != 0`, so the line through `x` and `p'` misses it.
+///   An edge in line with `x` does not contain `x`, because `x` is not on the surface, and it can
+///   meet that line only in `x`. So the segment meets no edge. Reversing an edge swaps two rows of
+///   its determinant and so changes the sign of the turn. Neighbouring triangles therefore agree on
+///   which of them is crossed.
+/// - A triangle of area 0 consists of its edges, so the result is 0. For it the side of `x` is 0.
+/// - In a triangle whose plane contains `x`, `n != 0` keeps `p'` off the plane. So the segment
+///   meets the plane only in `x`, which is not on the triangle, and the result is 0.
+/// - Any other triangle is crossed in its interior exactly when `x` and `p'` are on different sides
+///   and the turns about its three edges are equal.
 ///
-/// The segment is thus in general position to a closed surface, and along it the winding number changes by
-/// 1 at each crossing, down by 1 where it leaves through a front side.
+/// So the segment is in general position to a closed surface. Along it the winding number changes
+/// by 1 at each crossing, and decreases by 1 where the segment leaves through a front side.
 pub fn signed_crossing(x: DVec3, p: DVec3, triangle: [DVec3; 3]) -> i32 {
     let [a, b, c] = triangle;
     let side = orientation(a, b, c, x);
@@ -50,18 +53,19 @@ pub fn signed_crossing(x: DVec3, p: DVec3, triangle: [DVec3; 3]) -> i32 {
         0 => first_nonzero(normal_signs(x, a, b)),
         sign => sign,
     };
-    // Seen from x, on the back, the corners of a crossed triangle turn about p' in the positive sense.
+    // Seen from x behind the triangle, the corners of a crossed triangle turn about p' in the
+    // positive sense.
     if turns(a, b) == side && turns(b, c) == side && turns(c, a) == side { side } else { 0 }
 }
 
-/// Sign of the determinant `[a-d b-d c-d]`, exact: 1 when `d` is behind the triangle `abc`.
+/// Exact sign of the determinant `[a-d b-d c-d]`. It is 1 when `d` is behind the triangle `abc`.
 pub fn orientation(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
     let coord = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
     sign(robust::orient3d(coord(a), coord(b), coord(c), coord(d)))
 }
 
-/// [`orientation`] of `p + (e, e^2, e^3)`, `e > 0` infinitesimal: 1 behind the triangle, -1 in front of it, 0
-/// only when the triangle has no area.
+/// [`orientation`] of `p + (e, e^2, e^3)` with `e > 0` infinitesimal: 1 behind the triangle, -1 in
+/// front of it. It is 0 only when the triangle has no area.
 pub fn perturbed_orientation([a, b, c]: [DVec3; 3], p: DVec3) -> i32 {
     match orientation(a, b, c, p) {
         0 => -first_nonzero(normal_signs(a, b, c)),
@@ -69,7 +73,7 @@ pub fn perturbed_orientation([a, b, c]: [DVec3; 3], p: DVec3) -> i32 {
     }
 }
 
-/// Signs of the three components of `(b-a) x (c-a)`, exact; all 0 when the points are collinear.
+/// Exact signs of the three components of `(b-a) x (c-a)`; all 0 when the points are collinear.
 pub fn normal_signs(a: DVec3, b: DVec3, c: DVec3) -> [i32; 3] {
     [(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
         let coord = |p: DVec3| Coord { x: p[i], y: p[j] };

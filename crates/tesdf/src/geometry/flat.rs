@@ -1,17 +1,19 @@
-/// Edges shorter than this share of the body are points: squares of their areas leave the range of 64-bit floats.
+/// A face whose longest edge is not longer than this is a point. Squares of smaller areas would
+/// leave the range of 64-bit floats. Relative to a body of diagonal 1.
 const POINT: f64 = 1e-70;
 
-/// Whether three corners span no more than a segment or a point.
+/// Whether three corners span only a segment or a point.
 ///
-/// This is the one test for it. Every kernel then takes the face for its edges: it has no plane, so its normal is zero or NaN,
-/// and the point that is closest lies on an edge.
+/// This is the only test for flat faces. Every kernel treats a flat face as its edges: the face has
+/// no plane, its normal is zero or NaN, and the closest point lies on an edge.
 ///
-/// `twice_area` is the length of the cross product of two edges and `longest` the length of the longest edge, in a frame where the
-/// body has a diagonal of about 1. `least_height` is the greatest height over the longest edge that the precision at hand
-/// cannot tell from 0. The distance to the edges is wrong by half of it at most.
+/// `twice_area` is the length of the cross product of two edges. `longest` is the length of the
+/// longest edge, in a frame where the body has a diagonal of about 1. `least_height` is the largest
+/// height over the longest edge that the precision in use cannot distinguish from 0. Treating the
+/// face as its edges changes distances by at most half of it.
 ///
-/// Corners that coincide, and numbers that are not finite, make a flat face too: a comparison that asks for "less" would not see
-/// them.
+/// Coinciding corners and numbers that are not finite count as flat too. For this reason the test
+/// is not written as a single "less than".
 pub fn is_flat(twice_area: f64, longest: f64, least_height: f64) -> bool {
     let spans = twice_area > least_height * longest && longest > POINT;
     !spans

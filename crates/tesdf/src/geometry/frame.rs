@@ -2,26 +2,26 @@ use glam::DVec3;
 
 use super::Aabb;
 
-/// The frame in which everything is computed: `local = (x − offset) · scale`, exact for every vertex.
+/// The frame of all computations: `local = (x − offset) · scale`, exact for every vertex.
 ///
 /// A part of a few millimetres given in metres, a cube of edge 1e30 and a bracket 1000 km from the
-/// origin all become bodies of diagonal 0.5 to 1 near the origin, without rounding:
-/// - `scale` is a power of two;
-/// - an axis on which the body spans `[lo, hi]` with `0 < lo`, `hi ≤ 2 lo` (or mirrored) is offset by
-///   its middle, where subtraction is exact (Sterbenz); any other axis is not offset, as there the
-///   coordinates are at most twice the body's extent and lose nothing against it.
+/// origin all become bodies with a diagonal of 0.5 to 1 near the origin, without rounding:
+/// - `scale` is a power of two.
+/// - An axis on which the body spans `[lo, hi]` with `0 < lo`, `hi ≤ 2 lo` (or mirrored) is offset
+///   by its middle, where subtraction is exact (Sterbenz). Any other axis has no offset: there the
+///   coordinates are at most twice the body's extent, so they lose no precision relative to it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LocalFrame {
-    /// Subtracted first, in the mesh's unit.
+    /// Subtracted first; in the mesh's unit.
     pub offset: DVec3,
-    /// Multiplied second; a power of two.
+    /// Factor after the subtraction; a power of two.
     pub scale: f64,
     /// 1 / `scale`, exact.
     inverse: f64,
 }
 
 impl LocalFrame {
-    /// The frame of a body with these bounds, in the mesh's unit.
+    /// The frame of a body with these bounds. `bounds` is in the mesh's unit.
     pub fn of(bounds: Aabb) -> Self {
         let axis = |lo: f64, hi: f64| {
             let (near, far) = if lo > 0.0 { (lo, hi) } else { (-hi, -lo) };
@@ -32,28 +32,28 @@ impl LocalFrame {
         Self::new(offset, 2f64.powi(-exponent))
     }
 
-    /// A frame with a given offset and scale, as stored in an asset.
+    /// A frame with the given offset and scale, as stored in an asset.
     pub fn new(offset: DVec3, scale: f64) -> Self {
         Self { offset, scale, inverse: 1.0 / scale }
     }
 
-    /// Mesh unit to local.
+    /// From the mesh's unit to the local frame.
     pub fn to_local(self, p: DVec3) -> DVec3 {
         (p - self.offset) * self.scale
     }
 
-    /// Local to mesh unit.
+    /// From the local frame to the mesh's unit.
     pub fn to_world(self, p: DVec3) -> DVec3 {
         p * self.inverse + self.offset
     }
 
-    /// Mesh units per local unit: exact, as the scale is a power of two.
+    /// Mesh units per local unit. Exact, because the scale is a power of two.
     pub fn inverse_scale(self) -> f64 {
         self.inverse
     }
 }
 
-/// `x = m · 2^e` with `m` in [0.5, 1), for finite positive normal `x`.
+/// Splits `x` into `m · 2^e` with `m` in [0.5, 1). `x` must be finite, positive and normal.
 fn frexp(x: f64) -> (f64, i32) {
     let e = ((x.to_bits() >> 52) & 0x7ff) as i32 - 1022;
     (x / 2f64.powi(e), e)

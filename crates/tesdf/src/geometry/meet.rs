@@ -2,26 +2,28 @@ use glam::DVec3;
 
 use super::{normal_signs, orientation};
 
-/// Whether two closed triangles of positive area share a point; exact.
+/// Whether two closed triangles of positive area share a point. Exact.
 pub fn triangles_meet(t: [DVec3; 3], u: [DVec3; 3]) -> bool {
     if one_sided(t, u) || one_sided(u, t) {
         return false;
     }
-    // Where they meet at all, the end of what they share is on the border of one of them.
+    // When they share a point, they share one on an edge of one of them.
     let edges = |t: [DVec3; 3]| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])];
     edges(u).into_iter().any(|(p, q)| segment_meets_triangle(p, q, t))
         || edges(t).into_iter().any(|(p, q)| segment_meets_triangle(p, q, u))
 }
 
-/// Whether plain `f64` shows a plane between two triangles, so that they share no point but, if `corner_shared`, their first
-/// corner.
+/// Whether plain `f64` arithmetic proves that a plane separates two triangles. Then they share no
+/// point, except their first corner if `corner_shared`.
 ///
-/// It goes before the exact tests, which are slow for faces in one plane: the two ends of a prism of 4,000 sides have ten million
-/// pairs of such faces with boxes that overlap, and this leaves fewer than one in a thousand. "No" means nothing; "yes" is proved, as all
-/// rounding counts against it.
+/// This filter runs before the exact tests, which are slow for coplanar faces. The two ends of a
+/// prism with 4,000 sides have ten million pairs of such faces with overlapping boxes; the filter
+/// leaves fewer than one in a thousand. `true` is proved, because all rounding errors are bounded;
+/// `false` proves nothing.
 pub fn surely_apart(t: [DVec3; 3], u: [DVec3; 3], corner_shared: bool) -> bool {
     if corner_shared {
-        // Around the corner, each triangle is within a right angle of the middle of its two sides.
+        // The difference of the bisectors at the shared corner is a likely normal of a separating
+        // plane.
         let middle = |t: [DVec3; 3]| (t[1] - t[0]).normalize_or_zero() + (t[2] - t[0]).normalize_or_zero();
         let axis = middle(u) - middle(t);
         return least_along(axis, &u[1..], t[0]) > TINY && least_along(-axis, &t[1..], t[0]) > TINY;
@@ -36,10 +38,11 @@ pub fn surely_apart(t: [DVec3; 3], u: [DVec3; 3], corner_shared: bool) -> bool {
     past_an_edge(t, u) || past_an_edge(u, t)
 }
 
-/// Sums below this may have lost digits to underflow.
+/// Sums below this value may have lost digits to underflow.
 const TINY: f64 = 1e-290;
 
-/// At most the least of `axis · (p − from)` over the points: the rounding of three differences, products and sums is taken off.
+/// A lower bound of `axis · (p − from)` over the points. It subtracts the rounding errors of three
+/// differences, products and sums.
 fn least_along(axis: DVec3, points: &[DVec3], from: DVec3) -> f64 {
     let least = |p: &DVec3| {
         let d = *p - from;
@@ -48,7 +51,7 @@ fn least_along(axis: DVec3, points: &[DVec3], from: DVec3) -> f64 {
     points.iter().map(least).fold(f64::INFINITY, f64::min)
 }
 
-/// Whether a closed segment and a closed triangle of positive area share a point; exact.
+/// Whether a closed segment and a closed triangle of positive area share a point. Exact.
 pub fn segment_meets_triangle(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
     match (orientation(a, b, c, p), orientation(a, b, c, q)) {
         (0, 0) => segment_meets_coplanar(p, q, [a, b, c]),
@@ -60,7 +63,7 @@ pub fn segment_meets_triangle(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool
     }
 }
 
-/// Whether the corners of `u` are strictly on one side of the plane of `t`.
+/// Whether all corners of `u` are strictly on one side of the plane of `t`.
 fn one_sided([a, b, c]: [DVec3; 3], u: [DVec3; 3]) -> bool {
     let first = orientation(a, b, c, u[0]);
     first != 0 && orientation(a, b, c, u[1]) == first && orientation(a, b, c, u[2]) == first
@@ -69,7 +72,7 @@ fn one_sided([a, b, c]: [DVec3; 3], u: [DVec3; 3]) -> bool {
 fn segment_meets_coplanar(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
     let normal = normal_signs(a, b, c);
     let Some(axis) = (0..3).find(|&k| normal[k] != 0) else { return false };
-    // Positive where the turn is that of the triangle, seen along the axis.
+    // Positive when the three points turn like the triangle, seen along the axis.
     let turn = |u, v, w| normal[axis] * normal_signs(u, v, w)[axis];
     let edges = [(a, b), (b, c), (c, a)];
     let holds = |x| edges.iter().all(|&(u, v)| turn(u, v, x) >= 0);
@@ -78,7 +81,7 @@ fn segment_meets_coplanar(p: DVec3, q: DVec3, [a, b, c]: [DVec3; 3]) -> bool {
     }
     edges.iter().any(|&(u, v)| {
         let ends = (turn(p, q, u), turn(p, q, v));
-        // An edge in line with the segment is left to the other two.
+        // An edge in line with the segment needs no test: the other two edges decide.
         ends != (0, 0) && ends.0 * ends.1 <= 0 && turn(u, v, p) * turn(u, v, q) <= 0
     })
 }
@@ -93,9 +96,9 @@ mod tests {
         DVec3::new(c[0].into(), c[1].into(), c[2].into())
     }
 
-    /// Least distance of two triangles on a dense grid of both, refined around its minimum.
+    /// Distance of two triangles by alternating projections, which converge to the distance of two
+    /// convex sets.
     fn distance(t: [DVec3; 3], u: [DVec3; 3]) -> f64 {
-        // Alternating projections onto two convex sets go to their distance.
         let mut x = (t[0] + t[1] + t[2]) / 3.0;
         let mut last = f64::INFINITY;
         for _ in 0..20_000 {
@@ -132,7 +135,8 @@ mod tests {
             let project = |mut c: [i32; 3]| { if flat == 0 { c[1] = 1; } point(c) };
             let (t, u) = (t.map(project), u.map(project));
             prop_assume!(normal_signs(t[0], t[1], t[2]) != [0; 3] && normal_signs(u[0], u[1], u[2]) != [0; 3]);
-            // On this lattice, triangles that do not meet are farther apart than the iteration's error.
+            // On this lattice, triangles that do not meet are farther apart than the error of the
+            // iteration.
             prop_assert_eq!(triangles_meet(t, u), distance(t, u) < 5e-3);
             prop_assert_eq!(triangles_meet(u, t), triangles_meet(t, u));
         }

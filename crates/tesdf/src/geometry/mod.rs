@@ -1,4 +1,5 @@
-//! Closest points, bounds, predicates, winding numbers.
+//! Geometry of points, triangles and tetrahedra: closest points, bounds, box trees, exact
+//! predicates, winding numbers, the local frame.
 mod aabb;
 mod aabb_tree;
 mod barycentric;

@@ -2,11 +2,13 @@ use glam::DVec3;
 
 use super::Triangle;
 
-/// The least distance between a convex plane polygon and a triangle, and where on the polygon; `None` when it is `limit` or more.
+/// The least distance between a convex plane polygon and a triangle, with the nearest point of the
+/// polygon. `None` when the distance is `limit` or more.
 ///
-/// `points` go around the polygon; one or two are a point or a segment. `normal` is the polygon's unit normal, or zero when it
-/// has no area. Candidates are pairs of real points, so the distance is never too small by more than rounding; they are all that
-/// can be nearest: a corner and a face, two edges, an edge through a face.
+/// `points` go around the polygon; one or two points are a point or a segment. `normal` is the
+/// polygon's unit normal, or zero when it has no area. Every candidate is a pair of points of both
+/// shapes, so the distance is too small by no more than rounding. The candidates cover all cases of
+/// nearest points: a corner and a face, two edges, an edge through a face.
 ///
 /// ```
 /// use tesdf::geometry::{Triangle, polygon_to_triangle};
@@ -27,7 +29,7 @@ pub fn polygon_to_triangle(
 ) -> Option<(f64, DVec3)> {
     let corners = &triangle.corners;
     let mut best = Least { distance: limit, at: None };
-    // The plane of the triangle is not farther than the triangle.
+    // The triangle's plane is at least as near as the triangle.
     let to_points = Heights::new(points, corners[0], triangle.normal);
     if to_points.least >= limit {
         return None;
@@ -102,22 +104,23 @@ impl Least {
     }
 }
 
-/// Most points of a polygon whose heights are kept; those of others count as 0, which leaves nothing out.
-const MOST: usize = 12;
+/// Largest number of points whose heights are stored. With more points, all heights count as 0,
+/// which rules out no candidate.
+const MAX_POINTS: usize = 12;
 
 /// Heights of points over a plane.
 struct Heights {
-    heights: [f64; MOST],
-    /// Nothing between the points is nearer to the plane.
+    heights: [f64; MAX_POINTS],
+    /// Lower bound of the distance from the plane to the convex hull of the points.
     least: f64,
 }
 
 impl Heights {
     #[inline]
     fn new(points: &[DVec3], on_plane: DVec3, normal: DVec3) -> Self {
-        let mut heights = [0.0; MOST];
+        let mut heights = [0.0; MAX_POINTS];
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        if points.len() > MOST || normal == DVec3::ZERO {
+        if points.len() > MAX_POINTS || normal == DVec3::ZERO {
             return Self { heights, least: 0.0 };
         }
         for (height, p) in heights.iter_mut().zip(points) {
@@ -139,14 +142,14 @@ impl Heights {
     }
 }
 
-/// Where the segment goes through the plane, if its ends lie on different sides of it.
+/// The point where the segment crosses the plane; `None` unless its ends lie on different sides.
 #[inline]
 fn crossing(p: DVec3, q: DVec3, on_plane: DVec3, normal: DVec3) -> Option<DVec3> {
     let (h, k) = (normal.dot(p - on_plane), normal.dot(q - on_plane));
     (h * k < 0.0).then(|| p + (h / (h - k)) * (q - p))
 }
 
-/// Whether a point of the polygon's plane lies in it.
+/// Whether a point of the polygon's plane lies in the polygon.
 #[inline]
 fn holds(points: &[DVec3], normal: DVec3, x: DVec3) -> bool {
     let n = points.len();
@@ -154,7 +157,8 @@ fn holds(points: &[DVec3], normal: DVec3, x: DVec3) -> bool {
         let (p, q) = (points[i], points[if i + 1 == n { 0 } else { i + 1 }]);
         (q - p).cross(x - p).dot(normal)
     };
-    // Either way around: a clipped face keeps its sense, a polygon of the user may have the other.
+    // Both orientations are accepted: a clipped face keeps its orientation, a polygon of the caller
+    // may have the opposite one.
     (0..n).all(|i| side(i) >= 0.0) || (0..n).all(|i| side(i) <= 0.0)
 }
 
@@ -166,7 +170,8 @@ fn between_segments(p: DVec3, q: DVec3, r: DVec3, s: DVec3) -> (DVec3, DVec3) {
     let share = |x: f64, of: f64| if of > 0.0 { (x / of).clamp(0.0, 1.0) } else { 0.0 };
     let (b, c) = (u.dot(v), u.dot(w));
     let denominator = a * e - b * b;
-    // Parallel segments: any start will do, as the end is fitted to it and it to the end.
+    // For parallel segments any start works: the end is fitted to it, and then the start to the
+    // end.
     let start = if denominator > 0.0 { share(b * f - c * e, denominator) } else { 0.0 };
     let t = share(b * start + f, e);
     let start = share(b * t - c, a);

@@ -1,32 +1,34 @@
-//! Points and rays far out.
+//! Rays and vectors with coordinates up to the limits of `f64`.
 use glam::DVec3;
 
-/// A ray with a direction of length 1 to 4 that begins near a body.
+/// A ray that begins near a body. Its direction has a length of 1 to 4.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NearRay {
-    /// Where it begins.
+    /// Start of the ray.
     pub origin: DVec3,
-    /// The direction given, divided by `unit`.
+    /// The direction of the original ray, divided by `unit`.
     pub direction: DVec3,
-    /// A power of two.
+    /// Scale of the original direction; a power of two.
     pub unit: f64,
-    /// How far `origin` is along the ray given, in lengths of `direction`.
+    /// Position of `origin` along the original ray, in lengths of `direction`.
     pub skipped: f64,
 }
 
-/// A ray that begins within this many sizes of the body stays as it is.
+/// A ray that begins within this many body sizes of the body is not moved.
 const NEAR: f64 = 4.0;
-/// Where other rays begin: this many sizes before they pass the middle.
+/// Other rays are moved to this many body sizes before they pass the middle.
 const BEFORE: f64 = 2.0;
-/// Moves along a ray; each is off by the rounding of its length, so a few are enough.
+/// Largest number of moves along a ray. The error of a move is the rounding of its length, so a few
+/// moves are enough.
 const MOVES: usize = 40;
 
 impl NearRay {
-    /// The ray `origin + t · direction`, of finite numbers, from where it comes near the ball of radius `size` around `middle`; `None` when it
-    /// never does.
+    /// Moves the ray `origin + t · direction`, of finite numbers, to where it comes near the ball
+    /// of radius `size` around `middle`. `None` when the ray never comes near.
     ///
-    /// A point of the ray is rounded once per move and coordinate. So where the ray passes the body is off by 1e-16 of the
-    /// distance from the origin to there, and not at all across an axis that the ray runs along.
+    /// A point of the ray is rounded once per move and coordinate. So the position where the ray
+    /// passes the body has an error of 1e-16 of the distance from the original start. There is no
+    /// error across an axis that the ray is parallel to.
     pub fn new(origin: DVec3, direction: DVec3, middle: DVec3, size: f64) -> Option<Self> {
         let unit = power_of_two_below(direction.abs().max_element());
         let mut ray = Self { origin, direction: direction / unit, unit, skipped: 0.0 };
@@ -54,29 +56,32 @@ impl NearRay {
     }
 
     fn is_within(&self, middle: DVec3, reach: f64) -> bool {
-        // NaN fails the comparison.
+        // The comparison is false for NaN.
         (self.origin - middle).abs().cmple(DVec3::splat(reach)).all()
     }
 
-    /// The part of `limit`, in lengths of the direction given, that is left from `origin` on, in lengths of `direction`.
+    /// Converts `limit` to a limit that is measured from `origin` in lengths of `direction`.
+    /// `limit` is measured along the original ray in lengths of its direction.
     pub fn rest_of(&self, limit: f64) -> f64 {
         limit * self.unit - self.skipped
     }
 
-    /// From lengths of `direction` to lengths of the direction given, counted from where that ray begins; `None` above [`f64::MAX`].
+    /// Converts a parameter of this ray to a parameter of the original ray; `None` above
+    /// [`f64::MAX`].
     pub fn total(&self, t: f64) -> Option<f64> {
         Some((self.skipped + t) / self.unit).filter(|t| t.is_finite())
     }
 }
 
-/// A vector's length, at most [`f64::MAX`], and its direction; squares of its coordinates may overflow.
+/// The length of a vector, at most [`f64::MAX`], and its direction. Squares of its coordinates may
+/// overflow.
 pub fn length_and_direction(v: DVec3) -> (f64, DVec3) {
     let largest = v.abs().max_element();
     let scaled = v / largest;
     ((scaled.length() * largest).min(f64::MAX), scaled.normalize())
 }
 
-/// The greatest power of two that is not above `x`, a finite number above 0.
+/// The largest power of two that is not above `x`, which must be finite and positive.
 fn power_of_two_below(x: f64) -> f64 {
     let bits = x.to_bits();
     match x.is_normal() {

@@ -2,9 +2,11 @@ use std::ops::ControlFlow;
 
 use super::{Aabb, AabbTree, Child};
 
-/// Calls `pair` once with each two items, lower first, whose closed boxes share a point, until it breaks off.
+/// Calls `pair` once for each two items whose closed boxes share a point, lower item first, until
+/// it breaks off.
 ///
-/// `boxes` are those that the tree was built from. The order of the calls depends on the boxes alone.
+/// `boxes` must be those that the tree was built from. The order of the calls depends on the boxes
+/// alone.
 pub fn self_overlaps(
     tree: &AabbTree,
     boxes: &[Aabb],
@@ -15,7 +17,8 @@ pub fn self_overlaps(
         true => pair(i.min(j), i.max(j)),
         false => ControlFlow::Continue(()),
     };
-    // Each entry stands for all pairs of items of two subtrees; of one subtree when both are the same.
+    // Each entry represents all pairs of items of two subtrees, or of one subtree when both are the
+    // same.
     let mut stack = vec![(tree.root(), tree.root())];
     while let Some((a, b)) = stack.pop() {
         if !a.0.overlaps(b.0) {
@@ -32,7 +35,7 @@ pub fn self_overlaps(
                     items(other, other_end)[rest..].iter().try_for_each(|&j| report(i, j))?;
                 }
             }
-            // The larger of two different subtrees is opened; a leaf cannot be.
+            // The larger of two different subtrees is opened, unless it is a leaf.
             (Child::Node(n), other) if matches!(other, Child::Leaf { .. }) || larger(a.0, b.0) => {
                 stack.extend(tree.nodes()[n as usize].map(|side| (side, b)));
             }

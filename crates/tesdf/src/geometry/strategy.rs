@@ -1,8 +1,8 @@
-//! What property tests draw.
+//! Strategies of property tests.
 use glam::DVec3;
 use proptest::prelude::*;
 
-/// Points of a cube around the origin with sides of 2.
+/// Points of the cube [-1, 1)³.
 pub(crate) fn point() -> impl Strategy<Value = DVec3> {
     (-1.0..1.0, -1.0..1.0, -1.0..1.0).prop_map(|(x, y, z)| DVec3::new(x, y, z))
 }

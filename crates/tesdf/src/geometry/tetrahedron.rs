@@ -1,11 +1,14 @@
 use glam::DVec3;
 
-/// Whether a triangle comes within `pad` of a tetrahedron; may say yes without need, never no in error.
+/// Whether a triangle comes within `pad` of a tetrahedron. The test is conservative: it may return
+/// true for a farther triangle, but never false for a nearer one.
 ///
-/// Separating axes of two convex bodies: the triangle's plane and its in-plane edge normals, the four
-/// sides, and the 18 cross products of edges. A pair of bodies farther apart than `pad` has a
-/// separating direction among the differences of closest features, which are these axes; when a
-/// corner faces a corner the gap along them is smaller than the distance, hence "without need".
+/// It uses the separating axes of two convex bodies: the normal of the triangle's plane, the
+/// in-plane normals of its edges, the normals of the four sides, and the 18 cross products of
+/// edges. Bodies farther apart than `pad` have a separating direction, the difference of their
+/// closest features, which is one of these axes. Only when a corner is closest to a corner it may
+/// be none of them, and the gaps along the axes are smaller than the distance. So the result may be
+/// true without need.
 pub fn triangle_meets_tetrahedron(triangle: &[DVec3; 3], tetrahedron: &[DVec3; 4], pad: f64) -> bool {
     let [a, b, c] = *triangle;
     let t = *tetrahedron;
@@ -36,7 +39,7 @@ fn span<const N: usize>(points: &[DVec3; N], axis: DVec3) -> (f64, f64) {
     })
 }
 
-/// The volume of a tetrahedron, positive whatever its orientation.
+/// The volume of a tetrahedron. It is positive for either orientation.
 pub fn tetrahedron_volume(t: &[DVec3; 4]) -> f64 {
     (t[1] - t[0]).cross(t[2] - t[0]).dot(t[3] - t[0]).abs() / 6.0
 }
@@ -48,7 +51,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Points of the triangle that lie in the tetrahedron must be seen.
+        /// Finds every triangle of which a sample lies in the tetrahedron.
         #[test]
         fn never_no_in_error(t in [point(), point(), point(), point()], tri in [point(), point(), point()]) {
             let volume = |q: DVec3, k: usize| { let mut s = t; s[k] = q; tetrahedron_volume(&s) };
@@ -63,7 +66,7 @@ mod tests {
             }
             let answer = triangle_meets_tetrahedron(&tri, &t, 0.0);
             prop_assert!(!meets || answer);
-            // And far ones must not be seen.
+            // Far triangles must be rejected.
             let far = tri.map(|p| p + DVec3::splat(4.0));
             prop_assert!(!triangle_meets_tetrahedron(&far, &t, 0.1));
         }

@@ -2,7 +2,7 @@ use glam::DVec3;
 
 use super::is_flat;
 
-/// A part of a triangle: its interior, an edge or a corner.
+/// A feature of a triangle: its interior, an edge or a corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Feature {
     /// The triangle itself.
@@ -13,23 +13,25 @@ pub enum Feature {
     Vertex(u8),
 }
 
-/// A set of features whose closed regions hold a point; bit 0 the face, bits 1–3 edges, 4–6 corners.
+/// A set of features whose closed regions contain a point. Bit 0 is the face, bits 1–3 are the
+/// edges, bits 4–6 the corners.
 ///
-/// The region of a feature is where the triangle's closest point lies on it. Each is convex: the
-/// region of the face is a prism, of an edge a wedge, of a corner a cone.
+/// The region of a feature is the set of points whose closest point of the triangle lies on the
+/// feature. Each region is convex: a prism for the face, a wedge for an edge, a cone for a corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Regions(pub u8);
 
 impl Regions {
-    /// Only the face: for triangles without area, whose features are never told apart.
+    /// Only the face. Used for triangles without area, whose features are not distinguished.
     pub const FACE: Self = Self(1);
 
-    /// The regions that hold both points, and so the segment between them.
+    /// The regions that contain both points. As regions are convex, they also contain the segment
+    /// between the points.
     pub fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
     }
 
-    /// A corner if it holds one, else an edge, else `Face`.
+    /// The lowest-dimensional feature: a corner if the set has one, else an edge, else `Face`.
     pub fn least(self) -> Feature {
         match (self.0 >> 4, (self.0 >> 1) & 7) {
             (0, 0) => Feature::Face,
@@ -42,37 +44,39 @@ impl Regions {
 /// The point of a triangle that is closest to a query point.
 #[derive(Clone, Copy, Debug)]
 pub struct Closest {
-    /// Distance.
+    /// Distance from the query point.
     pub distance: f64,
     /// The closest point.
     pub point: DVec3,
-    /// The feature that the closest point lies on.
+    /// The feature on which the closest point lies.
     pub feature: Feature,
 }
 
 /// A triangle with its unit normal, ready for distance queries.
 #[derive(Clone, Copy, Debug)]
 pub struct Triangle {
-    /// Corners.
+    /// Corner positions.
     pub corners: [DVec3; 3],
-    /// Unit normal by the right-hand rule; zero when the triangle has no area, or no more than rounding gives it.
+    /// Unit normal by the right-hand rule. Zero when the triangle has no area within rounding.
     pub normal: DVec3,
-    /// So much longer than wide that which side of it a point is on takes care; true when that is not known.
+    /// Whether the triangle is so narrow that deciding the side of an edge needs care. True when
+    /// this is not known.
     is_needle: bool,
 }
 
-/// Sine of the angle at the first corner below which the normal is computed with twice the digits; heights
-/// above that are off by at most 1e-16 / 1e-3 of the triangle's size.
+/// Below this sine of the angle at the first corner, the normal is computed with twice the digits.
+/// Above it, heights have an error of at most 1e-16 / 1e-3 of the triangle's size.
 const NEEDLE: f64 = 1e-3;
 
-/// Height, as a share of the longest edge, up to which the sides are looked at again from their nearer ends.
+/// Up to this height, relative to the longest edge, the sides are tested again from their nearer
+/// ends.
 const TIP: f64 = 0.1;
 
-/// Height, as a share of the longest edge, up to which a triangle is no more than its edges: which side of them a point
-/// is on is rounding then.
+/// Up to this height, relative to the longest edge, a triangle counts as its edges: rounding would
+/// decide on which side of them a point is.
 const FLAT: f64 = 16.0 * f64::EPSILON;
 
-/// `(b - a) × (c - a)` by products and differences without rounding errors, but for the last sums.
+/// `(b - a) × (c - a)`. Products and differences are exact pairs; only the last sums are rounded.
 fn cross_of_differences(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     let (u, v) = ([0, 1, 2].map(|k| difference(b[k], a[k])), [0, 1, 2].map(|k| difference(c[k], a[k])));
     DVec3::from_array([(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
@@ -97,13 +101,14 @@ fn product(x: f64, y: f64) -> (f64, f64) {
 }
 
 impl Triangle {
-    /// Computes the normal.
+    /// Creates the triangle and computes its normal.
     pub fn new(corners: [DVec3; 3]) -> Self {
         let [a, b, c] = corners;
         let (u, v) = (b - a, c - a);
         let mut normal = u.cross(v);
-        // The cross product is off by some ulps of |u| |v|, in any direction. The normal of a needle would be noise, not
-        // even at right angles to it, and heights over its plane as wrong as the needle is long.
+        // The cross product has an error of some ulps of |u| |v| in any direction. For a needle
+        // this error would dominate: the normal would not even be perpendicular, and heights over
+        // its plane would be wrong by as much as the needle's length.
         if normal.length_squared() < NEEDLE * NEEDLE * u.length_squared() * v.length_squared() {
             normal = cross_of_differences(a, b, c);
         }
@@ -111,7 +116,8 @@ impl Triangle {
             .into_iter()
             .fold(u, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
         let longest_squared = longest.length_squared();
-        // What is left of rounding along the longest edge would count with that edge's length in heights over the plane.
+        // A remaining component along the longest edge would be multiplied by that edge's length in
+        // heights over the plane.
         normal -= longest * (normal.dot(longest) / longest_squared.max(f64::MIN_POSITIVE));
         let (twice_area, longest) = (normal.length(), longest_squared.sqrt());
         let flat = is_flat(twice_area, longest, FLAT * longest);
@@ -120,22 +126,23 @@ impl Triangle {
         Self { corners, normal, is_needle }
     }
 
-    /// A triangle whose normal is known already.
+    /// Creates a triangle whose normal is already known.
     #[inline]
     pub fn with_normal(corners: [DVec3; 3], normal: DVec3) -> Self {
         Self { corners, normal, is_needle: true }
     }
 
-    /// Whether it is so much longer than wide that [`closest`](Self::closest) looks at its sides twice.
+    /// Whether the triangle is so narrow that [`closest`](Self::closest) tests its sides twice.
     pub(crate) fn is_needle(&self) -> bool {
         self.is_needle
     }
 
-    /// The closest point to `p`.
+    /// The point of the triangle closest to `p`.
     ///
-    /// Inside of the prism over the face the distance is that to the plane, elsewhere the least of the
-    /// three edges. Both are accurate to a few ulp for slivers too, as the prism is told by distances
-    /// to its sides, never by a quotient of areas (a needle of aspect 1e7 loses seven digits there).
+    /// Inside the prism over the face, the distance is that to the plane. Elsewhere it is the least
+    /// distance to the three edges. Both are accurate to a few ulp, also for slivers: the prism is
+    /// decided by distances to its sides, never by a quotient of areas. A needle of aspect 1e7
+    /// would lose seven digits there.
     #[inline]
     pub fn closest(&self, p: DVec3) -> Closest {
         self.closest_seen(p, &Relative::new(self, p))
@@ -158,14 +165,14 @@ impl Triangle {
         nearer(nearer(a, b), c)
     }
 
-    /// The closest point to `p` of the plane.
+    /// The point of the triangle's plane closest to `p`.
     #[inline]
     pub fn closest_in_plane(&self, p: DVec3) -> Closest {
         let height = self.normal.dot(p - self.corners[0]);
         Closest { distance: height.abs(), point: p - height * self.normal, feature: Feature::Face }
     }
 
-    /// The closest point to `p` of edge `k`.
+    /// The point of edge `k` closest to `p`.
     #[inline]
     pub fn closest_on_edge(&self, k: usize, p: DVec3) -> Closest {
         let next = (k + 1) % 3;
@@ -181,7 +188,7 @@ impl Triangle {
         Closest { distance: p.distance(point), point, feature }
     }
 
-    /// The features whose closed region holds `p`.
+    /// The features whose closed regions contain `p`.
     #[inline]
     pub fn regions(&self, p: DVec3) -> Regions {
         self.regions_seen(&Relative::new(self, p))
@@ -198,20 +205,20 @@ impl Triangle {
             regions |= u8::from(relative.side[k] <= 0.0 && start[k] >= 0.0 && end[k] <= 0.0) << (1 + k);
             regions |= u8::from(start[k] <= 0.0 && end[(k + 2) % 3] >= 0.0) << (4 + k);
         }
-        // On a side that is not the same from both ends, by rounding.
+        // Rounding gives different sides of an edge from its two ends.
         if regions == 0 { Regions::FACE } else { Regions(regions) }
     }
 }
 
-/// A point as seen from a triangle.
+/// The position of a point relative to a triangle.
 struct Relative {
-    /// From each corner to the point.
+    /// Vectors from each corner to the point.
     from: [DVec3; 3],
-    /// From each corner to the next.
+    /// Vectors from each corner to the next.
     along: [DVec3; 3],
-    /// Height over each edge within the plane, times the edge's length; positive on the face's side.
+    /// In-plane distance from each edge times the edge's length. Positive on the face's side.
     side: [f64; 3],
-    /// Whether the point is over the face itself.
+    /// Whether the point is inside the prism over the face.
     over_face: bool,
 }
 
@@ -230,20 +237,21 @@ impl Relative {
         Self { from, along, side, over_face }
     }
 
-    /// Where edge `k` starts, seen along it: negative before its start.
+    /// Position of the point along edge `k` from its start; negative before the start.
     #[inline]
     fn start(&self, k: usize) -> f64 {
         self.along[k].dot(self.from[k])
     }
 
-    /// Where edge `k` ends: positive beyond its end.
+    /// Position of the point along edge `k` from its end; positive beyond the end.
     #[inline]
     fn end(&self, k: usize) -> f64 {
         self.along[k].dot(self.from[(k + 1) % 3])
     }
 }
 
-/// Beyond the tip of a needle the sides are rounding when seen from its other end.
+/// Tests the sides from the nearer end of each edge. Beyond the tip of a needle, only rounding
+/// decides the sides as seen from the other end.
 #[cold]
 fn seen_from_nearer_ends(from: &[DVec3; 3], along: &[DVec3; 3], normal: DVec3) -> bool {
     (0..3).all(|k| {
@@ -259,7 +267,8 @@ mod tests {
     use crate::testing::{degenerate, exact};
     use proptest::prelude::*;
 
-    /// What a distance may lose, for coordinates up to 2: a face that is taken for its edges 1.8e-15 (half of 16 ε) times its length of up to 3.5.
+    /// Largest accepted error of a distance, for coordinates up to 2. A face that counts as its
+    /// edges has an error of 1.8e-15 (half of 16 ε) times its length of up to 3.5.
     const ROUNDING: f64 = 8e-15;
 
     fn point() -> impl Strategy<Value = DVec3> {

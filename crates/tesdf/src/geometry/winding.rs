@@ -5,18 +5,18 @@ use crate::mesh::TriangleMesh;
 
 /// The winding number of a triangle mesh, exact and deterministic.
 ///
-/// It is the number of times that the surface goes around a point: 1 inside of a simple outward surface, 0
-/// outside, 2 where two such solids overlap, -1 inside of an inverted one. It is an integer that depends on the
-/// surface alone when the surface is closed, that is when every directed edge is used as often as its reverse;
-/// for an open surface the answers mean nothing.
+/// It counts how often the surface goes around a point: 1 inside a simple outward surface, 0
+/// outside, 2 where two such solids overlap, -1 inside an inverted solid. For a closed surface it
+/// is an integer that depends on the surface alone. A surface is closed when every directed edge is
+/// used as often as its reverse. For an open surface the results have no meaning.
 ///
-/// A point is compared with one far away by the crossings of the segment between them
-/// ([`signed_crossing`]). The segment runs along an axis, out of the nearest side of the bounds, so it is
-/// a box itself and the tree's boxes that it meets are found without rounding.
+/// The method compares a point with a far point by the crossings of the segment between them
+/// ([`signed_crossing`]). The segment runs along an axis, through the nearest side of the bounds.
+/// It is therefore a box itself, and finding the boxes of the tree that it meets needs no rounding.
 #[derive(Clone, Debug)]
 pub struct WindingNumber {
     tree: AabbTree,
-    /// Corners of the faces, in the order of the tree.
+    /// Corners of the faces, in tree order.
     triangles: Vec<[DVec3; 3]>,
     bounds: Aabb,
 }
@@ -33,8 +33,8 @@ impl WindingNumber {
         Self { tree, triangles, bounds }
     }
 
-    /// Winding number at `x`, which must not be on the surface; on it the answer is one of those nearby or
-    /// another, and 0 for NaN.
+    /// Winding number at `x`, which must not be on the surface. On the surface the result may be
+    /// the number on either side or another number. It is 0 for NaN.
     pub fn at(&self, x: DVec3) -> i32 {
         if !self.bounds.contains(x) {
             return 0;
@@ -42,16 +42,16 @@ impl WindingNumber {
         self.crossings(x, self.far_point(x))
     }
 
-    /// Winding number at `p + (e, e^2, e^3)` with `e > 0` infinitesimal: defined for every `p`, those on the
-    /// surface included; 0 for NaN.
+    /// Winding number at `p + (e, e^2, e^3)` with `e > 0` infinitesimal. It is defined for every
+    /// `p`, also on the surface. It is 0 for NaN.
     pub fn at_perturbed(&self, p: DVec3) -> i32 {
         let mut sum = 0;
         self.for_each_crossing_to(p, |_, sign| sum += sign);
         sum
     }
 
-    /// `winding(x) - winding(p')` with `p' = p + (e, e^2, e^3)`: the sum of [`signed_crossing`] over the faces.
-    /// `x` must not be on the surface.
+    /// `winding(x) - winding(p')` with `p' = p + (e, e^2, e^3)`: the sum of [`signed_crossing`]
+    /// over the faces. `x` must not be on the surface.
     pub fn crossings(&self, x: DVec3, p: DVec3) -> i32 {
         let mut sum = 0;
         self.for_each_crossing(x, p, |_, sign| sum += sign);
@@ -63,8 +63,9 @@ impl WindingNumber {
         &self.tree
     }
 
-    /// Calls `crossed` with each face that the segment from the far point to `p + (e, e^2, e^3)` crosses, and
-    /// the change of the winding number there: what [`at_perturbed`](Self::at_perturbed) adds up.
+    /// Calls `crossed` for each face that the segment from the far point to `p + (e, e^2, e^3)`
+    /// crosses, with the change of the winding number there. [`at_perturbed`](Self::at_perturbed)
+    /// adds up these changes.
     pub(crate) fn for_each_crossing_to(&self, p: DVec3, mut crossed: impl FnMut(u32, i32)) {
         if self.bounds.contains(p) {
             self.for_each_crossing(self.far_point(p), p, |face, sign| crossed(face, -sign));
@@ -92,19 +93,21 @@ impl WindingNumber {
         }
     }
 
-    /// The winding number at `x` from all faces, without a tree: slow, for comparison. `x` as in [`at`](Self::at).
+    /// The winding number at `x` from all faces, without a tree. Slow; for comparisons. `x` as in
+    /// [`at`](Self::at).
     pub fn brute_force(mesh: &TriangleMesh, x: DVec3) -> i32 {
         let far = mesh.bounds().max + DVec3::new(1.0, 2.0, 3.0) * mesh.diagonal();
         (0..mesh.faces().len()).map(|f| signed_crossing(x, far, mesh.triangle(f))).sum()
     }
 
-    /// A point outside of the bounds, along an axis from `x` through the nearest side.
+    /// A point outside the bounds, from `x` along an axis through the nearest side.
     fn far_point(&self, x: DVec3) -> DVec3 {
         let Aabb { min, max } = self.bounds;
         let step = self.bounds.extent().max_element();
         let mut best = (f64::INFINITY, x);
         for axis in 0..3 {
-            // Where the step is lost to rounding, far from the origin, the next number is outside as well.
+            // Far from the origin, rounding can swallow the step. The next floating-point number is
+            // then outside too.
             let up = (max[axis] + step).max(max[axis].next_up());
             let down = (min[axis] - step).min(min[axis].next_down());
             for (distance, to) in [(max[axis] - x[axis], up), (x[axis] - min[axis], down)] {
@@ -119,14 +122,15 @@ impl WindingNumber {
     }
 }
 
-/// A segment with what is needed to see that it misses a box.
+/// A segment, prepared for tests that it misses a box.
 struct Segment {
     bounds: Aabb,
-    /// Its middle, half of its direction, and the absolute values of the latter.
+    /// Its middle, half of its direction vector, and the absolute values of that half.
     middle: DVec3,
     half: DVec3,
     half_abs: DVec3,
-    /// A bound of the rounding errors of [`may_meet`](Self::may_meet) for boxes that its bounds overlap.
+    /// A bound of the rounding errors of [`may_meet`](Self::may_meet) for boxes that overlap the
+    /// segment's bounds.
     margin: f64,
     along_axis: bool,
 }
@@ -145,8 +149,8 @@ impl Segment {
         }
     }
 
-    /// False only when the segment misses the closed box: separating axes, the box's own exactly, the products
-    /// with those of the segment with a margin.
+    /// False only when the segment misses the closed box. Separating axes: the axes of the box
+    /// exactly, their cross products with the segment with a margin.
     fn may_meet(&self, b: Aabb) -> bool {
         if !self.bounds.overlaps(b) {
             return false;
@@ -156,7 +160,8 @@ impl Segment {
         }
         let size = 0.5 * b.extent();
         let to = self.middle - b.center();
-        // Each coordinate of `to`, `size` and `half` is off by some ulps of the box's or the segment's coordinates.
+        // Each coordinate of `to`, `size` and `half` has an error of some ulps of the coordinates
+        // of the box or the segment.
         let margin = self.margin + 1e-14 * b.min.abs().max(b.max.abs()).max_element();
         let (h, g) = (self.half, self.half_abs);
         let misses = |i: usize, j: usize| {
@@ -174,7 +179,7 @@ mod tests {
 
     use super::*;
 
-    /// Sum of the solid angles over 4 pi.
+    /// Sum of the solid angles divided by 4 pi.
     fn by_solid_angle(mesh: &TriangleMesh, x: DVec3) -> f64 {
         let sum: f64 = (0..mesh.faces().len())
             .map(|f| {
@@ -220,7 +225,7 @@ mod tests {
         }
     }
 
-    /// Faces of `n` x `n` x `n` unit cells, outward, for the cells that `solid` accepts.
+    /// The outward faces of the unit cells of an `n` x `n` x `n` grid that `solid` accepts.
     fn cells(n: i32, solid: impl Fn(i32, i32, i32) -> bool) -> TriangleMesh {
         let mut mesh = (Vec::new(), Vec::new());
         for x in 0..n {
@@ -250,7 +255,7 @@ mod tests {
         }
     }
 
-    /// Points at the corners, edges, faces and middles of a lattice of half units.
+    /// Points at the corners, edges, faces and centres of the cells: a lattice of half units.
     fn lattice(n: i32) -> impl Iterator<Item = DVec3> {
         let r = -1..=2 * n + 1;
         let all = move |x: i32| {
@@ -264,7 +269,7 @@ mod tests {
 
     #[test]
     fn cubes_on_a_lattice() {
-        // Cells that touch in faces, edges and corners, with their inner faces kept twice.
+        // Cells that touch in faces, edges and corners. Their inner faces are kept twice.
         for solid in
             [|_, _, _| true, |x: i32, y: i32, z: i32| (x + y + z) % 2 == 0, |x, y, z| x == y && y == z]
         {
@@ -312,7 +317,8 @@ mod tests {
     }
 
     proptest! {
-        /// Boundaries of random tetrahedra on a small lattice: closed, full of ties, overlaps and flat faces.
+        /// Boundaries of random tetrahedra on a small lattice: closed, with many ties, overlaps and
+        /// flat faces.
         #[test]
         fn random_closed_meshes(
             corners in prop::collection::vec(prop::array::uniform3(0i32..5), 4..12),
@@ -333,7 +339,7 @@ mod tests {
             }
         }
 
-        /// A sphere whose points move at random along their radius, and general points.
+        /// A sphere whose points move at random along their radius, and points in general position.
         #[test]
         fn random_spheres(radii in prop::collection::vec(0.3f64..1.7, 50), seeds in prop::array::uniform32(-1.0f64..1.0)) {
             let (rings, around) = (6usize, 8usize);
