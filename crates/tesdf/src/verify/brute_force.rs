@@ -2,45 +2,47 @@ use glam::DVec3;
 
 use crate::mesh::TriangleMesh;
 
-/// All faces of a mesh, one after the other. A face is passed over when a ball around it is farther than the nearest so far.
+/// Distance to all faces of a mesh, one after the other. A face is skipped when a ball around it is
+/// farther than the nearest face so far.
 ///
-/// Written apart from [`Triangle`](crate::geometry::Triangle), which queries use, so that an error in one shows against
-/// the other. Lengths are scaled by a power of two, so that no product leaves the range of `f64`.
+/// This code is independent of [`Triangle`](crate::geometry::Triangle), which queries use, so that
+/// an error in one shows in the comparison. Lengths are scaled by a power of two, so that products
+/// stay within the range of `f64`.
 pub(crate) struct BruteForce {
     facets: Vec<Facet>,
     balls: Vec<Ball>,
     scale: f64,
 }
 
-/// Around a face.
+/// A ball around a face.
 struct Ball {
     center: DVec3,
     radius: f64,
 }
 
-/// More than the rounding of a radius and a distance, as a share.
+/// Relative bound of the rounding error of a radius and a distance.
 const ROUNDING: f64 = 1e-14;
 
-/// Faces whose height is a smaller share of their length are their edges.
+/// A face whose height is a smaller fraction of its length counts as its edges.
 const FLAT: f64 = 4e-15;
-/// Faces smaller than this (scaled) are their edges.
+/// A face smaller than this (scaled) counts as its edges.
 const SMALLEST: f64 = 1e-70;
 
 /// A face in scaled lengths.
 struct Facet {
     corners: [DVec3; 3],
-    /// From each corner to the next.
+    /// Vectors from each corner to the next.
     along: [DVec3; 3],
-    /// Inverse squared lengths of those; 0 for a length of 0.
+    /// Inverse squared lengths of `along`; 0 for a length of 0.
     inverse: [f64; 3],
-    /// The longest edge: over the face is beside it.
+    /// Index of the longest edge. A point over the face is also beside this edge.
     longest: usize,
-    /// Unit normal; `None` without area.
+    /// Unit normal; `None` when the face has no area.
     normal: Option<DVec3>,
 }
 
 impl BruteForce {
-    /// `diagonal` is that of the mesh: finite and positive.
+    /// `diagonal` is the mesh's diagonal; it must be finite and positive.
     pub(crate) fn new(mesh: &TriangleMesh, diagonal: f64) -> Self {
         let scale = (-diagonal.log2().floor()).clamp(-1000.0, 1000.0).exp2();
         let facets = (0..mesh.faces().len()).map(|f| Facet::new(mesh.triangle(f).map(|p| p * scale)));
@@ -48,7 +50,7 @@ impl BruteForce {
         Self { balls: facets.iter().map(Facet::ball).collect(), facets, scale }
     }
 
-    /// Distance from `p` to the nearest of all faces, mesh unit.
+    /// Distance from `p` to the nearest of all faces, in the mesh's unit.
     pub(crate) fn distance(&self, p: DVec3) -> f64 {
         let p = p * self.scale;
         let mut least = f64::INFINITY;
@@ -61,7 +63,7 @@ impl BruteForce {
         least / self.scale
     }
 
-    /// From the closest point of one face to `p`, mesh unit.
+    /// Vector from the closest point of one face to `p`, in the mesh's unit.
     pub(crate) fn offset(&self, face: usize, p: DVec3) -> DVec3 {
         self.facets[face].offset(p * self.scale) / self.scale
     }
@@ -76,7 +78,8 @@ impl Facet {
         let longest = longer(longer(0, 1), 2);
         let length = along[longest].length();
         let cross = accurate_cross(along[0], along[1]);
-        // Lower faces are rounding, and the squared area of smaller ones is not a number of full precision.
+        // The height of a lower face is only rounding, and the squared area of a smaller face loses
+        // precision.
         let has_plane = cross.length() > FLAT * length * length && length > SMALLEST;
         let normal = has_plane.then_some(cross).and_then(DVec3::try_normalize);
         Self { corners, along, inverse, longest, normal }
@@ -92,7 +95,7 @@ impl Facet {
     fn offset(&self, p: DVec3) -> DVec3 {
         if let Some(n) = self.normal {
             let from = self.corners.map(|c| p - c);
-            // Beside a wrong "over the face" the foot is a rounding error away from the edge.
+            // When this test is wrong, the foot is only a rounding error away from the edge.
             let over = (0..3).all(|k| n.cross(self.along[k]).dot(from[k]) >= 0.0);
             let at = from[self.longest].dot(self.along[self.longest]) * self.inverse[self.longest];
             if over && (0.0..=1.0).contains(&at) {
@@ -104,7 +107,7 @@ impl Facet {
         for k in 0..3 {
             let from = p - self.corners[k];
             let t = (from.dot(self.along[k]) * self.inverse[k]).clamp(0.0, 1.0);
-            // From the nearer end, so that rounding is small against what is left.
+            // Measured from the nearer end, so that rounding is small relative to the remainder.
             let offset = if t <= 0.5 {
                 from - t * self.along[k]
             } else {
@@ -120,10 +123,10 @@ impl Facet {
     }
 }
 
-/// The cross product with each component right to some ulp of itself.
+/// The cross product. Each component is accurate to some ulps of itself.
 ///
-/// A plain cross product of the edges of a needle of aspect 1e7 has a normal that is off by 1e-9, and distances to its far end
-/// by 1e-9 of its length.
+/// With a plain cross product, a needle of aspect 1e7 has a normal with an error of 1e-9, and
+/// distances to its far end have an error of 1e-9 of its length.
 fn accurate_cross(u: DVec3, v: DVec3) -> DVec3 {
     // Kahan's difference of products; see Jeannerod, Louvet, Muller 2013.
     let difference = |a: f64, b: f64, c: f64, d: f64| {
@@ -175,7 +178,7 @@ mod tests {
 
     #[test]
     fn needles_keep_their_plane() {
-        // Height 1e-7 of the length, in no special position: points over the far end.
+        // Height 1e-7 of the length, in no special position; the points are over the far end.
         let (u, v) = (DVec3::new(0.3, 0.5, 0.7).normalize(), DVec3::new(0.1, -0.9, 0.2));
         let n = accurate_cross(u, v).normalize();
         let w = n.cross(u);

@@ -7,20 +7,24 @@ use crate::geometry::is_flat;
 use crate::mesh::TriangleMesh;
 use crate::query::{Answer, Precision};
 
-/// What a [`Precision`] promises.
+/// The error bounds that a [`Precision`] promises.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Promise {
-    /// Largest error of a distance, as a share of the diagonal.
+    /// Largest error of a distance, as a fraction of the diagonal.
     pub of_diagonal: f64,
-    /// Added to it: this many units in the last place of the largest coordinate of the mesh and the point.
+    /// Added to the error bound: this many units in the last place of the largest coordinate of the
+    /// mesh and the point.
     pub ulps: f64,
-    /// Largest error of a gradient, radians.
+    /// Largest error of a gradient, in radians.
     pub gradient: f64,
-    /// Added to it: this length over the distance, in the mesh's unit; 0 unless the precision takes narrow faces of the mesh for segments.
+    /// Added to the gradient bound: this length divided by the distance. In the mesh's unit; 0
+    /// unless the precision treats narrow faces of the mesh as segments.
     pub gradient_width: f64,
-    /// Gradients closer to the surface than this share of the diagonal are only promised to be unit vectors.
+    /// Nearer to the surface than this fraction of the diagonal, gradients are only promised to be
+    /// unit vectors.
     pub gradient_from: f64,
-    /// Distances and gradients are promised nearer to the surface than this, in the mesh's unit; `None`: everywhere. Signs always are.
+    /// Distances and gradients are promised only nearer to the surface than this, in the mesh's
+    /// unit; `None`: everywhere. Signs are promised everywhere.
     pub within: Option<f64>,
     diagonal: f64,
     largest_coordinate: f64,
@@ -52,19 +56,20 @@ impl Promise {
         }
     }
 
-    /// Largest error of a gradient at this distance, radians.
+    /// Largest error of a gradient at this distance, in radians.
     fn gradient_at(&self, distance: f64) -> f64 {
         self.gradient + self.gradient_width / distance.abs()
     }
 
-    /// Largest error of the distance at `p`, in the mesh's unit; also the distance up to which the sign is free.
+    /// Largest error of the distance at `p`, in the mesh's unit. Up to this distance from the
+    /// surface, either sign is accepted.
     pub fn distance(&self, p: DVec3) -> f64 {
         let largest = self.largest_coordinate.max(p.abs().max_element());
         self.of_diagonal * self.diagonal + self.ulps * (largest.next_up() - largest)
     }
 }
 
-/// Whether a face is lower than this over its longest edge.
+/// Whether some face has a height over its longest edge that is at most `height`.
 fn has_narrow_faces(mesh: &TriangleMesh, height: f64) -> bool {
     (0..mesh.faces().len()).any(|face| {
         let [a, b, c] = mesh.triangle(face).map(|p| p / height);
@@ -73,66 +78,71 @@ fn has_narrow_faces(mesh: &TriangleMesh, height: f64) -> bool {
     })
 }
 
-/// A point where an answer was off, in the mesh's unit.
+/// A point with an error. Lengths are in the mesh's unit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Worst {
     /// The point.
     pub point: [f64; 3],
-    /// Where it lies.
+    /// Class of the point.
     pub class: PointClass,
     /// Signed distance by brute force.
     pub expected: f64,
-    /// The answer.
+    /// Signed distance of the answer.
     pub found: f64,
     /// Face of the answer, 0-based.
     pub face: u32,
 }
 
-/// Points of one class.
+/// Errors at the points of one class.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClassErrors {
-    /// Where they lie.
+    /// The class.
     pub class: PointClass,
-    /// How many.
+    /// Number of points.
     pub points: usize,
     /// Largest error of a distance, in the mesh's unit.
     pub largest_error: f64,
 }
 
-/// How one precision compares with brute force.
+/// Comparison of one precision with brute force.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PrecisionReport {
     /// `f32` or `f64`.
     pub precision: &'static str,
-    /// Whether everything is as promised.
+    /// Whether all promises are kept.
     pub passed: bool,
-    /// What is promised.
+    /// The promised bounds.
     pub promise: Promise,
     /// Largest error of a signed distance, in the mesh's unit.
     pub largest_error: f64,
-    /// The same as a share of the diagonal.
+    /// The same as a fraction of the diagonal.
     pub largest_error_of_diagonal: f64,
-    /// The error that takes most of what is promised at its point, as a share of that; up to 1 is as promised.
+    /// Largest error relative to the bound at its point. The promise is kept when this is at most
+    /// 1.
     pub largest_error_of_promise: f64,
-    /// Where that is.
+    /// The point with the largest relative error.
     pub worst: Option<Worst>,
-    /// Points farther from the surface than the promised error, on the wrong side.
+    /// Number of points on the wrong side that are farther from the surface than the promised
+    /// error.
     pub sign_mistakes: usize,
-    /// The one farthest from the surface.
+    /// The point among them that is farthest from the surface.
     pub worst_sign: Option<Worst>,
-    /// Gradients farther off than promised, not of length 1, or of a face that is not closest.
+    /// Number of gradients with a larger error than promised, not of length 1, or of a face that is
+    /// not closest.
     pub gradient_mistakes: usize,
-    /// Largest angle between a gradient and the direction from the closest point of the answer's face, radians.
+    /// Largest angle between a gradient and the direction from the closest point of the answer's
+    /// face, in radians.
     pub largest_gradient_error: f64,
-    /// Where that is.
+    /// The point with this angle.
     pub worst_gradient: Option<Worst>,
-    /// Largest error of a signed distance where none is promised; `None` when every point has a promise.
+    /// Largest error of a signed distance where no bound is promised; `None` when every point has a
+    /// promise.
     pub largest_error_beyond: Option<f64>,
-    /// By where the points lie, those without a promise left out.
+    /// Errors by class, without the points that have no promise.
     pub classes: Vec<ClassErrors>,
 }
 
-/// A largest value and where it is; of equal ones the first.
+/// A largest value and its point. On ties the first point.
 #[derive(Clone, Debug, Default)]
 struct Largest {
     value: f64,
@@ -141,7 +151,7 @@ struct Largest {
 
 impl Largest {
     fn add(&mut self, value: f64, at: impl FnOnce() -> Worst) {
-        // What is not a number is worse than any number.
+        // NaN counts as worse than any number.
         let value = if value.is_nan() { f64::INFINITY } else { value };
         if self.at.is_none() || value > self.value {
             *self = Self { value, at: Some(at()) };
@@ -154,7 +164,7 @@ impl Largest {
     }
 }
 
-/// Errors of one precision so far.
+/// Accumulated errors of one precision.
 pub(super) struct Comparison {
     precision: Precision,
     promise: Promise,
@@ -190,7 +200,8 @@ impl Comparison {
         &self.promise
     }
 
-    /// Compares one answer; `offset` is from the closest point of the face that it names to `p`.
+    /// Compares one answer. `offset` is the vector to `p` from the closest point of the face that
+    /// the answer names.
     pub(super) fn add(
         &mut self,
         class: PointClass,
@@ -202,11 +213,11 @@ impl Comparison {
         let found = answer.signed_distance;
         let at = || Worst { point: p.to_array(), class, expected, found, face: answer.face };
         let bound = self.promise.distance(p);
-        // Nearer than the bound the side is free, but not the distance.
+        // Nearer than the bound, either sign is accepted, but the distance must be right.
         let clear = expected.abs() > bound;
         let error = if clear { (found - expected).abs() } else { (found.abs() - expected.abs()).abs() };
         let error = if error.is_nan() { f64::INFINITY } else { error };
-        // Zero is on neither side.
+        // A signed distance of zero is on neither side.
         if clear && found * expected.signum() <= 0.0 {
             self.sign_mistakes += 1;
             self.sign.add(expected.abs(), at);
@@ -234,7 +245,7 @@ impl Comparison {
         }
     }
 
-    /// The point where the distance or else the sign is not as promised, if there is one.
+    /// A point whose distance, or else sign, breaks the promise; `None` when there is none.
     pub(super) fn worst_mistake(self) -> Option<Worst> {
         if self.error.value > 1.0 { self.error.at } else { self.sign.at }
     }
@@ -283,11 +294,13 @@ impl Comparison {
     }
 }
 
-/// The angle between the gradient and the direction from the closest point of the face that the answer names, which must
-/// be a closest face; `None` so near to the surface that no direction is promised.
+/// The error of the gradient. The expected direction comes from the closest point of the face that
+/// the answer names, and this face must be a closest face. `None` so near to the surface that no
+/// direction is promised.
 ///
-/// Where several faces are closest the gradient of any of them is right. One face has one closest point, so this is as
-/// strict as a comparison with the nearest face, without its jumps.
+/// Where several faces are closest, the gradient of any of them is right. One face has only one
+/// closest point. So this test is as strict as a comparison with the nearest face, but does not
+/// jump between faces.
 fn gradient_error(
     p: DVec3,
     expected: f64,
@@ -303,6 +316,6 @@ fn gradient_error(
         return Some(f64::INFINITY);
     };
     let direction = expected.signum() * offset.normalize();
-    // The chord, which sees a wrong length too.
+    // The length of the chord, which also shows a wrong length of the gradient.
     Some((answer.gradient - direction).length())
 }

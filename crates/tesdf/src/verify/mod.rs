@@ -1,8 +1,9 @@
-//! An asset against brute force: every face for every point, and exact winding numbers.
+//! Compares an asset with brute force (every face for every point, and exact winding numbers), or
+//! proves it.
 //!
-//! Comes in: an opened asset. Goes out: for each [`Precision`] the largest error, wrong signs and wrong gradients, each with
-//! the point where it is. Nothing of the lists, the forest or the face tree is used for the comparison, only the mesh that
-//! the asset holds.
+//! Input: an opened asset. Output of [`verify()`]: for each [`Precision`] the largest error, wrong
+//! signs and wrong gradients, each with its point. The expected values come from the mesh in the
+//! asset alone, not from the lists, the forest or the face tree.
 pub(crate) mod brute_force;
 mod compare;
 mod prove;
@@ -29,10 +30,10 @@ pub use samples::PointClass;
 use samples::Sampler;
 pub(crate) use self_check::self_check;
 
-/// How much [`verify`] does.
+/// Number and seed of the points of [`verify`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct VerifyOptions {
-    /// Number of points; their classes take turns.
+    /// Number of points. The classes alternate.
     pub samples: usize,
     /// The same seed gives the same points.
     pub seed: u64,
@@ -44,7 +45,7 @@ impl Default for VerifyOptions {
     }
 }
 
-/// What [`verify`] found.
+/// The result of [`verify`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VerifyReport {
     /// Whether every promise was kept.
@@ -53,15 +54,15 @@ pub struct VerifyReport {
     pub samples: usize,
     /// Seed of the points.
     pub seed: u64,
-    /// Faces that each point was compared with.
+    /// Number of faces in the mesh. Each point is compared with all of them.
     pub faces: usize,
-    /// Points whose winding number was also found without any tree.
+    /// Number of points whose winding number was also computed without a tree.
     pub winding_brute_force: usize,
-    /// Of those, points where both ways differ.
+    /// Number of these points where the two winding numbers differ.
     pub winding_disagreements: usize,
-    /// Diagonal of the mesh's bounds, in its unit.
+    /// Diagonal of the mesh's bounds, in the mesh's unit.
     pub diagonal: f64,
-    /// `f32` storage, then the `f64` path.
+    /// Results for `f32` storage, then for the `f64` path.
     pub precisions: [PrecisionReport; 2],
 }
 
@@ -71,32 +72,34 @@ pub enum VerifyError {
     /// The mesh in the asset is not valid.
     #[error("the mesh in the file is not valid: {0}")]
     Mesh(#[from] MeshError),
-    /// The mesh in the asset has no inside.
+    /// The mesh in the asset is not closed, so it has no inside.
     #[error("the mesh in the file is not closed: the directed edges do not balance, so nothing has a sign")]
     NotClosed,
-    /// The mesh in the asset is a point.
+    /// The diagonal of the mesh is not a positive length.
     #[error("the mesh in the file has the diagonal {0}; expected a positive length")]
     Diagonal(f64),
-    /// No points were asked for.
+    /// The number of points is 0.
     #[error("0 points to compare; expected at least 1")]
     NoSamples,
-    /// `progress` said so.
+    /// `progress` cancelled the comparison.
     #[error("the comparison was cancelled")]
     Cancelled,
 }
 
-/// One point in so many has its winding number found without a tree as well.
+/// For one point in this many, the winding number is also computed without a tree.
 const BRUTE_FORCE_EVERY: u64 = 8;
 /// Points between two calls of `progress`.
 const CHUNK: u64 = 32;
 
-/// Compares the asset with brute force at points of every [`PointClass`], from all threads of the current rayon pool.
+/// Compares the asset with brute force at points of every [`PointClass`], on all threads of the
+/// current rayon pool.
 ///
-/// `progress` is told the share done, 0 to 1, from any thread, and says whether to go on. Checksums are not looked at: that is
-/// [`TeSdf::verify_checksums`].
+/// `progress` receives the completed fraction, 0 to 1, from any thread, and decides whether to
+/// continue. Checksums are not verified; [`TeSdf::verify_checksums`] does that.
 ///
 /// # Errors
-/// [`VerifyError`]: the asset's mesh is not one that could have been encoded, or `progress` broke off.
+/// [`VerifyError`]: the asset's mesh could not have been encoded, `samples` is 0, or `progress`
+/// cancelled.
 pub fn verify(
     asset: &TeSdf,
     options: &VerifyOptions,
@@ -149,16 +152,16 @@ pub fn verify(
     })
 }
 
-/// The mesh in the order of the asset's faces, and their ids in the source.
+/// The mesh with its faces in the order of the asset, and their ids in the source.
 pub(crate) fn mesh_of(asset: &TeSdf) -> Result<(TriangleMesh, Vec<u32>), MeshError> {
     let vertices = asset.vertices.iter().map(|&v| DVec3::from_array(v)).collect();
     Ok((TriangleMesh::new(vertices, asset.faces.to_vec())?, asset.face_ids.to_vec()))
 }
 
-/// What the answers are compared with.
+/// The reference for comparisons.
 struct Truth<'a> {
     faces: BruteForce,
-    /// Place in `faces` of each face of the source.
+    /// For each face id of the source, its index in `faces`.
     place: Vec<Option<usize>>,
     winding: &'a WindingNumber,
     mesh: &'a TriangleMesh,
@@ -184,7 +187,8 @@ impl Found {
         let class = PointClass::of_index(index);
         let distance = truth.faces.distance(p);
         let winding = truth.winding.at_perturbed(p);
-        // Where rounding could put the point on the surface, either answer of the other way is right.
+        // Nearer than this bound, rounding could put the point on the surface, where the other
+        // method may return either number.
         if index.is_multiple_of(BRUTE_FORCE_EVERY) && distance > self.comparisons[1].promise().distance(p) {
             self.brute_force += 1;
             self.disagreements += usize::from(WindingNumber::brute_force(truth.mesh, p) != winding);
@@ -192,7 +196,7 @@ impl Found {
         let expected = if winding >= 1 { -distance } else { distance };
         for comparison in &mut self.comparisons {
             let answer = asset.query(p, comparison.precision());
-            // From the closest point of the face that the answer names.
+            // Vector from the closest point of the face that the answer names.
             let place = truth.place.get(answer.face as usize).copied().flatten();
             let offset = place.map(|at| truth.faces.offset(at, p));
             comparison.add(class, p, expected, &answer, offset);

@@ -8,11 +8,11 @@ use crate::mesh::TriangleMesh;
 use crate::query::Precision;
 use crate::sampling::{Random, Weighted};
 
-/// Where a point that is compared with brute force lies.
+/// Classes of the points that are compared with brute force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PointClass {
-    /// Uniform in the mesh's bounds, 1.2 times as large.
+    /// Uniform in the mesh's bounds, enlarged by a factor of 1.2.
     Box,
     /// 1e-9 to 1e-2 diagonals from a face, on either side, uniform in the logarithm.
     NearSurface,
@@ -24,14 +24,14 @@ pub enum PointClass {
     AtVertex,
     /// On a face, edge or corner of a cell, up to rounding.
     CellBorder,
-    /// Inside of the solid, the deepest of several.
+    /// Inside the solid: the deepest of several points.
     Deep,
-    /// 0.2 to 1000 diagonals outside of the bounds.
+    /// 0.2 to 1000 diagonals outside the bounds.
     FarOutside,
 }
 
 impl PointClass {
-    /// All of them.
+    /// All classes.
     pub const ALL: [Self; 8] = [
         Self::Box,
         Self::NearSurface,
@@ -57,7 +57,8 @@ impl PointClass {
         }
     }
 
-    /// The class of sample `index`: in any 20 consecutive samples all are there, the likely trouble most often.
+    /// The class of sample `index`. Any 20 consecutive samples contain all classes; those where
+    /// errors are likely come most often.
     pub fn of_index(index: u64) -> Self {
         use PointClass::*;
         const TURN: [PointClass; 20] = [
@@ -86,7 +87,7 @@ impl PointClass {
     }
 }
 
-/// Makes the points: the same for the same asset and seed.
+/// Makes the points. The same asset and seed give the same points.
 pub(super) struct Sampler<'a> {
     asset: &'a TeSdf,
     mesh: &'a TriangleMesh,
@@ -95,13 +96,13 @@ pub(super) struct Sampler<'a> {
     bounds: Aabb,
     diagonal: f64,
     areas: Weighted,
-    /// Corners of the cells of the domain.
+    /// Corners of each cell of the domain, in the mesh's unit.
     cells: Vec<[DVec3; 4]>,
 }
 
-/// Points tried for one that is inside.
+/// Largest number of random points tried to find points inside.
 const TRIES: usize = 64;
-/// Points inside of which the deepest is taken.
+/// Number of points inside from which the deepest is taken.
 const DEEPEST_OF: usize = 4;
 
 impl<'a> Sampler<'a> {
@@ -112,7 +113,7 @@ impl<'a> Sampler<'a> {
         seed: u64,
     ) -> Self {
         let diagonal = mesh.diagonal();
-        // Relative to the diagonal, so that no area underflows.
+        // Relative to the diagonal, so that areas do not underflow.
         let areas = Weighted::new((0..mesh.faces().len()).map(|f| {
             let [a, b, c] = mesh.triangle(f);
             ((b - a) / diagonal).cross((c - a) / diagonal).length()
@@ -160,13 +161,13 @@ impl<'a> Sampler<'a> {
         random.in_box(Aabb { min: center - half, max: center + half })
     }
 
-    /// Corners of a face, by area.
+    /// Corners of a random face, with probability proportional to its area.
     fn face(&self, random: &mut Random) -> [DVec3; 3] {
         let face = self.areas.pick(random).unwrap_or(0);
         self.mesh.triangle(face)
     }
 
-    /// Corners of a face, small ones as often as large ones, in any rotation.
+    /// Corners of a random face, all faces with equal probability, in a random rotation.
     fn any_face(&self, random: &mut Random) -> [DVec3; 3] {
         let mut corners = self.mesh.triangle(random.below(self.mesh.faces().len()));
         corners.rotate_left(random.below(3));

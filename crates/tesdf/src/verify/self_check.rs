@@ -1,4 +1,4 @@
-//! A new encoding against brute force, before it counts as proved.
+//! Compares a new encoding with brute force before it counts as proved.
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -12,7 +12,8 @@ use crate::mesh::MeshError;
 use crate::query::Precision;
 use crate::sampling::Random;
 
-/// Points in cells of one kind. All together take 2 % of the time that encoding takes (docs/benchmarks.md).
+/// Number of points in cells of one kind. The whole check takes 2 % of the encoding time
+/// (docs/benchmarks.md).
 const POINTS: usize = 128;
 const SEED: u64 = 0x7e5d;
 const KINDS: [CellKind; 6] = [
@@ -24,9 +25,11 @@ const KINDS: [CellKind; 6] = [
     CellKind::NotOfDomain,
 ];
 
-/// Where an encoding is wrong, if it is: the point whose distance or sign is off the most, of points in cells of every kind.
+/// Finds an error in an encoding: the point with the largest error of distance or sign, among
+/// points in cells of every kind. `None` when all points are within the promised bounds.
 ///
-/// The least distance over all faces and an exact winding number are the truth; nothing of the lists or the face tree is.
+/// The expected values are the least distance over all faces and an exact winding number. They use
+/// neither the lists nor the face tree.
 pub(crate) fn self_check(asset: &TeSdf) -> Result<Option<(Precision, Worst)>, MeshError> {
     let (mesh, _) = mesh_of(asset)?;
     let (truth, winding) = (BruteForce::new(&mesh, mesh.diagonal()), WindingNumber::new(&mesh));
@@ -46,7 +49,7 @@ pub(crate) fn self_check(asset: &TeSdf) -> Result<Option<(Precision, Worst)>, Me
     Ok(mistake(Precision::F64).or_else(|| mistake(Precision::F32)))
 }
 
-/// Points in cells of every kind, half of them on a border.
+/// Random points in cells of every kind. Half of them lie on the border of a cell.
 fn points(asset: &TeSdf) -> Vec<DVec3> {
     let mut cells: [Vec<[DVec3; 4]>; KINDS.len()] = Default::default();
     asset.visit_cells(|cell| {
@@ -88,7 +91,7 @@ mod tests {
         let mut asset =
             encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
         assert_eq!(self_check(&asset), Ok(None));
-        // All cells are outside.
+        // Mark all cells as outside.
         let mut nodes = asset.nodes.to_vec();
         for word in &mut nodes {
             *word = match Node::decode(*word, &asset.lists) {

@@ -1,14 +1,16 @@
-//! Whether a face and a tetrahedron are apart.
+//! Decides whether a face and a tetrahedron are apart.
 use glam::DVec3;
 use robust::{Coord3D, orient3d};
 
-/// The sides of a tetrahedron and the corner opposite to each.
+/// The sides of a tetrahedron, each with the opposite corner.
 const SIDES: [([usize; 3], usize); 4] = [([1, 2, 3], 0), ([0, 2, 3], 1), ([0, 1, 3], 2), ([0, 1, 2], 3)];
 
-/// Whether some direction shows a gap of more than `gap`. `error` is the rounding of what is near.
+/// Whether some direction shows a gap of more than `gap`. `error` bounds the rounding error of
+/// heights near the cell.
 ///
-/// Of two convex polyhedra without a common point, a plane lies between that is parallel to a side of one of them or to an
-/// edge of each. Any other direction would do as well: each shows what it shows.
+/// Two convex polyhedra without a common point are separated by a plane that is parallel to a side
+/// of one of them, or to an edge of each. Only these directions are tried. A gap in any direction
+/// is a proof, so the rounding of a direction does no harm.
 pub fn are_apart(cell: &[DVec3; 4], face: &[DVec3; 3], gap: f64, error: f64) -> bool {
     let [a, b, c] = *face;
     let edges = [b - a, c - b, a - c];
@@ -32,9 +34,11 @@ pub fn are_apart(cell: &[DVec3; 4], face: &[DVec3; 3], gap: f64, error: f64) -> 
     })
 }
 
-/// Whether a face does not meet the inside of a tetrahedron, which it may share corners with; exact.
+/// Whether a face does not meet the interior of a tetrahedron. They may share corners. `true` is
+/// exact; `false` proves nothing.
 ///
-/// It looks for a plane through three corners, with the tetrahedron on one side and the face on the other, borders included.
+/// It tries planes through three corners, with the tetrahedron on one side and the face on the
+/// other, borders included.
 pub fn is_beside(cell: &[DVec3; 4], face: &[DVec3; 3]) -> bool {
     let of_sides = SIDES.iter().map(|(side, _)| side.map(|k| cell[k]));
     let shared = (0..3).flat_map(|at| (0..4).map(move |corner| (at, corner)));
@@ -50,12 +54,12 @@ pub fn is_beside(cell: &[DVec3; 4], face: &[DVec3; 3]) -> bool {
             of_cell = of_cell.map(|s| -s);
             of_face = of_face.map(|s| -s);
         }
-        // The inside of a cell with corners on both sides would be on both.
+        // A cell with corners on both sides of the plane would have interior points on both sides.
         of_cell.iter().any(|&s| s > 0) && of_cell.iter().all(|&s| s >= 0) && of_face.iter().all(|&s| s <= 0)
     })
 }
 
-/// A point of a face that lies in a tetrahedron, nearly; `None` when there is none up to rounding.
+/// A point of a face that lies in a tetrahedron up to rounding; `None` when none is found.
 pub fn common_point(cell: &[DVec3; 4], face: &[DVec3; 3]) -> Option<DVec3> {
     let mut polygon = face.to_vec();
     for ([i, j, k], opposite) in SIDES {
@@ -79,7 +83,7 @@ pub fn common_point(cell: &[DVec3; 4], face: &[DVec3; 3]) -> Option<DVec3> {
     (!polygon.is_empty()).then(|| polygon.iter().sum::<DVec3>() / count)
 }
 
-/// Sign of the determinant of `a - d`, `b - d`, `c - d`; exact.
+/// Exact sign of the determinant of `a - d`, `b - d`, `c - d`.
 pub fn orientation(a: DVec3, b: DVec3, c: DVec3, d: DVec3) -> i32 {
     let coord = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
     let value = orient3d(coord(a), coord(b), coord(c), coord(d));
@@ -98,7 +102,7 @@ mod tests {
         let over = above.map(|p| p + DVec3::splat(0.2));
         assert!(are_apart(&CELL, &over, 0.1, 1e-15) && common_point(&CELL, &over).is_none());
         assert!(!are_apart(&CELL, &over, 2.0, 1e-15));
-        // Through the middle, touching a corner, touching a side.
+        // Faces through the middle, touching a corner, and touching a side.
         let through = [DVec3::splat(-1.0), DVec3::splat(1.0), DVec3::new(0.1, 0.3, 0.2)];
         let p = common_point(&CELL, &through).expect("they meet");
         assert!(p.cmpge(DVec3::ZERO).all() && p.element_sum() <= 1.0);
@@ -113,7 +117,7 @@ mod tests {
         let outward = DVec3::new(0.3, -0.7, 0.2);
         for face in [
             [DVec3::X, DVec3::Y, DVec3::Z],
-            // At one edge, at one corner, with its tip in the plane of a side.
+            // Faces at one edge, at one corner, and with the tip in the plane of a side.
             [DVec3::ZERO, DVec3::X, outward],
             [DVec3::Z, DVec3::new(-1.0, 0.2, 1.0), DVec3::new(0.1, -1.0, 1.2)],
             [DVec3::new(-1.0, 0.0, 0.0), DVec3::new(0.2, 0.2, 0.0), DVec3::new(0.0, 0.0, -1.0)],

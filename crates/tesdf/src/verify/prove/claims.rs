@@ -1,25 +1,27 @@
-//! Which parts of the surface the list is known to be as near as, all over a piece, and at what cost.
+//! Claims on a piece: for which parts of the surface the list is known to be as near, and at what
+//! cost.
 //!
-//! A *claim* `(o, κ)` on a piece says: `d(x, list) ≤ d(x, o) + κ` for every point `x` of the piece. `docs/math.md`, section 15,
-//! proves each rule.
+//! A *claim* `(o, κ)` on a piece says: `d(x, list) ≤ d(x, o) + κ` for every point `x` of the piece.
+//! `docs/math.md`, section 15, proves each rule.
 use super::parts::Edge;
 use super::piece::Piece;
 use super::problem::{Item, OpenFace, Problem};
 
-/// Share of `delta` that all rules of a chain may cost together.
-const MOST: f64 = 0.875;
+/// Fraction of `delta` that all rules of a chain may cost together.
+const MAX_COST: f64 = 0.875;
 
-/// The claims that hold on a piece: those of the cell, and those that were added on the way to the piece.
+/// The claims that hold on a piece: those of the whole cell and those added on the way to the
+/// piece.
 pub struct Claims<'a> {
     problem: &'a Problem,
-    /// Of each item; infinite without a claim.
+    /// The cost of each item's claim; infinite when it has no claim.
     cost: Vec<f64>,
-    /// Items in the order of their claims.
+    /// Items in the order in which they were claimed.
     trail: Vec<Item>,
 }
 
 impl<'a> Claims<'a> {
-    /// Claims what the list holds, at no cost.
+    /// Begins with claims on all items that the list holds, at cost 0.
     pub fn new(problem: &'a Problem) -> Self {
         let mut claims = Self { problem, cost: vec![f64::INFINITY; problem.items()], trail: Vec::new() };
         for &item in &problem.held {
@@ -28,31 +30,32 @@ impl<'a> Claims<'a> {
         claims
     }
 
-    /// Number of claims; for [`forget`](Self::forget).
+    /// Number of claims; see [`forget`](Self::forget).
     pub fn count(&self) -> usize {
         self.trail.len()
     }
 
-    /// Takes all claims but the first `count` back.
+    /// Removes all claims except the first `count`.
     pub fn forget(&mut self, count: usize) {
         for item in self.trail.drain(count..) {
             self.cost[self.problem.place(item)] = f64::INFINITY;
         }
     }
 
-    /// The cost of an item's claim; infinite without one.
+    /// The cost of an item's claim; infinite when it has no claim.
     pub fn cost(&self, item: Item) -> f64 {
         self.cost[self.problem.place(item)]
     }
 
-    /// Whether there is no claim yet.
+    /// Whether the item has no claim yet.
     pub fn is_open(&self, item: Item) -> bool {
         self.cost(item) == f64::INFINITY
     }
 
-    /// Adds a claim, unless it costs too much or there is one already; says whether it was added.
+    /// Adds a claim, unless it costs too much or the item has a claim already. Returns whether it
+    /// was added.
     pub fn add(&mut self, item: Item, cost: f64) -> bool {
-        let is_new = cost <= MOST * self.problem.delta && self.is_open(item);
+        let is_new = cost <= MAX_COST * self.problem.delta && self.is_open(item);
         if is_new {
             let place = self.problem.place(item);
             self.cost[place] = cost;
@@ -61,12 +64,13 @@ impl<'a> Claims<'a> {
         is_new
     }
 
-    /// What a claim on a vertex costs by those of the edges and faces that it is a part of.
+    /// Cost of a claim on a vertex that follows from claims on edges and faces around it.
     pub fn vertex_by_others(&self, vertex: u32) -> f64 {
         self.least(&self.problem.around_vertex[vertex as usize])
     }
 
-    /// What a claim on an edge costs by those of the faces that it is a part of, or of the end that is nearest all over the piece.
+    /// Cost of a claim on an edge that follows from claims on faces around it, or from a claim on
+    /// the end that is nearest everywhere on the piece.
     pub fn edge_by_others(&self, edge: u32, piece: &Piece) -> f64 {
         let by_faces = self.least(&self.problem.around_edge[edge as usize]);
         by_faces.min(self.edge_by_ends(edge, &self.problem.edges[edge as usize], piece))
@@ -83,7 +87,8 @@ impl<'a> Claims<'a> {
         by(0).min(by(1))
     }
 
-    /// What missing a region costs when the greatest value of a function that is positive inside of it is `most`.
+    /// Cost of treating the piece as outside a region. `most` is the greatest value, at the piece's
+    /// corners, of a function that is positive inside the region.
     fn touched(&self, most: f64) -> f64 {
         let Problem { error, touch, .. } = *self.problem;
         if most <= -error {
@@ -99,7 +104,8 @@ impl<'a> Claims<'a> {
         items.iter().map(|&item| self.cost(item)).fold(f64::INFINITY, f64::min)
     }
 
-    /// What a claim on a face costs by those of its edges, where no point of the piece is over the face.
+    /// Cost of a claim on a face that follows from claims on its edges, when no point of the piece
+    /// is over the face.
     pub fn face_by_border(&self, face: &OpenFace, piece: &Piece) -> f64 {
         let border = face.border.map(|item| self.cost(item));
         let mut sides = [[0.0; 3]; 4];
@@ -112,7 +118,8 @@ impl<'a> Claims<'a> {
         let missed = self.touched(most_inside(&sides));
         let mut cost = 0.0;
         for k in 0..3 {
-            // An edge that all of the piece is on the inner side of has no closest point.
+            // When the whole piece is on the inner side of an edge, no closest point lies on that
+            // edge.
             let is_clear = sides.iter().all(|s| s[k] >= 2.0 * self.problem.touch + self.problem.error);
             if !is_clear {
                 cost = f64::max(cost, border[k]);
@@ -121,7 +128,8 @@ impl<'a> Claims<'a> {
         missed + cost
     }
 
-    /// What a claim on the edges of a face that is no thicker than rounding costs by each other.
+    /// Costs of claims on the edges of a face that is no thicker than rounding, each from claims on
+    /// the other edges.
     pub fn thin_border(&self, face: &OpenFace) -> [f64; 3] {
         let longest = face.shape.longest_edge();
         let cost = face.border.map(|item| self.cost(item));
@@ -130,8 +138,8 @@ impl<'a> Claims<'a> {
     }
 }
 
-/// A bound on how far inside of all three sides a point of a piece can be: the least over some mixtures of two sides of the
-/// greatest value at the corners.
+/// An upper bound on how far inside all three sides a point of a piece can be: the least, over some
+/// mixtures of two sides, of the greatest value at the corners.
 fn most_inside(sides: &[[f64; 3]; 4]) -> f64 {
     let of = |weights: [f64; 3]| {
         let value = |s: &[f64; 3]| weights[0] * s[0] + weights[1] * s[1] + weights[2] * s[2];
@@ -139,7 +147,7 @@ fn most_inside(sides: &[[f64; 3]; 4]) -> f64 {
     };
     let mut least = of([1.0, 0.0, 0.0]).min(of([0.0, 1.0, 0.0])).min(of([0.0, 0.0, 1.0]));
     for (k, l) in [(0, 1), (1, 2), (2, 0)] {
-        // The greatest of affine functions of the weight is least where two of them meet.
+        // The maximum of affine functions of the weight is least where two of them are equal.
         for i in 0..4 {
             for j in 0..i {
                 let slope = |s: &[f64; 3]| s[k] - s[l];

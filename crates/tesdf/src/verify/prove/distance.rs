@@ -1,7 +1,8 @@
-//! Shows for one cell that no face outside of its list is closer than the list by more than `delta`, or finds a point where one is.
+//! Proves for one cell that no face outside its list is closer than the list by more than `delta`,
+//! or finds a point where a face is.
 //!
-//! The cell is cut into pieces until a rule settles every face on every piece. Values at corners are handed on from piece to piece:
-//! a cut makes one new corner.
+//! The cell is cut into pieces until a rule settles every face on every piece. Values at corners
+//! are passed on from piece to piece, because a cut makes only one new corner.
 use glam::DVec3;
 
 use super::claims::Claims;
@@ -10,49 +11,50 @@ use super::parts::Bound;
 use super::piece::{Cut, Piece};
 use super::problem::{Item, Problem};
 
-/// A piece that so many cuts lead to is not cut: the search calls itself, and the stack has an end.
+/// Pieces after this many cuts are not cut further: the search is recursive, and the stack is
+/// limited.
 const DEEPEST: u32 = 2000;
 
-/// Pieces are halved this often before they are cut along the faces of the list.
+/// Pieces are halved this often before they are cut along faces of the list.
 const HALVED_FIRST: u32 = 8;
-/// Share of `delta` that the drift of the pieces may cost.
+/// Fraction of `delta` that the drift of the pieces may cost.
 const DRIFT: f64 = 1.0 / 32.0;
-/// Share of `delta` that rounding may be.
+/// Fraction of `delta` that the rounding error may reach.
 const ROUNDING: f64 = 0.125;
 
 /// Why a cell is not proved.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Open {
-    /// A point of the cell, relative to its middle, where a face outside of the list is closer by more than `delta`.
+    /// A face outside the list is closer by more than `delta` at a point of the cell.
     Refuted {
-        /// The point.
+        /// The point, relative to the centroid of the cell.
         at: DVec3,
-        /// The face, by its place in the file.
+        /// The face, by its index in the file.
         face: u32,
-        /// At most the distance of the list.
+        /// Lower bound of the distance of the list.
         list: f64,
-        /// At least the distance of the face.
+        /// Upper bound of the distance of the face.
         distance: f64,
     },
-    /// Neither proved nor refuted.
+    /// The cell is neither proved nor refuted.
     Undecided {
-        /// Why.
+        /// The reason.
         reason: Reason,
-        /// A point of the piece that the search stopped at, relative to the middle of the cell.
+        /// A point of the piece at which the search stopped, relative to the centroid of the cell.
         at: DVec3,
-        /// A face that is left, by its place in the file.
+        /// A face that is not settled, by its index in the file.
         face: u32,
     },
-    /// It was cancelled.
+    /// The search was cancelled.
     Cancelled,
 }
 
 /// Why a cell is undecided.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// More pieces than allowed.
+    /// The cell needs more pieces than allowed.
     Pieces,
-    /// Rounding is not small against `delta`.
+    /// The rounding error is not small relative to `delta`.
     Rounding,
 }
 
@@ -60,12 +62,12 @@ pub enum Reason {
 pub struct Search<'a> {
     problem: &'a Problem,
     claims: Claims<'a>,
-    /// Stacks: each piece has the end of both.
+    /// Stacks. Each piece owns the end of both.
     rivals: Vec<Rival>,
     faces: Vec<Facing>,
-    /// The piece on which an edge or vertex was last tested.
+    /// For each item, the number of the piece on which it was last tested.
     tested: Vec<u64>,
-    /// Pieces so far.
+    /// Number of pieces so far.
     pub pieces: u64,
     most_pieces: u64,
     is_cancelled: &'a dyn Fn() -> bool,
@@ -75,24 +77,24 @@ pub struct Search<'a> {
 #[derive(Clone, Copy, Debug)]
 struct Facing {
     at: u32,
-    /// At most its distance from each corner.
+    /// Lower bounds of its distance from each corner of the piece.
     low: [f64; 4],
-    /// What the centre of the piece sees of it.
+    /// Lower bound of its distance from the centre of the piece.
     center: Bound,
 }
 
-/// The ends of both stacks that belong to a piece.
+/// The starts of a piece's entries on both stacks.
 #[derive(Clone, Copy)]
 struct Start {
     rivals: usize,
     faces: usize,
 }
 
-/// Pieces between two looks at whether to stop.
+/// Number of pieces between two tests for cancellation.
 const LOOK: u64 = 1 << 12;
 
 impl<'a> Search<'a> {
-    /// At most `most_pieces` are looked at.
+    /// Prepares a search that visits at most `most_pieces` pieces.
     pub fn new(problem: &'a Problem, most_pieces: u64, is_cancelled: &'a dyn Fn() -> bool) -> Self {
         Self {
             problem,
@@ -130,7 +132,7 @@ impl<'a> Search<'a> {
         self.settle(&Piece::whole(corners), &nearest, Start { rivals: 0, faces: 0 })
     }
 
-    /// Settles all faces from `start` on, on a piece.
+    /// Settles all faces on the stack from `start` on, for one piece.
     fn settle(&mut self, piece: &Piece, nearest: &[Nearest; 4], start: Start) -> Result<(), Open> {
         self.pieces += 1;
         if self.pieces.is_multiple_of(LOOK) && (self.is_cancelled)() {
@@ -167,7 +169,7 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        // All of the piece is beyond where anything is promised.
+        // The whole piece lies beyond the distance up to which the certificate promises anything.
         let is_beyond = least - radius >= problem.within + problem.delta;
         if !is_beyond {
             self.claim_faces(&dominance, own.faces);
@@ -194,7 +196,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// What of the list is nearest to the centre, and at most the distance of the list there. Pushes the rivals that can be nearest in the piece.
+    /// The nearest face of the list as seen from the centre, and a lower bound of the distance of
+    /// the list there. Pushes the rivals that can be nearest somewhere in the piece.
     fn look_from_center(&mut self, center: DVec3, radius: f64, start: Start) -> (Nearest, f64) {
         let problem = self.problem;
         let end = self.rivals.len();
@@ -204,7 +207,7 @@ impl<'a> Search<'a> {
             let rival = self.rivals[at];
             let face = &problem.list[rival.at as usize];
             nearest = nearest.or(rival.at, center, face.high(center, problem.error));
-            // Without a bound of its own it could be as near as the highest less twice the error.
+            // Every rival is kept for now; the loop below drops those that are too far.
             self.rivals.push(rival);
         }
         let limit = nearest.high + 2.0 * radius;
@@ -222,7 +225,7 @@ impl<'a> Search<'a> {
         (nearest, low)
     }
 
-    /// Claims faces by the point and the plane.
+    /// Claims faces by the point rule and the plane rule.
     fn claim_faces(&mut self, dominance: &Dominance, from: usize) {
         for at in from..self.faces.len() {
             let facing = self.faces[at];
@@ -233,10 +236,11 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether a face that is left is closer at the centre than all of the list.
+    /// Fails when a remaining face is closer at the centre than the whole list.
     fn look_for_witness(&self, center: DVec3, high: f64, own: Start, piece: &Piece) -> Result<(), Open> {
         let Problem { delta, error, within, .. } = *self.problem;
-        // Besides the bounds themselves: the corners were rounded to the middle of the cell, and the pieces drift.
+        // Besides the errors of the bounds: corners are rounded when taken relative to the centroid
+        // of the cell, and pieces drift.
         let clear = delta + 2.0 * error + 2.0 * piece.drift;
         for facing in &self.faces[own.faces..] {
             let face = &self.problem.faces[facing.at as usize];
@@ -291,7 +295,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// What the new corner is nearest to, and what it sees of the rivals and of the faces that are left.
+    /// The nearest face of the list as seen from the new corner, and the bounds for the rivals and
+    /// the remaining faces there.
     fn look_from_cut(&self, cut: &Cut, own: Start) -> (Nearest, (Vec<f64>, Vec<f64>)) {
         let problem = self.problem;
         let mut nearest = Nearest::NONE;
@@ -308,17 +313,18 @@ impl<'a> Search<'a> {
 
 const NOT_SEEN: Bound = Bound { distance: f64::NEG_INFINITY, offset: DVec3::ZERO };
 
-/// Claims by chains: of faces by their edges, of edges by their ends and by the faces around them.
+/// Claims by chains: on faces from their edges, on edges from their ends and from the faces around
+/// them.
 struct Chain<'s, 'a, 't> {
     search: &'s mut Search<'a>,
     dominance: &'t Dominance,
     piece: &'t Piece,
-    /// Where the faces of the piece begin.
+    /// Start of the piece's faces on the stack.
     from: usize,
 }
 
 impl Chain<'_, '_, '_> {
-    /// Adds claims until no rule adds another one.
+    /// Adds claims until no rule adds another claim.
     fn follow(&mut self) {
         let problem = self.search.problem;
         let open: Vec<u32> = self.search.faces[self.from..].iter().map(|f| f.at).collect();

@@ -1,35 +1,36 @@
-//! Whether the list is nearer than a part of the surface all over a piece: the ball, the point and the plane.
+//! Tests whether the list is nearer than a part of the surface everywhere on a piece: the ball
+//! rule, the point rule and the plane rule.
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::parts::{Bound, Face, Part};
 use super::piece::Piece;
 
-/// A face of the list, with what the corners of a piece see of it.
+/// A face of the list with its distance bounds at the corners of a piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Rival {
-    /// Its place in the list.
+    /// Its index in the list.
     pub at: u32,
-    /// At least its distance from each corner.
+    /// Upper bounds of its distance from each corner.
     pub high: [f64; 4],
 }
 
-/// The face of the list that a corner is nearest to.
+/// The face of the list that is nearest to a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
-    /// Its place in the list.
+    /// Its index in the list.
     pub at: u32,
-    /// At least its distance.
+    /// Upper bound of its distance.
     pub high: f64,
-    /// The point of it that is nearest, nearly.
+    /// Its nearest point, up to rounding.
     pub point: DVec3,
 }
 
 impl Nearest {
-    /// Farther than everything.
+    /// Farther than every face.
     pub const NONE: Self = Self { at: 0, high: f64::INFINITY, point: DVec3::INFINITY };
 
-    /// The nearer of both.
+    /// The nearer one of `self` and face `at`, which has the bound `high` at `x`.
     pub fn or(self, at: u32, x: DVec3, high: Bound) -> Self {
         if high.distance < self.high {
             Self { at, high: high.distance, point: x - high.offset }
@@ -39,24 +40,24 @@ impl Nearest {
     }
 }
 
-/// Share of `delta` that each of the three tests may cost.
+/// Fraction of `delta` that each of the three rules may cost.
 pub const COST: f64 = 0.5;
-/// Share of `delta` that the corners may be nearer by in the point test.
+/// Fraction of `delta` by which the part may be nearer at the corners in the point rule.
 const POINT_SLACK: f64 = 0.125;
 
-/// A point of a face of the list, as the corners of a piece see it.
+/// A point of a face of the list, seen from the corners of a piece.
 struct Target {
-    /// At least the distance from each corner.
+    /// Upper bounds of its distance from each corner.
     high: [f64; 4],
-    /// How much nearer than that the part may be at a corner.
+    /// The part may be nearer than these bounds at a corner by this much.
     slack: f64,
 }
 
-/// What the three tests need of a piece.
+/// Data of a piece for the three rules.
 pub struct Dominance {
     center: DVec3,
     radius: f64,
-    /// At least the distance of the list from the centre.
+    /// Upper bound of the distance of the list from the centre.
     high: f64,
     error: f64,
     cost: f64,
@@ -65,12 +66,13 @@ pub struct Dominance {
     at_corners: [DVec3; 4],
     rivals: Vec<Rival>,
     targets: ArrayVec<Target, 9>,
-    /// Normals of the faces of the list that the corners and the centre are nearest to, towards the centre.
+    /// Unit normals, towards the centre, of the faces of the list that are nearest to the corners
+    /// and to the centre.
     normals: ArrayVec<DVec3, 5>,
 }
 
 impl Dominance {
-    /// `nearest` are those of the corners, then that of the centre.
+    /// `nearest` has the nearest faces of the four corners, then that of the centre.
     pub fn new(
         piece: &Piece,
         rivals: Vec<Rival>,
@@ -113,15 +115,17 @@ impl Dominance {
         }
     }
 
-    /// What the centre sees of a part, unless the list is nearer than the part all over the piece as the ball shows.
+    /// Lower bound of the part's distance from the centre; `None` when the ball rule proves that
+    /// the list is nearer than the part everywhere on the piece.
     pub fn unless_by_ball(&self, part: Part) -> Option<Bound> {
         let low = part.low(self.center, self.error);
         let is_nearer = self.high + 2.0 * self.radius <= low.distance + self.cost;
         (!is_nearer).then_some(low)
     }
 
-    /// Whether the list is nearer than a part, up to [`COST`], all over the piece, as the point or the plane shows. `low` are
-    /// bounds of the part's distance from the corners, `center` is what the centre sees of it.
+    /// Whether the point rule or the plane rule proves that the list is nearer than a part
+    /// everywhere on the piece, up to [`COST`]. `low` are lower bounds of the part's distance from
+    /// the corners, `center` is the bound at the centre.
     pub fn is_nearer(&self, part: Part, low: &[f64; 4], center: Bound) -> bool {
         self.by_point(low) || self.by_plane(part, center)
     }

@@ -1,26 +1,29 @@
-//! Arithmetic whose error is known: differences and products with what rounding loses, and unit normals of needles.
+//! Arithmetic with known errors: differences and products with their rounding errors, and unit
+//! normals of needles.
 use glam::DVec3;
 
-/// The largest relative error of one rounded operation.
+/// Largest relative error of one rounded operation.
 pub const U: f64 = f64::EPSILON / 2.0;
 
-/// Height over the longest edge, as a share of that edge, below which a triangle has no [`unit_normal`].
+/// A triangle whose height over its longest edge is at most this fraction of the edge has no
+/// [`unit_normal`].
 pub const FLAT: f64 = 1.0 / (1u64 << 48) as f64;
 
-/// `x - y`, rounded, and what rounding lost (Knuth).
+/// `x - y` rounded, and the rounding error (Knuth).
 pub fn difference(x: f64, y: f64) -> (f64, f64) {
     let rounded = x - y;
     let back = rounded - x;
     (rounded, (x - (rounded - back)) - (y + back))
 }
 
-/// `x y`, rounded, and what rounding lost.
+/// `x y` rounded, and the rounding error.
 fn product(x: f64, y: f64) -> (f64, f64) {
     let rounded = x * y;
     (rounded, x.mul_add(y, -rounded))
 }
 
-/// `(b - a) × (c - a)`: each component is off by at most 16 U² |b - a| |c - a| and one rounding of its own.
+/// `(b - a) × (c - a)`. The error of each component is at most 16 U² |b - a| |c - a| plus one
+/// rounding of the component.
 fn cross(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| difference(p[k], a[k])));
     DVec3::from_array([(1, 2), (2, 0), (0, 1)].map(|(i, j)| {
@@ -31,13 +34,16 @@ fn cross(a: DVec3, b: DVec3, c: DVec3) -> DVec3 {
     }))
 }
 
-/// The unit normal of a triangle, off by at most 8 U, and the height over the longest edge, rounded.
+/// The unit normal of a triangle, with an error of at most 8 U, and the height over the longest
+/// edge, rounded.
 ///
-/// `None` where the height is at most [`FLAT`] of the longest edge. Corners are at most some 2^7 from the origin.
+/// `None` when the height is at most [`FLAT`] times the longest edge. Corners may be about 2^7 from
+/// the origin at most.
 pub fn unit_normal([a, b, c]: [DVec3; 3]) -> Option<(DVec3, f64)> {
     let opposite = [b.distance(c), c.distance(a), a.distance(b)];
     let longest = opposite[0].max(opposite[1]).max(opposite[2]);
-    // At the widest angle, where the product of the two edges is largest against their lengths.
+    // Computed at the widest angle, where the cross product is largest relative to the lengths of
+    // its edges.
     let normal = if opposite[0] == longest {
         cross(a, b, c)
     } else if opposite[1] == longest {
@@ -46,7 +52,8 @@ pub fn unit_normal([a, b, c]: [DVec3; 3]) -> Option<(DVec3, f64)> {
         cross(c, a, b)
     };
     let largest = normal.abs().max_element();
-    // Smaller ones may have lost digits to underflow; their triangles are below 2^-200 in height or length.
+    // A smaller product may have lost digits to underflow. Such triangles are below 2^-200 in
+    // height or length.
     if largest.is_nan() || largest <= 2f64.powi(-400) {
         return None;
     }
@@ -60,7 +67,7 @@ pub fn unit_normal([a, b, c]: [DVec3; 3]) -> Option<(DVec3, f64)> {
 mod tests {
     use super::*;
 
-    /// A needle in no special position, given by exact coordinates: its normal is known from whole numbers.
+    /// A needle in no special position, with exact coordinates. Its normal is known from integers.
     #[test]
     fn normals_of_needles_keep_their_digits() {
         // a, b, c = a + (b - a) / 2 + e with e = (0, 0, 2^-40): all exact.

@@ -1,4 +1,5 @@
-//! Whether the face tree can find every face: its leaves name each face once, and its boxes hold what is below them.
+//! Checks that the face tree can find every face: its leaves name each face once, and its boxes
+//! contain the faces below them.
 use glam::DVec3;
 
 use super::exact::difference;
@@ -7,7 +8,7 @@ use crate::TeSdf;
 use crate::asset::layout::TreeChild;
 use crate::geometry::Aabb;
 
-/// What is wrong with the face tree, or with the names of the faces.
+/// The faults of the face tree and of the face ids.
 pub fn faults(asset: &TeSdf, triangles: &[[DVec3; 3]]) -> Vec<Fault> {
     let mut check = Check { asset, triangles, named: vec![0; triangles.len()], faults: Vec::new() };
     check.node(0);
@@ -30,13 +31,14 @@ pub fn faults(asset: &TeSdf, triangles: &[[DVec3; 3]]) -> Vec<Fault> {
 struct Check<'a> {
     asset: &'a TeSdf,
     triangles: &'a [[DVec3; 3]],
-    /// How often each face is named.
+    /// Number of times that the leaves name each face.
     named: Vec<u32>,
     faults: Vec<Fault>,
 }
 
 impl Check<'_> {
-    /// Bounds of the faces below a node. Opening has checked that the tree is no deeper than a stack can be.
+    /// Checks a node. Returns the bounds of the faces below it. Opening the asset has limited the
+    /// depth of the tree, so the recursion fits the stack.
     fn node(&mut self, node: u32) -> Aabb {
         let boxes = self.asset.tree_boxes[node as usize];
         let children = self.asset.tree_children[node as usize].map(TreeChild::decode);
@@ -65,7 +67,7 @@ impl Check<'_> {
     }
 }
 
-/// Whether `bound <= x - middle`, exact.
+/// Exact test of `bound <= x - middle`.
 fn is_at_most(bound: f64, x: f64, middle: f64) -> bool {
     let (rounded, lost) = difference(x, middle);
     bound < rounded || (bound == rounded && lost >= 0.0)

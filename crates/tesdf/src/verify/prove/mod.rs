@@ -1,7 +1,8 @@
-//! A proof, cell by cell, that an asset answers as its certificate says.
+//! Proves, cell by cell, that an asset answers as its certificate says.
 //!
-//! Comes in: an opened asset. Goes out: for every cell whether no face outside of its list can be closer than the list by more than
-//! the certificate's δ, whether its sign is right, and whether the face tree can find every face.
+//! Input: an opened asset. Output: for every cell, whether no face outside its list can be closer
+//! than the list by more than the certificate's δ, and whether its sign is right; for the face
+//! tree, whether it can find every face.
 //!
 //! ```text
 //!              forest, lists, faces
@@ -14,9 +15,10 @@
 //!        report ◀── face_tree
 //! ```
 //!
-//! Shared with the encoder: the layout of the file ([`layout`](crate::asset::layout)), the corners of the cells
-//! ([`Cell`]), the way to the local frame, and the exact predicates of the crate `robust`. Not shared: distances, bounds, rules,
-//! winding numbers, trees. `docs/math.md`, section 15, has the theorem.
+//! Shared with the encoder: the layout of the file ([`layout`](crate::asset::layout)), the corners
+//! of the cells ([`Cell`]), the mapping to the local frame, and the exact predicates of the crate
+//! `robust`. Not shared: distances, bounds, rules, winding numbers, trees. `docs/math.md`, section
+//! 15, has the theorem.
 mod apart;
 mod claims;
 mod distance;
@@ -48,10 +50,10 @@ use surface::Surface;
 use walk::{Found, Walk};
 use winding::Rays;
 
-/// How much [`prove`] does.
+/// Limits of [`prove`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProveOptions {
-    /// Most pieces that one cell is cut into; a cell that would need more is undecided.
+    /// Largest number of pieces for one cell. A cell that would need more is undecided.
     pub pieces: u64,
 }
 
@@ -61,58 +63,69 @@ impl Default for ProveOptions {
     }
 }
 
-/// Why nothing can be proved of an asset.
+/// Why a proof cannot begin or was cancelled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProveError {
-    /// The way to the local frame rounds.
+    /// Mapping a vertex to the local frame rounds it, or the vertex lies too far out.
     #[error(
         "vertex {vertex} (0-based) has no exact place within {} of the origin of the local frame; encode the mesh again",
         surface::FARTHEST
     )]
     Frame {
-        /// The vertex.
+        /// The vertex, 0-based.
         vertex: usize,
     },
-    /// The mesh has no inside.
+    /// The mesh is not closed, so it has no inside.
     #[error(
         "the mesh in the file is not closed: more faces run one way than the other along the edge of vertices {} and {} (0-based)",
         .edge[0], .edge[1]
     )]
     NotClosed {
-        /// Vertices of an edge.
+        /// Vertices of an unbalanced edge, 0-based.
         edge: [u32; 2],
     },
-    /// The domain is too large to count rounding.
+    /// The domain is too large for the rounding bounds.
     #[error(
         "the cube of the domain reaches {reach} from the origin of the local frame; expected at most {}",
         surface::FARTHEST
     )]
     Domain {
-        /// How far it reaches.
+        /// The largest absolute coordinate, in the local frame.
         reach: f64,
     },
-    /// The system gives no more threads.
+    /// The system refuses to start more threads.
     #[error("the system refused threads with a stack of {} MiB each; ask for fewer threads", STACK >> 20)]
     Threads,
-    /// `progress` said so.
+    /// `progress` cancelled the proof.
     #[error("the proof was cancelled")]
     Cancelled,
 }
 
-/// Room for the deepest search of a cell, some 8 KiB for each cut, in the profile of the tests too.
+/// Stack size in bytes. The deepest search of a cell needs some 8 KiB for each cut, in the test
+/// profile too.
 const STACK: usize = 64 << 20;
 
-/// Proves that an asset answers as its certificate says, from all threads of the current rayon pool.
+/// Proves that an asset answers as its certificate says, on all threads of the current rayon pool.
 ///
-/// For every cell with a list: at each of its points the list is at most δ farther than the nearest of all faces. For every cell:
-/// its label is the side of all of its points, or the faces that pass through it are in its list. For the face tree: its leaves
-/// name each face once, and its boxes hold them. δ is that of the certificate; an asset that certifies nothing is held to the δ of
-/// the certified encoder. Of an asset with cut lists, only points within the certificate's exactness distance are looked at.
+/// - For every cell with a list: at each of its points, the list is at most δ farther than the
+///   nearest of all faces.
+/// - For every cell: its label is the side of all its points, or the faces that pass through it are
+///   in its list.
+/// - For the face tree: its leaves name each face once, and its boxes contain the faces.
 ///
-/// `progress` is told the share done, 0 to 1, from any thread, and says whether to go on. The report is the same on any number of threads.
+/// δ is that of the certificate. When the certificate promises nothing, δ is that of the certified
+/// encoder. For an asset with truncated lists, only points within the certificate's exactness
+/// distance are covered.
+///
+/// The proof does not cover the `f32` path, gradients, rays or sign hints;
+/// [`verify`](super::verify) compares answers with brute force.
+///
+/// `progress` receives the completed fraction, 0 to 1, from any thread, and decides whether to
+/// continue. The report is the same for any number of threads.
 ///
 /// # Errors
-/// [`ProveError`]: the asset is none that an encoder makes, or `progress` broke off.
+/// [`ProveError`]: no encoder makes such an asset, the system refuses threads, or `progress`
+/// cancelled.
 pub fn prove(
     asset: &TeSdf,
     options: &ProveOptions,
@@ -132,7 +145,7 @@ pub fn prove(
     let certificate = asset.about().certificate();
     let diagonal = asset.bounds().extent().length();
     let granted = Certificate::DELTA * side * diagonal;
-    // What a file says of itself is never more than what the encoder may say.
+    // A file cannot claim a larger δ than the encoder grants.
     let delta = certificate.delta().map_or(granted, |delta| delta.min(granted));
     let within = certificate.exactness_distance();
     let walk = Walk {
@@ -147,7 +160,7 @@ pub fn prove(
     };
     let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
     let cells = || (0..roots.len()).into_par_iter().map(|root| walk.root(root, &all));
-    // The search calls itself for each cut.
+    // The search recurses for each cut, so it needs large stacks.
     let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).stack_size(STACK);
     let mut found = match threads.build() {
         Ok(threads) => threads.install(|| cells().reduce(Found::default, Found::join)),
@@ -181,10 +194,12 @@ pub fn prove(
     })
 }
 
-/// By how much a query can miss the cell that it finds, of the side of the cube: 2^-51, and more than that.
+/// Bound of how far a query point can lie outside the cell that is found for it, relative to the
+/// side of the cube. The actual bound is 2^-51.
 const MISSED: f64 = 1.0 / (1u64 << 40) as f64;
 
-/// The winding number is a whole number only where as many faces run along each edge one way as the other.
+/// Checks that as many faces run along each edge in one direction as in the other. Only then is the
+/// winding number an integer.
 fn check_closed(asset: &TeSdf, surface: &Surface) -> Result<(), ProveError> {
     let mut balance: HashMap<[u32; 2], (i64, [u32; 2])> = HashMap::new();
     for (corners, vertices) in surface.faces.iter().zip(asset.faces.iter()) {

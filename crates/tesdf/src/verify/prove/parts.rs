@@ -1,23 +1,24 @@
-//! Vertices, edges and faces as sets of points, and bounds of their distances from a point.
+//! Vertices, edges and faces as sets of points, with bounds of their distances from a point.
 //!
-//! Comes in: corners. Goes out: `low` bounds, which are at most the true distance, and `high` bounds, which are at least the true
-//! distance, both in spite of rounding. `docs/math.md`, section 15, counts the operations.
+//! Input: corners. Output: `low` bounds, which are at most the true distance, and `high` bounds,
+//! which are at least the true distance. Both account for rounding. `docs/math.md`, section 15,
+//! counts the operations.
 use glam::DVec3;
 
 use super::exact::{FLAT, U, unit_normal};
 
-/// A bound on the error of every quantity of this module, for points and corners that are within `reach` of each other and of
-/// the origin.
+/// An error bound for every quantity of this module. Points and corners must be within `reach` of
+/// each other and of the origin.
 pub fn rounding(reach: f64) -> f64 {
     32.0 * U * reach
 }
 
-/// A segment; a point where both ends are the same.
+/// A segment, or a point when both ends are equal.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
-    /// Its ends.
+    /// The two ends.
     pub ends: [DVec3; 2],
-    /// From the first end to the second.
+    /// Vector from the first end to the second.
     along: DVec3,
     /// 1 / |along|²; 0 for a point.
     inverse: f64,
@@ -28,56 +29,57 @@ impl Edge {
     pub fn new(ends: [DVec3; 2]) -> Self {
         let along = ends[1] - ends[0];
         let squared = along.length_squared();
-        // An edge whose squared length loses digits to underflow is as good as its first end.
+        // An edge whose squared length loses digits to underflow counts as its first end.
         let inverse = if squared > 1e-280 { 1.0 / squared } else { 0.0 };
         Self { ends, along, inverse }
     }
 
-    /// To `x` from a point of the edge that is nearly the closest one.
+    /// Vector to `x` from a point of the edge that is closest up to rounding.
     fn offset(&self, x: DVec3) -> DVec3 {
         let from = x - self.ends[0];
         let share = (from.dot(self.along) * self.inverse).clamp(0.0, 1.0);
         from - share * self.along
     }
 
-    /// How far `x` is beyond each end, towards the other end; `None` for a point.
+    /// Position of `x` along the edge, measured inwards from each end; `None` for a point.
     pub fn within(&self, x: DVec3) -> Option<[f64; 2]> {
         let unit = self.along.try_normalize().filter(|_| self.inverse > 0.0)?;
         Some([unit.dot(x - self.ends[0]), -unit.dot(x - self.ends[1])])
     }
 }
 
-/// The plane of a face, and the planes through its edges at right angles to it.
+/// The plane of a face, and the planes through its edges perpendicular to it.
 #[derive(Clone, Copy, Debug)]
 struct Prism {
     normal: DVec3,
-    /// Unit vectors in the plane, at right angles to each edge, towards the face.
+    /// Unit vectors in the plane, perpendicular to each edge, towards the face.
     inward: [DVec3; 3],
 }
 
-/// A triangle of any shape, down to a point.
+/// A triangle of any shape; it may be a segment or a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Face {
-    /// Its corners; edge `k` goes from corner `k` to the next.
+    /// The corners. Edge `k` goes from corner `k` to the next.
     pub corners: [DVec3; 3],
     edges: [Edge; 3],
-    /// `None` for a face that is taken for its edges.
+    /// `None` for a face that counts as its edges.
     prism: Option<Prism>,
-    /// A bound on the height over the longest edge; only for a face that is taken for its edges.
+    /// Upper bound of the height over the longest edge for a face that counts as its edges;
+    /// otherwise 0.
     pub thickness: f64,
 }
 
-/// A bound on a distance, and the way from which it comes.
+/// A bound of a distance, with the vector that it comes from.
 #[derive(Clone, Copy, Debug)]
 pub struct Bound {
     /// The bound.
     pub distance: f64,
-    /// To the point, from a point of the set or its plane.
+    /// Vector to the point from a point of the set or of its plane.
     pub offset: DVec3,
 }
 
 impl Face {
-    /// The triangle with these corners. Where its height is at most `thin` it is taken for its edges.
+    /// The triangle with these corners. It counts as its edges when its height is at most `thin`.
     pub fn new(corners: [DVec3; 3], thin: f64) -> Self {
         let edges = [0, 1, 2].map(|k| Edge::new([corners[k], corners[(k + 1) % 3]]));
         let plane = unit_normal(corners).filter(|(_, height)| *height > thin);
@@ -86,23 +88,24 @@ impl Face {
             inward: edges.map(|e| normal.cross(e.along.normalize_or_zero())),
         });
         let longest = edges.iter().map(|e| e.along.length()).fold(0.0, f64::max);
-        // The height itself is rounded.
+        // The factor covers the rounding of the height itself.
         let thickness = if prism.is_some() { 0.0 } else { 1.001 * thin.max(2.0 * FLAT * longest) };
         Self { corners, edges, prism, thickness }
     }
 
-    /// Number of the longest edge.
+    /// Index of the longest edge.
     pub fn longest_edge(&self) -> usize {
         let length = |k: usize| self.edges[k].along.length_squared();
         (0..3).fold(0, |best, k| if length(k) > length(best) { k } else { best })
     }
 
-    /// The unit normal; `None` for a face that is taken for its edges.
+    /// The unit normal; `None` for a face that counts as its edges.
     pub fn normal(&self) -> Option<DVec3> {
         self.prism.map(|p| p.normal)
     }
 
-    /// How far `x` is on the face's side of each edge; `None` for a face that is taken for its edges.
+    /// In-plane distance of `x` from each edge, positive on the face's side; `None` for a face that
+    /// counts as its edges.
     pub fn sides(&self, x: DVec3) -> Option<[f64; 3]> {
         let prism = self.prism?;
         Some([0, 1, 2].map(|k| prism.inward[k].dot(x - self.corners[k])))
@@ -113,20 +116,21 @@ impl Face {
         Bound { distance: height.abs(), offset: height * prism.normal }
     }
 
-    /// At most the distance of `x`; `error` is the [`rounding`].
+    /// Lower bound of the distance from `x`. `error` is the [`rounding`] bound.
     pub fn low(&self, x: DVec3, error: f64) -> Bound {
         let bound = match (&self.prism, self.sides(x)) {
-            // Over the face, or so near to its border that rounding hides it. The plane is never farther than the face.
+            // Over the face, or so near to its border that rounding hides it. The plane is never
+            // farther than the face.
             (Some(prism), Some(side)) if side.iter().all(|&s| s >= -error) => self.height(x, prism),
             _ => self.nearest_edge(x),
         };
         Bound { distance: bound.distance - error - self.thickness, ..bound }
     }
 
-    /// At least the distance of `x`, with the way from a point of the face.
+    /// Upper bound of the distance from `x`. The vector comes from a point of the face.
     pub fn high(&self, x: DVec3, error: f64) -> Bound {
         let bound = match (&self.prism, self.sides(x)) {
-            // Surely over the face: its foot is a point of the face.
+            // Certainly over the face, so the foot of the perpendicular is a point of the face.
             (Some(prism), Some(side)) if side.iter().all(|&s| s >= error) => self.height(x, prism),
             _ => self.nearest_edge(x),
         };
@@ -156,7 +160,7 @@ pub enum Part<'a> {
 }
 
 impl Part<'_> {
-    /// At most the distance of `x`; `error` is the [`rounding`].
+    /// Lower bound of the distance from `x`. `error` is the [`rounding`] bound.
     pub fn low(&self, x: DVec3, error: f64) -> Bound {
         let offset = match self {
             Self::Vertex(v) => x - **v,
@@ -166,7 +170,7 @@ impl Part<'_> {
         Bound { distance: offset.length() - error, offset }
     }
 
-    /// The points whose convex hull it is.
+    /// The points whose convex hull is the part.
     pub fn corners(&self) -> &[DVec3] {
         match self {
             Self::Vertex(v) => std::slice::from_ref(v),
@@ -175,7 +179,7 @@ impl Part<'_> {
         }
     }
 
-    /// The unit normal of a face.
+    /// The unit normal of a face; `None` for other parts.
     pub fn normal(&self) -> Option<DVec3> {
         match self {
             Self::Face(f) => f.normal(),
@@ -192,7 +196,8 @@ mod tests {
     use crate::testing::degenerate::{beyond_a_tip, face_and_point};
     use crate::testing::exact::{is_between, squared_distance};
 
-    /// How far corners and points of the strategies are from each other and the origin.
+    /// Bound of the distances of the strategies' corners and points from each other and from the
+    /// origin.
     const REACH: f64 = 8.0;
 
     fn bounds_hold(corners: [DVec3; 3], p: DVec3, thin: f64) -> Result<(), TestCaseError> {
@@ -201,7 +206,7 @@ mod tests {
         let exact = squared_distance(p, corners);
         let (low, high) = (face.low(p, error), face.high(p, error));
         prop_assert!(is_between(low.distance, &exact, high.distance), "{low:?} {high:?} {face:?}");
-        // The way of the upper bound comes from a point of the face.
+        // The vector of the upper bound comes from a point of the face.
         let on_face = squared_distance(p - high.offset, corners);
         prop_assert!(is_between(0.0, &on_face, error), "{high:?} {face:?}");
         for (k, edge) in face.edges.iter().enumerate() {

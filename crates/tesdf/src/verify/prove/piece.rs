@@ -1,4 +1,4 @@
-//! A piece of a cell, and how it is cut in two.
+//! A piece of a cell, and cutting it in two.
 use glam::DVec3;
 
 use super::exact::{U, difference};
@@ -10,18 +10,18 @@ const EDGES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 
 /// A tetrahedron.
 #[derive(Clone, Copy, Debug)]
 pub struct Piece {
-    /// Corners, relative to the middle of the cell.
+    /// Corners, relative to the centroid of the cell.
     pub corners: [DVec3; 4],
-    /// By how much the pieces may miss points of the cell, as cuts are rounded.
+    /// Bound of how far the pieces may miss points of the cell, because cuts are rounded.
     pub drift: f64,
-    /// Number of cuts.
+    /// Number of cuts that led to this piece.
     pub depth: u32,
 }
 
-/// A cut: an edge, and the point of it that becomes the new corner.
+/// A cut: an edge and its point that becomes the new corner.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
-    /// The ends of the edge; each child has the new corner in place of one of them.
+    /// The ends of the edge. In each child, the new corner replaces one of them.
     pub edge: [usize; 2],
     /// The new corner.
     pub corner: DVec3,
@@ -34,7 +34,7 @@ impl Piece {
         Self { corners, drift: 0.0, depth: 0 }
     }
 
-    /// A point in the middle, and the radius of a ball around it that holds the piece.
+    /// Centre and radius of a ball that contains the piece.
     pub fn ball(&self) -> (DVec3, f64) {
         let [a, b, c, d] = self.corners;
         let center = 0.25 * ((a + b) + (c + d));
@@ -42,7 +42,7 @@ impl Piece {
         (center, radius * (1.0 + 8.0 * U))
     }
 
-    /// Half of the longest edge.
+    /// A cut at the middle of the longest edge.
     pub fn halved(&self) -> Cut {
         let [i, j] = self.longest();
         let (a, b) = (self.corners[i], self.corners[j]);
@@ -57,9 +57,10 @@ impl Piece {
         [longest.0, longest.1]
     }
 
-    /// Along the side of the prism over a face, unless no side clearly passes through the piece.
+    /// A cut along a side of the prism over a face; `None` when no side clearly passes through the
+    /// piece.
     ///
-    /// Where two faces of one plane meet over a piece, halving would never tell them apart.
+    /// When two coplanar faces meet over a piece, halving alone would never separate their regions.
     pub fn cut_by(&self, face: &Face) -> Option<Cut> {
         let sides = self.corners.map(|c| face.sides(c));
         let [i, j] = self.longest();
@@ -78,7 +79,7 @@ impl Piece {
         None
     }
 
-    /// The part on one side of a cut: `end` 0 or 1 of the edge is replaced.
+    /// The part on one side of a cut. `end`, 0 or 1, is the end of the edge that is replaced.
     pub fn child(&self, cut: &Cut, end: usize) -> Self {
         let mut child = Self { drift: self.drift + cut.drift, depth: self.depth + 1, ..*self };
         child.corners[cut.edge[end]] = cut.corner;
@@ -86,5 +87,6 @@ impl Piece {
     }
 }
 
-/// Share of the longest edge that a plane must leave on both sides to cut.
+/// A plane must leave at least this fraction of the longest edge on both sides to be used for a
+/// cut.
 const CLEAR: f64 = 1e-3;

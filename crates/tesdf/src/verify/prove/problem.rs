@@ -1,4 +1,5 @@
-//! What has to be shown in one cell: the list, and the faces, edges and vertices near it that the list does not hold.
+//! What must be proved in one cell: the list, and the nearby faces, edges and vertices that the
+//! list does not hold.
 use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
@@ -7,7 +8,7 @@ use super::exact::U;
 use super::parts::{Edge, Face, Part, rounding};
 use super::surface::Surface;
 
-/// A part of the surface, by its kind and place in a [`Problem`].
+/// A part of the surface, by its kind and index in a [`Problem`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Item {
     /// A vertex.
@@ -18,49 +19,50 @@ pub enum Item {
     Face(u32),
 }
 
-/// A face that the list does not name.
+/// A face that is not in the list.
 pub struct OpenFace {
-    /// Its place in the file.
+    /// Its index in the file.
     pub position: u32,
-    /// The face, relative to the middle of the cell.
+    /// The face, relative to the centroid of the cell.
     pub shape: Face,
-    /// Its edges; a vertex for an edge whose ends are one point.
+    /// Its edges. An edge whose ends are one point is a vertex.
     pub border: [Item; 3],
 }
 
-/// What has to be shown in one cell. All points are relative to its middle.
+/// What must be proved in one cell. All points are relative to its centroid.
 pub struct Problem {
     /// The faces of the list.
     pub list: Vec<Face>,
-    /// The faces near the cell that the list does not name.
+    /// The faces near the cell that are not in the list.
     pub faces: Vec<OpenFace>,
-    /// Their edges.
+    /// The edges of `faces`.
     pub edges: Vec<Edge>,
-    /// Ends of the edges: places in `vertices`.
+    /// Ends of the edges, as indices into `vertices`.
     pub ends: Vec<[u32; 2]>,
-    /// Their vertices.
+    /// The vertices of `faces`.
     pub vertices: Vec<DVec3>,
-    /// For each edge the faces around it.
+    /// For each edge, the faces around it.
     pub around_edge: Vec<Vec<Item>>,
-    /// For each vertex the edges and faces around it.
+    /// For each vertex, the edges and faces around it.
     pub around_vertex: Vec<Vec<Item>>,
-    /// Items that are a part of a face of the list.
+    /// Items that are part of a face of the list.
     pub held: Vec<Item>,
-    /// Bound on the error of a distance.
+    /// Bound of the error of a distance.
     pub error: f64,
-    /// By how much the list may be farther than a face.
+    /// Largest accepted difference between the distances of the list and of a face.
     pub delta: f64,
-    /// What a region may be missed by and still count as missed.
+    /// A point this far inside a region still counts as outside, at this cost.
     pub touch: f64,
-    /// Only points nearer to the surface than this matter.
+    /// Only points nearer to the surface than this are proved.
     pub within: f64,
 }
 
-/// Faces of which none comes this near to another point are told from their edges; as a share of `delta`.
+/// A face whose height is at most this fraction of `delta` counts as its edges.
 const THIN: f64 = 1.0 / 64.0;
 
 impl Problem {
-    /// Of a cell with this middle and `corners` relative to it. `near` are the faces that can be closest in it.
+    /// The problem of a cell. `corners` are relative to its centroid `middle`. `near` are the faces
+    /// that can be closest in it.
     pub fn new(
         surface: &Surface,
         middle: DVec3,
@@ -154,7 +156,7 @@ impl Problem {
         self.vertices.len() + self.edges.len() + self.faces.len()
     }
 
-    /// The place of an item among those of all kinds.
+    /// The index of an item among the items of all kinds.
     pub fn place(&self, item: Item) -> usize {
         match item {
             Item::Vertex(at) => at as usize,
@@ -173,14 +175,14 @@ impl Problem {
     }
 }
 
-/// Where the vertices and edges of the surface are in a problem.
+/// Indices, in a problem, of the vertices and edges of the surface.
 #[derive(Default)]
 struct Places {
     vertices: HashMap<u32, u32>,
     edges: HashMap<[u32; 2], u32>,
 }
 
-/// What the faces of a list hold.
+/// Faces, edges and vertices that the list holds.
 struct Held {
     faces: HashSet<[u32; 3]>,
     edges: HashSet<[u32; 2]>,

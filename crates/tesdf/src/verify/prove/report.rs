@@ -1,56 +1,60 @@
-//! What the proof found.
+//! The result of a proof.
 use glam::DVec3;
 use serde::Serialize;
 
 use crate::TeSdf;
 
-/// What a proof found, of every cell.
+/// The result of a proof over all cells.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ProveReport {
     /// Whether everything was proved.
     pub proved: bool,
-    /// What was proved: in every cell with a list, no face is closer than the list by more than this; mesh unit.
+    /// The bound that was proved: in every cell with a list, no face is closer than the list by
+    /// more than this. In the mesh's unit.
     pub delta: f64,
-    /// `delta` as a share of the mesh's diagonal.
+    /// `delta` as a fraction of the mesh's diagonal.
     pub delta_of_diagonal: f64,
-    /// Whether the certificate of the file promises as much. Where it promises nothing, `delta` is that of the certified encoder.
+    /// Whether the certificate of the file promises a bound. If not, `delta` is that of the
+    /// certified encoder.
     pub certified: bool,
-    /// Only points nearer to the surface than this were looked at, as lists were cut; mesh unit. `None`: all points.
+    /// Only points nearer to the surface than this are covered, because lists were truncated. In
+    /// the mesh's unit; `None`: all points.
     pub within: Option<f64>,
-    /// Distances: of cells with a list.
+    /// Claims on distances, one for each cell with a list.
     pub distances: Tally,
-    /// Signs: of all cells, and of the space that is not of the domain.
+    /// Claims on signs, one for each cell and one for the space outside the domain. In a conforming
+    /// domain, also one for each tetrahedron.
     pub signs: Tally,
-    /// The face tree, which answers where there is no list; 1 when nothing is wrong with it.
+    /// One claim: the face tree, which answers where there is no list, is right.
     pub face_tree: Tally,
-    /// Pieces that the cells were cut into.
+    /// Total number of pieces into which the cells were cut.
     pub pieces: u64,
-    /// The most pieces of one cell.
+    /// Largest number of pieces of one cell.
     pub most_pieces: u64,
-    /// What is not proved; the first [`FAULTS`](Self::FAULTS), in the order of the cells.
+    /// Claims that are not proved: the first [`FAULTS`](Self::FAULTS), in the order of the cells.
     pub faults: Vec<Fault>,
 }
 
 impl ProveReport {
-    /// Most faults that are listed.
+    /// Largest number of listed faults.
     pub const FAULTS: usize = 16;
 }
 
-/// How many claims of one kind were proved.
+/// Numbers of claims of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Tally {
-    /// All of them.
+    /// All claims.
     pub claims: usize,
-    /// Proved.
+    /// Proved claims.
     pub proved: usize,
-    /// Shown to be wrong.
+    /// Claims shown to be wrong.
     pub refuted: usize,
-    /// Neither.
+    /// Claims neither proved nor shown to be wrong.
     pub undecided: usize,
 }
 
 impl Tally {
-    /// Counts a claim; `fault` is what is wrong with it.
+    /// Counts a claim. `fault` is `None` when it is proved.
     pub(super) fn count(&mut self, fault: Option<&Fault>) {
         self.claims += 1;
         match fault.map(|f| f.verdict) {
@@ -70,19 +74,19 @@ impl Tally {
     }
 }
 
-/// What a [`Fault`] is about.
+/// The subject of a [`Fault`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Claim {
     /// The list of a cell.
     Distance,
-    /// The label of a cell, or the faces that its sign is counted over.
+    /// The label of a cell, or the faces over which its sign is counted.
     Sign,
     /// The face tree.
     FaceTree,
 }
 
-/// What became of a claim that is not proved.
+/// The outcome of a claim that is not proved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -95,21 +99,21 @@ pub enum Verdict {
 /// A claim that is not proved.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Fault {
-    /// What it is about.
+    /// The subject.
     pub claim: Claim,
-    /// What became of it.
+    /// The outcome.
     pub verdict: Verdict,
     /// The cell, by its [id](crate::asset::CellView::id).
     pub cell: Option<u32>,
-    /// Where, in the mesh's unit.
+    /// A point at the fault, in the mesh's unit.
     pub point: Option<[f64; 3]>,
-    /// The face that it is about, by its id in the source, 0-based.
+    /// The face concerned, by its id in the source, 0-based.
     pub face: Option<u32>,
-    /// Distance of the list from the point, for a wrong list; mesh unit.
+    /// For a wrong list, the distance of the list from the point, in the mesh's unit.
     pub list_distance: Option<f64>,
-    /// Distance of the face from the point, for a wrong list; mesh unit.
+    /// For a wrong list, the distance of the face from the point, in the mesh's unit.
     pub face_distance: Option<f64>,
-    /// What is wrong.
+    /// The reason, for people.
     pub reason: String,
 }
 
@@ -135,22 +139,22 @@ impl Fault {
         Self::new(claim, Verdict::Undecided, reason)
     }
 
-    /// In a cell.
+    /// Sets the cell.
     pub(super) fn cell(self, cell: u32) -> Self {
         Self { cell: Some(cell), ..self }
     }
 
-    /// At a point of the local frame.
+    /// Sets the point, given in the local frame.
     pub(super) fn at(self, asset: &TeSdf, point: DVec3) -> Self {
         Self { point: Some(asset.frame.to_world(point).to_array()), ..self }
     }
 
-    /// About a face, by its place in the file.
+    /// Sets the face, given by its index in the file.
     pub(super) fn face(self, asset: &TeSdf, face: u32) -> Self {
         Self { face: Some(asset.face_ids[face as usize]), ..self }
     }
 
-    /// With distances in the local frame.
+    /// Sets the distances, given in the local frame.
     pub(super) fn distances(self, asset: &TeSdf, list: f64, face: f64) -> Self {
         let unit = asset.frame.inverse_scale();
         Self { list_distance: Some(list * unit), face_distance: Some(face * unit), ..self }

@@ -1,4 +1,5 @@
-//! Signs in a conforming domain: the labels of its tetrahedra, and that nothing of the solid is outside of all of them.
+//! Signs in a conforming domain: the labels of its tetrahedra, and that no part of the solid is
+//! outside all of them.
 use std::collections::HashMap;
 
 use glam::DVec3;
@@ -10,9 +11,11 @@ use crate::asset::layout::{Label, Node, Side};
 use crate::domain::Cell;
 
 impl Signs<'_> {
-    /// What is wrong with the label of a tetrahedron of a conforming domain. `near` are the faces near it.
+    /// The fault in the label of a tetrahedron of a conforming domain; `None` when the label is
+    /// proved. `near` are the faces near it.
     ///
-    /// Faces are sides of tetrahedra, so none may meet the inside, exactly; then one winding number holds in all of it.
+    /// Faces are sides of tetrahedra, so no face may meet the interior; this is tested exactly.
+    /// Then the winding number is constant in the tetrahedron.
     pub fn root_fault(&self, root: usize, cell: &Cell, near: &[u32]) -> Option<Fault> {
         let centroid = cell.centroid();
         let winding = self.rays.at(centroid);
@@ -41,7 +44,7 @@ impl Signs<'_> {
         Some(fault.face(self.asset, *face))
     }
 
-    /// The one side of all cells of a tetrahedron.
+    /// The common side of all cells of a tetrahedron; `None` when they differ.
     fn side_of_leaves(&self, root: usize) -> Option<Side> {
         let mut stack = vec![root as u32];
         let mut side = None;
@@ -56,10 +59,12 @@ impl Signs<'_> {
         side
     }
 
-    /// What is wrong with the space outside of all tetrahedra, where every query says outside.
+    /// The fault in the space outside all tetrahedra, where every query answers outside; `None`
+    /// when it is proved.
     ///
-    /// The boundaries of the tetrahedra, each as often as the winding number in it, must add up to the surface. Then the winding
-    /// number at any point is that of the tetrahedra which hold the point, and 0 where none does.
+    /// The boundaries of the tetrahedra, each multiplied by the winding number in the tetrahedron,
+    /// must add up to the surface. Then the winding number of a point is that of the tetrahedron
+    /// that contains it, and 0 when there is none.
     pub fn outside_fault(&self, roots: &[Cell]) -> Option<Fault> {
         let mut sum: HashMap<[[u64; 3]; 3], i64> = HashMap::new();
         let mut add = |triangle: [DVec3; 3], times: i64| {
@@ -91,7 +96,8 @@ impl Signs<'_> {
     }
 }
 
-/// A triangle by its corners in an order of their own, and the sign of the permutation; `None` when two corners are one point.
+/// A triangle with its corners in a canonical order, and the sign of the permutation; `None` when
+/// two corners are equal.
 fn oriented(triangle: [DVec3; 3]) -> Option<([[u64; 3]; 3], i64)> {
     let mut key = triangle.map(|p| (p + 0.0).to_array().map(f64::to_bits));
     let mut sign = 1;

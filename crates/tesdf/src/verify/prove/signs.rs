@@ -1,4 +1,5 @@
-//! Whether the label of a cell is right all over the cell: the winding number at its centroid, and no face that passes through.
+//! Proves that the label of a cell is right everywhere in the cell: the winding number at its
+//! centroid agrees, and no face passes through.
 use glam::DVec3;
 
 use super::apart::{are_apart, common_point};
@@ -10,21 +11,23 @@ use crate::TeSdf;
 use crate::asset::layout::{Label, Node, Side};
 use crate::domain::Cell;
 
-/// What looks at the labels of the cells of a bisection domain.
+/// Checks the labels of the cells of a bisection domain.
 pub struct Signs<'a> {
     pub asset: &'a TeSdf,
     pub surface: &'a Surface,
     pub rays: Rays<'a>,
-    /// How near to a cell a face counts as passing through it: more than a point can miss its cell by.
+    /// A face this near to a cell counts as passing through it. It is more than the distance by
+    /// which a point can miss its cell.
     pub gap: f64,
 }
 
 impl Signs<'_> {
-    /// What is wrong with the sign of a cell. `near` are the faces near it, `list` is its list.
+    /// The fault in the sign of a cell; `None` when it is proved. `near` are the faces near the
+    /// cell, `list` is its list.
     pub fn fault(&self, word: u32, cell: &Cell, node: Node, list: &[u32], near: &[u32]) -> Option<Fault> {
         let fault = self.located(word, cell).or_else(|| self.label(cell, node));
         let fault = fault.or_else(|| {
-            // Where the surface passes, the sign is counted over the faces of the list.
+            // In a crossing cell, the sign is counted over the faces of the list.
             let counted: &[u32] =
                 if matches!(node, Node::Listed(Label::Crossing(_), _)) { list } else { &[] };
             self.passing(cell, near, counted)
@@ -32,7 +35,7 @@ impl Signs<'_> {
         fault.map(|f| f.cell(word))
     }
 
-    /// A query at the centroid must arrive at the cell.
+    /// A fault when a query at the centroid does not find the cell.
     pub fn located(&self, word: u32, cell: &Cell) -> Option<Fault> {
         let centroid = cell.centroid();
         let (_, found) = self.asset.place_and_word(centroid);
@@ -60,7 +63,7 @@ impl Signs<'_> {
         }
     }
 
-    /// A face that comes into the cell, besides the `counted` ones.
+    /// A fault when a face outside `counted` comes into the cell.
     fn passing(&self, cell: &Cell, near: &[u32], counted: &[u32]) -> Option<Fault> {
         let middle = cell.centroid();
         let corners = cell.corners.map(|c| c - middle);
@@ -96,7 +99,7 @@ impl Signs<'_> {
         None
     }
 
-    /// Outside of the cube everything counts as outside: no face may be there.
+    /// A fault when a vertex lies outside the cube, where every query answers outside.
     pub fn beyond_cube(&self) -> Option<Fault> {
         let (low, side) = (self.asset.cube.origin(), self.asset.cube.side());
         let is_beyond = |p: &DVec3| !(p.cmpge(low).all() && p.cmple(low + side).all());
@@ -106,7 +109,7 @@ impl Signs<'_> {
     }
 }
 
-/// The side that the label of a cell says; of one that the surface passes through, the outside.
+/// The side that the label of a cell says; `Outside` for a crossing cell.
 pub fn side_of(node: Node) -> Side {
     match node {
         Node::Listed(Label::Inside, _) | Node::Far(Side::Inside) => Side::Inside,

@@ -1,4 +1,5 @@
-//! The surface of an asset as the proof sees it: vertices told apart by where they are, and a ball around each face.
+//! The surface of an asset as the proof uses it: vertices identified by position, and a ball around
+//! each face.
 use std::collections::HashMap;
 
 use glam::DVec3;
@@ -8,20 +9,21 @@ use super::exact::difference;
 use super::parts::{Face, rounding};
 use crate::geometry::LocalFrame;
 
-/// Farther from the origin of the local frame no vertex and no cell may be: rounding is counted for such lengths.
+/// No vertex and no cell may be farther than this from the origin of the local frame: the rounding
+/// bounds assume it.
 pub const FARTHEST: f64 = 64.0;
 
-/// All faces, in the local frame and the order of the file.
+/// All faces, in the local frame and in the order of the file.
 pub struct Surface {
-    /// Positions, each once.
+    /// Distinct positions.
     pub points: Vec<DVec3>,
-    /// Corners of the faces: places in `points`.
+    /// Corners of the faces, as indices into `points`.
     pub faces: Vec<[u32; 3]>,
     /// The faces themselves.
     pub triangles: Vec<Face>,
-    /// A point of each face, and a radius around it that holds the face.
+    /// For each face, centre and radius of a ball that contains it, up to rounding.
     balls: Vec<(DVec3, f64)>,
-    /// Bound on the error of a distance between points that are [`FARTHEST`] from the origin.
+    /// Bound of the error of a distance between points that are up to [`FARTHEST`] from the origin.
     pub error: f64,
 }
 
@@ -29,7 +31,8 @@ impl Surface {
     /// The mesh of an asset.
     ///
     /// # Errors
-    /// When the way to the local frame rounds a vertex, or leads too far from its origin.
+    /// [`ProveError::Frame`] when mapping a vertex to the local frame rounds it, or the vertex lies
+    /// farther than [`FARTHEST`] from the origin.
     pub fn new(vertices: &[[f64; 3]], faces: &[[u32; 3]], frame: LocalFrame) -> Result<Self, ProveError> {
         let is_exact = |v: DVec3| (0..3).all(|k| difference(v[k], frame.offset[k]).1 == 0.0);
         let mut places = HashMap::new();
@@ -42,7 +45,7 @@ impl Surface {
             if !(is_exact(v) && back == v - frame.offset && p.abs().max_element() <= FARTHEST) {
                 return Err(ProveError::Frame { vertex });
             }
-            // -0 is 0.
+            // Turns -0 into 0.
             let bits = (p + 0.0).to_array().map(f64::to_bits);
             place_of.push(*places.entry(bits).or_insert_with(|| {
                 points.push(p + 0.0);
@@ -61,9 +64,9 @@ impl Surface {
         Ok(Self { points, faces, triangles, balls, error: rounding(4.0 * FARTHEST) })
     }
 
-    /// Keeps those of `faces` that can be closest to a point within `radius` of `center`.
+    /// The faces among `faces` that can be closest to a point within `radius` of `center`.
     ///
-    /// Of a face that is left out, every point of that ball is at least as far as from some face that is kept.
+    /// For every dropped face, some kept face is at least as near at every point of that ball.
     pub fn retain_near(&self, center: DVec3, radius: f64, faces: &[u32]) -> Vec<u32> {
         let ball = |face: u32| {
             let (middle, reach) = self.balls[face as usize];

@@ -1,4 +1,4 @@
-//! Goes through the forest of an asset, with the faces that can matter, and looks at every cell.
+//! Traverses the forest of an asset with the faces that can matter, and checks every cell.
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -11,7 +11,7 @@ use crate::TeSdf;
 use crate::asset::layout::Node;
 use crate::domain::Cell;
 
-/// What was found in some cells, in their order.
+/// Results for some cells, in their order.
 #[derive(Default)]
 pub struct Found {
     pub distances: Tally,
@@ -47,7 +47,7 @@ impl Found {
     }
 }
 
-/// The walk; lengths are in the local frame.
+/// The traversal. Lengths are in the local frame.
 pub struct Walk<'a, P> {
     pub asset: &'a TeSdf,
     pub signs: &'a Signs<'a>,
@@ -55,13 +55,13 @@ pub struct Walk<'a, P> {
     pub delta: f64,
     pub within: f64,
     pub progress: P,
-    /// Words of the forest that are done.
+    /// Number of finished words of the forest.
     pub done: AtomicUsize,
     pub cancelled: AtomicBool,
 }
 
 impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
-    /// Looks at a root and all below it; its lists can only need `faces`.
+    /// Checks a root and all cells below it. `faces` must contain all faces that can matter in it.
     pub fn root(&self, root: usize, faces: &[u32]) -> Found {
         let cell = self.asset.root(root);
         let near = self.near(&cell, faces);
@@ -80,7 +80,7 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
         self.signs.surface.retain_near(centroid, radius, faces)
     }
 
-    /// `near` are the faces near the cell.
+    /// Checks the cells below a word. `near` are the faces near the cell.
     fn below(&self, word: u32, cell: Cell, near: &[u32]) -> Found {
         if self.is_cancelled() {
             return Found::default();
@@ -126,13 +126,13 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
         found
     }
 
-    /// What is wrong with the list of a cell, and the number of pieces that it took to see.
+    /// The fault in the list of a cell, and the number of pieces of its search.
     fn distances(&self, word: u32, cell: &Cell, list: &[u32], near: &[u32]) -> (Option<Fault>, u64) {
         let middle = cell.centroid();
         let corners = cell.corners.map(|c| c - middle);
         let surface = self.signs.surface;
         let problem = Problem::new(surface, middle, &corners, list, near, self.delta, self.within);
-        // Asked inside of long searches, too.
+        // Long searches also ask for cancellation.
         let is_cancelled = || {
             if (self.progress)(self.done.load(Ordering::Relaxed) as f64 / self.asset.nodes.len() as f64)
                 .is_break()

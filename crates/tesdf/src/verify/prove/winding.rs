@@ -1,28 +1,30 @@
-//! Winding numbers by rays along the first axis, exact: with the point moved by infinitesimals, no ray meets an edge.
+//! Exact winding numbers by rays along the first axis. The point is moved by infinitesimals, so
+//! that no ray meets an edge.
 use glam::DVec3;
 use robust::{Coord, orient2d};
 
 use super::apart::orientation;
 
-/// The faces of a closed surface by where a ray along the first axis can meet them: a grid over the other two axes.
+/// The faces of a closed surface in a grid over the second and third axis, which finds the faces
+/// that a ray along the first axis can meet.
 pub struct Rays<'a> {
     triangles: &'a [[DVec3; 3]],
-    /// Least second and third coordinate, and cells per length.
+    /// Lowest second and third coordinate, and cells per unit length.
     origin: [f64; 2],
     scale: [f64; 2],
     side: usize,
-    /// Where the faces of each cell of the grid begin.
+    /// For each cell of the grid, the start of its faces in `faces`.
     starts: Vec<u32>,
     faces: Vec<u32>,
 }
 
-/// Most cells of the grid along one axis; a large face is in many of them.
-const MOST: usize = 1 << 7;
+/// Largest number of grid cells along one axis; a large face is in many cells.
+const MAX_CELLS: usize = 1 << 7;
 
 impl<'a> Rays<'a> {
     /// Sorts the faces into the grid.
     pub fn new(triangles: &'a [[DVec3; 3]]) -> Self {
-        let side = (triangles.len() as f64).sqrt().ceil().clamp(1.0, MOST as f64) as usize;
+        let side = (triangles.len() as f64).sqrt().ceil().clamp(1.0, MAX_CELLS as f64) as usize;
         let corners = || triangles.iter().flatten();
         let least = corners().fold(DVec3::INFINITY, |low, &p| low.min(p));
         let most = corners().fold(DVec3::NEG_INFINITY, |high, &p| high.max(p));
@@ -53,7 +55,8 @@ impl<'a> Rays<'a> {
         rays
     }
 
-    /// Rounding does not matter, as it never changes the order of two coordinates.
+    /// Cell index along an axis. Rounding does no harm, because it never changes the order of two
+    /// coordinates.
     fn column(&self, axis: usize, x: f64) -> usize {
         (((x - self.origin[axis]) * self.scale[axis]).max(0.0) as usize).min(self.side - 1)
     }
@@ -77,15 +80,18 @@ impl<'a> Rays<'a> {
     }
 }
 
-/// By how much the winding number falls where the ray from `p + (e, e², e³)` along the first axis passes through a face.
+/// The decrease of the winding number where the ray from `p + (e, e², e³)` along the first axis
+/// passes through a face.
 ///
-/// All decisions are signs of polynomials in `e`; each is that of the first coefficient which is not 0.
+/// All decisions are signs of polynomials in `e`. Each sign is that of the first nonzero
+/// coefficient.
 fn crossing(&[a, b, c]: &[DVec3; 3], p: DVec3) -> i32 {
     let facing = turn(a, b, c);
     if facing == 0 || [turn_at(a, b, p), turn_at(b, c, p), turn_at(c, a, p)] != [facing; 3] {
         return 0;
     }
-    // The first component of the normal has the sign of `facing`: a step forward leads in front of a face that looks forward.
+    // The first component of the normal has the sign of `facing`: a step forward leads in front of
+    // a face that faces forward.
     let behind = match orientation(a, b, c, p) {
         0 => -facing,
         sign => sign,
@@ -93,7 +99,7 @@ fn crossing(&[a, b, c]: &[DVec3; 3], p: DVec3) -> i32 {
     if behind == facing { facing } else { 0 }
 }
 
-/// Sign of the turn from `a` over `b` to `c` as seen against the first axis; exact.
+/// Exact sign of the turn from `a` over `b` to `c`, seen against the direction of the first axis.
 fn turn(a: DVec3, b: DVec3, c: DVec3) -> i32 {
     let coord = |p: DVec3| Coord { x: p.y, y: p.z };
     let value = orient2d(coord(a), coord(b), coord(c));
@@ -116,7 +122,8 @@ mod tests {
     use crate::geometry::WindingNumber;
     use crate::mesh::TriangleMesh;
 
-    /// Two boxes that overlap, on a lattice: rays along edges, through corners, in planes of faces.
+    /// Two overlapping boxes on a lattice. Rays run along edges, through corners and in the planes
+    /// of faces.
     #[test]
     fn agrees_with_the_other_way_on_a_lattice() {
         let mut vertices = Vec::new();
