@@ -1,4 +1,5 @@
-//! Batches into arrays give the answers of single queries, for any number of points, in and out of the domain.
+//! Batches into arrays give the answers of single queries, for any number of points, inside and
+//! outside the domain.
 mod support;
 
 use support::meshes::named;
@@ -35,7 +36,7 @@ impl Columns {
         }
     }
 
-    /// Bit by bit, so that NaN is equal to itself.
+    /// Compares bits, so that NaN equals itself.
     fn is(&self, row: usize, answer: &Answer) -> bool {
         let bits = |v: [f64; 3]| v.map(f64::to_bits);
         self.signed_distance[row].to_bits() == answer.signed_distance.to_bits()
@@ -56,7 +57,8 @@ fn columns_are_the_answers() {
     let asset = asset();
     let bounds = asset.bounds();
     let mut random = Random(1);
-    // More than two tasks of a batch, and not a multiple of what goes through the stages together.
+    // More than two tasks of a batch, and not a multiple of the number of points that pass the
+    // stages together.
     let mut points: Vec<DVec3> =
         (0..8195).map(|_| bounds.center() + 0.7 * random.in_cube() * bounds.extent()).collect();
     points[5].y = f64::NAN;
@@ -86,7 +88,7 @@ fn columns_are_the_answers() {
     );
 }
 
-/// Lengths that differ are an error that names the array, and no row is written.
+/// Arrays of a wrong length are an error that names the array, and no row is written.
 #[test]
 fn lengths_that_differ_are_an_error() {
     let asset = asset();

@@ -1,5 +1,5 @@
-//! The certificate on random meshes and random tetrahedra, against dense brute force: no point of a cell is farther from
-//! its list than from the mesh.
+//! Compares the certificate with dense brute force, on random meshes and random tetrahedra: at no
+//! point of a cell is its list farther than the mesh.
 mod support;
 
 use proptest::prelude::*;
@@ -24,7 +24,7 @@ fn options(preset: Preset, band: f64) -> EncodeOptions {
     EncodeOptions { band: Length::OfDiagonal(band), ..EncodeOptions::preset(preset) }
 }
 
-/// Encodes a member of a family, looks into its cells, and asks it for distances.
+/// Encodes a member of a family, checks its cells, and checks distances.
 fn check_member(family: Family, seed: u64, options: &EncodeOptions) -> Result<(), String> {
     let solid = family.member(seed);
     let asset =
@@ -88,16 +88,17 @@ proptest! {
     }
 }
 
-/// Triangles that share vertices as those of a surface do, but need not close, and lie anywhere about the cell.
+/// Random triangles around the cell. They share vertices like those of a surface, but need not be
+/// closed.
 #[derive(Clone, Copy, Debug)]
 enum Soup {
     General,
     /// Corners on a coarse lattice: ties, coplanar and degenerate triangles.
     Lattice,
-    /// Two sheets a few rounding errors to 1e-7 apart.
+    /// Two sheets at a distance from a few rounding errors to 1e-7.
     Sheets,
     Needles,
-    /// Tangent to a sphere about the cell: all about as near.
+    /// Tangent to a sphere around the cell, so all are about equally near.
     Around,
 }
 
@@ -126,7 +127,7 @@ fn soup(kind: Soup, random: &mut Random) -> TriangleMesh {
     if faces.is_empty() {
         faces.push([0, 1, 2]);
     }
-    // The local frame has diagonals of 0.5 to 1.
+    // Bodies in the local frame have a diagonal of 0.5 to 1.
     let extent = TriangleMesh::new(vertices.clone(), faces.clone()).expect("valid ids").diagonal();
     vertices.iter_mut().for_each(|v| *v *= 0.7 / extent.max(1e-3));
     TriangleMesh::new(vertices, faces).expect("valid ids")
@@ -187,7 +188,7 @@ proptest! {
     }
 }
 
-/// The checks can fail.
+/// Shows that the checks can fail.
 #[test]
 fn missing_faces_are_noticed() {
     let solid = Shape::default().add_sphere(DVec3::ZERO, 1, || 1.0).solid();

@@ -1,4 +1,5 @@
-//! Clearance against brute force over all pairs of faces, dense samples, and formulas.
+//! Compares clearance with brute force over all pairs of faces, with dense samples, and with
+//! formulas.
 mod support;
 
 use std::sync::Arc;
@@ -50,7 +51,7 @@ fn between(a: (Shape, Pose, f64), b: (Shape, Pose, f64)) -> Clearance {
     found
 }
 
-/// Both ways around; the search may be cut short.
+/// Measures both orders of the pair. The search may be cut short.
 fn measured(a: (Shape, Pose, f64), b: (Shape, Pose, f64)) -> Clearance {
     let (scene, [a, b]) = scene([a, b]);
     let options = ClearanceOptions::default();
@@ -91,7 +92,7 @@ fn apart_it_is_the_least_distance_of_all_pairs_of_faces() {
     let mut random = Random(7);
     for round in 0..24 {
         let (a, b) = (&assets[round % 4], &assets[random.index(4)]);
-        // All shapes about one unit wide.
+        // Both shapes are scaled to a width of about one unit.
         let size = |asset: &TeSdf| 2.0 / asset.bounds().extent().length();
         let (scale_a, scale_b) = (size(a) * random.between(0.3, 1.5), size(b) * random.between(0.3, 3.0));
         let far = [0.0, 0.05, 0.5, 20.0, 2000.0][round % 5];
@@ -117,13 +118,14 @@ fn apart_it_is_the_least_distance_of_all_pairs_of_faces() {
     }
 }
 
-/// Where a face of the source mesh is among the asset's.
+/// Index, among the asset's faces, of a face of the source mesh.
 fn position_of(asset: &TeSdf, face: u32) -> usize {
     let ids: Option<&[u32]> = asset.container().section("mesh.face_ids").expect("of this type");
     ids.expect("a section").iter().position(|id| *id == face).expect("a face")
 }
 
-/// The least value that a grid of points on the faces of one body finds in the field of the other, and the grid's greatest step.
+/// The least value of one body's field at a grid of points on the faces of the other body, and the
+/// grid's largest step.
 fn by_samples(surface: &[[DVec3; 3]], field: &TeSdf, pose: Pose, scale: f64) -> (f64, f64) {
     const N: usize = 24;
     let (mut least, mut step) = (f64::INFINITY, 0.0f64);
@@ -162,7 +164,7 @@ fn in_each_other_it_is_as_deep_as_dense_samples_find() {
         cut_short += u32::from(!found.converged);
         assert!(found.distance <= brute + 4e-8, "{round}: a deeper point: {found:?} {brute}");
         assert!(found.distance >= brute - step_a.max(step_b), "{round}: {found:?} {brute}");
-        // What is claimed is there: the surface's witness has this value in the field.
+        // The witness is real: the field has this value at the reported point of the surface.
         let (field, pose, scale, point) = match found.field {
             InstanceId(0) => (a, pose_a, scale_a, found.point_b),
             _ => (b, pose_b, scale_b, found.point_a),
@@ -171,7 +173,8 @@ fn in_each_other_it_is_as_deep_as_dense_samples_find() {
         assert!((value - found.distance).abs() < 1e-12, "{found:?} {value}");
         assert!((found.point_a.distance(found.point_b) + found.distance).abs() < 1e-12);
     }
-    // Deep in a bumpy body the certificate can fail; the depth found is still that of the samples.
+    // Deep in a bumpy body the search can be cut short. The depth found is still that of the
+    // samples.
     assert!(cut_short <= 4, "{cut_short} of 12 searches cut short");
 }
 
@@ -241,14 +244,14 @@ fn a_mesh_of_a_box_is_a_box() {
 #[test]
 fn one_inside_of_the_other_penetrates() {
     let (room, small) = (boxed(DVec3::ONE, 2), boxed(DVec3::splat(0.1), 2));
-    // The deepest of its points is at least 0.8 from every wall.
+    // The deepest point of the small box is 0.8 from the nearest wall.
     for found in [
         between(placed(room.clone(), Pose::IDENTITY, 1.0), placed(small.clone(), at(0.3, 0., 0.), 1.0)),
         between(placed(small, at(0.3, 0., 0.), 1.0), placed(room.clone(), Pose::IDENTITY, 1.0)),
     ] {
         assert!((found.distance + 0.8).abs() < 4e-8, "{found:?}");
     }
-    // One of two parts is inside, the other outside and nearer.
+    // One of two parts is inside; the other is outside and nearer to the surface.
     let two = Surface::default().add_box(DVec3::splat(-0.05), DVec3::splat(0.05), 1).add_box(
         DVec3::new(1.01, -0.1, -0.1),
         DVec3::new(1.3, 0.1, 0.1),
@@ -260,7 +263,7 @@ fn one_inside_of_the_other_penetrates() {
 
 #[test]
 fn between_two_walls_the_depth_is_found_to_the_tolerance() {
-    // The deepest points of the peg's sides in the plate are a whole line.
+    // The deepest points of the peg's sides in the plate form a line.
     let (plate, peg) = (boxed(DVec3::new(1.0, 1.0, 0.1), 4), boxed(DVec3::new(0.3, 0.05, 1.0), 2));
     let turn = DQuat::from_rotation_z(0.3);
     let found = between(
@@ -277,7 +280,7 @@ fn one_and_the_same_pose_is_touching() {
         let found = between(placed(asset.clone(), pose, 1.0), placed(asset, pose, 1.0));
         assert!(found.distance.abs() < 4e-8, "{found:?}");
     }
-    // Faces that share a plane.
+    // Coplanar faces.
     let cube = boxed(DVec3::ONE, 2);
     let found = between(placed(cube.clone(), Pose::IDENTITY, 1.0), placed(cube, at(0.5, 0.25, 2.0), 1.0));
     assert!(found.distance.abs() < 4e-8, "{found:?}");
@@ -287,16 +290,16 @@ fn one_and_the_same_pose_is_touching() {
 fn a_nut_on_its_bolt_has_its_gap() {
     let (bolt, nut) =
         (asset(&named("procedural/iso_m16_bolt_6k.obj")), asset(&named("procedural/iso_m16_nut_c100.obj")));
-    // Half a turn on: half a pitch.
+    // After half a turn, the nut is half a pitch further.
     let unit = bolt.bounds().extent().z / 40.0;
     let height = 5.0 * unit;
     let turn = DQuat::from_rotation_z(std::f64::consts::TAU * 5.0 / 2.0);
     let pose = Pose::new(DVec3::new(0.0, 0.0, height), turn).expect("a pose");
     let found = between(placed(bolt.clone(), Pose::IDENTITY, 1.0), placed(nut.clone(), pose, 1.0));
-    // The flanks are 50 micrometres apart; facets bring them a little nearer.
+    // The flanks are 50 micrometres apart. Flat facets bring them a little nearer.
     let gap = found.distance / unit;
     assert!((0.03..0.0525).contains(&gap), "{gap}: {found:?}");
-    // A push along the axis of 0.2 mm is more than the backlash.
+    // Moving the nut by 0.2 mm along the axis exceeds the backlash.
     let pushed = Pose { translation: pose.translation + DVec3::new(0.0, 0.0, 0.2 * unit), ..pose };
     let found = between(placed(bolt, Pose::IDENTITY, 1.0), placed(nut, pushed, 1.0));
     let depth = -found.distance / unit;
@@ -321,7 +324,7 @@ fn what_has_no_clearance_is_an_error() {
     assert_eq!(refused(&scene, a, c, options), CollideError::NoInstance(c));
 }
 
-/// Boxes of edge 1 with their lowest corners on the x axis.
+/// Boxes of edge 1. Their lowest corners are on the x axis.
 fn boxes(at: &[f64]) -> Arc<TeSdf> {
     let add = |shape: Surface, &x: &f64| shape.add_box(x * DVec3::X, x * DVec3::X + DVec3::ONE, 1);
     asset(&at.iter().fold(Surface::default(), add).solid())
@@ -338,7 +341,7 @@ fn surfaces_on_each_other_overlap_where_the_bodies_are_on_one_side() {
     let body = |corners: &[f64], x: f64| placed(boxes(corners), at(x), 1.0);
     for (a, b, expected) in [
         (&[0.0][..], &[0.0][..], true),
-        // One box of two is in one place with one of two others.
+        // One of two boxes coincides with one of the two other boxes.
         (&[0.0, 10.0], &[10.0, 20.0], true),
         (&[0.0, 10.0], &[11.0, 20.0], false),
         (&[0.0], &[1.0], false),

@@ -1,7 +1,7 @@
-//! [`Triangle::closest`] certified by convexity, on triangles that are nearly or wholly without area.
+//! Certifies [`Triangle::closest`] by convexity, on triangles with nearly or exactly no area.
 //!
-//! The closest point `c` of a triangle to `p` is told by `(p - c)·(v - c) ≤ 0` for its three corners `v`: no second way of
-//! computing it is needed, and none that shares its rounding.
+//! A point `c` of a triangle is closest to `p` when `(p - c)·(v - c) ≤ 0` for the three corners
+//! `v`. So the test needs no second implementation that could share rounding errors.
 mod support;
 
 use proptest::prelude::*;
@@ -10,14 +10,15 @@ use support::reference::exceeds;
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
-/// A triangle with corners on a line up to `width`, which may be no more than rounding, and a size of about 1.
+/// A triangle of size about 1 whose corners are on a line up to `width`, which may be as small as
+/// rounding.
 fn needle(random: &mut Random, width: f64) -> [DVec3; 3] {
     let along = if random.index(3) == 0 { DVec3::X } else { random.direction() };
     let at = random.in_cube();
     std::array::from_fn(|_| at + random.between(-1.0, 1.0) * along + width * random.in_cube())
 }
 
-/// Points of space, of the line of the needle and beside it, and of the plane through it.
+/// Points anywhere, near the line of the needle, and in the plane through it.
 fn beside(t: &Triangle, random: &mut Random) -> DVec3 {
     let [a, b, _] = t.corners;
     let on_line = a + random.between(-2.0, 3.0) * (b - a);
@@ -29,19 +30,19 @@ fn beside(t: &Triangle, random: &mut Random) -> DVec3 {
     }
 }
 
-/// Of a point and a segment.
+/// Distance between a point and a segment.
 fn to_edge(p: DVec3, a: DVec3, b: DVec3) -> f64 {
     let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
     if t.is_nan() { p.distance(a) } else { p.distance(a + t * (b - a)) }
 }
 
-/// At least the distance from the edges to the farthest point of the face.
+/// Upper bound of the distance from the edges to any point of the face.
 fn width([a, b, c]: &[DVec3; 3]) -> f64 {
     let segments = [(*a, *b, *c), (*b, *c, *a), (*c, *a, *b)];
     segments.into_iter().map(|(p, q, r)| to_edge(p, q, r)).fold(f64::INFINITY, f64::min)
 }
 
-/// Rounding that a distance may lose, for coordinates of about 1.
+/// Accepted rounding error of a distance, for coordinates of about 1.
 const SLACK: f64 = 2e-13;
 
 fn certify(t: &Triangle, p: DVec3) -> Result<(), String> {

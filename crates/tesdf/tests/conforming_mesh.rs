@@ -1,10 +1,11 @@
-//! The gate of conforming tetrahedral meshes: one mesh that passes, and for each check one that fails it and no earlier one.
+//! The checks of conforming tetrahedral meshes: one mesh that passes, and for each check a mesh
+//! that fails this check and no earlier check.
 use tesdf::asset::layout::Side;
 use tesdf::domain::{Classes, ConformingError, ConformingMesh, MissingFace, TetMesh};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 
-/// Corner `i` of the unit cube has x, y, z in bits 0, 1, 2.
+/// Corner `i` of the unit cube. Bits 0, 1, 2 of `i` are x, y, z.
 fn corner(i: u32) -> DVec3 {
     DVec3::new((i & 1).into(), (i >> 1 & 1).into(), (i >> 2).into())
 }
@@ -17,7 +18,7 @@ fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
     (b - a).cross(c - a).dot(d - a) / 6.0
 }
 
-/// The outer boundary of tetrahedra, outward.
+/// The outer boundary of the tetrahedra, oriented outward.
 fn surface(vertices: &[DVec3], tetrahedra: &[[u32; 4]]) -> TriangleMesh {
     let mut faces: Vec<[u32; 3]> = Vec::new();
     for &[a, b, c, d] in tetrahedra {
@@ -42,14 +43,16 @@ fn cube() -> SolidMesh {
     SolidMesh::new(surface(&cube_vertices(), &CUBE)).unwrap()
 }
 
-/// The cube with a shell of tetrahedra around it: each face is joined to its copy on the cube [-1, 2]^3 as a prism.
+/// The cube with a shell of tetrahedra around it. Each face is joined by a prism to its copy on the
+/// cube [-1, 2]^3.
 fn cube_in_a_box() -> (Vec<DVec3>, Vec<[u32; 4]>) {
     let inner = cube_vertices();
     let mut vertices = inner.clone();
     vertices.extend(inner.iter().map(|&p| 3.0 * p - 1.0));
     let mut tetrahedra = CUBE.to_vec();
     for &face in surface(&inner, &CUBE).faces() {
-        // Cut each prism by ascending ids: neighbours agree on the diagonal of the side that they share.
+        // Prisms are cut by ascending ids, so that neighbours agree on the diagonal of the side
+        // that they share.
         let [mut a, mut b, mut c] = face;
         if a > b {
             std::mem::swap(&mut a, &mut b)
@@ -86,7 +89,8 @@ fn a_cube_conforms() {
     }
 }
 
-/// Corners in negative order, vertices in another order, doubled and unused ones, -0 for 0.
+/// Negatively oriented corners, vertices in another order, duplicate and unused vertices, -0
+/// instead of 0.
 #[test]
 fn vertices_are_matched_by_position() {
     let solid = cube();
@@ -128,12 +132,13 @@ fn an_outer_region_is_outside() {
         ..Classes::default()
     };
     assert_eq!(mesh.classes(), expected);
-    // Part of an outer region is one, too.
+    // A part of an outer region is also an outer region.
     let part = conform(&cube(), vertices, tetrahedra[..20].to_vec()).unwrap();
     assert_eq!(part.sides(), &mesh.sides()[..20]);
 }
 
-/// A box inside of a box, both outward: the inner one has the winding number 2, and is inside all the same.
+/// A box inside a box, both oriented outward. The inner box has the winding number 2, so it is
+/// inside too.
 #[test]
 fn winding_numbers_above_one_are_inside() {
     let (vertices, tetrahedra) = cube_in_a_box();
@@ -144,7 +149,7 @@ fn winding_numbers_above_one_are_inside() {
     assert!(mesh.sides().iter().all(|&s| s == Side::Inside));
 }
 
-/// The same with the inner box inward: a cavity, which need not have tetrahedra but may.
+/// The same with the inner box oriented inward: a cavity. It may have tetrahedra, but need not.
 #[test]
 fn a_cavity_is_outside() {
     let (vertices, tetrahedra) = cube_in_a_box();
@@ -200,13 +205,13 @@ fn sharing() {
         "{error}"
     );
 
-    // A peak on the face 0 1 3, on the wrong side of it: within the cube.
+    // A tetrahedron on face 0 1 3, on its wrong side: inside the cube.
     vertices.push(DVec3::new(0.6, 0.3, 0.25));
     tetrahedra[6] = [0, 1, 3, 8];
     let error = conform(&cube(), vertices.clone(), tetrahedra.clone()).unwrap_err();
     assert!(matches!(error, ConformingError::SameSide { tetrahedra: [0, 6], .. }), "{error}");
 
-    // On a triangle that has two already.
+    // A tetrahedron on a triangle that already has two.
     tetrahedra[6] = [0, 1, 7, 8];
     let error = conform(&cube(), vertices, tetrahedra).unwrap_err();
     assert!(matches!(error, ConformingError::Overfull { users: 3, tetrahedra: [0, 1], .. }), "{error}");
@@ -214,7 +219,8 @@ fn sharing() {
 
 #[test]
 fn faces() {
-    // The cube with its centre of the side z = 0 as a further vertex: a fan to 7 and the diagonal's neighbours.
+    // The cube with the centre of its side z = 0 as an additional vertex. Four tetrahedra around it
+    // form a fan to vertex 7.
     let mut vertices = cube_vertices();
     vertices.push(DVec3::new(0.5, 0.5, 0.0));
     let mut tetrahedra = vec![[8, 1, 3, 7], [8, 0, 1, 7], [8, 3, 2, 7], [8, 2, 0, 7]];
@@ -231,7 +237,7 @@ fn faces() {
     };
     assert_eq!(error, expected);
 
-    // The other diagonal of the side z = 0: tetrahedra of five, mirrored, do not fit.
+    // Five tetrahedra, mirrored, use the other diagonal of the side z = 0, so they do not fit.
     let five = vec![[0, 3, 5, 6], [1, 0, 3, 5], [2, 0, 6, 3], [4, 0, 5, 6], [7, 3, 6, 5]];
     let error = conform(&cube(), cube_vertices(), five).unwrap_err();
     let recut = MissingFace::Recut;
@@ -240,7 +246,7 @@ fn faces() {
 
 #[test]
 fn a_face_without_area() {
-    // The edge from 0 to 1 opened into a slit with a face that is a line.
+    // The edge from 0 to 1 is opened into a slit, closed by a face without area.
     let mut vertices = cube_vertices();
     vertices.push(DVec3::new(0.5, 0.0, 0.0));
     let mut faces = surface(&cube_vertices(), &CUBE).faces().to_vec();
@@ -263,13 +269,13 @@ fn a_face_without_area() {
 
 #[test]
 fn labels() {
-    // A tetrahedron is missing inside: its sides within the cube are open, its faces are there no more.
+    // A solid cube made of tetrahedra around a vertex at its centre conforms.
     let mut vertices = cube_vertices();
     vertices.push(DVec3::splat(0.5));
     let shell: Vec<_> =
         surface(&cube_vertices(), &CUBE).faces().iter().map(|&[a, b, c]| [a, b, c, 8]).collect();
     assert!(conform(&cube(), vertices.clone(), shell.clone()).is_ok());
-    // A hole inside that touches no face: put a small cube around the centre, and leave it empty.
+    // An empty hole that touches no face of the surface: the small cube in the middle is left out.
     let (boxed, tetrahedra) = cube_in_a_box();
     let outside = surface(&boxed, &tetrahedra);
     let solid = SolidMesh::new(TriangleMesh::new(boxed.clone(), outside.faces().to_vec()).unwrap()).unwrap();
@@ -277,12 +283,13 @@ fn labels() {
     let error = conform(&solid, boxed.clone(), tetrahedra[6..].to_vec()).unwrap_err();
     assert!(matches!(error, ConformingError::InsideOpen { .. }), "{error}");
 
-    // Tetrahedra around the cube only, none in it.
+    // Tetrahedra only around the cube, none inside it.
     let error = conform(&cube(), boxed, tetrahedra[6..].to_vec()).unwrap_err();
     assert!(matches!(error, ConformingError::InsideEmpty { winding: 1, .. }), "{error}");
 }
 
-/// The larger of two outer tetrahedra that hang together lies in the cube, so the smaller one, on a face, is inside as well.
+/// Of two connected outer tetrahedra, the larger lies in the cube. So the smaller one, which lies
+/// on a face, is labelled inside too.
 #[test]
 fn labels_across_a_face() {
     let mut vertices = cube_vertices();
@@ -304,7 +311,8 @@ fn a_part_without_a_point_inside() {
     assert_eq!(error, ConformingError::NoSeed { tetrahedron: 6 });
 }
 
-/// Two tetrahedra that touch no face of the surface, and each other not either, but lie in the same place.
+/// Two tetrahedra that touch no face of the surface and do not share a face, but lie in the same
+/// place.
 #[test]
 fn overlap() {
     let far = |shift: f64| {
@@ -327,7 +335,7 @@ fn overlap() {
         matches!(error, ConformingError::Overlap { ref found, .. } if found.contains("tetrahedra 6 and 7")),
         "{error}"
     );
-    // One within the other.
+    // One contains the other.
     let [a, b, c, d] = far(0.0);
     let m = 0.25 * (a + b + c + d);
     let error = with(&[[a, b, c, d], [a, b, c, d].map(|p| m + 0.25 * (p - m))]).unwrap_err();
@@ -342,7 +350,7 @@ fn overlap() {
         matches!(error, ConformingError::Overlap { ref found, .. } if found.contains("meets itself")),
         "{error}"
     );
-    // One lies in the solid. It is no part of the inside, yet has its winding number.
+    // One lies in the solid. It is not connected to the inside, but has its winding number.
     let error = with(&[far(0.0).map(|p| 0.1 * (p - 5.0) + DVec3::new(0.5, 0.2, 0.1))]).unwrap_err();
     assert!(matches!(error, ConformingError::InsideOpen { tetrahedron: 6, .. }), "{error}");
 }

@@ -1,4 +1,5 @@
-//! The pairs of a face and a cell that detection looks at, against all pairs: none is missing, none is made up.
+//! Compares the (face, cell) pairs that detection examines with all pairs: none is missing, and
+//! none is invented.
 mod support;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,23 +15,25 @@ use tesdf::glam::DVec3;
 /// A face and a cell.
 type Pair = (u32, u32);
 
-/// Pairs closer to the threshold than this share of the diagonal may go either way: Exact's tolerance is 1e-7.
+/// Pairs closer to the threshold than this fraction of the diagonal may be decided either way; the
+/// tolerance of the exact mode is 1e-7.
 const BAND: f64 = 1e-6;
-/// Polygons of less area than this, of the squared diagonal, are points and lines up to rounding.
+/// Polygons with less area than this fraction of the squared diagonal are points and lines up to
+/// rounding.
 const DEGENERATE: f64 = 1e-12;
 
-/// What all pairs of a direction give.
+/// The pairs of one ordered pair of bodies, by brute force.
 #[derive(Default)]
 struct BruteForce {
-    /// The polygon is not empty, its area and the least signed distance found on it, in b's unit.
+    /// For each nonempty polygon: its area and the least signed distance found on it, in b's unit.
     pairs: BTreeMap<Pair, (f64, f64)>,
 }
 
 impl BruteForce {
-    /// Every `stride`-th face of `a` and every cell of `b`.
+    /// Every `stride`-th face of `a` with every cell of `b`.
     fn of(a: &Placed, b: &Placed, stride: usize, contact_distance: f64) -> Self {
         let mut cells = Vec::new();
-        // What a cell without a list holds is answered by the face tree, and names no cell.
+        // Cells without a list are answered by the face tree, and contacts there name no cell.
         b.body.asset.visit_cells(|cell| {
             if cell.kind.is_listed() {
                 cells.push((cell.id, cell.corners, Aabb::of(&cell.corners)));
@@ -65,7 +68,8 @@ impl BruteForce {
     }
 }
 
-/// Compares one direction; answers with how many pairs were needed, and how many were too close to call.
+/// Compares one ordered pair. Returns the number of required pairs and of pairs too close to
+/// decide.
 fn compare(a: usize, b: usize, bodies: &[Placed], stride: usize, contact_distance: f64) -> [usize; 2] {
     let all = BruteForce::of(&bodies[a], &bodies[b], stride, contact_distance);
     let options = CollideOptions { contact_distance, ..CollideOptions::default() };
@@ -103,7 +107,7 @@ fn compare(a: usize, b: usize, bodies: &[Placed], stride: usize, contact_distanc
             assert!(!reported.contains_key(pair), "{pair:?} is {beyond} beyond the contact distance");
         }
     }
-    // Rounding may leave a point or a line in a cell that only touches it.
+    // When a face only touches a cell, rounding may leave a point or a line in it.
     let (faces, mut corners) = (&bodies[a], BTreeMap::new());
     bodies[b].body.asset.visit_cells(|cell| {
         if cell.kind.is_listed() {
@@ -125,7 +129,7 @@ fn compare(a: usize, b: usize, bodies: &[Placed], stride: usize, contact_distanc
     [needed, unclear]
 }
 
-/// Needed pairs, and those too close to call, over both directions.
+/// Required pairs and pairs too close to decide, over both orders.
 fn compare_both(bodies: &[Placed], stride: usize, contact_distance: f64) -> [usize; 2] {
     let forth = compare(0, 1, bodies, stride, contact_distance);
     let back = compare(1, 0, bodies, stride, contact_distance);
@@ -137,7 +141,7 @@ fn hold(names: [&str; 2], relations: &[Relation], stride: usize, share_unclear: 
     let (mut needed, mut unclear) = (0, 0);
     for relation in relations {
         let bodies = relation.place(names, &mut random);
-        // Zero, within the band of 0.05, and of small bodies beyond it.
+        // Contact distances: zero, within the band of 0.05, and, for small bodies, beyond it.
         for &wide in &[0.0, 0.02, 0.08][..if stride == 1 { 3 } else { 2 }] {
             let [n, u] = compare_both(&bodies, stride, wide * bodies[0].diagonal());
             (needed, unclear) = (needed + n, unclear + u);

@@ -1,4 +1,5 @@
-//! The exact mode against dense samples of each face, and against a branch and bound that shares none of its code.
+//! Compares the exact mode with dense samples of each face, and with a branch and bound that shares
+//! no code with it.
 mod support;
 
 use std::collections::BTreeMap;
@@ -16,12 +17,13 @@ use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;
 
-/// No sample of a face may be deeper than what is reported by more than this share of the diagonal.
+/// A sample of a face may be deeper than the reported contact by at most this fraction of the
+/// diagonal.
 const DEEPER: f64 = 1e-6;
-/// The default tolerance of the exact mode, and rounding.
+/// The default tolerance of the exact mode, plus rounding.
 const TOLERANCE: f64 = 1.001e-7;
 
-/// The least distance of each face of a direction.
+/// The least distance of each face of an ordered pair.
 fn least_by_face(found: &Contacts, a: u32, b: u32) -> BTreeMap<u32, f64> {
     let mut least = BTreeMap::new();
     for c in of_direction(&found.contacts, a, b) {
@@ -31,7 +33,8 @@ fn least_by_face(found: &Contacts, a: u32, b: u32) -> BTreeMap<u32, f64> {
     least
 }
 
-/// Compares the faces (in the world) with what was reported; `diagonal` is of the field's body. Returns how many faces touch.
+/// Compares the reported contacts with the faces (in the world). `diagonal` is that of the field's
+/// body. Returns the number of faces that touch.
 fn compare(
     least: &BTreeMap<u32, f64>,
     faces: &[(u32, [DVec3; 3])],
@@ -71,7 +74,7 @@ fn faces(body: &Placed, stride: usize) -> Vec<(u32, [DVec3; 3])> {
     all.step_by(stride).map(|f| (f, body.body.face(f, body.at))).collect()
 }
 
-/// Both directions, in the mode `exact`; how many faces touch.
+/// Compares both orders in the mode `exact`. Returns the number of faces that touch.
 fn hold(bodies: &[Placed; 2], stride: [usize; 2], contact_distance: f64) -> usize {
     let options = CollideOptions { contact_distance, ..CollideOptions::default() };
     let found = detect(&scene(bodies), &options).expect("a good scene");
@@ -87,7 +90,7 @@ fn hold(bodies: &[Placed; 2], stride: [usize; 2], contact_distance: f64) -> usiz
     touching
 }
 
-/// A nut on a bolt, off its place by `aside`.
+/// A nut on a bolt, displaced by `aside`.
 fn bolt_and_nut(random: &mut Random, aside: f64) -> [Placed; 2] {
     let bolt = Placed::around("iso_m16_bolt_6k", rotation(random), 1.0, DVec3::ZERO);
     let moved = Pose {
@@ -101,7 +104,7 @@ fn bolt_and_nut(random: &mut Random, aside: f64) -> [Placed; 2] {
 fn no_sample_of_bolt_and_nut_is_deeper() {
     let mut random = Random(1);
     let mut touching = 0;
-    // In metres; the clearance is 25 µm.
+    // In metres. The clearance is 25 µm.
     for (aside, contact_distance) in [(0.0, 1e-4), (3e-4, 2e-5)] {
         touching += hold(&bolt_and_nut(&mut random, aside), [97, 89], contact_distance);
     }
@@ -157,7 +160,7 @@ fn within_the_tolerance_of_certified_bounds() {
     assert!(certain > 100 && open < certain / 10, "{certain} faces certified, {open} left open");
 }
 
-/// A box's signed distance, by its formula.
+/// Signed distance of a box, by its formula.
 fn box_distance(p: DVec3, half: DVec3) -> f64 {
     let q = p.abs() - half;
     q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
@@ -183,7 +186,7 @@ fn boxes_against_meshes() {
         let found = detect(&scene, &options).expect("a good scene");
         let of_mesh = faces(&mesh, mesh.body.solid.mesh().faces().len().div_ceil(150));
         let of_box = shapes::Shape::default().add_box(-half, half, 1).mesh();
-        // The box numbers its triangles in its own way: all of them together.
+        // The box shape numbers its triangles in its own way, so all of them are compared together.
         let whole: Vec<(u32, [DVec3; 3])> =
             (0..12).map(|f| (0, of_box.triangle(f).map(|p| pose.to_world(p)))).collect();
         let diagonal = 2.0 * half.length();
@@ -196,7 +199,7 @@ fn boxes_against_meshes() {
             .map(|(_, t)| sampled(t, 12, 1e-8, |p| mesh.distance_by_tree(p)))
             .min_by(|x, y| x.0.total_cmp(&y.0))
             .expect("twelve triangles");
-        // That the reported one is a point of the box is tested elsewhere.
+        // Another test checks that the reported point is a point of the box.
         assert!(of_field < lowest + DEEPER * mesh.diagonal(), "{name}: {of_field} {lowest}");
     }
     assert!(touching > 30, "{touching} faces touch");
@@ -204,7 +207,8 @@ fn boxes_against_meshes() {
 
 #[test]
 fn a_box_on_a_floor_of_other_triangles() {
-    // The lower side of the box lies in the floor, whose triangles it straddles: all distances are 0.
+    // The lower side of the box lies in the floor and extends over several of its triangles. All
+    // distances are 0.
     let floor = Body::new(
         shapes::Shape::default().add_box(DVec3::new(-1.0, -1.0, -0.5), DVec3::new(1.0, 1.0, 0.0), 7).solid(),
     );

@@ -1,4 +1,4 @@
-//! Overlaps that no contact shows are told, and nothing else is.
+//! Overlaps without a contact are reported as hidden, and no other pair is.
 mod support;
 
 use std::sync::{Arc, LazyLock};
@@ -17,7 +17,7 @@ const NODE: Mode = Mode::Node;
 const MODES: [Mode; 3] = [NODE, Mode::FACE, Mode::EXACT];
 const IDS: [InstanceId; 2] = [InstanceId(0), InstanceId(1)];
 
-/// The box from 0 to `size`, as a mesh.
+/// A mesh of the box from 0 to `size`.
 fn block(size: DVec3) -> Arc<Body> {
     Arc::new(Body::new(shapes::Shape::default().add_box(DVec3::ZERO, size, 1).solid()))
 }
@@ -40,7 +40,7 @@ fn found(scene: &Scene, mode: Mode) -> Contacts {
         .expect("good")
 }
 
-/// The depth of the hidden overlap of the first two instances.
+/// Depth of the hidden overlap of the first two instances; `None` when no overlap is reported.
 fn hidden(scene: &Scene, mode: Mode) -> Option<f64> {
     let hidden = found(scene, mode).hidden;
     assert!(hidden.len() <= 1 && hidden.iter().all(|h| [h.instance_a, h.instance_b] == IDS), "{hidden:?}");
@@ -70,7 +70,8 @@ fn equal_cubes_that_pass_through_each_other_along_an_edge() {
                 for scene in [bodies(cube(), cube(), at(step.x, step.y, step.z)), simple(step)] {
                     assert!(deepest(&found(&scene, NODE)) < 1e-9, "no node is inside, by {step}");
                     let told = hidden(&scene, NODE).unwrap_or_else(|| panic!("nothing hidden by {step}"));
-                    // Or a ball inside of both, whose radius may be greater.
+                    // Alternatively, the reported depth is the radius of a ball inside both bodies,
+                    // which may be greater.
                     assert!((0.74 * depth..=0.5).contains(&told), "{told} instead of {depth}");
                     assert!(deepest(&found(&scene, Mode::FACE)) > 0.9 * depth);
                     assert_eq!(hidden(&scene, Mode::FACE).filter(|_| depth > 0.2), None, "faces show it");
@@ -95,7 +96,7 @@ fn bodies_in_one_place_overlap_in_every_mode() {
 #[test]
 fn bars_that_cross_like_a_plus_sign() {
     let along = |x: f64, y: f64| block(DVec3::new(x, y, 1.0));
-    // Flush, as no node then lies on the other bar, and one inside of the other.
+    // Flush bars, or one bar thinner than the other: no node lies inside the other bar.
     for (height, thickness) in [(1.0, 1.0), (1.0, 0.5), (0.3, 1.0)] {
         let tall = block(DVec3::new(1.0, 5.0, height));
         let scene = bodies(along(5.0, thickness), tall, at(2.0, -2.0, 0.5 * (1.0 - height)));
@@ -128,7 +129,8 @@ fn bodies_that_touch_or_are_apart_have_no_hidden_overlap() {
     let small = Placement { scale: 0.1, ..at(1.0, 0.3, 0.3) };
     for mode in MODES {
         for to in [
-            // A face, half of it, an edge, a corner; a little apart, and a little in.
+            // Contact in a face, half a face, an edge and a corner; then slightly apart, and
+            // slightly overlapping.
             at(1.0, 0.0, 0.0),
             at(0.5, 1.0, 0.0),
             at(1.0, 1.0, 0.5),
@@ -142,7 +144,7 @@ fn bodies_that_touch_or_are_apart_have_no_hidden_overlap() {
         ] {
             assert_eq!(hidden(&bodies(cube(), cube(), to), mode), None, "{mode:?} {to:?}");
         }
-        // A plate as thin as a thousandth, on another, turned.
+        // A plate with a thickness of a thousandth, on another plate, rotated.
         let plate = block(DVec3::new(1.0, 1.0, 1e-3));
         let to = Placement {
             pose: Pose { translation: DVec3::new(0.5, 0.0, 1e-3), rotation: turned },
@@ -154,7 +156,7 @@ fn bodies_that_touch_or_are_apart_have_no_hidden_overlap() {
 
 #[test]
 fn nodes_that_show_an_overlap_hide_none() {
-    // A corner and an edge in a face, a small cube inside of a large one.
+    // A corner in a face, an edge in a face, and a small cube inside a large cube.
     let corner = Placement {
         pose: Pose {
             translation: DVec3::new(0.5, 0.5, 0.8),
@@ -179,7 +181,7 @@ fn thickness(scene: &Scene) -> f64 {
     IDS.into_iter().filter_map(of).fold(f64::INFINITY, f64::min)
 }
 
-/// What is told is true, and what is deep is told.
+/// Reported overlaps are real, and deep overlaps are reported.
 fn as_exact(placed: &[Placed], same_place: bool) -> (usize, usize) {
     let scene = scene(placed);
     let found = found(&scene, NODE);
@@ -191,7 +193,7 @@ fn as_exact(placed: &[Placed], same_place: bool) -> (usize, usize) {
         Some(h) => {
             assert!(h.depth > 2.0 * shown && h.depth > 0.05 * thickness, "{h:?}, shown {shown}");
             assert!(h.depth <= (depth + 1e-5 * size).max(thickness), "{h:?} of {depth}");
-            // In one place surfaces are nowhere inside of each other.
+            // For equal bodies in the same pose, no surface is inside the other body.
             assert!(depth > 0.0 || same_place, "they do not overlap");
         }
         None => {
@@ -211,7 +213,8 @@ fn hidden_overlaps_are_those_of_the_exact_clearance() {
         let relation = RELATIONS[k % RELATIONS.len()];
         let pair = [random.index(names.len()), random.index(names.len())].map(|i| names[i]);
         let mut placed = relation.place(pair, &mut random);
-        // Half of them far into each other, where relations may only make bodies touch; half of those boxes, whose nodes show least.
+        // In half of the cases the bodies are moved far into each other, because a relation may
+        // only make them touch. In half of these, the bodies are boxes, whose nodes show the least.
         if k % 2 == 0 {
             if k % 4 == 0 {
                 let mut bar = || block(DVec3::from_array([0, 1, 2].map(|_| random.between(0.2, 2.0))));

@@ -1,6 +1,7 @@
-//! Meshes of `data/`, lying to each other in every way: no contact is lost, and each is what it says.
+//! Meshes of `data/` in all relative placements: no contact is lost, and each contact is sound.
 //!
-//! `TESDF_TEST_FACES=6600 cargo test --release -p tesdf --test contacts_none_lost` is the long run, with larger meshes.
+//! `TESDF_TEST_FACES=6600 cargo test --release -p tesdf --test contacts_none_lost` is the long run,
+//! with larger meshes.
 mod support;
 
 use std::collections::BTreeMap;
@@ -18,19 +19,20 @@ use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;
 
-/// Meshes of more faces are part of the long run.
+/// Meshes with more faces are part of the long run only.
 const FACES: usize = 1_200;
-/// The default tolerance of 1e-7 is tested by `contacts_exact`; here it would take minutes.
+/// `contacts_exact` tests the default tolerance of 1e-7, which would take minutes here.
 const COARSE: f64 = 1e-4;
 const EXACT: Mode = Mode::Face(FaceMethod::Exact { tolerance: Length::OfDiagonal(COARSE) });
-/// What 16 iterations may miss: large faces in large cells, where the field is least convex.
+/// Accepted shortfall of 16 Frank–Wolfe iterations. The worst cases are large faces in large cells,
+/// where the field is least convex.
 const FRANK_WOLFE: f64 = 5e-2;
-/// Faces of each direction that are sampled.
+/// Number of sampled faces per ordered pair.
 const SAMPLED: usize = 30;
-/// Coordinates in the world are rounded; of their size.
+/// Rounding of world coordinates, relative to their size.
 const ROUNDING: f64 = 1e-13;
 
-/// Bodies of sizes that no other body has.
+/// Bodies whose size differs from that of all other bodies.
 const EXTREME: [&str; 2] = ["huge_1e30_obj", "tiny_1e-30_obj"];
 
 fn names() -> Vec<String> {
@@ -42,18 +44,18 @@ fn names() -> Vec<String> {
     rows.filter(|r| r.faces <= most && !meshes::CRACKED.contains(&r.name.as_str())).map(|r| r.name).collect()
 }
 
-/// A scene for each mesh, with another mesh, so that all relations and all meshes take part.
+/// For each mesh a scene with a second mesh. All relations and all meshes occur.
 fn cases() -> Vec<(Relation, [Placed; 2])> {
     let names = names();
     assert!(names.len() > 20, "only {} meshes", names.len());
     let mut random = Random(7);
-    // Encoded side by side.
+    // Encodes in parallel.
     names.par_iter().for_each(|name| drop(body(name)));
     let pair = |k: usize| {
         let relation = RELATIONS[k % RELATIONS.len()];
         let (first, second) = (&names[k % names.len()], &names[random.index(names.len())]);
-        // The very same pose means most for the same mesh.
-        // Nor has a body a place at one that is 1e12 times as large.
+        // The relation `Same` is meaningful only for the same mesh. A body of extreme size has no
+        // useful placement with one 1e12 times as large.
         let is_alone = |name: &String| EXTREME.contains(&name.as_str());
         let alone = relation == Relation::Same || is_alone(first) || is_alone(second);
         let second = if alone { first } else { second };
@@ -62,7 +64,7 @@ fn cases() -> Vec<(Relation, [Placed; 2])> {
     (0..names.len()).map(pair).collect()
 }
 
-/// Largest coordinate on the way from the bodies to the world.
+/// Largest absolute coordinate that occurs between the bodies and the world.
 fn size(bodies: &[Placed]) -> f64 {
     let of = |b: &Placed| {
         let bounds = b.at.bounds(b.body.solid.mesh().bounds());
@@ -80,7 +82,7 @@ fn is_small(bodies: &[Placed]) -> bool {
 fn wide(k: usize, relation: Relation, bodies: &[Placed]) -> f64 {
     let small = is_small(bodies);
     let share = match (k % 3, relation) {
-        // Beyond the band of 0.05, which the face tree answers.
+        // Beyond the band of 0.05, where the face tree answers.
         (_, Relation::Far) if small => 150.0,
         (_, Relation::Apart) if small => 2.0,
         (1, Relation::Apart) => 0.07,
@@ -90,7 +92,7 @@ fn wide(k: usize, relation: Relation, bodies: &[Placed]) -> f64 {
     share * bodies[0].diagonal()
 }
 
-/// What every contact promises.
+/// Checks the guarantees of a contact.
 fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
     let (a, b) = (&bodies[c.instance_a.0 as usize], &bodies[c.instance_b.0 as usize]);
     let diagonal = a.diagonal().max(b.diagonal());
@@ -108,7 +110,8 @@ fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
     let on_b = Triangle::new(b.body.face(c.face_b, b.at));
     assert!(on_b.closest(c.point_b).distance < rounding, "{}", what());
     if c.distance.abs() > 1e-6 * diagonal + 1e6 * rounding {
-        // The gradient, and that of the query unless another point is as near.
+        // The normal is the gradient. It equals the gradient of the query, unless another point is
+        // equally near.
         assert!(c.normal.distance(between / c.distance) < 1e-5, "{}", what());
         let same = (b.at.to_world(answer.closest_point) - c.point_b).length() < 1e-6 * diagonal;
         let gradient = b.at.pose.rotation * answer.gradient;
@@ -124,7 +127,7 @@ fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
     }
 }
 
-/// Sorted by pair, direction, face and cell; no face has two contacts in one cell.
+/// Contacts are sorted by pair, order, face and cell, and a face has at most one contact per cell.
 fn is_sorted(contacts: &[Contact]) {
     let key = |c: &Contact| {
         let (a, b) = (c.instance_a, c.instance_b);
@@ -146,7 +149,7 @@ fn least(contacts: &[Contact], a: u32, b: u32) -> BTreeMap<u32, f64> {
     least
 }
 
-/// Vertices of `a` against the field of `b`.
+/// All vertices of `a` within reach of the field of `b` have contacts.
 fn has_all_nodes(found: &Contacts, bodies: &[Placed], a: usize, b: usize, contact_distance: f64) {
     let nodes = least(&found.contacts, a as u32, b as u32);
     let (from, to) = (&bodies[a], &bodies[b]);
@@ -167,7 +170,8 @@ fn has_all_nodes(found: &Contacts, bodies: &[Placed], a: usize, b: usize, contac
     }
 }
 
-/// Samples of some faces of `a`, and all of its vertices, in the field of `b`: none is deeper. `shallow` is what the method may miss.
+/// Samples of some faces of `a`, and all its vertices, are not deeper in the field of `b` than the
+/// contacts. `shallow` is the accepted shortfall of the method.
 fn has_the_deepest(
     found: &Contacts,
     bodies: &[Placed],
@@ -192,7 +196,7 @@ fn has_the_deepest(
     }
 }
 
-/// The contacts with the instances named the other way around.
+/// The contacts with the two instances exchanged.
 fn renamed(contacts: &[Contact]) -> Vec<Contact> {
     let other = |id: InstanceId| InstanceId(1 - id.0);
     let mut all: Vec<Contact> = contacts
@@ -203,7 +207,8 @@ fn renamed(contacts: &[Contact]) -> Vec<Contact> {
     all
 }
 
-/// Faces with their least distances are the same but for rounding, and for those at the threshold.
+/// Both results have the same faces with the same least distances, up to rounding. Faces at the
+/// threshold may differ.
 fn same_but_rounding(one: &Contacts, other: &Contacts, bodies: &[Placed], contact_distance: f64, error: f64) {
     for (a, b) in [(0, 1), (1, 0)] {
         let band = error * bodies[b as usize].diagonal() + 1e-12 * size(bodies);
@@ -235,9 +240,9 @@ fn no_contact_is_lost() {
                 rotation: rotation(&mut random),
             };
             let moved = [bodies[0].moved(motion), bodies[1].moved(motion)];
-            // What the modes may be off by: Exact's tolerance twice, and nothing for nodes.
+            // Accepted differences: twice the tolerance in the exact mode, rounding for nodes.
             for (mode, error) in [(Mode::Node, 1e-12), (EXACT, 2.1 * COARSE), (Mode::FACE, f64::INFINITY)] {
-                // Surfaces that lie in each other take the exact mode its limit of evaluations.
+                // When surfaces coincide, the exact mode reaches its limit of evaluations.
                 let is_flat = matches!(relation, Relation::Same | Relation::SharedFaces);
                 if mode == EXACT && is_flat && !is_small(bodies) {
                     continue;
@@ -270,7 +275,8 @@ fn no_contact_is_lost() {
         .collect();
     for relation in RELATIONS {
         let found: usize = counts.iter().filter(|c| c.0 == relation).map(|c| c.1).sum();
-        // Far, only small bodies meet, by a wide contact distance.
+        // In the relation `Far`, only small bodies have contacts, because of a wide contact
+        // distance.
         assert!(found > 0 || relation == Relation::Far, "{relation:?}: no contact at all");
     }
 }
@@ -305,7 +311,7 @@ fn the_same_bytes_on_any_number_of_threads() {
 
 type Bits = ([u64; 10], [u32; 4], Option<u32>, FeatureId, bool);
 
-/// Every bit of a contact; equal numbers may differ in them.
+/// All bits of the contacts. Equal numbers, such as 0 and -0, may differ in their bits.
 fn bits(contacts: &[Contact]) -> Vec<Bits> {
     let all = |c: &Contact| {
         let [p, q, n]: [DVec3; 3] = [c.point_a, c.point_b, c.normal];

@@ -41,7 +41,7 @@ fn message(bytes: &[u8]) -> String {
     open(bytes).unwrap_err().to_string()
 }
 
-/// The sample with its header's JSON edited and the length field and padding made to fit.
+/// The sample with an edited JSON header; the length field and the padding are adjusted.
 fn edited(from: &str, to: &str) -> Vec<u8> {
     let bytes = sample();
     let end = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
@@ -261,7 +261,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None,
         rng_seed: prop::test_runner::RngSeed::Fixed(7), ..ProptestConfig::default() })]
 
-    /// Replaces, removes and inserts bytes, mostly in the header, and asks for every answer there is.
+    /// Replaces, removes and inserts bytes, mostly in the header, and calls every accessor.
     #[test]
     fn mutated_bytes_never_panic(
         edits in prop::collection::vec((any::<prop::sample::Index>(), 0..4_u8, any::<u8>()), 1..12),

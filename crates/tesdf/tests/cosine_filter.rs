@@ -1,4 +1,5 @@
-//! Eq. (10) on the paper's Fig. 5: two faces in the field of a rectangle, three gradients, one of which is of use.
+//! Eq. (10) on the paper's Fig. 5: two faces in the field of a rectangle, with three gradients,
+//! only one of which is useful.
 mod support;
 
 use support::bodies::Body;
@@ -7,16 +8,17 @@ use tesdf::collide::{CollideOptions, Contact, Instance, InstanceId, Mode, Pose, 
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
-/// The rectangle, 4 × 1, deep along y.
+/// The rectangle, 4 × 1, extruded along y.
 fn rectangle() -> Shape {
     Shape::default().add_box(DVec3::new(0.0, -2.0, 0.0), DVec3::new(4.0, 2.0, 1.0), 4)
 }
 
-/// The probing body: its lower side is deeper than the middle of the rectangle (n¹ points down), then climbs out of it (n²).
-/// Corners in the plane, the face from one to the next on the outside.
+/// The probing body. Its lower side is below the middle of the rectangle (n¹ points down); the next
+/// side rises out of the rectangle (n²). Corners are in the plane, and each side runs from one
+/// corner to the next.
 const PROBE: [[f64; 2]; 5] = [[1.0, 0.35], [2.0, 0.35], [3.2, 1.15], [3.2, 1.6], [1.0, 1.6]];
 
-/// A prism over a convex polygon in x and z, counter-clockwise.
+/// A prism over a convex polygon in x and z, given counter-clockwise.
 fn prism(polygon: &[[f64; 2]], half_depth: f64) -> Shape {
     let n = polygon.len() as u32;
     let at = |y: f64| polygon.iter().map(move |&[x, z]| DVec3::new(x, y, z));
@@ -29,7 +31,7 @@ fn prism(polygon: &[[f64; 2]], half_depth: f64) -> Shape {
             faces.extend([[0, i + 1, i], [n, n + i, n + i + 1]]);
         }
     }
-    // Seen from −y, x to the right and z up turn clockwise: turn the faces over.
+    // Seen from −y, with x to the right and z up, the faces turn clockwise, so they are reversed.
     let outward = faces.into_iter().map(|[a, b, c]| [a, c, b]).collect();
     Shape { vertices, faces: outward }
 }
@@ -50,7 +52,7 @@ impl Figure {
         Self { scene, probe }
     }
 
-    /// Contacts of the probe's faces with a normal, and how many were dropped in all.
+    /// Contacts of the probe's faces, and the number of contacts that were dropped in total.
     fn contacts(&self, mode: Mode, cos_theta: Option<f64>) -> (Vec<Contact>, usize) {
         let options = CollideOptions { cos_theta, ..CollideOptions::with_mode(mode) };
         let found = detect(&self.scene, &options).expect("a good scene");
@@ -62,7 +64,7 @@ impl Figure {
         Triangle::new(self.probe.solid.mesh().triangle(face as usize)).normal
     }
 
-    /// Those of the faces with a normal.
+    /// The contacts of the faces with this normal.
     fn of_normal<'a>(&self, contacts: &'a [Contact], normal: DVec3) -> Vec<&'a Contact> {
         contacts.iter().filter(|c| self.normal(c.face_a).distance(normal) < 1e-9).collect()
     }
@@ -77,10 +79,10 @@ fn gradients_that_face_away_are_dropped() {
         let (all, filtered) = figure.contacts(mode, None);
         assert_eq!(filtered, 0);
         let points = |c: &Contact, way: f64| c.normal.z * way > 0.999;
-        // ∇φ¹: the nearest side is the lower one, though the way out is up.
+        // ∇φ¹: the nearest side is the lower one, although the way out is up.
         let first = figure.of_normal(&all, n1);
         assert!(!first.is_empty() && first.iter().all(|c| points(c, -1.0)), "{mode:?} {first:?}");
-        // ∇φ² and ∇φ³: the second face has both, cell by cell.
+        // ∇φ² and ∇φ³: the second face has both, in different cells.
         let second = figure.of_normal(&all, n2);
         assert!(second.iter().any(|c| points(c, -1.0)), "{mode:?}");
         assert!(second.iter().any(|c| points(c, 1.0)), "{mode:?}");
@@ -92,7 +94,7 @@ fn gradients_that_face_away_are_dropped() {
         assert!(!second_kept.is_empty(), "{mode:?}: ∇φ³ is gone");
         assert!(second_kept.iter().all(|c| points(c, 1.0)), "{mode:?}: ∇φ² stays");
         assert!(filtered > 0);
-        // Exactly Eq. (10), and what stays is as it was.
+        // The kept contacts satisfy Eq. (10) exactly and are unchanged.
         let by_hand: Vec<Contact> =
             all.iter().filter(|c| c.normal.dot(figure.normal(c.face_a)) <= -cos).copied().collect();
         assert_eq!(kept, by_hand, "{mode:?}");
@@ -103,7 +105,7 @@ fn gradients_that_face_away_are_dropped() {
 fn the_extremes_keep_all_and_the_opposite_only() {
     let figure = Figure::new();
     let (all, _) = figure.contacts(Mode::EXACT, None);
-    // ∇φ · n > 1 is never true; rounding of two unit vectors aside.
+    // ∇φ · n > 1 is never true, except for the rounding of two unit vectors.
     let (kept, filtered) = figure.contacts(Mode::EXACT, Some(-1.0));
     assert!(all.len() - kept.len() == 0 || filtered > 0 && all.len() - kept.len() < all.len() / 4);
     let (strict, _) = figure.contacts(Mode::EXACT, Some(1.0 - 1e-9));

@@ -1,4 +1,4 @@
-//! Moved vertices: distances, stale cells and contacts against the moved mesh itself.
+//! Moved vertices: distances, stale cells and contacts, compared with the moved mesh itself.
 mod support;
 
 use std::collections::BTreeMap;
@@ -54,7 +54,7 @@ fn lists_hold_again_after_re_encoding() {
         let moved = asset.move_vertices(&moves(&domain, bend)).expect("moderate");
         assert!(moved.inverted.is_empty());
         let before = verified(&asset);
-        // Nothing is promised now, but the sides.
+        // Only signs are promised now.
         assert!(before.passed && asset.about().certificate().delta().is_none(), "{before:#?}");
         errors.push(before.precisions[1].largest_error_beyond.expect("no promise"));
 
@@ -122,7 +122,7 @@ fn only_what_moved_is_looked_at() {
     assert!(reencoded.checked < reencoded.cells * 2 / 3, "{} of {}", reencoded.checked, reencoded.cells);
     assert!(reencoded.stale.len() * 8 < reencoded.cells, "{} of {}", reencoded.stale.len(), reencoded.cells);
     assert!(verified(&asset).passed);
-    // And back: in steps it is the same as at once.
+    // Moving back in steps gives the same result as encoding the original.
     let back: Vec<_> =
         moves(&domain, dent).iter().map(|&(id, _)| (id, domain.vertices()[id as usize])).collect();
     asset.move_vertices(&back).expect("moderate");
@@ -178,7 +178,7 @@ fn bad_moves_change_nothing() {
     assert_eq!(bisected.move_vertices(&[]), Err(DeformError::NotConforming));
 }
 
-/// The least distance of each face that has contacts, by direction.
+/// The least distance of each face with contacts, by instance.
 fn lowest(scene: &Scene, options: &CollideOptions) -> BTreeMap<(u32, u32), f64> {
     let mut lowest = BTreeMap::new();
     for c in detect(scene, options).expect("a good scene").contacts {
@@ -236,7 +236,7 @@ fn contacts_of_a_conforming_domain_are_those_of_the_bisection_domain() {
                 }
             }
         }
-        // The scene deforms its beam, and back come the contacts of the mesh as it is then.
+        // When the scene deforms its beam, the contacts are those of the deformed mesh.
         let (mut scene, beam) = scene_of(encoded(&solid, &domain, &self::options()));
         let mesh = scene.mesh_mut(beam).expect("a mesh");
         mesh.move_vertices(&moves(&domain, bend)).expect("moderate");
@@ -249,7 +249,8 @@ fn contacts_of_a_conforming_domain_are_those_of_the_bisection_domain() {
 
 #[test]
 fn nothing_is_lost_where_lists_are_cut() {
-    // A ball sunk into a block: deep inside the lists overestimate distances, and no ball may be ruled out by them.
+    // A ball inside a block: deep inside, truncated lists overestimate distances, so no bounding
+    // ball may be ruled out by them.
     let block = Shape::default().add_box(DVec3::splat(-2.0), DVec3::splat(2.0), 6).solid();
     let ball = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid();
     let encoded = |solid: &SolidMesh, max_entries| {

@@ -1,4 +1,5 @@
-//! Faces that are points or segments, exactly or once rounded, in otherwise sound meshes: through encoding, queries and contacts.
+//! Faces that are points or segments, exactly or after rounding, in otherwise valid meshes:
+//! encoding, queries and contacts.
 mod support;
 
 use std::ops::ControlFlow;
@@ -35,7 +36,7 @@ const CUBE: [[u32; 3]; 12] = [
     [3, 7, 5],
 ];
 
-/// The cube from −1 to 1; vertex k has its x, y, z from the bits of k.
+/// The cube from −1 to 1. The bits of vertex k are its x, y, z.
 fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let corner = |k: u32| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64) * 2.0 - 1.0;
     ((0..8).map(corner).collect(), CUBE.to_vec())
@@ -47,7 +48,7 @@ fn encoded(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> Arc<TeSdf> {
     Arc::new(encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes"))
 }
 
-/// Distances, signs and gradients are as promised, in both precisions.
+/// Checks distances, signs and gradients against their promises, in both precisions.
 fn assert_right(asset: &TeSdf) {
     let options = VerifyOptions { samples: 4000, seed: 3 };
     let report = verify(asset, &options, |_| ControlFlow::Continue(())).expect("a valid mesh");
@@ -60,7 +61,7 @@ fn assert_right(asset: &TeSdf) {
     });
 }
 
-/// A unit box that dips by 0.1 into the top of a body of the given height.
+/// Depths by mode of a box that dips by 0.1 into the top of a body with the given height.
 fn depths(asset: &Arc<TeSdf>, top: f64) -> Vec<f64> {
     let mut scene = Scene::new();
     let body = scene.add_shape(asset.clone()).expect("room");
@@ -95,7 +96,7 @@ fn a_face_of_one_vertex() {
 
 #[test]
 fn a_facet_of_zeros() {
-    // As exporters write at the end of a binary STL: a point away from the surface.
+    // Some exporters write such a facet at the end of a binary STL: a point away from the surface.
     let (mut vertices, mut faces) = cube();
     vertices.iter_mut().for_each(|v| *v += DVec3::splat(3.0));
     vertices.push(DVec3::ZERO);
@@ -106,10 +107,10 @@ fn a_facet_of_zeros() {
     assert!((asset.signed_distance(at, Precision::F64) - at.length()).abs() < 1e-12);
 }
 
-/// A corner of the cube is cut off, by a triangle of the given size.
+/// The cube with one corner cut off by a triangle of the given size.
 fn chamfered(size: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let (mut vertices, faces) = cube();
-    // Vertex 7 becomes three vertices, one along each edge; each face there takes its two neighbours.
+    // Vertex 7 becomes three vertices, one along each edge. Each face there uses two of them.
     let along = |axis: usize| vertices[7] - size * DVec3::AXES[axis];
     let cut = [along(0), along(1), along(2)];
     vertices[7] = cut[0];
@@ -118,7 +119,7 @@ fn chamfered(size: f64) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     // The sides x = −1, y = −1, z = −1 stay.
     let is_low = |f: &[u32; 3]| (0..3).any(|axis| f.iter().all(|v| v >> axis & 1 == 0));
     let mut all: Vec<[u32; 3]> = faces.into_iter().filter(is_low).collect();
-    // Sides x = 1, y = 1, z = 1: squares of which one corner is missing, as pentagons.
+    // The sides x = 1, y = 1, z = 1 are squares with one corner cut off, so they are pentagons.
     let sides: [[u32; 5]; 3] = [[1, 3, id[2], id[1], 5], [2, 6, id[0], id[2], 3], [4, 5, id[1], id[0], 6]];
     for [a, b, c, d, e] in sides {
         all.extend([[a, b, c], [a, c, d], [a, d, e]]);
@@ -183,7 +184,8 @@ fn vertices_far_away_and_thin_plates() {
     }
 }
 
-/// Face 7 is 5e-60 high: a segment, once rounded. Seen from a point that is nearest to that segment, its normal used to count.
+/// Face 7 has a height of 5e-60, so it is a segment after rounding. Its normal used to decide the
+/// sign of points nearest to that segment.
 #[test]
 fn a_segment_between_two_faces_tells_no_side() {
     let mut vertices: Vec<DVec3> =
@@ -217,7 +219,8 @@ fn clearance_sees_no_planes_of_points() {
     }
 }
 
-/// A member of a family with some edges shrunk to nothing or nearly so, and some faces of one vertex: closed all the same.
+/// A member of a family with some edges shrunk to zero or nearly zero, and with some faces that use
+/// one vertex three times. It stays closed.
 fn degenerate(family: Family, seed: u64) -> SolidMesh {
     let solid = family.member(seed);
     let mut random = Random(seed);
@@ -245,7 +248,8 @@ fn degenerate(family: Family, seed: u64) -> SolidMesh {
     }
 }
 
-/// The deepest contact of each mode against the depths of the vertices, and every contact's distance against all faces.
+/// Compares the deepest contact of each mode with the depths of the vertices, and the distance of
+/// every contact with all faces.
 fn check_contacts(asset: &Arc<TeSdf>, solid: &SolidMesh, shift: DVec3) -> Result<(), TestCaseError> {
     let reference = Reference::new(solid.mesh());
     let mut scene = Scene::new();

@@ -1,5 +1,5 @@
-//! What `encode` promises besides distances: the same bytes on any number of threads, a prompt end when cancelled, options
-//! that are checked and used.
+//! Guarantees of `encode` besides distances: the same bytes for any number of threads, a prompt end
+//! after cancellation, and options that are checked and used.
 mod support;
 
 use std::time::{Duration, Instant};
@@ -55,7 +55,7 @@ fn a_cancelled_encode_stops_soon() {
         (encoder.join().expect("no panic"), asked.elapsed())
     });
     assert!(matches!(result, Err(EncodeError::Cancelled)), "{result:?}");
-    // A cell takes microseconds; the bound allows for a machine that does much else.
+    // A cell takes microseconds. The bound allows for a machine under load.
     assert!(late < Duration::from_secs(2), "{late:?} after it was asked");
 
     let before = EncodeProgress::default();
@@ -124,7 +124,7 @@ fn every_option_is_used() {
     assert_eq!(encode_on(1, &solid, &named).about().options, named);
 }
 
-/// A region of no extent, and one far away, are domain too.
+/// A region without extent and a region far away belong to the domain too.
 #[test]
 fn odd_regions() {
     let solid = ball();

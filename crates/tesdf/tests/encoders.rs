@@ -1,4 +1,4 @@
-//! Both encoders in both domains, truncated and for deformation, against brute force.
+//! Compares both encoders with brute force, in both domains, truncated and for deformation.
 mod support;
 
 use std::collections::BTreeSet;
@@ -30,7 +30,7 @@ fn verified(asset: &TeSdf) -> VerifyReport {
         .expect("a valid mesh")
 }
 
-/// An L of 4 by 3 cubes, two thick, in a grid with an outer layer.
+/// An L of 4 by 3 cubes, two cubes thick, in a grid with an outer layer.
 fn block() -> (SolidMesh, ConformingMesh) {
     let l =
         |x, y, z| (1..5).contains(&x) && (1..3).contains(&z) && ((1..3).contains(&y) || (x < 3 && y == 3));
@@ -56,7 +56,7 @@ fn a_conforming_domain_is_exact_plain_or_bisected() {
         assert_eq!(plain, refinement == Refinement::None);
         assert_eq!((statistics.far_cells, statistics.outside_cells, statistics.crossing_cells), (0, 0, 0));
         assert_eq!(asset.classes(), Some(conforming.classes()));
-        // All of the grid is the domain, and nothing else.
+        // The domain is exactly the grid.
         assert!((statistics.domain_volume - 216.0).abs() < 20.0);
         assert!(asset.query_in_domain(DVec3::splat(-1.0), Precision::F64).is_none());
         assert!(asset.query_in_domain(DVec3::splat(3.3), Precision::F64).is_some());
@@ -101,7 +101,7 @@ fn sampling_with_a_threshold_as_wide_as_the_grid_misses_nothing() {
     }
 }
 
-/// Names one face a cell, whatever is asked.
+/// Returns one face for each cell, whatever is asked.
 struct OneFace;
 
 impl Sampler for OneFace {
@@ -150,7 +150,8 @@ fn the_papers_sampling_misses_faces_where_the_grid_is_coarse() {
         let report = verified(&asset);
         assert!(report.passed && asset.about().certificate().delta().is_none(), "nothing is promised");
         misses.push(report.precisions[1].largest_error_beyond.expect("nothing is promised"));
-        // A sample is a point of the cell: what is closest there is in the certified list, or as close as what is.
+        // A sample is a point of the cell. The face closest to it is in the certified list, or as
+        // close as a face of that list.
         assert!(asset.about().statistics.entries <= certified.about().statistics.entries * 12 / 10);
     }
     assert!(misses[0] > 1e-3 && misses[2] < 0.2 * misses[0], "{misses:?}");

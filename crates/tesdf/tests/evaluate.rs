@@ -1,4 +1,4 @@
-//! Bands and largest errors against a direct loop over all points of the grid and all faces.
+//! Compares bands and largest errors with a direct loop over all points of the grid and all faces.
 mod support;
 
 use support::tetrahedra::grid;
@@ -25,7 +25,7 @@ fn encoded(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf 
     encode_in(solid, domain, &Source::default(), options, &EncodeProgress::default()).unwrap()
 }
 
-/// An L of cubes, each of six tetrahedra, with a layer around it.
+/// An L of cubes with six tetrahedra each, and a layer around it.
 fn block() -> (SolidMesh, ConformingMesh) {
     let l =
         |x, y, z| (1..5).contains(&x) && (1..3).contains(&z) && ((1..3).contains(&y) || (x < 3 && y == 3));
@@ -34,7 +34,7 @@ fn block() -> (SolidMesh, ConformingMesh) {
     (solid, conforming)
 }
 
-/// Distance from the surface and error at each point of the domain, by all faces.
+/// Distance from the surface and error at each point of the domain, from all faces.
 fn direct(solid: &SolidMesh, asset: &TeSdf, grid: &Grid) -> Vec<(f64, f64)> {
     let mesh = solid.mesh();
     let triangles: Vec<Triangle> = (0..mesh.faces().len()).map(|f| Triangle::new(mesh.triangle(f))).collect();
@@ -94,7 +94,7 @@ fn full_lists_have_no_error_and_truncated_ones_that_of_a_direct_loop() {
     // The certificate's distance is a lower bound of the band's width.
     let promised = cut.about().certificate().exactness_distance().unwrap();
     assert!(reports[1].exactness_width >= promised, "{promised} {:?}", reports[1]);
-    // One by one as together.
+    // One asset alone gives the same report as several together.
     assert_eq!(evaluate(&[&cut], &options, |_| {}).unwrap(), reports[1..]);
 }
 
@@ -115,7 +115,7 @@ fn a_sampled_encoder_in_a_conforming_domain_misses_what_a_direct_loop_finds() {
     assert_eq!((reports[1].cells_inexact, reports[1].exactness_band), (0, Some(1.0)));
     assert!(reports[2].exactness_band < Some(1.0), "{:?}", reports[2]);
     assert_eq!(reports[0].points_by_tree, 0);
-    // On one thread the same.
+    // One thread gives the same reports.
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert_eq!(one.install(|| evaluate(&all, &options, |_| {})).unwrap(), reports);
 }

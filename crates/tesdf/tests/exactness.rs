@@ -1,7 +1,7 @@
-//! Every mesh of `data/`, encoded, against brute force and against the reference distances.
+//! Compares every encoded mesh of `data/` with brute force and with the reference distances.
 //!
-//! `TESDF_TEST_POINTS=100000 TESDF_TEST_PRESET=default cargo test --release -p tesdf --test exactness -- --nocapture` is the
-//! long run, with a table of the largest errors.
+//! `TESDF_TEST_POINTS=100000 TESDF_TEST_PRESET=default cargo test --release -p tesdf --test
+//! exactness -- --nocapture` is the long run, with a table of the largest errors.
 mod support;
 
 use std::fmt::Write as _;
@@ -21,14 +21,14 @@ use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::query::{Answer, Precision};
 
-/// Points per mesh, unless `TESDF_TEST_POINTS` says otherwise.
+/// Points per mesh, unless `TESDF_TEST_POINTS` is set.
 const POINTS: usize = 1800;
-/// Of those, the ones that are compared with all faces without a tree.
+/// Number of these points that are compared with all faces without a tree.
 const BRUTE: usize = 54;
-/// Meshes that are encoded with the default preset in any case.
+/// Meshes that are always encoded with the default preset.
 const DEFAULT_PRESET: [&str; 3] = ["iso_m16_bolt_6k", "iso_m16_nut_c50", "lobed_hole_c100"];
 
-/// Meshes of more faces take minutes to encode: they are part of the long run.
+/// Meshes with at least this many faces take minutes to encode and are part of the long run only.
 const LARGE: usize = 100_000;
 
 struct Sample {
@@ -39,7 +39,7 @@ struct Sample {
     cells: Cells,
 }
 
-/// All meshes, encoded once for all tests; `Err` names what went wrong.
+/// All meshes, encoded once for all tests. `Err` names the fault.
 static SAMPLES: LazyLock<Vec<Result<Sample, String>>> = LazyLock::new(|| {
     let mut rows = meshes::manifest();
     rows.retain(|r| !meshes::CRACKED.contains(&r.name.as_str()));
@@ -64,8 +64,8 @@ impl Sample {
     }
 }
 
-/// `TESDF_TEST_PRESET` of all meshes; without it a mixture that takes minutes: a few with the default preset, large ones with
-/// coarser cells than any preset makes.
+/// The preset `TESDF_TEST_PRESET` for all meshes. Without it, a mixture that takes minutes: a few
+/// meshes with the default preset, large meshes with coarser cells than any preset makes.
 fn options(row: &Row) -> EncodeOptions {
     let fast = EncodeOptions::preset(Preset::Fast);
     match std::env::var("TESDF_TEST_PRESET").as_deref() {
@@ -79,7 +79,7 @@ fn options(row: &Row) -> EncodeOptions {
     }
 }
 
-/// Runs `check` on every mesh and reports all that fail together.
+/// Runs `check` on every mesh and reports all failures together.
 fn on_all(check: impl Fn(&Sample) -> Result<(), String> + Sync) {
     assert!(SAMPLES.len() > 60, "{} meshes in the manifest", SAMPLES.len());
     let failed = Mutex::new(Vec::new());
@@ -96,7 +96,7 @@ fn on_all(check: impl Fn(&Sample) -> Result<(), String> + Sync) {
     assert!(failed.is_empty(), "{} meshes fail:\n{}", failed.len(), failed.join("\n"));
 }
 
-/// Keeps the first few of many mistakes.
+/// Counts mistakes and keeps the first few.
 #[derive(Default)]
 struct Mistakes {
     count: usize,
@@ -143,7 +143,7 @@ fn distances_equal_brute_force() {
                 let local = s.reference.frame.to_local(p);
                 let [low, high] = s.reference.certified_bounds(local).map(|d| d / s.reference.frame.scale);
                 let slack = s.reference.tolerance_f64(p);
-                // Near the surface `p - c` cancels: the bound loses in proportion.
+                // Near the surface, `p - c` cancels, so the bound becomes weaker in proportion.
                 let weak = slack + 4e-16 * s.reference.diagonal.powi(2) / exact.abs().max(1e-300);
                 let weak = weak.min(slack + 1e-7 * s.reference.diagonal);
                 if exact.abs() < low - slack || exact.abs() > high + slack || low < exact.abs() - weak {
@@ -240,7 +240,8 @@ fn answers_are_consistent() {
     });
 }
 
-/// The closest point is on the face named and as far as the distance says; the gradient is a unit vector, and right.
+/// The closest point is on the named face and at the reported distance. The gradient is a right
+/// unit vector.
 fn check_answer(s: &Sample, p: DVec3, answer: Answer, precision: Precision) -> Result<(), String> {
     let r = &s.reference;
     let tolerance = tolerance(r, p, precision);
@@ -259,11 +260,12 @@ fn check_answer(s: &Sample, p: DVec3, answer: Answer, precision: Precision) -> R
     check_gradient(r, p, answer, precision)
 }
 
-/// Largest angle between the gradient and the truth.
+/// Largest accepted angle between the gradient and the expected direction, in radians.
 const ANGLE: f64 = 1e-3;
 
-/// The truth is `(x - c) / φ` for the closest point c; where several are equally near up to the precision, for any of
-/// them. On the surface it is the pseudonormal of the closest feature.
+/// The expected gradient is `(x - c) / φ` for the closest point c. When several points are equally
+/// near up to the precision, any of them may be used. On the surface the expected direction is the
+/// pseudonormal of the closest feature.
 fn check_gradient(r: &Reference, p: DVec3, answer: Answer, precision: Precision) -> Result<(), String> {
     let local = r.frame.to_local(p);
     let (_, nearest) = r.closest_local(local);
@@ -272,7 +274,8 @@ fn check_gradient(r: &Reference, p: DVec3, answer: Answer, precision: Precision)
         Precision::F64 => (1e-9, 2e-12),
     };
     let diagonal = r.local_diagonal();
-    // A point's own coordinates are rounded, far from the origin by more than the diagonal allows.
+    // The coordinates of the point are rounded. Far from the origin, this rounding exceeds the part
+    // relative to the diagonal.
     let ulp = 8.0 * f64::EPSILON * p.abs().max_element().max(r.largest) * r.frame.scale;
     let within = r.within_local(local, nearest.distance + reach * diagonal + 1e-15 * nearest.distance);
     let agrees = |n: DVec3| answer.gradient.angle_between(n) <= ANGLE;
@@ -295,7 +298,7 @@ fn check_gradient(r: &Reference, p: DVec3, answer: Answer, precision: Precision)
     Ok(())
 }
 
-/// The sum of normals over an edge's faces, the angle-weighted one over a vertex's.
+/// The sum of the normals of the faces around an edge, or the angle-weighted sum around a vertex.
 fn pseudonormal(r: &Reference, face: u32, feature: Feature) -> DVec3 {
     let corners = r.faces[face as usize];
     let held: Vec<u32> = match feature {
@@ -333,7 +336,7 @@ fn domains_are_well_formed() {
     });
 }
 
-/// Cracks wider than rounding are left by default repair, and refused by name.
+/// Cracks wider than rounding remain after default repair. The error then names them.
 #[test]
 fn cracked_meshes_are_refused() {
     for row in meshes::manifest().iter().filter(|r| meshes::CRACKED.contains(&r.name.as_str())) {
@@ -342,7 +345,7 @@ fn cracked_meshes_are_refused() {
     }
 }
 
-/// The band and the regions are the domain.
+/// The band and the regions belong to the domain.
 #[test]
 fn regions_belong_to_the_domain() {
     let solid = meshes::named("procedural/tetra.obj");

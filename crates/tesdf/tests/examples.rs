@@ -1,8 +1,9 @@
-//! The examples run, and what each of them asserts holds. `cargo test` builds them; `cargo test --test …` does not.
+//! The examples run, and their assertions hold. `cargo test` builds them; `cargo test --test …`
+//! does not.
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Runs an example with these arguments and gives what it printed.
+/// Runs an example with these arguments and returns its output.
 fn run(name: &str, arguments: &[&str]) -> String {
     let test = std::env::current_exe().expect("a test is a program");
     let folder = test.parent().and_then(|deps| deps.parent()).expect("it lies in target/PROFILE/deps");

@@ -1,4 +1,5 @@
-//! Meshes of large fans, of needles and with stray vertices: encoded in bounded size, and right.
+//! Meshes with large fans, with needles and with stray vertices: the encoding has a bounded size
+//! and is exact.
 mod support;
 
 use std::f64::consts::TAU;
@@ -28,7 +29,7 @@ fn encoded(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> TeSdf {
     asset
 }
 
-/// The lists of a fan hold some hundred entries a face, not one per face and face.
+/// The lists of a fan have some hundred entries per face, not one for each pair of faces.
 fn assert_small(asset: &TeSdf) {
     let statistics = &asset.about().statistics;
     assert!(statistics.entries < 700 * statistics.faces, "{statistics:?}");
@@ -55,7 +56,7 @@ fn a_disc_of_two_fans() {
     assert_small(&encoded(vertices, faces.collect()));
 }
 
-/// Many needles side by side, none at a vertex of many.
+/// Many needles side by side, none at a vertex with many faces.
 #[test]
 fn a_long_prism_of_many_sides() {
     let n = 1000;
@@ -96,7 +97,7 @@ fn rods() {
     }
 }
 
-/// The box around it is a million times as wide as the sphere: all of that is a few cells.
+/// The box around the mesh is a million times as wide as the sphere, but needs only a few cells.
 #[test]
 fn a_sphere_with_a_vertex_far_away() {
     let sphere = Shape::default().add_sphere(DVec3::ZERO, 3, || 1.0).mesh();

@@ -23,7 +23,7 @@ fn encoded(solid: &SolidMesh) -> TeSdf {
 
 static KEY: LazyLock<TeSdf> = LazyLock::new(|| encoded(&named("procedural/shaft_keyway.obj")));
 
-/// The same at other sizes and places.
+/// The same mesh with another size and position.
 fn scaled(asset: &TeSdf, scale: f64, shift: DVec3) -> TeSdf {
     let corners = (0..asset.face_count()).flat_map(|f| asset.face_corners(f).map(|p| p * scale + shift));
     let faces = (0..asset.face_count() as u32).map(|f| [3 * f, 3 * f + 1, 3 * f + 2]).collect();
@@ -35,7 +35,7 @@ fn scaled(asset: &TeSdf, scale: f64, shift: DVec3) -> TeSdf {
     encoded(&SolidMesh::new(welded.unwrap().mesh).unwrap())
 }
 
-/// `r` times a direction; the directions are along axes, in coordinate planes, and any.
+/// Directions along axes, in coordinate planes, and random.
 fn directions() -> Vec<DVec3> {
     let mut random = Random(5);
     let mut all: Vec<DVec3> = (0..30).map(|_| random.direction()).collect();
@@ -62,7 +62,7 @@ fn points_have_right_answers_however_far_out_they_are() {
                 if length(p - middle) < 3e8 * diagonal {
                     continue;
                 }
-                // The nearest corner by its projection: from so far out nothing else counts.
+                // The nearest corner is found by projection: from so far out, nothing else matters.
                 let away = ((p - middle) / r).normalize();
                 let deepest = corners.iter().map(|&c| away.dot(c - middle)).fold(f64::NEG_INFINITY, f64::max);
                 for precision in [Precision::F32, Precision::F64] {
@@ -91,7 +91,8 @@ fn points_have_right_answers_however_far_out_they_are() {
     }
 }
 
-/// A distance that no `f64` holds is the largest one; points that are not finite have no answer.
+/// A distance too large for `f64` is answered with the largest `f64`. Points that are not finite
+/// have no answer.
 #[test]
 fn the_ends_of_the_range() {
     for precision in [Precision::F32, Precision::F64] {
@@ -126,7 +127,7 @@ fn rays_from_far_out_meet_the_face_that_rays_from_near_meet() {
             for distance in [1e3, 1e16, 1e30, 1e150, 1e200, 1e308] {
                 for unit in [1.0, 1e-3, 1e-100, 1e100] {
                     let far = asset.ray_cast(from(distance), -axis * unit, f64::INFINITY);
-                    // Above the largest number there is no such place on the ray.
+                    // Above the largest number there is no such parameter of the ray.
                     let expected = near.filter(|_| distance / unit <= f64::MAX);
                     assert_eq!(far.map(|h| h.face), expected.map(|h| h.face), "{distance} {unit}");
                     assert_eq!(asset.ray_cast(from(distance), axis * unit, f64::INFINITY), None);
@@ -145,7 +146,7 @@ fn rays_from_far_out_meet_the_face_that_rays_from_near_meet() {
     assert_eq!(asset.ray_cast(DVec3::splat(1e200), DVec3::X, f64::INFINITY), None);
 }
 
-/// With a scale of 1e-30 a step of the direction is below the rounding of the origin.
+/// With a scale of 1e-30, a step of the direction is below the rounding of the origin.
 #[test]
 fn rays_through_meshes_of_any_size_miss_what_is_beside_them() {
     for scale in [1e30, 1.0, 1e-30] {
@@ -239,7 +240,7 @@ fn poses_far_out_have_no_contacts_or_are_refused() {
     assert!(refused.to_string().contains("too far out"), "{refused}");
     let below = two(key.clone(), Shape::Plane, DVec3::Z * -1e40).unwrap();
     assert!(detect(&below, &CollideOptions::default()).unwrap().contacts.is_empty());
-    // A plane that far above has all of the body below it.
+    // All of the body is below a plane that far above.
     let above = two(key, Shape::Plane, DVec3::Z * 1e9).unwrap();
     let contacts = detect(&above, &CollideOptions::with_mode(Mode::Node)).unwrap().contacts;
     assert!(!contacts.is_empty() && contacts.iter().all(|c| (c.distance + 1e9).abs() < 1.0));

@@ -1,5 +1,5 @@
-//! Gmsh as a subprocess. It must be installed: `pip install gmsh` or `apt install gmsh`, or its path in TESDF_GMSH; `./test`
-//! does that.
+//! Tests with Gmsh as a subprocess. It must be installed (`pip install gmsh` or `apt install
+//! gmsh`), or `TESDF_GMSH` must have its path; `./test` does that.
 mod support;
 
 use std::path::{Path, PathBuf};
@@ -35,10 +35,11 @@ fn the_inside_is_filled() {
         assert!(mesh.sides().iter().all(|&s| s == Side::Inside));
         let (classes, faces) = (mesh.classes(), solid.mesh().faces().len());
         assert_eq!(classes.surface_vertices, solid.mesh().vertices().len());
-        // What the paper has for a bolt; a cube needs five or six.
+        // The paper has such a ratio for a bolt; a cube needs five or six tetrahedra.
         let ratio = mesh.tetrahedra().len() as f64 / faces as f64;
         assert!((0.4..2.0).contains(&ratio), "{file}: {ratio} tetrahedra per face");
-        // Labels against the winding number at another point than the gate's seed.
+        // Labels are compared with the winding number at another point than the one that labelled
+        // them.
         let winding = WindingNumber::new(solid.mesh());
         for t in (0..mesh.sides().len()).step_by(7) {
             let [a, b, c, d] = mesh.corners(t);
@@ -66,7 +67,7 @@ fn a_band_fills_the_bounds_grown() {
     }
 }
 
-/// Only what meets the region, and all of that.
+/// The domain contains all that meets the region, and nothing else.
 #[test]
 fn a_region_is_filled_and_nothing_else() {
     let region = [0.09, -0.005, -0.005, 0.12, 0.025, 0.025];
@@ -94,7 +95,7 @@ fn a_region_is_filled_and_nothing_else() {
     }
 }
 
-/// Gmsh sees the local frame: a beam 1000 km away, in units of 1e20, is the same to it.
+/// Gmsh sees the local frame, so a mesh 1e6 units away, in units of 1e20, is the same to it.
 #[test]
 fn unit_and_place_do_not_matter() {
     let near = named("procedural/cube.obj");
@@ -125,7 +126,7 @@ fn all_settings_work() {
     }
 }
 
-/// A program that stands in for Gmsh.
+/// A script that replaces Gmsh.
 #[cfg(unix)]
 fn stand_in(folder: &Path, script: &str) -> GmshOptions {
     use std::os::unix::fs::PermissionsExt;
@@ -135,7 +136,7 @@ fn stand_in(folder: &Path, script: &str) -> GmshOptions {
     GmshOptions { executable: Some(path), ..GmshOptions::default() }
 }
 
-/// The unit cube in its local frame, with the tetrahedra of a file.
+/// An MSH file with the unit cube in its local frame and the given tetrahedra.
 fn msh(tetrahedra: &[[u32; 4]]) -> String {
     let mut out = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n8\n".to_owned();
     for i in 0..8 {
@@ -187,7 +188,7 @@ fn the_next_settings_are_tried_when_the_gate_refuses() {
         "{because}"
     );
 
-    // None will do.
+    // No settings give a valid result.
     let script = format!(
         "if grep -q 'Algorithm3D = 10' domain.geo; then cp {at}/open.msh domain.msh; else cp {at}/flat.msh domain.msh; fi"
     );

@@ -1,4 +1,5 @@
-//! Bytes of an asset that a stranger wrote: opening refuses them by name, or every query ends without a panic.
+//! Assets with hostile bytes: opening is refused with a named error, or every query ends without a
+//! panic.
 mod support;
 
 use std::path::Path;
@@ -29,8 +30,9 @@ fn small() -> TeSdf {
     encode(&ball(), &source, &options, &EncodeProgress::default()).expect("valid options")
 }
 
-/// A file of this version, written once: it must go on opening and answering as it did. Raise `FORMAT_VERSION` when the
-/// bytes of an asset change their meaning; `TESDF_WRITE_GOLDEN=1` writes the file.
+/// A file of this format version, written once. It must continue to open and give the same answers.
+/// Raise `FORMAT_VERSION` when the bytes of an asset change their meaning. `TESDF_WRITE_GOLDEN=1`
+/// writes the file.
 #[test]
 fn the_golden_asset_answers() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/golden_asset_v1");
@@ -66,7 +68,7 @@ fn every_proper_prefix_is_refused() {
     assert!(matches!(TeSdf::from_bytes(&longer), Err(AssetError::TrailingBytes { .. })));
 }
 
-/// One flipped bit, anywhere: the checksums see it, if opening does not.
+/// Flips one bit anywhere. The checksums detect it, if opening does not.
 #[test]
 fn checksums_cover_every_byte() {
     let bytes = small().as_bytes().to_vec();
@@ -79,7 +81,7 @@ fn checksums_cover_every_byte() {
     }
 }
 
-/// Where the sections lie in the file.
+/// Byte ranges of the sections in the file.
 fn ranges(asset: &TeSdf) -> Vec<(&'static str, std::ops::Range<usize>)> {
     let file = asset.as_bytes().as_ptr() as usize;
     let sections = asset.container().sections();
@@ -87,7 +89,7 @@ fn ranges(asset: &TeSdf) -> Vec<(&'static str, std::ops::Range<usize>)> {
     placed.filter(|(_, _, n)| *n > 0).map(|(name, at, n)| (name, at..at + n)).collect()
 }
 
-/// Every way of asking, at points near and far, on the body and not finite.
+/// Calls every kind of query, at points near, far, on the body and not finite.
 fn ask(asset: &TeSdf, random: &mut Random) {
     let extremes = [f64::NAN, f64::INFINITY, f64::MAX, -f64::MAX, 1e30, 1e-310, 0.0];
     for i in 0..12 {
@@ -110,7 +112,7 @@ fn ask(asset: &TeSdf, random: &mut Random) {
     }
 }
 
-/// Opens and asks; says whether it opened.
+/// Opens the bytes and queries them. Returns whether they opened.
 fn survives(bytes: &[u8], random: &mut Random) -> bool {
     match TeSdf::from_bytes(bytes) {
         Ok(asset) => {
@@ -128,7 +130,7 @@ fn survives(bytes: &[u8], random: &mut Random) -> bool {
     }
 }
 
-/// A number that an index, a count, an offset or a coordinate least expects.
+/// A number that is hostile as an index, a count, an offset or a coordinate.
 fn hostile_bytes(random: &mut Random, width: usize, size: usize) -> [u8; 8] {
     let word = [
         0,
@@ -157,7 +159,7 @@ fn hostile_bytes(random: &mut Random, width: usize, size: usize) -> [u8; 8] {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 4000, ..ProptestConfig::default() })]
 
-    /// The container stays as it was; what is in it does not.
+    /// Changes the sections, but not the header.
     #[test]
     fn mutated_sections(seed in any::<u64>(), changes in 1usize..4) {
         let asset = SMALL.get_or_init(small);
@@ -175,7 +177,7 @@ proptest! {
         survives(&bytes, &mut random);
     }
 
-    /// The header, too.
+    /// Changes the header too.
     #[test]
     fn mutated_bytes(seed in any::<u64>(), changes in 1usize..4) {
         let asset = SMALL.get_or_init(small);
@@ -194,7 +196,8 @@ proptest! {
 
 static SMALL: std::sync::OnceLock<TeSdf> = std::sync::OnceLock::new();
 
-/// One hostile number at a time in every place of the sections that hold few, and in the first words of those that hold many.
+/// Writes one hostile number at a time: everywhere in short sections, and in the first words of
+/// long sections.
 #[test]
 fn every_word_in_turn() {
     let asset = small();
@@ -216,7 +219,7 @@ fn every_word_in_turn() {
     assert!(opened > 100 && refused > 100, "{opened} opened, {refused} refused");
 }
 
-/// A forest that leads back into itself, or to one word twice, is refused; so is a face tree.
+/// A forest with a cycle, or with a word that is reached twice, is refused; so is such a face tree.
 #[test]
 fn cycles_are_refused() {
     let asset = small();
@@ -239,13 +242,14 @@ fn cycles_are_refused() {
     }
 }
 
-/// Lists in each other would let a small file ask for the work of a large one.
+/// Overlapping lists would let a small file demand the work of a large one.
 #[test]
 fn lists_that_overlap_are_refused() {
     let asset = small();
     let place = |name: &str| ranges(&asset).into_iter().find(|r| r.0 == name).expect("the section").1;
     let (nodes, lists) = (place(layout::NODES.name), place(layout::LISTS.name));
-    // Each third byte begins the slots of one list, and is a slot of others; all are of palette 0.
+    // Every third byte begins the slots of one list and is a slot of others. All lists use palette
+    // 0.
     const COUNT: u8 = 36;
     let mut bytes = asset.as_bytes().to_vec();
     bytes[lists.clone()].iter_mut().enumerate().for_each(|(i, b)| *b = if i % 3 == 2 { COUNT } else { 0 });

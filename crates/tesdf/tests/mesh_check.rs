@@ -1,4 +1,5 @@
-//! What `check` finds and what the encoder's mesh type accepts, for every file of `data/bad` that can be read.
+//! The defects that `check` finds and the meshes that `SolidMesh` accepts, for every readable file
+//! of `data/bad`.
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -15,7 +16,7 @@ fn load(name: &str) -> TriangleMesh {
     read(&bad(name)).unwrap_or_else(|e| panic!("{name}: {e}")).mesh
 }
 
-/// Kinds and numbers of the defects of each file that can be read; no entry: none.
+/// Kinds and numbers of the defects of each readable file. Files without an entry have none.
 const FOUND: &[(&str, &[(DefectKind, usize)])] = &[
     ("open_holes.obj", &[(OpenEdge, 9), (NonManifoldVertex, 1)]),
     ("open_half.obj", &[(OpenEdge, 24)]),
@@ -41,7 +42,7 @@ const FOUND: &[(&str, &[(DefectKind, usize)])] = &[
     ("far_from_origin.obj", &[(FarFromOrigin, 1)]),
 ];
 
-/// Files that the encoder does not take, with words that the refusal has, and whether repair helps.
+/// Files that the encoder refuses, with words of the error, and whether repair helps.
 const REFUSED: &[(&str, &str, bool)] = &[
     ("open_holes.obj", "edge 6-7 is open: only face 4 has it", false),
     ("open_half.obj", "is open: only face", false),
@@ -103,7 +104,7 @@ fn the_encoder_takes_what_has_an_inside() {
 #[test]
 fn rows_to_accept_are_accepted_and_those_to_reject_are_not() {
     let table = std::fs::read_to_string(bad("expected.tsv")).unwrap();
-    // Rows to repair whose winding number is at least 0 everywhere already.
+    // Rows marked for repair whose mesh is a solid already.
     let solid_as_is = ["zero_area_repeated_index.obj", "cavity_inverted.obj", "nan_unused_vertex.obj"];
     for line in table.lines().skip(1) {
         let fields: Vec<&str> = line.split('\t').collect();
@@ -210,7 +211,8 @@ fn a_moebius_strip_is_non_orientable() {
             DVec3::new(radius * angle.cos(), radius * angle.sin(), side * tilt.sin())
         })
         .collect();
-    // Vertex 10 would be vertex 0 with the sides exchanged: vertex 1 takes its place.
+    // After one round, vertex 0 comes again with the sides exchanged, so vertex 10 is replaced by
+    // vertex 1.
     let id = |i: u32| if i < 10 { i } else { 11 - i };
     let faces = (0..10)
         .map(|i| if i % 2 == 0 { [id(i), id(i + 1), id(i + 2)] } else { [id(i + 1), id(i), id(i + 2)] });
@@ -223,7 +225,8 @@ fn a_moebius_strip_is_non_orientable() {
 
 #[test]
 fn folds_are_accepted_with_a_warning() {
-    // A unit cube whose lid is a fan around a vertex that lies beyond one side of it, above or below the lid.
+    // A unit cube whose lid is a fan around a vertex that lies beyond one side of the lid, above or
+    // below it.
     let folded = |height: f64| {
         let corner = |x: i32, y: i32, z: i32| DVec3::new(x.into(), y.into(), z.into());
         let mut vertices: Vec<DVec3> = [0, 1]

@@ -1,4 +1,4 @@
-//! Reading: every file of `data/bad`, and what each format may hold.
+//! Reads every file of `data/bad`, and variants of each format.
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -9,15 +9,15 @@ fn bad(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bad").join(name)
 }
 
-/// What reading gives: numbers of vertices and faces, or words that the error has.
+/// Result of reading: numbers of vertices and faces, or words of the error.
 enum Outcome {
     Mesh(usize, usize),
     Error(&'static [&'static str]),
 }
 use Outcome::{Error, Mesh};
 
-/// Defects of the surface (open, crossing, wrongly oriented, out of range) are read; `check`
-/// finds them. Defects of the file are not.
+/// Files with a defect of the surface (open, crossing, wrongly oriented, out of range) are read,
+/// and `check` finds the defect. Files with a defect of the file are refused.
 const OUTCOMES: &[(&str, Outcome)] = &[
     ("open_holes.obj", Mesh(162, 317)),
     ("open_half.obj", Mesh(89, 152)),
@@ -226,7 +226,8 @@ fn obj_errors_name_the_line() {
 fn ascii_stl_variants() {
     let one_line = b"solid my facet facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 \
         endloop endfacet endsolid my";
-    // `facet` ends the name, so a name with that word in it cannot be told from a facet.
+    // `facet` ends the name, so a name that contains this word cannot be distinguished from a
+    // facet.
     assert!(error(one_line, MeshFormat::Stl).contains("expected 'normal'"));
     let two = b"\n solid a b c\nfacet normal -nan(ind) 1.#QNAN nan outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 \
         endloop endfacet endsolid a b c\nsolid\nfacet normal 0 0 1 outer loop\nvertex 0 0 0\nvertex 0 1 0\nvertex -0 0 1e0\
@@ -266,7 +267,7 @@ fn ply_variants() {
         b"ply\rformat binary_big_endian 1.0\relement vertex 3\rproperty uchar x\rproperty ushort y\r\
         property short z\relement face 1\rproperty list ushort char vertex_indices\rend_header\r"
             .to_vec();
-    // The data begin with a line feed, which is not a part of the header's last line.
+    // The data begin with a line feed, which does not belong to the header's last line.
     binary.extend([10, 0, 1, 0, 2, 0, 1, 0, 0xFF, 0xFE, 5, 0, 0, 0, 0, 0, 3, 0, 1, 2]);
     let loaded = read_bytes(&binary, MeshFormat::Ply).unwrap();
     let expected = [DVec3::new(10.0, 1.0, 2.0), DVec3::new(0.0, 256.0, -2.0), DVec3::new(5.0, 0.0, 0.0)];

@@ -1,4 +1,4 @@
-//! Reading glTF: buffers, transforms, primitive modes, and faults by element.
+//! Reads glTF: buffers, transforms, primitive modes, and errors that name the element.
 mod sample;
 
 use sample::{DATA_URI, glb, json, tetrahedron_buffer};
@@ -37,7 +37,7 @@ fn buffers_inside_and_outside_agree() {
 
 #[test]
 fn transforms_compose_and_mirrors_keep_outward_outward() {
-    // A scale of 0.001 is meant as the decimal, though the JSON is read in f32.
+    // A scale of 0.001 means the decimal number, although the JSON is read in f32.
     let nodes = r#"{"translation":[1,2,3],"children":[1]},{"mesh":0,"scale":[0.001,0.001,0.001]}"#;
     let loaded = load(&json(DATA_URI, nodes));
     assert_eq!(loaded.mesh.vertices()[1], DVec3::new(1.001, 2.0, 3.0));
@@ -55,7 +55,7 @@ fn transforms_compose_and_mirrors_keep_outward_outward() {
 #[test]
 fn strips_fans_lists_and_sparse_positions() {
     let buffer = tetrahedron_buffer();
-    // Without indices the four vertices are a strip or a fan of two triangles.
+    // Without indices, the four vertices are a strip or a fan of two triangles.
     let bare = |mode: u32| json("", NODE).replace(r#","indices":1"#, &format!(r#","mode":{mode}"#));
     let read_glb = |text: &str| read_bytes(&glb(text, &buffer), MeshFormat::Glb);
     assert_eq!(read_glb(&bare(5)).unwrap().mesh.faces(), [[0, 1, 2], [2, 1, 3]]);
@@ -65,7 +65,7 @@ fn strips_fans_lists_and_sparse_positions() {
     let error = read_glb(&bare(1)).unwrap_err().to_string();
     assert!(error.contains("no face"), "{error}");
 
-    // Vertex 3 is replaced by vertex 1's position through a sparse accessor.
+    // A sparse accessor replaces the position of vertex 3 by that of vertex 1.
     let sparse = json("", NODE).replace(
         r#""count":4,"#,
         r#""count":4,"sparse":{"count":1,"indices":{"bufferView":1,"byteOffset":5,"componentType":5121},
@@ -133,7 +133,7 @@ fn faults_name_the_element() {
 
 #[test]
 fn a_mesh_that_is_shown_too_often_is_refused() {
-    // 8192 faces that all name one vertex; a file of kilobytes, which would make 10 GB.
+    // 8192 faces that all use one vertex. A file of some kilobytes would expand to 10 GB.
     let shows = |times: usize| {
         let text = json("", &vec![NODE; times].join(",")).replace(r#""count":12"#, r#""count":24576"#);
         let text = text.replace(r#""byteLength":60"#, r#""byteLength":24624"#);

@@ -1,4 +1,5 @@
-//! Reading hostile bytes: no panic, no silent part of a file, nothing allocated by a count.
+//! Reads hostile bytes: no panic, no part of a file ignored silently, no memory allocated by a
+//! count.
 mod sample;
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -9,28 +10,28 @@ use sample::{DATA_URI, OFF, glb, json, tetrahedron_buffer};
 use tesdf::mesh::{MeshFormat, read_bytes};
 
 thread_local! {
-    /// Bytes this thread holds, and the most it held since it was last reset.
+    /// Bytes that this thread holds, and the largest value since the last reset.
     static HELD: Cell<(usize, usize)> = const { Cell::new((0, 0)) };
 }
 
-/// Counts what each thread holds.
+/// An allocator that counts the bytes each thread holds.
 struct Counting;
 
-// SAFETY: every call is passed on to `System` unchanged; the count is a plain thread-local cell
+// SAFETY: every call is passed on to `System` unchanged. The count is a plain thread-local cell
 // without a destructor, which allocates nothing.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let (held, most) = HELD.get();
         let held = held + layout.size();
         HELD.set((held, most.max(held)));
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller's guarantees are passed on.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
         let (held, most) = HELD.get();
         HELD.set((held.saturating_sub(layout.size()), most));
-        // SAFETY: the caller's promise is passed on.
+        // SAFETY: the caller's guarantees are passed on.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -38,7 +39,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// SplitMix64: small, seeded, the same everywhere.
+/// SplitMix64: small, seeded, and the same everywhere.
 struct Random(u64);
 
 impl Random {
@@ -73,7 +74,7 @@ fn samples() -> Vec<(String, MeshFormat, Vec<u8>)> {
     samples
 }
 
-/// Words that break parsers, put where they may mean something.
+/// Words that can break parsers.
 const TOKENS: &[&[u8]] = &[
     b"-1",
     b"0",
@@ -127,14 +128,14 @@ fn mutate(bytes: &[u8], random: &mut Random) -> Vec<u8> {
     out
 }
 
-/// Reads; whatever comes must be sound, small, and explained.
+/// Reads the bytes. A mesh must be valid, memory use small, and an error explained.
 fn assert_survives(name: &str, bytes: &[u8], format: MeshFormat) -> bool {
     let (held, _) = HELD.get();
     HELD.set((held, held));
     let result = read_bytes(bytes, format);
     let used = HELD.get().1 - held;
-    // A face `f 1 1 1` of eight bytes takes about 100 in the several passes of reading. Two more
-    // pages cover messages and tables of fixed size.
+    // A face `f 1 1 1` of eight bytes takes about 100 bytes of memory per byte in the passes of
+    // reading. Two more pages cover messages and tables of fixed size.
     assert!(used <= 100 * bytes.len() + 8192, "{name}: {used} bytes held for {} read", bytes.len());
     match result {
         Ok(loaded) => {
@@ -162,7 +163,7 @@ fn mutated_files_never_panic_nor_take_memory() {
             if assert_survives(&name, &mutated, format) { read += 1 } else { refused += 1 }
         }
     }
-    // Both ways must have been taken often for the test to mean anything.
+    // Both outcomes must occur often for the test to be meaningful.
     assert!(read > 10_000 && refused > 10_000, "{read} read, {refused} refused");
 }
 

@@ -1,4 +1,4 @@
-//! What `repair` changes, says and leaves.
+//! The changes and reports of `repair`, and what it leaves unchanged.
 use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
@@ -51,7 +51,7 @@ fn duplicates_and_collapsed_faces_are_dropped() {
     assert!(solid(&fixed).is_simple());
 }
 
-/// A tetrahedron, one of its faces twice and once reversed.
+/// A tetrahedron with one face present twice and once reversed.
 #[test]
 fn a_duplicate_that_closes_the_surface_stays() {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].to_vec();
@@ -76,15 +76,15 @@ fn t_junctions_are_split() {
 
 #[test]
 fn a_collinear_face_goes_when_its_neighbours_are_split() {
-    // The cap of the file closes the mesh: nothing to do.
+    // The collinear face of the file closes the mesh, so nothing is repaired.
     let capped = load("bad/zero_area_cap.obj");
     let fixed = repaired(&capped);
     assert!(fixed.report.is_unchanged());
     assert_eq!(fixed.mesh, capped);
-    // Without it there is a T-junction.
+    // Without this face there is a T-junction.
     let open = TriangleMesh::new(capped.vertices().to_vec(), capped.faces()[..13].to_vec()).unwrap();
     assert!(solid(&repaired(&open)).is_simple());
-    // Reversed, it closes nothing; its long edge is split at its own middle corner.
+    // Reversed, the face closes nothing. Its long edge is split at its own middle corner.
     let mut faces = capped.faces().to_vec();
     faces[13].swap(1, 2);
     let spoiled = TriangleMesh::new(capped.vertices().to_vec(), faces).unwrap();
@@ -150,7 +150,7 @@ fn good_meshes_are_left_alone() {
 fn crossing_shells_keep_their_orientation() {
     let mesh = load("bad/two_boxes_overlap.obj");
     let mut faces = mesh.faces().to_vec();
-    // The second box inverted as a whole, and one face of the first.
+    // The second box is inverted completely, and one face of the first box is reversed.
     faces[12..].iter_mut().for_each(|f| f.swap(0, 1));
     faces[5].swap(0, 1);
     let fixed = repaired(&TriangleMesh::new(mesh.vertices().to_vec(), faces).unwrap());
@@ -216,7 +216,7 @@ fn repaired_parts_have_the_reference_distances() {
     }
 }
 
-/// A box as a grid of `n` cells per edge on each side, each cell two triangles.
+/// A box whose sides are grids of `n` × `n` cells with two triangles each.
 fn grid_box(min: DVec3, max: DVec3, n: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let mut ids = std::collections::BTreeMap::new();
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
@@ -244,7 +244,7 @@ fn grid_box(min: DVec3, max: DVec3, n: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     (vertices, faces)
 }
 
-/// Nested boxes, the k-th inside the (k-1)-th, outward and inward in turn.
+/// Nested boxes, the k-th inside the (k-1)-th, alternately outward and inward.
 fn nested(depth: u32, n: u32) -> TriangleMesh {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for k in 0..depth {
@@ -279,8 +279,8 @@ fn sorted_faces(mesh: &TriangleMesh) -> Vec<[[u64; 3]; 3]> {
 }
 
 proptest! {
-    /// Faces reversed at random, repeated and collapsed ones added, everything in random order: nested shells come
-    /// back as they were.
+    /// Faces are reversed at random, duplicate and collapsed faces are added, and everything is
+    /// shuffled. Repair restores the nested shells.
     #[test]
     fn spoiled_shells_are_restored(
         depth in 1u32..5, n in 1u32..3,
@@ -306,7 +306,8 @@ proptest! {
         prop_assert!(repaired(&fixed.mesh).report.is_unchanged());
     }
 
-    /// Faces of a box split on one side of their edges only, some reversed, the box turned so that points on edges are rounded.
+    /// Faces of a box are split at edges on one side only, some faces are reversed, and the box is
+    /// rotated, so that points on edges are rounded.
     #[test]
     fn t_junctions_of_rounded_points_close(
         splits in prop::collection::vec((0usize..1000, 0u8..3, 0.05f64..0.95), 1..30),
@@ -340,7 +341,7 @@ proptest! {
         }
     }
 
-    /// Whatever the faces, nothing panics, and what comes out as encodable is a solid.
+    /// For any faces, nothing panics, and an encodable result is a solid.
     #[test]
     fn any_faces_are_survived(
         corners in prop::collection::vec(prop::array::uniform3(0i8..4), 3..10),

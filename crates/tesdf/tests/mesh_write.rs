@@ -1,11 +1,11 @@
-//! Writing: what comes back when a written file is read.
+//! Reading a written file gives the mesh back.
 use std::path::Path;
 
 use proptest::prelude::*;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{TriangleMesh, WriteError, WriteFormat, read, write};
 
-/// Awkward but finite coordinates.
+/// Unusual but finite coordinates.
 fn mesh() -> TriangleMesh {
     let vertices = vec![
         DVec3::new(0.1, 1.0 / 3.0, -2e-7),
@@ -60,8 +60,8 @@ fn files_are_replaced_whole_or_not_at_all() {
 }
 
 proptest! {
-    /// Any finite bit pattern survives; only equal positions, which welding merges, are avoided
-    /// by numbering z.
+    /// Any finite bit pattern survives. Equal positions would be welded, so numbering z avoids
+    /// them.
     #[test]
     fn any_finite_coordinates_survive_ply_and_obj(
         points in prop::collection::vec((any::<f64>(), any::<f64>()), 3..40),
@@ -71,7 +71,7 @@ proptest! {
         let vertices: Vec<_> = points.iter().enumerate()
             .map(|(i, p)| DVec3::new(finite(p.0), finite(p.1), i as f64)).collect();
         let n = vertices.len() as u32;
-        // Every vertex is used, since unused ones are dropped on reading.
+        // Every vertex is used, because reading drops unused vertices.
         let mut faces: Vec<_> = (0..n).map(|i| [i, (i + 1) % n, (i + 2) % n]).collect();
         faces.push([0, 1, 2].map(|i: usize| corners[i] as u32 % n));
         let mesh = TriangleMesh::new(vertices, faces).unwrap();

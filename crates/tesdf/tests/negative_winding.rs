@@ -1,4 +1,5 @@
-//! Places with a negative winding number: all are found, wherever on a face they are, and they count as outside.
+//! Places with a negative winding number are found wherever on a face they are, and they count as
+//! outside.
 mod support;
 
 use proptest::prelude::*;
@@ -12,7 +13,7 @@ use tesdf::mesh::{CheckReport, DefectKind, Severity, SolidMesh, TriangleMesh, ch
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, verify};
 
-/// Faces of a tetrahedron whose corners have a positive volume, outward.
+/// Faces of a tetrahedron with positive volume, oriented outward.
 const OUTWARD: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
 
 /// A closed mesh made of shells.
@@ -43,7 +44,7 @@ impl Shells {
     }
 }
 
-/// A unit cube, and in it a tetrahedron that is inside out and whose apex is `height` above the lid of the cube.
+/// A unit cube containing an inverted tetrahedron whose apex is `height` above the lid of the cube.
 fn pierced(height: f64) -> TriangleMesh {
     let corners = [
         DVec3::new(0.6, 0.6, 0.3),
@@ -60,7 +61,7 @@ fn negative(report: &CheckReport) -> Vec<(Severity, DVec3)> {
     defects.map(|d| (d.severity, DVec3::from_array(d.place))).collect()
 }
 
-/// No face has its centre beside the tip: the centres alone do not tell.
+/// No face has its centroid near the tip, so centroids alone are not enough.
 #[test]
 fn a_tip_through_a_face_is_found_away_from_all_centres() {
     for height in [0.3, 1e-3, 1e-6, 1e-9, 1e-12] {
@@ -78,7 +79,8 @@ fn a_tip_through_a_face_is_found_away_from_all_centres() {
     assert!(negative(&below).is_empty());
 }
 
-/// Points near faces, vertices and the axes of `asset`, against all faces and exact winding numbers.
+/// Compares points near faces, vertices and places of negative winding number with all faces and
+/// exact winding numbers.
 fn assert_exact(mesh: &TriangleMesh, asset: &TeSdf) {
     let options = VerifyOptions { samples: 3000, ..VerifyOptions::default() };
     let report = verify(asset, &options, |_| std::ops::ControlFlow::Continue(())).expect("it ran to its end");
@@ -113,7 +115,7 @@ fn assert_exact(mesh: &TriangleMesh, asset: &TeSdf) {
     assert!(below_zero > 20, "{below_zero} points with a negative winding number");
 }
 
-/// Below 0 is outside, as far from all faces as brute force says.
+/// Places with a negative winding number are outside, and their distance is that of brute force.
 #[test]
 fn what_is_inside_out_is_outside() {
     let folded = {
@@ -147,7 +149,7 @@ fn a_mesh_that_is_all_inside_out_stays_an_error() {
     assert!(refusal.is_repairable() && refusal.to_string().contains("inside out"), "{refusal}");
 }
 
-/// The same tetrahedra, one of them or two on the same face: the jumps of faces that lie on each other add up.
+/// The same tetrahedron once or twice on the same faces: the jumps of coinciding faces add up.
 #[test]
 fn faces_on_each_other_count_together() {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
@@ -158,7 +160,7 @@ fn faces_on_each_other_count_together() {
     assert_eq!(check(&none).winding, Some([0, 0]));
     let minus_one = OUTWARD.into_iter().chain(inside_out).chain(inside_out);
     assert_eq!(check(&Shells::default().add(&corners, minus_one).mesh()).winding, Some([-1, 0]));
-    // A smaller face within a larger one, in its plane.
+    // A smaller face inside a larger coplanar face.
     let half = corners.map(|p| DVec3::new(0.2, 0.2, 0.0) + 0.5 * p);
     let within = Shells::default().add(&corners, OUTWARD).add(&half, inside_out).mesh();
     let mirrored = half.map(|p| DVec3::new(p.x, p.y, -p.z));
@@ -167,7 +169,7 @@ fn faces_on_each_other_count_together() {
     assert_eq!(check(&beside).winding, Some([-1, 1]));
 }
 
-/// All the winding numbers on a fine grid between lattice points, from all faces.
+/// Range of the winding numbers on a fine grid between lattice points, from all faces.
 fn on_a_grid(mesh: &TriangleMesh) -> [i32; 2] {
     let bounds = mesh.bounds();
     let steps = 23;
@@ -184,8 +186,8 @@ fn on_a_grid(mesh: &TriangleMesh) -> [i32; 2] {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
-    /// Boundaries of random tetrahedra, of either orientation: `check` finds no less than a grid of points, and where it finds a
-    /// negative winding number there is one.
+    /// Boundaries of random tetrahedra of either orientation. `check` finds at least the range that
+    /// a grid of points finds, and where it reports a negative winding number there is one.
     #[test]
     fn no_less_than_a_grid_finds(
         tetrahedra in prop::collection::vec(prop::array::uniform4(prop::array::uniform3(0i32..7)), 1..5),
@@ -206,14 +208,15 @@ proptest! {
         let winding = WindingNumber::new(&mesh);
         for (_, place) in negative(&report) {
             let mut random = Random(3);
-            // The smallest cell of tetrahedra on this lattice is larger than 1e-4.
+            // The smallest cell between tetrahedra on this lattice is larger than 1e-4.
             let around = (0..4000).map(|k| place + [1e-3, 1e-5][k % 2] * random.in_cube());
             prop_assert!(around.into_iter().any(|p| winding.at(p) < 0), "no negative winding number at {place}");
         }
     }
 }
 
-/// Two sheets 2.5e-43 apart: a place on one is rounded to beyond the other, which used to look like an inside.
+/// Two sheets 2.5e-43 apart. Rounding moves a place on one sheet beyond the other, which used to
+/// look like an inside.
 #[test]
 fn a_solid_inside_out_with_sheets_nearer_than_rounding() {
     let vertices = [

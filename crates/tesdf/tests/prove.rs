@@ -1,4 +1,4 @@
-//! The proof holds for good assets, and finds what is wrong with others.
+//! The proof succeeds for good assets and finds the faults of others.
 mod support;
 
 use std::ops::ControlFlow;
@@ -31,7 +31,7 @@ fn encoded(solid: &SolidMesh) -> TeSdf {
     encoded_with(solid, Domain::Bisection, &fast())
 }
 
-/// A ball with a box-shaped cavity: cells of every label.
+/// A ball with a box-shaped cavity, which has cells of every label.
 fn hollow() -> TeSdf {
     let mut shape = Shape::default().add_sphere(DVec3::new(3.0, -2.0, 0.5), 2, || 1.0);
     let outer = shape.faces.len();
@@ -52,7 +52,7 @@ fn proved(asset: &TeSdf) -> ProveReport {
     proved_with(asset, 1 << 16)
 }
 
-/// The asset after `change` of a section; opening does not look at checksums.
+/// The asset after `change` of a section. Opening does not verify checksums.
 fn changed(asset: &TeSdf, spec: SectionSpec, change: impl FnOnce(&mut [u8])) -> TeSdf {
     let mut bytes = asset.as_bytes().to_vec();
     let section = asset.container().sections().find(|s| s.spec == spec).expect("the section is there").bytes;
@@ -69,7 +69,7 @@ fn change_nodes(asset: &TeSdf, change: impl Fn(Node) -> Node) -> TeSdf {
     })
 }
 
-/// Puts a face in the place of another one in every palette.
+/// Replaces a face by another face in every palette.
 fn replace_in_palettes(asset: &TeSdf, from: u16, to: u16) -> TeSdf {
     changed(asset, layout::PALETTES, |bytes| {
         for word in bytes.as_chunks_mut::<2>().0 {
@@ -80,13 +80,13 @@ fn replace_in_palettes(asset: &TeSdf, from: u16, to: u16) -> TeSdf {
     })
 }
 
-/// Distance of a point from faces, by their ids, which are their places in the mesh.
+/// Distance of a point from faces, given by their ids, which are their indices in the mesh.
 fn distance(solid: &SolidMesh, faces: &[u32], p: DVec3) -> f64 {
     let of = |&f: &u32| Triangle::new(solid.mesh().triangle(f as usize)).closest(p).distance;
     faces.iter().map(of).fold(f64::INFINITY, f64::min)
 }
 
-/// Whether a lattice of points in each cell shows a list that is wrong by more than `tolerance`.
+/// Whether a lattice of points in each cell shows a list with an error above `tolerance`.
 fn is_wrong_somewhere(solid: &SolidMesh, asset: &TeSdf, tolerance: f64) -> bool {
     let all: Vec<u32> = (0..solid.mesh().faces().len() as u32).collect();
     let mut is_wrong = false;
@@ -124,7 +124,8 @@ fn hard_shapes_are_proved() {
 
 #[test]
 fn faces_without_area_are_proved() {
-    // The middle of an edge of a box is a vertex on one side only; a face without area closes the gap.
+    // The middle of an edge of a box becomes a vertex on one side only. A face without area closes
+    // the gap.
     let mut shape = one_box();
     let [a, b, c] = shape.faces[0];
     let middle = shape.vertices.len() as u32;
@@ -154,8 +155,8 @@ fn a_list_that_lost_a_face_is_refuted_with_a_point() {
     assert!(close(fault.list_distance, of_list) && close(fault.face_distance, of_face), "{fault:?}");
 }
 
-/// Lists that lost one face each: the proof never says that a list is right where a lattice of points shows that it is wrong, and
-/// what it says to be wrong is.
+/// Each list loses one face. The proof never accepts a list that a lattice of points shows to be
+/// wrong, and a list that it refutes is wrong.
 #[test]
 fn verdicts_agree_with_a_lattice_of_points() {
     let solid = Shape::default().add_sphere(DVec3::ZERO, 1, || 1.0).solid();
@@ -181,12 +182,12 @@ fn verdicts_agree_with_a_lattice_of_points() {
         }
         let lost = random.index(slots.len());
         let other = slots[(lost + 1) % slots.len()];
-        // Palette, count, slots.
+        // Layout: palette, count, slots.
         let at = offset as usize + 3 + lost;
         let asset = changed(&asset, layout::LISTS, |bytes| bytes[at] = other);
         let report = proved(&asset);
         if is_wrong_somewhere(&solid, &asset, 1e-9) {
-            // Never proved; refuted unless rounding ends the search first.
+            // The list must not be proved. It is refuted, unless rounding ends the search first.
             assert!(report.distances.proved < report.distances.claims, "{report:#?}");
             wrong += usize::from(report.distances.refuted > 0);
         } else {
@@ -216,7 +217,7 @@ fn a_duplicate_stands_for_its_twin_in_distances_and_not_in_signs() {
     let report = proved(&replace_in_palettes(&asset, 0, twin as u16));
     assert_eq!(report.distances.proved, report.distances.claims, "{report:#?}");
     assert!(report.signs.refuted > 0 && !report.proved, "{report:#?}");
-    // Without both, the distances are wrong, too.
+    // Without both twins, the distances are wrong too.
     let other = (1..asset.face_count()).find(|&k| corners(k) != corners(0)).expect("another one") as u16;
     let report = proved(&replace_in_palettes(&replace_in_palettes(&asset, 0, other), twin as u16, other));
     assert!(report.distances.refuted > 0, "{report:#?}");
@@ -250,7 +251,7 @@ fn wrong_labels_are_refuted() {
             report.faults.iter().all(|f| f.claim == Claim::Sign && f.cell.is_some() && f.point.is_some())
         );
     }
-    // A face that is near to a cell without passing through it makes no sign wrong.
+    // A face near a cell that does not pass through it makes no sign wrong.
     assert!(proved(&never).signs.refuted > kinds[1] / 2);
 }
 
@@ -258,7 +259,7 @@ fn wrong_labels_are_refuted() {
 fn a_face_tree_that_misses_a_face_is_refuted() {
     let asset = hollow();
     let small = changed(&asset, layout::TREE_BOXES, |bytes| {
-        // The least first coordinate of the first box.
+        // The lowest x of the first box.
         let (first, _) = bytes.split_first_chunk_mut::<4>().expect("a box");
         *first = (f32::from_le_bytes(*first) + 0.1).to_le_bytes();
     });
@@ -275,7 +276,7 @@ fn cut_lists_are_proved_near_the_surface() {
     let asset = encoded_with(&solid, Domain::Bisection, &options);
     let report = proved(&asset);
     assert!(report.within.is_some_and(|within| within > 0.0) && report.proved, "{report:#?}");
-    // Farther out they are wrong, or this test would show nothing.
+    // Farther out the lists are wrong; otherwise this test would show nothing.
     assert!(is_wrong_somewhere(&solid, &asset, 1e-6));
 }
 
@@ -300,7 +301,7 @@ fn conforming_domains_are_proved() {
         let report = proved(&asset);
         let (distances, signs) = (report.distances, report.signs);
         assert_eq!((distances.proved, signs.refuted), (distances.claims, 0), "{refinement:?}: {report:#?}");
-        // Which side of a flat tetrahedron a face is on can stay undecided.
+        // For a flat tetrahedron, the side of a face can remain undecided.
         assert!(signs.undecided * 100 < signs.claims, "{signs:?}");
         let listed = asset.about().statistics.listed_cells;
         assert_eq!(report.signs.claims, listed + domain.tetrahedra().len() + 1);

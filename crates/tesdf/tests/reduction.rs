@@ -1,4 +1,5 @@
-//! What a reduction keeps, and what it says is lost, against distances computed one by one.
+//! Compares what a reduction keeps, and the loss that it reports, with distances computed one by
+//! one.
 mod support;
 
 use proptest::prelude::*;
@@ -12,7 +13,7 @@ type Wrench = [f64; 6];
 
 /// Rounding of sums of wrenches.
 const ROUNDING: f64 = 1e-9;
-/// How far from the least error the test's own solver stops.
+/// Accepted error of the test's own solver.
 const SOLVER: f64 = 1e-3;
 
 fn contact(instances: [u32; 2], point: DVec3, normal: DVec3, distance: f64, face: u32) -> Contact {
@@ -31,7 +32,7 @@ fn contact(instances: [u32; 2], point: DVec3, normal: DVec3, distance: f64, face
     }
 }
 
-/// Contacts between instances 2 and 5, as many in each direction as it comes.
+/// Contacts between instances 2 and 5, with a random order of the pair.
 fn patch(count: usize, seed: u64, mut place: impl FnMut(&mut Random) -> (DVec3, DVec3)) -> Vec<Contact> {
     let mut random = Random(seed);
     let mut contacts: Vec<Contact> = (0..count)
@@ -46,7 +47,8 @@ fn patch(count: usize, seed: u64, mut place: impl FnMut(&mut Random) -> (DVec3, 
     contacts
 }
 
-/// Patches of the kinds that occur: flat, around a shaft, in a corner of a box, anything, few places with many contacts.
+/// Typical patches: flat, around a shaft, in the corner of a box, random, and few places with many
+/// contacts.
 fn any_patch() -> impl Strategy<Value = Vec<Contact>> {
     (1..250usize, 0..5, any::<u64>()).prop_map(|(count, kind, seed)| {
         let turn = DQuat::from_rotation_arc(DVec3::Z, Random(seed).direction());
@@ -81,7 +83,7 @@ fn reduce(contacts: &[Contact], n: u32) -> (Vec<Contact>, PairReduction) {
     (kept, reports[0])
 }
 
-/// Of a unit force, on instance 2.
+/// Wrench of a unit force on instance 2.
 fn wrench(c: &Contact, report: &PairReduction) -> Wrench {
     let force = if c.instance_a == InstanceId(2) { c.normal } else { -c.normal };
     let torque = (c.point_a - report.center).cross(force) / report.length.max(f64::MIN_POSITIVE);
@@ -100,16 +102,17 @@ fn dot(a: &Wrench, b: &Wrench) -> f64 {
     (0..6).map(|k| a[k] * b[k]).sum()
 }
 
-/// Forces on the kept contacts in place of forces of sum 1 on all.
+/// Forces on the kept contacts that replace given forces of sum 1 on all contacts.
 struct Replacement {
     forces: Vec<f64>,
-    /// What is left of the wrench: an upper bound of the least error.
+    /// Norm of the remaining wrench: an upper bound of the least error.
     error: f64,
-    /// A lower bound of the least error: how far the goal is beyond the kept wrenches in some direction.
+    /// A lower bound of the least error: how far the goal lies beyond the kept wrenches in some
+    /// direction.
     least: f64,
 }
 
-/// By pairwise Frank–Wolfe steps, which are slow where the hull is thin.
+/// Solves by pairwise Frank–Wolfe steps, which are slow where the hull is thin.
 fn replacement(kept: &[Wrench], goal: &Wrench) -> Replacement {
     let mut forces = vec![0.0; kept.len()];
     forces[0] = 1.0;
@@ -155,7 +158,8 @@ proptest! {
                 prop_assert!(replaced.least <= report.wrench_error + ROUNDING);
             }
         }
-        // The forces that lose most are those of one contact, and they lose what the report says: it is no loose bound.
+        // The loss is largest for a force on a single contact. The report states exactly this loss,
+        // so it is not a loose bound.
         let single = all.iter().map(|w| replacement(&kept, w));
         let (least, most) = single.fold((0.0, 0.0), |(l, m), r| (r.least.max(l), r.error.max(m)));
         prop_assert!(least <= report.wrench_error + ROUNDING, "{least} {report:?}");
@@ -171,10 +175,10 @@ proptest! {
         let mut axes: Vec<DVec3> = Vec::new();
         while n >= 7 && axes.len() < 3 {
             let off = |c: &Contact| axes.iter().fold(c.point_a - report.center, |p, a| p - p.dot(*a) * a);
-            // The first of equal ones, as the reduction takes it: points of a ring are equally far out.
+            // On ties the first one, as the reduction does: points of a ring are equally far out.
             let longer = |a: DVec3, b: DVec3| if b.length_squared() > a.length_squared() { b } else { a };
             let longest = contacts.iter().map(off).fold(DVec3::ZERO, longer);
-            // What is left of a flat patch is rounding, and has no direction.
+            // The remainder of a flat patch is rounding and has no direction.
             if longest.length() <= 1e-3 * report.length {
                 break;
             }
@@ -187,7 +191,7 @@ proptest! {
         }
     }
 
-    /// The report says what is lost, and whoever asks is told the same.
+    /// The reported loss equals the one computed on its own.
     #[test]
     fn reports_tell_the_error(contacts in any_patch(), n in 1..40u32) {
         let (kept, report) = reduce(&contacts, n);
@@ -211,11 +215,12 @@ proptest! {
         prop_assert_eq!(reduce_pairs(contacts.clone(), Reduction::None), (contacts, Vec::new()));
     }
 
-    /// The contacts of a pair, in their order, whatever else touches and on any number of threads.
+    /// The contacts of a pair are reduced in order, whatever else touches and for any number of
+    /// threads.
     #[test]
     fn pairs_are_reduced_on_their_own(patches in prop::collection::vec(any_patch(), 1..6), n in 1..12u32) {
         let alone: Vec<_> = patches.iter().map(|contacts| reduce(contacts, n)).collect();
-        // Pair k is (k, 100 - k): in the scene's order the two directions of a pair are far from each other.
+        // Pair k is (k, 100 - k): in the scene's order, the two orders of a pair are far apart.
         let renamed = |contacts: &[Contact], k: usize| -> Vec<Contact> {
             let rename = |id: InstanceId| InstanceId(if id.0 == 2 { k as u32 } else { 100 - k as u32 });
             contacts
@@ -243,7 +248,8 @@ proptest! {
     }
 }
 
-/// 100 × 100 contacts on a plane, the deepest one somewhere inside: eight keep the corners, and so the whole support polygon.
+/// 100 × 100 contacts on a plane, with the deepest at a corner or in the interior. Eight kept
+/// contacts include the corners, and so the whole support polygon.
 #[test]
 fn a_flat_patch_keeps_its_corners() {
     let turn = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.0);
@@ -262,7 +268,7 @@ fn a_flat_patch_keeps_its_corners() {
     }
 }
 
-/// Contacts that say the same, from one body or from the other, are one.
+/// Equal contacts, from either body, are merged.
 #[test]
 fn equal_contacts_are_one() {
     let (point, normal) = (DVec3::new(3.0, -2.0, 1.0), DVec3::Y);
@@ -277,15 +283,16 @@ fn equal_contacts_are_one() {
     assert_eq!(reduce_pairs(Vec::new(), Reduction::PerPair(4)), (Vec::new(), Vec::new()));
 }
 
-/// A ring of contacts that push outwards, as around a shaft: what is lost falls with the square of the number that is kept.
+/// A ring of contacts that push outwards, as around a shaft. The loss falls with the square of the
+/// number of kept contacts.
 #[test]
 fn a_ring_is_lost_by_the_square() {
     let contacts = patch(5000, 1, |random| {
         let (sin, cos) = (std::f64::consts::TAU * random.unit()).sin_cos();
         (DVec3::new(cos, sin, 0.0), DVec3::new(cos, sin, 0.0))
     });
-    // The hull is that of a circle, and a chord over 1/n of it is 1 − cos(π/n) from its arc. Arcs are halved, so the longest are up to
-    // twice the shortest.
+    // The hull is that of a circle. A chord over 1/n of the circle is 1 − cos(π/n) from its arc.
+    // Arcs are halved, so the longest are up to twice the shortest.
     for n in [8u32, 16, 32, 64] {
         let error = reduce(&contacts, n).1.wrench_error;
         let chord = |n: f64| 1.0 - (std::f64::consts::PI / n).cos();

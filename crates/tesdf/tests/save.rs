@@ -1,4 +1,4 @@
-//! Outputs: what is refused, what is kept, what is left behind.
+//! Outputs: refused paths, kept attributes, and files left behind.
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -61,7 +61,7 @@ fn an_output_that_is_an_input_is_refused() {
         }
         assert!(is_same_file(output, &input) && !is_same_file(output, &other));
     }
-    // Equal bytes are another file; a file that is not there is none.
+    // A file with equal bytes is another file. A missing file is not the same as itself.
     let none = folder.path().join("none");
     assert!(!is_same_file(&none, &none));
     let options = SaveOptions { inputs: &[&input, &none], ..options };
@@ -69,7 +69,7 @@ fn an_output_that_is_an_input_is_refused() {
     assert_eq!(fs::read(&input).unwrap(), b"precious");
 }
 
-/// As a process that was killed leaves it, and as a living process holds it.
+/// Part files as a killed process leaves them, and as a living process holds them.
 #[test]
 fn abandoned_part_files_are_removed_and_those_of_the_living_are_not() {
     let folder = folder();
@@ -100,7 +100,8 @@ fn a_part_grows_beside_its_target_and_keeps_others_away() {
     let mut part = to.part().unwrap().expect("a regular file");
     part.write_all(b"new").unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"old");
-    // Another write into the folder, as of another process: locks belong to the open file.
+    // Another write into the folder acts like another process, because locks belong to the open
+    // file.
     save_atomic(&folder.path().join("other"), b"").unwrap();
     let mut file = part.finish().unwrap();
     file.write_all(b"er").unwrap();
@@ -142,14 +143,14 @@ mod unix {
             save_atomic(&saved, b"again").unwrap();
             assert_eq!(mode(&saved), bits, "{bits:o}");
         }
-        // Nobody else may read the new bytes, not even before they are in their place.
+        // Nobody else may read the new bytes, not even before the rename.
         set_mode(&saved, 0o600);
         let _part = destination(&saved).unwrap().part().unwrap();
         let part = names(folder.path()).into_iter().find(|name| name.ends_with(".part")).unwrap();
         assert_eq!(mode(&folder.path().join(part)), 0o600);
     }
 
-    /// Only an administrator may give a file to another user.
+    /// Only an administrator may change the owner of a file.
     #[test]
     fn a_replaced_file_keeps_its_owner_where_the_system_allows_it() {
         let folder = folder();
@@ -221,7 +222,7 @@ mod unix {
         let full = destination(Path::new("/dev/full")).unwrap();
         let found = full.write(b"x").unwrap_err().to_string();
         assert!(found.starts_with("cannot write /dev/full: No space left"), "{found}");
-        // A folder where nobody can create files, the administrator included.
+        // A folder where nobody, not even an administrator, can create files.
         let found = destination(Path::new("/proc/a")).unwrap_err().to_string();
         assert!(found.starts_with("cannot create a file in /proc: "), "{found}");
     }

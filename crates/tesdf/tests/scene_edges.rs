@@ -1,4 +1,4 @@
-//! Scenes at the edges: what cannot be is an error that names it, what can be is answered.
+//! Edge cases of scenes: invalid input is an error that names it, and valid input is answered.
 mod support;
 
 use support::bodies::body;
@@ -25,7 +25,7 @@ fn row(places: &[f64]) -> (Scene, Vec<InstanceId>) {
     (scene, ids)
 }
 
-/// Pairs (a, b) that have a contact.
+/// Ordered pairs (a, b) that have a contact.
 fn touching(scene: &Scene) -> Vec<(u32, u32)> {
     let found = detect(scene, &CollideOptions::default()).expect("a good scene");
     let mut pairs: Vec<_> = found.contacts.iter().map(|c| (c.instance_a.0, c.instance_b.0)).collect();
@@ -54,7 +54,7 @@ fn poses_that_are_none() {
         Instance { shape: ShapeId(77), ..good },
     ];
     for instance in bad {
-        // The third of a list: it is named by its place there, and none is added.
+        // The third of a list: the error names its index in the list, and no instance is added.
         let error = scene.add_many(&[good, good, instance]).expect_err("is refused");
         assert!(matches!(error, CollideError::Instance { instance: 2, .. }), "{error}");
         let error = scene.update(&[(ids[0], instance)]).expect_err("is refused");
@@ -63,7 +63,7 @@ fn poses_that_are_none() {
     }
     assert_eq!(scene.instances().len(), 1);
     assert_eq!(scene.instance(ids[0]).expect("it is there").pose, at(0.0));
-    // Within 1e-6 of unit length it is rounding, and made unit.
+    // A rotation within 1e-6 of unit length counts as rounding and is normalised.
     let id = scene.add(Instance { pose: rotation(0.0, 0.0, 0.0, 1.0 + 5e-7), ..good }).expect("is taken");
     assert_eq!(scene.instance(id).expect("it is there").pose.rotation.length(), 1.0);
 }
@@ -108,7 +108,7 @@ fn scenes_of_little() {
     let none = detect(&Scene::new(), &CollideOptions::default()).expect("nothing is no error");
     assert_eq!((none.contacts.len(), none.statistics.instance_pairs), (0, 0));
     assert_eq!(touching(&row(&[0.0]).0), []);
-    // Two planes never meet: they are half spaces, and would touch all along a line.
+    // Two planes have no contacts: they are half-spaces, and would touch along a whole line.
     let mut scene = Scene::new();
     let plane = scene.add_shape(Shape::Plane).expect("a plane");
     scene.add_many(&[Instance::new(plane, Pose::IDENTITY); 2]).expect("poses");
@@ -117,11 +117,11 @@ fn scenes_of_little() {
 
 #[test]
 fn contact_distance_of_zero() {
-    // Touching counts, apart by a hair does not, overlapping by one does.
+    // Touching spheres have contacts. A tiny gap means none, a tiny overlap means some.
     assert_eq!(touching(&row(&[0.0, 2.0]).0), [(0, 1), (1, 0)]);
     assert_eq!(touching(&row(&[0.0, 2.0 + 1e-12]).0), []);
     assert_eq!(touching(&row(&[0.0, 2.0 - 1e-12]).0), [(0, 1), (1, 0)]);
-    // Of meshes, too: cubes that share a side.
+    // Also for meshes: cubes that share a side.
     let cube = body("cube");
     let edge = cube.solid.mesh().bounds().extent().x;
     let mut scene = Scene::new();
@@ -136,7 +136,8 @@ fn contact_distance_of_zero() {
 
 #[test]
 fn bounds_that_touch_only_after_rounding() {
-    // Turned together, two cubes that share a side still have contacts within a contact distance of a thousandth of a picometre.
+    // Two cubes that share a side, rotated together, still have contacts at a contact distance of a
+    // thousandth of a picometre.
     let cube = body("cube");
     let edge = cube.solid.mesh().bounds().extent().x;
     for k in 0..100 {
@@ -169,7 +170,7 @@ fn what_never_meets() {
         change(&mut instance);
         scene.update(&[(id, instance)]).expect("a good state");
     };
-    // One side of the filter is enough to keep two apart.
+    // One side of the filter is enough to exclude a pair.
     edit(&mut scene, ids[0], &|i| i.groups = Groups { memberships: 1, filter: !2 });
     edit(&mut scene, ids[1], &|i| i.groups = Groups { memberships: 2, filter: !0 });
     assert_eq!(touching(&scene), [(0, 2), (2, 0), (1, 2), (2, 1)]);
@@ -232,7 +233,8 @@ fn many_worlds_are_many_times_one() {
     assert!(worlds.is_sorted());
 }
 
-/// Bodies on a grid that do not touch, but for one pair in a thousand. A million: the example `many_instances`.
+/// Bodies on a grid. Only one pair in a thousand touches. The example `many_instances` has a
+/// million bodies.
 #[test]
 fn a_hundred_thousand_instances() {
     let count = 100_000usize;
@@ -259,7 +261,7 @@ fn a_hundred_thousand_instances() {
     let expected: Vec<(u32, u32)> =
         (0..count as u32).step_by(1000).flat_map(|k| [(k, k + 1), (k + 1, k)]).collect();
     assert_eq!(pairs, expected);
-    // It is contacts that cost, not instances.
+    // The cost depends on contacts, not on instances.
     assert_eq!(found.statistics.instance_pairs, expected.len());
     assert!(found.statistics.bytes < 100_000 + 1000 * found.contacts.len(), "{:?}", found.statistics);
 }

@@ -1,4 +1,5 @@
-//! Reading tetrahedra: each format against the same mesh, and what is at fault in files that are not.
+//! Reads tetrahedra: each format is compared with the same mesh, and faulty files give errors that
+//! name the fault.
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -19,10 +20,10 @@ fn golden(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/tetrahedra").join(name)
 }
 
-/// What else than its 60 tetrahedra the cylinder has.
+/// Other elements of the cylinder, besides its 60 tetrahedra.
 const SKIPPED: Skipped = Skipped { points: 2, lines: 16, surfaces: 58 };
 
-/// The corners of each tetrahedron as positions, which do not depend on how vertices are numbered.
+/// Corners of each tetrahedron as positions, which do not depend on vertex numbers.
 fn positions(mesh: &TetMesh) -> Vec<[[f64; 3]; 4]> {
     (0..mesh.tetrahedra().len()).map(|t| mesh.corners(t).map(|p| p.to_array())).collect()
 }
@@ -68,14 +69,15 @@ fn vtu_files_hold_the_same_tetrahedra() {
         let found = positions(&loaded.mesh);
         let differ = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-15;
         let close = !found.iter().flatten().flatten().zip(expected.iter().flatten().flatten()).any(differ);
-        // VTK writes text with fewer digits than it needs.
+        // VTK writes text with fewer digits than needed.
         assert!(if name == "ascii.vtu" { close } else { found == expected }, "{name}");
         let skipped = if name == "meshio.vtu" { Skipped::default() } else { SKIPPED };
         assert_eq!((loaded.format, loaded.skipped), (TetFormat::Vtu, skipped), "{name}");
     }
 }
 
-/// TetGen's files, from either path, counted from 0 and from 1, conform to the surface that they fill.
+/// TetGen's files, from either path, counted from 0 or from 1, conform to the surface that they
+/// fill.
 #[test]
 fn the_beam_conforms() {
     let beam = read_tetrahedra(&data("beam.node")).unwrap();
@@ -219,7 +221,7 @@ fn tetgen_errors_name_the_line() {
     }
 }
 
-/// A VTU file of one piece whose points are the appended bytes.
+/// A VTU file with one piece whose points are the appended bytes.
 fn vtu_of_points(points: &[u8]) -> Vec<u8> {
     let head = "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\" header_type=\"UInt32\" \
                 compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\">\n\
@@ -244,7 +246,7 @@ fn bytes_that_unpack_to_gigabytes_are_refused_before() {
     let error = bomb(64);
     assert!(error.starts_with("VTU, line 5: "), "{error}");
     assert!(error.contains("to 301989888 bytes") && error.contains("at most 100 times"), "{error}");
-    // A file of a size that meshes have is judged by what is in it.
+    // A file of ordinary size is judged by its content.
     let error = bomb(1);
     assert!(!error.contains("unpack"), "{error}");
 }

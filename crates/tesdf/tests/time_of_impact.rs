@@ -1,4 +1,4 @@
-//! Time of impact: against formulas, and against clearances at many times before it.
+//! Compares the time of impact with formulas, and with clearances at many earlier times.
 mod support;
 
 use std::sync::Arc;
@@ -73,7 +73,8 @@ impl Case {
             .distance
     }
 
-    /// Apart at `samples` times before the impact, or the end; within the tolerance at it.
+    /// Checks that the bodies are apart at `samples` times before the impact (or the end), and
+    /// within the tolerance at the impact.
     fn check(&self, options: &TimeOfImpactOptions, samples: u32) -> Option<Impact> {
         let impact = self.impact(options);
         let until = impact.map_or(options.end, |i| i.time);
@@ -134,7 +135,7 @@ fn what_moves_alike_or_away_never_meets() {
     let away = linear([1.0, 0.0, 0.0], [0.0; 3]);
     let case = Case::new(ball.clone(), at(2.0, 0.0, 0.0), away, cube.clone(), Pose::IDENTITY, Motion::Rest);
     assert!(case.check(&EXACT, 5).is_none());
-    // The end comes first.
+    // The end of the interval comes first.
     let slow = linear([-0.05, 0.0, 0.0], [0.0; 3]);
     assert!(
         Case::new(ball, at(2.0, 0.0, 0.0), slow, cube, Pose::IDENTITY, Motion::Rest).impact(&EXACT).is_none()
@@ -143,7 +144,7 @@ fn what_moves_alike_or_away_never_meets() {
 
 #[test]
 fn nothing_thin_and_fast_is_passed_through() {
-    // A sheet that crosses a sheet of the same thickness in 2e-10 of the time.
+    // A sheet that passes through a sheet of the same thickness in 2e-10 of the time.
     let sheet = boxed(DVec3::new(1.0, 1.0, 1e-4));
     let fast = linear([0.0, 0.0, -1e6], [0.0; 3]);
     let case = Case::new(sheet.clone(), at(0.3, 0.2, 500.0), fast, sheet, Pose::IDENTITY, Motion::Rest);
@@ -153,8 +154,8 @@ fn nothing_thin_and_fast_is_passed_through() {
 
 #[test]
 fn a_turning_bar_hits_what_is_in_its_way() {
-    // The bar's side is at y = 0.1 in its frame; a ball of radius 0.2 on the y axis, two out, is met at the angle where its centre
-    // is 0.3 from the bar's axis.
+    // The bar's side is at y = 0.1 in its frame. A ball of radius 0.2 lies on the y axis at y = 2.
+    // They meet at the angle where the ball's centre is 0.3 from the bar's axis.
     let bar = boxed(DVec3::new(3.0, 0.1, 0.1));
     let ball = Shape::Sphere { radius: 0.2 };
     let expected = (std::f64::consts::FRAC_PI_2 - (0.3f64 / 2.0).asin()) / 0.5;
@@ -174,7 +175,7 @@ fn a_turning_bar_hits_what_is_in_its_way() {
             "{impact:?} {expected}"
         );
     }
-    // The ball around the bar instead: the same by symmetry.
+    // The ball moves around the bar instead; by symmetry the time is the same.
     let case = Case::new(
         bar,
         Pose::IDENTITY,
@@ -235,7 +236,7 @@ fn what_touches_or_penetrates_at_the_start_has_time_0() {
 
 #[test]
 fn steps_that_are_used_up_are_said_to_be() {
-    // Sliding along a wall at a distance of 0.01: ever so many steps.
+    // Sliding along a wall at a distance of 0.01 needs a very large number of steps.
     let (cube, slide) = (boxed(DVec3::ONE), linear([1.0, 0.0, 0.0], [0.0; 3]));
     let case = Case::new(cube.clone(), at(0.0, 0.0, 2.01), slide, cube, Pose::IDENTITY, Motion::Rest);
     let options = TimeOfImpactOptions { iterations: 10, ..EXACT };
@@ -262,7 +263,8 @@ fn a_nut_turns_freely_down_its_pitch_and_jams_otherwise() {
     let case =
         |pitch| Case::new(nut.clone(), start, screw(pitch), bolt.clone(), Pose::IDENTITY, Motion::Rest);
     assert_eq!(case(2.0).impact(&options), None, "along its thread it is free");
-    // With ten times the pitch it is off by nine pitches a turn; the flanks, 0.05 apart, are 0.058 apart along the axis, less facets.
+    // With ten times the pitch, the nut is off by nine pitches per turn. The flanks are 0.05 apart,
+    // so 0.058 along the axis, minus the effect of flat facets.
     let jam = case(20.0).check(&options, 3).expect("it jams");
     let shift = 18.0 * jam.time / std::f64::consts::TAU;
     assert!(jam.touches && (0.01..0.06).contains(&shift), "{jam:?} after {shift}");

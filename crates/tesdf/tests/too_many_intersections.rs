@@ -1,10 +1,10 @@
-//! Faces that all meet each other: as many pairs as the square of their number, which are not listed.
+//! Faces that all meet each other have a quadratic number of pairs, which are not listed.
 use std::collections::BTreeMap;
 
 use tesdf::glam::DVec3;
 use tesdf::mesh::{DefectKind, RepairOptions, Severity, SolidMesh, TriangleMesh, check, repair};
 
-/// Needles along x and along y, closed, that all cross each other.
+/// Closed needles along x and along y that all cross each other.
 fn crossing_needles(count: u32) -> TriangleMesh {
     let (mut vertices, mut faces) = (Vec::new(), Vec::new());
     for k in 0..count {

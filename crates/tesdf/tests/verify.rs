@@ -1,4 +1,4 @@
-//! Brute force finds what is wrong with an asset; a good one passes.
+//! Brute force finds the faults of an asset, and a good asset passes.
 mod support;
 
 use std::ops::ControlFlow;
@@ -19,7 +19,7 @@ fn encoded(solid: &SolidMesh) -> TeSdf {
     encode(solid, &Source::default(), &options, &EncodeProgress::default()).expect("valid options")
 }
 
-/// A ball with a box-shaped cavity: cells of every label.
+/// A ball with a box-shaped cavity, which has cells of every label.
 fn hollow() -> TeSdf {
     let mut shape = Shape::default().add_sphere(DVec3::new(3.0, -2.0, 0.5), 3, || 1.0);
     let outer = shape.faces.len();
@@ -32,7 +32,7 @@ fn verified(asset: &TeSdf, samples: usize) -> VerifyReport {
     verify(asset, &VerifyOptions { samples, seed: 1 }, |_| ControlFlow::Continue(())).expect("a valid mesh")
 }
 
-/// The asset after `change` of a section; opening does not look at checksums.
+/// The asset after `change` of a section. Opening does not verify checksums.
 fn changed(asset: &TeSdf, spec: SectionSpec, change: impl Fn(&mut [u8])) -> TeSdf {
     let mut bytes = asset.as_bytes().to_vec();
     let section = asset.container().sections().find(|s| s.spec == spec).expect("the section is there").bytes;
@@ -80,7 +80,7 @@ fn a_comparison_can_be_broken_off() {
         ControlFlow::Break(())
     });
     assert_eq!(found, Err(VerifyError::Cancelled));
-    // One for each thread at most, of three thousand.
+    // At most one chunk per thread, of three thousand chunks.
     assert!(chunks.into_inner() <= rayon::current_num_threads());
 }
 
@@ -104,7 +104,7 @@ fn a_wrong_label_is_a_sign_mistake() {
 #[test]
 fn a_face_that_is_missing_from_the_lists_is_found() {
     let asset = encoded(&Shape::default().add_box(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0), 1).solid());
-    // Every list is of slots of one palette of all 12 faces: face at place 4 becomes that at place 5.
+    // Every list uses slots of one palette with all 12 faces. Face index 4 is replaced by 5.
     let asset = changed(&asset, layout::PALETTES, |bytes| {
         for word in bytes.as_chunks_mut::<2>().0 {
             if u16::from_le_bytes(*word) == 4 {
@@ -122,7 +122,7 @@ fn a_face_that_is_missing_from_the_lists_is_found() {
 
 #[test]
 fn a_wrong_sign_hint_is_found() {
-    // "Points that this feature is closest to are inside", for every feature.
+    // Every feature says that the points closest to it are inside.
     let asset = changed(&hollow(), layout::SIGN_HINTS, |bytes| bytes.fill(0xff));
     for precision in verified(&asset, 2000).precisions {
         assert!(!precision.passed && precision.sign_mistakes > 50, "{precision:#?}");
@@ -183,7 +183,7 @@ fn reads_by_volume_are_those_of_random_points() {
     let options = InspectOptions { samples: 2000, seed: 5 };
     let found = inspect(&asset, &options);
     assert_eq!(found, inspect(&asset, &options));
-    // By rejection, with points that are not those of `inspect`.
+    // Random points by rejection, other than those of `inspect`.
     let mut random = support::random::Random(9);
     let (mut reads, mut count) = (0, 0);
     let (low, high) = (DVec3::new(1.5, -3.5, -1.0), DVec3::new(4.5, -0.5, 2.0));

@@ -1,7 +1,7 @@
-//! Small glTF and OFF samples, made here so that tests can vary them.
+//! Small glTF and OFF samples, generated here so that tests can vary them.
 #![allow(dead_code, reason = "each test program uses its own part")]
 
-/// A tetrahedron (0, x, y, z) as positions (f32) and twelve indices (u8), 48 + 12 bytes.
+/// A tetrahedron (0, x, y, z) as positions (f32) and twelve indices (u8): 48 + 12 bytes.
 pub fn tetrahedron_buffer() -> Vec<u8> {
     let positions: [f32; 12] = [0., 0., 0., 1., 0., 0., 0., 1., 0., 0., 0., 1.];
     let mut buffer: Vec<u8> = positions.iter().flat_map(|v| v.to_le_bytes()).collect();
@@ -9,7 +9,7 @@ pub fn tetrahedron_buffer() -> Vec<u8> {
     buffer
 }
 
-/// glTF JSON around that buffer; `uri` is the buffer's `uri` member with a comma, or nothing.
+/// glTF JSON for that buffer. `uri` is the buffer's `uri` member with a comma, or empty.
 pub fn json(uri: &str, nodes: &str) -> String {
     format!(
         r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],"nodes":[{nodes}],

@@ -1,4 +1,4 @@
-//! Encoded meshes of `data/`, made once per test program, and where the tests put them.
+//! Encoded meshes of `data/`, made once per test program, and relative placements of two bodies.
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex};
 
@@ -12,20 +12,22 @@ use tesdf::mesh::SolidMesh;
 use super::meshes;
 use super::random::Random;
 
-/// A mesh, and its asset.
+/// A mesh and its asset.
 pub struct Body {
     pub solid: SolidMesh,
     pub asset: Arc<TeSdf>,
 }
 
-/// The mesh of a row of the manifest, by name; cells are as coarse as detection still likes, as nobody waits for queries here.
+/// The mesh of a row of the manifest, by name. It is encoded with coarse cells, because these tests
+/// do not measure queries.
 pub fn body(name: &str) -> Arc<Body> {
     static BODIES: LazyLock<Mutex<HashMap<String, Arc<Body>>>> = LazyLock::new(Mutex::default);
     let known = || BODIES.lock().expect("no test panics while it looks");
     if let Some(body) = known().get(name) {
         return body.clone();
     }
-    // Not under the lock: encoding is parallel, and its thread may take up another task that wants a body.
+    // Encode without the lock: encoding is parallel, and its thread may take up another task that
+    // needs a body.
     let row = meshes::manifest().into_iter().find(|r| r.name == name).expect("a row of the manifest");
     let body = Arc::new(Body::new(row.solid().expect("a solid")));
     known().entry(name.into()).or_insert(body).clone()
@@ -48,13 +50,13 @@ impl Body {
         self.solid.mesh().bounds().center()
     }
 
-    /// A face in the world, by its id in the mesh.
+    /// Corners of a face in the world, by its id in the mesh.
     pub fn face(&self, face: u32, at: Placement) -> [DVec3; 3] {
         self.solid.mesh().triangle(face as usize).map(|p| at.to_world(p))
     }
 }
 
-/// A body somewhere.
+/// A body with a placement.
 #[derive(Clone)]
 pub struct Placed {
     pub body: Arc<Body>,
@@ -66,14 +68,14 @@ impl Placed {
         Self { body: body(name), at }
     }
 
-    /// Turned by `rotation` about its middle, which goes to `to`.
+    /// Rotates the body by `rotation` about its centre, and moves the centre to `to`.
     pub fn around(name: &str, rotation: DQuat, scale: f64, to: DVec3) -> Self {
         let body = body(name);
         let translation = to - rotation * (scale * body.center());
         Self { body, at: Placement { pose: Pose { translation, rotation }, scale } }
     }
 
-    /// Signed distance from a point of the world, by the tree over all faces.
+    /// Signed distance at a point of the world, from the tree over all faces.
     pub fn distance_by_tree(&self, p: DVec3) -> f64 {
         let precision = tesdf::query::Precision::F64;
         self.at.scale * self.body.asset.query_by_tree(self.at.to_shape(p), precision).signed_distance
@@ -98,12 +100,12 @@ pub fn scene(bodies: &[Placed]) -> Scene {
     scene
 }
 
-/// Those of one direction.
+/// The contacts of the ordered pair (`a`, `b`).
 pub fn of_direction(contacts: &[Contact], a: u32, b: u32) -> impl Iterator<Item = &Contact> {
     contacts.iter().filter(move |c| (c.instance_a, c.instance_b) == (InstanceId(a), InstanceId(b)))
 }
 
-/// Uniform over all rotations.
+/// A uniformly random rotation.
 pub fn rotation(random: &mut Random) -> DQuat {
     loop {
         let (v, w) = (random.in_cube(), random.between(-1.0, 1.0));
@@ -114,24 +116,25 @@ pub fn rotation(random: &mut Random) -> DQuat {
     }
 }
 
-/// How two bodies lie to each other.
+/// Relative placement of two bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Relation {
-    /// Some face of the one lies close to some face of the other, within 1e-3 of the diagonal on either side.
+    /// A face of one body lies close to a face of the other, within 1e-3 of the diagonal on either
+    /// side.
     Touching,
-    /// A vertex of the one lies on a face of the other up to rounding.
+    /// A vertex of one body lies on a face of the other up to rounding.
     JustTouching,
-    /// Middles closer than a quarter of the diagonal.
+    /// The centres are closer than a quarter of the diagonal.
     Deep,
-    /// The very same pose.
+    /// Exactly the same pose.
     Same,
-    /// Bounds apart.
+    /// The bounds are apart.
     Apart,
-    /// A hundred diagonals away.
+    /// A hundred diagonals apart.
     Far,
-    /// The second is smaller and in the middle of the first.
+    /// The second body is smaller, in the middle of the first.
     Inside,
-    /// Bounds share a side, both parallel to the axes: faces lie in one plane.
+    /// The bounds share a side, and both bodies are parallel to the axes, so faces are coplanar.
     SharedFaces,
 }
 
@@ -147,7 +150,8 @@ pub const RELATIONS: [Relation; 8] = [
 ];
 
 impl Relation {
-    /// Two bodies that lie like this; the first one is as it is in its file, but for a random motion of both.
+    /// Places two bodies in this relation. The first body has the pose of its file, except for a
+    /// random motion of both bodies.
     pub fn place(self, names: [&str; 2], random: &mut Random) -> [Placed; 2] {
         let first = Placed::new(names[0], Placement { pose: Pose::IDENTITY, scale: 1.0 });
         let other = body(names[1]);
@@ -185,14 +189,14 @@ impl Relation {
         };
         let both = Pose { translation: size * random.in_cube(), rotation: rotation(random) };
         match self {
-            // Turned, they would lie in one plane only up to rounding.
+            // After a rotation, the faces would be coplanar only up to rounding.
             Self::SharedFaces | Self::Same => [first, second],
             _ => [first.moved(both), second.moved(both)],
         }
     }
 }
 
-/// The second body with one of its vertices on a face of the first, moved out by `by`.
+/// The second body with one of its vertices on a face of the first body, moved out by `by`.
 fn touching(first: &Placed, other: &Body, name: &str, random: &mut Random, by: f64) -> Placed {
     let mesh = first.body.solid.mesh();
     let face = mesh.triangle(random.index(mesh.faces().len()));
@@ -202,7 +206,7 @@ fn touching(first: &Placed, other: &Body, name: &str, random: &mut Random, by: f
     let scale = first.body.diagonal() / other.diagonal();
     let vertices = other.solid.mesh().vertices();
     let vertex = vertices[random.index(vertices.len())];
-    // The vertex looks down on the face.
+    // The body is above the face, with the vertex pointing down.
     let look = (other.center() - vertex).normalize_or(DVec3::Z);
     let rotation = DQuat::from_rotation_arc(look, outward);
     let translation = at + by * outward - rotation * (scale * vertex);

@@ -11,20 +11,20 @@ use super::random::Random;
 pub struct Located {
     pub cell: Cell,
     pub node: Node,
-    /// Faces by position, as stored.
+    /// Faces of the list by their index in the file, in stored order.
     pub positions: Vec<u32>,
-    /// Faces by their ids in the source.
+    /// Faces of the list by their ids in the source.
     pub faces: Vec<u32>,
 }
 
-/// The cells of an asset, read from its sections alone.
+/// The cells of an asset, decoded from its sections alone.
 pub struct Cells {
     pub frame: LocalFrame,
     pub cube: DomainCube,
     pub leaves: Vec<Located>,
     nodes: Vec<u32>,
     lists: Vec<u8>,
-    /// Leaf of each word.
+    /// For each word of the forest, its leaf.
     leaf_of: Vec<Option<u32>>,
 }
 
@@ -82,7 +82,7 @@ impl Cells {
         self.leaves.push(Located { cell, node, positions, faces });
     }
 
-    /// The cell that point location finds, `p` in the local frame.
+    /// The cell that point location finds. `p` is in the local frame.
     pub fn locate(&self, p: DVec3) -> Option<&Located> {
         let (mut word, mut lambda) = self.cube.locate(p, 0)?;
         let mut depth = 0;
@@ -93,8 +93,8 @@ impl Cells {
         self.leaf_of[word].map(|leaf| &self.leaves[leaf as usize])
     }
 
-    /// A point of a cell of the domain, of the kind that rounding likes least: on a corner, an edge or a side, exactly or
-    /// a few ulp beside. In the mesh's unit.
+    /// A point of a cell of the domain where rounding matters most: on a corner, an edge or a side,
+    /// exactly or a few ulp beside it. In the mesh's unit.
     pub fn border_point(&self, random: &mut Random) -> DVec3 {
         let leaf = &self.leaves[random.index(self.leaves.len())];
         let mut weights: [f64; 4] = random.weights();
@@ -135,13 +135,13 @@ impl Lists {
     }
 }
 
-/// The point with these weights, of sum 1.
+/// The weighted mean of the corners. The weights are normalised to sum 1.
 pub fn combine(corners: &[DVec3; 4], weights: &[f64; 4]) -> DVec3 {
     let sum: f64 = weights.iter().sum();
     (0..4).map(|k| weights[k] / sum * corners[k]).sum()
 }
 
-/// Barycentric coordinates.
+/// Barycentric coordinates of `p`.
 pub fn barycentric(corners: &[DVec3; 4], p: DVec3) -> [f64; 4] {
     let volume = |t: [DVec3; 4]| (t[1] - t[0]).cross(t[2] - t[0]).dot(t[3] - t[0]);
     let whole = volume(*corners);
@@ -152,7 +152,7 @@ pub fn barycentric(corners: &[DVec3; 4], p: DVec3) -> [f64; 4] {
     })
 }
 
-/// All points of a lattice over a cell, its corners included.
+/// The points of a lattice over a cell, including its corners.
 pub fn lattice(corners: &[DVec3; 4], n: usize) -> Vec<DVec3> {
     let mut points = Vec::new();
     for i in 0..=n {

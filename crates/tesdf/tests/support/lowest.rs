@@ -1,4 +1,5 @@
-//! The least of a function over a polygon by samples alone, and clipping by a tetrahedron's four planes.
+//! Minimum of a function over a polygon from samples alone, and clipping by the four planes of a
+//! tetrahedron.
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
@@ -34,8 +35,9 @@ pub fn area(polygon: &[DVec3]) -> f64 {
     (1..polygon.len().saturating_sub(1)).map(fan).sum::<DVec3>().length()
 }
 
-/// The least value that is found, and where: a lattice over each triangle of the polygon's fan, then a search around the best
-/// points in steps that halve, down to `finest` of the size. No more than a search: it finds nothing lower than the minimum.
+/// The least value that the search finds, and its point. It samples a lattice over each triangle of
+/// the polygon's fan, then searches around the best points in steps that halve, down to `finest` of
+/// the size. The result is an upper bound of the minimum.
 pub fn sampled(polygon: &[DVec3], lattice: usize, finest: f64, value: impl Fn(DVec3) -> f64) -> (f64, DVec3) {
     let mut best = (f64::INFINITY, DVec3::ZERO);
     let n = lattice.max(1);
@@ -74,7 +76,7 @@ pub fn sampled(polygon: &[DVec3], lattice: usize, finest: f64, value: impl Fn(DV
     best
 }
 
-/// Towards, away from, and along the sides of a triangle, in barycentric coordinates.
+/// Steps towards, away from and along the sides of a triangle, in barycentric coordinates.
 const MOVES: [[f64; 3]; 12] = [
     [1.0, -1.0, 0.0],
     [-1.0, 1.0, 0.0],
@@ -90,7 +92,7 @@ const MOVES: [[f64; 3]; 12] = [
     [0.5, 0.5, -1.0],
 ];
 
-/// A part of a triangle that is still open, the one of the lowest bound first.
+/// A part of a triangle that still needs work; the part with the lowest bound comes first.
 struct Open {
     bound: f64,
     corners: [DVec3; 3],
@@ -113,11 +115,12 @@ impl Ord for Open {
     }
 }
 
-/// Between what two numbers the least signed distance over a triangle lies, by branch and bound; they are no farther apart than
-/// `tolerance` unless `most` evaluations were not enough.
+/// Lower and upper bound of the least signed distance over a triangle, by branch and bound. They
+/// differ by at most `tolerance`, unless `most` evaluations were not enough.
 ///
-/// `nearest` gives the signed distance at a point and the nearest triangle. The field is 1-Lipschitz, and nowhere deeper than the distance
-/// to any one triangle, which is convex.
+/// `nearest` gives the signed distance at a point and the nearest triangle. Two facts give the
+/// bounds: the field is 1-Lipschitz, and it is nowhere deeper than the distance to any one
+/// triangle, which is convex.
 pub fn certified(
     triangle: [DVec3; 3],
     tolerance: f64,
@@ -138,7 +141,7 @@ pub fn certified(
     };
     add(triangle, &mut open);
     while let Some(Open { bound, corners: [a, b, c] }) = open.pop() {
-        // Four alike, where the detector halves.
+        // Quarters the triangle, whereas the detector halves it.
         let [d, e, f] = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)];
         let mut now = (f64::INFINITY, 0);
         for part in [[a, d, f], [d, b, e], [f, e, c], [d, e, f]] {

@@ -2,7 +2,7 @@ use std::path::{Path, PathBuf};
 
 use tesdf::mesh::{RepairOptions, SolidMesh, read, repair};
 
-/// What a row of `data/MANIFEST.tsv` says of a mesh that can be encoded, as it is or repaired.
+/// A row of `data/MANIFEST.tsv` for a mesh that can be encoded, as it is or after repair.
 pub struct Row {
     pub name: String,
     pub path: PathBuf,
@@ -11,16 +11,16 @@ pub struct Row {
     pub references: Vec<PathBuf>,
 }
 
-/// Surfaces with real cracks, which only a wider tolerance closes, in the mesh's unit.
+/// Meshes with real cracks that only a wider tolerance closes, in the mesh's unit.
 const WELDED: [(&str, f64); 1] = [("soup_jitter_obj", 1e-8)];
-/// Surfaces with cracks that no weld closes: default repair leaves them, and says so.
+/// Meshes with cracks that no weld closes. Default repair leaves the cracks and reports them.
 pub const CRACKED: [&str; 2] = ["factory_nut_m4_loose_subdiv_3x", "factory_nut_m8_loose_subdiv_3x"];
 
 pub fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data")
 }
 
-/// All rows but those that are to be rejected. A file that is missing fails when it is read.
+/// All rows except those marked for rejection. A missing file fails when it is read.
 pub fn manifest() -> Vec<Row> {
     let text = std::fs::read_to_string(data().join("MANIFEST.tsv")).expect("data/MANIFEST.tsv");
     let mut lines = text.lines();
@@ -54,7 +54,7 @@ pub fn manifest() -> Vec<Row> {
 }
 
 impl Row {
-    /// The solid, repaired where the manifest says so.
+    /// The solid, repaired when the manifest says so.
     pub fn solid(&self) -> Result<SolidMesh, String> {
         let loaded = read(&self.path).map_err(|e| format!("{}: {e}", self.path.display()))?;
         let mut mesh = loaded.mesh;
@@ -78,7 +78,7 @@ impl Row {
     }
 }
 
-/// The mesh of a file of `data/`, which must be a solid.
+/// The mesh of a file in `data/`, which must be a solid.
 pub fn named(file: &str) -> SolidMesh {
     let path = data().join(file);
     let loaded = read(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));

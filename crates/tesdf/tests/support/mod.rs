@@ -1,5 +1,6 @@
-//! What the tests of encoding and queries share: the meshes of `data/`, an exact reference by brute force, seeded points,
-//! closed shapes, and the cells of an asset read from its bytes alone.
+//! Shared parts of the tests of encoding and queries: the meshes of `data/`, an exact reference by
+//! brute force, seeded points, closed shapes, and the cells of an asset decoded from its bytes
+//! alone.
 #![allow(dead_code, reason = "each test program uses its own part")]
 
 pub mod bodies;

@@ -4,18 +4,18 @@ use tesdf::mesh::TriangleMesh;
 use super::cells::Cells;
 use super::random::Random;
 
-/// Where a point of [`sample`] was put.
+/// Placement of a point of [`sample`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Beside the surface, within 2 % of the diagonal.
+    /// Near the surface, within 2 % of the diagonal.
     Near,
-    /// Beside the surface, 1e-13 to 1e-1 of the diagonal, from faces, edges and vertices alike, in any direction.
+    /// 1e-13 to 1e-1 diagonals from faces, edges and vertices, in any direction.
     Beside,
     Face,
     Edge,
     Vertex,
     CellBorder,
-    /// In the bounds, deep inside too.
+    /// Inside the bounds, also deep inside.
     Deep,
     /// Up to a few diagonals away.
     Outside,
@@ -35,7 +35,7 @@ pub const KINDS: [Kind; 9] = [
     Kind::FarAway,
 ];
 
-/// `TESDF_TEST_POINTS`, or `default`: points per mesh.
+/// Number of points per mesh: `TESDF_TEST_POINTS`, or `default`.
 pub fn count(default: usize) -> usize {
     match std::env::var("TESDF_TEST_POINTS") {
         Ok(text) => text.parse().expect("TESDF_TEST_POINTS is a number of points"),
@@ -43,7 +43,7 @@ pub fn count(default: usize) -> usize {
     }
 }
 
-/// `n` points in turn of each kind; the same for the same mesh and cells.
+/// `n` points, with the kinds in turn. The same mesh and cells give the same points.
 pub fn sample(mesh: &TriangleMesh, cells: &Cells, n: usize) -> Vec<(Kind, DVec3)> {
     let mut random = Random(mesh.faces().len() as u64);
     let areas = Areas::of(mesh);
@@ -82,7 +82,7 @@ pub fn on(face: [DVec3; 3], weights: [f64; 3]) -> DVec3 {
     face[0] + weights[1] / sum * (face[1] - face[0]) + weights[2] / sum * (face[2] - face[0])
 }
 
-/// Faces by area.
+/// Picks faces with probability proportional to their area.
 struct Areas(Vec<f64>);
 
 impl Areas {

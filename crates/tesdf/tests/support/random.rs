@@ -1,6 +1,6 @@
 use tesdf::glam::DVec3;
 
-/// SplitMix64: the same points on every machine.
+/// SplitMix64, which gives the same points on every machine.
 pub struct Random(pub u64);
 
 impl Random {
@@ -11,7 +11,7 @@ impl Random {
         x ^ x >> 31
     }
 
-    /// In [0, 1).
+    /// Uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -26,12 +26,12 @@ impl Random {
         if self.bits() & 1 == 0 { size } else { -size }
     }
 
-    /// Below `n`.
+    /// An index below `n`.
     pub fn index(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
 
-    /// In the cube from -1 to 1.
+    /// A point of the cube [-1, 1)³.
     pub fn in_cube(&mut self) -> DVec3 {
         DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
     }
@@ -45,7 +45,7 @@ impl Random {
         }
     }
 
-    /// Weights of sum 1, uniform over a simplex.
+    /// Barycentric weights, uniform over a simplex.
     pub fn weights<const N: usize>(&mut self) -> [f64; N] {
         let w: [f64; N] = std::array::from_fn(|_| -(1.0 - self.unit()).ln());
         let sum: f64 = w.iter().sum();

@@ -2,16 +2,17 @@ use tesdf::geometry::{Aabb, AabbTree, Closest, LocalFrame, Triangle, WindingNumb
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 
-/// Exact distances from all faces, with none of the encoder.
+/// Exact distances from all faces, without code of the encoder.
 ///
-/// It computes in the mesh's local frame, into which the vertices go without rounding (checked here).
+/// It computes in the mesh's local frame. Vertices are mapped there without rounding, which is
+/// checked here.
 pub struct Reference {
     pub triangles: Vec<Triangle>,
     pub faces: Vec<[u32; 3]>,
     pub frame: LocalFrame,
-    /// In the mesh's unit.
+    /// Diagonal of the mesh, in the mesh's unit.
     pub diagonal: f64,
-    /// Largest coordinate of the mesh, in its unit.
+    /// Largest absolute coordinate of the mesh, in the mesh's unit.
     pub largest: f64,
     tree: AabbTree,
     winding: WindingNumber,
@@ -43,14 +44,14 @@ impl Reference {
         self.diagonal * self.frame.scale
     }
 
-    /// The nearest face and where, `p` in the local frame.
+    /// The nearest face and its closest point. `p` is in the local frame.
     pub fn closest_local(&self, p: DVec3) -> (u32, Closest) {
         let nearest = self.tree.nearest(p, |f| self.triangles[f as usize].closest(p).distance.powi(2));
         let face = nearest.expect("a mesh has faces").1;
         (face, self.triangles[face as usize].closest(p))
     }
 
-    /// All faces at most `reach` away, `p` in the local frame.
+    /// All faces within a distance of `reach`. `p` is in the local frame.
     pub fn within_local(&self, p: DVec3, reach: f64) -> Vec<(u32, Closest)> {
         let mut found = Vec::new();
         let grown = reach * (1.0 + 1e-12) + 1e-15;
@@ -78,7 +79,7 @@ impl Reference {
         found
     }
 
-    /// Distance in the mesh's unit, negative inside.
+    /// Signed distance, negative inside. In the mesh's unit.
     pub fn signed_distance(&self, p: DVec3) -> f64 {
         let distance = self.closest_local(self.frame.to_local(p)).1.distance / self.frame.scale;
         if self.is_inside(p) { -distance } else { distance }
@@ -92,9 +93,10 @@ impl Reference {
         &self.winding
     }
 
-    /// Bounds of the distance from all faces, without the tree and without trusting [`Triangle::closest`]: the answer
-    /// `c` for a face is on it up to rounding, and by convexity no point of the face is closer to `p` than
-    /// `sqrt(|p - c|² - 2 max over its corners v of (p - c)·(v - c))`. Local frame.
+    /// Bounds of the distance from all faces, without the tree and without trusting
+    /// [`Triangle::closest`]. The closest point `c` of a face lies on the face up to rounding. By
+    /// convexity, no point of the face is closer to `p` than `sqrt(|p - c|² - 2 max over its
+    /// corners v of (p - c)·(v - c))`. In the local frame.
     pub fn certified_bounds(&self, p: DVec3) -> [f64; 2] {
         self.triangles.iter().fold([f64::INFINITY; 2], |[low, high], t| {
             let c = t.closest(p).point;
@@ -105,19 +107,19 @@ impl Reference {
         })
     }
 
-    /// What the `f64` path promises: 1e-12 × diagonal plus 4 ulp of the largest coordinate.
+    /// Error bound of the `f64` path: 1e-12 × diagonal plus 4 ulp of the largest coordinate.
     pub fn tolerance_f64(&self, p: DVec3) -> f64 {
         let largest = self.largest.max(p.abs().max_element());
         1e-12 * self.diagonal + 4.0 * (largest.next_up() - largest)
     }
 
-    /// What `f32` storage promises; the ulps of the coordinates given are not its own.
+    /// Error bound of `f32` storage. The ulps of the input coordinates come in addition.
     pub fn tolerance_f32(&self, p: DVec3) -> f64 {
         1e-6 * self.diagonal + self.tolerance_f64(p)
     }
 }
 
-/// Whether an error is more than allowed; NaN is.
+/// Whether an error exceeds the tolerance. NaN does.
 pub fn exceeds(error: f64, tolerance: f64) -> bool {
     error > tolerance || error.is_nan()
 }

@@ -5,14 +5,14 @@ use tesdf::mesh::{SolidMesh, TriangleMesh};
 
 use super::random::Random;
 
-/// Closed surfaces, one after the other.
+/// A mesh to which closed surfaces are added one by one.
 #[derive(Default)]
 pub struct Shape {
     pub vertices: Vec<DVec3>,
     pub faces: Vec<[u32; 3]>,
 }
 
-/// Corners of the sides of a box, outward; bit `k` of a corner picks the maximum of axis `k`.
+/// Corners of the sides of a box, outward. Bit `k` of a corner selects the maximum of axis `k`.
 const SIDES: [[u32; 4]; 6] =
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
@@ -25,7 +25,7 @@ impl Shape {
         TriangleMesh::new(self.vertices, self.faces).expect("valid ids")
     }
 
-    /// A box with sides of `n` × `n` squares.
+    /// Adds a box whose sides have `n` × `n` squares.
     pub fn add_box(mut self, min: DVec3, max: DVec3, n: u32) -> Self {
         let mut ids = HashMap::new();
         for [a, b, c, d] in SIDES {
@@ -50,7 +50,8 @@ impl Shape {
         self
     }
 
-    /// A sphere of 20 · 4^`levels` faces; `radius` gives the distance of each vertex from the centre.
+    /// Adds a sphere of 20 · 4^`levels` faces. `radius` gives the distance of each vertex from the
+    /// centre.
     pub fn add_sphere(mut self, center: DVec3, levels: u32, mut radius: impl FnMut() -> f64) -> Self {
         let g = (1.0 + 5f64.sqrt()) / 2.0;
         let mut points: Vec<DVec3> = [(0, 1), (1, 2), (2, 0)]
@@ -99,22 +100,24 @@ impl Shape {
     }
 }
 
-/// Shapes that a filter goes wrong on first.
+/// Families of shapes that are difficult for a filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// A sphere with every vertex moved along its radius; it may be spiky.
     RoughSphere,
-    /// Boxes that overlap: the surface intersects itself, the winding number is 2 inside.
+    /// Overlapping boxes: the surface intersects itself, and the winding number is 2 in the
+    /// overlap.
     OverlappingBoxes,
     /// Cubes of a lattice that touch in faces, edges and corners, and keep their inner faces.
     TouchingCubes,
-    /// Two boxes with a gap of 1e-7 of the diagonal, and a wall as thin.
+    /// Two boxes with a gap of 1e-7 of the diagonal, and a wall of the same thickness.
     ThinWalls,
-    /// A box of faces a million times longer than wide.
+    /// A box whose faces are a million times longer than wide.
     Slivers,
-    /// A prism with many sides, all as far from its axis.
+    /// A prism with many sides, all at the same distance from its axis.
     Prism,
-    /// A ball in a shell, concentric: every point of the middle layer has far rivals.
+    /// A ball in a concentric shell: every point midway between them has many faces at nearly the
+    /// same distance.
     Shell,
 }
 
@@ -129,7 +132,7 @@ pub const FAMILIES: [Family; 7] = [
 ];
 
 impl Family {
-    /// A member of the family, of a size and place that change with the seed, too.
+    /// A member of the family. Its size and position also depend on the seed.
     pub fn member(self, seed: u64) -> SolidMesh {
         let mut random = Random(seed);
         let mut shape = self.shape(&mut random);
@@ -139,7 +142,7 @@ impl Family {
             1 => random.in_cube(),
             _ => 100.0 * random.in_cube(),
         };
-        // Adding is rounded the same for equal coordinates: what was closed stays closed.
+        // Equal coordinates are rounded equally, so a closed surface stays closed.
         shape.vertices.iter_mut().for_each(|v| *v = scale * (*v + to));
         shape.solid()
     }

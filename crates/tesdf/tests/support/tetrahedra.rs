@@ -7,11 +7,13 @@ use tesdf::mesh::{SolidMesh, TriangleMesh};
 
 use super::random::Random;
 
-/// The six Kuhn tetrahedra of a cube, by bits of the corners, positively oriented.
+/// The six Kuhn tetrahedra of a cube, positively oriented. The bits of a corner are its
+/// coordinates.
 const KUHN: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 5, 1, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 6, 4, 7]];
 
-/// A jittered grid of `n`³ unit cubes in six tetrahedra each, of which those that `inside` picks are the solid.
+/// A jittered grid of `n`³ unit cubes with six tetrahedra each. The tetrahedra of the cubes that
+/// `inside` selects form the solid.
 pub fn grid(n: usize, jitter: f64, inside: impl Fn(usize, usize, usize) -> bool) -> (SolidMesh, TetMesh) {
     let mut random = Random(n as u64);
     let side = n + 1;
@@ -59,7 +61,7 @@ pub fn grid(n: usize, jitter: f64, inside: impl Fn(usize, usize, usize) -> bool)
     (solid, TetMesh::new(points, tetrahedra).expect("valid tetrahedra"))
 }
 
-/// A beam of 6 × 2 × 2 cubes with an outer layer.
+/// A beam of 6 × 2 × 2 cubes, surrounded by tetrahedra.
 pub fn beam() -> (SolidMesh, ConformingMesh) {
     let inside = |x, y, z| (1..7).contains(&x) && (3..5).contains(&y) && (3..5).contains(&z);
     let (solid, tetrahedra) = grid(8, 0.1, inside);
@@ -67,7 +69,7 @@ pub fn beam() -> (SolidMesh, ConformingMesh) {
     (solid, conforming)
 }
 
-/// The same without anything around it.
+/// The same beam without tetrahedra around it.
 pub fn bare_beam() -> (SolidMesh, ConformingMesh) {
     let (solid, domain) = beam();
     let cells = domain.tetrahedra().iter().zip(domain.sides());
@@ -84,7 +86,7 @@ pub fn bend(p: DVec3) -> DVec3 {
     DVec3::new(1.0, 4.0, 4.0) + turn * (p - DVec3::new(1.0, 4.0, 4.0))
 }
 
-/// What [`TeSdf::move_vertices`](tesdf::TeSdf::move_vertices) takes to move all vertices.
+/// The argument of [`TeSdf::move_vertices`](tesdf::TeSdf::move_vertices) that moves all vertices.
 pub fn moves(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<(u32, DVec3)> {
     (0..)
         .zip(domain.vertices())

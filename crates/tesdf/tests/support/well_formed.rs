@@ -7,26 +7,28 @@ use super::cells::{Cells, Located, barycentric, combine, lattice};
 use super::random::Random;
 use super::reference::Reference;
 
-/// What an asset promises of its cells, in its local frame, checked with nothing of the encoder.
+/// The guarantees of an asset about its cells, in its local frame, checked without code of the
+/// encoder.
 ///
-/// - Cells are reached once each and halve their parents (checked as [`Cells`] reads them).
+/// - Each cell is reached once and halves its parent (checked while [`Cells`] reads them).
 /// - Lists ascend, without repetitions.
-/// - No point of a cell is farther from its list than from the mesh by more than `delta`.
-/// - A list names every face within the padding of its cell, and only crossing cells are met.
-/// - Labels agree with the winding number; what is left out of the domain is outside and beyond the band.
-/// - Point location finds the cell that holds the point.
+/// - At no point of a cell is the list farther than the mesh by more than `delta`.
+/// - A list names every face within the padding of its cell, and faces meet only crossing cells.
+/// - Labels agree with the winding number. Cells that are not of the domain are outside and beyond
+///   the band.
+/// - Point location finds the cell that contains the point.
 pub struct WellFormed<'a> {
     pub reference: &'a Reference,
     pub cells: &'a Cells,
-    /// In the local frame.
+    /// Band of the domain, in the local frame.
     pub band: f64,
-    /// Points a side of the lattice of points of each cell.
+    /// Number of lattice points along an edge of each cell.
     pub lattice: usize,
-    /// At most so many cells, evenly spread.
+    /// Largest number of checked cells; they are evenly spread.
     pub most_cells: usize,
 }
 
-/// Share of the diagonal that rounding in the encoder may cost: the certificate's.
+/// Accepted rounding error of the encoder as a fraction of the diagonal, as in the certificate.
 const DELTA: f64 = 1e-13;
 
 impl WellFormed<'_> {
@@ -86,7 +88,8 @@ impl WellFormed<'_> {
         let crossing = matches!(leaf.node, Node::Listed(Label::Crossing(_), _));
         for face in self.reference.overlapping(Aabb::of(corners).grown(PAD)) {
             let triangle = &self.reference.triangles[face as usize];
-            // The separating axes may say yes without need; only then is the distance worth its time.
+            // The separating-axis test may return true without need. Only then the slower distance
+            // is computed.
             let met = triangle_meets_tetrahedron(&triangle.corners, corners, PAD);
             if met && !(crossing && leaf.faces.contains(&face)) {
                 let gap = gap(triangle, corners);
@@ -98,7 +101,7 @@ impl WellFormed<'_> {
         Ok(())
     }
 
-    /// `p` is inside of the cell.
+    /// `p` must be inside the cell.
     fn check_label(&self, leaf: &Located, p: DVec3) -> Result<(), String> {
         let reference = self.reference;
         let winding = |p: DVec3| reference.winding().at_perturbed(reference.frame.to_world(p));
@@ -106,7 +109,8 @@ impl WellFormed<'_> {
         let right = match leaf.node {
             Node::Listed(Label::Crossing(w), _) => {
                 let centroid = leaf.cell.centroid();
-                // In the mesh's frame the centroid is rounded: on the surface it can be on another side.
+                // In the mesh's frame the centroid is rounded. Near the surface it can be on
+                // another side.
                 let beside = reference.closest_local(centroid).1.distance < 1e-12;
                 beside || winding(centroid) == w as i32
             }
@@ -120,7 +124,7 @@ impl WellFormed<'_> {
 
     fn check_location(&self, leaf: &Located, p: DVec3) -> Result<(), String> {
         let holds = |l: &Located| {
-            // Fixed point cuts coordinates to 2^-52 of the cube, whatever the depth.
+            // Fixed-point location truncates coordinates to 2^-52 of the cube, at any depth.
             let slack = 8.0 * f64::EPSILON * 2f64.powf(f64::from(l.cell.depth) / 3.0);
             barycentric(&l.cell.corners, p).iter().all(|&w| w >= -slack)
         };
@@ -132,7 +136,7 @@ impl WellFormed<'_> {
     }
 }
 
-/// The distance of a triangle and a tetrahedron.
+/// The distance between a triangle and a tetrahedron.
 fn gap(triangle: &Triangle, t: &[DVec3; 4]) -> f64 {
     let inside = |p: DVec3| barycentric(t, p).iter().all(|&w| w >= 0.0);
     if triangle.corners.iter().any(|&p| inside(p)) {
@@ -142,14 +146,16 @@ fn gap(triangle: &Triangle, t: &[DVec3; 4]) -> f64 {
     sides.iter().map(|s| triangles_gap(triangle, s)).fold(f64::INFINITY, f64::min)
 }
 
-/// Of two triangles: corner to triangle and edge to edge, or 0 where an edge goes through.
+/// The distance between two triangles: corner to triangle and edge to edge, or 0 where an edge
+/// passes through.
 fn triangles_gap(a: &Triangle, b: &Triangle) -> f64 {
     let mut least = f64::INFINITY;
     for (t, o) in [(a, b), (b, a)] {
         for k in 0..3 {
             let (p, q) = (t.corners[k], t.corners[(k + 1) % 3]);
             least = least.min(o.closest(p).distance);
-            // The distance from a convex body along a segment is convex: thirds close in on its minimum.
+            // The distance from a convex body is convex along a segment, so ternary search finds
+            // its minimum.
             let (mut low, mut high) = (0.0, 1.0);
             for _ in 0..80 {
                 let (s, u) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
