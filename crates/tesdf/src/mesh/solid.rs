@@ -22,7 +22,7 @@ pub struct SolidMesh {
 }
 
 impl SolidMesh {
-    /// Checks the mesh with [`check`](super::check).
+    /// Checks the mesh with [`check`](super::check()).
     ///
     /// # Errors
     /// [`NotSolid`] has all errors, and says whether repair with default options would help.

@@ -143,20 +143,20 @@ struct Seen {
 
 /// When all cosines between the corners and their sum exceed this value, a unit vector inside is a
 /// weighted sum of the corners, with weights that add up to at most 3 / 0.1.
-const LEAST_COSINE: f64 = 0.1;
+const MIN_COSINE: f64 = 0.1;
 
 impl Seen {
     fn from(center: DVec3, t: [DVec3; 3]) -> Self {
         let corners = t.map(|c| direction(center, c));
         let middle = corners[0] + corners[1] + corners[2];
-        if !corners.iter().all(|c| c.dot(middle) > LEAST_COSINE) {
+        if !corners.iter().all(|c| c.dot(middle) > MIN_COSINE) {
             return Self { planes: None };
         }
         let plane = |k: usize| {
             let normal = corners[k].cross(corners[(k + 1) % 3]);
             let normal = if normal.dot(corners[(k + 2) % 3]) > 0.0 { -normal } else { normal };
             let beyond = corners.iter().map(|&c| normal.dot(c)).fold(0.0, f64::max);
-            (normal, (beyond + ROUNDING * normal.length()) * 3.0 / LEAST_COSINE)
+            (normal, (beyond + ROUNDING * normal.length()) * 3.0 / MIN_COSINE)
         };
         Self { planes: Some([0, 1, 2].map(plane)) }
     }

@@ -318,7 +318,7 @@ fn clearance(
     let axis = direction.abs().max_position();
     let (sign, aside) = (direction[axis], 1 - axis);
     let at = from.extend(0.0);
-    let way = Aabb::of(&[at, at + direction.extend(0.0) * f64::MAX]);
+    let ray = Aabb::of(&[at, at + direction.extend(0.0) * f64::MAX]);
     let mut nearest: Option<f64> = None;
     let mut meet = |[p, q]: Segment| {
         let width = q[aside] - p[aside];
@@ -334,9 +334,9 @@ fn clearance(
         }
     };
     tree.visit(
-        |bounds| bounds.overlaps(way),
+        |bounds| bounds.overlaps(ray),
         |items| {
-            let met = items.iter().map(|&i| i as usize).filter(|&i| boxes[i].overlaps(way));
+            let met = items.iter().map(|&i| i as usize).filter(|&i| boxes[i].overlaps(ray));
             met.for_each(|i| meet(segments[i]));
         },
     );

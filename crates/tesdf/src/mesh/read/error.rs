@@ -69,7 +69,7 @@ pub enum ReadError {
         format: MeshFormat,
         /// The place of the fault.
         place: Place,
-        /// What was found there.
+        /// The content found there.
         found: String,
         /// What was expected, or what to do.
         help: String,

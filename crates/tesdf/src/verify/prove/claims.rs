@@ -115,7 +115,7 @@ impl<'a> Claims<'a> {
                 None => return border.into_iter().fold(0.0, f64::max) + face.shape.thickness,
             }
         }
-        let missed = self.touched(most_inside(&sides));
+        let missed = self.touched(max_inside(&sides));
         let mut cost = 0.0;
         for k in 0..3 {
             // When the whole piece is on the inner side of an edge, no closest point lies on that
@@ -140,7 +140,7 @@ impl<'a> Claims<'a> {
 
 /// An upper bound on how far inside all three sides a point of a piece can be: the least, over some
 /// mixtures of two sides, of the greatest value at the corners.
-fn most_inside(sides: &[[f64; 3]; 4]) -> f64 {
+fn max_inside(sides: &[[f64; 3]; 4]) -> f64 {
     let of = |weights: [f64; 3]| {
         let value = |s: &[f64; 3]| weights[0] * s[0] + weights[1] * s[1] + weights[2] * s[2];
         sides.iter().map(value).fold(f64::NEG_INFINITY, f64::max)

@@ -8,7 +8,7 @@ use super::{ReadError, fault};
 
 /// Largest number of vertices, and of face corners, of all instances together. The encoder accepts
 /// fewer.
-const MOST: usize = 1 << 27;
+const MAX_ELEMENTS: usize = 1 << 27;
 
 /// Refuses a scene with too many vertices or face corners. `meshes` has the mesh of each instance.
 pub(super) fn check(data: &Data<'_>, meshes: impl Iterator<Item = usize>) -> Result<(), ReadError> {
@@ -17,9 +17,9 @@ pub(super) fn check(data: &Data<'_>, meshes: impl Iterator<Item = usize>) -> Res
     for mesh in meshes {
         for ((sum, more), what) in sums.iter_mut().zip(elements[mesh]).zip(["vertices", "corners of faces"]) {
             *sum = sum.saturating_add(more);
-            if *sum > MOST {
+            if *sum > MAX_ELEMENTS {
                 let found = format!("with this instance of it the scene has {sum} {what}");
-                let help = format!("expected at most {MOST}: split the scene");
+                let help = format!("expected at most {MAX_ELEMENTS}: split the scene");
                 return Err(fault(data.format, format!("meshes[{mesh}]"), found, help));
             }
         }
