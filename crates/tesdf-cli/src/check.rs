@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use serde::Serialize;
 use tesdf::mesh::{CheckReport, LoadReport, RepairOptions, TriangleMesh, check, repair};
 
-use crate::mesh_file;
-use crate::report::{self, Failure, Outcome};
+use tesdf_terminal::mesh_file;
+use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf check`.
 #[derive(clap::Args, Debug)]

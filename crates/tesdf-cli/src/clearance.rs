@@ -3,8 +3,8 @@ use tesdf::collide::{Clearance, ClearanceOptions, InstanceId, clearance};
 use tesdf::encode::Length;
 
 use crate::collide::Bodies;
-use crate::parse;
-use crate::report::{self, Failure, Outcome};
+use tesdf_terminal::parse;
+use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf clearance`.
 #[derive(clap::Args, Debug)]

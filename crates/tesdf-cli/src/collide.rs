@@ -14,10 +14,11 @@ use tesdf::encode::Length;
 
 use tesdf_sim::newton::Detect as _;
 
-use crate::asset_file::{Assets, check_units};
-use crate::devices::{self, Choice, OnDevice};
-use crate::report::{self, Failure, Outcome, count};
-use crate::{parse, why};
+use crate::why;
+use tesdf_terminal::asset_file::{Assets, check_units};
+use tesdf_terminal::device::{self, Choice};
+use tesdf_terminal::parse;
+use tesdf_terminal::report::{self, Failure, Outcome, count};
 
 /// Two placed bodies: arguments that several commands share.
 #[derive(clap::Args, Debug)]
@@ -89,7 +90,7 @@ pub struct Args {
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
     /// Where contacts are found
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = devices::help("contacts are found"))]
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = device::help("contacts are found"))]
     pub device: Choice,
     /// Say instead why contacts are or are not there: what each stage made of all candidates, or of one face (in the mode `node`, node) of
     /// instance 0, or as INSTANCE:FACE of one of either
@@ -166,7 +167,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         return why::run(&scene, ids, &options, part, args.json);
     }
     let found = match args.device.open()? {
-        Some(device) => OnDevice::new(device).detect(&scene, &options),
+        Some(device) => device.into_detector().detect(&scene, &options),
         None => detect(&scene, &options),
     };
     let found = found.map_err(Failure::new)?;

@@ -13,11 +13,11 @@ use tesdf::encode::{Domain, DomainChoice, EncodeOptions, EncodeProgress, Encoder
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 
-use crate::devices::{self, Choice};
-use crate::output::Consent;
-use crate::progress::{interrupt_flag, watched};
-use crate::report::{self, Failure, Outcome};
-use crate::{mesh_file, output, parse};
+use tesdf_terminal::device::{self, Choice};
+use tesdf_terminal::output::Consent;
+use tesdf_terminal::progress::{interrupt_flag, watched};
+use tesdf_terminal::report::{self, Failure, Outcome};
+use tesdf_terminal::{mesh_file, output, parse};
 
 mod choices;
 
@@ -51,7 +51,7 @@ pub struct Args {
     #[arg(long, value_name = "LENGTH|safe", value_parser = choices::threshold)]
     pub threshold: Option<Threshold>,
     /// Where samples are looked at
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = devices::help("samples are looked at"))]
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("samples are looked at"))]
     pub device: Choice,
     /// Cut lists to this many faces, those that are needed nearest to the surface
     #[arg(long, value_name = "N")]

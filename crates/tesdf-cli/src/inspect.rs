@@ -7,8 +7,8 @@ use tesdf::asset::about::{Certificate, Source, Statistics};
 use tesdf::encode::{EncodeOptions, Length};
 use tesdf::inspect::{InspectOptions, Inspection, inspect};
 
-use crate::asset_file;
-use crate::report::{self, Failure, Outcome, count, size};
+use tesdf_terminal::asset_file;
+use tesdf_terminal::report::{self, Failure, Outcome, count, size};
 
 /// Arguments of `tesdf inspect`.
 #[derive(clap::Args, Debug)]

@@ -11,32 +11,24 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod abort;
-pub mod asset_file;
-pub mod bench;
 pub mod check;
 pub mod clearance;
 pub mod collide;
 pub mod completions;
 pub mod devices;
 pub mod encode;
-pub mod evaluate;
 pub mod inspect;
-pub mod mesh_file;
-pub mod output;
-pub mod parse;
-pub mod progress;
 pub mod query;
 pub mod render;
 pub mod repair;
-pub mod report;
-pub mod run_file;
 pub mod simulate;
 pub mod slice;
 pub mod toi;
 pub mod verify;
 pub mod why;
 
-use report::{Failure, Outcome};
+use tesdf_bench::{detection, evaluate};
+use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Exact signed distances of triangle meshes.
 #[derive(Parser, Debug)]
@@ -76,7 +68,7 @@ pub enum Command {
     /// List the devices that can compute, by the numbers and names that --device takes
     Devices(devices::Args),
     /// Measure what detection costs on a device, stage by stage
-    Bench(bench::Args),
+    Bench(detection::Args),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
     /// Move the bodies of a scene and write the run
@@ -126,7 +118,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Clearance(args) => clearance::run(args),
         Command::Toi(args) => toi::run(args),
         Command::Devices(args) => devices::run(args),
-        Command::Bench(args) => bench::run(args),
+        Command::Bench(args) => detection::run(args),
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),

@@ -7,9 +7,9 @@ use tesdf::mesh::{
     write_bytes,
 };
 
-use crate::output::{self, Consent};
-use crate::report::{self, Failure, Outcome};
-use crate::{mesh_file, parse};
+use tesdf_terminal::output::{self, Consent};
+use tesdf_terminal::report::{self, Failure, Outcome};
+use tesdf_terminal::{mesh_file, parse};
 
 /// Arguments of `tesdf repair`.
 #[derive(clap::Args, Debug)]

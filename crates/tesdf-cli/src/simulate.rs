@@ -13,11 +13,11 @@ use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{CutRun, HiddenPair, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
-use crate::devices::{self, Choice, OnDevice};
-use crate::output::{self, Consent};
-use crate::progress::{interrupt_flag, watched};
-use crate::report::{self, Failure, Outcome};
-use crate::{parse, run_file};
+use tesdf_terminal::device::{self, Choice, Device};
+use tesdf_terminal::output::{self, Consent};
+use tesdf_terminal::progress::{interrupt_flag, watched};
+use tesdf_terminal::report::{self, Failure, Outcome};
+use tesdf_terminal::{parse, run_file};
 
 mod recorder;
 
@@ -52,7 +52,7 @@ pub struct Args {
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = geometry)]
     pub geometries: Vec<(String, PathBuf)>,
     /// Where contacts are found
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = devices::help("contacts are found"))]
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("contacts are found"))]
     pub device: Choice,
     /// Print the result as JSON
     #[arg(long)]
@@ -123,11 +123,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         }
         e => Failure::new(e),
     })?;
-    let device_name = device.as_ref().map_or("cpu", |device| &device.info().name);
+    let device_name = device.as_ref().map_or("cpu", Device::name);
     let origin = RunOrigin::of(&system, device_name).map_err(Failure::new)?;
     let begun = begin(args, &loaded, cut.as_ref(), &mut system, &origin)?;
     let engine = match device {
-        Some(device) => loaded.newton_with(system, OnDevice::new(device)),
+        Some(device) => loaded.newton_with(system, device.into_detector()),
         None => loaded.newton(system),
     };
     let mut engine = engine.map_err(Failure::new)?;

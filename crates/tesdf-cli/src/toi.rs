@@ -3,9 +3,10 @@ use serde::Serialize;
 use tesdf::collide::{Impact, Motion, TimeOfImpactOptions, time_of_impact};
 use tesdf::encode::Length;
 
+use crate::clearance;
 use crate::collide::Bodies;
-use crate::report::{self, Failure, Outcome};
-use crate::{clearance, parse};
+use tesdf_terminal::parse;
+use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf toi`.
 #[derive(clap::Args, Debug)]

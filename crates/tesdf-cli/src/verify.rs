@@ -11,9 +11,9 @@ use tesdf::TeSdf;
 use tesdf::asset::{AssetError, Container, layout};
 use tesdf::verify::{PrecisionReport, ProveReport, VerifyError, VerifyOptions, VerifyReport, Worst, verify};
 
-use crate::asset_file;
-use crate::progress::{Progress, interrupt_flag};
-use crate::report::{self, Failure, Outcome, count};
+use tesdf_terminal::asset_file;
+use tesdf_terminal::progress::{Progress, interrupt_flag};
+use tesdf_terminal::report::{self, Failure, Outcome, count};
 
 /// Arguments of `tesdf verify`.
 #[derive(clap::Args, Debug)]

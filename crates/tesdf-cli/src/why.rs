@@ -6,7 +6,7 @@ use tesdf::collide::{
     WhyReport, why,
 };
 
-use crate::report::{self, Failure, Outcome, count};
+use tesdf_terminal::report::{self, Failure, Outcome, count};
 
 /// Prints why contacts are or are not there: both ways, or for one part (instance, number) the way that it is a surface.
 ///

@@ -4,7 +4,7 @@ use tesdf::encode::{Deformation, EncodeChoices, Refinement, Threshold};
 use tesdf::geometry::Aabb;
 
 use super::Args;
-use crate::parse;
+use tesdf_terminal::parse;
 
 /// Ways to find the closest faces of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

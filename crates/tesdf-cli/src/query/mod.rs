@@ -9,9 +9,9 @@ use tesdf::query::Precision;
 
 pub use points::{HEADER, PointsError, read, write};
 
-use crate::asset_file;
-use crate::progress::Progress;
-use crate::report::{self, Failure, Outcome};
+use tesdf_terminal::asset_file;
+use tesdf_terminal::progress::Progress;
+use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf query`.
 #[derive(clap::Args, Debug)]

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use tesdf::collide::Shape;
 use tesdf::glam::DVec3;
 
-use crate::asset_file::{Assets, check_units};
-use crate::parse;
-use crate::report::Failure;
+use tesdf_terminal::asset_file::{Assets, check_units};
+use tesdf_terminal::parse;
+use tesdf_terminal::report::Failure;
 
 /// A body's geometry: a file, or a simple shape.
 #[derive(Clone, Debug)]

@@ -27,9 +27,9 @@ pub use overlay::ContactMark;
 pub use picture::{Scenery, render};
 pub use stage::{Drawn, Exposure};
 
-use crate::output::{self, Consent};
-use crate::parse;
-use crate::report::{Failure, Outcome};
+use tesdf_terminal::output::{self, Consent};
+use tesdf_terminal::parse;
+use tesdf_terminal::report::{Failure, Outcome};
 
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]

@@ -9,10 +9,10 @@ use tesdf_sim::record::RecordedContact;
 use tesdf_sim::scene_file::{LoadedScene, SceneError};
 
 use super::{Args, ContactMark, Posed};
-use crate::progress::{interrupt_flag, watched};
-use crate::report::Failure;
 use crate::simulate::replace_geometries;
-use crate::{output, run_file};
+use tesdf_terminal::progress::{interrupt_flag, watched};
+use tesdf_terminal::report::Failure;
+use tesdf_terminal::{output, run_file};
 
 /// Reads a run and opens what its bodies are; with the output, which is none of these files.
 ///

@@ -6,8 +6,8 @@ use tesdf::save::Destination;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::{CutRun, Moment, RunJournal, RunOrigin, RunRecord, SimulateError};
 
-use crate::output;
-use crate::report::Failure;
+use tesdf_terminal::output;
+use tesdf_terminal::report::Failure;
 
 /// Records each step of a run at its destination. The first step replaces what was there.
 pub struct Recorder<'a> {

@@ -5,8 +5,8 @@ use tesdf::TeSdf;
 use tesdf::verify::{Fault, ProveError, ProveOptions, ProveReport, Tally, Verdict, prove};
 
 use super::{Args, go_on, uninterrupted};
-use crate::progress::Progress;
-use crate::report::{Failure, count};
+use tesdf_terminal::progress::Progress;
+use tesdf_terminal::report::{Failure, count};
 
 /// Proves what the file says of itself.
 ///

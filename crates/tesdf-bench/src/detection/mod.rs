@@ -1,9 +1,12 @@
 //! `tesdf bench`: what detection costs on a device, stage by stage.
 mod collide;
 mod frames;
+#[cfg(feature = "gpu")]
+mod on_device;
 mod poses;
+mod report;
 
-use crate::report::{Failure, Outcome};
+use tesdf_terminal::report::{Failure, Outcome};
 
 /// Arguments of `tesdf bench`.
 #[derive(clap::Args, Debug)]

@@ -5,7 +5,7 @@ use tesdf::domain::ConformingMesh;
 use tesdf::geometry::{Aabb, orientation};
 use tesdf::glam::{DQuat, DVec3};
 
-use crate::report::Failure;
+use tesdf_terminal::report::Failure;
 
 /// A bend of the far end against the near one, with a twist around the long axis.
 #[derive(Clone, Copy, Debug, PartialEq)]

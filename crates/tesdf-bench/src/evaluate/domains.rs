@@ -9,8 +9,8 @@ use tesdf::mesh::SolidMesh;
 
 use super::DomainName;
 use super::meshes::Mesh;
-use crate::mesh_file;
-use crate::report::{Failure, note};
+use tesdf_terminal::mesh_file;
+use tesdf_terminal::report::{Failure, note};
 
 /// A solid in a domain.
 pub struct Place {

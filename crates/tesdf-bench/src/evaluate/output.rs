@@ -6,8 +6,8 @@ use tesdf::save::Destination;
 
 use super::meshes::MESHES;
 use super::{Format, TableArgs};
-use crate::output;
-use crate::report::{self, Failure};
+use tesdf_terminal::output;
+use tesdf_terminal::report::{self, Failure};
 
 /// A table: the names of its columns, and its rows as text.
 pub struct Text {

@@ -13,8 +13,8 @@ use tesdf::inspect::{InspectOptions, inspect};
 
 use super::domains::Place;
 use super::output;
-use crate::progress::{Progress, watched};
-use crate::report::Failure;
+use tesdf_terminal::progress::{Progress, watched};
+use tesdf_terminal::report::Failure;
 
 /// How lists are made.
 #[derive(Clone, Debug)]

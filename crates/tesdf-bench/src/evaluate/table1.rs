@@ -11,8 +11,8 @@ use super::domains::{Place, open};
 use super::measure::{Cells, Cost, Way, compare};
 use super::meshes::{Deforms, MESHES, Mesh, Quick};
 use super::output::{Sink, Text, band, error, or_dash, short, threshold};
-use super::{TableArgs, heading, paper};
-use crate::report::{Failure, note};
+use super::{TableArgs, paper};
+use tesdf_terminal::report::{Failure, note};
 
 /// E_max of the truncated lists.
 const MAX_ENTRIES: u32 = 32;
@@ -409,7 +409,7 @@ fn markdown(table: &Table) -> String {
     let text = Text { columns, rows: table.rows.iter().map(line).collect() };
     format!(
         "{}\nGrid: {} voxels along the diagonal. Two figures: full lists / at most {MAX_ENTRIES} faces; one figure: both.\n\n{}",
-        heading::lines(),
+        crate::heading::lines(),
         table.grid,
         text.markdown(3)
     )

@@ -5,7 +5,6 @@
 //! as Markdown, CSV or JSON.
 mod deformed;
 mod domains;
-mod heading;
 mod measure;
 mod meshes;
 mod output;
@@ -19,9 +18,9 @@ use meshes::Mesh;
 use output::Sink;
 use tesdf::evaluate::EvaluateOptions;
 
-use crate::devices::{self, Choice};
-use crate::output::Consent;
-use crate::report::{Failure, Outcome};
+use tesdf_terminal::device::{self, Choice};
+use tesdf_terminal::output::Consent;
+use tesdf_terminal::report::{Failure, Outcome};
 
 /// Arguments of `tesdf evaluate`.
 #[derive(clap::Args, Debug)]
@@ -53,7 +52,7 @@ pub struct TableArgs {
     #[arg(long, value_name = "Q")]
     pub resolution: Option<u32>,
     /// Where samples are looked at
-    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = devices::help("samples are looked at"))]
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("samples are looked at"))]
     pub device: Choice,
     /// A coarse grid, few samples, and in Table I the smaller meshes alone
     #[arg(long)]

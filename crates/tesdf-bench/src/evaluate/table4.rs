@@ -8,8 +8,8 @@ use super::domains::open;
 use super::measure::{Cells, Cost, Way, compare};
 use super::meshes::{MESHES, SHAFT};
 use super::output::{Sink, Text, band, error, or_dash, short};
-use super::{TableArgs, heading, paper};
-use crate::report::{Failure, note};
+use super::{TableArgs, paper};
+use tesdf_terminal::report::{Failure, note};
 
 /// What `--format json` prints.
 #[derive(Serialize)]
@@ -201,7 +201,7 @@ fn markdown(table: &Table) -> String {
     let text = Text { columns: columns.into_iter().map(str::to_string).collect(), rows }.markdown(3);
     format!(
         "{}\nThe shaft by E_max. Grid: {} voxels along the diagonal, {points} points in the last domain.\n\n{text}",
-        heading::lines(),
+        crate::heading::lines(),
         table.grid
     )
 }

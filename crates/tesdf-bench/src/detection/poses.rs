@@ -5,9 +5,9 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use tesdf::glam::{DQuat, DVec3};
 
-use crate::output::{self, Consent};
-use crate::parse;
-use crate::report::{self, Failure, Outcome, count};
+use tesdf_terminal::output::{self, Consent};
+use tesdf_terminal::parse;
+use tesdf_terminal::report::{self, Failure, Outcome, count};
 
 /// The version that is written and read.
 pub const VERSION: u32 = 1;

@@ -14,9 +14,9 @@ use tesdf::mesh::SolidMesh;
 use tesdf_sim::scene_file::{LoadedScene, MOST_BODIES};
 
 use super::poses::{PoseFile, VERSION};
-use crate::progress::{interrupt_flag, watched};
-use crate::report::Failure;
-use crate::{asset_file, mesh_file, run_file};
+use tesdf_terminal::progress::{interrupt_flag, watched};
+use tesdf_terminal::report::Failure;
+use tesdf_terminal::{asset_file, mesh_file, run_file};
 
 /// Most instances in all worlds.
 const MOST_INSTANCES: usize = 1 << 20;

@@ -1,0 +1,32 @@
+//! The heading of a table.
+use tesdf::query::Isa;
+use tesdf_bench::heading::{command, load, processor, version_and_date};
+
+use crate::{Failure, output};
+
+/// Prints the command, the date, the processor and what the build uses of it.
+pub fn print() -> Result<(), Failure> {
+    output::line(&format!("`{}`\n", command()))?;
+    output::line(&format!("- {}", version_and_date()))?;
+    let load = load().map_or("unknown".into(), |[one, _]| one);
+    output::line(&format!("- {}, load at the start {load}", processor()))?;
+    output::line(&format!("- compiled for {}; tesdf chose {:?} at run time\n", target(), Isa::detect()))
+}
+
+/// The instruction sets that the whole program, peers included, was compiled for.
+fn target() -> String {
+    let mut all = vec![std::env::consts::ARCH];
+    for (has, name) in [
+        (cfg!(target_feature = "avx2"), "AVX2"),
+        (cfg!(target_feature = "fma"), "FMA"),
+        (cfg!(target_feature = "avx512f"), "AVX-512"),
+    ] {
+        if has {
+            all.push(name);
+        }
+    }
+    if all.len() == 1 {
+        all.push("baseline");
+    }
+    all.join(" ")
+}

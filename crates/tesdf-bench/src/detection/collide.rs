@@ -1,0 +1,199 @@
+//! `tesdf bench collide SCENE|RUN|POSES`
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::ValueEnum;
+use serde::Serialize;
+use tesdf::collide::{CollideOptions, FaceMethod, Mode, Reduction, detect};
+
+use super::frames::Frames;
+use super::report::{Counts, PHASES, Report, Spread, ms, text};
+use tesdf_terminal::device::{self, Choice, Device};
+use tesdf_terminal::parse;
+use tesdf_terminal::report::{self as output, Failure, Outcome};
+
+/// Arguments of `tesdf bench collide`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// A scene (.toml), a run (.tesrun) whose poses are replayed, or a file of poses (.json)
+    #[arg(value_name = "SCENE|RUN|POSES")]
+    pub source: PathBuf,
+    /// Where contacts are found
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Best, help = device::help("contacts are found"))]
+    pub device: Choice,
+    /// What is tested against the other body's field
+    #[arg(long, value_enum, default_value_t = ModeName::Face)]
+    pub mode: ModeName,
+    /// Frank-Wolfe iterations of the mode `face`
+    #[arg(long, value_name = "K", default_value_t = 16)]
+    pub iterations: u32,
+    /// Threshold of the cosine filter
+    #[arg(long, value_name = "C", value_parser = parse::number, default_value_t = 0.3, allow_hyphen_values = true)]
+    pub cos_theta: f64,
+    /// Contacts are taken up to this signed distance [default: what the file says, else 0]
+    #[arg(long, value_name = "D", value_parser = parse::length)]
+    pub contact_distance: Option<f64>,
+    /// Longest lists of meshes that are encoded for a file of poses [default: not cut]
+    #[arg(long, value_name = "E")]
+    pub e_max: Option<u32>,
+    /// Keep at most N contacts of a pair of bodies
+    #[arg(long, value_name = "N")]
+    pub reduce: Option<u32>,
+    /// The scene so many times, in worlds of their own
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub worlds: u32,
+    /// Frames of a run or of a file of poses, at most
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    pub frames: usize,
+    /// Measurements of each frame
+    #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub repeat: u32,
+    /// Threads that work on a polygon
+    #[arg(long, value_enum, default_value_t = LanesName::Group)]
+    pub lanes: LanesName,
+    /// Exchange values through shared memory, where there are planes of 32 threads too
+    #[arg(long)]
+    pub shared: bool,
+    /// Detect on the processor too, and print the ratio
+    #[arg(long)]
+    pub against_cpu: bool,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What is tested.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ModeName {
+    /// The vertices
+    Node,
+    /// The faces, by Frank-Wolfe iterations
+    Face,
+    /// The faces, exactly
+    Exact,
+}
+
+/// How a polygon is worked on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LanesName {
+    /// 32 threads, which share the faces of the list
+    Group,
+    /// A thread alone
+    Single,
+}
+
+/// Measures and prints.
+///
+/// # Errors
+/// A file that cannot be read, or a device that fails.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let device = args.device.open()?;
+    let mut frames = Frames::read(&args.source, args.frames, args.worlds, args.e_max)?;
+    let contact_distance = args.contact_distance.or(frames.contact_distance).unwrap_or(0.0);
+    let mode = match args.mode {
+        ModeName::Node => Mode::Node,
+        ModeName::Face => Mode::Face(FaceMethod::FrankWolfe { iterations: args.iterations }),
+        ModeName::Exact => Mode::EXACT,
+    };
+    let options = CollideOptions {
+        contact_distance,
+        cos_theta: Some(args.cos_theta),
+        reduction: args.reduce.map_or(Reduction::None, Reduction::PerPair),
+        ..CollideOptions::with_mode(mode)
+    };
+    options.validate().map_err(Failure::new)?;
+    let mut report = Report {
+        source: args.source.display().to_string(),
+        device: "cpu".into(),
+        mode: args.mode,
+        iterations: args.iterations,
+        cos_theta: args.cos_theta,
+        contact_distance,
+        e_max: args.e_max,
+        lanes: args.lanes,
+        worlds: args.worlds,
+        instances: frames.scene.instances().len(),
+        frames: frames.poses.len(),
+        repeat: args.repeat.max(1),
+        launches: 0,
+        stages: Vec::new(),
+        phases_ms: PHASES.map(|phase| (phase, 0.0)),
+        phases_unpruned_ms: None,
+        counts: Counts::default(),
+        bytes: None,
+        wall_ms: Spread::default(),
+        cpu_wall_ms: None,
+        cpu_over_device: None,
+    };
+    match device {
+        Some(device) => {
+            measure_device(&mut report, args, device, &mut frames, &options)?;
+            if args.against_cpu {
+                let (cpu, _) = on_processor(&mut frames, &options, report.repeat)?;
+                report.cpu_over_device = Some(cpu.mean / report.wall_ms.mean);
+                report.cpu_wall_ms = Some(cpu);
+            }
+        }
+        None => (report.wall_ms, report.counts) = on_processor(&mut frames, &options, report.repeat)?,
+    }
+    if args.json {
+        output::json(&report)?;
+    } else {
+        output::text(&text(&report))?;
+    }
+    Ok(Outcome::Good)
+}
+
+#[cfg(feature = "gpu")]
+fn measure_device(
+    report: &mut Report,
+    args: &Args,
+    device: Device,
+    frames: &mut Frames,
+    options: &CollideOptions,
+) -> Result<(), Failure> {
+    super::on_device::fill(report, args, &device.0, frames, options)
+}
+
+#[cfg(not(feature = "gpu"))]
+fn measure_device(
+    _: &mut Report,
+    _: &Args,
+    device: Device,
+    _: &mut Frames,
+    _: &CollideOptions,
+) -> Result<(), Failure> {
+    match device {}
+}
+
+fn on_processor(
+    frames: &mut Frames,
+    options: &CollideOptions,
+    repeat: u32,
+) -> Result<(Spread, Counts), Failure> {
+    let (mut times, mut found) = (Vec::new(), Vec::new());
+    for frame in 0..frames.poses.len() {
+        frames.show(frame)?;
+        for _ in 0..repeat {
+            let start = Instant::now();
+            let contacts = detect(&frames.scene, options).map_err(Failure::new)?;
+            times.push(ms(start.elapsed()));
+            found.push(contacts.statistics);
+        }
+    }
+    let spread = |value: fn(&tesdf::collide::Statistics) -> usize| {
+        Spread::of(found.iter().map(|s| value(s) as f64).collect())
+    };
+    let counts = Counts {
+        directions: spread(|s| s.instance_pairs),
+        candidates: spread(|s| s.candidates),
+        queries: spread(|s| s.polygons),
+        contacts: spread(|s| s.touching - s.filtered),
+        filtered: spread(|s| s.filtered),
+        kept: (options.reduction != Reduction::None).then(|| spread(|s| s.touching - s.filtered - s.reduced)),
+        ..Counts::default()
+    };
+    Ok((Spread::of(times), counts))
+}

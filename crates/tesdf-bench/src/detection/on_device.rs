@@ -1,0 +1,138 @@
+//! Detection on a device, stage by stage.
+use std::time::{Duration, Instant};
+
+use tesdf::collide::{CollideOptions, Reduction};
+use tesdf_gpu::{Counting, Detector, DetectorOptions, Device, Exchange, Lanes, Memory, Pruning};
+use tesdf_terminal::report::Failure;
+
+use super::collide::{Args, LanesName, ModeName};
+use super::frames::Frames;
+use super::report::{Bytes, Counts, PHASES, Report, Spread, Stage, ms};
+
+/// Of a stage, among all; what only prepares a launch belongs to that. Reduction is none of the three.
+fn phase(stages: &[(&str, Duration)], stage: usize) -> &'static str {
+    match stages[stage].0 {
+        "groups" if stage + 1 < stages.len() => phase(stages, stage + 1),
+        "instance bounds" | "instance pairs" | "meshlets" => "BP",
+        "polygons" | "outside of domains" | "nodes" => "MP",
+        "face narrow phase" | "node narrow phase" | "exact narrow phase" => "NP",
+        _ => "reduction",
+    }
+}
+
+/// Measures all frames on the device, once more with operations counted, and once more without pruning.
+///
+/// # Errors
+/// The device fails.
+pub fn fill(
+    report: &mut Report,
+    args: &Args,
+    device: &Device,
+    frames: &mut Frames,
+    options: &CollideOptions,
+) -> Result<(), Failure> {
+    report.device = device.info().name.clone();
+    let with = DetectorOptions {
+        memory: Memory::Grow,
+        lanes: match args.lanes {
+            LanesName::Group => Lanes::Group,
+            LanesName::Single => Lanes::Single,
+        },
+        exchange: if args.shared { Exchange::Shared } else { Exchange::Device },
+        ..DetectorOptions::default()
+    };
+    let mut detector = Detector::new(device, &frames.scene, with).map_err(Failure::new)?;
+    let measured = measure(frames, &mut detector, options, report.repeat)?;
+    report.launches = detector.report().launches;
+    report.phases_ms = measured.phases();
+    let counting = DetectorOptions { counting: Counting::Operations, ..with };
+    let mut detector = Detector::new(device, &frames.scene, counting).map_err(Failure::new)?;
+    let operations = measure(frames, &mut detector, options, 1)?;
+    let unpruned = DetectorOptions { pruning: Pruning::Bounds, ..with };
+    let mut detector = Detector::new(device, &frames.scene, unpruned).map_err(Failure::new)?;
+    let all = measure(frames, &mut detector, options, 1)?;
+    report.phases_unpruned_ms = Some(all.phases());
+    report.counts = measured.counts;
+    report.counts.queries_unpruned = Some(all.counts.queries);
+    let is_face = args.mode == ModeName::Face;
+    report.counts.evaluations = operations.counts.evaluations.filter(|_| is_face);
+    report.counts.distances = operations.counts.distances.filter(|_| is_face);
+    report.stages = measured.stages;
+    report.bytes = Some(measured.bytes);
+    report.wall_ms = measured.wall_ms;
+    Ok(())
+}
+
+struct Measured {
+    stages: Vec<Stage>,
+    counts: Counts,
+    bytes: Bytes,
+    wall_ms: Spread,
+}
+
+impl Measured {
+    fn phases(&self) -> [(&'static str, f64); 3] {
+        PHASES.map(|phase| {
+            (phase, self.stages.iter().filter(|s| s.phase == phase).map(|s| s.ms.mean).sum::<f64>())
+        })
+    }
+}
+
+fn measure(
+    frames: &mut Frames,
+    detector: &mut Detector,
+    options: &CollideOptions,
+    repeat: u32,
+) -> Result<Measured, Failure> {
+    let (mut walls, mut reports) = (Vec::new(), Vec::new());
+    for frame in 0..frames.poses.len() {
+        frames.show(frame)?;
+        // Buffers grow, and kernels are compiled, before anything is measured.
+        detector.detect(&frames.scene, options).map_err(Failure::new)?;
+        for _ in 0..repeat {
+            let start = Instant::now();
+            detector.detect(&frames.scene, options).map_err(Failure::new)?;
+            walls.push(ms(start.elapsed()));
+            detector.detect_timed(&frames.scene, options).map_err(Failure::new)?;
+            reports.push(detector.report().clone());
+        }
+    }
+    let stage = |k: usize| {
+        let name = reports[0].stages[k].0;
+        let ms = Spread::of(reports.iter().map(|r| ms(r.stages[k].1)).collect());
+        Stage { name, phase: phase(&reports[0].stages, k), ms }
+    };
+    let stages = (0..reports.first().map_or(0, |r| r.stages.len())).map(stage).collect();
+    let count = |k: usize| Spread::of(reports.iter().map(|r| f64::from(r.counts[k])).collect());
+    let bytes = |value: fn(&tesdf_gpu::DeviceReport) -> usize| {
+        Spread::of(reports.iter().map(|r| value(r) as f64).collect())
+    };
+    let held = detector.bytes();
+    Ok(Measured {
+        stages,
+        counts: Counts {
+            directions: count(0),
+            meshlets: count(2),
+            queries: count(3),
+            contacts: count(4),
+            filtered: count(5),
+            kept: (options.reduction != Reduction::None).then(|| count(14)),
+            candidates: count(6),
+            queries_unpruned: None,
+            evaluations: Some(count(8)),
+            distances: Some(count(9)),
+        },
+        bytes: Bytes {
+            sent: bytes(|r| r.sent),
+            read: bytes(|r| r.read),
+            shapes_table: held.shapes.table,
+            shapes_words: held.shapes.words,
+            shapes_rows: held.shapes.rows,
+            products: held.products.iter().map(|(_, bytes)| bytes).sum(),
+            total: held.with_instances(frames.scene.instances().len()),
+            per_instance: held.per_instance,
+            products_by_buffer: held.products,
+        },
+        wall_ms: Spread::of(walls),
+    })
+}

@@ -1,0 +1,31 @@
+//! `tesdf devices`
+use tesdf_terminal::report::{Failure, Outcome};
+
+#[cfg(feature = "gpu")]
+mod list;
+
+/// Arguments of `tesdf devices`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// Print the devices as a JSON array
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Lists the devices.
+///
+/// # Errors
+/// There is none, stdout cannot be written, or the tool was built without the feature `gpu`.
+#[cfg(feature = "gpu")]
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    list::run(args)
+}
+
+/// Lists the devices, of which there are none.
+///
+/// # Errors
+/// Always: says how to build the tool with the feature `gpu`.
+#[cfg(not(feature = "gpu"))]
+pub fn run(_: &Args) -> Result<Outcome, Failure> {
+    Err(tesdf_terminal::device::built_without(""))
+}

@@ -1,0 +1,85 @@
+//! The option `--device` of commands: the processor, or a device that the GPU crate opens.
+//!
+//! A tool built without the feature `gpu` has the same option; each choice but `cpu` is then an error that
+//! says how to build the tool with it.
+use tesdf::encode::Sampler;
+use tesdf::encode::sampled::Processor;
+
+use crate::report::Failure;
+
+#[cfg(feature = "gpu")]
+mod gpu;
+#[cfg(not(feature = "gpu"))]
+mod no_gpu;
+
+#[cfg(feature = "gpu")]
+pub use gpu::{Device, open};
+#[cfg(not(feature = "gpu"))]
+pub use no_gpu::{Device, built_without, open};
+
+/// The help of `--device`: where `what` is done.
+pub fn help(what: &str) -> String {
+    format!(
+        "Where {what}: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part \
+         of its name"
+    )
+}
+
+/// The value of `--device`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// The processor.
+    #[default]
+    Processor,
+    /// The device that `TESDF_DEVICE` names, or the best device there is.
+    Best,
+    /// A device, by its number or a part of its name.
+    Named(String),
+}
+
+impl Choice {
+    /// `cpu`, `gpu`, or the number or name of a device.
+    ///
+    /// # Errors
+    /// None: [`open`](Self::open) finds out whether there is such a device.
+    pub fn parse(text: &str) -> Result<Self, std::convert::Infallible> {
+        Ok(match text {
+            "cpu" => Self::Processor,
+            "gpu" => Self::Best,
+            name => Self::Named(name.into()),
+        })
+    }
+
+    /// Opens the device; `None` for the processor.
+    ///
+    /// # Errors
+    /// There is no such device, or the tool was built without the feature `gpu`.
+    pub fn open(&self) -> Result<Option<Device>, Failure> {
+        match self {
+            Self::Processor => Ok(None),
+            Self::Best => open(None).map(Some),
+            Self::Named(name) => open(Some(name)).map(Some),
+        }
+    }
+
+    /// The sampler of Algorithm 1 on that device.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn sampler(&self) -> Result<Box<dyn Sampler>, Failure> {
+        Ok(match self.open()? {
+            Some(device) => device.into_sampler(),
+            None => Box::new(Processor),
+        })
+    }
+}
+
+impl std::fmt::Display for Choice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Processor => "cpu",
+            Self::Best => "gpu",
+            Self::Named(name) => name,
+        })
+    }
+}

@@ -1,0 +1,62 @@
+//! What stands for a device in a tool without the feature `gpu`: a type without values.
+use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene};
+use tesdf::encode::Sampler;
+use tesdf_sim::newton::Detect;
+
+use crate::report::Failure;
+
+/// A device, of which there is none.
+pub enum Device {}
+
+/// Always an error, as no device can be opened.
+///
+/// # Errors
+/// Says how to build the tool with the feature `gpu`.
+pub fn open(name: Option<&str>) -> Result<Device, Failure> {
+    Err(built_without(&format!("--device {}: ", name.unwrap_or("gpu"))))
+}
+
+/// The error of everything that needs a device.
+pub fn built_without(prefix: &str) -> Failure {
+    Failure::new(format!("{prefix}this tesdf was built without the GPU")).hint(
+        "build it in the repository with `cargo build --release --features gpu --bin tesdf`; `cpu` is the processor",
+    )
+}
+
+impl Device {
+    /// Its name.
+    pub fn name(&self) -> &str {
+        match *self {}
+    }
+
+    /// Takes the samples of Algorithm 1 on the device.
+    pub fn into_sampler(self) -> Box<dyn Sampler> {
+        match self {}
+    }
+
+    /// Finds contacts on the device.
+    pub fn into_detector(self) -> impl Detect {
+        self
+    }
+}
+
+impl Detect for Device {
+    fn detect(&self, _: &Scene, _: &CollideOptions) -> Result<Contacts, CollideError> {
+        match *self {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::device::Choice;
+
+    #[test]
+    fn a_device_is_an_error_that_says_how_to_build_with_the_gpu() {
+        for (choice, name) in [(Choice::Best, "--device gpu"), (Choice::Named("2".into()), "--device 2")] {
+            let failure = choice.open().err().expect("there is no device");
+            assert!(failure.message.starts_with(name), "{failure:?}");
+            assert!(failure.hint.is_some_and(|hint| hint.contains("--features gpu")));
+        }
+        assert!(Choice::Processor.open().is_ok_and(|device| device.is_none()));
+    }
+}
