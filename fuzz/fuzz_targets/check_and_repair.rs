@@ -10,14 +10,22 @@ use tesdf::mesh::{DefectKind, RepairOptions, Severity, SolidMesh, check, repair}
 
 fuzz_target!(|data: &[u8]| {
     let mut bytes = Unstructured::new(data);
-    let mesh = if bytes.arbitrary().unwrap_or(false) { support::soup(&mut bytes) } else { support::closed(&mut bytes) };
+    let mesh = if bytes.arbitrary().unwrap_or(false) {
+        support::soup(&mut bytes)
+    } else {
+        support::closed(&mut bytes)
+    };
     let Ok(mesh) = mesh else { return };
     let before = check(&mesh);
     if let Ok(repaired) = repair(&mesh, &RepairOptions::default()) {
         let after = check(&repaired.mesh);
         let sound = before.of_severity(Severity::Error).next().is_none();
         let mut errors = after.of_severity(Severity::Error);
-        assert!(!sound || errors.all(|defect| defect.kind == DefectKind::NoInside), "repair of {mesh:?} made {:?}", after.defects);
+        assert!(
+            !sound || errors.all(|defect| defect.kind == DefectKind::NoInside),
+            "repair of {mesh:?} made {:?}",
+            after.defects
+        );
     }
     let _ = SolidMesh::new(mesh);
 });

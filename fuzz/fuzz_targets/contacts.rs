@@ -8,12 +8,12 @@ use std::sync::{Arc, LazyLock};
 use glam::{DQuat, DVec3};
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, InstanceId, Mode, Pose, Scene, detect};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
-use tesdf::geometry::{Triangle, WindingNumber};
-use tesdf::mesh::{SolidMesh, TriangleMesh};
+use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::geometry::Triangle;
+use tesdf::mesh::{SolidMesh, TriangleMesh, WindingNumber};
+use tesdf::{Progress, TeSdf};
 
 struct Body {
     mesh: TriangleMesh,
@@ -30,7 +30,7 @@ static BODIES: LazyLock<Vec<Body>> = LazyLock::new(|| {
             let mesh = support::closed(&mut Unstructured::new(bytes)).ok()?;
             let solid = SolidMesh::new(mesh.clone()).ok()?;
             let options = EncodeOptions::preset(Preset::Fast);
-            let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).ok()?;
+            let asset = encode(&solid, &Source::default(), &options, &Progress::default()).ok()?;
             let winding = WindingNumber::new(&mesh);
             Some(Body { mesh, winding, asset: Arc::new(asset) })
         })
@@ -66,7 +66,8 @@ fuzz_target!(|data: &[u8]| {
         scene.add(Instance::new(shape, at)).expect("a valid pose");
     }
     for mode in [Mode::Node, CollideOptions::default().mode] {
-        let found = detect(&scene, &CollideOptions { mode, ..CollideOptions::default() }).expect("valid options");
+        let found =
+            detect(&scene, &CollideOptions { mode, ..CollideOptions::default() }).expect("valid options");
         for contact in &found.contacts {
             let (body, at) = if contact.instance_b == InstanceId(0) { (a, at_a) } else { (b, at_b) };
             let exact = body.signed_distance(at.rotation.inverse() * (contact.point_a - at.translation));

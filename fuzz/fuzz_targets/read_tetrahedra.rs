@@ -9,7 +9,8 @@ fuzz_target!(|data: &[u8]| {
     let Some((choice, bytes)) = data.split_first() else { return };
     let folder = tempfile::tempdir().expect("a folder for temporary files");
     let at = |extension: &str| folder.path().join("fuzz").with_extension(extension);
-    let write = |extension: &str, bytes: &[u8]| std::fs::write(at(extension), bytes).expect("room for a file");
+    let write =
+        |extension: &str, bytes: &[u8]| std::fs::write(at(extension), bytes).expect("room for a file");
     let path = match choice % 3 {
         0 => {
             write("msh", bytes);

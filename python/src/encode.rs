@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use tesdf::encode::{
-    Deformation, Domain, DomainChoice, EncodeChoices, EncodeProgress, EncoderChoice, Preset, Refinement,
-    Stage, Threshold, encode_in,
+    Deformation, Domain, DomainChoice, EncodeChoices, EncoderChoice, Preset, Refinement, Threshold, encode_in,
 };
+use tesdf::{Progress, Stage};
 
 use crate::asset::Asset;
 use crate::errors::{Error, argument};
@@ -79,7 +79,7 @@ pub fn encode(
 
     let input = MeshInput::new(mesh)?;
     let pool = pool::of(threads).map_err(|e| e.raise(py))?;
-    let state = EncodeProgress::default();
+    let state = Progress::default();
     let work = || {
         pool.install(|| {
             let (solid, path, source) = input.load()?.solid()?;

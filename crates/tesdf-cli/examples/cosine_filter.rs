@@ -4,9 +4,10 @@
 use std::error::Error;
 use std::sync::Arc;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Contact, Instance, InstanceId, Pose, Scene, detect};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::geometry::Triangle;
 use tesdf::glam::{DVec2, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
@@ -39,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut scene = Scene::new();
     for solid in &solids {
         let options = EncodeOptions::preset(Preset::Fast);
-        let asset = encode(solid, &Source::default(), &options, &EncodeProgress::default())?;
+        let asset = encode(solid, &Source::default(), &options, &Progress::default())?;
         let shape = scene.add_shape(Arc::new(asset))?;
         scene.add(Instance::new(shape, Pose::IDENTITY))?;
     }

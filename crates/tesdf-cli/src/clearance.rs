@@ -1,6 +1,6 @@
 //! `tesdf clearance A.tesdf B.tesdf`
+use tesdf::Length;
 use tesdf::collide::{Clearance, ClearanceOptions, InstanceId, clearance};
-use tesdf::encode::Length;
 
 use crate::collide::Bodies;
 use tesdf_terminal::parse;

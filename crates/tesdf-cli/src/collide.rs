@@ -5,12 +5,11 @@ use std::sync::Arc;
 
 use clap::ValueEnum;
 use serde::Serialize;
-use tesdf::TeSdf;
 use tesdf::collide::{
     CollideOptions, Contact, Contacts, FaceMethod, HiddenOverlap, Instance, InstanceId, Mode, PairReduction,
     Pose, Reduction, Scene, Statistics, detect,
 };
-use tesdf::encode::Length;
+use tesdf::{Length, TeSdf};
 
 use tesdf_sim::newton::Detect as _;
 

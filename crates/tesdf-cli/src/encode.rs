@@ -6,12 +6,12 @@ use std::time::Instant;
 
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
-use tesdf::TeSdf;
-use tesdf::asset::about::{Certificate, Source, Statistics};
+use tesdf::asset::about::{Source, Statistics};
 use tesdf::domain::tetrahedra_files;
-use tesdf::encode::{Domain, DomainChoice, EncodeOptions, EncodeProgress, Encoder, Threshold, encode_with};
+use tesdf::encode::{Domain, DomainChoice, EncodeOptions, Encoder, Threshold, encode_with};
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
+use tesdf::{Certificate, Progress, TeSdf};
 
 use tesdf_terminal::device::{self, Choice};
 use tesdf_terminal::output::Consent;
@@ -127,7 +127,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let name = args.mesh.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let source = Source { name, blake3: load.source_blake3.clone() };
     let interrupted = interrupt_flag()?;
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     let choices = args.choices();
     let options = choices.options().map_err(Failure::new)?;
     if options.encoder == Encoder::Certified && args.device != Choice::Processor {

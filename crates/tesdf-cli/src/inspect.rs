@@ -3,9 +3,10 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 use tesdf::asset::FORMAT_VERSION;
-use tesdf::asset::about::{Certificate, Source, Statistics};
-use tesdf::encode::{EncodeOptions, Length};
+use tesdf::asset::about::{Source, Statistics};
+use tesdf::encode::EncodeOptions;
 use tesdf::inspect::{InspectOptions, Inspection, inspect};
+use tesdf::{Certificate, Length};
 
 use tesdf_terminal::asset_file;
 use tesdf_terminal::report::{self, Failure, Outcome, count, size};

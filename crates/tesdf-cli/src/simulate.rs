@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use tesdf::encode::EncodeProgress;
+use tesdf::Progress;
 use tesdf_sim::criterion::ScrewReport;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
@@ -115,7 +115,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let output = output::open(args.output(), &inputs, args.consent)?;
     let device = args.device.open()?;
     let interrupted = interrupt_flag()?;
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     let system = watched(&progress, &interrupted, || loaded.system(&progress));
     let mut system = system.map_err(|e| match e {
         SceneError::Cancelled => {

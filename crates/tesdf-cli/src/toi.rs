@@ -1,7 +1,7 @@
 //! `tesdf toi A.tesdf B.tesdf`
 use serde::Serialize;
+use tesdf::Length;
 use tesdf::collide::{Impact, Motion, TimeOfImpactOptions, time_of_impact};
-use tesdf::encode::Length;
 
 use crate::clearance;
 use crate::collide::Bodies;

@@ -12,7 +12,7 @@ use tesdf::asset::{AssetError, Container, layout};
 use tesdf::verify::{PrecisionReport, ProveReport, VerifyError, VerifyOptions, VerifyReport, Worst, verify};
 
 use tesdf_terminal::asset_file;
-use tesdf_terminal::progress::{Progress, interrupt_flag};
+use tesdf_terminal::progress::{Bar, interrupt_flag};
 use tesdf_terminal::report::{self, Failure, Outcome, count};
 
 /// Arguments of `tesdf verify`.
@@ -113,7 +113,7 @@ fn compare(
     asset: &TeSdf,
     interrupted: &AtomicBool,
 ) -> Result<Result<VerifyReport, VerifyError>, Failure> {
-    let bar = Progress::new("comparing with brute force");
+    let bar = Bar::new("comparing with brute force");
     let options = VerifyOptions { samples: args.samples as usize, ..VerifyOptions::default() };
     let found = verify(asset, &options, |share| go_on(&bar, share, interrupted));
     uninterrupted(interrupted)?;
@@ -121,7 +121,7 @@ fn compare(
 }
 
 /// Shows the share done, and says whether Ctrl-C was pressed.
-fn go_on(bar: &Progress, share: f64, interrupted: &AtomicBool) -> ControlFlow<()> {
+fn go_on(bar: &Bar, share: f64, interrupted: &AtomicBool) -> ControlFlow<()> {
     bar.set(share);
     if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }

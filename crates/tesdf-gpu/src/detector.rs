@@ -7,10 +7,10 @@ mod stages;
 
 use std::collections::BTreeMap;
 
+use tesdf::Length;
 use tesdf::collide::{
     CollideError, CollideOptions, Contacts, HiddenOverlap, Reduction, Scene, Shape, ShapeId, Statistics,
 };
-use tesdf::encode::Length;
 
 use buffers::{Members, Products, ROW, WORD};
 pub use options::{

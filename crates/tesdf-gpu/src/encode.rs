@@ -5,13 +5,13 @@ mod face;
 
 use cubecl::prelude::*;
 use rayon::prelude::*;
-use tesdf::TeSdf;
-use tesdf::encode::sampled::Processor;
-use tesdf::encode::surface::Surface;
+use tesdf::encode::Processor;
+use tesdf::encode::Surface;
 use tesdf::encode::{
-    Domain, EncodeError, EncodeOptions, EncodeProgress, SampledCell, Sampler, Sampling, Source, encode_with,
+    Domain, EncodeError, EncodeOptions, SampledCell, Sampler, Sampling, Source, encode_with,
 };
 use tesdf::mesh::SolidMesh;
+use tesdf::{Progress, TeSdf};
 
 use cell::{CellRows, Grid};
 pub use count::{SampleCounter, SampleCounts};
@@ -35,7 +35,7 @@ pub fn encode(
     domain: Domain,
     source: &Source,
     options: &EncodeOptions,
-    progress: &EncodeProgress,
+    progress: &Progress,
 ) -> Result<TeSdf, EncodeError> {
     encode_with(solid, domain, source, options, &DeviceSampler::new(device.clone()), progress)
 }
@@ -85,7 +85,7 @@ impl DeviceSampler {
         faces: &[CandidateFace],
         cells: &[SampledCell],
         grid: &Grid,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Vec<Vec<f64>>, EncodeError> {
         let of_cells: Vec<CellRows> = cells.iter().map(|cell| CellRows::new(cell, grid)).collect();
         let mut first = 0;
@@ -121,7 +121,7 @@ impl DeviceSampler {
         ranges: &[[u32; 2]],
         grid: &Grid,
         cells: &[SampledCell],
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Vec<u32>, EncodeError> {
         let device = &self.device;
         let refused = |e: GpuError| EncodeError::Sampler(Box::new(e));
@@ -202,7 +202,7 @@ impl Sampler for DeviceSampler {
         surface: &Surface,
         cells: &[SampledCell],
         sampling: &Sampling,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Vec<Vec<f64>>, EncodeError> {
         let faces: Vec<CandidateFace> = surface.triangles.par_iter().map(CandidateFace::new).collect();
         let grid = Grid::new(sampling);
@@ -243,7 +243,7 @@ mod tests {
     use super::*;
     use tesdf::domain::Cell;
     use tesdf::encode::Threshold;
-    use tesdf::encode::surface::Touching;
+    use tesdf::encode::internal::Touching;
     use tesdf::geometry::AabbTree;
     use tesdf::glam::DVec3;
     use tesdf::mesh::TriangleMesh;
@@ -259,7 +259,7 @@ mod tests {
         let boxes: Vec<_> = surface.triangles.iter().map(|t| tesdf::geometry::Aabb::of(&t.corners)).collect();
         let cell = SampledCell::new(&surface, &AabbTree::build(&boxes, 4), cell, &sampling, 1.0);
         assert_eq!(cell.faces.len(), 4);
-        let progress = EncodeProgress::default();
+        let progress = Progress::default();
         let mut sampler = DeviceSampler::new(Device::choose(None).expect("a device"));
         sampler.most_candidates = 3;
         let found =

@@ -3,11 +3,11 @@ mod moving;
 mod roots;
 
 use glam::{DVec3, Vec3};
-use tesdf::asset::Arrays;
+use tesdf::asset::FaceRecord;
 use tesdf::asset::layout::{SignHints, TreeChild};
 use tesdf::collide::Shape;
 use tesdf::geometry::Triangle;
-use tesdf::query::FaceRecord;
+use tesdf::query::Arrays;
 
 use crate::GpuError;
 use crate::device::{Buffer, Device};

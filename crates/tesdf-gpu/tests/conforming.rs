@@ -8,14 +8,14 @@ use compare::{Compared, device, each_mode, hold, hold_against};
 use support::random::Random;
 use support::shapes;
 use support::tetrahedra::{bare_beam, beam, bend, moves};
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{Instance, Placement, Pose, Scene, Shape};
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::{Domain, EncodeOptions, EncodeProgress, Preset, Refinement, encode, encode_in};
+use tesdf::encode::{Domain, EncodeOptions, Preset, Refinement, encode, encode_in};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
 use tesdf::query::Precision;
+use tesdf::{Progress, TeSdf};
 use tesdf_gpu::{Detector, DetectorOptions, DeviceArray, GpuError, Images, query};
 
 fn plain() -> EncodeOptions {
@@ -23,7 +23,7 @@ fn plain() -> EncodeOptions {
 }
 
 fn encoded(solid: &SolidMesh, domain: &ConformingMesh, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, Domain::Conforming(domain), &Source::default(), options, &EncodeProgress::default())
+    encode_in(solid, Domain::Conforming(domain), &Source::default(), options, &Progress::default())
         .expect("valid options")
 }
 
@@ -82,7 +82,7 @@ fn contacts_are_those_of_the_host() {
     let mut random = Random(8);
     let bisected = |solid: &SolidMesh| {
         let options = EncodeOptions::preset(Preset::Fast);
-        encode(solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes")
+        encode(solid, &Source::default(), &options, &Progress::default()).expect("encodes")
     };
     // Of small faces, and of faces larger than the beam.
     let ball = bisected(&shapes::Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid());
@@ -120,9 +120,8 @@ fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
     let device = device();
     let mut random = Random(4);
     let ball = shapes::Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid();
-    let ball =
-        encode(&ball, &Source::default(), &EncodeOptions::preset(Preset::Fast), &EncodeProgress::default())
-            .expect("encodes");
+    let ball = encode(&ball, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())
+        .expect("encodes");
     let mut compared = Compared::default();
     for (solid, domain) in [beam(), bare_beam()] {
         for encoding in &encodings()[..2] {

@@ -11,13 +11,13 @@ use compare::{Compared, device, each_mode, found, hold, least};
 use support::bodies::{Body, Placed, RELATIONS, Relation, body, rotation, scene};
 use support::meshes;
 use support::random::Random;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{
     CollideOptions, Contact, Contacts, Groups, Instance, InstanceId, Mode, Pose, Scene, Shape, detect,
 };
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
+use tesdf::{Progress, TeSdf};
 use tesdf_gpu::{Capacities, Detector, DetectorOptions, Exchange, GpuError, Lanes, Memory, Pruning};
 
 #[test]
@@ -118,8 +118,7 @@ fn truncated_lists() {
         .solid()
         .expect("solid");
     let options = EncodeOptions { max_entries: Some(8), ..EncodeOptions::preset(Preset::Fast) };
-    let asset: TeSdf =
-        encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
+    let asset: TeSdf = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
     let truncated = Arc::new(Body { solid, asset: Arc::new(asset) });
     let mut random = Random(31);
     for _ in 0..3 {

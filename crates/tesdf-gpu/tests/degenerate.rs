@@ -9,14 +9,14 @@ use support::random::Random;
 use support::reference::Reference;
 use support::shapes::{FAMILIES, Shape as Faces};
 use support::tetrahedra::{bare_beam, beam};
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{FaceMethod, Instance, Mode, Placement, Pose, Reduction, Scene, Shape};
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::{Domain, EncodeOptions, EncodeProgress, Preset, Refinement, encode, encode_in};
+use tesdf::encode::{Domain, EncodeOptions, Preset, Refinement, encode, encode_in};
 use tesdf::geometry::Triangle;
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
+use tesdf::{Progress, TeSdf};
 use tesdf_gpu::{
     Detector, DetectorOptions, DeviceAnswers, DeviceArray, Images, WorldAnswer, query, query_arrays,
 };
@@ -30,7 +30,7 @@ fn solid(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> SolidMesh {
 
 fn encoded(solid: &SolidMesh) -> TeSdf {
     let options = EncodeOptions::preset(Preset::Fast);
-    encode(solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes")
+    encode(solid, &Source::default(), &options, &Progress::default()).expect("encodes")
 }
 
 /// The cube from −1 to 1 with more vertices and faces.
@@ -184,7 +184,7 @@ fn what_collapses_on_the_device() {
     for (solid, domain) in [beam(), bare_beam()] {
         let options = EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Fast) };
         let domain_of = Domain::Conforming(&domain);
-        let rest = encode_in(&solid, domain_of, &Source::default(), &options, &EncodeProgress::default())
+        let rest = encode_in(&solid, domain_of, &Source::default(), &options, &Progress::default())
             .expect("valid options");
         let shape = Shape::from(rest);
         let (bounds, diagonal) = (shape.bounds(), shape.diagonal());

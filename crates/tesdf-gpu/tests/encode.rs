@@ -6,17 +6,18 @@ use std::ops::ControlFlow;
 
 use support::meshes;
 use support::tetrahedra::grid;
-use tesdf::TeSdf;
 use tesdf::domain::{Cell, ConformingMesh, DomainCube};
-use tesdf::encode::sampled::Processor;
-use tesdf::encode::surface::{Surface, Touching};
+use tesdf::encode::Processor;
+use tesdf::encode::Surface;
+use tesdf::encode::internal::Touching;
 use tesdf::encode::{
-    Domain, EncodeError, EncodeOptions, EncodeProgress, Encoder, Preset, Refinement, SampledCell, Sampler,
-    Sampling, Source, Threshold, encode_in, encode_with,
+    Domain, EncodeError, EncodeOptions, Encoder, Preset, Refinement, SampledCell, Sampler, Sampling, Source,
+    Threshold, encode_in, encode_with,
 };
 use tesdf::geometry::{Aabb, AabbTree, LocalFrame};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::verify::{VerifyOptions, verify};
+use tesdf::{Progress, TeSdf};
 use tesdf_gpu::{Device, DeviceSampler, ROUNDING, SamplerLimits, encode};
 
 fn device() -> Device {
@@ -72,7 +73,7 @@ impl Case {
 fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
     let sampler = DeviceSampler::new(device());
     println!("device: {}", sampler.name());
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     let thresholds = [Threshold::Absolute(0.0), Threshold::Absolute(1e-3), Threshold::CoveringRadius];
     let (mut listed, mut besides, mut most_candidates) = (0, 0, 0);
     for name in ["tetra", "cube", "l_bracket", "torus_quads", "shaft_keyway", "icosphere_5k"] {
@@ -142,7 +143,7 @@ fn lists(asset: &TeSdf) -> Vec<Vec<u32>> {
 
 #[test]
 fn a_whole_asset_in_both_domains() {
-    let (device, progress) = (device(), EncodeProgress::default());
+    let (device, progress) = (device(), Progress::default());
     let (solid, conforming) = block();
     let sampling = Sampling { resolution: 7, ..Sampling::PAPER };
     for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
@@ -182,7 +183,7 @@ fn a_whole_asset_in_both_domains() {
 fn a_threshold_as_wide_as_the_grid_misses_nothing() {
     let (solid, conforming) = block();
     let options = sampled(Sampling { resolution: 3, ..Sampling::SAFE }, Refinement::None);
-    let (source, progress) = (Source::default(), EncodeProgress::default());
+    let (source, progress) = (Source::default(), Progress::default());
     let domain = Domain::Conforming(&conforming);
     let asset = encode(&device(), &solid, domain, &source, &options, &progress).expect("encodes");
     assert!(asset.about().certificate().delta().is_some());
@@ -195,7 +196,7 @@ fn a_threshold_as_wide_as_the_grid_misses_nothing() {
 fn it_can_be_stopped() {
     let case = Case::new("tetra");
     let sampling = Sampling { resolution: 3, ..Sampling::PAPER };
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     progress.cancel();
     let stopped =
         DeviceSampler::new(device()).sample(&case.surface, &case.sampled(&sampling), &sampling, &progress);

@@ -3,9 +3,10 @@ use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Mode};
-use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
+use tesdf::encode::{EncodeOptions, encode};
 use tesdf::mesh::{SolidMesh, read};
 use tesdf_rapier::rapier3d_f64::prelude::*;
 use tesdf_rapier::{RapierOptions, TesdfShape, query_dispatcher};
@@ -13,7 +14,7 @@ use tesdf_rapier::{RapierOptions, TesdfShape, query_dispatcher};
 fn main() -> Result<(), Box<dyn Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/procedural/cube.obj");
     let solid = SolidMesh::new(read(&path)?.mesh)?;
-    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &EncodeProgress::default())?;
+    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &Progress::default())?;
     let bounds = asset.bounds();
     let (height, top) = (bounds.extent().z, bounds.max.z);
     let cube = TesdfShape::new(Arc::new(asset));

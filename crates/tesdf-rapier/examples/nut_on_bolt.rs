@@ -5,13 +5,13 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Reduction, Shape};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 use tesdf::query::Precision;
+use tesdf::{Progress, TeSdf};
 use tesdf_rapier::{RapierEngine, RapierOptions};
 use tesdf_sim::criterion::{ScrewCriterion, ScrewTracker};
 use tesdf_sim::{Dynamics, Mass, MassProperties, System};
@@ -109,7 +109,7 @@ fn asset(name: &str) -> Result<Arc<TeSdf>, Box<dyn Error>> {
     }
     let solid = SolidMesh::new(read(&path)?.mesh)?;
     let options = EncodeOptions::preset(Preset::Fast);
-    Ok(Arc::new(encode(&solid, &Source::default(), &options, &EncodeProgress::default())?))
+    Ok(Arc::new(encode(&solid, &Source::default(), &options, &Progress::default())?))
 }
 
 /// How deep the vertices of one mesh are in another, m.

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
-use tesdf::encode::EncodeProgress;
+use tesdf::Progress;
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_sim::record::{CutRun, RecordError, RunJournal, RunOrigin, RunRecord};
 use tesdf_sim::scene_file::LoadedScene;
@@ -65,7 +65,7 @@ impl Bench {
     }
 
     fn system(&self) -> tesdf_sim::System {
-        self.loaded.system(&EncodeProgress::default()).unwrap()
+        self.loaded.system(&Progress::default()).unwrap()
     }
 
     fn origin(&self) -> RunOrigin {
@@ -215,7 +215,7 @@ fn what_would_give_other_bits_is_refused() {
     fs::write(bench.folder.path().join("moved.obj"), WEDGE).unwrap();
     let mut loaded = bench.loaded.clone();
     assert!(loaded.replace_geometry("wedge", "moved.obj".into()));
-    let system = loaded.system(&EncodeProgress::default()).unwrap();
+    let system = loaded.system(&Progress::default()).unwrap();
     cut.check(&loaded.scene, &RunOrigin::of(&system, "cpu").unwrap()).unwrap();
 }
 

@@ -2,8 +2,9 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh, write};
 use tesdf_sim::record::{RecordError, RunRecord};
@@ -36,7 +37,7 @@ fn load(text: &str) -> Result<LoadedScene, SceneError> {
 /// What becomes of a text: the error of parsing it or of building its system and engine.
 fn refusal(text: &str) -> String {
     let error = load(text).and_then(|scene| {
-        let system = scene.system(&EncodeProgress::default())?;
+        let system = scene.system(&Progress::default())?;
         scene.newton(system).map(|_| ())
     });
     error.expect_err("it was accepted").to_string()
@@ -47,7 +48,7 @@ fn a_scene_is_what_it_says() {
     let loaded = load(DROP).unwrap();
     assert_eq!(loaded.scene.detector.mode, DetectorMode::Exact);
     assert_eq!(loaded.scene.gravity, [0.0, 0.0, -9.81]);
-    let system = loaded.system(&EncodeProgress::default()).unwrap();
+    let system = loaded.system(&Progress::default()).unwrap();
     assert_eq!(system.bodies()[0].mass, Mass::Fixed);
     let Mass::Free(mass) = system.bodies()[1].mass else { panic!("the brick is fixed") };
     assert!((mass.mass - 0.5).abs() < 1e-15);
@@ -98,7 +99,7 @@ fn errors_say_where() {
 fn a_run_survives_its_file() {
     let run = || {
         let loaded = load(DROP).unwrap();
-        let system = loaded.system(&EncodeProgress::default()).unwrap();
+        let system = loaded.system(&Progress::default()).unwrap();
         let mut engine = loaded.newton(system).unwrap();
         simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap()
     };
@@ -141,7 +142,7 @@ fn what_is_no_run_is_refused() {
 #[test]
 fn a_run_can_be_broken_off() {
     let loaded = load(DROP).unwrap();
-    let mut engine = loaded.newton(loaded.system(&EncodeProgress::default()).unwrap()).unwrap();
+    let mut engine = loaded.newton(loaded.system(&Progress::default()).unwrap()).unwrap();
     let stop = |m: &tesdf_sim::Moment<'_>| match m.step {
         3 => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
@@ -213,7 +214,7 @@ fn cubes(bodies: &str) -> (tempfile::TempDir, LoadedScene) {
     write(&folder.path().join("cube.ply"), &mesh).unwrap();
     for (name, unit) in [("mm", "mm"), ("inch", "inches"), ("furlong", "furlong")] {
         let options = EncodeOptions { unit: Some(unit.into()), ..EncodeOptions::preset(Preset::Fast) };
-        let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).unwrap();
+        let asset = encode(&solid, &Source::default(), &options, &Progress::default()).unwrap();
         asset.save(&folder.path().join(name).with_extension("tesdf")).unwrap();
     }
     let text = format!("time_step = 1e-3\nduration = 1\n{bodies}");
@@ -236,7 +237,7 @@ fn a_mesh_of_a_thousand_bodies_is_loaded_once() {
         let mesh = body.get_mut().mesh.as_mut().unwrap();
         *mesh = mesh.to_str().unwrap().replace("FOLDER", &name).into();
     }
-    let system = loaded.system(&EncodeProgress::default()).unwrap();
+    let system = loaded.system(&Progress::default()).unwrap();
     let shape = |body: &tesdf_sim::Body| system.scene().instance(body.instance).unwrap().shape;
     assert_eq!(system.bodies().len(), 1000);
     assert!(system.bodies().iter().all(|body| shape(body) == shape(&system.bodies()[0])));
@@ -251,7 +252,7 @@ fn units_that_differ_need_scales_that_make_them_one() {
             )
         };
         let (_folder, loaded) = cubes(&assets.map(body).concat());
-        loaded.system(&EncodeProgress::default()).map(|_| ()).map_err(|e| e.to_string())
+        loaded.system(&Progress::default()).map(|_| ()).map_err(|e| e.to_string())
     };
     for good in
         [[("mm", 1e-3), ("inch", 0.0254)], [("mm", 1.0), ("inch", 25.4)], [("mm", 1.0), ("furlong", 3.0)]]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tesdf::TeSdf;
 use tesdf::asset::AssetError;
-use tesdf::asset::unit::is_same_unit;
+use tesdf::base::unit::is_same_unit;
 use tesdf::geometry::Aabb;
 
 use crate::report::{self, Failure};

@@ -5,20 +5,20 @@ use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use tesdf::encode::{EncodeProgress, Stage};
+use tesdf::{Progress, Stage};
 
 use crate::report::Failure;
 
 /// A bar on stderr, with an estimate of the time left; nothing is drawn when stderr is not a terminal.
 #[derive(Debug)]
-pub struct Progress {
+pub struct Bar {
     bar: ProgressBar,
 }
 
 /// The bar's steps: finer than it can be drawn.
 const STEPS: u64 = 10_000;
 
-impl Progress {
+impl Bar {
     /// A bar named after what is being done, such as `encoding`.
     pub fn new(what: &'static str) -> Self {
         let bar = ProgressBar::new(STEPS).with_message(what);
@@ -44,7 +44,7 @@ impl Progress {
     }
 }
 
-impl Drop for Progress {
+impl Drop for Bar {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
@@ -69,11 +69,11 @@ pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
 }
 
 /// Runs `work` while another thread draws its progress and hands Ctrl-C on.
-pub fn watched<T>(progress: &EncodeProgress, interrupted: &AtomicBool, work: impl FnOnce() -> T) -> T {
+pub fn watched<T>(progress: &Progress, interrupted: &AtomicBool, work: impl FnOnce() -> T) -> T {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {
         let watcher = scope.spawn(|| {
-            let bar = Progress::new("encoding");
+            let bar = Bar::new("encoding");
             while !done.load(Ordering::Acquire) {
                 if interrupted.load(Ordering::Relaxed) {
                     progress.cancel();

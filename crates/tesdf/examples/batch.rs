@@ -5,8 +5,9 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::time::Instant;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 use tesdf::query::Precision;
@@ -20,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let solid = SolidMesh::new(read(&path)?.mesh)?;
     let bounds = solid.mesh().bounds();
     let asset =
-        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &EncodeProgress::default())?;
+        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())?;
 
     let middle = |i: usize| (i as f64 + 0.5) / GRID as f64;
     let points: Vec<DVec3> = (0..GRID.pow(3))

@@ -5,9 +5,10 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
 use tesdf::collide::{ClearanceOptions, Instance, Pose, Scene, clearance};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 
@@ -17,7 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let solid = SolidMesh::new(read(&given.as_ref().map_or(PathBuf::from(cube), PathBuf::from))?.mesh)?;
     let height = solid.mesh().bounds().extent().z;
     let asset =
-        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &EncodeProgress::default())?;
+        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())?;
 
     // Both instances share the encoded mesh. Lengths are in the mesh's unit.
     let mut scene = Scene::new();

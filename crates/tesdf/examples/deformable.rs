@@ -4,10 +4,11 @@
 use std::error::Error;
 use std::path::Path;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, Pose, Scene, Shape, detect};
 use tesdf::domain::{ConformingMesh, read_tetrahedra};
-use tesdf::encode::{Deformation, Domain, EncodeOptions, EncodeProgress, Refinement, encode_in};
+use tesdf::encode::{Deformation, Domain, EncodeOptions, Refinement, encode_in};
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 
@@ -22,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         refinement: Refinement::None,
         ..EncodeOptions::default()
     };
-    let (source, progress) = (Source::default(), EncodeProgress::default());
+    let (source, progress) = (Source::default(), Progress::default());
     let asset = encode_in(&solid, Domain::Conforming(&domain), &source, &options, &progress)?;
     let (bounds, diagonal) = (asset.bounds(), solid.mesh().diagonal());
 

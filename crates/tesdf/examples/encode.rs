@@ -4,12 +4,12 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 use tesdf::query::Precision;
+use tesdf::{Progress, TeSdf};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let name = mesh.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let source = Source { name, blake3: loaded.report.source_blake3 };
     // Another thread may watch the progress, and cancel.
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     let asset = encode(&solid, &source, &EncodeOptions::preset(Preset::Fast), &progress)?;
     asset.save(&file)?;
 

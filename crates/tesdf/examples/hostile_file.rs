@@ -3,12 +3,12 @@
 //! `cargo run --release --example hostile_file -- [FILE.tesdf]`; without a file it makes one.
 use std::error::Error;
 
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::asset::{AssetError, layout};
-use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
+use tesdf::encode::{EncodeOptions, encode};
 use tesdf::mesh::{SolidMesh, read};
 use tesdf::query::Precision;
+use tesdf::{Progress, TeSdf};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let good = match std::env::args_os().nth(1) {
@@ -53,6 +53,6 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn made() -> Result<Vec<u8>, Box<dyn Error>> {
     let mesh = read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/tetra.obj").as_ref())?.mesh;
     let solid = SolidMesh::new(mesh)?;
-    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &EncodeProgress::default())?;
+    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &Progress::default())?;
     Ok(asset.as_bytes().to_vec())
 }

@@ -5,9 +5,10 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Scene, Shape, detect};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 
@@ -16,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/chain_link.obj");
     let solid = SolidMesh::new(read(Path::new(path))?.mesh)?;
     let options = EncodeOptions::preset(Preset::Fast);
-    let link = encode(&solid, &Source::default(), &options, &EncodeProgress::default())?;
+    let link = encode(&solid, &Source::default(), &options, &Progress::default())?;
 
     let mut scene = Scene::new();
     let low = link.bounds().min.z;

@@ -4,8 +4,9 @@
 use std::error::Error;
 use std::path::PathBuf;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
+use tesdf::encode::{EncodeOptions, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 use tesdf::query::Precision;
@@ -15,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let given = std::env::args_os().nth(1);
     let solid = SolidMesh::new(read(&given.as_ref().map_or(PathBuf::from(cube), PathBuf::from))?.mesh)?;
     let (bounds, diagonal) = (solid.mesh().bounds(), solid.mesh().diagonal());
-    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &EncodeProgress::default())?;
+    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &Progress::default())?;
 
     // F32 is fast and within 1e-6 × diagonal; F64 is exact up to rounding. Lengths are in the mesh's unit.
     let above = bounds.center() + DVec3::new(0.1, 0.2, 0.6) * bounds.extent();

@@ -5,9 +5,10 @@ use std::error::Error;
 use std::path::Path;
 use std::sync::Arc;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, Pose, Scene, Shape, detect};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 
@@ -15,7 +16,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
     let solid = SolidMesh::new(read(Path::new(path))?.mesh)?;
     let options = EncodeOptions::preset(Preset::Fast);
-    let cube = Arc::new(encode(&solid, &Source::default(), &options, &EncodeProgress::default())?);
+    let cube = Arc::new(encode(&solid, &Source::default(), &options, &Progress::default())?);
 
     // A cube of 20 mm around the origin. Each shape overlaps its side x = 10 mm, or its bottom, by 1 mm.
     let half_extents = DVec3::new(0.005, 0.003, 0.003);

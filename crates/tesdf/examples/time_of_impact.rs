@@ -4,11 +4,12 @@
 use std::error::Error;
 use std::path::PathBuf;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
 use tesdf::collide::{
     Instance, Motion, Pose, Scene, Shape, TimeOfImpactOptions, Velocity, clearance, time_of_impact,
 };
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
 
@@ -18,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let solid = SolidMesh::new(read(&given.as_ref().map_or(PathBuf::from(cube), PathBuf::from))?.mesh)?;
     let diagonal = solid.mesh().diagonal();
     let asset =
-        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &EncodeProgress::default())?;
+        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())?;
 
     let mut scene = Scene::new();
     let (mesh, plane) = (scene.add_shape(asset)?, scene.add_shape(Shape::Plane)?);

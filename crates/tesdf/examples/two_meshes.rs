@@ -4,18 +4,18 @@
 use std::error::Error;
 use std::path::Path;
 
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Reduction, Scene, detect};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, read};
+use tesdf::{Progress, TeSdf};
 
 fn load(name: &str) -> Result<TeSdf, Box<dyn Error>> {
     let path = format!("{}/../../data/procedural/{name}.obj", env!("CARGO_MANIFEST_DIR"));
     let solid = SolidMesh::new(read(Path::new(&path))?.mesh)?;
     let options = EncodeOptions::preset(Preset::Fast);
-    Ok(encode(&solid, &Source::default(), &options, &EncodeProgress::default())?)
+    Ok(encode(&solid, &Source::default(), &options, &Progress::default())?)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -4,14 +4,14 @@ use std::io::{self, Read};
 use std::path::Path;
 
 /// Largest number of bytes that are read from a pipe or a device, which may never end: 4 GiB.
-pub const MOST_STREAMED: u64 = 1 << 32;
+pub const MAX_STREAMED: u64 = 1 << 32;
 
 /// Reads all bytes of a file, a pipe or a device. A regular file may be as large as memory allows.
 ///
 /// # Errors
 /// The error of the operating system; [`io::ErrorKind::OutOfMemory`] when the file does not fit
 /// into memory; [`io::ErrorKind::FileTooLarge`] when a pipe or a device gives more than
-/// [`MOST_STREAMED`] bytes.
+/// [`MAX_STREAMED`] bytes.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut file = File::open(path)?;
     let mut bytes = Vec::new();
@@ -40,9 +40,9 @@ pub(crate) fn read_rest(file: &mut File, bytes: &mut Vec<u8>) -> io::Result<()> 
         file.read_to_end(bytes)?;
         return Ok(());
     }
-    file.take(MOST_STREAMED + 1).read_to_end(bytes)?;
-    if bytes.len() as u64 > MOST_STREAMED {
-        let found = format!("it is no regular file, and more than {MOST_STREAMED} bytes came from it");
+    file.take(MAX_STREAMED + 1).read_to_end(bytes)?;
+    if bytes.len() as u64 > MAX_STREAMED {
+        let found = format!("it is no regular file, and more than {MAX_STREAMED} bytes came from it");
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, found));
     }
     Ok(())

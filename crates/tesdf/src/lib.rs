@@ -5,9 +5,14 @@
 //!                                                     └──query──▶ signed distance, gradient, closest point, face
 //! ```
 //!
+//! Each module uses only those to its left:
+//! `base`, `input`, `save` ← `geometry` ← `mesh` ← `domain` ← `asset` ← `query` ← `verify` ← `encode` ← `deform`, with `collide` after `query`,
+//! `evaluate` after `verify`, and `inspect` after `asset`.
+//!
 //! ```
+//! use tesdf::Progress;
 //! use tesdf::asset::about::Source;
-//! use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
+//! use tesdf::encode::{EncodeOptions, encode};
 //! use tesdf::glam::DVec3;
 //! use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
 //! use tesdf::query::Precision;
@@ -16,7 +21,7 @@
 //! let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 //! let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh; // or mesh::read(path)
 //! let solid = SolidMesh::new(mesh)?; // has an inside, or the error says what is wrong where
-//! let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &EncodeProgress::default())?;
+//! let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &Progress::default())?;
 //!
 //! let answer = asset.query(DVec3::new(0.1, 0.3, 0.3), Precision::F64);
 //! assert!((answer.signed_distance + 0.1).abs() < 1e-12); // 0.1 inside of the side x = 0
@@ -32,6 +37,7 @@
 #![warn(missing_docs)]
 
 pub mod asset;
+pub mod base;
 pub mod collide;
 pub mod deform;
 pub mod domain;
@@ -49,4 +55,5 @@ pub(crate) mod testing;
 pub mod verify;
 
 pub use asset::TeSdf;
+pub use base::{Certificate, Length, Progress, Side, Stage};
 pub use glam;

@@ -4,11 +4,11 @@ mod support;
 
 use support::meshes::named;
 use support::random::Random;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::query::{Answer, AnswerColumns, BatchError, Extent, Precision};
+use tesdf::{Progress, TeSdf};
 
 struct Columns {
     signed_distance: Vec<f64>,
@@ -49,7 +49,7 @@ impl Columns {
 fn asset() -> TeSdf {
     let solid = named("procedural/shaft_keyway.obj");
     let options = EncodeOptions::preset(Preset::Fast);
-    encode(&solid, &Source::default(), &options, &EncodeProgress::default()).unwrap()
+    encode(&solid, &Source::default(), &options, &Progress::default()).unwrap()
 }
 
 #[test]

@@ -7,20 +7,20 @@ use std::sync::Arc;
 use support::meshes::named;
 use support::random::Random;
 use support::shapes::Shape as Surface;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{
     Clearance, ClearanceOptions, CollideError, Instance, InstanceId, Pose, Scene, Shape, clearance,
 };
-use tesdf::encode::{EncodeOptions, EncodeProgress, Length, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::geometry::{Triangle, polygon_to_triangle};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
 use tesdf::query::Precision;
+use tesdf::{Length, Progress, TeSdf};
 
 fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
     let options = EncodeOptions::preset(Preset::Fast);
-    Arc::new(encode(solid, &Source::default(), &options, &EncodeProgress::default()).expect("it encodes"))
+    Arc::new(encode(solid, &Source::default(), &options, &Progress::default()).expect("it encodes"))
 }
 
 fn bumpy(seed: u64) -> Arc<TeSdf> {

@@ -1,6 +1,6 @@
 //! The checks of conforming tetrahedral meshes: one mesh that passes, and for each check a mesh
 //! that fails this check and no earlier check.
-use tesdf::asset::layout::Side;
+use tesdf::Side;
 use tesdf::domain::{Classes, ConformingError, ConformingMesh, MissingFace, TetMesh};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};

@@ -9,10 +9,10 @@ use support::bodies::{Body, Placed, Relation, of_direction, rotation, scene};
 use support::lowest::{certified, sampled};
 use support::random::Random;
 use support::shapes;
+use tesdf::Length;
 use tesdf::collide::{
     CollideOptions, Contacts, FaceMethod, Instance, Mode, Placement, Pose, Scene, Shape, detect,
 };
-use tesdf::encode::Length;
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;

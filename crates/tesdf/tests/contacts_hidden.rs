@@ -6,11 +6,11 @@ use std::sync::{Arc, LazyLock};
 use support::bodies::{Body, Placed, RELATIONS, Relation, body, rotation, scene};
 use support::random::Random;
 use support::shapes;
+use tesdf::Length;
 use tesdf::collide::{
     ClearanceOptions, CollideOptions, Contacts, Instance, InstanceId, Mode, Placement, Pose, Scene, Shape,
     clearance, detect,
 };
-use tesdf::encode::Length;
 use tesdf::glam::{DQuat, DVec3};
 
 const NODE: Mode = Mode::Node;

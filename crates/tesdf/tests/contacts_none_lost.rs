@@ -11,10 +11,10 @@ use support::bodies::{Placed, RELATIONS, Relation, body, of_direction, rotation,
 use support::lowest::sampled;
 use support::meshes;
 use support::random::Random;
+use tesdf::Length;
 use tesdf::collide::{
     CollideOptions, Contact, Contacts, FaceMethod, FeatureId, InstanceId, Mode, Pose, detect,
 };
-use tesdf::encode::Length;
 use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;

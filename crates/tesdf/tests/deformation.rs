@@ -7,25 +7,23 @@ use std::ops::ControlFlow;
 use support::random::Random;
 use support::shapes::Shape;
 use support::tetrahedra::{bare_beam, beam, bend, moves};
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Scene, detect};
 use tesdf::deform::DeformError;
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::{
-    Deformation, Domain, EncodeOptions, EncodeProgress, Preset, Refinement, encode, encode_in,
-};
+use tesdf::encode::{Deformation, Domain, EncodeOptions, Preset, Refinement, encode, encode_in};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, VerifyReport, verify};
+use tesdf::{Progress, TeSdf};
 
 fn options() -> EncodeOptions {
     EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Fast) }
 }
 
 fn encoded(solid: &SolidMesh, domain: &ConformingMesh, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, Domain::Conforming(domain), &Source::default(), options, &EncodeProgress::default())
+    encode_in(solid, Domain::Conforming(domain), &Source::default(), options, &Progress::default())
         .expect("valid options")
 }
 
@@ -173,7 +171,7 @@ fn bad_moves_change_nothing() {
     let rest = encoded(&solid, &domain, &options());
     assert_eq!(asset.query(p, Precision::F64), rest.query(p, Precision::F64));
     let mut bisected =
-        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &EncodeProgress::default())
+        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())
             .expect("encodes");
     assert_eq!(bisected.move_vertices(&[]), Err(DeformError::NotConforming));
 }
@@ -209,13 +207,8 @@ fn contacts_of_a_conforming_domain_are_those_of_the_bisection_domain() {
     for (solid, domain) in [beam(), bare_beam()] {
         let ball = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid();
         let bisected = |solid: &SolidMesh| {
-            encode(
-                solid,
-                &Source::default(),
-                &EncodeOptions::preset(Preset::Fast),
-                &EncodeProgress::default(),
-            )
-            .expect("encodes")
+            encode(solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())
+                .expect("encodes")
         };
         let by_cost = EncodeOptions { refinement: Refinement::ByCost, byte_worth: 0.02, ..options() };
         let scene_of = |beam: TeSdf| {
@@ -255,7 +248,7 @@ fn nothing_is_lost_where_lists_are_cut() {
     let ball = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid();
     let encoded = |solid: &SolidMesh, max_entries| {
         let options = EncodeOptions { max_entries, ..EncodeOptions::preset(Preset::Fast) };
-        encode(solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes")
+        encode(solid, &Source::default(), &options, &Progress::default()).expect("encodes")
     };
     let scene_of = |most| {
         let mut scene = Scene::new();

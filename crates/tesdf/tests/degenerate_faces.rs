@@ -9,17 +9,17 @@ use proptest::prelude::*;
 use support::random::Random;
 use support::reference::Reference;
 use support::shapes::{FAMILIES, Family, Shape};
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{
     ClearanceOptions, CollideOptions, FaceMethod, Instance, InstanceId, Mode, Pose, Scene, Shape as Body,
     clearance, detect,
 };
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, verify};
+use tesdf::{Progress, TeSdf};
 
 const CUBE: [[u32; 3]; 12] = [
     [0, 2, 1],
@@ -45,7 +45,7 @@ fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
 fn encoded(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> Arc<TeSdf> {
     let solid = SolidMesh::new(TriangleMesh::new(vertices, faces).expect("valid ids")).expect("a solid");
     let options = EncodeOptions::default();
-    Arc::new(encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes"))
+    Arc::new(encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes"))
 }
 
 /// Checks distances, signs and gradients against their promises, in both precisions.
@@ -285,7 +285,7 @@ proptest! {
     fn random_meshes_with_degenerate_faces(family in prop::sample::select(FAMILIES.to_vec()), seed in any::<u64>()) {
         let solid = degenerate(family, seed);
         let options = EncodeOptions::preset(Preset::Fast);
-        let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
+        let asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
         let report = verify(&asset, &VerifyOptions { samples: 600, seed }, |_| ControlFlow::Continue(())).expect("a valid mesh");
         prop_assert!(report.passed, "{report:#?}");
         let shift = 0.4 * solid.mesh().diagonal() * Random(seed).in_cube();

@@ -7,17 +7,16 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPoolBuilder;
 use support::meshes::named;
 use support::shapes::{FAMILIES, Shape};
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeError, EncodeOptions, EncodeProgress, Length, Preset, Stage, encode};
+use tesdf::encode::{EncodeError, EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::query::Precision;
+use tesdf::{Length, Progress, Stage, TeSdf};
 
 fn encode_on(threads: usize, solid: &SolidMesh, options: &EncodeOptions) -> TeSdf {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    pool.install(|| encode(solid, &Source::default(), options, &EncodeProgress::default()))
-        .expect("valid options")
+    pool.install(|| encode(solid, &Source::default(), options, &Progress::default())).expect("valid options")
 }
 
 fn ball() -> SolidMesh {
@@ -45,7 +44,7 @@ fn same_bytes_from_1_2_and_8_threads() {
 fn a_cancelled_encode_stops_soon() {
     let solid = named("procedural/iso_m16_bolt_24k.obj");
     let options = EncodeOptions { byte_worth: 1e-3, ..EncodeOptions::default() };
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     let (result, late) = std::thread::scope(|scope| {
         let encoder = scope.spawn(|| encode(&solid, &Source::default(), &options, &progress));
         std::thread::sleep(Duration::from_millis(1500));
@@ -58,7 +57,7 @@ fn a_cancelled_encode_stops_soon() {
     // A cell takes microseconds. The bound allows for a machine under load.
     assert!(late < Duration::from_secs(2), "{late:?} after it was asked");
 
-    let before = EncodeProgress::default();
+    let before = Progress::default();
     before.cancel();
     let result = encode(&ball(), &Source::default(), &EncodeOptions::default(), &before);
     assert!(matches!(result, Err(EncodeError::Cancelled)), "{result:?}");
@@ -66,7 +65,7 @@ fn a_cancelled_encode_stops_soon() {
 
 #[test]
 fn progress_ends_at_the_end() {
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     assert_eq!(progress.state(), (Stage::Refine, 0.0));
     encode(&ball(), &Source::default(), &EncodeOptions::default(), &progress).expect("valid options");
     assert_eq!(progress.state().0, Stage::Assemble);
@@ -93,7 +92,7 @@ fn options_without_meaning_are_refused_by_name() {
         ("region", EncodeOptions { regions: vec![[0.0, 0.0, 0.0, inf, 1.0, 1.0]], ..d() }),
     ];
     for (name, options) in cases {
-        match encode(&ball(), &Source::default(), &options, &EncodeProgress::default()) {
+        match encode(&ball(), &Source::default(), &options, &Progress::default()) {
             Err(EncodeError::Option { option, .. }) => assert_eq!(option, name, "{options:?}"),
             other => panic!("{options:?} gives {other:?}"),
         }
@@ -143,6 +142,6 @@ fn odd_regions() {
     }
     let too_far =
         EncodeOptions { regions: vec![[-40.0, 3.0, 8.0, -39.0, 4.0, 9.0]], ..EncodeOptions::default() };
-    let refused = encode(&solid, &Source::default(), &too_far, &EncodeProgress::default());
+    let refused = encode(&solid, &Source::default(), &too_far, &Progress::default());
     assert!(matches!(refused, Err(EncodeError::Option { option: "band or region", .. })));
 }

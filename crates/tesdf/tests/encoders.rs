@@ -7,22 +7,22 @@ use std::ops::ControlFlow;
 use support::random::Random;
 use support::shapes::Shape;
 use support::tetrahedra::grid;
-use tesdf::TeSdf;
 use tesdf::asset::CellKind;
 use tesdf::asset::about::Source;
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::surface::Surface;
+use tesdf::encode::Surface;
 use tesdf::encode::{
-    Deformation, Domain, EncodeError, EncodeOptions, EncodeProgress, Encoder, Preset, Refinement,
-    SampledCell, Sampler, Sampling, Threshold, encode_in, encode_with,
+    Deformation, Domain, EncodeError, EncodeOptions, Encoder, Preset, Refinement, SampledCell, Sampler,
+    Sampling, Threshold, encode_in, encode_with,
 };
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, VerifyReport, verify};
+use tesdf::{Progress, TeSdf};
 
 fn encoded(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, domain, &Source::default(), options, &EncodeProgress::default()).expect("valid options")
+    encode_in(solid, domain, &Source::default(), options, &Progress::default()).expect("valid options")
 }
 
 fn verified(asset: &TeSdf) -> VerifyReport {
@@ -114,7 +114,7 @@ impl Sampler for OneFace {
         _: &Surface,
         cells: &[SampledCell],
         _: &Sampling,
-        _: &EncodeProgress,
+        _: &Progress,
     ) -> Result<Vec<Vec<f64>>, EncodeError> {
         let only_first = |cell: &SampledCell| {
             (0..cell.faces.len()).map(|at| if at == 0 { 0.0 } else { f64::INFINITY }).collect()
@@ -126,7 +126,7 @@ impl Sampler for OneFace {
 #[test]
 fn what_a_sampler_says_is_no_proof() {
     let (solid, conforming) = block();
-    let (source, progress) = (Source::default(), EncodeProgress::default());
+    let (source, progress) = (Source::default(), Progress::default());
     for most in [None, Some(3)] {
         for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
             let encoder = Encoder::Sampled(Sampling { resolution: 3, ..Sampling::SAFE });
@@ -219,7 +219,7 @@ fn options_that_mean_nothing_are_errors() {
         domain,
         &Source::default(),
         &options,
-        &EncodeProgress::default(),
+        &Progress::default(),
     ) {
         Err(EncodeError::Option { option, .. }) => option,
         other => panic!("{:?}", other.map(|_| ())),

@@ -2,16 +2,14 @@
 mod support;
 
 use support::tetrahedra::grid;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::{
-    Domain, EncodeOptions, EncodeProgress, Encoder, Refinement, Sampling, Threshold, encode_in,
-};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Refinement, Sampling, Threshold, encode_in};
 use tesdf::evaluate::{BandReport, EvaluateError, EvaluateOptions, Grid, evaluate};
-use tesdf::geometry::{Triangle, WindingNumber};
-use tesdf::mesh::{SolidMesh, read};
+use tesdf::geometry::Triangle;
+use tesdf::mesh::{SolidMesh, WindingNumber, read};
 use tesdf::query::Precision;
+use tesdf::{Progress, TeSdf};
 
 fn data(name: &str) -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/procedural").join(name)
@@ -22,7 +20,7 @@ fn solid(name: &str) -> SolidMesh {
 }
 
 fn encoded(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, domain, &Source::default(), options, &EncodeProgress::default()).unwrap()
+    encode_in(solid, domain, &Source::default(), options, &Progress::default()).unwrap()
 }
 
 /// An L of cubes with six tetrahedra each, and a layer around it.

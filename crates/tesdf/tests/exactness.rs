@@ -13,13 +13,13 @@ use support::meshes::{self, Row};
 use support::points::{self, KINDS, Kind};
 use support::reference::{Reference, exceeds};
 use support::well_formed::WellFormed;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, Length, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::geometry::{Closest, Feature};
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::query::{Answer, Precision};
+use tesdf::{Length, Progress, TeSdf};
 
 /// Points per mesh, unless `TESDF_TEST_POINTS` is set.
 const POINTS: usize = 1800;
@@ -53,7 +53,7 @@ impl Sample {
         let named = |e: String| format!("{}: {e}", row.name);
         let solid = row.solid().map_err(named)?;
         let options = options(&row);
-        let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default())
+        let asset = encode(&solid, &Source::default(), &options, &Progress::default())
             .map_err(|e| named(e.to_string()))?;
         let (reference, cells) = (Reference::new(solid.mesh()), Cells::of(&asset));
         Ok(Self { row, solid, asset, reference, cells })
@@ -332,7 +332,7 @@ fn domains_are_well_formed() {
     on_all(|s| {
         let band = 0.05 * s.reference.local_diagonal();
         let (reference, cells) = (&s.reference, &s.cells);
-        WellFormed { reference, cells, band, lattice: 2, most_cells: points::count(POINTS) / 8 }.check()
+        WellFormed { reference, cells, band, lattice: 2, max_cells: points::count(POINTS) / 8 }.check()
     });
 }
 
@@ -358,8 +358,7 @@ fn regions_belong_to_the_domain() {
         regions: vec![[a[0], a[1], a[2], b[0], b[1], b[2]]],
         ..EncodeOptions::default()
     };
-    let asset =
-        encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("valid options");
+    let asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("valid options");
     let reference = Reference::new(solid.mesh());
     let mut random = support::random::Random(5);
     for i in 0..2000 {

@@ -5,20 +5,20 @@ use std::sync::{Arc, LazyLock};
 
 use support::meshes::named;
 use support::random::Random;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{
     ClearanceOptions, CollideError, CollideOptions, Instance, Mode, Motion, Pose, Scene, Shape,
     TimeOfImpactOptions, Velocity, clearance, detect, time_of_impact,
 };
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::query::{Answer, AnswerColumns, Extent, Precision};
+use tesdf::{Progress, TeSdf};
 
 fn encoded(solid: &SolidMesh) -> TeSdf {
     let options = EncodeOptions::preset(Preset::Fast);
-    encode(solid, &Source::default(), &options, &EncodeProgress::default()).expect("valid options")
+    encode(solid, &Source::default(), &options, &Progress::default()).expect("valid options")
 }
 
 static KEY: LazyLock<TeSdf> = LazyLock::new(|| encoded(&named("procedural/shaft_keyway.obj")));

@@ -6,16 +6,15 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use support::meshes::named;
-use tesdf::asset::layout::Side;
 use tesdf::domain::gmsh::{
     GmshAlgorithm, GmshError, GmshOptimizer, GmshOptions, GmshSettings, RefusedBecause, tetrahedralise,
     tetrahedralise_and_report,
 };
 use tesdf::domain::{ConformingError, ConformingMesh};
-use tesdf::encode::{EncodeProgress, Length};
-use tesdf::geometry::{Aabb, WindingNumber, tetrahedron_volume};
+use tesdf::geometry::{Aabb, tetrahedron_volume};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, TriangleMesh};
+use tesdf::mesh::{SolidMesh, TriangleMesh, WindingNumber};
+use tesdf::{Length, Progress, Side};
 
 fn volume(mesh: &ConformingMesh, side: Side) -> f64 {
     let of_side = |&t: &usize| mesh.sides()[t] == side;
@@ -178,7 +177,7 @@ fn the_next_settings_are_tried_when_the_gate_refuses() {
         "if grep -q 'Algorithm3D = 10' domain.geo; then cp {at}/good.msh domain.msh; else cp {at}/flat.msh domain.msh; fi"
     );
     let options = stand_in(folder.path(), &script);
-    let report = tetrahedralise_and_report(&unit_cube(), &options, &EncodeProgress::default()).unwrap();
+    let report = tetrahedralise_and_report(&unit_cube(), &options, &Progress::default()).unwrap();
     assert_eq!(report.mesh.sides(), [Side::Inside; 6]);
     assert_eq!(report.settings.algorithm, GmshAlgorithm::Hxt);
     let [first] = &report.refused[..] else { panic!("{:?}", report.refused) };
@@ -229,7 +228,7 @@ fn a_run_that_is_no_longer_wanted_is_ended() {
     let folder = tempfile::tempdir().unwrap();
     let started = folder.path().join("started");
     let options = stand_in(folder.path(), &format!("touch {}; exec sleep 60", started.display()));
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     let found = std::thread::scope(|scope| {
         let running = scope.spawn(|| tetrahedralise_and_report(&unit_cube(), &options, &progress));
         while !started.exists() && !running.is_finished() {

@@ -10,13 +10,13 @@ use support::random::Random;
 use support::reference::Reference;
 use support::shapes::Shape;
 use support::well_formed::WellFormed;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::asset::{AssetError, layout, save_atomic};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Length, encode};
+use tesdf::encode::{EncodeOptions, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::query::Precision;
+use tesdf::{Length, Progress, TeSdf};
 
 fn ball() -> SolidMesh {
     Shape::default().add_sphere(DVec3::new(0.1, 0.2, 0.3), 1, || 1.0).solid()
@@ -27,7 +27,7 @@ fn small() -> TeSdf {
     let options =
         EncodeOptions { byte_worth: 0.5, band: Length::OfDiagonal(0.3), ..EncodeOptions::default() };
     let source = Source { name: "ball.obj".into(), blake3: "0".repeat(64) };
-    encode(&ball(), &source, &options, &EncodeProgress::default()).expect("valid options")
+    encode(&ball(), &source, &options, &Progress::default()).expect("valid options")
 }
 
 /// A file of this format version, written once. It must continue to open and give the same answers.
@@ -47,7 +47,7 @@ fn the_golden_asset_answers() {
     let solid = ball();
     let (reference, cells) = (Reference::new(solid.mesh()), Cells::of(&asset));
     let band = 0.3 * reference.local_diagonal();
-    WellFormed { reference: &reference, cells: &cells, band, lattice: 2, most_cells: usize::MAX }
+    WellFormed { reference: &reference, cells: &cells, band, lattice: 2, max_cells: usize::MAX }
         .check()
         .expect("cells");
     for (kind, p) in support::points::sample(solid.mesh(), &cells, 900) {

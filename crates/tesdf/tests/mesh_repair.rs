@@ -3,9 +3,11 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 use tesdf::{
-    geometry::WindingNumber,
     glam::DVec3,
-    mesh::{DefectKind, RepairError, RepairOptions, Repaired, SolidMesh, TriangleMesh, check, read, repair},
+    mesh::{
+        DefectKind, RepairError, RepairOptions, Repaired, SolidMesh, TriangleMesh, WindingNumber, check,
+        read, repair,
+    },
 };
 
 fn data(name: &str) -> PathBuf {

@@ -4,14 +4,13 @@ mod support;
 
 use proptest::prelude::*;
 use support::random::Random;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
-use tesdf::geometry::WindingNumber;
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{CheckReport, DefectKind, Severity, SolidMesh, TriangleMesh, check};
+use tesdf::mesh::{CheckReport, DefectKind, Severity, SolidMesh, TriangleMesh, WindingNumber, check};
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, verify};
+use tesdf::{Progress, TeSdf};
 
 /// Faces of a tetrahedron with positive volume, oriented outward.
 const OUTWARD: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
@@ -132,7 +131,7 @@ fn what_is_inside_out_is_outside() {
         let warned = solid.warnings().iter().any(|d| d.kind == DefectKind::NegativeWinding);
         assert!(warned, "{:?}", solid.warnings());
         for options in [EncodeOptions::preset(Preset::Fast), EncodeOptions::preset(Preset::Compact)] {
-            let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).unwrap();
+            let asset = encode(&solid, &Source::default(), &options, &Progress::default()).unwrap();
             assert_exact(&mesh, &asset);
         }
     }

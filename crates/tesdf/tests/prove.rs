@@ -7,24 +7,22 @@ use support::cells::lattice;
 use support::random::Random;
 use support::shapes::{FAMILIES, Shape};
 use support::tetrahedra::beam;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::asset::layout::{self, Label, List, Node};
 use tesdf::asset::{CellKind, SectionSpec};
-use tesdf::encode::{
-    Domain, EncodeOptions, EncodeProgress, Encoder, Preset, Refinement, Sampling, Threshold, encode_in,
-};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset, Refinement, Sampling, Threshold, encode_in};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::verify::{Claim, ProveError, ProveOptions, ProveReport, Verdict, prove};
+use tesdf::{Progress, TeSdf};
 
 fn fast() -> EncodeOptions {
     EncodeOptions::preset(Preset::Fast)
 }
 
 fn encoded_with(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, domain, &Source::default(), options, &EncodeProgress::default()).expect("valid options")
+    encode_in(solid, domain, &Source::default(), options, &Progress::default()).expect("valid options")
 }
 
 fn encoded(solid: &SolidMesh) -> TeSdf {
@@ -108,7 +106,7 @@ fn good_assets_are_proved_the_same_way_on_any_number_of_threads() {
     assert_eq!(report.distances.proved, statistics.listed_cells);
     let cells = statistics.listed_cells + statistics.far_cells + statistics.outside_cells;
     assert_eq!((report.signs.proved, report.face_tree.proved), (cells + 1, 1));
-    assert!(report.pieces > 1000 && report.most_pieces > 10);
+    assert!(report.pieces > 1000 && report.max_pieces > 10);
     assert_eq!(Some(report.delta), asset.about().certificate().delta());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     assert_eq!(pool.install(|| proved(&asset)), report);

@@ -3,8 +3,9 @@ mod support;
 
 use support::meshes::named;
 use support::random::Random;
+use tesdf::Progress;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::query::Precision;
 
 #[test]
@@ -13,7 +14,7 @@ fn tree_and_lists_agree() {
         let solid = named(file);
         let (bounds, diagonal) = (solid.mesh().bounds(), solid.mesh().diagonal());
         let options = EncodeOptions::preset(Preset::Fast);
-        let asset = encode(&solid, &Source::default(), &options, &EncodeProgress::default()).unwrap();
+        let asset = encode(&solid, &Source::default(), &options, &Progress::default()).unwrap();
         let mut random = Random(1);
         for i in 0..4000 {
             let share = random.in_cube() * if i % 4 == 0 { 4.0 } else { 0.6 };

@@ -2,11 +2,11 @@
 mod support;
 
 use support::bodies::body;
+use tesdf::Length;
 use tesdf::collide::{
     CollideError, CollideOptions, FaceMethod, Groups, Instance, InstanceId, Mode, Placement, Pose, Reduction,
     Scene, Shape, ShapeId, Velocity, detect,
 };
-use tesdf::encode::Length;
 use tesdf::glam::{DQuat, DVec3};
 
 fn sphere(scene: &mut Scene, radius: f64) -> ShapeId {

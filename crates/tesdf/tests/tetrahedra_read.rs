@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
-use tesdf::asset::layout::Side;
+use tesdf::Side;
 use tesdf::domain::{
     Classes, ConformingError, ConformingMesh, MissingFace, ReadTetrahedraError, Skipped, TetFormat, TetMesh,
     load_tetrahedra, read_tetrahedra,

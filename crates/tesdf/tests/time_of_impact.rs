@@ -6,19 +6,19 @@ use std::sync::Arc;
 use support::meshes::named;
 use support::random::Random;
 use support::shapes::Shape as Surface;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{
     ClearanceOptions, CollideError, Impact, Instance, InstanceId, Motion, Pose, Scene, Shape,
     TimeOfImpactOptions, Velocity, clearance, time_of_impact,
 };
-use tesdf::encode::{EncodeOptions, EncodeProgress, Length, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
+use tesdf::{Length, Progress, TeSdf};
 
 fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
     let options = EncodeOptions::preset(Preset::Fast);
-    Arc::new(encode(solid, &Source::default(), &options, &EncodeProgress::default()).expect("it encodes"))
+    Arc::new(encode(solid, &Source::default(), &options, &Progress::default()).expect("it encodes"))
 }
 
 fn boxed(half: DVec3) -> Arc<TeSdf> {

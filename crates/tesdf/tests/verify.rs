@@ -4,19 +4,19 @@ mod support;
 use std::ops::ControlFlow;
 
 use support::shapes::Shape;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::asset::layout::{self, Label, Node};
 use tesdf::asset::{CellKind, SectionSpec};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::inspect::{InspectOptions, inspect};
 use tesdf::mesh::SolidMesh;
 use tesdf::verify::{PointClass, VerifyError, VerifyOptions, VerifyReport, verify};
+use tesdf::{Progress, TeSdf};
 
 fn encoded(solid: &SolidMesh) -> TeSdf {
     let options = EncodeOptions::preset(Preset::Fast);
-    encode(solid, &Source::default(), &options, &EncodeProgress::default()).expect("valid options")
+    encode(solid, &Source::default(), &options, &Progress::default()).expect("valid options")
 }
 
 /// A ball with a box-shaped cavity, which has cells of every label.

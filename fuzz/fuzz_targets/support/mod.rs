@@ -26,7 +26,9 @@ pub fn soup(bytes: &mut Unstructured) -> Result<TriangleMesh> {
     let vertices = (0..bytes.int_in_range(3usize..=12)?).map(|_| point(bytes)).collect::<Result<Vec<_>>>()?;
     let last = vertices.len() as u32 - 1;
     let faces = (0..bytes.int_in_range(1usize..=24)?)
-        .map(|_| Ok([bytes.int_in_range(0..=last)?, bytes.int_in_range(0..=last)?, bytes.int_in_range(0..=last)?]))
+        .map(|_| {
+            Ok([bytes.int_in_range(0..=last)?, bytes.int_in_range(0..=last)?, bytes.int_in_range(0..=last)?])
+        })
         .collect::<Result<Vec<_>>>()?;
     Ok(TriangleMesh::new(vertices, faces).expect("ids are in range and numbers finite"))
 }
@@ -36,7 +38,10 @@ pub fn closed(bytes: &mut Unstructured) -> Result<TriangleMesh> {
     let corner = |k: u32| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
     let (mut vertices, mut faces): (Vec<DVec3>, Vec<[u32; 3]>) = if bytes.arbitrary()? {
         let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        ((0..8).map(corner).collect(), sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect())
+        (
+            (0..8).map(corner).collect(),
+            sides.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        )
     } else {
         let axes = [DVec3::X, DVec3::Y, DVec3::NEG_X, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
         let around = (0..4u32).flat_map(|k| [[k, (k + 1) % 4, 4], [(k + 1) % 4, k, 5]]);

@@ -4,13 +4,13 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{Instance, InstanceId, Pose, Scene};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::input;
 use tesdf::mesh::SolidMesh;
+use tesdf::{Progress, TeSdf};
 use tesdf_sim::scene_file::{LoadedScene, MOST_BODIES};
 
 use super::poses::{PoseFile, VERSION};
@@ -50,7 +50,7 @@ impl Frames {
 
     fn of_scene(loaded: &LoadedScene) -> Result<Self, Failure> {
         let interrupted = interrupt_flag()?;
-        let progress = EncodeProgress::default();
+        let progress = Progress::default();
         let system = watched(&progress, &interrupted, || loaded.system(&progress)).map_err(Failure::new)?;
         let scene = system.scene().clone();
         let poses = vec![scene.instances().map(|(_, instance)| instance.pose).collect()];
@@ -162,7 +162,7 @@ fn geometry(path: &Path, max_entries: Option<u32>, interrupted: &AtomicBool) -> 
     let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
     let solid = SolidMesh::new(mesh_file::read(path)?.mesh).map_err(|e| named(&e))?;
     let options = EncodeOptions { max_entries, ..EncodeOptions::preset(Preset::Default) };
-    let progress = EncodeProgress::default();
+    let progress = Progress::default();
     watched(&progress, interrupted, || encode(&solid, &Source::default(), &options, &progress))
         .map(Arc::new)
         .map_err(|e| named(&e))

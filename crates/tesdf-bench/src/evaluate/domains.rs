@@ -1,10 +1,11 @@
 //! Meshes and the tetrahedra around them.
 use std::path::Path;
 
+use tesdf::Progress;
 use tesdf::asset::about::Source;
 use tesdf::domain::gmsh::{GmshError, GmshOptions, tetrahedralise_and_report};
 use tesdf::domain::{ConformingMesh, read_tetrahedra};
-use tesdf::encode::{Domain, EncodeProgress};
+use tesdf::encode::Domain;
 use tesdf::mesh::SolidMesh;
 
 use super::DomainName;
@@ -55,11 +56,10 @@ pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Place, Failu
         return Ok(Place { solid, source, name: "bisection".into(), conforming: None });
     }
     let options = GmshOptions { band: mesh.outside, ..GmshOptions::default() };
-    let made =
-        tetrahedralise_and_report(&solid, &options, &EncodeProgress::default()).map_err(|e| match e {
-            GmshError::AllRefused(_) => at(&e),
-            e => Failure::new(e),
-        })?;
+    let made = tetrahedralise_and_report(&solid, &options, &Progress::default()).map_err(|e| match e {
+        GmshError::AllRefused(_) => at(&e),
+        e => Failure::new(e),
+    })?;
     made.refused.iter().for_each(|refused| note(&format!("{}: {refused:?}", mesh.name)));
     Ok(Place { solid, source, name: "Gmsh".into(), conforming: Some(made.mesh) })
 }

@@ -3,17 +3,16 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use serde::Serialize;
-use tesdf::TeSdf;
 use tesdf::encode::{
-    Deformation, EncodeOptions, EncodeProgress, Encoder, Refinement, Sampler, Sampling, Threshold,
-    encode_with,
+    Deformation, EncodeOptions, Encoder, Refinement, Sampler, Sampling, Threshold, encode_with,
 };
 use tesdf::evaluate::{BandReport, EvaluateOptions, evaluate};
 use tesdf::inspect::{InspectOptions, inspect};
+use tesdf::{Progress, TeSdf};
 
 use super::domains::Place;
 use super::output;
-use tesdf_terminal::progress::{Progress, watched};
+use tesdf_terminal::progress::{Bar, watched};
 use tesdf_terminal::report::Failure;
 
 /// How lists are made.
@@ -72,7 +71,7 @@ impl Way {
     /// What the library refused.
     pub fn encode(&self, place: &Place, sampler: &dyn Sampler) -> Result<(TeSdf, f64), Failure> {
         let start = Instant::now();
-        let progress = EncodeProgress::default();
+        let progress = Progress::default();
         let never = AtomicBool::new(false);
         let asset = watched(&progress, &never, || {
             encode_with(&place.solid, place.domain(), &place.source, &self.options, sampler, &progress)
@@ -124,6 +123,6 @@ impl Cost {
 /// # Errors
 /// As [`evaluate`].
 pub fn compare(assets: &[&TeSdf], options: &EvaluateOptions) -> Result<Vec<BandReport>, Failure> {
-    let bar = Progress::new("comparing with exact distances");
+    let bar = Bar::new("comparing with exact distances");
     evaluate(assets, options, |share| bar.set(share)).map_err(Failure::new)
 }

@@ -1,5 +1,5 @@
 //! The meshes of Table I: nearest to the paper's, whose own are not public.
-use tesdf::encode::Length;
+use tesdf::Length;
 
 use super::paper;
 

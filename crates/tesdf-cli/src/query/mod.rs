@@ -10,7 +10,7 @@ use tesdf::query::Precision;
 pub use points::{HEADER, PointsError, read, write};
 
 use tesdf_terminal::asset_file;
-use tesdf_terminal::progress::Progress;
+use tesdf_terminal::progress::Bar;
 use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf query`.
@@ -38,7 +38,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let points =
         read(&bytes).map_err(|e| at(&e).hint("expected a CSV file whose header has the columns x, y, z"))?;
     // Rows that run over the terminal show the progress themselves.
-    let bar = (!io::stdout().is_terminal()).then(|| Progress::new("querying"));
+    let bar = (!io::stdout().is_terminal()).then(|| Bar::new("querying"));
     report::result(HEADER.as_bytes())?;
     let mut rows = Vec::new();
     for (i, chunk) in points.chunks(CHUNK).enumerate() {

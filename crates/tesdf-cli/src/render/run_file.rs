@@ -1,8 +1,8 @@
 //! The bodies of a recorded run at one of its steps.
 use std::path::Path;
 
+use tesdf::Progress;
 use tesdf::collide::Placement;
-use tesdf::encode::EncodeProgress;
 use tesdf::glam::Vec3;
 use tesdf::save::Destination;
 use tesdf_sim::record::RecordedContact;
@@ -26,7 +26,7 @@ pub fn posed(args: &Args, run: &Path) -> Result<(Posed, Destination), Failure> {
     let mut inputs = loaded.geometry_files();
     inputs.push(run.to_path_buf());
     let output = output::open(&args.output, &inputs, args.consent)?;
-    let (progress, interrupted) = (EncodeProgress::default(), interrupt_flag()?);
+    let (progress, interrupted) = (Progress::default(), interrupt_flag()?);
     let system = watched(&progress, &interrupted, || loaded.system(&progress)).map_err(|e| match e {
         SceneError::Body { name, reason, .. } => at(&format!("body {name}: {reason}"))
             .hint("the run holds paths, not meshes; --geometry BODY=FILE says where they are now"),

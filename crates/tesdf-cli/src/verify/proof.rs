@@ -5,7 +5,7 @@ use tesdf::TeSdf;
 use tesdf::verify::{Fault, ProveError, ProveOptions, ProveReport, Tally, Verdict, prove};
 
 use super::{Args, go_on, uninterrupted};
-use tesdf_terminal::progress::Progress;
+use tesdf_terminal::progress::Bar;
 use tesdf_terminal::report::{Failure, count};
 
 /// Proves what the file says of itself.
@@ -17,7 +17,7 @@ pub fn run(
     asset: &TeSdf,
     interrupted: &AtomicBool,
 ) -> Result<Result<ProveReport, ProveError>, Failure> {
-    let bar = Progress::new("proving cell by cell");
+    let bar = Bar::new("proving cell by cell");
     let mut options = ProveOptions::default();
     if let Some(pieces) = args.pieces {
         options.pieces = pieces.get();
@@ -49,7 +49,7 @@ pub fn text(report: &ProveReport) -> String {
     text += &format!(
         "  pieces          {}, at most {} of one cell\n",
         count(report.pieces as usize, "piece"),
-        report.most_pieces
+        report.max_pieces
     );
     report.faults.iter().for_each(|fault| text += &fault_text(fault));
     let undecided = report.distances.undecided + report.signs.undecided;

@@ -2,8 +2,9 @@
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
-use tesdf::encode::surface::Surface;
-use tesdf::encode::{EncodeError, EncodeProgress, SampledCell, Sampler, Sampling};
+use tesdf::Progress;
+use tesdf::encode::Surface;
+use tesdf::encode::{EncodeError, SampledCell, Sampler, Sampling};
 
 use super::cell::{CellRows, Grid};
 use super::face::CandidateFace;
@@ -74,7 +75,7 @@ impl Sampler for SampleCounter {
         surface: &Surface,
         cells: &[SampledCell],
         sampling: &Sampling,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Vec<Vec<f64>>, EncodeError> {
         if progress.is_cancelled() {
             return Err(EncodeError::Cancelled);

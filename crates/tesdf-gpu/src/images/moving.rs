@@ -1,7 +1,7 @@
 //! Vertices of conforming domains that move on the device.
 use cubecl::prelude::*;
-use tesdf::asset::Arrays;
 use tesdf::asset::layout::TreeChild;
+use tesdf::query::Arrays;
 
 use super::Images;
 use crate::GpuError;

@@ -1,7 +1,7 @@
 //! The roots of a forest, and the tree of boxes that finds those of a conforming domain.
 use glam::DVec3;
-use tesdf::asset::Arrays;
 use tesdf::geometry::{Aabb, AabbTree, Child};
+use tesdf::query::Arrays;
 
 use crate::kernels::assets::NONE;
 use crate::kernels::tetrahedra::{ROWS, Tetrahedron, tetrahedron_of};

@@ -1,6 +1,6 @@
 //! The distance from a point to a face, as `tesdf`'s `f32` kernel computes it: the same record, the same formulas.
 use cubecl::prelude::*;
-use tesdf::query::FaceRecord;
+use tesdf::asset::FaceRecord;
 
 use super::vector::{V3, cross, dot, minus, pick, plus, plus_scaled, scaled, v3};
 
@@ -51,7 +51,7 @@ pub fn normal_of(a: V3, b: V3, c: V3) -> V3 {
     scaled(select(spans, 1.0f32 / size.max(1e-30f32), 0.0f32), across)
 }
 
-/// The face of three corners, as `tesdf::query::FaceRecord` makes it, without hints; in `f32` alone.
+/// The face of three corners, as `tesdf::asset::FaceRecord` makes it, without hints; in `f32` alone.
 #[cube]
 pub fn record_of(a: V3, b: V3, c: V3) -> Face {
     let (ab, ac, bc) = (minus(b, a), minus(c, a), minus(c, b));

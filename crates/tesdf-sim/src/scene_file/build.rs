@@ -2,15 +2,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{
     CollideError, CollideOptions, Contacts, FaceMethod, Instance, Mode, Pose, Scene, Shape, ShapeId,
     Velocity, detect,
 };
-use tesdf::encode::{EncodeError, EncodeOptions, EncodeProgress, Length, Preset, encode};
+use tesdf::encode::{EncodeError, EncodeOptions, Preset, encode};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{self, LoadedMesh, SolidMesh};
+use tesdf::{Length, Progress, TeSdf};
 
 use super::read::LoadedScene;
 use super::units::Measure;
@@ -26,7 +26,7 @@ impl LoadedScene {
     ///
     /// # Errors
     /// The body at fault, with its line; or [`SceneError::Cancelled`].
-    pub fn system(&self, progress: &EncodeProgress) -> Result<System, SceneError> {
+    pub fn system(&self, progress: &Progress) -> Result<System, SceneError> {
         let scene = &self.scene;
         scene.steps().map_err(|e| self.value(e.key, e.reason))?;
         let gravity = DVec3::from_array(scene.gravity);
@@ -145,7 +145,7 @@ impl Shapes {
         scene: &LoadedScene,
         body: &BodySection,
         system: &mut System,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<ShapeId, ShapeFailure> {
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
@@ -184,7 +184,7 @@ fn add_shape(system: &mut System, shape: Shape) -> Result<ShapeId, ShapeFailure>
     system.add_shape(shape).map_err(|e| ShapeFailure::Reason(e.to_string()))
 }
 
-fn encode_mesh(file: &Path, progress: &EncodeProgress) -> Result<TeSdf, ShapeFailure> {
+fn encode_mesh(file: &Path, progress: &Progress) -> Result<TeSdf, ShapeFailure> {
     let at = |e: &dyn std::fmt::Display| ShapeFailure::Reason(format!("{}: {e}", file.display()));
     let LoadedMesh { mesh, report, .. } = mesh::read(file).map_err(|e| at(&e))?;
     let solid = SolidMesh::new(mesh).map_err(|e| at(&e))?;

@@ -1,5 +1,5 @@
 //! Whether the units of assets fit together in a scene.
-use tesdf::asset::unit::metres;
+use tesdf::base::unit::metres;
 use tesdf::collide::{Shape, ShapeId};
 
 use super::BodySection;

@@ -2,8 +2,8 @@
 //!
 //! A tool built without the feature `gpu` has the same option; each choice but `cpu` is then an error that
 //! says how to build the tool with it.
+use tesdf::encode::Processor;
 use tesdf::encode::Sampler;
-use tesdf::encode::sampled::Processor;
 
 use crate::report::Failure;
 

@@ -2,7 +2,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::TeSdf;
-use super::layout::{Label, List, Node, Side};
+use super::layout::{Label, List, Node};
+use crate::base::Side;
 use crate::domain::Cell;
 
 /// A tetrahedron of the domain.

@@ -1,6 +1,7 @@
 //! The sections of an asset and the words in them; the one place that knows the byte layout.
 
 use super::{Element, SectionSpec};
+use crate::base::Side;
 
 /// `[V, 3]` vertex positions in the mesh's unit, in the order of the source.
 pub const VERTICES: SectionSpec = SectionSpec::required("mesh.vertices", Element::F64, 3);
@@ -87,15 +88,6 @@ pub enum Node {
     Far(Side),
     /// Farther out than the band.
     NotOfDomain,
-}
-
-/// Which side of the surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// Winding number 0.
-    Outside,
-    /// Winding number 1 or more.
-    Inside,
 }
 
 const LEAF: u32 = 1 << 31;

@@ -14,26 +14,33 @@
 //! `checksum` is BLAKE3 of the first 8 + n bytes with its own 64 digits set to `0`; `checksum.NAME` is BLAKE3 of section
 //! NAME. Together they cover every byte of the file.
 pub mod about;
-mod arrays;
 mod cell_bounds;
 mod cells;
 mod conforming;
 mod container;
+mod entries;
 mod error;
+mod face_record;
 mod header;
+mod incidence;
 mod inner_ball;
 pub mod layout;
+mod motion;
+pub(crate) mod options;
+mod roots;
 mod section;
 mod te_sdf;
-pub mod unit;
 
 pub use crate::save::save_atomic;
-pub use arrays::Arrays;
+pub(crate) use cell_bounds::CellBounds;
 pub use cells::{CellKind, CellView};
 pub(crate) use conforming::Conforming;
 pub use container::{Container, SharedSection, write_container};
 pub use error::AssetError;
-pub(crate) use inner_ball::{InnerBall, corner_reach};
+pub use face_record::FaceRecord;
+pub(crate) use incidence::Incidence;
+pub(crate) use inner_ball::InnerBall;
+pub(crate) use motion::Motion;
 pub use section::{Element, Presence, Section, SectionSpec};
 pub use te_sdf::TeSdf;
 

@@ -7,12 +7,15 @@ use glam::DVec3;
 use super::about::About;
 use super::cell_bounds::CellBounds;
 use super::conforming::Conforming;
+use super::entries::Entries;
+use super::face_record::FaceRecord;
+use super::inner_ball::InnerBall;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
-use super::{AssetError, Container, InnerBall, Section, SharedSection, save_atomic, write_container};
-use crate::deform::Motion;
+use super::motion::Motion;
+use super::{AssetError, Container, Section, SharedSection, save_atomic, write_container};
+use crate::base::Isa;
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
-use crate::query::{Entries, FaceRecord, Isa};
 
 /// A Tetra-Encoded Signed Distance Field: an encoded mesh, immutable, shared by all that use it.
 ///
@@ -59,12 +62,12 @@ pub struct TeSdf {
     pub(crate) isa: Isa,
     /// Of the faces' corners, in the mesh's unit; made on opening.
     bounds: Aabb,
-    cell_bounds: OnceLock<CellBounds>,
+    pub(crate) cell_bounds: OnceLock<CellBounds>,
     /// What has moved since it was opened, if anything has.
     pub(crate) motion: Option<Motion>,
     lowest_faces: OnceLock<Vec<u32>>,
-    pub(super) inner_ball: OnceLock<InnerBall>,
-    pub(super) corner_reaches: OnceLock<Vec<f32>>,
+    pub(crate) inner_ball: OnceLock<InnerBall>,
+    pub(crate) corner_reaches: OnceLock<Vec<f32>>,
 }
 
 impl TeSdf {
@@ -128,7 +131,7 @@ impl TeSdf {
             corner_reaches: OnceLock::new(),
         };
         asset.check_mesh()?;
-        asset.conforming = Conforming::open(&asset)?;
+        asset.conforming = Conforming::open(&asset.container, asset.placed())?;
         asset.check_lists()?;
         asset.check_tree()?;
         let middle = asset.cube.middle();
@@ -151,7 +154,7 @@ impl TeSdf {
         &self.about
     }
 
-    /// Name of the mesh's unit as it was recorded, if it was; see [`unit`](super::unit).
+    /// Name of the mesh's unit as it was recorded, if it was; see [`unit`](crate::base::unit).
     pub fn unit(&self) -> Option<&str> {
         self.about.options.unit.as_deref().map(str::trim).filter(|unit| !unit.is_empty())
     }
@@ -267,11 +270,6 @@ impl TeSdf {
         }
         let diagonal = self.bounds.extent().length();
         self.about.options.band.resolve(diagonal) * self.frame.scale
-    }
-
-    /// The least signed distances of the cells; made on first use.
-    pub(crate) fn cell_bounds(&self) -> &CellBounds {
-        self.cell_bounds.get_or_init(|| CellBounds::new(self))
     }
 
     /// Corners of the face at `position`, its place in the file, in the mesh's unit.

@@ -1,7 +1,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::detect::Direction;
+use super::ordered_pair::OrderedPair;
 use super::{CollideError, CollideOptions, InstanceId, Scene};
 
 /// A face (or node) of one body within a cell of another: what the narrow phase is asked about.
@@ -27,21 +27,21 @@ pub struct Candidate {
 /// # Errors
 /// As [`detect`](super::detect()).
 pub fn candidates(scene: &Scene, options: &CollideOptions) -> Result<Vec<Candidate>, CollideError> {
-    let directions = Direction::all(scene, options)?;
-    Ok(directions.par_iter().flat_map_iter(of_direction).collect())
+    let pairs = OrderedPair::all(scene, options)?;
+    Ok(pairs.par_iter().flat_map_iter(of_pair).collect())
 }
 
-fn of_direction(direction: &Direction) -> Vec<Candidate> {
+fn of_pair(pair: &OrderedPair) -> Vec<Candidate> {
     let mut found = Vec::new();
-    for candidate in direction.candidates() {
-        let (part, face_a, _) = direction.part(candidate);
-        direction.search.polygons(&direction.field, &part, &mut |clipped| {
+    for candidate in pair.candidates() {
+        let (part, face_a, _) = pair.part(candidate);
+        pair.search.polygons(&pair.field, &part, &mut |clipped| {
             found.push(Candidate {
-                instance_a: direction.a,
-                instance_b: direction.b,
+                instance_a: pair.a,
+                instance_b: pair.b,
                 face_a,
                 tet_b: clipped.cell,
-                polygon: clipped.polygon.points().map(|p| direction.field.to_world(p)).collect(),
+                polygon: clipped.polygon.points().map(|p| pair.field.to_world(p)).collect(),
             });
         });
     }

@@ -7,7 +7,7 @@ use super::least::{Least, least};
 use super::narrow::Search;
 use super::surface::SurfaceBody;
 use super::{CollideError, CollideOptions, FaceMethod, InstanceId, Mode, Placement, Scene, Shape};
-use crate::encode::Length;
+use crate::base::Length;
 use crate::query::Precision;
 
 /// How exactly a clearance is wanted.
@@ -202,10 +202,10 @@ impl<'a> Pair<'a> {
     /// For each face of *a* a point of it and the direction inward; the world's frame. Of a simple shape one place is enough, as it is convex.
     fn behind_faces(&self) -> Vec<(DVec3, DVec3)> {
         let Body { shape, placement, .. } = &self.a;
-        let turn = |n: DVec3| placement.pose.rotation * n;
+        let rotate = |n: DVec3| placement.pose.rotation * n;
         let of_face = |[a, b, c]: [DVec3; 3]| {
             let normal = (b - a).cross(c - a).try_normalize()?;
-            Some((placement.to_world((a + b + c) / 3.0), turn(-normal)))
+            Some((placement.to_world((a + b + c) / 3.0), rotate(-normal)))
         };
         match shape {
             Shape::Mesh(asset) => {
@@ -213,7 +213,7 @@ impl<'a> Pair<'a> {
             }
             Shape::Plane => Vec::new(),
             // From the middle of its upper side down.
-            simple => vec![(placement.to_world(DVec3::Z * simple.bounds().max.z), turn(DVec3::NEG_Z))],
+            simple => vec![(placement.to_world(DVec3::Z * simple.bounds().max.z), rotate(DVec3::NEG_Z))],
         }
     }
 
@@ -256,7 +256,7 @@ impl<'a> Pair<'a> {
         let gradient = minimum.value.gradient;
         let on_surface = field.to_world(minimum.point - part.radius * gradient);
         let on_field = field.to_world(minimum.value.closest_point);
-        let away = field.turn(gradient);
+        let away = field.rotate(gradient);
         let (face_surface, (face_field, _)) = (surface.face_id(face), field.names(&minimum.value));
         let (point_a, point_b, normal, face_a, face_b) = match of {
             Surface::A => (on_surface, on_field, away, face_surface, face_field),

@@ -1,11 +1,12 @@
 //! The body whose signed distance field it is.
 use glam::DVec3;
 
+use super::field_value::FieldValue;
 use super::simple::Simple;
 use super::{FeatureB, Placement, Shape};
 use crate::TeSdf;
 use crate::geometry::Feature;
-use crate::query::{Faces, Found, Place, Precision};
+use crate::query::{Faces, Place, Precision};
 
 /// A field in the frame that it is computed in: the local frame of an asset, the frame of a simple shape.
 #[derive(Clone, Copy, Debug)]
@@ -24,28 +25,6 @@ pub struct FieldBody<'a> {
     placement: Placement,
 }
 
-/// What a field says at a point, in its frame.
-#[derive(Clone, Copy, Debug)]
-pub struct FieldValue {
-    /// Signed distance.
-    pub distance: f64,
-    /// Its gradient, unit.
-    pub gradient: DVec3,
-    /// The nearest point of the surface.
-    pub closest_point: DVec3,
-    /// The nearest face, by position in the asset; of a simple shape its number.
-    pub position: u32,
-    /// The part of that face.
-    pub feature: Feature,
-}
-
-impl From<Found> for FieldValue {
-    fn from(found: Found) -> Self {
-        let Found { signed_distance: distance, gradient, closest_point, position, feature } = found;
-        Self { distance, gradient, closest_point, position, feature }
-    }
-}
-
 /// What `f32` may be off by, in the local frame of an asset: twice what is promised for queries.
 pub const ROUNDING: f64 = 2e-6;
 
@@ -57,7 +36,7 @@ impl<'a> FieldBody<'a> {
     pub fn new(shape: &'a Shape, placement: Placement) -> Self {
         let field = match shape {
             Shape::Mesh(asset) => Field::Mesh(asset),
-            simple => Field::Simple(Simple::new(simple)),
+            simple => Field::Simple(Simple::from(simple)),
         };
         Self { field, placement }
     }
@@ -88,12 +67,12 @@ impl<'a> FieldBody<'a> {
     }
 
     /// Of a direction, from the field's frame to the world.
-    pub fn turn(&self, v: DVec3) -> DVec3 {
+    pub fn rotate(&self, v: DVec3) -> DVec3 {
         self.placement.pose.rotation * v
     }
 
     /// Of a direction, from the world to the field's frame.
-    pub fn turn_back(&self, v: DVec3) -> DVec3 {
+    pub fn rotate_back(&self, v: DVec3) -> DVec3 {
         self.placement.pose.rotation.inverse() * v
     }
 

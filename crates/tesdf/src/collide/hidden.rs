@@ -12,41 +12,16 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use serde::Serialize;
 
-use super::detect::Direction;
 use super::field::FieldBody;
+use super::ordered_pair::OrderedPair;
 use super::surface::SurfaceBody;
-use super::{CollideError, CollideOptions, Contact, InstanceId, Mode, Scene};
-use crate::asset::corner_reach;
+use super::{CollideError, CollideOptions, Contact, HiddenOverlap, InstanceId, Mode, Scene};
 use crate::asset::layout::TreeChild;
 use crate::geometry::Aabb;
-
-/// Two bodies that overlap although no contact of theirs shows it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct HiddenOverlap {
-    /// The instance of the lower id.
-    pub instance_a: InstanceId,
-    /// The instance of the higher id.
-    pub instance_b: InstanceId,
-    /// How deep one body is in the other, at least, in the world's unit: how far a point of the one is inside of the other, or the radius
-    /// of a ball that is inside of both.
-    pub depth: f64,
-}
+use crate::query::corner_reach;
 
 impl HiddenOverlap {
-    /// From this depth on, as a share of the lesser of the [inner balls](super::Shape::inner_ball) of the bodies, an overlap is found.
-    pub const SURE: f64 = 0.5;
-    /// From this depth on it is found where few looks are enough; nothing less deep is told.
-    pub const FINE: f64 = 0.05;
-    /// Looks at a face for what is less deep than [`SURE`](Self::SURE).
-    pub const FINE_LOOKS: u32 = 4;
-    /// Looks at the faces of a body after which a search gives up. Plates a thousandth as thick as wide that lie on each other would take a
-    /// million.
-    pub const MOST_LOOKS: u32 = 1 << 14;
-    /// An overlap is hidden when it is more than so many times as deep as the deepest contact.
-    pub const SHOWN: f64 = 2.0;
-
     /// Of overlaps those that the contacts do not show.
     pub fn not_shown(overlaps: Vec<Self>, contacts: &[Contact]) -> Vec<Self> {
         if overlaps.is_empty() {
@@ -73,18 +48,18 @@ pub fn hidden_overlaps(
     options: &CollideOptions,
     contacts: &[Contact],
 ) -> Result<Vec<HiddenOverlap>, CollideError> {
-    Ok(among(&Direction::all(scene, options)?, options.mode, contacts))
+    Ok(among(&OrderedPair::all(scene, options)?, options.mode, contacts))
 }
 
-/// The same for directions, of which both of a pair are side by side.
-pub fn among(directions: &[Direction], mode: Mode, contacts: &[Contact]) -> Vec<HiddenOverlap> {
-    let overlap = |pair: &[Direction]| {
-        let depth = |d: &Direction| depth(&d.surface, &d.field, mode) * d.field.unit();
+/// The same for ordered pairs; the two orders of a pair of instances are side by side.
+pub fn among(pairs: &[OrderedPair], mode: Mode, contacts: &[Contact]) -> Vec<HiddenOverlap> {
+    let overlap = |pair: &[OrderedPair]| {
+        let depth = |p: &OrderedPair| depth(&p.surface, &p.field, mode) * p.field.unit();
         let (a, b) = (pair[0].a, pair[0].b);
         let depth = pair.iter().map(depth).fold(0.0, f64::max);
         (depth > 0.0).then_some(HiddenOverlap { instance_a: a.min(b), instance_b: a.max(b), depth })
     };
-    HiddenOverlap::not_shown(directions.par_chunks(2).filter_map(overlap).collect(), contacts)
+    HiddenOverlap::not_shown(pairs.par_chunks(2).filter_map(overlap).collect(), contacts)
 }
 
 /// How deep a surface is in a field where no contact need show it, at least, in the field's frame; 0 when no such place was found.
@@ -167,7 +142,7 @@ impl Looks<'_> {
         let before = self.looks;
         let mut stack = vec![corners];
         while let Some(corners) = stack.pop() {
-            if self.looks >= HiddenOverlap::MOST_LOOKS
+            if self.looks >= HiddenOverlap::MAX_LOOKS
                 || !Aabb::of(&corners).grown(part.radius).overlaps(self.core)
             {
                 continue;

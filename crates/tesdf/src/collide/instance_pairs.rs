@@ -30,7 +30,7 @@ const ULPS: f64 = 8.0;
 const FEW: usize = 16;
 
 /// Most pairs of a scene: with what is made of each for the detection they take some GB.
-pub const MOST_PAIRS: usize = 1 << 22;
+pub const MAX_PAIRS: usize = 1 << 22;
 
 /// All pairs that can touch, sorted by world and ids.
 ///
@@ -67,9 +67,9 @@ pub fn instance_pairs(
             }
             pairs.len()
         };
-        let within = |found: usize| match found <= MOST_PAIRS {
+        let within = |found: usize| match found <= MAX_PAIRS {
             true => Ok(()),
-            false => Err(CollideError::TooManyPairs { limit: MOST_PAIRS }),
+            false => Err(CollideError::TooManyPairs { limit: MAX_PAIRS }),
         };
         let planes: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].is_plane).collect();
         let bodies: Vec<usize> = (0..entries.len()).filter(|&i| !entries[i].is_plane).collect();
@@ -131,7 +131,7 @@ mod tests {
         let ids: Vec<_> =
             (0..2897).map(|_| scene.add(Instance::new(shape, Pose::IDENTITY)).unwrap()).collect();
         let error = instance_pairs(&scene, 0.0, 0.0).unwrap_err();
-        assert_eq!(error, CollideError::TooManyPairs { limit: MOST_PAIRS });
+        assert_eq!(error, CollideError::TooManyPairs { limit: MAX_PAIRS });
         scene.remove(&ids[..1]).unwrap();
         assert_eq!(instance_pairs(&scene, 0.0, 0.0).unwrap().len(), 2896 * 2895 / 2);
     }

@@ -7,7 +7,8 @@ use glam::DVec3;
 use super::polygon::{Parts, Polygon, Vertex};
 use crate::TeSdf;
 use crate::asset::Conforming;
-use crate::asset::layout::{Node, Side};
+use crate::asset::layout::Node;
+use crate::base::Side;
 use crate::domain::{Cell, ROOTS};
 use crate::geometry::{Aabb, barycentric};
 use crate::query::Place;
@@ -91,7 +92,7 @@ impl Clipping<'_> {
         if self.beyond {
             // Between two tetrahedra rounding leaves slivers, which may go on along their side out of the domain.
             let outside = |part: &Polygon| {
-                !part.is_thinner(SLIVER) && matches!(self.asset.place(part.center()), Place::NotOfDomain)
+                !part.is_thinner(SLIVER) && matches!(self.asset.locate(part.center()), Place::NotOfDomain)
             };
             for polygon in rest.into_iter().filter(outside) {
                 visit(&ClippedPolygon { polygon, place: Place::NotOfDomain, cell: None });
@@ -187,7 +188,7 @@ impl Clipping<'_> {
 
 /// A point, in the cell that holds it, if that can hold a signed distance up to `reach`.
 pub fn locate(asset: &TeSdf, point: DVec3, reach: f64, visit: &mut impl FnMut(&ClippedPolygon)) {
-    let (place, word) = asset.place_and_word(point);
+    let (place, word) = asset.locate_with_word(point);
     let cell = u32::try_from(word).ok();
     let beyond = matches!(place, Place::NotOfDomain) && reach < asset.band();
     if beyond || cell.is_some_and(|word| asset.cell_bounds().least(word) > reach) {

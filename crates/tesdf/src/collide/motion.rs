@@ -84,14 +84,16 @@ impl Motion {
             Self::Rest => start,
             Self::Linear { velocity } => Pose {
                 translation: start.translation + t * velocity.linear,
-                rotation: turned(DQuat::from_scaled_axis(t * velocity.angular), start.rotation),
+                rotation: rotated(DQuat::from_scaled_axis(t * velocity.angular), start.rotation),
             },
             Self::Screw { point, axis, angular_speed, pitch } => {
                 let (axis, angle) = (axis.normalize_or_zero(), t * angular_speed);
-                let turn = DQuat::from_axis_angle(axis, angle);
+                let rotation = DQuat::from_axis_angle(axis, angle);
                 Pose {
-                    translation: point + turn * (start.translation - point) + pitch * (angle / TAU) * axis,
-                    rotation: turned(turn, start.rotation),
+                    translation: point
+                        + rotation * (start.translation - point)
+                        + pitch * (angle / TAU) * axis,
+                    rotation: rotated(rotation, start.rotation),
                 }
             }
         }
@@ -113,19 +115,19 @@ impl Motion {
     }
 }
 
-fn turned(turn: DQuat, rotation: DQuat) -> DQuat {
-    (turn * rotation).normalize()
+fn rotated(by: DQuat, rotation: DQuat) -> DQuat {
+    (by * rotation).normalize()
 }
 
 impl Twist {
-    /// Whether it turns.
-    pub fn turns(&self) -> bool {
+    /// Whether it rotates.
+    pub fn rotates(&self) -> bool {
         self.spin != DVec3::ZERO
     }
 
     /// The greatest speed that turning gives a point of a shape placed at the start. For a rounded one that of its core: the ball around
     /// a point goes where the point goes.
-    fn turning_speed(&self, shape: &Shape, placement: Placement) -> f64 {
+    fn rotation_speed(&self, shape: &Shape, placement: Placement) -> f64 {
         let axis = self.spin.normalize_or_zero();
         if axis == DVec3::ZERO {
             return 0.0;
@@ -157,17 +159,17 @@ impl Twist {
 /// A point's speed is its body's drift and, across the axis, at most the turning speed. About one direction (or when one body does not turn)
 /// drift along the axis and turning are at right angles; in general they add up.
 pub fn closing_speed(bodies: [(Twist, &Shape, Placement); 2]) -> f64 {
-    let [turning_a, turning_b] =
-        bodies.map(|(twist, shape, placement)| twist.turning_speed(shape, placement));
+    let [rotation_a, rotation_b] =
+        bodies.map(|(twist, shape, placement)| twist.rotation_speed(shape, placement));
     let [a, b] = bodies.map(|(twist, ..)| twist);
-    let (drift, turning) = (a.drift - b.drift, turning_a + turning_b);
+    let (drift, rotation) = (a.drift - b.drift, rotation_a + rotation_b);
     let one_axis = a.spin.cross(b.spin) == DVec3::ZERO;
-    let speed = if one_axis && turning > 0.0 {
-        let axis = if turning_a > 0.0 { a.spin } else { b.spin }.normalize_or_zero();
+    let speed = if one_axis && rotation > 0.0 {
+        let axis = if rotation_a > 0.0 { a.spin } else { b.spin }.normalize_or_zero();
         let along = drift.dot(axis);
-        along.hypot((drift - along * axis).length() + turning)
+        along.hypot((drift - along * axis).length() + rotation)
     } else {
-        drift.length() + turning
+        drift.length() + rotation
     };
     // Room for rounding.
     speed * (1.0 + 1e-12)
@@ -186,9 +188,9 @@ mod tests {
             angular_speed: -2.0,
             pitch: 0.5,
         };
-        let turn = screw.pose_at(start, -TAU / 2.0);
-        assert!(turn.translation.distance(start.translation - DVec3::new(0.0, 0.0, -0.5)) < 1e-14);
-        assert!(turn.rotation.angle_between(start.rotation) < 1e-7);
+        let back = screw.pose_at(start, -TAU / 2.0);
+        assert!(back.translation.distance(start.translation - DVec3::new(0.0, 0.0, -0.5)) < 1e-14);
+        assert!(back.rotation.angle_between(start.rotation) < 1e-7);
         let quarter = screw.pose_at(start, -TAU / 8.0);
         assert!(quarter.translation.distance(DVec3::new(3.0, 3.0, 2.125)) < 1e-14);
     }

@@ -1,7 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::CollideError;
-use crate::encode::Length;
+use crate::base::Length;
 use crate::query::Precision;
 
 /// What is tested of body *a* against the field of body *b*.

@@ -5,7 +5,7 @@ use crate::geometry::Aabb;
 
 /// Most vertices of a polygon: a triangle clipped by a tetrahedron has seven; the rest is room for those that rounding
 /// leaves on a line.
-pub const MOST_VERTICES: usize = 12;
+pub const MAX_VERTICES: usize = 12;
 
 /// A vertex of a polygon that is being clipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,7 +27,7 @@ impl Vertex {
 
 /// A convex polygon: a face, a segment or a point, clipped by a cell.
 #[derive(Clone, Debug, Default)]
-pub struct Polygon(ArrayVec<Vertex, MOST_VERTICES>);
+pub struct Polygon(ArrayVec<Vertex, MAX_VERTICES>);
 
 /// Where a polygon lies, seen from a plane.
 #[expect(
@@ -44,7 +44,7 @@ pub enum Parts {
 }
 
 impl Polygon {
-    /// From one to [`MOST_VERTICES`] vertices.
+    /// From one to [`MAX_VERTICES`] vertices.
     pub fn new(points: &[DVec3]) -> Self {
         Self(points.iter().map(|&point| Vertex { point, lambda: [0.0; 4] }).collect())
     }
@@ -66,7 +66,7 @@ impl Polygon {
 
     /// Bounds of the vertices.
     pub fn bounds(&self) -> Aabb {
-        Aabb::of(&self.points().collect::<ArrayVec<DVec3, MOST_VERTICES>>())
+        Aabb::of(&self.points().collect::<ArrayVec<DVec3, MAX_VERTICES>>())
     }
 
     /// Mean of the vertices: a point of the polygon.
@@ -77,10 +77,10 @@ impl Polygon {
     /// Whether it has an area, of less than `thickness` times its greatest length from the first vertex; no points and segments.
     pub fn is_thinner(&self, thickness: f64) -> bool {
         let Some(first) = self.points().next() else { return false };
-        let ways: ArrayVec<DVec3, MOST_VERTICES> = self.points().skip(1).map(|p| p - first).collect();
-        let twice_the_area: DVec3 = ways.windows(2).map(|pair| pair[0].cross(pair[1])).sum();
-        let longest = ways.iter().map(|way| way.length()).fold(0.0, f64::max);
-        ways.len() > 1 && twice_the_area.length() < thickness * longest
+        let spokes: ArrayVec<DVec3, MAX_VERTICES> = self.points().skip(1).map(|p| p - first).collect();
+        let twice_the_area: DVec3 = spokes.windows(2).map(|pair| pair[0].cross(pair[1])).sum();
+        let longest = spokes.iter().map(|spoke| spoke.length()).fold(0.0, f64::max);
+        spokes.len() > 1 && twice_the_area.length() < thickness * longest
     }
 
     /// Greatest distance from `p` to a point of the polygon: to a vertex, as the polygon is convex.
@@ -91,7 +91,7 @@ impl Polygon {
     /// Cuts where `height` is 0. The parts are closed; what only touches the plane is not cut.
     #[inline]
     pub fn cut(&self, height: impl Fn(&Vertex) -> f64) -> Parts {
-        let mut heights = [0.0; MOST_VERTICES];
+        let mut heights = [0.0; MAX_VERTICES];
         let (mut above, mut below) = (false, false);
         for (h, v) in heights.iter_mut().zip(&self.0) {
             *h = height(v);
@@ -105,7 +105,7 @@ impl Polygon {
         }
     }
 
-    fn across(&self, heights: &[f64; MOST_VERTICES]) -> Parts {
+    fn across(&self, heights: &[f64; MAX_VERTICES]) -> Parts {
         let (mut first, mut second) = (Self::default(), Self::default());
         let n = self.0.len();
         for i in 0..n {

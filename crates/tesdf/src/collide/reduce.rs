@@ -65,8 +65,8 @@ pub fn wrench_error(contacts: &[Contact], kept: &[Contact], center: DVec3, lengt
         if hull.is_empty() {
             return f64::INFINITY;
         }
-        let way = residual(&hull, &wrench_of(c, center, length));
-        dot(&way, &way).sqrt()
+        let residual = residual(&hull, &wrench_of(c, center, length));
+        dot(&residual, &residual).sqrt()
     };
     contacts.par_iter().map(distance).reduce(|| 0.0, f64::max)
 }
@@ -150,16 +150,16 @@ fn extremes(n: usize, radius: f64, at: impl Fn(usize) -> DVec3) -> Vec<usize> {
     extremes
 }
 
-/// All wrenches, and for each its way from a point of the hull of those that are kept. The hull only grows, so that
-/// point stays in it, and the length of the way stays an upper bound of the distance.
+/// All wrenches, and for each its residual, the vector from a point of the hull of those that are kept. The hull only grows, so that
+/// point stays in it, and the length of the residual stays an upper bound of the distance.
 struct Kept {
     wrenches: [Vec<f64>; 6],
-    ways: [Vec<f64>; 6],
-    /// Squared lengths of the ways.
+    residuals: [Vec<f64>; 6],
+    /// Squared lengths of the residuals.
     bounds: Vec<f64>,
     /// The greatest of each block.
     greatest: Vec<f64>,
-    /// How many were kept when the way was last the shortest.
+    /// How many were kept when the residual was last the shortest.
     exact: Vec<u32>,
     /// Kept contacts and their wrenches, in the order in which they were chosen.
     order: Vec<usize>,
@@ -174,7 +174,7 @@ impl Kept {
         }
         Self {
             wrenches,
-            ways: std::array::from_fn(|_| vec![0.0; n]),
+            residuals: std::array::from_fn(|_| vec![0.0; n]),
             bounds: vec![f64::INFINITY; n],
             greatest: vec![f64::INFINITY; n.div_ceil(BLOCK)],
             exact: vec![0; n],
@@ -183,29 +183,29 @@ impl Kept {
         }
     }
 
-    /// The hull grows by wrench `i`: all ways are shortened by what the segments to it allow.
+    /// The hull grows by wrench `i`: all residuals are shortened by what the segments to it allow.
     fn keep(&mut self, i: usize) {
         let new = self.wrench(i);
         let n = self.bounds.len();
         if self.hull.is_empty() {
-            for ((way, wrench), x) in self.ways.iter_mut().zip(&self.wrenches).zip(new) {
-                *way = wrench.iter().map(|w| w - x).collect();
+            for ((residual, wrench), x) in self.residuals.iter_mut().zip(&self.wrenches).zip(new) {
+                *residual = wrench.iter().map(|w| w - x).collect();
             }
         }
         self.order.push(i);
         self.hull.push(new);
         let [w0, w1, w2, w3, w4, w5] = self.wrenches.each_ref().map(|column| &column[..n]);
-        let [r0, r1, r2, r3, r4, r5] = self.ways.each_mut().map(|column| &mut column[..n]);
+        let [r0, r1, r2, r3, r4, r5] = self.residuals.each_mut().map(|column| &mut column[..n]);
         let bounds = &mut self.bounds[..n];
         for j in 0..n {
-            let way = [r0[j], r1[j], r2[j], r3[j], r4[j], r5[j]];
+            let residual = [r0[j], r1[j], r2[j], r3[j], r4[j], r5[j]];
             let wrench = [w0[j], w1[j], w2[j], w3[j], w4[j], w5[j]];
             // From the point of the hull, w − r, to the new one.
-            let to: Wrench = std::array::from_fn(|k| new[k] - wrench[k] + way[k]);
-            let step = (dot(&way, &to) / dot(&to, &to).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            let way: Wrench = std::array::from_fn(|k| way[k] - step * to[k]);
-            [r0[j], r1[j], r2[j], r3[j], r4[j], r5[j]] = way;
-            bounds[j] = dot(&way, &way);
+            let to: Wrench = std::array::from_fn(|k| new[k] - wrench[k] + residual[k]);
+            let step = (dot(&residual, &to) / dot(&to, &to).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let residual: Wrench = std::array::from_fn(|k| residual[k] - step * to[k]);
+            [r0[j], r1[j], r2[j], r3[j], r4[j], r5[j]] = residual;
+            bounds[j] = dot(&residual, &residual);
         }
         for block in 0..self.greatest.len() {
             self.update_greatest(block);
@@ -228,11 +228,11 @@ impl Kept {
             }
             *choices -= 1;
             self.exact[i] = now;
-            let way = residual(&self.hull, &self.wrench(i));
-            let square = dot(&way, &way);
+            let residual = residual(&self.hull, &self.wrench(i));
+            let square = dot(&residual, &residual);
             if square < self.bounds[i] {
                 self.bounds[i] = square;
-                self.ways.iter_mut().zip(way).for_each(|(column, x)| column[i] = x);
+                self.residuals.iter_mut().zip(residual).for_each(|(column, x)| column[i] = x);
                 self.update_greatest(block);
             }
         }

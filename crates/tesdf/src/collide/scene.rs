@@ -1,28 +1,12 @@
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt;
 use std::sync::Arc;
 
 use glam::DVec3;
-use serde::Serialize;
 
 use super::shape::SIZE;
-use super::{CollideError, Placement, Pose, Shape};
+use super::{CollideError, InstanceId, Placement, Pose, Shape, ShapeId};
 use crate::TeSdf;
 use crate::geometry::Aabb;
-
-/// Names a shape of a scene; never used again after the shape is removed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-pub struct ShapeId(pub u32);
-
-/// Names an instance of a scene: 0, 1, 2, … in the order of adding; never used again after the instance is removed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
-pub struct InstanceId(pub u32);
-
-impl fmt::Display for InstanceId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
 
 /// Which instances meet which: two do when each one's `memberships` share a bit with the other's `filter`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -67,7 +67,7 @@ impl Shape {
     pub fn bounds(&self) -> Aabb {
         match self {
             Self::Mesh(asset) => asset.bounds(),
-            simple => Simple::new(simple).bounds(),
+            simple => Simple::from(simple).bounds(),
         }
     }
 
@@ -80,7 +80,7 @@ impl Shape {
                 let frame = asset.frame;
                 (radius > 0.0).then(|| (frame.to_world(center), radius * frame.inverse_scale()))
             }
-            simple => Simple::new(simple).inner_radius().map(|radius| (DVec3::ZERO, radius)),
+            simple => Simple::from(simple).inner_radius().map(|radius| (DVec3::ZERO, radius)),
         }
     }
 
@@ -89,7 +89,7 @@ impl Shape {
     pub fn parts(&self) -> (Vec<Vec<DVec3>>, f64) {
         match self {
             Self::Mesh(_) | Self::Plane => (Vec::new(), 0.0),
-            simple => Simple::new(simple).parts(),
+            simple => Simple::from(simple).parts(),
         }
     }
 
@@ -97,13 +97,26 @@ impl Shape {
     pub fn nodes(&self) -> Vec<(DVec3, u32)> {
         match self {
             Self::Mesh(_) | Self::Plane => Vec::new(),
-            simple => Simple::new(simple).nodes().0,
+            simple => Simple::from(simple).nodes().0,
         }
     }
 
     /// Diagonal of the bounds, in the shape's unit; that of a plane is infinite.
     pub fn diagonal(&self) -> f64 {
         self.bounds().extent().length()
+    }
+}
+
+impl From<&Shape> for Simple {
+    /// Of any shape but a mesh, which has no formula and is taken for a point.
+    fn from(shape: &Shape) -> Self {
+        match *shape {
+            Shape::Plane => Self::Plane,
+            Shape::Box { half_extents } => Self::Box(half_extents),
+            Shape::Sphere { radius } => Self::Round { half_height: 0.0, radius },
+            Shape::Capsule { half_height, radius } => Self::Round { half_height, radius },
+            Shape::Mesh(_) => Self::Round { half_height: 0.0, radius: 0.0 },
+        }
     }
 }
 

@@ -19,7 +19,7 @@ impl Shape {
             _ if !p.is_finite() => f64::NAN,
             // Squares would overflow, and from so far out every shape but a plane is a point.
             _ if p.abs().max_element() > FAR && !matches!(self, Self::Plane) => length_and_direction(p).0,
-            ref simple => Simple::new(simple).value(p).distance,
+            ref simple => Simple::from(simple).value(p).distance,
         }
     }
 

@@ -1,8 +1,7 @@
 //! Planes, boxes, spheres and capsules: their fields by formula, and what is tested of them as surfaces.
 use glam::DVec3;
 
-use super::Shape;
-use super::field::FieldValue;
+use super::field_value::FieldValue;
 use crate::geometry::{Aabb, Feature};
 
 /// A convex shape whose signed distance is a formula. All of the fields are convex functions.
@@ -22,17 +21,6 @@ pub enum Simple {
 }
 
 impl Simple {
-    /// Of any shape but a mesh, which has no formula and is taken for a point.
-    pub fn new(shape: &Shape) -> Self {
-        match *shape {
-            Shape::Plane => Self::Plane,
-            Shape::Box { half_extents } => Self::Box(half_extents),
-            Shape::Sphere { radius } => Self::Round { half_height: 0.0, radius },
-            Shape::Capsule { half_height, radius } => Self::Round { half_height, radius },
-            Shape::Mesh(_) => Self::Round { half_height: 0.0, radius: 0.0 },
-        }
-    }
-
     /// Signed distance, gradient, nearest point; a box numbers its sides −x +x −y +y −z +z.
     pub fn value(&self, p: DVec3) -> FieldValue {
         let (distance, gradient, closest_point, position) = match *self {

@@ -72,8 +72,8 @@ impl<'a> SurfaceBody<'a> {
         // The images of the origin and the axes: the map is affine.
         let shift = field.to_field(placement.to_world(DVec3::ZERO));
         let unit = placement.scale / field.unit();
-        let turn = |axis: DVec3| field.turn_back(placement.pose.rotation * axis) * unit;
-        let linear = DMat3::from_cols(turn(DVec3::X), turn(DVec3::Y), turn(DVec3::Z));
+        let rotate = |axis: DVec3| field.rotate_back(placement.pose.rotation * axis) * unit;
+        let linear = DMat3::from_cols(rotate(DVec3::X), rotate(DVec3::Y), rotate(DVec3::Z));
         Self { shape, linear, shift, scale: unit }
     }
 
@@ -91,7 +91,7 @@ impl<'a> SurfaceBody<'a> {
                 self.visit_leaves(asset, field, reach, |start, count| faces.extend(start..start + count));
             }
             Shape::Plane => faces.extend(0..2),
-            simple => faces.extend(0..Simple::new(simple).parts().0.len() as u32),
+            simple => faces.extend(0..Simple::from(simple).parts().0.len() as u32),
         }
         faces.retain(|&face| {
             let part = self.face(face, field, reach);
@@ -104,7 +104,7 @@ impl<'a> SurfaceBody<'a> {
     /// Nodes that can, by vertex number: those of the faces that can.
     pub fn nodes(&self, field: &FieldBody, reach: f64) -> Candidates {
         let Shape::Mesh(asset) = self.shape else {
-            return (0..Simple::new(self.shape).nodes().0.len() as u32).collect();
+            return (0..Simple::from(self.shape).nodes().0.len() as u32).collect();
         };
         let mut nodes = Vec::new();
         self.visit_leaves(asset, field, reach, |start, count| {
@@ -129,7 +129,7 @@ impl<'a> SurfaceBody<'a> {
                 Part::new(&square[face as usize % 2].map(|p| self.to_field(p)), 0.0)
             }
             simple => {
-                let (parts, radius) = Simple::new(simple).parts();
+                let (parts, radius) = Simple::from(simple).parts();
                 let points: Vec<DVec3> = parts[face as usize].iter().map(|&p| self.to_field(p)).collect();
                 Part::new(&points, radius * self.scale)
             }
@@ -143,7 +143,7 @@ impl<'a> SurfaceBody<'a> {
                 Part::new(&[self.to_field(DVec3::from_array(asset.vertices[node as usize]))], 0.0)
             }
             simple => {
-                let (nodes, radius) = Simple::new(simple).nodes();
+                let (nodes, radius) = Simple::from(simple).nodes();
                 Part::new(&[self.to_field(nodes[node as usize].0)], radius * self.scale)
             }
         }
@@ -162,7 +162,7 @@ impl<'a> SurfaceBody<'a> {
     pub fn face_of_node(&self, node: u32) -> u32 {
         match self.shape {
             Shape::Mesh(asset) => asset.lowest_faces()[node as usize],
-            simple => Simple::new(simple).nodes().0[node as usize].1,
+            simple => Simple::from(simple).nodes().0[node as usize].1,
         }
     }
 
@@ -171,7 +171,7 @@ impl<'a> SurfaceBody<'a> {
         match self.shape {
             Shape::Mesh(asset) => asset.face_count() as u32,
             Shape::Plane => 2,
-            simple => Simple::new(simple).parts().0.len() as u32,
+            simple => Simple::from(simple).parts().0.len() as u32,
         }
     }
 
@@ -179,7 +179,7 @@ impl<'a> SurfaceBody<'a> {
     pub fn node_count(&self) -> u32 {
         match self.shape {
             Shape::Mesh(asset) => asset.vertices.len() as u32,
-            simple => Simple::new(simple).nodes().0.len() as u32,
+            simple => Simple::from(simple).nodes().0.len() as u32,
         }
     }
 

@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use super::clearance::{Body, Pair};
 use super::motion::{Motion, Twist, closing_speed};
 use super::{Clearance, CollideError, InstanceId, Placement, Scene, Shape};
-use crate::encode::Length;
+use crate::base::Length;
 
 /// What counts as an impact, and how long to look for one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -119,7 +119,7 @@ fn moving<'a>(body: &Body<'a>, motion: Motion) -> Result<(Twist, &'a Shape, Plac
         return refuse(reason);
     }
     let twist = motion.twist(body.placement.pose);
-    if twist.turns() && matches!(body.shape, Shape::Plane) {
+    if twist.rotates() && matches!(body.shape, Shape::Plane) {
         return refuse(
             "a plane that turns has points of any speed; expected a motion without turning".into(),
         );

@@ -2,8 +2,8 @@
 use glam::DVec3;
 use serde::Serialize;
 
-use super::detect::Direction;
 use super::middle::ClippedPolygon;
+use super::ordered_pair::OrderedPair;
 use super::{CollideError, CollideOptions, InstanceId, Mode, Scene, Shape};
 
 /// What became of a pair of instances.
@@ -164,8 +164,8 @@ pub fn why(
     if pair == PairVerdict::BothPlanes {
         return Ok(report);
     }
-    let stages = Stages { direction: Direction::new(scene, options, a, b, contact_distance)?, options };
-    let candidates = stages.direction.candidates();
+    let stages = Stages { pair: OrderedPair::new(scene, options, a, b, contact_distance)?, options };
+    let candidates = stages.pair.candidates();
     let wanted = match part {
         None => candidates.clone(),
         Some(id) => stages.named(id)?,
@@ -177,13 +177,13 @@ pub fn why(
 }
 
 struct Stages<'a> {
-    direction: Direction<'a>,
+    pair: OrderedPair<'a>,
     options: &'a CollideOptions,
 }
 
 impl Stages<'_> {
     fn total(&self) -> usize {
-        let surface = &self.direction.surface;
+        let surface = &self.pair.surface;
         match self.options.mode {
             Mode::Node => surface.node_count() as usize,
             Mode::Face(_) => surface.face_count() as usize,
@@ -195,7 +195,7 @@ impl Stages<'_> {
         let total = self.total() as u32;
         let found: Vec<u32> = match self.options.mode {
             Mode::Node => (0..total).filter(|&node| node == id).collect(),
-            Mode::Face(_) => (0..total).filter(|&f| self.direction.surface.face_id(f) == id).collect(),
+            Mode::Face(_) => (0..total).filter(|&f| self.pair.surface.face_id(f) == id).collect(),
         };
         if found.is_empty() {
             let (option, expected) = match self.options.mode {
@@ -208,8 +208,8 @@ impl Stages<'_> {
     }
 
     fn part(&self, candidate: u32, is_candidate: bool) -> PartReport {
-        let Direction { surface, field, search, .. } = &self.direction;
-        let (part, _, id) = self.direction.part(candidate);
+        let OrderedPair { surface, field, search, .. } = &self.pair;
+        let (part, _, id) = self.pair.part(candidate);
         let unit = field.unit();
         let broad = if is_candidate {
             BroadVerdict::Candidate
@@ -234,7 +234,7 @@ impl Stages<'_> {
         search.within(f64::INFINITY).minima(field, &part, &mut |_| (), &mut |polygon, minimum| {
             let key = key(polygon);
             let verdict = match kept.iter().find(|k| k.0 == key) {
-                Some((_, minimum)) if self.direction.is_filtered(&part, minimum) => {
+                Some((_, minimum)) if self.pair.is_filtered(&part, minimum) => {
                     PolygonVerdict::Filtered { cosine: minimum.value.gradient.dot(part.normal) }
                 }
                 Some(_) => PolygonVerdict::Contact,

@@ -2,12 +2,8 @@
 //!
 //! In go moves of vertices; out come the asset itself, changed in place, and what was inverted. All cost follows what moved, but for
 //! copies of flat arrays.
-mod incidence;
 mod move_vertices;
 mod stale;
 
 pub use move_vertices::{DeformError, Moved};
 pub use stale::Reencoded;
-
-pub(crate) use incidence::Incidence;
-pub(crate) use move_vertices::Motion;

@@ -2,12 +2,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::incidence::Incidence;
 use crate::TeSdf;
 use crate::asset::layout::{SignHints, TreeChild};
-use crate::asset::{Conforming, SharedSection};
+use crate::asset::{Conforming, FaceRecord, Incidence, Motion, SharedSection};
 use crate::geometry::{Aabb, orientation};
-use crate::query::FaceRecord;
 
 /// Why vertices cannot be moved; nothing was.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -48,15 +46,6 @@ pub struct Moved {
     pub tetrahedra: usize,
     /// Those of them that are now inside out or flat, ascending: points of them may be found in several cells or in none.
     pub inverted: Vec<u32>,
-}
-
-/// What has moved since every list was proved.
-#[derive(Clone, Debug)]
-pub(crate) struct Motion {
-    pub(super) incidence: Arc<Incidence>,
-    /// By position.
-    pub(super) faces: Vec<bool>,
-    pub(super) tetrahedra: Vec<bool>,
 }
 
 impl TeSdf {
@@ -101,7 +90,7 @@ impl TeSdf {
             self.sign_hints = SharedSection::of_rows(&vec![0; self.faces.len()]);
             self.records.iter_mut().for_each(|record| record.forget_hints());
             Motion {
-                incidence: Arc::new(domain.incidence(self)),
+                incidence: Arc::new(domain.incidence(self.placed(), &self.faces, &self.tree_children)),
                 faces: vec![false; self.faces.len()],
                 tetrahedra: vec![false; domain.tetrahedra().len()],
             }
@@ -129,9 +118,9 @@ impl TeSdf {
         faces.iter().for_each(|&f| motion.faces[f as usize] = true);
         tetrahedra.iter().for_each(|&t| motion.tetrahedra[t as usize] = true);
         self.refit_faces(&faces, &incidence);
-        domain.refit(self, &tetrahedra, &incidence);
+        domain.refit(self.placed(), &tetrahedra, &incidence);
         let inverted = |&t: &u32| {
-            let [a, b, c, d] = domain.corners_in_unit(self, t as usize);
+            let [a, b, c, d] = domain.corners_in_unit(self.placed(), t as usize);
             orientation(a, b, c, d) >= 0
         };
         let moved = Moved {

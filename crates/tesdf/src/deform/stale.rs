@@ -2,21 +2,19 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::TeSdf;
-use crate::asset::SharedSection;
-use crate::asset::about::{About, Proved};
+use crate::asset::about::About;
 use crate::asset::layout::{Label, List, MAX_LIST_OFFSET, Node, TREE_LEAF};
+use crate::asset::{Motion, SharedSection};
+use crate::base::{Chains, Proved};
 use crate::domain::Cell;
 use crate::encode::EncodeError;
 use crate::encode::candidates::Pool;
-use crate::encode::chains::Chains;
 use crate::encode::filter::{Scratch, filter};
 use crate::encode::lists::Lists;
 use crate::encode::sampled::lipschitz_candidates;
 use crate::encode::surface::{Surface, Touching};
 use crate::geometry::{Aabb, AabbTree};
 use crate::mesh::TriangleMesh;
-
-use super::Motion;
 
 /// What [`TeSdf::reencode_stale`] has done.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

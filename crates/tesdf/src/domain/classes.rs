@@ -1,6 +1,6 @@
 use serde::Serialize;
 
-use crate::asset::layout::Side;
+use crate::base::Side;
 
 /// Numbers of vertices and tetrahedra by class, as the paper has them in Sec. III-A.
 ///

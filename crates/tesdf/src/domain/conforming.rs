@@ -7,10 +7,10 @@ mod triangles;
 mod weld;
 
 use super::{Classes, TetMesh};
-use crate::{asset::layout::Side, geometry::orientation, mesh::SolidMesh};
+use crate::{base::Side, geometry::orientation, mesh::SolidMesh};
 pub use error::{ConformingError, MissingFace};
 use weld::Welded;
-pub(super) use {triangles::sides_of, weld::first_at_position};
+pub(super) use weld::first_at_position;
 
 /// A tetrahedralisation that conforms to a solid's surface: each face is a side of tetrahedra, and none passes through one.
 ///

@@ -13,8 +13,7 @@ mod input;
 mod run;
 
 use super::{ConformingMesh, TetMesh};
-use crate::asset::layout::Side;
-use crate::encode::{EncodeProgress, Length};
+use crate::base::{Length, Progress, Side};
 use crate::geometry::{Aabb, LocalFrame};
 use crate::mesh::SolidMesh;
 pub use error::{GmshError, Refused, RefusedBecause};
@@ -126,7 +125,7 @@ pub struct GmshMesh {
 /// # Errors
 /// [`GmshError`] says how to install Gmsh, which option is wrong, or for each of the settings what failed.
 pub fn tetrahedralise(solid: &SolidMesh, options: &GmshOptions) -> Result<ConformingMesh, GmshError> {
-    Ok(tetrahedralise_and_report(solid, options, &EncodeProgress::default())?.mesh)
+    Ok(tetrahedralise_and_report(solid, options, &Progress::default())?.mesh)
 }
 
 /// As [`tetrahedralise`], with the settings that it took. Gmsh is ended when `progress` is cancelled.
@@ -136,7 +135,7 @@ pub fn tetrahedralise(solid: &SolidMesh, options: &GmshOptions) -> Result<Confor
 pub fn tetrahedralise_and_report(
     solid: &SolidMesh,
     options: &GmshOptions,
-    progress: &EncodeProgress,
+    progress: &Progress,
 ) -> Result<GmshMesh, GmshError> {
     let layers = Layers::new(solid, options)?;
     let frame = LocalFrame::of(solid.mesh().bounds());

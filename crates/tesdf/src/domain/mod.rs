@@ -12,6 +12,7 @@ mod conforming;
 mod cube;
 pub mod gmsh;
 mod read;
+mod sides;
 mod tet_mesh;
 
 pub use bisection::{Barycentric, Cell, MAX_DEPTH, ROOTS};

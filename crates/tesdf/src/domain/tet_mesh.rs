@@ -2,7 +2,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::conforming::sides_of;
+use super::sides::sides_of;
 use crate::{
     geometry::orientation,
     mesh::{MeshError, TriangleMesh},

@@ -3,11 +3,10 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::EncodeError;
+use super::error::EncodeError;
 use super::refine::{Leaf, Tree};
-use crate::asset::layout::{
-    LONG_WINDING, Label, List, MAX_LIST_OFFSET, NO_PALETTE, Node, PALETTE_SIZE, Side,
-};
+use crate::asset::layout::{LONG_WINDING, Label, List, MAX_LIST_OFFSET, NO_PALETTE, Node, PALETTE_SIZE};
+use crate::base::Side;
 
 /// The forest and its lists, as they are stored.
 #[derive(Debug, Default)]

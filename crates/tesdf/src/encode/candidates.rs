@@ -6,8 +6,7 @@
 use glam::DVec3;
 
 use super::doubles::{Doubles, GROUP, Vector, dispatch};
-use super::filter::Survivor;
-use super::surface::Surface;
+use super::surface::{Requirement, Surface};
 use crate::domain::Cell;
 use crate::geometry::{Feature, Regions, Triangle};
 
@@ -71,6 +70,17 @@ impl Candidates<'_> {
         look(surface.isa, &surface.triangles, self.faces, self.shape, p, out);
         nearest_seen(self.faces.len(), self.stride, out)
     }
+}
+
+/// A candidate that the rules did not drop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Survivor {
+    /// Index among the candidates.
+    pub index: u32,
+    /// What of the face the cell needs.
+    pub requirement: Requirement,
+    /// Whether the face comes within [`PAD`](super::filter::PAD) of the cell.
+    pub meets: bool,
 }
 
 /// Memory of candidates as seen from up to five points: the corners of a cell, and the middle of the edge where it is
@@ -362,9 +372,9 @@ fn length<L: Doubles>(v: Vector<L>) -> L {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::base::Isa;
     use crate::encode::surface::Touching;
     use crate::mesh::TriangleMesh;
-    use crate::query::Isa;
     use crate::testing::degenerate;
     use proptest::prelude::*;
 

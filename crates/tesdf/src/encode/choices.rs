@@ -5,9 +5,8 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::{
-    Deformation, EncodeOptions, EncodeProgress, Encoder, Length, Preset, Refinement, Sampling, Threshold,
-};
+use super::{Deformation, EncodeOptions, Encoder, Preset, Refinement, Sampling, Threshold};
+use crate::base::{Length, Progress};
 use crate::domain::gmsh::{GmshError, GmshOptions, tetrahedralise_and_report};
 use crate::domain::{ConformingError, ConformingMesh, ReadTetrahedraError, read_tetrahedra};
 use crate::mesh::SolidMesh;
@@ -175,7 +174,7 @@ impl EncodeChoices {
     pub fn tetrahedra(
         &self,
         solid: &SolidMesh,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Option<ConformingMesh>, DomainError> {
         match &self.domain {
             DomainChoice::Bisection => Ok(None),

@@ -49,6 +49,18 @@ pub trait Doubles: Copy {
 /// Rows are filled up to a multiple of this many numbers.
 pub const GROUP: usize = 8;
 
+/// Visits the indices in either of two sets, ascending; tells whether each is in the first. A set is a bit per index.
+pub(super) fn visit_members(first: &[u8], second: &[u8], mut visit: impl FnMut(usize, bool)) {
+    for (group, (&a, &b)) in first.iter().zip(second).enumerate() {
+        let mut open = a | b;
+        while open != 0 {
+            let lane = open.trailing_zeros() as usize;
+            open &= open - 1;
+            visit(group * GROUP + lane, a >> lane & 1 == 1);
+        }
+    }
+}
+
 /// Three coordinates.
 #[derive(Clone, Copy)]
 pub struct Vector<L>(pub [L; 3]);
@@ -299,7 +311,7 @@ mod x86_64 {
 macro_rules! dispatch {
     ($(#[$doc:meta])* fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $out:ty)? = $generic:ident) => {
         $(#[$doc])*
-        fn $name(isa: crate::query::Isa, $($arg: $ty),*) $(-> $out)? {
+        fn $name(isa: crate::base::Isa, $($arg: $ty),*) $(-> $out)? {
             #[cfg(target_arch = "x86_64")]
             #[target_feature(enable = "avx2,fma")]
             fn avx2($($arg: $ty),*) $(-> $out)? {
@@ -311,13 +323,13 @@ macro_rules! dispatch {
                 $generic::<std::arch::x86_64::__m512d>($($arg),*)
             }
             match isa {
-                crate::query::Isa::Baseline => $generic::<f64>($($arg),*),
+                crate::base::Isa::Baseline => $generic::<f64>($($arg),*),
                 // SAFETY: `Isa::detect` found the features.
                 #[cfg(target_arch = "x86_64")]
-                crate::query::Isa::Avx2 => unsafe { avx2($($arg),*) },
+                crate::base::Isa::Avx2 => unsafe { avx2($($arg),*) },
                 // SAFETY: as above.
                 #[cfg(target_arch = "x86_64")]
-                crate::query::Isa::Avx512 => unsafe { avx512($($arg),*) },
+                crate::base::Isa::Avx512 => unsafe { avx512($($arg),*) },
             }
         }
     };

@@ -1,37 +1,20 @@
 //! The certified filter: which faces can be closest somewhere in a cell.
 
-use super::candidates::{Candidates, Pool};
-use super::chains::Chains;
-use super::doubles::{Doubles, GROUP, dispatch};
+use super::candidates::{Candidates, Pool, Survivor};
+use super::chains::link_weight;
+use super::doubles::{Doubles, GROUP, dispatch, visit_members};
 use super::plane_rule::{PlaneRule, Rivals, Verdict};
-use super::surface::{Requirement, Surface, Touching};
-use super::tighten::Settled;
+use super::settled::Settled;
+use super::surface::{Surface, Touching};
+use crate::base::Chains;
 use crate::domain::Cell;
 use crate::geometry::{Feature, triangle_meets_tetrahedron};
-
-/// Rounding margin of the rules, in the local frame, where the body's diagonal is 0.5 to 1.
-///
-/// A computed distance is off by a few 2^-53 of the coordinates' size, which is the cube's side. A face is dropped only
-/// when another one is closer by more than this times the side (at least 1), so that rounding cannot make two
-/// faces drop each other.
-pub const MARGIN: f64 = 4e-15;
 
 /// How near to a cell a face counts as meeting it, in the local frame.
 ///
 /// More than the rounding of point location (2^-52 of the cube), and more than the 1e-9 × diagonal
 /// under which the gradient comes from the faces around the closest feature: those are listed, too.
 pub const PAD: f64 = 2.5e-9;
-
-/// A candidate that the rules did not drop.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Survivor {
-    /// Index among the candidates.
-    pub index: u32,
-    /// What of the face the cell needs.
-    pub requirement: Requirement,
-    /// Whether the face comes within [`PAD`] of the cell.
-    pub meets: bool,
-}
 
 /// What the filter found out about a cell.
 #[derive(Debug)]
@@ -99,7 +82,7 @@ const MANY: usize = 1 << 12;
 /// Applies rules A (point), B (plane) and C (shared feature) to the candidates of a cell.
 ///
 /// See `docs/math.md` for the proofs. Rules A and B drop a face only for one that is closer in all of
-/// the cell by [`MARGIN`], a strict partial order, so that their sequence does not matter; rule C then
+/// the cell by [`MARGIN`](super::surface::MARGIN), a strict partial order, so that their sequence does not matter; rule C then
 /// goes through the rest in order. Faces that meet the cell are kept whole whatever the rules say.
 ///
 /// `chains` are those of the filters that left the candidates: rule C stops where their budget is used up.
@@ -184,18 +167,6 @@ pub fn filter(
     filtered
 }
 
-/// Visits the indices in either of two sets, ascending; tells whether each is in the first. A set is a bit per index.
-pub(super) fn visit_members(first: &[u8], second: &[u8], mut visit: impl FnMut(usize, bool)) {
-    for (group, (&a, &b)) in first.iter().zip(second).enumerate() {
-        let mut open = a | b;
-        while open != 0 {
-            let lane = open.trailing_zeros() as usize;
-            open &= open - 1;
-            visit(group * GROUP + lane, a >> lane & 1 == 1);
-        }
-    }
-}
-
 dispatch! {
     /// Rule A: which candidates are not farther than one of five points as seen from all corners; and which come `near`
     /// the centroid. A bit each.
@@ -272,7 +243,7 @@ fn share_features(
         });
         let Some((_, at)) = found else { continue };
         before = found;
-        let Some(link) = Chains::weight(surface, cell, part, face(i)) else { continue };
+        let Some(link) = link_weight(surface, cell, part, face(i)) else { continue };
         let weight = chained[i] + link;
         if chains.allow(weight) {
             chained[at] = chained[at].max(weight);

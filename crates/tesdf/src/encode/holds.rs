@@ -1,9 +1,9 @@
 //! Whether a list that came from elsewhere is exact: by the certified filter.
 use super::candidates::Candidates;
-use super::chains::Chains;
 use super::filter::{Scratch, filter};
+use super::settled::Settled;
 use super::surface::Surface;
-use super::tighten::Settled;
+use crate::base::Chains;
 use crate::domain::Cell;
 
 /// Bisections below a cell that tell whether its list is exact.

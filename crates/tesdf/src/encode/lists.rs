@@ -2,7 +2,7 @@
 use rayon::prelude::*;
 
 use super::assemble::collect;
-use super::chains::Chains;
+use super::error::EncodeError;
 use super::filter::{PAD, Scratch};
 use super::holds::holds;
 use super::rank::{Ranked, rank};
@@ -11,10 +11,12 @@ use super::roots::Roots;
 use super::sampled::{SampledCell, Sampler, sample};
 use super::surface::Surface;
 use super::tighten::{Levels, tighten};
-use super::{Deformation, EncodeError, EncodeOptions, EncodeProgress, Encoder, Sampling, Stage, Threshold};
-use crate::asset::layout::{Label, Side};
+use super::{Deformation, EncodeOptions, Encoder, Sampling, Threshold};
+use crate::asset::layout::Label;
+use crate::base::{Chains, Progress, Side, Stage};
 use crate::domain::Cell;
-use crate::geometry::{AabbTree, WindingNumber, triangle_meets_tetrahedron};
+use crate::geometry::{AabbTree, triangle_meets_tetrahedron};
+use crate::mesh::WindingNumber;
 
 /// What the lists are made from.
 pub struct Lists<'a> {
@@ -64,7 +66,7 @@ impl Lists<'_> {
         roots: &Roots,
         winding: &WindingNumber,
         sampler: &dyn Sampler,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Finished, EncodeError> {
         let mut cells = Vec::new();
         for (root, tree) in trees.iter_mut().enumerate() {
@@ -147,7 +149,7 @@ impl Lists<'_> {
         cells: &[(Cell, usize)],
         sampling: &Sampling,
         sampler: &dyn Sampler,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Vec<Option<Found>>, EncodeError> {
         let mut found = Vec::with_capacity(leaves.len());
         for (leaves, cells) in leaves.chunks(SAMPLED_AT_ONCE).zip(cells.chunks(SAMPLED_AT_ONCE)) {

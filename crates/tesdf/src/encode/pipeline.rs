@@ -1,93 +1,22 @@
 use super::assemble::assemble;
-use super::effort::{EFFORT_PER_FACE, Effort, refine, refine_within_effort};
+use super::attempts::{EFFORT_PER_FACE, refine, refine_within_effort};
+use super::effort::Effort;
+use super::error::EncodeError;
 use super::hints::{Simplicity, sign_hints};
 use super::lists::{Finished, Lists};
 use super::refine::{Refiner, Weights};
-use super::roots::Roots;
+use super::roots::{Domain, MAX_SIZE, Roots};
 use super::sampled::{Processor, Sampler, lipschitz_candidates};
+use super::statistics::statistics;
 use super::surface::{Surface, Touching};
-use super::{Deformation, EncodeOptions, EncodeProgress, Encoder, Refinement, Stage, Threshold};
+use super::{Deformation, EncodeOptions, Encoder, Refinement, Source, Threshold};
 use crate::asset::layout::{self, TREE_LEAF, TreeChild};
-use crate::asset::{AssetError, Section, TeSdf, about, write_container};
-use crate::domain::{Cell, ConformingMesh, DomainCube, MAX_DEPTH};
-use crate::geometry::{Aabb, AabbTree, Child, LocalFrame, WindingNumber};
-use crate::mesh::{MeshError, SolidMesh, TriangleMesh};
-use crate::query::Precision;
-use crate::verify::{Worst, self_check};
-
-/// Why a solid cannot be encoded.
-#[derive(Debug, thiserror::Error)]
-pub enum EncodeError {
-    /// [`EncodeProgress::cancel`] was called.
-    #[error("the encoding was cancelled")]
-    Cancelled,
-    /// An option has no meaning.
-    #[error("option {option} is {found}; expected {expected}")]
-    Option {
-        /// Name of the option.
-        option: &'static str,
-        /// The value found.
-        found: String,
-        /// What is accepted.
-        expected: &'static str,
-    },
-    /// More of something than the file format can name.
-    #[error("{found} {what} are more than the {limit} that the file format can name; split the mesh")]
-    TooLarge {
-        /// What there is too much of.
-        what: &'static str,
-        /// How much was found.
-        found: usize,
-        /// The most that fits.
-        limit: usize,
-    },
-    /// Lists of faces that are near each other all over the domain, and no bisection makes them shorter.
-    #[error(
-        "the faces have no short lists: {compared} comparisons of faces with cells were not enough to tell them apart. Face \
-         {face} is {slenderness:.1e} times as long as it is high; `tesdf check` lists faces like it, remesh them, or split the mesh"
-    )]
-    NoShortLists {
-        /// The face that is longest for its height, 0-based.
-        face: u32,
-        /// Its longest edge over its height.
-        slenderness: f64,
-        /// Comparisons that were made.
-        compared: u64,
-    },
-    /// The mesh does not fit the local frame.
-    #[error(transparent)]
-    Mesh(#[from] MeshError),
-    /// What looks at samples cannot.
-    #[error("{0}")]
-    Sampler(Box<dyn std::error::Error + Send + Sync>),
-    /// The finished file is wrong somewhere, although its lists count as proved: a bug of this library.
-    #[error(
-        "the encoded file is wrong: at ({}, {}, {}) it says {} in {precision:?}, and all faces say {}; \
-         this is a bug of tesdf, so please report it with the mesh and the options; nothing was written",
-        worst.point[0], worst.point[1], worst.point[2], worst.found, worst.expected
-    )]
-    SelfCheck {
-        /// What the query computed with.
-        precision: Precision,
-        /// The point that is off the most.
-        worst: Box<Worst>,
-    },
-    /// The finished file does not open.
-    #[error("the encoded asset is not valid: {0}")]
-    Asset(#[from] AssetError),
-}
-
-/// What is known of the file that a mesh came from.
-pub use about::Source;
-
-/// The tetrahedra that an asset's cells come from.
-#[derive(Clone, Copy, Debug)]
-pub enum Domain<'a> {
-    /// Six tetrahedra of a cube around the solid and its band, bisected where that pays.
-    Bisection,
-    /// Tetrahedra that conform to the surface, bisected or not ([`Refinement`]).
-    Conforming(&'a ConformingMesh),
-}
+use crate::asset::{Section, TeSdf, about, write_container};
+use crate::base::{Certificate, Progress, Proved, Stage};
+use crate::domain::{Cell, DomainCube, MAX_DEPTH};
+use crate::geometry::{Aabb, AabbTree, Child, LocalFrame};
+use crate::mesh::{MeshError, SolidMesh, TriangleMesh, WindingNumber};
+use crate::verify::self_check;
 
 /// Encodes a solid in the bisection domain; the same mesh and options give the same bytes on any number of threads (it
 /// runs in the current rayon pool).
@@ -98,7 +27,7 @@ pub fn encode(
     solid: &SolidMesh,
     source: &Source,
     options: &EncodeOptions,
-    progress: &EncodeProgress,
+    progress: &Progress,
 ) -> Result<TeSdf, EncodeError> {
     encode_in(solid, Domain::Bisection, source, options, progress)
 }
@@ -112,7 +41,7 @@ pub fn encode_in(
     domain: Domain,
     source: &Source,
     options: &EncodeOptions,
-    progress: &EncodeProgress,
+    progress: &Progress,
 ) -> Result<TeSdf, EncodeError> {
     encode_with(solid, domain, source, options, &Processor, progress)
 }
@@ -127,7 +56,7 @@ pub fn encode_with(
     source: &Source,
     options: &EncodeOptions,
     sampler: &dyn Sampler,
-    progress: &EncodeProgress,
+    progress: &Progress,
 ) -> Result<TeSdf, EncodeError> {
     let mesh = solid.mesh();
     let diagonal = mesh.diagonal();
@@ -244,13 +173,13 @@ pub fn encode_with(
         Encoder::Certified => "certified".into(),
         Encoder::Sampled(_) => sampler.name(),
     };
-    let proved = about::Proved { within: exact_within / frame.scale, chains: proof };
-    let certificate = about::Certificate::new(encoder, &domain, diagonal, &roots.cube, proved);
+    let proved = Proved { within: exact_within / frame.scale, chains: proof };
+    let certificate = Certificate::new(encoder, domain.name().into(), diagonal, roots.cube.side(), proved);
     let about = about::About {
         source: source.clone(),
         options: options.clone(),
         certificate,
-        statistics: about::Statistics::of(&trees, &labels, &roots.cells, mesh, frame),
+        statistics: statistics(&trees, &labels, &roots.cells, mesh, frame),
     };
     let bytes = write_container(&sections, &about.to_metadata())?;
     let asset = TeSdf::from_bytes(&bytes)?;
@@ -329,8 +258,6 @@ fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<
     Ok(band)
 }
 
-/// Widest domain, in diagonals of the mesh: rounding, and with it the certificate's delta, grows with it.
-pub(super) const MAX_SIZE: f64 = 8.0;
 const MAX_TIGHTEN: u32 = 30;
 const MAX_RESOLUTION: u32 = 1024;
 

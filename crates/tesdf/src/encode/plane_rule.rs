@@ -3,8 +3,7 @@
 use glam::DVec3;
 
 use super::candidates::{Candidates, GRADIENT};
-use super::doubles::{Doubles, GROUP, Vector, dispatch};
-use super::filter::visit_members;
+use super::doubles::{Doubles, GROUP, Vector, dispatch, visit_members};
 use super::surface::{Surface, Touching};
 use crate::domain::Cell;
 
@@ -122,7 +121,7 @@ impl<'a> PlaneRule<'a> {
     ///
     /// Where a corner of the cell is on both faces, both distances are 0 there and no margin is to be had. The margin at the
     /// other corners is enough: the tangent may pass the shared corner at 0 (docs/math.md, 4).
-    pub fn judge(&self, isa: crate::query::Isa, alive: &[u8], near: &[u8], verdict: &mut Verdict) {
+    pub fn judge(&self, isa: crate::base::Isa, alive: &[u8], near: &[u8], verdict: &mut Verdict) {
         if verdict.low.len() < self.stride {
             verdict.low.resize(self.stride, 0.0);
             verdict.beaten.resize(self.stride / GROUP, 0);

@@ -1,8 +1,8 @@
 //! From what distance on a cell needs each face of its list: Eq. (7), by bounds.
 use super::candidates::{Candidates, GRADIENT};
-use super::chains::Chains;
 use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
+use crate::base::Chains;
 use crate::domain::Cell;
 
 /// A face of a list, with what truncation asks.

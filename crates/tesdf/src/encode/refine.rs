@@ -1,11 +1,10 @@
 //! Over-refines the domain and prunes it while unwinding.
 
-use super::EncodeProgress;
-use super::candidates::{Candidates, Pool};
-use super::chains::Chains;
+use super::candidates::{Candidates, Pool, Survivor};
 use super::effort::Effort;
-use super::filter::{Scratch, Survivor, filter};
+use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
+use crate::base::{Chains, Progress};
 use crate::domain::Cell;
 use crate::geometry::Aabb;
 
@@ -92,7 +91,7 @@ pub struct Refiner<'a> {
     /// Bisections from a root to the deepest cell, at most [`MAX_DEPTH`](crate::domain::MAX_DEPTH); 0 leaves the roots whole.
     pub max_depth: u32,
     /// Told of the volume done, in units of 2^-40 of a root; asked whether to stop.
-    pub progress: &'a EncodeProgress,
+    pub progress: &'a Progress,
     /// What the roots together may cost.
     pub effort: &'a Effort,
 }

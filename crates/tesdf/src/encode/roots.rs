@@ -1,11 +1,32 @@
 //! The tetrahedra that the forest grows from.
 use glam::DVec3;
 
-use super::EncodeError;
-use super::pipeline::{Domain, MAX_SIZE};
-use crate::asset::layout::Side;
-use crate::domain::{Cell, DomainCube};
+use super::error::EncodeError;
+use crate::base::Side;
+use crate::domain::{Cell, ConformingMesh, DomainCube};
 use crate::geometry::{Aabb, AabbTree, LocalFrame};
+
+/// The tetrahedra that an asset's cells come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Domain<'a> {
+    /// Six tetrahedra of a cube around the solid and its band, bisected where that pays.
+    Bisection,
+    /// Tetrahedra that conform to the surface, bisected or not ([`Refinement`](super::Refinement)).
+    Conforming(&'a ConformingMesh),
+}
+
+impl Domain<'_> {
+    /// How the certificate calls it.
+    pub(super) fn name(&self) -> &'static str {
+        match self {
+            Self::Bisection => "bisection",
+            Self::Conforming(_) => "conforming",
+        }
+    }
+}
+
+/// Widest domain, in diagonals of the mesh: rounding, and with it the certificate's delta, grows with it.
+pub(super) const MAX_SIZE: f64 = 8.0;
 
 /// The roots of a domain, in the local frame.
 #[derive(Debug)]

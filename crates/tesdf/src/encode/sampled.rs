@@ -6,9 +6,11 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::error::EncodeError;
 use super::filter::Scratch;
 use super::surface::Surface;
-use super::{EncodeError, EncodeProgress, Sampling, Threshold};
+use super::{Sampling, Threshold};
+use crate::base::Progress;
 use crate::domain::Cell;
 use crate::geometry::AabbTree;
 
@@ -49,7 +51,7 @@ pub trait Sampler: Sync {
         surface: &Surface,
         cells: &[SampledCell],
         sampling: &Sampling,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Vec<Vec<f64>>, EncodeError>;
 }
 
@@ -67,7 +69,7 @@ impl Sampler for Processor {
         surface: &Surface,
         cells: &[SampledCell],
         sampling: &Sampling,
-        progress: &EncodeProgress,
+        progress: &Progress,
     ) -> Result<Vec<Vec<f64>>, EncodeError> {
         let of_cell = |scratch: &mut Scratch, cell: &SampledCell| {
             (!progress.is_cancelled()).then(|| sample(surface, cell, sampling, scratch))

@@ -3,10 +3,16 @@
 use std::cmp::Reverse;
 use std::collections::HashMap;
 
-use super::filter::MARGIN;
+use crate::base::Isa;
 use crate::geometry::{Feature, Triangle};
 use crate::mesh::TriangleMesh;
-use crate::query::Isa;
+
+/// Rounding margin of the rules, in the local frame, where the body's diagonal is 0.5 to 1.
+///
+/// A computed distance is off by a few 2^-53 of the coordinates' size, which is the cube's side. A face is dropped only
+/// when another one is closer by more than this times the side (at least 1), so that rounding cannot make two
+/// faces drop each other.
+pub const MARGIN: f64 = 4e-15;
 
 /// A part of the surface whose distance a cell needs: a face, an edge or a vertex.
 ///
@@ -47,25 +53,25 @@ pub struct Surface {
     /// Faces in the local frame.
     pub triangles: Vec<Triangle>,
     /// Vertex ids of each face.
-    pub faces: Vec<[u32; 3]>,
+    pub(crate) faces: Vec<[u32; 3]>,
     /// Edge ids of each face; edge `k` joins corners `k` and `k + 1`.
-    pub edges: Vec<[u32; 3]>,
+    pub(crate) edges: Vec<[u32; 3]>,
     edge_count: u32,
     /// Faces of each edge.
     edge_faces: Vec<Vec<u32>>,
     /// Faces of each vertex.
     vertex_faces: Vec<Vec<u32>>,
     /// Total area, local frame.
-    pub area: f64,
+    pub(crate) area: f64,
     /// Longest edge of each face, local frame.
     longest: Vec<f64>,
     needleness: f64,
     /// What a distance must be less by to count as less: [`MARGIN`] times the size of the domain.
-    pub margin: f64,
+    pub(crate) margin: f64,
     /// What becomes of faces that come near to a cell.
-    pub touching: Touching,
+    pub(crate) touching: Touching,
     /// What the filter computes with; the results are the same.
-    pub isa: Isa,
+    pub(crate) isa: Isa,
 }
 
 impl Surface {
@@ -118,18 +124,18 @@ impl Surface {
     }
 
     /// Length of the longest edge of a face, local frame.
-    pub fn longest(&self, face: u32) -> f64 {
+    pub(crate) fn longest(&self, face: u32) -> f64 {
         self.longest[face as usize]
     }
 
     /// How much the faces are needles: their mean longest edge over the root of their mean area. 1.5 for a mesh of
     /// equilateral triangles, 2 to 4 for most meshes, 14 for a gear of 20,000 faces each as long as it is thick.
-    pub fn needleness(&self) -> f64 {
+    pub(crate) fn needleness(&self) -> f64 {
         self.needleness
     }
 
     /// The face whose longest edge is the most times its height, the first of equals, and how many.
-    pub fn most_slender(&self) -> (u32, f64) {
+    pub(crate) fn most_slender(&self) -> (u32, f64) {
         let slenderness = |face: usize| {
             let [a, b, c] = self.triangles[face].corners;
             self.longest[face].powi(2) / (b - a).cross(c - a).length()
@@ -139,7 +145,7 @@ impl Surface {
     }
 
     /// The requirement of a face's feature.
-    pub fn requirement(&self, face: u32, feature: Feature) -> Requirement {
+    pub(crate) fn requirement(&self, face: u32, feature: Feature) -> Requirement {
         let (f, e) = (self.faces.len() as u32, self.edge_count);
         Requirement(match feature {
             Feature::Face => face,
@@ -149,12 +155,12 @@ impl Surface {
     }
 
     /// How many requirements there are: faces, edges and vertices.
-    pub fn parts(&self) -> usize {
+    pub(crate) fn parts(&self) -> usize {
         self.faces.len() + self.edge_faces.len() + self.vertex_faces.len()
     }
 
     /// What a requirement names.
-    pub fn part(&self, requirement: Requirement) -> Part {
+    pub(crate) fn part(&self, requirement: Requirement) -> Part {
         let (f, e) = (self.faces.len() as u32, self.edge_count);
         match requirement.0 {
             id if id < f => Part::Face(id),
@@ -164,27 +170,27 @@ impl Surface {
     }
 
     /// Number of vertices.
-    pub fn vertex_count(&self) -> usize {
+    pub(crate) fn vertex_count(&self) -> usize {
         self.vertex_faces.len()
     }
 
     /// The faces of an edge.
-    pub fn edge_faces(&self, edge: u32) -> &[u32] {
+    pub(crate) fn edge_faces(&self, edge: u32) -> &[u32] {
         &self.edge_faces[edge as usize]
     }
 
     /// The faces around a vertex.
-    pub fn vertex_faces(&self, vertex: u32) -> &[u32] {
+    pub(crate) fn vertex_faces(&self, vertex: u32) -> &[u32] {
         &self.vertex_faces[vertex as usize]
     }
 
     /// Whether a requirement is a whole face.
-    pub fn is_face(&self, requirement: Requirement) -> bool {
+    pub(crate) fn is_face(&self, requirement: Requirement) -> bool {
         requirement.0 < self.faces.len() as u32
     }
 
     /// Whether `face` holds the feature that `requirement` names.
-    pub fn holds(&self, face: u32, requirement: Requirement) -> bool {
+    pub(crate) fn holds(&self, face: u32, requirement: Requirement) -> bool {
         match self.part(requirement) {
             Part::Face(f) => f == face,
             Part::Edge(e) => self.edges[face as usize].contains(&e),
@@ -193,7 +199,7 @@ impl Surface {
     }
 
     /// The edges and corners of a face.
-    pub fn implied(&self, face: u32) -> [Requirement; 6] {
+    pub(crate) fn implied(&self, face: u32) -> [Requirement; 6] {
         let [a, b, c] = [0, 1, 2].map(|k| self.requirement(face, Feature::Edge(k)));
         let [d, e, f] = [0, 1, 2].map(|k| self.requirement(face, Feature::Vertex(k)));
         [a, b, c, d, e, f]
@@ -203,7 +209,7 @@ impl Surface {
     ///
     /// Faces are taken as they are; then each edge that none of them has takes the one of its faces that
     /// meets most of what is still open; then vertices likewise.
-    pub fn cover(&self, requirements: &[Requirement]) -> Vec<u32> {
+    pub(crate) fn cover(&self, requirements: &[Requirement]) -> Vec<u32> {
         let first_part = requirements.partition_point(|&r| self.is_face(r));
         let mut kept: Vec<u32> = requirements[..first_part].iter().map(|r| r.0).collect();
         let whole = kept.len();
@@ -261,7 +267,7 @@ impl Surface {
     }
 
     /// The faces that hold an edge or a vertex, ascending.
-    pub fn faces_of(&self, requirement: Requirement) -> &[u32] {
+    pub(crate) fn faces_of(&self, requirement: Requirement) -> &[u32] {
         match self.part(requirement) {
             Part::Face(_) => &[],
             Part::Edge(e) => &self.edge_faces[e as usize],

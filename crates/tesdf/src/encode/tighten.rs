@@ -1,9 +1,10 @@
 //! Shortens the list of a finished cell to what some point of it needs.
 
 use super::candidates::Candidates;
-use super::chains::Chains;
 use super::filter::{Scratch, filter};
-use super::surface::{Part, Requirement, Surface};
+use super::settled::Settled;
+use super::surface::Surface;
+use crate::base::Chains;
 use crate::domain::Cell;
 use crate::geometry::Feature;
 
@@ -66,52 +67,9 @@ pub fn tighten(
     pool.fill(surface, list, cell);
     needed.descend(*cell, &pool.candidates(), levels, chains, scratch);
     scratch.give_back(pool);
-    needed.settled.list.sort_unstable();
-    let tight = surface.cover(&needed.settled.list);
+    let tight = surface.cover(needed.settled.sorted());
     scratch.settled = needed.settled;
     (tight, needed.heaviest)
-}
-
-/// A set of requirements, with what its faces imply.
-#[derive(Debug, Default)]
-pub struct Settled {
-    list: Vec<Requirement>,
-    /// By the index of a requirement: the round in which it was implied (doubled), or settled (and one more).
-    mark: Vec<u64>,
-    round: u64,
-}
-
-impl Settled {
-    /// Empties the set.
-    pub(super) fn start(&mut self, surface: &Surface) {
-        self.list.clear();
-        self.mark.resize(surface.parts(), 0);
-        self.round += 2;
-    }
-
-    /// Adds a whole face.
-    pub(super) fn settle_face(&mut self, surface: &Surface, face: u32) {
-        self.settle(surface, surface.requirement(face, Feature::Face));
-    }
-
-    fn settle(&mut self, surface: &Surface, requirement: Requirement) {
-        if self.mark[requirement.index()] == self.round + 1 {
-            return;
-        }
-        self.mark[requirement.index()] = self.round + 1;
-        self.list.push(requirement);
-        if let Part::Face(face) = surface.part(requirement) {
-            for part in surface.implied(face) {
-                let mark = &mut self.mark[part.index()];
-                *mark = self.round.max(*mark);
-            }
-        }
-    }
-
-    /// Whether it, or a face that has it, is in the set.
-    pub(super) fn holds(&self, requirement: Requirement) -> bool {
-        self.mark[requirement.index()] >= self.round
-    }
 }
 
 struct Needed<'a> {

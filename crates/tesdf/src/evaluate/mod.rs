@@ -159,7 +159,7 @@ fn slab(grid: &Grid, z: u64, reference: &Reference, fields: &[Field]) -> Vec<Tal
             let mut exact = None;
             for (field, tally) in fields.iter().zip(&mut tallies) {
                 let local = field.asset.frame.to_local(p);
-                let (place, word) = field.asset.place_and_word(local);
+                let (place, word) = field.asset.locate_with_word(local);
                 if let Place::NotOfDomain = place {
                     tally.outside();
                     continue;

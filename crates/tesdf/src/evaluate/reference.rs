@@ -1,7 +1,7 @@
 use glam::DVec3;
 
-use crate::geometry::{Aabb, AabbTree, WindingNumber};
-use crate::mesh::{MeshError, TriangleMesh};
+use crate::geometry::{Aabb, AabbTree};
+use crate::mesh::{MeshError, TriangleMesh, WindingNumber};
 use crate::verify::brute_force::BruteForce;
 
 /// The exact signed distance of a mesh, from a tree over all faces, the triangle routine of brute

@@ -1,5 +1,5 @@
 //! Geometry of points, triangles and tetrahedra: closest points, bounds, box trees, exact
-//! predicates, winding numbers, the local frame.
+//! predicates, the local frame.
 mod aabb;
 mod aabb_tree;
 mod barycentric;
@@ -14,7 +14,6 @@ mod self_overlap;
 pub(crate) mod strategy;
 mod tetrahedron;
 mod triangle;
-mod winding;
 
 pub use aabb::Aabb;
 pub use aabb_tree::{AabbTree, Child};
@@ -28,4 +27,3 @@ pub(crate) use ray::{NearRay, length_and_direction};
 pub use self_overlap::self_overlaps;
 pub use tetrahedron::{tetrahedron_volume, triangle_meets_tetrahedron};
 pub use triangle::{Closest, Feature, Regions, Triangle};
-pub use winding::WindingNumber;

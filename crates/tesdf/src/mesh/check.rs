@@ -130,7 +130,7 @@ pub fn check(mesh: &TriangleMesh) -> CheckReport {
     let pairs = self_intersections(mesh, &flaws.without_area(), &touching);
     defects.extend(intersections::defects(mesh, &pairs, lenient));
     // When pairs are missing, unknown faces could cut a patch.
-    if closed && pairs.len() < intersections::most_pairs(mesh) {
+    if closed && pairs.len() < intersections::max_pairs(mesh) {
         let meetings = winding::Meetings { flaws: &flaws, intersections: &pairs, touching: &touching };
         let (range, found) = winding::winding_defects(mesh, &topology, &meetings);
         report.winding = Some(range);

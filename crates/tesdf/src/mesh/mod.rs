@@ -9,6 +9,7 @@ mod solid;
 mod topology;
 mod triangle_mesh;
 mod weld;
+mod winding;
 mod write;
 
 pub(crate) use check::coordinate_in_range;
@@ -20,4 +21,5 @@ pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, 
 pub use solid::{NotSolid, SolidMesh};
 pub use topology::{Edge, EdgeUse, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};
+pub use winding::WindingNumber;
 pub use write::{WriteError, WriteFormat, write, write_bytes};

@@ -154,7 +154,7 @@ impl TeSdf {
         let mut locals = [DVec3::NAN; FLIGHT];
         locals.iter_mut().zip(points).for_each(|(local, &p)| *local = self.frame.to_local(p));
         let mut places = [Place::NotOfDomain; FLIGHT];
-        self.places(&locals, &mut places);
+        self.locate_all(&locals, &mut places);
         for place in &places {
             if let Place::Listed { offset, .. } = *place {
                 fetch(&self.lists[offset as usize..]);

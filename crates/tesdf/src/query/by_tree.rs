@@ -4,7 +4,7 @@ use super::far::is_near;
 use super::sign::hinted_side;
 use super::{Answer, ON_SURFACE_F32, ON_SURFACE_F64, Precision, Reads};
 use crate::TeSdf;
-use crate::asset::layout::Side;
+use crate::base::Side;
 
 impl TeSdf {
     /// As [`query`](Self::query), from the tree over all faces instead of the lists: what a good bounding volume hierarchy

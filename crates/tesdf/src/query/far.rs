@@ -3,7 +3,7 @@ use glam::DVec3;
 
 use super::{Answer, Faces, Place};
 use crate::TeSdf;
-use crate::asset::layout::Side;
+use crate::base::Side;
 use crate::geometry::length_and_direction;
 
 /// A point with a coordinate above this (local frame) is far: squares of larger numbers leave the range of 64-bit floats

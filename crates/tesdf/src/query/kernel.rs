@@ -3,74 +3,12 @@
 //! One source, compiled per instruction set and chosen when an asset is opened. With fused multiply-add the last
 //! bits differ from those without; only which of two equally near faces wins can follow from that.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::lanes::Lanes;
 
-use crate::asset::layout::SignHints;
-use crate::geometry::{Triangle, is_flat};
-
-/// A face in `f32`, relative to the middle of the cube, in one cache line: corner a, b − a, c − a, unit normal,
-/// inverse squared lengths of b − a, c − a, c − b, and the bits of the sign hints.
-///
-/// Without area, or nearly so, the normal is NaN, which fails the test for the prism over the face: only edges count. The inverse
-/// of a length of zero is 0, which makes the closest point of that edge its start.
-#[derive(Clone, Copy, Debug)]
-#[repr(C, align(64))]
-pub struct FaceRecord(Record);
-
-type Record = [f32; 16];
-const HINTS: usize = 15;
-
-impl FaceRecord {
-    /// Faces of less height than this (local frame) are no more than their edges: rounding may have turned them over, and
-    /// then no prism stands on them. Half of it is within what `f32` promises, 1e-6 × diagonal.
-    pub const LEAST_HEIGHT: f64 = 7e-7;
-
-    /// Rounds a triangle of the local frame.
-    pub fn new(triangle: &Triangle, middle: DVec3, hints: SignHints) -> Self {
-        let [a, b, c] = triangle.corners.map(|p| (p - middle).as_vec3());
-        let (u, v) = ((b - a).as_dvec3(), (c - a).as_dvec3());
-        let longest = u.length().max(v.length()).max((u - v).length());
-        let flat = is_flat(u.cross(v).dot(triangle.normal), longest, Self::LEAST_HEIGHT);
-        let n = if flat { Vec3::NAN } else { triangle.normal.as_vec3() };
-        let inverse = |v: Vec3| {
-            let inverse = 1.0 / v.as_dvec3().length_squared();
-            if inverse < f64::from(f32::MAX) { inverse as f32 } else { 0.0 }
-        };
-        let inverses = Vec3::new(inverse(b - a), inverse(c - a), inverse(c - b));
-        let mut record = [f32::from_bits(hints.0.into()); 16];
-        for (k, v) in [a, b - a, c - a, n, inverses].into_iter().enumerate() {
-            record[3 * k..3 * k + 3].copy_from_slice(&v.to_array());
-        }
-        Self(record)
-    }
-
-    /// The numbers, in the order of the type's documentation.
-    pub fn as_array(&self) -> &[f32; 16] {
-        &self.0
-    }
-
-    /// The face in `f64`, relative to the middle of the cube.
-    #[inline]
-    pub fn triangle(&self) -> Triangle {
-        let v = |k: usize| Vec3::from_slice(&self.0[3 * k..]).as_dvec3();
-        let normal = v(3);
-        let normal = if normal.is_nan() { DVec3::ZERO } else { normal };
-        Triangle::with_normal([v(0), v(0) + v(1), v(0) + v(2)], normal)
-    }
-
-    /// From now on only the winding number tells the sign.
-    pub fn forget_hints(&mut self) {
-        self.0[HINTS] = f32::from_bits(SignHints::default().0.into());
-    }
-
-    /// How the sign follows from the closest feature.
-    #[inline]
-    pub fn hints(&self) -> SignHints {
-        SignHints(self.0[HINTS].to_bits() as u16)
-    }
-}
+use crate::asset::FaceRecord;
+use crate::base::Isa;
 
 /// The low bits of a squared distance say which part of the face it is to: they are worth 2^-22 of it, half of that of
 /// the distance, and cost no register.
@@ -93,44 +31,6 @@ impl Nearest {
     #[inline]
     pub fn part(self) -> u32 {
         self.distance_squared.to_bits() & PART
-    }
-}
-
-/// Instruction set that the kernels are compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Isa {
-    /// Whatever the build targets.
-    Baseline,
-    /// AVX2 and FMA: eight lanes.
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    /// The same eight lanes with the 32 registers of AVX-512, which the kernel needs not to spill.
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-impl Isa {
-    /// The widest that this processor has.
-    pub fn detect() -> Self {
-        #[cfg(target_arch = "x86_64")]
-        {
-            use std::arch::is_x86_feature_detected as has;
-            if has!("avx2") && has!("fma") {
-                return if has!("avx512f") && has!("avx512vl") { Self::Avx512 } else { Self::Avx2 };
-            }
-        }
-        Self::Baseline
-    }
-
-    /// All that this processor has, for tests of each.
-    #[cfg(test)]
-    pub(crate) fn all_here() -> Vec<Self> {
-        let mut all = vec![Self::Baseline];
-        #[cfg(target_arch = "x86_64")]
-        if Self::detect() != Self::Baseline {
-            all.extend([Self::Avx2, Self::detect()]);
-        }
-        all
     }
 }
 
@@ -206,9 +106,9 @@ fn within_lanes<L: Lanes<N>, const N: usize>(
 ) {
     let p = V([L::splat(p.x), L::splat(p.y), L::splat(p.z)]);
     for faces in faces {
-        let mut rows = [&records[0].0; N];
+        let mut rows = [records[0].as_array(); N];
         for l in 0..N {
-            rows[l] = &records[faces[l] as usize].0;
+            rows[l] = records[faces[l] as usize].as_array();
         }
         let d = distance_squared(L::load(rows), p).to_array();
         for l in 0..N {
@@ -230,9 +130,9 @@ fn nearest_lanes<L: Lanes<N>, const N: usize>(
     let mut least = L::splat(best.distance_squared);
     let mut nearest = L::from_bits([best.face; N]);
     for faces in faces {
-        let mut rows = [&records[0].0; N];
+        let mut rows = [records[0].as_array(); N];
         for l in 0..N {
-            rows[l] = &records[faces[l] as usize].0;
+            rows[l] = records[faces[l] as usize].as_array();
         }
         let d = distance_squared(L::load(rows), p);
         let closer = d.less(least);
@@ -316,9 +216,12 @@ impl<L> V<L> {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::asset::layout::SignHints;
+    use crate::geometry::Triangle;
     use crate::testing::{degenerate, exact};
 
     /// What `f32` promises of a body with a diagonal of 0.5, the least that there is: 1e-6 of it.

@@ -1,7 +1,8 @@
 use glam::DVec3;
 
 use crate::TeSdf;
-use crate::asset::layout::{Label, List, Node, Side};
+use crate::asset::layout::{Label, List, Node};
+use crate::base::Side;
 use crate::domain::{Barycentric, Cell};
 
 use super::kernel::LANES;
@@ -25,56 +26,6 @@ pub enum Place {
     Far(Side),
     /// No cell, or one outside of the domain.
     NotOfDomain,
-}
-
-/// Where the descents of an asset begin: the words of all cells of one depth, made on opening.
-///
-/// The upper levels of the forest are nearly all bisected; a grid that holds them saves half of the way.
-#[derive(Clone, Debug)]
-pub struct Entries {
-    level: u32,
-    words: Vec<u32>,
-}
-
-/// Share of the forest's words that the entries may take.
-const ENTRY_SHARE: usize = 2;
-
-impl Entries {
-    /// The deepest grid that takes at most half of the forest's own words.
-    pub fn new(nodes: &[u32]) -> Self {
-        if nodes.len() < 6 {
-            return Self { level: 0, words: Vec::new() };
-        }
-        let level =
-            (0..10).take_while(|l| (6usize << (3 * l)) * ENTRY_SHARE <= nodes.len()).last().unwrap_or(0);
-        let mut words = vec![0; 6 << (3 * level)];
-        for root in 0..6 {
-            Self::fill(nodes, root, Cell::root(DVec3::ZERO, 1.0, root), level, &mut words);
-        }
-        Self { level, words }
-    }
-
-    fn fill(nodes: &[u32], word: usize, cell: Cell, level: u32, words: &mut [u32]) {
-        if cell.depth == 3 * level {
-            if let Some((at, _)) = Barycentric::in_grid(cell.centroid(), level) {
-                words[at] = word as u32;
-            }
-            return;
-        }
-        for side in 0..2 {
-            // A leaf above the grid stands for all of its part of the grid.
-            let below = match Node::decode(nodes[word], &[]) {
-                Node::Split(children) => children as usize + side,
-                _ => word,
-            };
-            Self::fill(nodes, below, cell.child(side), level, words);
-        }
-    }
-
-    /// Size in bytes.
-    pub fn bytes(&self) -> usize {
-        std::mem::size_of_val(self.words.as_slice())
-    }
 }
 
 /// The faces of a list, by position, filled up for the kernel by repeating the last one.
@@ -117,16 +68,16 @@ impl Faces {
 impl TeSdf {
     /// Finds what answers for a point of the local frame.
     #[inline]
-    pub(crate) fn place(&self, local: DVec3) -> Place {
-        self.place_and_word(local).0
+    pub(crate) fn locate(&self, local: DVec3) -> Place {
+        self.locate_with_word(local).0
     }
 
     /// The same, with the word of the cell; [`NOWHERE`] outside of the cube.
     #[inline]
-    pub(crate) fn place_and_word(&self, local: DVec3) -> (Place, usize) {
+    pub(crate) fn locate_with_word(&self, local: DVec3) -> (Place, usize) {
         if let Some(domain) = &self.conforming {
             return match self.locate_root(domain, local) {
-                Some((root, lambda)) => self.place_below(root, lambda),
+                Some((root, lambda)) => self.locate_below(root, lambda),
                 None => (Place::NotOfDomain, NOWHERE),
             };
         }
@@ -155,7 +106,7 @@ impl TeSdf {
     }
 
     /// The same from a root of a conforming domain, in floating point.
-    fn place_below(&self, root: usize, mut lambda: [f64; 4]) -> (Place, usize) {
+    fn locate_below(&self, root: usize, mut lambda: [f64; 4]) -> (Place, usize) {
         let (mut word, mut depth) = (root, 0);
         loop {
             match Node::decode(self.nodes[word], &self.lists) {
@@ -175,7 +126,7 @@ impl TeSdf {
 
     /// The cell that holds a point of the local frame, with its label and list if it has them.
     ///
-    /// On a border this may be another of the cells that share it than [`place`](Self::place) finds: the grid rounds
+    /// On a border this may be another of the cells that share it than [`locate`](Self::locate) finds: the grid rounds
     /// up, the descent to side 0.
     pub(super) fn cell(&self, local: DVec3) -> Option<(Cell, Label, u32)> {
         if self.conforming.is_some() {
@@ -226,9 +177,9 @@ impl TeSdf {
     ///
     /// They descend level by level together: the ways to memory of all points overlap, and no branch depends on where a
     /// point goes. Measured on a bolt of 25,000 faces: a fifth of the time of one descent after the other.
-    pub(super) fn places(&self, locals: &[DVec3], places: &mut [Place; FLIGHT]) {
+    pub(super) fn locate_all(&self, locals: &[DVec3], places: &mut [Place; FLIGHT]) {
         if self.conforming.is_some() {
-            places.iter_mut().zip(locals).for_each(|(place, &local)| *place = self.place(local));
+            places.iter_mut().zip(locals).for_each(|(place, &local)| *place = self.locate(local));
             return;
         }
         let (entries, nodes) = (&self.entries, &*self.nodes);

@@ -3,9 +3,12 @@
 //! A point is taken to the local frame, its cell is found by descending the forest in fixed point, and the
 //! least distance to the faces of the cell's list is the answer. Points that no list serves (outside of the
 //! domain, or in a far cell) are answered from the tree over all faces, exactly too.
+mod arrays;
 mod batch;
 mod by_tree;
+mod cell_bounds;
 mod far;
+mod inner_ball;
 mod kernel;
 mod lanes;
 mod locate;
@@ -17,15 +20,16 @@ use std::cell::RefCell;
 
 use glam::DVec3;
 
+pub use arrays::Arrays;
 pub use batch::{AnswerColumns, BatchError, Extent};
-pub use kernel::{FaceRecord, Isa};
-pub use locate::Entries;
+pub(crate) use inner_ball::corner_reach;
 pub(crate) use locate::{Faces, Place};
 pub use nearest::Reads;
 pub use ray::RayHit;
 
 use crate::TeSdf;
-use crate::asset::layout::{Label, Side};
+use crate::asset::layout::Label;
+use crate::base::Side;
 use crate::geometry::{Closest, Feature};
 use far::is_near;
 use sign::hinted_side;
@@ -100,14 +104,14 @@ impl TeSdf {
     /// Answers for any point; `point` is in the mesh's unit.
     pub fn query(&self, point: DVec3, precision: Precision) -> Answer {
         let local = self.frame.to_local(point);
-        self.answer_alone(point, local, self.place(local), precision)
+        self.answer_alone(point, local, self.locate(local), precision)
     }
 
     /// As [`query`](Self::query), but `None` outside of the domain: more than the band from the solid, give or
     /// take a cell, and where no list was worth its bytes.
     pub fn query_in_domain(&self, point: DVec3, precision: Precision) -> Option<Answer> {
         let local = self.frame.to_local(point);
-        match self.place(local) {
+        match self.locate(local) {
             Place::NotOfDomain => None,
             place => Some(self.answer_alone(point, local, place, precision)),
         }
@@ -122,7 +126,7 @@ impl TeSdf {
     /// go either way; points that are not finite are outside.
     pub fn is_inside(&self, point: DVec3) -> bool {
         let local = self.frame.to_local(point);
-        match self.place(local) {
+        match self.locate(local) {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
             Place::Listed { label: Label::Crossing(_), .. } => self.winding_in_cell(local) >= 1,
             _ => false,
@@ -133,7 +137,7 @@ impl TeSdf {
     pub fn reads(&self, point: DVec3) -> Reads {
         let local = self.frame.to_local(point);
         let mut reads = Reads::default();
-        if let Place::Listed { offset, .. } = self.place(local) {
+        if let Place::Listed { offset, .. } = self.locate(local) {
             let mut faces = Faces::default();
             self.read_list(offset, &mut faces);
             reads.list_entries = faces.ids().len();
@@ -181,7 +185,7 @@ impl TeSdf {
 
     /// As [`found_at`](Self::found_at) in `f32`, with the exact distance also where lists are not known to be exact.
     pub(crate) fn found_exactly(&self, local: DVec3) -> Found {
-        let place = self.place(local);
+        let place = self.locate(local);
         match place {
             Place::Listed { label, .. } if !self.has_exact_lists() => {
                 let inside = match label {

@@ -29,7 +29,7 @@ impl Reads {
 /// Twice what a distance of the `f32` kernel is off by, relative and absolute (local frame).
 ///
 /// Coordinates of points up to 4 from the middle are off by 2^-22 at most, those of faces, within 1, by 2^-25; a face taken for its edges
-/// costs 3.5e-7 ([`FaceRecord`](super::FaceRecord)); a squared distance of some twenty operations 2^-20 of it, with the low bits that
+/// costs 3.5e-7 ([`FaceRecord`](crate::asset::FaceRecord)); a squared distance of some twenty operations 2^-20 of it, with the low bits that
 /// say the part.
 const F32_RELATIVE: f32 = 4e-6;
 const F32_ABSOLUTE: f32 = 4e-6;

@@ -3,7 +3,8 @@ use glam::DVec3;
 use super::ON_SURFACE_F32;
 use super::locate::Faces;
 use crate::TeSdf;
-use crate::asset::layout::{Label, Side, SignHint, SignHints};
+use crate::asset::layout::{Label, SignHint, SignHints};
+use crate::base::Side;
 use crate::geometry::{Closest, Feature, signed_crossing};
 
 /// The side that the closest feature tells, where it tells one. `height` is that of the point over the face.

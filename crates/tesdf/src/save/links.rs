@@ -13,7 +13,7 @@ pub(super) enum Meant {
 }
 
 /// The same limit as that of Linux.
-const MOST_LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// Follows the links of the last component. Renaming over a link would replace the link instead of
 /// its file.
@@ -22,7 +22,7 @@ const MOST_LINKS: usize = 40;
 /// The links form a circle.
 pub(super) fn follow(path: &Path) -> io::Result<Meant> {
     let mut path = path.to_path_buf();
-    for _ in 0..MOST_LINKS {
+    for _ in 0..MAX_LINKS {
         // A link in /proc may name a file that was renamed or removed, so the descriptor itself is
         // used.
         if is_descriptor(&path) {

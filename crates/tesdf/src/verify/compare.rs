@@ -2,7 +2,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::PointClass;
-use crate::asset::about::Certificate;
+use crate::base::Certificate;
 use crate::geometry::is_flat;
 use crate::mesh::TriangleMesh;
 use crate::query::{Answer, Precision};

@@ -18,9 +18,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::TeSdf;
-use crate::asset::about::Certificate;
-use crate::geometry::WindingNumber;
-use crate::mesh::{MeshError, Topology, TriangleMesh};
+use crate::base::Certificate;
+use crate::mesh::{MeshError, Topology, TriangleMesh, WindingNumber};
 use crate::query::Precision;
 use brute_force::BruteForce;
 use compare::Comparison;

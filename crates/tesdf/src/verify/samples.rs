@@ -3,8 +3,8 @@ use serde::Serialize;
 
 use crate::TeSdf;
 use crate::asset::CellKind;
-use crate::geometry::{Aabb, Triangle, WindingNumber};
-use crate::mesh::TriangleMesh;
+use crate::geometry::{Aabb, Triangle};
+use crate::mesh::{TriangleMesh, WindingNumber};
 use crate::query::Precision;
 use crate::sampling::{Random, Weighted};
 

@@ -7,8 +7,7 @@ use super::compare::{Comparison, Worst};
 use super::{PointClass, mesh_of};
 use crate::TeSdf;
 use crate::asset::CellKind;
-use crate::geometry::WindingNumber;
-use crate::mesh::MeshError;
+use crate::mesh::{MeshError, WindingNumber};
 use crate::query::Precision;
 use crate::sampling::Random;
 
@@ -76,8 +75,9 @@ mod tests {
     use super::*;
     use crate::asset::SharedSection;
     use crate::asset::about::Source;
-    use crate::asset::layout::{Label, Node, Side};
-    use crate::encode::{EncodeOptions, EncodeProgress, encode};
+    use crate::asset::layout::{Label, Node};
+    use crate::base::{Progress, Side};
+    use crate::encode::{EncodeOptions, encode};
     use crate::mesh::{MeshFormat, SolidMesh, read_bytes};
 
     #[test]
@@ -88,8 +88,7 @@ mod tests {
         let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj).expect("a mesh").mesh;
         let solid = SolidMesh::new(mesh).expect("a solid");
         let options = EncodeOptions::default();
-        let mut asset =
-            encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
+        let mut asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
         assert_eq!(self_check(&asset), Ok(None));
         // Mark all cells as outside.
         let mut nodes = asset.nodes.to_vec();

@@ -2,12 +2,12 @@
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex};
 
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::collide::{Contact, Instance, InstanceId, Placement, Pose, Scene, Shape};
-use tesdf::encode::{EncodeOptions, EncodeProgress, Preset, encode};
+use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
+use tesdf::{Progress, TeSdf};
 
 use super::meshes;
 use super::random::Random;
@@ -37,8 +37,7 @@ impl Body {
     pub fn new(solid: SolidMesh) -> Self {
         let byte_worth = if solid.mesh().faces().len() > 1000 { 2.0 } else { 0.5 };
         let options = EncodeOptions { byte_worth, ..EncodeOptions::preset(Preset::Fast) };
-        let asset =
-            encode(&solid, &Source::default(), &options, &EncodeProgress::default()).expect("encodes");
+        let asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
         Self { solid, asset: Arc::new(asset) }
     }
 

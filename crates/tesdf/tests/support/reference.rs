@@ -1,6 +1,6 @@
-use tesdf::geometry::{Aabb, AabbTree, Closest, LocalFrame, Triangle, WindingNumber};
+use tesdf::geometry::{Aabb, AabbTree, Closest, LocalFrame, Triangle};
 use tesdf::glam::DVec3;
-use tesdf::mesh::TriangleMesh;
+use tesdf::mesh::{TriangleMesh, WindingNumber};
 
 /// Exact distances from all faces, without code of the encoder.
 ///

@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use tesdf::asset::layout::Side;
+use tesdf::Side;
 use tesdf::domain::{ConformingMesh, TetMesh};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};

@@ -1,5 +1,6 @@
-use tesdf::asset::layout::{Label, Node, Side};
-use tesdf::encode::filter::PAD;
+use tesdf::Side;
+use tesdf::asset::layout::{Label, Node};
+use tesdf::encode::internal::PAD;
 use tesdf::geometry::{Aabb, Triangle, triangle_meets_tetrahedron};
 use tesdf::glam::DVec3;
 
@@ -25,7 +26,7 @@ pub struct WellFormed<'a> {
     /// Number of lattice points along an edge of each cell.
     pub lattice: usize,
     /// Largest number of checked cells; they are evenly spread.
-    pub most_cells: usize,
+    pub max_cells: usize,
 }
 
 /// Accepted rounding error of the encoder as a fraction of the diagonal, as in the certificate.
@@ -34,7 +35,7 @@ const DELTA: f64 = 1e-13;
 impl WellFormed<'_> {
     pub fn check(&self) -> Result<(), String> {
         let n = self.cells.leaves.len();
-        let step = n.div_ceil(self.most_cells);
+        let step = n.div_ceil(self.max_cells);
         let mut random = Random(n as u64);
         for (i, leaf) in self.cells.leaves.iter().enumerate().step_by(step) {
             let check = |what: &str, found: Result<(), String>| {

@@ -4,9 +4,8 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use tesdf::asset::about::Source;
 use tesdf::domain::gmsh::{GmshOptions, tetrahedralise};
-use tesdf::encode::{
-    Domain, EncodeOptions, EncodeProgress, Encoder, Length, Refinement, Sampling, encode_with,
-};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Refinement, Sampling, encode_with};
+use tesdf::{Length, Progress};
 use tesdf_gpu::SampleCounter;
 
 use crate::input::{Input, Preset};
@@ -93,7 +92,7 @@ fn row(args: &Args, input: &Input, name: DomainName) -> Result<(), Failure> {
     let options =
         EncodeOptions { encoder: Encoder::Sampled(sampling), refinement, ..Preset::Default.options() };
     let counter = SampleCounter::new(args.every, args.blocks);
-    encode_with(&input.solid, domain, &Source::default(), &options, &counter, &EncodeProgress::default())?;
+    encode_with(&input.solid, domain, &Source::default(), &options, &counter, &Progress::default())?;
     let counts = counter.counts();
     let seconds = |distances: f64| format!("{:.1}", distances * OPERATIONS / args.speed);
     output::row(&[

@@ -10,14 +10,13 @@ use std::time::{Duration, Instant};
 use parry3d::math::Pose as ParryPose;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
-use tesdf::TeSdf;
 use tesdf::collide::{
     ClearanceOptions, CollideOptions, Instance, InstanceId, Mode, Pose, Scene, clearance, detect,
 };
-use tesdf::encode::Length;
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 use tesdf::query::Precision;
+use tesdf::{Length, TeSdf};
 
 use crate::clearance::Body;
 use crate::input::{Input, Preset};

@@ -1,5 +1,5 @@
 //! The heading of a table.
-use tesdf::query::Isa;
+use tesdf::base::Isa;
 use tesdf_bench::heading::{command, load, processor, version_and_date};
 
 use crate::{Failure, output};

@@ -3,10 +3,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
-use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, EncodeProgress, encode};
+use tesdf::encode::{EncodeOptions, encode};
 use tesdf::mesh::{ReadError, RepairOptions, SolidMesh, repair};
+use tesdf::{Progress, TeSdf};
 
 use crate::Failure;
 
@@ -106,7 +106,7 @@ impl Input {
     /// Encodes the mesh; the asset and the seconds it took, on all threads of the current rayon pool.
     pub fn encode(&self, options: &EncodeOptions) -> Result<(TeSdf, f64), Failure> {
         let start = Instant::now();
-        let asset = encode(&self.solid, &self.source, options, &EncodeProgress::default())
+        let asset = encode(&self.solid, &self.source, options, &Progress::default())
             .map_err(|e| format!("{}: {e}", self.source.name))?;
         Ok((asset, start.elapsed().as_secs_f64()))
     }

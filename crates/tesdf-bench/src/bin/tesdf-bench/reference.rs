@@ -1,7 +1,7 @@
 use rayon::prelude::*;
-use tesdf::geometry::{Aabb, AabbTree, Triangle, WindingNumber};
+use tesdf::geometry::{Aabb, AabbTree, Triangle};
 use tesdf::glam::DVec3;
-use tesdf::mesh::TriangleMesh;
+use tesdf::mesh::{TriangleMesh, WindingNumber};
 
 /// Signed distances in `f64` that share nothing with an asset but the closest point of one triangle: a tree over the faces as
 /// read, and winding numbers.

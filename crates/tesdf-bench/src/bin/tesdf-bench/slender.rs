@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use rayon::ThreadPoolBuilder;
+use tesdf::Progress;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeProgress, encode};
+use tesdf::encode::encode;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 
@@ -89,7 +90,7 @@ fn one(name: &str, mesh: TriangleMesh, preset: Preset, unit: Option<f64>) -> Res
     let solid = SolidMesh::new(mesh)?;
     let checked = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let asset = encode(&solid, &Source::default(), &preset.options(), &EncodeProgress::default())?;
+    let asset = encode(&solid, &Source::default(), &preset.options(), &Progress::default())?;
     let seconds = start.elapsed().as_secs_f64();
     let ratio = seconds / faces as f64 / unit.unwrap_or(seconds / faces as f64);
     output::row(&[

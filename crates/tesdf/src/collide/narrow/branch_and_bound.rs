@@ -6,13 +6,14 @@ use glam::DVec3;
 
 use super::Lowest;
 use crate::TeSdf;
-use crate::collide::field::{CellField, FieldValue};
+use crate::collide::field::CellField;
+use crate::collide::field_value::FieldValue;
 use crate::collide::polygon::Polygon;
 use crate::geometry::Triangle;
 use crate::query::Precision;
 
 /// Evaluations after which a search gives up.
-const MOST_EVALUATIONS: usize = 20_000;
+const MAX_EVALUATIONS: usize = 20_000;
 
 /// A corner of a part of the polygon.
 #[derive(Clone, Copy, Debug)]
@@ -67,7 +68,7 @@ pub fn branch_and_bound(
         if !search.is_open(piece.bound) {
             break;
         }
-        if search.evaluations > MOST_EVALUATIONS {
+        if search.evaluations > MAX_EVALUATIONS {
             return Lowest { point: search.best.1, converged: false };
         }
         for half in search.halves(piece.corners) {

@@ -3,9 +3,10 @@ use glam::DVec3;
 use super::Lowest;
 use super::branch_and_bound::branch_and_bound;
 use crate::TeSdf;
-use crate::asset::layout::{Label, Side};
+use crate::asset::layout::Label;
+use crate::base::Side;
 use crate::collide::field::{CellField, ROUNDING};
-use crate::collide::polygon::{MOST_VERTICES, Parts, Polygon};
+use crate::collide::polygon::{MAX_VERTICES, Parts, Polygon};
 use crate::geometry::polygon_to_triangle;
 use crate::query::{Faces, Place, Precision};
 
@@ -61,7 +62,7 @@ pub fn lowest(
 }
 
 /// Cuts after which what is left of a polygon is searched as it is.
-const MOST_CUTS: usize = 64;
+const MAX_CUTS: usize = 64;
 
 /// A polygon and the faces that can be nearest to its points; all of it is within a ball.
 #[derive(Clone, Copy)]
@@ -81,7 +82,7 @@ impl Query<'_> {
     /// The least distance between the polygon and a face, up to the tolerance, and where on the polygon; `likely` is looked at
     /// first. Endless, and the ball's middle, when all are beyond reach.
     fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3) {
-        let mut points = [DVec3::ZERO; MOST_VERTICES];
+        let mut points = [DVec3::ZERO; MAX_VERTICES];
         points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
         let points = &points[..self.polygon.vertices().len()];
         // A polygon that may cross the surface is always seen.
@@ -123,7 +124,7 @@ impl Query<'_> {
             let center = polygon.center();
             let reach = self.reach.min(least.0);
             let part = Query { polygon: &polygon, center, radius: polygon.reach(center), reach, ..*self };
-            if cuts < MOST_CUTS
+            if cuts < MAX_CUTS
                 && let Some((above, below)) = part.cut()
             {
                 cuts += 1;
@@ -148,7 +149,7 @@ impl Query<'_> {
 
     /// The polygon cut along the plane of the face that it goes through deepest; `None` when it goes through none.
     fn cut(&self) -> Option<(Polygon, Polygon)> {
-        let mut points = [DVec3::ZERO; MOST_VERTICES];
+        let mut points = [DVec3::ZERO; MAX_VERTICES];
         points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
         let points = &points[..self.polygon.vertices().len()];
         let mut deepest = (CLEAR, None);

@@ -5,7 +5,8 @@ mod frank_wolfe;
 
 use glam::DVec3;
 
-use super::field::{CellField, Field, FieldBody, FieldValue, ROUNDING};
+use super::field::{CellField, Field, FieldBody, ROUNDING};
+use super::field_value::FieldValue;
 use super::middle::{self, ClippedPolygon};
 use super::polygon::Polygon;
 use super::surface::Part;

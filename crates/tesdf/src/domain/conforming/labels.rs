@@ -7,8 +7,8 @@ use super::{
     weld::Welded,
 };
 use crate::{
-    geometry::{WindingNumber, orientation, tetrahedron_volume},
-    mesh::SolidMesh,
+    geometry::{orientation, tetrahedron_volume},
+    mesh::{SolidMesh, WindingNumber},
 };
 
 /// The winding number of each tetrahedron.

@@ -3,18 +3,10 @@ use glam::DVec3;
 
 use super::{ConformingError, MissingFace, weld::Welded};
 use crate::{
+    domain::sides::sides_of,
     geometry::{Triangle as Corners, normal_signs},
     mesh::SolidMesh,
 };
-
-/// Corners of the four sides of a positively oriented tetrahedron, counter-clockwise seen from outside; side `k` is opposite
-/// to corner `k`.
-const SIDES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-
-/// The sides of a positively oriented tetrahedron, outward.
-pub(in crate::domain) fn sides_of(corners: [u32; 4]) -> [[u32; 3]; 4] {
-    SIDES.map(|side| side.map(|k| corners[k]))
-}
 
 /// A vertex farther than this from a missing face, relative to the diagonal, does not lie on it.
 const ON_FACE: f64 = 1e-9;

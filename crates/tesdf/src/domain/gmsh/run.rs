@@ -10,8 +10,8 @@ use std::{
 };
 
 use super::{GmshError, GmshOptions, RefusedBecause, input::SURFACE};
+use crate::base::Progress;
 use crate::domain::{TetMesh, read_tetrahedra};
-use crate::encode::EncodeProgress;
 
 /// Between two looks at whether Gmsh has ended.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -25,7 +25,7 @@ pub(super) fn run(
     surface: &str,
     script: &str,
     options: &GmshOptions,
-    progress: &EncodeProgress,
+    progress: &Progress,
 ) -> Result<Result<TetMesh, RefusedBecause>, GmshError> {
     let folder = tempfile::Builder::new().prefix("tesdf-gmsh-").tempdir().map_err(GmshError::Folder)?;
     let path = |name: &str| folder.path().join(name);
@@ -81,7 +81,7 @@ fn executable(options: &GmshOptions) -> PathBuf {
 }
 
 /// `None` when it took too long or is no longer wanted, and was ended.
-fn wait(mut child: Child, limit: Duration, progress: &EncodeProgress) -> std::io::Result<Option<ExitStatus>> {
+fn wait(mut child: Child, limit: Duration, progress: &Progress) -> std::io::Result<Option<ExitStatus>> {
     let start = Instant::now();
     loop {
         if let Some(status) = child.try_wait()? {

@@ -11,12 +11,12 @@ use crate::{
 /// Largest number of pairs that the search returns in a small mesh, and per face in a large mesh.
 /// The surface of a solid has far fewer. If all faces meet each other, the number of pairs is
 /// quadratic and fits no memory.
-const MOST_PAIRS: usize = 1 << 20;
-const MOST_PAIRS_PER_FACE: usize = 2;
+const MAX_PAIRS: usize = 1 << 20;
+const MAX_PAIRS_PER_FACE: usize = 2;
 
 /// A mesh with at least this number of intersecting pairs is refused.
-pub(crate) fn most_pairs(mesh: &TriangleMesh) -> usize {
-    MOST_PAIRS.max(MOST_PAIRS_PER_FACE * mesh.faces().len())
+pub(crate) fn max_pairs(mesh: &TriangleMesh) -> usize {
+    MAX_PAIRS.max(MAX_PAIRS_PER_FACE * mesh.faces().len())
 }
 
 /// Finds pairs of faces that meet in more than the corners or the edge that they share. Pairs are
@@ -32,7 +32,7 @@ pub(crate) fn self_intersections(
 ) -> Vec<[u32; 2]> {
     let faces: Vec<u32> =
         (0..mesh.faces().len() as u32).filter(|f| without_area.binary_search(f).is_err()).collect();
-    let (mut pairs, most) = (Vec::new(), most_pairs(mesh));
+    let (mut pairs, most) = (Vec::new(), max_pairs(mesh));
     // The number of pairs shows whether the search was broken off.
     let _ = pairs_that_may_meet(mesh, &faces, |f, g| {
         if meet_beyond_shared(mesh, f, g) && !touching.contains(&(f, g)) && !touching.contains(&(g, f)) {
@@ -81,7 +81,7 @@ fn meet_beyond_shared(mesh: &TriangleMesh, f: u32, g: u32) -> bool {
 }
 
 pub(super) fn defects(mesh: &TriangleMesh, pairs: &[[u32; 2]], lenient: Severity) -> Vec<Defect> {
-    if pairs.len() >= most_pairs(mesh) {
+    if pairs.len() >= max_pairs(mesh) {
         let [f, g] = pairs[0];
         let message = format!(
             "{} pairs of faces intersect, such as faces {f} and {g}, and perhaps more: too many for the surface of a solid",

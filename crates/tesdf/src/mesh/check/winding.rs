@@ -9,8 +9,8 @@ use super::{
     regions::{self, Sample},
 };
 use crate::{
-    geometry::{Aabb, Triangle, WindingNumber, perturbed_orientation},
-    mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, topology::Edge},
+    geometry::{Aabb, Triangle, perturbed_orientation},
+    mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, WindingNumber, topology::Edge},
 };
 
 /// Bound of the rounding error of intersection points, relative to the largest coordinate: about a

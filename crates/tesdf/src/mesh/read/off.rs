@@ -8,7 +8,7 @@ use super::{MeshFormat, RawMesh, ReadError, sniff};
 const OFF: MeshFormat = MeshFormat::Off;
 
 /// Largest count of numbers in a vertex: x y z, four of normal or colour each, and two of texture.
-const MOST_VERTEX_NUMBERS: usize = 12;
+const MAX_VERTEX_NUMBERS: usize = 12;
 
 pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
     sniff::refuse_other_kinds(bytes, OFF)?;
@@ -33,7 +33,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
             }
             count += 1;
         }
-        if !(3..=MOST_VERTEX_NUMBERS).contains(&count) {
+        if !(3..=MAX_VERTEX_NUMBERS).contains(&count) {
             let found = format!("vertex {i} (0-based) has {count} numbers");
             return Err(malformed(
                 OFF,

@@ -4,9 +4,9 @@ use glam::DVec3;
 
 use super::{Draft, RepairReport};
 use crate::{
-    geometry::{WindingNumber, perturbed_orientation},
+    geometry::perturbed_orientation,
     mesh::{
-        Topology, TriangleMesh,
+        Topology, TriangleMesh, WindingNumber,
         check::{TJunctions, face_flaws, height, self_intersections},
         topology::DisjointSets,
     },

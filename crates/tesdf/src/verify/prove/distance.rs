@@ -69,7 +69,7 @@ pub struct Search<'a> {
     tested: Vec<u64>,
     /// Number of pieces so far.
     pub pieces: u64,
-    most_pieces: u64,
+    max_pieces: u64,
     is_cancelled: &'a dyn Fn() -> bool,
 }
 
@@ -94,8 +94,8 @@ struct Start {
 const LOOK: u64 = 1 << 12;
 
 impl<'a> Search<'a> {
-    /// Prepares a search that visits at most `most_pieces` pieces.
-    pub fn new(problem: &'a Problem, most_pieces: u64, is_cancelled: &'a dyn Fn() -> bool) -> Self {
+    /// Prepares a search that visits at most `max_pieces` pieces.
+    pub fn new(problem: &'a Problem, max_pieces: u64, is_cancelled: &'a dyn Fn() -> bool) -> Self {
         Self {
             problem,
             claims: Claims::new(problem),
@@ -103,7 +103,7 @@ impl<'a> Search<'a> {
             faces: Vec::new(),
             tested: vec![0; problem.items()],
             pieces: 0,
-            most_pieces,
+            max_pieces,
             is_cancelled,
         }
     }
@@ -263,7 +263,7 @@ impl<'a> Search<'a> {
             let face = problem.faces[self.faces[own.faces].at as usize].position;
             Err(Open::Undecided { reason, at: piece.ball().0, face })
         };
-        if self.pieces >= self.most_pieces || piece.depth >= DEEPEST {
+        if self.pieces >= self.max_pieces || piece.depth >= DEEPEST {
             return undecided(Reason::Pieces);
         }
         if piece.drift > DRIFT * problem.delta {

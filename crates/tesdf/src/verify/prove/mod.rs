@@ -42,7 +42,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize};
 use rayon::prelude::*;
 
 use crate::TeSdf;
-use crate::asset::about::Certificate;
+use crate::base::Certificate;
 use crate::domain::Cell;
 pub use report::{Claim, Fault, ProveReport, Tally, Verdict};
 use signs::Signs;
@@ -189,7 +189,7 @@ pub fn prove(
         signs: found.signs,
         face_tree,
         pieces: found.pieces,
-        most_pieces: found.most_pieces,
+        max_pieces: found.max_pieces,
         faults: found.faults,
     })
 }

@@ -7,7 +7,8 @@ use glam::DVec3;
 use super::apart::{is_beside, orientation};
 use super::report::{Claim, Fault};
 use super::signs::{Signs, side_of};
-use crate::asset::layout::{Label, Node, Side};
+use crate::asset::layout::{Label, Node};
+use crate::base::Side;
 use crate::domain::Cell;
 
 impl Signs<'_> {

@@ -8,7 +8,8 @@ use super::report::{Claim, Fault};
 use super::surface::Surface;
 use super::winding::Rays;
 use crate::TeSdf;
-use crate::asset::layout::{Label, Node, Side};
+use crate::asset::layout::{Label, Node};
+use crate::base::Side;
 use crate::domain::Cell;
 
 /// Checks the labels of the cells of a bisection domain.
@@ -38,7 +39,7 @@ impl Signs<'_> {
     /// A fault when a query at the centroid does not find the cell.
     pub fn located(&self, word: u32, cell: &Cell) -> Option<Fault> {
         let centroid = cell.centroid();
-        let (_, found) = self.asset.place_and_word(centroid);
+        let (_, found) = self.asset.locate_with_word(centroid);
         (found != word as usize).then(|| {
             Fault::refuted(Claim::Sign, "a query at the centroid of the cell arrives at another cell")
                 .at(self.asset, centroid)

@@ -119,8 +119,7 @@ fn turn_at(a: DVec3, b: DVec3, p: DVec3) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::WindingNumber;
-    use crate::mesh::TriangleMesh;
+    use crate::mesh::{TriangleMesh, WindingNumber};
 
     /// Two overlapping boxes on a lattice. Rays run along edges, through corners and in the planes
     /// of faces.

@@ -1,7 +1,6 @@
 use std::collections::BTreeSet;
 
-use crate::TeSdf;
-use crate::asset::layout::TreeChild;
+use super::layout::TreeChild;
 use crate::geometry::{AabbTree, Child};
 
 /// What a vertex moves: made when the first one does.
@@ -20,8 +19,13 @@ pub struct Incidence {
 }
 
 impl Incidence {
-    /// Of an asset whose domain is made of `tetrahedra`, found by `tree`.
-    pub fn new(asset: &TeSdf, tetrahedra: &[[u32; 4]], vertices: usize, tree: &AabbTree) -> Self {
+    /// Of faces and of the tetrahedra of a conforming domain, each with the number of vertices that they use, and of the trees over both.
+    pub fn new(
+        (faces, mesh_vertices): (&[[u32; 3]], usize),
+        face_tree: &[[u32; 2]],
+        (tetrahedra, vertices): (&[[u32; 4]], usize),
+        tree: &AabbTree,
+    ) -> Self {
         let face_children = |node: &[u32; 2]| {
             node.map(|word| match TreeChild::decode(word) {
                 TreeChild::Node(n) => Child::Node(n),
@@ -31,9 +35,9 @@ impl Incidence {
         let mut place = vec![0; tetrahedra.len()];
         tree.order().iter().enumerate().for_each(|(at, &t)| place[t as usize] = at as u32);
         Self {
-            faces: Rows::new(&asset.faces, asset.vertices.len()),
+            faces: Rows::new(faces, mesh_vertices),
             tetrahedra: Rows::new(tetrahedra, vertices),
-            face_tree: Parents::new(asset.tree_children.iter().map(face_children), asset.faces.len()),
+            face_tree: Parents::new(face_tree.iter().map(face_children), faces.len()),
             tetrahedron_tree: Parents::new(
                 tree.nodes().iter().map(|node| [node[0].1, node[1].1]),
                 tetrahedra.len(),

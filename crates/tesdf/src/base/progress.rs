@@ -13,15 +13,15 @@ pub enum Stage {
 
 /// Shared between the thread that encodes and one that watches: how far it is, and the wish to stop.
 #[derive(Debug, Default)]
-pub struct EncodeProgress {
-    pub(super) cancel: AtomicBool,
-    pub(super) done: AtomicU64,
+pub struct Progress {
+    cancel: AtomicBool,
+    done: AtomicU64,
     total: AtomicU64,
     stage: AtomicU8,
 }
 
-impl EncodeProgress {
-    /// Asks the encoder to stop; it answers [`EncodeError::Cancelled`](super::EncodeError::Cancelled).
+impl Progress {
+    /// Asks the encoder to stop; it answers [`EncodeError::Cancelled`](crate::encode::EncodeError::Cancelled).
     pub fn cancel(&self) {
         self.cancel.store(true, Ordering::Relaxed);
     }
@@ -42,13 +42,13 @@ impl EncodeProgress {
         (stage, (self.done.load(Ordering::Relaxed) as f64 / total as f64).min(1.0))
     }
 
-    pub(super) fn begin(&self, stage: Stage, total: u64) {
+    pub(crate) fn begin(&self, stage: Stage, total: u64) {
         self.done.store(0, Ordering::Relaxed);
         self.total.store(total, Ordering::Relaxed);
         self.stage.store(stage as u8, Ordering::Relaxed);
     }
 
-    pub(super) fn advance(&self, by: u64) {
+    pub(crate) fn advance(&self, by: u64) {
         self.done.fetch_add(by, Ordering::Relaxed);
     }
 }

@@ -1,11 +1,11 @@
 use glam::DVec3;
 
-use super::{Conforming, TeSdf};
+use crate::TeSdf;
+use crate::asset::{Conforming, FaceRecord};
 use crate::domain::DomainCube;
 use crate::geometry::{Aabb, LocalFrame};
-use crate::query::FaceRecord;
 
-/// The arrays of an asset, as kernels of other devices read them. [`layout`](super::layout) explains the words.
+/// The arrays of an asset, as kernels of other devices read them. [`layout`](crate::asset::layout) explains the words.
 ///
 /// Lengths are in the local frame; `f32` positions are relative to the middle of the cube.
 #[derive(Clone, Copy, Debug)]
@@ -14,9 +14,9 @@ pub struct Arrays<'a> {
     pub frame: LocalFrame,
     /// The cube of the bisection forest.
     pub cube: DomainCube,
-    /// The forest: see [`Node`](super::layout::Node). The first words are its roots.
+    /// The forest: see [`Node`](crate::asset::layout::Node). The first words are its roots.
     pub nodes: &'a [u32],
-    /// The lists: see [`List`](super::layout::List).
+    /// The lists: see [`List`](crate::asset::layout::List).
     pub lists: &'a [u8],
     /// Where each palette begins, and where the last one ends.
     pub palette_starts: &'a [u32],
@@ -26,7 +26,7 @@ pub struct Arrays<'a> {
     pub palettes_high: Option<&'a [u8]>,
     /// Boxes of the two children of each node of the face tree.
     pub tree_boxes: &'a [[f32; 12]],
-    /// The children: see [`TreeChild`](super::layout::TreeChild).
+    /// The children: see [`TreeChild`](crate::asset::layout::TreeChild).
     pub tree_children: &'a [[u32; 2]],
     /// Corner vertices of the faces.
     pub faces: &'a [[u32; 3]],

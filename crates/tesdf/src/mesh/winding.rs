@@ -1,7 +1,7 @@
 use glam::DVec3;
 
-use super::{Aabb, AabbTree, Child, signed_crossing};
-use crate::mesh::TriangleMesh;
+use super::TriangleMesh;
+use crate::geometry::{Aabb, AabbTree, Child, signed_crossing};
 
 /// The winding number of a triangle mesh, exact and deterministic.
 ///

@@ -1,0 +1,16 @@
+//! Ground types that every stage may use: lengths, sides, progress, certificates, names of units. They use no other module.
+mod certificate;
+mod chains;
+mod isa;
+mod length;
+mod progress;
+mod side;
+pub mod unit;
+
+pub use certificate::Certificate;
+pub(crate) use certificate::{Proved, Written};
+pub(crate) use chains::Chains;
+pub use isa::Isa;
+pub use length::Length;
+pub use progress::{Progress, Stage};
+pub use side::Side;

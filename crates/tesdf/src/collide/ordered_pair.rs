@@ -1,0 +1,95 @@
+//! Two instances in an order: the surface of the first against the signed distance field of the second.
+use super::field::FieldBody;
+use super::instance_pairs::instance_pairs;
+use super::narrow::{Minimum, Search};
+use super::surface::{Candidates, Part, SurfaceBody};
+use super::{CollideError, CollideOptions, Contact, FeatureId, InstanceId, Mode, Scene};
+
+/// One body's surface against another's field.
+pub struct OrderedPair<'a> {
+    /// Whose faces or nodes.
+    pub surface: SurfaceBody<'a>,
+    /// Whose signed distances.
+    pub field: FieldBody<'a>,
+    /// How minima are found, and up to which value.
+    pub search: Search,
+    options: &'a CollideOptions,
+    pub a: InstanceId,
+    pub b: InstanceId,
+}
+
+impl<'a> OrderedPair<'a> {
+    /// All pairs of instances that can touch, each in both orders.
+    pub fn all(scene: &'a Scene, options: &'a CollideOptions) -> Result<Vec<Self>, CollideError> {
+        options.validate()?;
+        instance_pairs(scene, options.contact_distance, options.speculative_time)?
+            .iter()
+            .flat_map(|pair| [(pair.first, pair.second, pair), (pair.second, pair.first, pair)])
+            .map(|(a, b, pair)| Self::new(scene, options, a, b, pair.contact_distance))
+            .collect()
+    }
+
+    /// `contact_distance` is that of the pair, in the world's unit.
+    pub fn new(
+        scene: &'a Scene,
+        options: &'a CollideOptions,
+        a: InstanceId,
+        b: InstanceId,
+        contact_distance: f64,
+    ) -> Result<Self, CollideError> {
+        let (of_a, of_b) = (scene.instance(a)?, scene.instance(b)?);
+        let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
+        let field = FieldBody::new(shape_b, of_b.placement());
+        let surface = SurfaceBody::new(shape_a, of_a.placement(), &field);
+        let diagonal = shape_b.diagonal().min(f64::MAX) * of_b.scale;
+        let search = Search::new(options, contact_distance, &field, diagonal);
+        Ok(Self { surface, field, search, options, a, b })
+    }
+
+    /// Broad phase.
+    pub fn candidates(&self) -> Candidates {
+        match self.options.mode {
+            Mode::Node => self.surface.nodes(&self.field, self.search.reach),
+            Mode::Face(_) => self.surface.faces(&self.field, self.search.reach),
+        }
+    }
+
+    /// A candidate, the user's number of its face, and its own: of the node or the face.
+    pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
+        match self.options.mode {
+            Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
+            Mode::Face(_) => {
+                let face = self.surface.face_id(candidate);
+                (self.surface.face(candidate, &self.field, self.search.reach), face, face)
+            }
+        }
+    }
+
+    /// Eq. (10). What is rounded has every normal.
+    pub fn is_filtered(&self, part: &Part, minimum: &Minimum) -> bool {
+        match (self.options.mode, self.options.cos_theta) {
+            (Mode::Face(_), Some(cos)) if part.points().len() == 3 => {
+                minimum.value.gradient.dot(part.normal) > -cos
+            }
+            _ => false,
+        }
+    }
+
+    pub fn contact(&self, part: &Part, minimum: &Minimum, face_a: u32, feature: u32) -> Contact {
+        let Minimum { point, value, cell, converged } = *minimum;
+        let (face_b, feature_b) = self.field.names(&value);
+        Contact {
+            point_a: self.field.to_world(point - part.radius * value.gradient),
+            point_b: self.field.to_world(value.closest_point),
+            normal: self.field.rotate(value.gradient),
+            distance: (value.distance - part.radius) * self.field.unit(),
+            face_a,
+            face_b,
+            tet_b: cell,
+            instance_a: self.a,
+            instance_b: self.b,
+            feature: FeatureId { a: feature, b: feature_b },
+            converged,
+        }
+    }
+}

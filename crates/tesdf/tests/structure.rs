@@ -1,0 +1,159 @@
+//! Each module of the library uses only those before it, and no files use each other in a circle.
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+/// The order of the modules, as `docs/architecture.md` and the documentation of the crate have it.
+const ORDER: [&str; 15] = [
+    "base", "input", "save", "geometry", "sampling", "mesh", "domain", "asset", "query", "verify", "encode",
+    "deform", "collide", "evaluate", "inspect",
+];
+/// What unit tests share; all of them may use it.
+const FOR_TESTS: &str = "testing";
+
+/// A module or an item: the names on the way to it from the root of the crate.
+type Names = Vec<String>;
+
+/// The files of the crate by module, without comments and unit tests, and what their modules export again.
+struct Source {
+    files: BTreeMap<Names, String>,
+    exports: BTreeMap<Names, Names>,
+}
+
+impl Source {
+    fn read() -> Self {
+        let mut source = Self { files: BTreeMap::new(), exports: BTreeMap::new() };
+        source.add(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &Vec::new());
+        for (module, code) in &source.files {
+            for (at, _) in code.match_indices("pub use ").chain(code.match_indices("pub(crate) use ")) {
+                let tree = &code[at..][code[at..].find(" use ").map_or(0, |use_at| use_at + 5)..];
+                for names in tree_of(tree, &Vec::new()).0 {
+                    let from = match names[0].as_str() {
+                        "crate" => names[1..].to_vec(),
+                        _ => [module.as_slice(), &names].concat(),
+                    };
+                    let last = names[names.len() - 1].clone();
+                    source.exports.insert([module.as_slice(), &[last]].concat(), from);
+                }
+            }
+        }
+        source
+    }
+
+    fn add(&mut self, path: &Path, module: &Names) {
+        for entry in fs::read_dir(path).expect("a folder of the crate") {
+            let path = entry.expect("an entry").path();
+            let name = path.file_stem().and_then(|name| name.to_str()).expect("a name").to_owned();
+            let inner = match name.as_str() {
+                "lib" | "mod" => module.clone(),
+                _ => [module.as_slice(), &[name]].concat(),
+            };
+            if path.is_dir() {
+                self.add(&path, &inner);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                self.files.insert(inner, code(&fs::read_to_string(&path).expect("text")));
+            }
+        }
+    }
+
+    /// The module whose file defines an item.
+    fn home(&self, item: &[String]) -> Names {
+        let known = (0..=item.len()).rev().find(|&n| self.files.contains_key(&item[..n])).unwrap_or(0);
+        match item.get(..=known).and_then(|exported| self.exports.get(exported)) {
+            Some(from) if from.as_slice() != item => self.home(from),
+            _ => item[..known].to_vec(),
+        }
+    }
+
+    /// The modules that a file uses, besides those that it is in and those in it.
+    fn used(&self, module: &Names) -> BTreeSet<Names> {
+        let homes = paths(&self.files[module], module).into_iter().map(|item| self.home(&item));
+        homes.filter(|home| !home.starts_with(module) && !module.starts_with(home)).collect()
+    }
+}
+
+/// Without comments and unit tests.
+fn code(text: &str) -> String {
+    let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
+}
+
+/// The items that a file names by a path that begins with `crate`, `self` or `super`.
+fn paths(code: &str, module: &Names) -> Vec<Names> {
+    let mut items = Vec::new();
+    for start in ["crate::", "self::", "super::"] {
+        for (at, _) in code.match_indices(start) {
+            if code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':') {
+                continue;
+            }
+            let (mut from, mut rest) = (module.clone(), &code[at..]);
+            if let Some(below) = rest.strip_prefix("crate::") {
+                (from, rest) = (Vec::new(), below);
+            }
+            rest = rest.strip_prefix("self::").unwrap_or(rest);
+            while let Some(below) = rest.strip_prefix("super::") {
+                from.pop();
+                rest = below;
+            }
+            items.extend(tree_of(rest, &from).0);
+        }
+    }
+    items
+}
+
+/// The items of a use tree below `from`, and what comes after it.
+fn tree_of<'a>(text: &'a str, from: &Names) -> (Vec<Names>, &'a str) {
+    if let Some(mut rest) = text.strip_prefix('{') {
+        let mut items = Vec::new();
+        loop {
+            rest = rest.trim_start_matches([' ', '\n', ',']);
+            if let Some(after) = rest.strip_prefix('}') {
+                return (items, after);
+            }
+            let (inner, after) = tree_of(rest, from);
+            items.extend(inner);
+            // A new name makes no difference.
+            rest = after.trim_start_matches(|c| c != ',' && c != '}');
+        }
+    }
+    let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len());
+    let names = [from.as_slice(), &[text[..end].to_owned()]].concat();
+    match text[end..].strip_prefix("::") {
+        Some(below) if below.starts_with(|c: char| c.is_alphabetic() || c == '_' || c == '{') => {
+            tree_of(below, &names)
+        }
+        _ => (vec![names], &text[end..]),
+    }
+}
+
+#[test]
+fn modules_use_those_before_them_alone() {
+    let source = Source::read();
+    let place = |name: &str| ORDER.iter().position(|&other| other == name);
+    let mut arrows = 0;
+    for module in source.files.keys().filter(|module| !module.is_empty() && module[0] != FOR_TESTS) {
+        let own = place(&module[0]).unwrap_or_else(|| panic!("{} has a place in the order", module[0]));
+        for used in source.used(module).iter().filter(|used| used[0] != FOR_TESTS) {
+            assert!(place(&used[0]) <= Some(own), "{} uses {}", module.join("::"), used.join("::"));
+            arrows += 1;
+        }
+    }
+    assert!(arrows > 300, "{arrows} uses were found");
+}
+
+#[test]
+fn no_files_use_each_other_in_a_circle() {
+    let source = Source::read();
+    let mut open: BTreeMap<Names, BTreeSet<Names>> =
+        source.files.keys().map(|module| (module.clone(), source.used(module))).collect();
+    loop {
+        let files = open.len();
+        let names: BTreeSet<Names> = open.keys().cloned().collect();
+        // A file that uses none of those that are left is in no circle.
+        open.retain(|_, used| used.iter().any(|used| names.contains(used)));
+        if open.len() == files {
+            break;
+        }
+    }
+    assert!(open.is_empty(), "in circles, or using files that are: {open:#?}");
+}
