@@ -4,25 +4,28 @@ use rayon::prelude::*;
 use super::ordered_pair::OrderedPair;
 use super::{CollideError, CollideOptions, InstanceId, Scene};
 
-/// A face (or node) of one body within a cell of another: what the narrow phase is asked about.
+/// A face (or node) of one body within a cell of another body: a problem for the narrow phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
-    /// The body whose face it is.
+    /// The body that has the face.
     pub instance_a: InstanceId,
-    /// The body whose cell it is.
+    /// The body that has the cell.
     pub instance_b: InstanceId,
-    /// The face of a, 0-based in the encoded mesh; for a node the lowest face that has it.
+    /// The face of a, 0-based in the encoded mesh. For a node, the lowest face that has it.
     pub face_a: u32,
-    /// The cell of b's domain, as [`CellView::id`](crate::asset::CellView::id); `None` outside of its cube, and for a simple shape.
+    /// The cell of b's domain, as [`CellView::id`](crate::asset::CellView::id); `None` outside its
+    /// cube, and for a simple shape.
     pub tet_b: Option<u32>,
-    /// The part of the face that lies in the cell, in the world: one to three points of a node, segment or triangle, clipped.
+    /// The part of the face in the cell, in the world: a node, segment or triangle, clipped by the
+    /// cell.
     pub polygon: Vec<DVec3>,
 }
 
-/// What the broad and the middle phase leave of a scene: all pairs of a face and a cell that [`detect`](super::detect()) looks for a
-/// contact in, with the part of the face that is in the cell.
+/// The result of the broad and the middle phase: all (face, cell) pairs in which
+/// [`detect`](super::detect()) looks for a contact, with the part of the face in the cell.
 ///
-/// To draw, to count, and to see why something is no contact: a pair that is not here is farther apart than the contact distance.
+/// For debug drawing, counting and analysis. A pair that is missing here is farther apart than the
+/// contact distance.
 ///
 /// # Errors
 /// As [`detect`](super::detect()).

@@ -1,78 +1,78 @@
 use super::{InstanceId, ShapeId};
 
-/// Why a scene or a detection is refused. Nothing was changed.
+/// Why a scene or a detection is refused. The scene is unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CollideError {
-    /// Numbers that are no rigid motion.
+    /// The numbers are not a rigid motion.
     #[error("not a pose: {found}; expected {expected}")]
     NotAPose {
-        /// What was given.
+        /// The numbers found.
         found: String,
-        /// What a pose is.
+        /// The conditions of a pose.
         expected: &'static str,
     },
-    /// An instance has a part that cannot be.
+    /// An instance has an invalid state.
     #[error("instance {instance}: {reason}")]
     Instance {
-        /// The instance, or the place in the list that was to be added.
+        /// The instance, or its index in the list that was to be added.
         instance: u32,
-        /// What was found, and what was expected.
+        /// What was found and what was expected.
         reason: String,
     },
-    /// An instance that was removed, or never was.
+    /// The instance was removed or never existed.
     #[error("instance {} is not in the scene; it was removed, or belongs to another scene", .0.0)]
     NoInstance(InstanceId),
-    /// A shape that was removed, or never was.
+    /// The shape was removed or never existed.
     #[error("shape {} is not in the scene; it was removed, or belongs to another scene", .0.0)]
     NoShape(ShapeId),
-    /// A shape that is still used.
+    /// The shape is still in use.
     #[error("shape {} is used by instance {}; remove its instances first", .shape.0, .instance.0)]
     ShapeInUse {
         /// The shape.
         shape: ShapeId,
-        /// One of its instances, the one of the lowest id.
+        /// The instance with the lowest id that uses it.
         instance: InstanceId,
     },
-    /// The sizes of a shape.
+    /// A shape has an invalid size.
     #[error("{shape}: {found}; expected {expected}")]
     Shape {
-        /// Which shape.
+        /// Kind of the shape.
         shape: &'static str,
-        /// What was given.
+        /// The size found.
         found: String,
-        /// What was expected.
+        /// The expected size.
         expected: &'static str,
     },
-    /// More instances on top of each other than can be looked at.
+    /// Too many pairs of instances are close to each other.
     #[error(
         "more than {limit} pairs of instances come near each other; expected fewer: spread them out, or keep them apart by worlds, \
          groups or exclusions"
     )]
     TooManyPairs {
-        /// The most that are looked at.
+        /// Largest accepted number of pairs.
         limit: usize,
     },
-    /// Two instances that have no distance.
+    /// Two instances have no clearance.
     #[error("instances {a} and {b} have no clearance: {reason}")]
     NoClearance {
-        /// The one.
+        /// The first instance.
         a: InstanceId,
-        /// The other.
+        /// The second instance.
         b: InstanceId,
-        /// Why not, and what was expected.
+        /// The reason and what was expected.
         reason: &'static str,
     },
-    /// An option has a value that makes no sense.
+    /// An option has an invalid value.
     #[error("{option} is {found}; expected {expected}")]
     Option {
-        /// The option's name.
+        /// Name of the option.
         option: &'static str,
-        /// Its value.
+        /// The value found.
         found: String,
-        /// What was expected.
+        /// The expected value.
         expected: &'static str,
     },
-    /// A detector of another device has failed.
+    /// A detector on another device failed.
     #[error("{0}")]
     Device(String),
 }

@@ -1,4 +1,4 @@
-//! The body whose signed distance field it is.
+//! The body of a pair whose signed distance field is used.
 use glam::DVec3;
 
 use super::field_value::FieldValue;
@@ -8,12 +8,13 @@ use crate::TeSdf;
 use crate::geometry::Feature;
 use crate::query::{Faces, Place, Precision};
 
-/// A field in the frame that it is computed in: the local frame of an asset, the frame of a simple shape.
+/// A field in the frame of its computations: the local frame of an asset, or the frame of a simple
+/// shape.
 #[derive(Clone, Copy, Debug)]
 pub enum Field<'a> {
-    /// Of an encoded mesh.
+    /// The field of an encoded mesh.
     Mesh(&'a TeSdf),
-    /// Of a plane, box, sphere or capsule.
+    /// The field of a plane, box, sphere or capsule.
     Simple(Simple),
 }
 
@@ -25,10 +26,10 @@ pub struct FieldBody<'a> {
     placement: Placement,
 }
 
-/// What `f32` may be off by, in the local frame of an asset: twice what is promised for queries.
+/// Error bound of `f32` in the local frame of an asset: twice the bound promised for queries.
 pub const ROUNDING: f64 = 2e-6;
 
-/// What a value may be off by in `f64`, relative to the numbers that it is made of.
+/// Relative error bound of a value in `f64`, with respect to the numbers in its computation.
 const FAR: f64 = 1e-12;
 
 impl<'a> FieldBody<'a> {
@@ -49,7 +50,7 @@ impl<'a> FieldBody<'a> {
         }
     }
 
-    /// From the world to the field's frame.
+    /// Maps a point from the world to the field's frame.
     pub fn to_field(&self, p: DVec3) -> DVec3 {
         let p = self.placement.to_shape(p);
         match self.field {
@@ -58,7 +59,7 @@ impl<'a> FieldBody<'a> {
         }
     }
 
-    /// From the field's frame to the world.
+    /// Maps a point from the field's frame to the world.
     pub fn to_world(&self, p: DVec3) -> DVec3 {
         match self.field {
             Field::Mesh(asset) => self.placement.to_world(asset.frame.to_world(p)),
@@ -66,21 +67,21 @@ impl<'a> FieldBody<'a> {
         }
     }
 
-    /// Of a direction, from the field's frame to the world.
+    /// Rotates a direction from the field's frame to the world.
     pub fn rotate(&self, v: DVec3) -> DVec3 {
         self.placement.pose.rotation * v
     }
 
-    /// Of a direction, from the world to the field's frame.
+    /// Rotates a direction from the world to the field's frame.
     pub fn rotate_back(&self, v: DVec3) -> DVec3 {
         self.placement.pose.rotation.inverse() * v
     }
 
-    /// Whether no point within `radius` of `p` can have a signed distance up to `reach`; all in the field's frame. May
-    /// say no where it is so.
+    /// Whether no point within `radius` of `p` can have a signed distance up to `reach`. All in the
+    /// field's frame. `true` is certain; `false` may be wrong.
     pub fn is_beyond(&self, p: DVec3, radius: f64, reach: f64) -> bool {
         let limit = radius + reach;
-        // Far out the bounds are nearly the body.
+        // Far out, the bounds are a good approximation of the body.
         if let Field::Mesh(asset) = self.field
             && asset.local_bounds().distance_squared(p) > (limit.max(0.0) + ROUNDING).powi(2)
         {
@@ -90,15 +91,15 @@ impl<'a> FieldBody<'a> {
         distance > limit + slack
     }
 
-    /// The signed distance at `p`, and what it may be off by; in the field's frame.
+    /// The signed distance at `p` and a bound of its error, in the field's frame.
     pub fn rough(&self, p: DVec3) -> (f64, f64) {
         match self.field {
             Field::Mesh(asset) => {
-                // Between listed distances and true ones no ball can be ruled out.
+                // Uses exact distances: distances from inexact lists cannot rule out a ball.
                 let distance = asset.found_exactly(p).signed_distance;
                 (distance, ROUNDING + FAR * distance.abs())
             }
-            // Rounding of a formula, relative to the size of its numbers.
+            // The formula's rounding is relative to the size of its numbers.
             Field::Simple(simple) => {
                 let distance = simple.value(p).distance;
                 (distance, FAR * (distance.abs() + p.abs().max_element()))
@@ -106,7 +107,7 @@ impl<'a> FieldBody<'a> {
         }
     }
 
-    /// No point within `radius` of `p` has a lower signed distance than this; all in the field's frame.
+    /// Lower bound of the signed distance within `radius` of `p`. All in the field's frame.
     pub fn least_within(&self, p: DVec3, radius: f64) -> f64 {
         let (distance, slack) = self.rough(p);
         distance - slack - radius
@@ -120,7 +121,7 @@ impl<'a> FieldBody<'a> {
         }
     }
 
-    /// The names of a face and a feature, as the user knows them.
+    /// The ids of a face and a feature in the user's numbering.
     pub fn names(&self, value: &FieldValue) -> (u32, FeatureB) {
         let Field::Mesh(asset) = self.field else {
             return (value.position, FeatureB::Face(value.position));
@@ -139,24 +140,24 @@ impl<'a> FieldBody<'a> {
     }
 }
 
-/// The field within one cell: all of its points are answered in the same way.
+/// The field within one cell, where all points are answered in the same way.
 #[derive(Clone, Copy, Debug)]
 pub enum CellField<'a> {
-    /// A cell of a mesh's domain, with the faces of its list if it has one.
+    /// A cell of a mesh's domain, with the faces of its list, if it has one.
     Mesh {
         /// The mesh.
         asset: &'a TeSdf,
-        /// Where the cell lies.
+        /// The part of the asset that answers the cell's points.
         place: Place,
-        /// Its list; empty without one.
+        /// The faces of its list; empty without a list.
         faces: &'a Faces,
     },
-    /// All of a simple shape's field.
+    /// The complete field of a simple shape.
     Simple(Simple),
 }
 
 impl CellField<'_> {
-    /// The value at a point of the cell; the point is finite.
+    /// The value at a point of the cell. The point must be finite.
     #[inline]
     pub fn value(&self, p: DVec3, precision: Precision) -> FieldValue {
         match *self {

@@ -3,18 +3,18 @@ use glam::DVec3;
 use crate::geometry::Feature;
 use crate::query::Found;
 
-/// What a field says at a point, in its frame.
+/// The value of a field at a point, in the field's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldValue {
     /// Signed distance.
     pub distance: f64,
-    /// Its gradient, unit.
+    /// Its unit gradient.
     pub gradient: DVec3,
     /// The nearest point of the surface.
     pub closest_point: DVec3,
-    /// The nearest face, by position in the asset; of a simple shape its number.
+    /// The nearest face: its index in the asset, or its number in a simple shape.
     pub position: u32,
-    /// The part of that face.
+    /// The feature of that face.
     pub feature: Feature,
 }
 

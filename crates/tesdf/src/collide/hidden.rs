@@ -1,13 +1,13 @@
 //! Overlaps that no contact shows.
 //!
-//! A node tells of an overlap only where it is inside of the other body. Two equal boxes, one of which is moved along an edge, overlap
-//! without such a node, and so do two bars that cross like a plus sign. Two bodies in one place overlap although their surfaces are
-//! nowhere inside of each other, so that no face tells either.
+//! A node shows an overlap only where it is inside the other body. Two equal boxes, one moved along
+//! an edge, overlap without such a node. So do two bars that cross like a plus sign. Two bodies in
+//! the same pose overlap although no surface is inside the other body, so no face shows it either.
 //!
-//! Two searches find them, and neither changes a contact:
-//! - for nodes, the faces of each body in the field of the other. A face is nowhere deeper than its deepest corner by more than its
-//!   [`corner_reach`], so finely meshed faces are passed over unseen;
-//! - in every mode, a ball inside of each body in the field of the other.
+//! Two searches find such overlaps. Neither changes a contact.
+//! - In node mode, the faces of each body are searched in the field of the other. A face is deeper
+//!   than its deepest corner by at most its [`corner_reach`], so finely meshed faces are skipped.
+//! - In every mode, the centre of a ball inside each body is tested in the field of the other.
 use std::collections::BTreeMap;
 
 use glam::DVec3;
@@ -22,7 +22,7 @@ use crate::geometry::Aabb;
 use crate::query::corner_reach;
 
 impl HiddenOverlap {
-    /// Of overlaps those that the contacts do not show.
+    /// The overlaps that the contacts do not show.
     pub fn not_shown(overlaps: Vec<Self>, contacts: &[Contact]) -> Vec<Self> {
         if overlaps.is_empty() {
             return overlaps;
@@ -38,8 +38,9 @@ impl HiddenOverlap {
     }
 }
 
-/// The overlaps of a scene that `contacts`, which were found with the same options, do not show; sorted by world and instances. As
-/// [`Contacts::hidden`](super::Contacts::hidden), for contacts of other detectors.
+/// The overlaps of a scene that `contacts` do not show, sorted by world and instances. `contacts`
+/// must come from a detection with the same options. This gives
+/// [`Contacts::hidden`](super::Contacts::hidden) for contacts of other detectors.
 ///
 /// # Errors
 /// As [`detect`](super::detect()).
@@ -51,7 +52,7 @@ pub fn hidden_overlaps(
     Ok(among(&OrderedPair::all(scene, options)?, options.mode, contacts))
 }
 
-/// The same for ordered pairs; the two orders of a pair of instances are side by side.
+/// The same for ordered pairs. The two orders of a pair must be adjacent.
 pub fn among(pairs: &[OrderedPair], mode: Mode, contacts: &[Contact]) -> Vec<HiddenOverlap> {
     let overlap = |pair: &[OrderedPair]| {
         let depth = |p: &OrderedPair| depth(&p.surface, &p.field, mode) * p.field.unit();
@@ -62,7 +63,8 @@ pub fn among(pairs: &[OrderedPair], mode: Mode, contacts: &[Contact]) -> Vec<Hid
     HiddenOverlap::not_shown(pairs.par_chunks(2).filter_map(overlap).collect(), contacts)
 }
 
-/// How deep a surface is in a field where no contact need show it, at least, in the field's frame; 0 when no such place was found.
+/// Lower bound of the depth of a surface in a field, at places that need not have a contact. In the
+/// field's frame; 0 when no such place was found.
 fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode) -> f64 {
     let (Some((center, radius)), Some(of_field)) = (surface.inner_ball(), field.inner_radius()) else {
         return 0.0;
@@ -74,7 +76,7 @@ fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode) -> f64 {
     }
     let (at_center, slack) = field.rough(center);
     if HiddenOverlap::FINE * thickness <= 2.0 * slack {
-        // Thinner than what rounding leaves to see.
+        // The body is too thin relative to rounding.
         return 0.0;
     }
     let mut search = Looks { field, core, thickness, deepest: radius.min(-at_center).max(0.0), looks: 0 };
@@ -84,10 +86,10 @@ fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode) -> f64 {
     if search.deepest > HiddenOverlap::FINE * thickness { search.deepest } else { 0.0 }
 }
 
-/// A search for places where a surface is deep in a field.
+/// Searches places where a surface is deep in a field.
 struct Looks<'a> {
     field: &'a FieldBody<'a>,
-    /// What is deep enough is within this box.
+    /// Points that are deep enough lie in this box.
     core: Aabb,
     thickness: f64,
     /// The greatest depth so far.
@@ -96,12 +98,12 @@ struct Looks<'a> {
 }
 
 impl Looks<'_> {
-    /// What is not deeper than this is not looked for.
+    /// The search ignores depths up to this value.
     fn wanted(&self, share: f64) -> f64 {
         (share * self.thickness).max(1.25 * self.deepest)
     }
 
-    /// How deep a point is in the field.
+    /// Depth of a point in the field.
     fn look(&mut self, p: DVec3) -> f64 {
         self.looks += 1;
         -self.field.rough(p).0
@@ -131,7 +133,7 @@ impl Looks<'_> {
         }
     }
 
-    /// Looks at a face, and at quarters of it as long as these can be deep.
+    /// Evaluates a face at its middle, then quarters it as long as its parts can be deep enough.
     fn at_face(&mut self, surface: &SurfaceBody, face: u32) {
         let part = surface.face(face, self.field, 0.0);
         let (first, last) = (part.points()[0], part.points()[part.points().len() - 1]);
@@ -155,7 +157,8 @@ impl Looks<'_> {
             } else {
                 HiddenOverlap::SURE
             });
-            // What a piece this small holds is as deep as its middle, but for a quarter.
+            // In a piece this small, no point is deeper than its middle by more than a quarter of
+            // the wanted depth.
             if depth + reach > wanted && reach > 0.25 * wanted {
                 stack.extend(quarters(corners));
             }
@@ -163,7 +166,8 @@ impl Looks<'_> {
     }
 }
 
-/// The middle of a triangle's longest side or its centroid, whichever is nearer to the farthest corner, and that distance.
+/// The middle of a triangle's side or its centroid, whichever has the smaller distance to its
+/// farthest corner, and that distance.
 fn middle(corners: [DVec3; 3]) -> (DVec3, f64) {
     let [a, b, c] = corners;
     let reach = |p: DVec3| corners.map(|q| q.distance(p)).into_iter().fold(0.0, f64::max);
@@ -172,7 +176,7 @@ fn middle(corners: [DVec3; 3]) -> (DVec3, f64) {
     points.into_iter().map(|p| (p, reach(p))).fold((a, f64::INFINITY), nearer)
 }
 
-/// The one in the middle comes out first.
+/// The triangle in the middle is last, so a stack returns it first.
 fn quarters([a, b, c]: [DVec3; 3]) -> [[DVec3; 3]; 4] {
     let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
     [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]

@@ -2,28 +2,30 @@ use serde::Serialize;
 
 use super::InstanceId;
 
-/// Two bodies that overlap although no contact of theirs shows it.
+/// Two bodies that overlap although none of their contacts shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct HiddenOverlap {
-    /// The instance of the lower id.
+    /// The instance with the lower id.
     pub instance_a: InstanceId,
-    /// The instance of the higher id.
+    /// The instance with the higher id.
     pub instance_b: InstanceId,
-    /// How deep one body is in the other, at least, in the world's unit: how far a point of the one is inside of the other, or the radius
-    /// of a ball that is inside of both.
+    /// Lower bound of the depth, in the world's unit: how far a point of one body is inside the
+    /// other, or the radius of a ball inside both.
     pub depth: f64,
 }
 
 impl HiddenOverlap {
-    /// From this depth on, as a share of the lesser of the [inner balls](super::Shape::inner_ball) of the bodies, an overlap is found.
+    /// Overlaps at least this deep are found. A fraction of the smaller of the bodies' [inner
+    /// balls](super::Shape::inner_ball).
     pub const SURE: f64 = 0.5;
-    /// From this depth on it is found where few looks are enough; nothing less deep is told.
+    /// Overlaps at least this deep are found when few evaluations per face are enough. Shallower
+    /// overlaps are never reported. A fraction as for [`SURE`](Self::SURE).
     pub const FINE: f64 = 0.05;
-    /// Looks at a face for what is less deep than [`SURE`](Self::SURE).
+    /// Number of evaluations per face in the search for depths below [`SURE`](Self::SURE).
     pub const FINE_LOOKS: u32 = 4;
-    /// Looks at the faces of a body after which a search gives up. Plates a thousandth as thick as wide that lie on each other would take a
-    /// million.
+    /// Number of evaluations per body after which a search gives up. Two plates with a thickness of
+    /// a thousandth, lying on each other, would need a million.
     pub const MAX_LOOKS: u32 = 1 << 14;
-    /// An overlap is hidden when it is more than so many times as deep as the deepest contact.
+    /// An overlap is hidden when it is more than this many times as deep as the deepest contact.
     pub const SHOWN: f64 = 2.0;
 }

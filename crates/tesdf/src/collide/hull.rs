@@ -1,18 +1,20 @@
 //! The point of a convex hull that is closest to a given point, in the space of wrenches.
 //!
-//! In: the points that span the hull, and a target. Out: the target less a point of the hull. Whatever the rounding, that
-//! point is a convex combination of the given ones, so the length of what comes out is an upper bound of the distance.
+//! Input: the points that span the hull, and a target. Output: the target minus a point of the
+//! hull. This point is a convex combination of the given points, whatever the rounding. So the
+//! length of the output is an upper bound of the distance.
 
-/// Force and torque over a length: the coordinates of a wrench.
+/// Coordinates of a wrench: force, then torque divided by a length.
 pub(super) type Wrench = [f64; 6];
 
-/// Points of which the closest one is a combination; seven span the space.
+/// Largest number of points in the combination; seven points span the space.
 const ACTIVE: usize = 7;
-/// A distance below this is rounding: the coordinates are of size 1.
+/// A shorter distance is rounding, as the coordinates are of size 1.
 pub(super) const ROUNDING: f64 = 1e-12;
-/// How far the squared distance may be above the least, as a share of it.
+/// Accepted relative error of the squared distance.
 const SLACK: f64 = 1e-7;
-/// The algorithm ends by itself, mostly in fewer than ten steps; this is for rounding.
+/// Limit of the steps. The algorithm usually ends in fewer than ten; the limit guards against
+/// rounding.
 const STEPS: usize = 64;
 
 pub(super) fn dot(a: &Wrench, b: &Wrench) -> f64 {
@@ -24,18 +26,19 @@ fn plus(a: &Wrench, scale: f64, b: &Wrench) -> Wrench {
     std::array::from_fn(|k| a[k] + scale * b[k])
 }
 
-/// A convex combination of the points of a hull, each less the target.
+/// A convex combination of points of the hull, each minus the target.
 struct Combination {
     points: [Wrench; ACTIVE],
     weights: [f64; ACTIVE],
     count: usize,
 }
 
-/// `target − q` with `q` the point of the hull of `points` that is closest to `target`, by P. Wolfe's algorithm
-/// (Finding the nearest point in a polytope, 1976): a face of the hull grows by the point that lies farthest on the target's
-/// side, and shrinks to where the closest point of its affine span is inside of it.
+/// `target − q`, where `q` is the point of the hull of `points` that is closest to `target`. P.
+/// Wolfe's algorithm (Finding the nearest point in a polytope, 1976): a face of the hull grows by
+/// the point that lies farthest on the target's side. It shrinks until the closest point of its
+/// affine span is inside it.
 ///
-/// `points` is not empty.
+/// `points` must not be empty.
 pub(super) fn residual(points: &[Wrench], target: &Wrench) -> Wrench {
     let shifted = |p: &Wrench| plus(p, -1.0, target);
     let nearest = least(points, |p| dot(&shifted(p), &shifted(p)));
@@ -53,7 +56,7 @@ pub(super) fn residual(points: &[Wrench], target: &Wrench) -> Wrench {
         face.count += 1;
         let next = face.settle();
         if dot(&next, &next) >= square {
-            // Rounding has the last word.
+            // Only rounding is left, so the search ends.
             break;
         }
         x = next;
@@ -61,7 +64,7 @@ pub(super) fn residual(points: &[Wrench], target: &Wrench) -> Wrench {
     x.map(|x| -x)
 }
 
-/// The first of the points with the least key.
+/// Index of the first point with the least key.
 fn least(points: &[Wrench], key: impl Fn(&Wrench) -> f64) -> usize {
     let mut best = (f64::INFINITY, 0);
     for (j, p) in points.iter().enumerate() {
@@ -74,8 +77,8 @@ fn least(points: &[Wrench], key: impl Fn(&Wrench) -> f64) -> usize {
 }
 
 impl Combination {
-    /// Moves towards the point of the affine span that is closest to the origin, dropping points that stand in the way; the
-    /// point arrived at.
+    /// Moves towards the point of the affine span that is closest to the origin, and drops points
+    /// whose weights reach 0. Returns the resulting point.
     fn settle(&mut self) -> Wrench {
         loop {
             let goal = self.affine_minimum();
@@ -90,7 +93,7 @@ impl Combination {
             for k in 0..self.count {
                 weights[k] = (weights[k] + stop.0 * (goal[k] - weights[k])).max(0.0);
             }
-            // Exactly, so that the face loses a point with every turn.
+            // Set to exactly 0, so that the face loses a point in every iteration.
             if let Some(k) = stop.1 {
                 weights[k] = 0.0;
             }
@@ -101,8 +104,9 @@ impl Combination {
         }
     }
 
-    /// Weights, of sum 1 and any sign, of the point of the affine span that is closest to the origin: least squares by modified
-    /// Gram–Schmidt on the differences to the first point.
+    /// Weights of the point of the affine span that is closest to the origin. Their sum is 1; they
+    /// may be negative. Least squares by modified Gram–Schmidt on the differences to the first
+    /// point.
     fn affine_minimum(&self) -> [f64; ACTIVE] {
         let (first, n) = (self.points[0], self.count - 1);
         let mut q: [Wrench; ACTIVE - 1] = std::array::from_fn(|k| plus(&self.points[k + 1], -1.0, &first));
@@ -110,7 +114,7 @@ impl Combination {
         let mut rest = first;
         for k in 0..n {
             let length = dot(&q[k], &q[k]).sqrt();
-            // A difference that the others span adds nothing: its weight is 0.
+            // A difference in the span of the others adds nothing, so its weight is 0.
             if length <= ROUNDING {
                 continue;
             }
@@ -141,7 +145,7 @@ impl Combination {
                 count += 1;
             }
         }
-        // Weights of sum 1 are never all 0; with NaN they may be none.
+        // Weights of sum 1 are never all 0. With NaN, none may be positive.
         self.count = count.max(1);
         let sum: f64 = self.weights[..self.count].iter().sum();
         self.weights[..self.count].iter_mut().for_each(|w| *w /= sum);
@@ -163,7 +167,8 @@ mod tests {
         proptest::array::uniform6(-size..size)
     }
 
-    /// Points in a subspace of up to six dimensions, some of them equal or mid-way between others.
+    /// Points in a subspace of up to six dimensions. Some are equal to others or midway between
+    /// others.
     fn points() -> impl Strategy<Value = Vec<Wrench>> {
         (prop::collection::vec(wrench(1.0), 1..65), 1..7usize, any::<u64>()).prop_map(
             |(mut points, rank, seed)| {
@@ -183,7 +188,8 @@ mod tests {
     }
 
     proptest! {
-        /// x is the closest point to the origin of a convex set exactly when no point of the set has v·x < |x|².
+        /// x is the point of a convex set closest to the origin exactly when no point v of the set
+        /// has v·x < |x|².
         #[test]
         fn nothing_is_closer(points in points(), target in wrench(1.5), inside in any::<bool>()) {
             let mean = std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64);

@@ -2,11 +2,12 @@ use std::fmt;
 
 use serde::Serialize;
 
-/// Names a shape of a scene; never used again after the shape is removed.
+/// Id of a shape in a scene. It is never reused after the shape is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct ShapeId(pub u32);
 
-/// Names an instance of a scene: 0, 1, 2, … in the order of adding; never used again after the instance is removed.
+/// Id of an instance in a scene: 0, 1, 2, … in the order of adding. It is never reused after the
+/// instance is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct InstanceId(pub u32);
 

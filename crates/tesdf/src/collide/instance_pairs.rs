@@ -1,4 +1,4 @@
-//! Which instances can touch: those of one world whose bounds meet.
+//! Finds the instances that can touch: instances of one world whose bounds overlap.
 use std::collections::BTreeMap;
 
 use super::{CollideError, Instance, InstanceId, Scene, Shape, Velocity};
@@ -7,35 +7,38 @@ use crate::geometry::{Aabb, AabbTree};
 /// Two instances whose bounds come within their contact distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstancePair {
-    /// The lower id.
+    /// The instance with the lower id.
     pub first: InstanceId,
-    /// The higher id.
+    /// The instance with the higher id.
     pub second: InstanceId,
-    /// Contacts count up to this signed distance, in the world's unit.
+    /// The pair's contact distance: contacts are reported up to this signed distance, in the
+    /// world's unit.
     pub contact_distance: f64,
 }
 
 struct Entry {
     id: InstanceId,
     bounds: Aabb,
-    /// What it can move in the time ahead.
+    /// Distance that it can move within the speculative time.
     motion: f64,
     is_plane: bool,
 }
 
-/// What placing a box may round, in ulps of its largest coordinate.
+/// Rounding error of the placement of a box, in ulps of its largest coordinate.
 const ULPS: f64 = 8.0;
 
-/// Worlds of more instances than this get a tree.
+/// Worlds with more instances than this get a tree.
 const FEW: usize = 16;
 
-/// Most pairs of a scene: with what is made of each for the detection they take some GB.
+/// Largest number of pairs in a scene. With the data of the detection, this many pairs need some
+/// GB.
 pub const MAX_PAIRS: usize = 1 << 22;
 
 /// All pairs that can touch, sorted by world and ids.
 ///
 /// # Errors
-/// Names an instance whose shape is gone; [`CollideError::TooManyPairs`].
+/// [`CollideError::Instance`] names an instance whose shape is missing;
+/// [`CollideError::TooManyPairs`].
 pub fn instance_pairs(
     scene: &Scene,
     contact_distance: f64,
@@ -49,7 +52,7 @@ pub fn instance_pairs(
         let is_plane = matches!(shape, Shape::Plane);
         let motion = instance.motion_ahead(shape, speculative_time);
         let bounds = scene.bounds(id)?;
-        // Bounds that touch would lose each other by rounding.
+        // Without this, rounding could separate bounds that touch.
         let rounding = ULPS * f64::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
         let bounds = bounds.grown(0.5 * contact_distance + motion + rounding);
         worlds.entry(instance.world).or_default().push(Entry { id, bounds, motion, is_plane });
@@ -101,7 +104,8 @@ pub fn instance_pairs(
 }
 
 impl Instance {
-    /// How far the velocity can take a point of the instance in a time; `shape` is its shape.
+    /// Greatest distance that the velocity can move a point of the instance in `time`. `shape` is
+    /// its shape.
     pub fn motion_ahead(&self, shape: &Shape, time: f64) -> f64 {
         if time > 0.0 {
             let arm = if matches!(shape, Shape::Plane) { 0.0 } else { reach(shape.bounds()) * self.scale };
@@ -127,7 +131,7 @@ mod tests {
     fn more_pairs_than_the_memory_holds_are_refused() {
         let mut scene = Scene::new();
         let shape = scene.add_shape(Shape::Sphere { radius: 1.0 }).unwrap();
-        // 2897 · 2896 / 2 pairs are just more than 2²².
+        // 2897 · 2896 / 2 pairs are slightly more than 2²².
         let ids: Vec<_> =
             (0..2897).map(|_| scene.add(Instance::new(shape, Pose::IDENTITY)).unwrap()).collect();
         let error = instance_pairs(&scene, 0.0, 0.0).unwrap_err();

@@ -1,4 +1,4 @@
-//! The least signed distance over a whole surface: best-first over its face tree.
+//! The least signed distance over a whole surface, by best-first search over its face tree.
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -9,24 +9,24 @@ use super::narrow::{Minimum, Search};
 use super::surface::{Part, SurfaceBody};
 use crate::asset::layout::TreeChild;
 
-/// Where a surface is deepest in a field, or nearest to it; in the field's frame.
+/// The point of a surface that is deepest in a field or nearest to it, in the field's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Least {
-    /// Signed distance of the surface's point.
+    /// Signed distance of the surface point.
     pub distance: f64,
-    /// The face, by position in the surface's asset.
+    /// The face, by its index in the surface's asset.
     pub face: u32,
     /// The face itself.
     pub part: Part,
-    /// The point of its core.
+    /// The minimum over the core of the face.
     pub minimum: Minimum,
-    /// Whether every search over a face that was needed came to its tolerance.
+    /// Whether all required searches over faces reached their tolerance.
     pub converged: bool,
 }
 
-/// What is still to be looked at.
+/// A part of the surface that is still to be searched.
 struct Open {
-    /// No point of it has a lower signed distance.
+    /// Lower bound of the signed distances on it.
     bound: f64,
     item: Item,
 }
@@ -51,17 +51,20 @@ impl PartialOrd for Open {
 }
 impl Ord for Open {
     fn cmp(&self, other: &Self) -> Ordering {
-        // The heap gives the lowest bound first; of equal ones, faces.
+        // The heap returns the lowest bound first; among equal bounds, faces first.
         other.bound.total_cmp(&self.bound).then_with(|| other.item.cmp(&self.item))
     }
 }
 
-/// The least signed distance over a surface that is at most `limit`, to the search's tolerance and `tolerance` together; lengths in the
-/// field's frame. `None` when there is none, or when positions are too far out for their numbers.
+/// The least signed distance over a surface, in the field's frame. The error is within the sum of
+/// the search's tolerance and `tolerance`. `None` when the value is above `limit`, or when
+/// positions are too far out for their numbers.
 ///
-/// The field is 1-Lipschitz: over a ball it is at least the value at the middle less the radius. Nodes and faces are taken in the
-/// order of that bound; a face is searched exactly, up to the least value so far. Values at the middle of faces bound the least from above
-/// before the first face is searched. Bounds are `f32` values with room for their rounding; what is returned is `f64`.
+/// The field is 1-Lipschitz: over a ball it is at least the value at the centre minus the radius.
+/// Nodes and faces are visited in the order of this bound. A face is searched exactly, up to the
+/// least value so far. Before the first face is searched, the values at the centres of faces bound
+/// the result from above. Bounds are `f32` values with a margin for their rounding; the result is
+/// `f64`.
 pub fn least(
     surface: &SurfaceBody,
     field: &FieldBody,
@@ -71,7 +74,7 @@ pub fn least(
 ) -> Option<Least> {
     let mut best: Option<Least> = None;
     let mut converged = true;
-    // Nothing above this is wanted.
+    // Values above this are not needed.
     let mut limit = limit;
     let mut open = BinaryHeap::new();
     open.push(Open { bound: f64::NEG_INFINITY, item: item(surface.whole()) });
@@ -125,7 +128,7 @@ fn item(child: TreeChild) -> Item {
     }
 }
 
-/// A point of a part's core, and the reach of the core from there.
+/// Centre of a part's core, and the radius of a ball around it that contains the core.
 fn middle(part: &Part) -> (DVec3, f64) {
     let center = part.points().iter().sum::<DVec3>() / part.points().len() as f64;
     (center, part.points().iter().map(|p| p.distance(center)).fold(0.0, f64::max))

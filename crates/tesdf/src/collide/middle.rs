@@ -1,7 +1,8 @@
-//! Middle phase: a face, clipped by every cell that it meets.
+//! Middle phase: clips a face by every cell that it meets.
 //!
-//! The polygon goes down the bisection forest, from the six roots of the cube or from the tetrahedra of a conforming domain: each bisection is a plane through the cell, so what arrives at a leaf is the face
-//! clipped by that leaf, and no cell that the face does not meet is visited.
+//! The polygon descends the bisection forest, from the six roots of the cube or from the tetrahedra
+//! of a conforming domain. Each bisection cuts it by a plane through the cell. So the polygon at a
+//! leaf is the face clipped by that leaf, and cells that the face does not meet are not visited.
 use glam::DVec3;
 
 use super::polygon::{Parts, Polygon, Vertex};
@@ -13,27 +14,28 @@ use crate::domain::{Cell, ROOTS};
 use crate::geometry::{Aabb, barycentric};
 use crate::query::Place;
 
-/// What is thinner (local frame) is a sliver: parts beside it are as near.
+/// A thinner polygon (local frame) is a sliver. The parts beside it have almost the same distances.
 const SLIVER: f64 = 1e-11;
 
-/// A face, clipped by a cell.
+/// The part of a face in a cell.
 #[derive(Clone, Debug)]
 pub struct ClippedPolygon {
-    /// In the field's local frame.
+    /// The polygon, in the field's local frame.
     pub polygon: Polygon,
-    /// What answers for the points of the cell.
+    /// The part of the asset that answers the cell's points.
     pub place: Place,
-    /// The word of the cell in the forest; `None` outside of the cube.
+    /// The word of the cell in the forest; `None` outside the cube.
     pub cell: Option<u32>,
 }
 
-/// Clips by the cells that can hold a signed distance up to `reach` (local frame).
+/// Clips by the cells that can contain a signed distance up to `reach` (local frame).
 ///
-/// What lies beyond the band is left out unless `reach` is wider than the band; then it is what the face tree answers.
+/// Parts beyond the band are skipped, unless `reach` is wider than the band. Then the face tree
+/// answers them.
 pub fn clip(asset: &TeSdf, polygon: Polygon, reach: f64, visit: &mut impl FnMut(&ClippedPolygon)) {
     let clipping = Clipping { asset, reach, beyond: reach >= asset.band() };
     if let Some(domain) = &asset.conforming {
-        // The solid itself is all of the domain.
+        // The domain need not extend beyond the solid.
         return Clipping { beyond: reach > 0.0, ..clipping }.tetrahedra(domain, polygon, visit);
     }
     let (origin, side) = (asset.cube.origin(), asset.cube.side());
@@ -66,12 +68,13 @@ pub fn clip(asset: &TeSdf, polygon: Polygon, reach: f64, visit: &mut impl FnMut(
 struct Clipping<'a> {
     asset: &'a TeSdf,
     reach: f64,
-    /// Whether what lies beyond the band counts.
+    /// Whether parts beyond the band are needed.
     beyond: bool,
 }
 
 impl Clipping<'_> {
-    /// Clips by the tetrahedra of a conforming domain; what none of them holds is what the face tree answers.
+    /// Clips by the tetrahedra of a conforming domain. The face tree answers the parts outside all
+    /// tetrahedra.
     fn tetrahedra(&self, domain: &Conforming, polygon: Polygon, visit: &mut impl FnMut(&ClippedPolygon)) {
         let mut rest = vec![polygon.clone()];
         self.asset.visit_roots(domain, polygon.bounds(), |root| {
@@ -90,7 +93,8 @@ impl Clipping<'_> {
             }
         });
         if self.beyond {
-            // Between two tetrahedra rounding leaves slivers, which may go on along their side out of the domain.
+            // Rounding leaves slivers between two tetrahedra. Such a sliver may extend along a side
+            // to the outside of the domain.
             let outside = |part: &Polygon| {
                 !part.is_thinner(SLIVER) && matches!(self.asset.locate(part.center()), Place::NotOfDomain)
             };
@@ -100,8 +104,9 @@ impl Clipping<'_> {
         }
     }
 
-    /// Cuts by the planes between the roots, x_i = x_j, as sorting the three coordinates compares them: `axes` are in falling
-    /// order after the comparisons of neighbours 0 1, 1 2, 0 1.
+    /// Cuts by the planes x_i = x_j between the roots, in the way that sorting three coordinates
+    /// compares them. After the comparisons of the neighbours 0 1, 1 2, 0 1, the coordinates of
+    /// `axes` are in descending order.
     fn order(
         &self,
         polygon: Polygon,
@@ -117,8 +122,8 @@ impl Clipping<'_> {
         let mut swapped = axes;
         swapped.swap(at, at + 1);
         let [i, j] = [axes[at], axes[at + 1]];
-        // Without an exchange the last comparison is the first one again: rounding would split off what lies in its plane, and one
-        // face would have two polygons in a cell.
+        // Without an exchange, the last comparison repeats the first. Rounding would then split off
+        // what lies in its plane, and one face would have two polygons in a cell.
         let unchanged = if comparison == 1 { 3 } else { comparison + 1 };
         match polygon.cut(|v| (v.point[i] - origin[i]) - (v.point[j] - origin[j])) {
             Parts::Above => self.order(polygon, axes, unchanged, visit),
@@ -130,7 +135,7 @@ impl Clipping<'_> {
         }
     }
 
-    /// From a root of the cube.
+    /// Descends from a root of the cube.
     fn descend(&self, root: usize, mut polygon: Polygon, visit: &mut impl FnMut(&ClippedPolygon)) {
         let [i, j, k] = ROOTS[root];
         let (origin, inverse) = (self.asset.cube.origin(), 1.0 / self.asset.cube.side());
@@ -141,7 +146,7 @@ impl Clipping<'_> {
         self.below(root, polygon, visit);
     }
 
-    /// From any root; the vertices have their coordinates in it.
+    /// Descends from any root. The vertices have their barycentric coordinates in it.
     fn below(&self, root: usize, mut polygon: Polygon, visit: &mut impl FnMut(&ClippedPolygon)) {
         let bounds = self.asset.cell_bounds();
         let mut waiting: Vec<(u32, u32, Polygon)> = Vec::new();
@@ -186,7 +191,7 @@ impl Clipping<'_> {
     }
 }
 
-/// A point, in the cell that holds it, if that can hold a signed distance up to `reach`.
+/// Visits the cell of a point, if that cell can contain a signed distance up to `reach`.
 pub fn locate(asset: &TeSdf, point: DVec3, reach: f64, visit: &mut impl FnMut(&ClippedPolygon)) {
     let (place, word) = asset.locate_with_word(point);
     let cell = u32::try_from(word).ok();
@@ -197,7 +202,8 @@ pub fn locate(asset: &TeSdf, point: DVec3, reach: f64, visit: &mut impl FnMut(&C
     visit(&ClippedPolygon { polygon: Polygon::new(&[point]), place, cell });
 }
 
-/// The part of a polygon that a tetrahedron holds, with its coordinates there; the other parts go to `out`.
+/// The part of a polygon in a tetrahedron, with barycentric coordinates. The other parts go to
+/// `out`.
 fn cut_by(corners: &[DVec3; 4], mut polygon: Polygon, mut out: impl FnMut(Polygon)) -> Option<Polygon> {
     polygon.vertices_mut().iter_mut().for_each(|v| v.lambda = barycentric(corners, v.point));
     for k in 0..4 {

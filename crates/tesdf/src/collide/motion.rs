@@ -5,51 +5,52 @@ use glam::{DQuat, DVec3};
 use super::{Pose, Shape, Velocity};
 use crate::collide::Placement;
 
-/// How a body moves from its pose on, in the world.
+/// The motion of a body from its initial pose, in the world.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Motion {
-    /// Not at all.
+    /// No motion.
     #[default]
     Rest,
-    /// With a constant velocity of its origin, turning about that at a constant rate.
+    /// Constant velocity of the body's origin, and rotation about the origin at a constant rate.
     Linear {
-        /// Per unit of time; angular in radians, about the body's origin.
+        /// Velocity per unit of time; the angular part in radians, about the body's origin.
         velocity: Velocity,
     },
-    /// Turning about a line, and along it.
+    /// Rotation about a line and translation along it.
     Screw {
         /// A point of the line.
         point: DVec3,
-        /// Its direction; of any length but 0.
+        /// Direction of the line; any length except 0.
         axis: DVec3,
-        /// Radians per unit of time, by the right hand about `axis`.
+        /// Radians per unit of time; the right-hand rule about `axis`.
         angular_speed: f64,
-        /// Way along `axis` per turn, in the world's unit.
+        /// Translation along `axis` per turn, in the world's unit.
         pitch: f64,
     },
 }
 
-/// A motion as a drift, the same at all points, and a turn about a line that drifts along.
+/// A motion as a drift, equal at all points, and a rotation about a line that drifts along.
 #[derive(Clone, Copy, Debug)]
 pub struct Twist {
     drift: DVec3,
-    /// Radians per unit of time.
+    /// Angular velocity, in radians per unit of time.
     spin: DVec3,
     /// A point of the line at the start.
     center: DVec3,
 }
 
-/// What is accepted in motions: squares and products of such numbers stay in the range of 64-bit floats.
+/// Largest accepted absolute value in motions. Squares and products of such numbers stay within the
+/// range of 64-bit floats.
 const LARGEST: f64 = 1e50;
 const EXPECTED: &str = "expected absolute values up to 1e50";
 
 fn in_range(v: DVec3) -> bool {
-    // NaN fails the comparison.
+    // The comparison is false for NaN.
     v.abs().cmple(DVec3::splat(LARGEST)).all()
 }
 
 impl Velocity {
-    /// Checks the numbers; says what is wrong.
+    /// Checks the numbers. The error describes the fault.
     pub(super) fn validate(&self) -> Result<(), String> {
         let Self { linear, angular } = *self;
         match in_range(linear) && in_range(angular) {
@@ -60,7 +61,7 @@ impl Velocity {
 }
 
 impl Motion {
-    /// Checks the numbers; says what is wrong.
+    /// Checks the numbers. The error describes the fault.
     pub(super) fn validate(&self) -> Result<(), String> {
         match *self {
             Self::Linear { velocity } => velocity.validate(),
@@ -99,7 +100,7 @@ impl Motion {
         }
     }
 
-    /// The motion of a body that is at `start` at time 0, taken apart.
+    /// Decomposes the motion of a body that is at `start` at time 0.
     pub(super) fn twist(&self, start: Pose) -> Twist {
         match *self {
             Self::Rest => Twist { drift: DVec3::ZERO, spin: DVec3::ZERO, center: start.translation },
@@ -125,8 +126,8 @@ impl Twist {
         self.spin != DVec3::ZERO
     }
 
-    /// The greatest speed that turning gives a point of a shape placed at the start. For a rounded one that of its core: the ball around
-    /// a point goes where the point goes.
+    /// The greatest speed that the rotation gives a point of a shape placed at the start. For a
+    /// rounded shape, a point of its core: the ball around a point moves with the point.
     fn rotation_speed(&self, shape: &Shape, placement: Placement) -> f64 {
         let axis = self.spin.normalize_or_zero();
         if axis == DVec3::ZERO {
@@ -135,7 +136,7 @@ impl Twist {
         let from_axis = |p: DVec3| (placement.to_world(p) - self.center).cross(axis).length();
         let greatest = |points: &mut dyn Iterator<Item = DVec3>| points.map(from_axis).fold(0.0, f64::max);
         let arm = match *shape {
-            // Corners of faces only; a file may have others.
+            // Only corners of faces; a file may have other vertices.
             Shape::Mesh(ref asset) => {
                 let corner = |v: &u32| DVec3::from_array(asset.vertices[*v as usize]);
                 greatest(&mut asset.faces.as_flattened().iter().map(corner))
@@ -154,10 +155,12 @@ impl Twist {
     }
 }
 
-/// A bound of how fast any point of one body can come closer to any of another, at any time.
+/// Upper bound of the speed at which any point of one body can approach any point of the other, at
+/// any time.
 ///
-/// A point's speed is its body's drift and, across the axis, at most the turning speed. About one direction (or when one body does not turn)
-/// drift along the axis and turning are at right angles; in general they add up.
+/// The speed of a point is its body's drift plus a part perpendicular to the axis, which is at most
+/// the rotation speed. When both bodies rotate about one direction (or one does not rotate), the
+/// drift along the axis is perpendicular to the rotation. In general the parts add up.
 pub fn closing_speed(bodies: [(Twist, &Shape, Placement); 2]) -> f64 {
     let [rotation_a, rotation_b] =
         bodies.map(|(twist, shape, placement)| twist.rotation_speed(shape, placement));
@@ -171,7 +174,7 @@ pub fn closing_speed(bodies: [(Twist, &Shape, Placement); 2]) -> f64 {
     } else {
         drift.length() + rotation
     };
-    // Room for rounding.
+    // Margin for rounding.
     speed * (1.0 + 1e-12)
 }
 

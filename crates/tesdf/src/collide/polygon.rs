@@ -3,14 +3,14 @@ use glam::DVec3;
 
 use crate::geometry::Aabb;
 
-/// Most vertices of a polygon: a triangle clipped by a tetrahedron has seven; the rest is room for those that rounding
-/// leaves on a line.
+/// Largest number of vertices of a polygon. A triangle clipped by a tetrahedron has up to seven;
+/// the others leave room for vertices that rounding adds on a line.
 pub const MAX_VERTICES: usize = 12;
 
 /// A vertex of a polygon that is being clipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vertex {
-    /// Where it is, in the field's local frame.
+    /// Position, in the field's local frame.
     pub point: DVec3,
     /// Barycentric coordinates in the cell.
     pub lambda: [f64; 4],
@@ -29,37 +29,37 @@ impl Vertex {
 #[derive(Clone, Debug, Default)]
 pub struct Polygon(ArrayVec<Vertex, MAX_VERTICES>);
 
-/// Where a polygon lies, seen from a plane.
+/// The parts of a polygon with respect to a plane.
 #[expect(
     clippy::large_enum_variant,
     reason = "made and taken apart in one place, a million times a step: no box"
 )]
 pub enum Parts {
-    /// Above, or in the plane.
+    /// The polygon is above the plane or in it.
     Above,
-    /// Below; a part of it may be in the plane.
+    /// The polygon is below the plane; a part of it may be in the plane.
     Below,
-    /// On both sides: the part above and the part below.
+    /// The polygon is on both sides: the part above and the part below.
     Across(Polygon, Polygon),
 }
 
 impl Polygon {
-    /// From one to [`MAX_VERTICES`] vertices.
+    /// `points` has one to [`MAX_VERTICES`] points.
     pub fn new(points: &[DVec3]) -> Self {
         Self(points.iter().map(|&point| Vertex { point, lambda: [0.0; 4] }).collect())
     }
 
-    /// The vertices, in order around.
+    /// The vertices, in order around the polygon.
     pub fn vertices(&self) -> &[Vertex] {
         &self.0
     }
 
-    /// The same, to change them.
+    /// Mutable access to the vertices.
     pub fn vertices_mut(&mut self) -> &mut [Vertex] {
         &mut self.0
     }
 
-    /// Where the vertices are.
+    /// Positions of the vertices.
     pub fn points(&self) -> impl ExactSizeIterator<Item = DVec3> + Clone {
         self.0.iter().map(|v| v.point)
     }
@@ -69,12 +69,13 @@ impl Polygon {
         Aabb::of(&self.points().collect::<ArrayVec<DVec3, MAX_VERTICES>>())
     }
 
-    /// Mean of the vertices: a point of the polygon.
+    /// Mean of the vertices, which is a point of the polygon.
     pub fn center(&self) -> DVec3 {
         self.points().sum::<DVec3>() / self.0.len() as f64
     }
 
-    /// Whether it has an area, of less than `thickness` times its greatest length from the first vertex; no points and segments.
+    /// Whether twice its area is less than `thickness` times the greatest distance of a vertex from
+    /// the first vertex. False for points and segments.
     pub fn is_thinner(&self, thickness: f64) -> bool {
         let Some(first) = self.points().next() else { return false };
         let spokes: ArrayVec<DVec3, MAX_VERTICES> = self.points().skip(1).map(|p| p - first).collect();
@@ -83,12 +84,14 @@ impl Polygon {
         spokes.len() > 1 && twice_the_area.length() < thickness * longest
     }
 
-    /// Greatest distance from `p` to a point of the polygon: to a vertex, as the polygon is convex.
+    /// Greatest distance from `p` to a point of the polygon. As the polygon is convex, that point
+    /// is a vertex.
     pub fn reach(&self, p: DVec3) -> f64 {
         self.points().map(|v| v.distance_squared(p)).fold(0.0, f64::max).sqrt()
     }
 
-    /// Cuts where `height` is 0. The parts are closed; what only touches the plane is not cut.
+    /// Cuts the polygon where `height` is 0. The parts are closed. A polygon that only touches the
+    /// plane is not cut.
     #[inline]
     pub fn cut(&self, height: impl Fn(&Vertex) -> f64) -> Parts {
         let mut heights = [0.0; MAX_VERTICES];
@@ -117,10 +120,10 @@ impl Polygon {
             if h <= 0.0 {
                 second.push(v);
             }
-            // A segment has no edge back.
+            // A segment has no edge back to its first vertex.
             let is_edge = n > 2 || i == 0;
             if is_edge && ((h > 0.0 && h_next < 0.0) || (h < 0.0 && h_next > 0.0)) {
-                // From the same end on both sides of an edge that two polygons share.
+                // Computed from the same end in both polygons that share the edge.
                 let v = if h > 0.0 {
                     Vertex::between(&v, &self.0[j], h / (h - h_next))
                 } else {
@@ -133,8 +136,8 @@ impl Polygon {
         Parts::Across(first, second)
     }
 
-    /// Adds a vertex; one that is where the last one is adds nothing. Of too many the one that adds least area goes:
-    /// more than seven are there only by rounding.
+    /// Adds a vertex, unless it equals the last vertex. When the polygon is full, the vertex that
+    /// contributes the least area is removed: more than seven vertices exist only by rounding.
     fn push(&mut self, v: Vertex) {
         if self.0.last().is_some_and(|last| last.point == v.point) {
             return;

@@ -3,23 +3,24 @@ use glam::{DQuat, DVec3};
 use super::CollideError;
 use crate::geometry::Aabb;
 
-/// A rigid motion from a body's frame to the world's: rotate, then translate.
+/// A rigid motion from a body's frame to the world's frame: first rotate, then translate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Where the body's origin lies, in the world's unit.
+    /// Position of the body's origin, in the world's unit.
     pub translation: DVec3,
     /// Unit quaternion, x y z w.
     pub rotation: DQuat,
 }
 
-/// How far from 1 the length of a quaternion may be to be taken for rounding.
+/// A quaternion whose length deviates from 1 by at most this is normalised; the deviation counts as
+/// rounding.
 const UNIT: f64 = 1e-6;
 
 impl Pose {
-    /// The body's frame is the world's.
+    /// The body's frame equals the world's.
     pub const IDENTITY: Self = Self { translation: DVec3::ZERO, rotation: DQuat::IDENTITY };
 
-    /// Normalises `rotation` when its length is within 1e-6 of 1.
+    /// Checks a pose. `rotation` is normalised when its length is within 1e-6 of 1.
     ///
     /// # Errors
     /// [`CollideError::NotAPose`] for other quaternions and for numbers that are not finite.
@@ -37,7 +38,7 @@ impl Pose {
                 expected: "length 1, up to 1e-6: divide the quaternion (x y z w) by its length",
             });
         }
-        // A quaternion that is of unit length already is kept bit for bit.
+        // A quaternion of exactly unit length is kept bit for bit.
         let rotation = if length == 1.0 { rotation } else { rotation / length };
         Ok(Self { translation, rotation })
     }
@@ -47,17 +48,17 @@ impl Pose {
         Self { translation, rotation: DQuat::IDENTITY }
     }
 
-    /// From the body's frame to the world's.
+    /// From the body's frame to the world's frame.
     pub fn to_world(self, p: DVec3) -> DVec3 {
         self.rotation * p + self.translation
     }
 
-    /// From the world's frame to the body's.
+    /// From the world's frame to the body's frame.
     pub fn to_body(self, p: DVec3) -> DVec3 {
         self.rotation.inverse() * (p - self.translation)
     }
 
-    /// First `other`, then this.
+    /// The motion that first applies `other`, then `self`.
     pub fn after(self, other: Self) -> Self {
         Self { translation: self.to_world(other.translation), rotation: self.rotation * other.rotation }
     }
@@ -73,17 +74,17 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// From the shape's frame to the world's.
+    /// From the shape's frame to the world's frame.
     pub fn to_world(self, p: DVec3) -> DVec3 {
         self.pose.to_world(self.scale * p)
     }
 
-    /// From the world's frame to the shape's.
+    /// From the world's frame to the shape's frame.
     pub fn to_shape(self, p: DVec3) -> DVec3 {
         self.pose.to_body(p) / self.scale
     }
 
-    /// The box around a box of the shape's frame, in the world.
+    /// The smallest box in the world around a box of the shape's frame.
     pub fn bounds(self, shape: Aabb) -> Aabb {
         let (center, half) = (self.to_world(shape.center()), 0.5 * self.scale * shape.extent());
         let axes = glam::DMat3::from_quat(self.pose.rotation);

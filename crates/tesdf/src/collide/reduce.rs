@@ -1,20 +1,25 @@
-//! Keeps, of all contacts of a pair of instances, a few that can do what all can do.
+//! Keeps a few contacts of a pair of instances that can replace all of them.
 //!
-//! In: contacts in the order of a detection. Out: those kept, in the same order, and per pair a bound on what is lost.
+//! Input: contacts in the order of a detection. Output: the kept contacts in the same order, and a
+//! bound of the loss for each pair.
 //!
-//! The wrench of a unit force at contact *i*, on the instance of the lower id, is `w_i = (n_i, (p_i − c) × n_i / L)`: `c` is the
-//! middle of the box around the contact points and `L` their radius around it, so force and torque are comparable. What the pair can exert with
-//! a total force `F` is `F` times the convex hull of all `w_i`, so the kept contacts should span a hull that is nearly as
-//! large. Kept are
+//! The wrench of a unit force at contact *i*, on the instance with the lower id, is `w_i = (n_i,
+//! (p_i − c) × n_i / L)`. Here `c` is the centre of the box around the contact points, and `L` is
+//! their largest distance from `c`, which makes force and torque comparable. With a total force
+//! `F`, the pair can exert `F` times the convex hull of all `w_i`. So the kept contacts should span
+//! a hull that is nearly as large. The kept contacts are
 //!
 //! 1. the deepest contact,
-//! 2. the extremes of the contact points along both signs of three axes: the first leads to the point farthest from `c`,
-//!    the second to the one farthest from the first, the third is normal to both,
-//! 3. one by one, the contact whose wrench is farthest from the hull of those kept (Blum, Har-Peled, Raichel, Sparse
-//!    approximation via generating point sets, 2016), until there are enough or the hull is complete.
+//! 2. the extremes of the contact points along both directions of three axes: the first axis leads
+//!    to the point farthest from `c`, the second to the point farthest from the first axis, the
+//!    third is normal to both,
+//! 3. one by one, the contact whose wrench is farthest from the hull of the kept wrenches (Blum,
+//!    Har-Peled, Raichel, Sparse approximation via generating point sets, 2016), until there are
+//!    enough or the hull is complete.
 //!
-//! That several cells clip one face and give as many contacts needs no rule of its own: equal wrenches are in the hull once
-//! one is kept. The bound is proved in `docs/math.md`, "What a reduction loses".
+//! Several cells may clip one face and give several contacts. They need no special rule: equal
+//! wrenches are in the hull once one of them is kept. The bound is proved in `docs/math.md`, "What
+//! a reduction loses".
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -22,21 +27,25 @@ use rayon::prelude::*;
 use super::hull::{ROUNDING, Wrench, dot, residual};
 use super::{Contact, InstanceId, PairReduction, Reduction};
 
-/// An axis along which the points reach less than this share of `L` has no extremes worth a contact: a flat patch
-/// has two axes, whatever the rounding of its points (1e-7 in `f32`).
+/// An axis along which the points extend less than this fraction of `L` gets no extremes. So a flat
+/// patch has two axes, whatever the rounding of its points (1e-7 in `f32`).
 const FLAT: f64 = 1e-3;
-/// Contacts per maximum that is kept up to date.
+/// Number of contacts per block. For each block the maximum is kept up to date.
 const BLOCK: usize = 512;
-/// Closest points of the hull, per contact, that the choice may compute in all; what is beyond is chosen by upper bounds of the
-/// distances. Choosing 64 of 100,000 contacts takes 0.8 on a torus, 1.3 around a shaft.
+/// Limit, per contact, of the closest points on the hull that the selection computes. Beyond the
+/// limit, upper bounds of the distances decide. Selecting 64 of 100,000 contacts needs 0.8 per
+/// contact on a torus and 1.3 around a shaft.
 const CHOICES: usize = 4;
 
-/// Reduces each pair of instances, in whichever direction their contacts are. Contacts keep their order; the reports are sorted by
-/// instances, one for each pair that touches. [`Reduction::None`] returns the contacts as they are, without reports.
+/// Reduces the contacts of each pair of instances, in both orders together. Contacts keep their
+/// order. The reports are sorted by instances, one for each pair that touches. [`Reduction::None`]
+/// returns the contacts unchanged, without reports.
 ///
-/// `PerPair(0)`, which [`CollideOptions::validate`](super::CollideOptions::validate) refuses, counts as 1.
+/// `PerPair(0)`, which [`CollideOptions::validate`](super::CollideOptions::validate) refuses,
+/// counts as 1.
 ///
-/// The same input gives the same output on any number of threads; a pair of `N` contacts takes time `O(N n)` and some 130 bytes each.
+/// The same input gives the same output for any number of threads. To keep `n` of `N` contacts of a
+/// pair takes `O(N n)` time and about 130 bytes per contact.
 pub fn reduce_pairs(contacts: Vec<Contact>, reduction: Reduction) -> (Vec<Contact>, Vec<PairReduction>) {
     let Reduction::PerPair(n) = reduction else { return (contacts, Vec::new()) };
     let mut by_pair: Vec<(InstanceId, InstanceId, usize)> = contacts
@@ -55,10 +64,13 @@ pub fn reduce_pairs(contacts: Vec<Contact>, reduction: Reduction) -> (Vec<Contac
     (kept, reduced.into_iter().map(|(_, report)| report).collect())
 }
 
-/// What is lost when `kept` stand for all `contacts` of a pair, whoever chose them: the greatest distance of the wrench of a contact from the hull of
-/// those of the kept ones, as [`PairReduction::wrench_error`], with torques around `center` and in units of `length`. To 1e-7 of it.
+/// The loss when the contacts `kept`, however they were chosen, replace all `contacts` of a pair.
+/// It is the greatest distance of a contact's wrench from the hull of the kept wrenches, as in
+/// [`PairReduction::wrench_error`]. Torques are taken around `center` and divided by `length`. The
+/// relative error is at most 1e-7.
 ///
-/// All contacts are of one pair of instances, in either direction. 0 without contacts, infinite where none of them is kept.
+/// All contacts must belong to one pair of instances, in either order. The result is 0 without
+/// contacts, and infinite when none of them is kept.
 pub fn wrench_error(contacts: &[Contact], kept: &[Contact], center: DVec3, length: f64) -> f64 {
     let hull: Vec<Wrench> = kept.iter().map(|c| wrench_of(c, center, length)).collect();
     let distance = |c: &Contact| {
@@ -71,16 +83,16 @@ pub fn wrench_error(contacts: &[Contact], kept: &[Contact], center: DVec3, lengt
     contacts.par_iter().map(distance).reduce(|| 0.0, f64::max)
 }
 
-/// The wrench of a unit force on the instance of the lower id.
+/// The wrench of a unit force on the instance with the lower id.
 fn wrench_of(contact: &Contact, center: DVec3, length: f64) -> Wrench {
     let Contact { point_a, normal, instance_a: a, instance_b: b, .. } = *contact;
     let force = if a < b { normal } else { -normal };
-    // A single point needs no scale: its torques are 0.
+    // A single point needs no scale, because its torques are 0.
     let torque = (point_a - center).cross(force) / if length > 0.0 { length } else { 1.0 };
     [force.x, force.y, force.z, torque.x, torque.y, torque.z]
 }
 
-/// The places in `contacts` of those that are kept of one pair.
+/// Indices in `contacts` of the kept contacts of one pair.
 fn reduce(
     contacts: &[Contact],
     pair: &[(InstanceId, InstanceId, usize)],
@@ -119,7 +131,8 @@ fn reduce(
     {
         kept.keep(i);
     }
-    // All that may matter is computed once more, so the maximum is that of the distances, not of their bounds.
+    // Updates all distances that can be the maximum, so that the maximum is a distance and not only
+    // a bound.
     kept.farthest(&mut pair.len());
     report.wrench_error = kept.error();
     report.kept = kept.order.len();
@@ -127,13 +140,14 @@ fn reduce(
     (kept.order.into_iter().map(|i| pair[i].2).collect(), report)
 }
 
-/// The first `i < n` of the greatest key.
+/// The first `i < n` with the greatest key.
 fn first_most(n: usize, key: impl Fn(usize) -> f64) -> usize {
-    // `max_by` returns the last of equals.
+    // `max_by` returns the last of equal elements.
     (0..n).rev().map(|i| (key(i), i)).max_by(|x, y| x.0.total_cmp(&y.0)).map_or(0, |(_, i)| i)
 }
 
-/// The extremes of points `at(i)`, relative to their center, within `radius` of it.
+/// Indices of the extremes of the points `at(i)`, which are relative to their centre and within
+/// `radius` of it.
 fn extremes(n: usize, radius: f64, at: impl Fn(usize) -> DVec3) -> Vec<usize> {
     let mut extremes = Vec::with_capacity(6);
     let mut axes = Vec::with_capacity(3);
@@ -150,18 +164,19 @@ fn extremes(n: usize, radius: f64, at: impl Fn(usize) -> DVec3) -> Vec<usize> {
     extremes
 }
 
-/// All wrenches, and for each its residual, the vector from a point of the hull of those that are kept. The hull only grows, so that
-/// point stays in it, and the length of the residual stays an upper bound of the distance.
+/// All wrenches, each with its residual: the vector to it from a point of the hull of the kept
+/// wrenches. The hull only grows, so this point stays in it, and the length of the residual remains
+/// an upper bound of the distance.
 struct Kept {
     wrenches: [Vec<f64>; 6],
     residuals: [Vec<f64>; 6],
     /// Squared lengths of the residuals.
     bounds: Vec<f64>,
-    /// The greatest of each block.
+    /// The greatest bound of each block.
     greatest: Vec<f64>,
-    /// How many were kept when the residual was last the shortest.
+    /// For each wrench, the number of kept contacts when its residual was last exact.
     exact: Vec<u32>,
-    /// Kept contacts and their wrenches, in the order in which they were chosen.
+    /// Kept contacts, in the order of their selection; `hull` has their wrenches.
     order: Vec<usize>,
     hull: Vec<Wrench>,
 }
@@ -183,7 +198,8 @@ impl Kept {
         }
     }
 
-    /// The hull grows by wrench `i`: all residuals are shortened by what the segments to it allow.
+    /// Adds wrench `i` to the hull. All residuals become shorter where a segment to the new wrench
+    /// allows it.
     fn keep(&mut self, i: usize) {
         let new = self.wrench(i);
         let n = self.bounds.len();
@@ -200,7 +216,7 @@ impl Kept {
         for j in 0..n {
             let residual = [r0[j], r1[j], r2[j], r3[j], r4[j], r5[j]];
             let wrench = [w0[j], w1[j], w2[j], w3[j], w4[j], w5[j]];
-            // From the point of the hull, w − r, to the new one.
+            // From the point of the hull, w − r, to the new wrench.
             let to: Wrench = std::array::from_fn(|k| new[k] - wrench[k] + residual[k]);
             let step = (dot(&residual, &to) / dot(&to, &to).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
             let residual: Wrench = std::array::from_fn(|k| residual[k] - step * to[k]);
@@ -212,8 +228,9 @@ impl Kept {
         }
     }
 
-    /// The contact whose wrench is farthest from the hull; `None` when all are in it, up to rounding. Takes one of `choices` for each
-    /// distance that it computes, and without any left goes by the bounds.
+    /// The contact whose wrench is farthest from the hull; `None` when all are in it up to
+    /// rounding. Each computed distance uses one of `choices`; when none is left, the bounds
+    /// decide.
     fn farthest(&mut self, choices: &mut usize) -> Option<usize> {
         let now = self.hull.len() as u32;
         loop {
@@ -238,7 +255,7 @@ impl Kept {
         }
     }
 
-    /// The greatest distance from the hull: an upper bound.
+    /// Upper bound of the greatest distance from the hull.
     fn error(&self) -> f64 {
         self.greatest.iter().copied().fold(0.0, f64::max).sqrt()
     }

@@ -8,28 +8,29 @@ use crate::TeSdf;
 use crate::asset::InnerBall;
 use crate::geometry::Aabb;
 
-/// Accepted sizes, and diagonals of placed shapes in the world's unit: as of meshes. Squares and cubes of them stay far from the ends of the
-/// range of 64-bit floats.
+/// Accepted sizes, and accepted diagonals of placed shapes in the world's unit; the same range as
+/// for meshes. Their squares and cubes stay far from the ends of the range of 64-bit floats.
 pub(super) const SIZE: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
 
-/// A body's geometry, in its own frame; shared by all instances.
+/// The geometry of a body, in its own frame. All its instances share it.
 #[derive(Clone, Debug)]
 pub enum Shape {
     /// An encoded mesh.
     Mesh(Arc<TeSdf>),
-    /// The half space z ≤ 0; its surface is the plane z = 0.
+    /// The half-space z ≤ 0. Its surface is the plane z = 0.
     Plane,
     /// A box centred on the origin.
     Box {
-        /// Half of its edge lengths; positive.
+        /// Half of the edge lengths; positive.
         half_extents: DVec3,
     },
-    /// A sphere around the origin.
+    /// A sphere centred on the origin.
     Sphere {
         /// Radius; positive.
         radius: f64,
     },
-    /// All points within `radius` of the segment from `-half_height` to `half_height` on the z axis.
+    /// All points within `radius` of the segment from `-half_height` to `half_height` on the z
+    /// axis.
     Capsule {
         /// Half of the segment's length; positive.
         half_height: f64,
@@ -63,7 +64,7 @@ impl Shape {
         Err(CollideError::Shape { shape, found, expected: "numbers from 1e-50 to 1e50" })
     }
 
-    /// Bounds in the shape's frame; those of a plane are infinite.
+    /// Bounds in the shape's frame; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         match self {
             Self::Mesh(asset) => asset.bounds(),
@@ -71,8 +72,10 @@ impl Shape {
         }
     }
 
-    /// Middle and radius of a ball inside, in the shape's frame: how thick the body is, at least. Of a mesh it is the largest of those that touch
-    /// the surface at the middles of up to 64 faces; made on first use. `None` for a plane, and for a mesh in which no ball was found.
+    /// Centre and radius of a ball inside, in the shape's frame. The radius is a lower bound of the
+    /// thickness of the body. For a mesh, it is the largest of the balls that touch the surface at
+    /// the centroids of up to 64 faces; computed on first use. `None` for a plane, and for a mesh
+    /// in which no ball was found.
     pub fn inner_ball(&self) -> Option<(DVec3, f64)> {
         match self {
             Self::Mesh(asset) => {
@@ -84,8 +87,10 @@ impl Shape {
         }
     }
 
-    /// What is tested of a simple shape as a surface: convex polygons of one to three points, and the radius that all of the surface is
-    /// within of them. A box has twelve triangles, a capsule its segment, a sphere its centre; meshes and planes have faces of their own.
+    /// The parts that represent the surface of a simple shape in tests: convex polygons of one to
+    /// three points, and a radius. The surface lies within the radius of the polygons. A box has
+    /// twelve triangles, a capsule its segment, a sphere its centre. Meshes and planes have faces
+    /// of their own, so their list is empty.
     pub fn parts(&self) -> (Vec<Vec<DVec3>>, f64) {
         match self {
             Self::Mesh(_) | Self::Plane => (Vec::new(), 0.0),
@@ -93,7 +98,7 @@ impl Shape {
         }
     }
 
-    /// The nodes among the points of the [`parts`](Self::parts), each with the lowest part that has it.
+    /// The distinct points of the [`parts`](Self::parts), each with the lowest part that has it.
     pub fn nodes(&self) -> Vec<(DVec3, u32)> {
         match self {
             Self::Mesh(_) | Self::Plane => Vec::new(),
@@ -101,14 +106,14 @@ impl Shape {
         }
     }
 
-    /// Diagonal of the bounds, in the shape's unit; that of a plane is infinite.
+    /// Diagonal of the bounds, in the shape's unit; infinite for a plane.
     pub fn diagonal(&self) -> f64 {
         self.bounds().extent().length()
     }
 }
 
 impl From<&Shape> for Simple {
-    /// Of any shape but a mesh, which has no formula and is taken for a point.
+    /// For any shape except a mesh. A mesh has no formula and becomes a point.
     fn from(shape: &Shape) -> Self {
         match *shape {
             Shape::Plane => Self::Plane,

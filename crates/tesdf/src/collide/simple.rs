@@ -1,17 +1,18 @@
-//! Planes, boxes, spheres and capsules: their fields by formula, and what is tested of them as surfaces.
+//! Planes, boxes, spheres and capsules: their fields as formulas, and the parts of their surfaces.
 use glam::DVec3;
 
 use super::field_value::FieldValue;
 use crate::geometry::{Aabb, Feature};
 
-/// A convex shape whose signed distance is a formula. All of the fields are convex functions.
+/// A convex shape whose signed distance is a formula. All these fields are convex functions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Simple {
-    /// z ≤ 0.
+    /// The half-space z ≤ 0.
     Plane,
-    /// Half extents.
+    /// A box with these half extents.
     Box(DVec3),
-    /// All within the radius of the segment between ± the half height on the z axis; a sphere when that is 0.
+    /// All points within `radius` of the segment between ± `half_height` on the z axis; a sphere
+    /// when `half_height` is 0.
     Round {
         /// Half of the segment's length.
         half_height: f64,
@@ -21,7 +22,8 @@ pub enum Simple {
 }
 
 impl Simple {
-    /// Signed distance, gradient, nearest point; a box numbers its sides −x +x −y +y −z +z.
+    /// Signed distance, gradient and nearest point. The sides of a box are numbered −x +x −y +y −z
+    /// +z.
     pub fn value(&self, p: DVec3) -> FieldValue {
         let (distance, gradient, closest_point, position) = match *self {
             Self::Plane => (p.z, DVec3::Z, p.with_z(0.0), 0),
@@ -30,7 +32,7 @@ impl Simple {
                 let core = DVec3::new(0.0, 0.0, p.z.clamp(-half_height, half_height));
                 let from_core = p - core;
                 let length = from_core.length();
-                // On the core itself every direction across it is as good.
+                // On the core itself, all directions perpendicular to it are equally good.
                 let gradient = if length > 0.0 { from_core / length } else { DVec3::X };
                 (length - radius, gradient, core + radius * gradient, 0)
             }
@@ -38,7 +40,7 @@ impl Simple {
         FieldValue { distance, gradient, closest_point, position, feature: Feature::Face }
     }
 
-    /// Bounds; those of a plane are infinite.
+    /// Bounds; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         let half = match *self {
             Self::Plane => {
@@ -50,7 +52,8 @@ impl Simple {
         Aabb { min: -half, max: half }
     }
 
-    /// The radius of the largest ball inside, around the origin; none for a plane, which has no largest.
+    /// The radius of the largest ball inside, centred on the origin; `None` for a plane, where it
+    /// is unlimited.
     pub fn inner_radius(&self) -> Option<f64> {
         match *self {
             Self::Plane => None,
@@ -59,10 +62,11 @@ impl Simple {
         }
     }
 
-    /// What is tested of the shape as a surface: parts, each within `radius` of a convex polygon of up to three points.
+    /// The parts that represent the surface: convex polygons of up to three points, and a radius
+    /// within which the surface lies.
     ///
-    /// A box has twelve triangles, two to a side in the order of [`value`](Self::value), a sphere its centre, a capsule its
-    /// segment. A plane has no corners; see [`plane_square`].
+    /// A box has twelve triangles, two for each side in the order of [`value`](Self::value). A
+    /// sphere has its centre, a capsule its segment. A plane has no corners; see [`plane_square`].
     pub fn parts(&self) -> (Vec<Vec<DVec3>>, f64) {
         match *self {
             Self::Plane => (Vec::new(), 0.0),
@@ -74,7 +78,7 @@ impl Simple {
         }
     }
 
-    /// The nodes among the parts' points, each with the lowest part that has it.
+    /// The distinct points of the parts, each with the lowest part that has it.
     pub fn nodes(&self) -> (Vec<(DVec3, u32)>, f64) {
         let (parts, radius) = self.parts();
         let mut nodes: Vec<(DVec3, u32)> = Vec::new();
@@ -92,7 +96,7 @@ impl Simple {
 fn box_value(p: DVec3, half: DVec3) -> (f64, DVec3, DVec3, u32) {
     let clamped = p.clamp(-half, half);
     let sign = DVec3::from_array(p.to_array().map(|x| if x < 0.0 { -1.0 } else { 1.0 }));
-    // The side that is the nearest, or that the point is most outside of.
+    // The nearest side, or the side that the point is most outside of.
     let depth = half - p.abs();
     let axis = (0..3).min_by(|&i, &j| depth[i].total_cmp(&depth[j])).unwrap_or(0);
     let side = 2 * axis as u32 + u32::from(sign[axis] > 0.0);
@@ -127,7 +131,8 @@ fn box_triangles(half: DVec3) -> Vec<Vec<DVec3>> {
     triangles
 }
 
-/// The square of the plane z = 0 that holds all of its points within `radius` of `center`, as two triangles.
+/// The square of the plane z = 0 that contains all its points within `radius` of `center`, as two
+/// triangles.
 pub fn plane_square(center: DVec3, radius: f64) -> [[DVec3; 3]; 2] {
     let corner = |u: f64, v: f64| DVec3::new(center.x + u * radius, center.y + v * radius, 0.0);
     let [a, b, c, d] = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];

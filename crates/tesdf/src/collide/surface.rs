@@ -1,4 +1,5 @@
-//! The body whose surface is tested, and the broad phase: which of its faces or nodes can touch a field.
+//! The body of a pair whose surface is tested, and the broad phase, which finds its faces or nodes
+//! that can touch a field.
 use glam::{DMat3, DVec3, Vec3};
 
 use super::field::{Field, FieldBody};
@@ -8,26 +9,26 @@ use crate::TeSdf;
 use crate::asset::layout::TreeChild;
 use crate::geometry::{Aabb, Triangle};
 
-/// A surface placed in the world, seen from the frame of a field.
+/// A surface placed in the world, mapped to the frame of a field.
 #[derive(Clone, Debug)]
 pub struct SurfaceBody<'a> {
     shape: &'a Shape,
-    /// Field = `linear` · p + `shift`, of points p of the shape's frame.
+    /// A point p of the shape's frame is `linear` · p + `shift` in the field's frame.
     linear: DMat3,
     shift: DVec3,
     /// Field units per unit of the shape.
     scale: f64,
 }
 
-/// What the broad phase left of a surface: faces or nodes that can touch, in order.
+/// The result of the broad phase: faces or nodes of a surface that can touch, in order.
 pub type Candidates = Vec<u32>;
 
-/// A part of the face tree.
+/// A node or leaf of the face tree.
 #[derive(Clone, Copy, Debug)]
 pub struct Branch {
     /// The node or leaf.
     pub child: TreeChild,
-    /// Middle of a ball that holds it, in the field's frame.
+    /// Centre of a ball that contains it, in the field's frame.
     pub center: DVec3,
     /// Radius of the ball.
     pub radius: f64,
@@ -38,9 +39,9 @@ pub struct Branch {
 pub struct Part {
     points: [DVec3; 3],
     count: usize,
-    /// The surface is all within this of the part.
+    /// The surface lies within this distance of the part.
     pub radius: f64,
-    /// Unit normal; zero for what is rounded or has no area.
+    /// Unit normal; zero for a rounded shape or a part without area.
     pub normal: DVec3,
 }
 
@@ -54,12 +55,12 @@ impl Part {
         part
     }
 
-    /// One to three points.
+    /// The one to three points.
     pub fn points(&self) -> &[DVec3] {
         &self.points[..self.count]
     }
 
-    /// A ball around the part's core: the middle of its box, and the reach from there.
+    /// A ball around the part's core: the centre of its box, and the radius.
     pub fn ball(&self) -> (DVec3, f64) {
         let center = Aabb::of(self.points()).center();
         (center, self.points().iter().map(|p| p.distance(center)).fold(0.0, f64::max))
@@ -67,9 +68,9 @@ impl Part {
 }
 
 impl<'a> SurfaceBody<'a> {
-    /// A shape at `placement`, as the field's frame sees it.
+    /// A shape at `placement`, mapped to the field's frame.
     pub fn new(shape: &'a Shape, placement: Placement, field: &FieldBody) -> Self {
-        // The images of the origin and the axes: the map is affine.
+        // The map is affine, so the images of the origin and the axes define it.
         let shift = field.to_field(placement.to_world(DVec3::ZERO));
         let unit = placement.scale / field.unit();
         let rotate = |axis: DVec3| field.rotate_back(placement.pose.rotation * axis) * unit;
@@ -77,13 +78,14 @@ impl<'a> SurfaceBody<'a> {
         Self { shape, linear, shift, scale: unit }
     }
 
-    /// From the shape's frame to the field's.
+    /// From the shape's frame to the field's frame.
     #[inline]
     pub fn to_field(&self, p: DVec3) -> DVec3 {
         self.linear * p + self.shift
     }
 
-    /// Faces that can come within `reach` (field's frame) of the solid; all numbers of a simple shape's parts.
+    /// Faces that can come within `reach` (field's frame) of the solid. For a simple shape, the
+    /// indices of its parts.
     pub fn faces(&self, field: &FieldBody, reach: f64) -> Candidates {
         let mut faces = Vec::new();
         match self.shape {
@@ -101,7 +103,8 @@ impl<'a> SurfaceBody<'a> {
         faces
     }
 
-    /// Nodes that can, by vertex number: those of the faces that can.
+    /// The vertices of the faces in the leaves that can come within `reach`. For a simple shape,
+    /// all its nodes.
     pub fn nodes(&self, field: &FieldBody, reach: f64) -> Candidates {
         let Shape::Mesh(asset) = self.shape else {
             return (0..Simple::from(self.shape).nodes().0.len() as u32).collect();
@@ -122,7 +125,7 @@ impl<'a> SurfaceBody<'a> {
                 Part::new(&asset.face_corners(face as usize).map(|p| self.to_field(p)), 0.0)
             }
             Shape::Plane => {
-                // Only what is over or under the field's body matters.
+                // Only the part over or under the field's body matters.
                 let (center, radius) = field.ball();
                 let center = self.linear.transpose() * (center - self.shift) / (self.scale * self.scale);
                 let square = plane_square(center, (radius + reach) / self.scale);
@@ -149,7 +152,7 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// The user's number of a face.
+    /// The id of a face in the user's numbering.
     pub fn face_id(&self, face: u32) -> u32 {
         match self.shape {
             Shape::Mesh(asset) => asset.face_ids[face as usize],
@@ -158,7 +161,7 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// The user's number of the lowest face that has a node.
+    /// The id, in the user's numbering, of the lowest face that has a node.
     pub fn face_of_node(&self, node: u32) -> u32 {
         match self.shape {
             Shape::Mesh(asset) => asset.lowest_faces()[node as usize],
@@ -166,7 +169,7 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// How many faces there are to name, of a simple shape its parts.
+    /// Number of faces; for a simple shape, of its parts.
     pub fn face_count(&self) -> u32 {
         match self.shape {
             Shape::Mesh(asset) => asset.face_count() as u32,
@@ -175,7 +178,7 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// How many nodes there are to name: vertices, or corners of a simple shape's parts.
+    /// Number of nodes: vertices, or distinct points of a simple shape's parts.
     pub fn node_count(&self) -> u32 {
         match self.shape {
             Shape::Mesh(asset) => asset.vertices.len() as u32,
@@ -183,7 +186,7 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// Whether a run of faces has a face, or in node mode a node.
+    /// Whether a range of faces contains a face, or in node mode a node.
     pub fn holds(&self, start: u32, count: u32, candidate: u32, mode: Mode) -> bool {
         match (mode, self.shape) {
             (Mode::Node, Shape::Mesh(asset)) => {
@@ -193,7 +196,7 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// Everything: the root of the face tree, or all parts of a simple shape.
+    /// The root of the face tree, or all parts of a simple shape.
     pub fn whole(&self) -> TreeChild {
         match self.shape {
             Shape::Mesh(_) => TreeChild::Node(0),
@@ -201,7 +204,7 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// The two halves of a node of the face tree; nothing for simple shapes, which have none.
+    /// The two children of a node of the face tree; `None` for simple shapes.
     pub fn halves(&self, node: u32) -> Option<[Branch; 2]> {
         match self.shape {
             Shape::Mesh(asset) => Some(self.branches(asset, node)),
@@ -223,24 +226,26 @@ impl<'a> SurfaceBody<'a> {
         })
     }
 
-    /// The greatest distance of a point of the faces below from the nearest corner of its face, in the field's frame.
+    /// The greatest distance of a point of the faces below from the nearest corner of its face, in
+    /// the field's frame.
     pub fn corner_reach(&self, child: TreeChild) -> f64 {
         match (self.shape, child) {
             (Shape::Mesh(asset), TreeChild::Node(node)) => {
                 f64::from(asset.corner_reaches()[node as usize]) * asset.frame.inverse_scale() * self.scale
             }
-            // Faces are looked at one by one.
+            // Faces of leaves are tested one by one.
             _ => f64::INFINITY,
         }
     }
 
-    /// The [`inner ball`](Shape::inner_ball) in the field's frame: middle and radius.
+    /// The [`inner ball`](Shape::inner_ball) in the field's frame: centre and radius.
     pub fn inner_ball(&self) -> Option<(DVec3, f64)> {
         let (center, radius) = self.shape.inner_ball()?;
         Some((self.to_field(center), radius * self.scale))
     }
 
-    /// Whether the bounds of the shape and a box of the field's frame may have a point in common: no side of either parts them.
+    /// Whether the bounds of the shape and a box of the field's frame may have a common point.
+    /// False only when a side of one of them separates them.
     pub fn may_meet(&self, other: Aabb) -> bool {
         let own = self.shape.bounds();
         let around = |b: Aabb, to: &dyn Fn(DVec3) -> DVec3| {
@@ -256,14 +261,14 @@ impl<'a> SurfaceBody<'a> {
             && around(other, &|p| back * (p - self.shift)).overlaps(own)
     }
 
-    /// The leaves of the face tree that can come within `reach` of the solid: a node is left out when the ball around its box
-    /// is out of the field's reach (the field is 1-Lipschitz).
+    /// Visits the leaves of the face tree that can come within `reach` of the solid. The field is
+    /// 1-Lipschitz, so a node is skipped when the ball around its box is out of reach.
     fn visit_leaves(&self, asset: &TeSdf, field: &FieldBody, reach: f64, mut leaf: impl FnMut(u32, u32)) {
         let mut stack = vec![TreeChild::Node(0)];
         while let Some(child) = stack.pop() {
             match child {
                 TreeChild::Leaf(start, count) => leaf(start, count),
-                // The first child comes out first.
+                // Reversed, so that the first child is visited first.
                 TreeChild::Node(node) => stack.extend(
                     self.branches(asset, node)
                         .into_iter()
@@ -275,8 +280,9 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// The bound by which the broad phase leaves out all leaves that `holds` (first face, number of faces) says yes to: the least signed
-    /// distance that the node's ball can have (field's frame). `None` when one of them is kept.
+    /// The bound by which the broad phase skips all leaves that `holds` (first face, number of
+    /// faces) accepts: the least signed distance that the skipped node's ball can have (field's
+    /// frame). `None` when the broad phase keeps such a leaf.
     pub fn pruned_by(&self, field: &FieldBody, reach: f64, holds: impl Fn(u32, u32) -> bool) -> Option<f64> {
         let mut least: Option<f64> = None;
         let mut stack = vec![(self.whole(), None)];
@@ -304,7 +310,7 @@ impl<'a> SurfaceBody<'a> {
 }
 
 impl FieldBody<'_> {
-    /// Bounds of the body, in the field's frame; endless for a plane.
+    /// Bounds of the body, in the field's frame; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         match self.field {
             Field::Mesh(asset) => asset.local_bounds(),
@@ -312,7 +318,7 @@ impl FieldBody<'_> {
         }
     }
 
-    /// A ball around the body, in the field's frame; endless for a plane.
+    /// A ball around the body, in the field's frame; infinite for a plane.
     fn ball(&self) -> (DVec3, f64) {
         let bounds = match self.field {
             Field::Mesh(asset) => asset.local_bounds(),

@@ -5,19 +5,21 @@ use super::motion::{Motion, Twist, closing_speed};
 use super::{Clearance, CollideError, InstanceId, Placement, Scene, Shape};
 use crate::base::Length;
 
-/// What counts as an impact, and how long to look for one.
+/// Definition of an impact, and limits of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TimeOfImpactOptions {
-    /// Bodies this near touch; a share of the smaller body's diagonal, or in the world's unit.
+    /// Bodies within this distance touch: a fraction of the smaller body's diagonal, or a length in
+    /// the world's unit.
     pub tolerance: Length,
-    /// Motion is followed from time 0 to this.
+    /// The motion is followed from time 0 to this time.
     pub end: f64,
-    /// Most steps, at most [`MAX_ITERATIONS`](Self::MAX_ITERATIONS); each measures one clearance.
+    /// Largest number of steps, at most [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). Each step
+    /// computes one clearance.
     pub iterations: u32,
 }
 
 impl TimeOfImpactOptions {
-    /// Most steps that can be asked for.
+    /// Largest accepted value of `iterations`.
     pub const MAX_ITERATIONS: u32 = 1_000_000;
 }
 
@@ -28,48 +30,56 @@ impl Default for TimeOfImpactOptions {
     }
 }
 
-/// When two moving bodies touch.
+/// The impact of two moving bodies.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Impact {
-    /// Before this time the bodies are apart.
+    /// Time of the impact. Before it the bodies are apart.
     pub time: f64,
-    /// Witnesses, normal and distance at that time: within the tolerance when `converged`; below 0 only at time 0, for
-    /// bodies that penetrate from the start.
+    /// Witness points, normal and distance at that time. When `touches`, the distance is within the
+    /// tolerance. It is negative only at time 0, for bodies that penetrate from the start.
     #[serde(flatten)]
     pub clearance: Clearance,
-    /// Steps taken.
+    /// Number of steps taken.
     pub iterations: u32,
-    /// Whether the bodies touch at `time`. False when the steps were used up (bodies that slide along each other make many): then `time` is
-    /// how far the motion is known to be free.
+    /// Whether the bodies touch at `time`. False when the steps were used up, for example by bodies
+    /// that slide along each other. Then the motion is known to be free up to `time`.
     pub touches: bool,
 }
 
-/// The first time at which two moving instances touch; `None` when they stay apart, by more than half of the tolerance, up to
-/// the end.
+/// The first time at which two moving instances touch. `None` when they stay apart, by more than
+/// half of the tolerance, until the end.
 ///
-/// Conservative advancement (Mirtich 1996; for meshes that are not convex, Zhang, Lee and Kim 2006): in a time t the clearance
-/// shrinks by at most t times the greatest closing speed of any two points, so the bodies can move on until clearance less half of
-/// the tolerance could be used up. Nothing is sampled, so nothing thin or fast is passed through. The instances' own velocities
-/// are not looked at; give them as [`Motion::Linear`].
+/// Conservative advancement (Mirtich 1996; for meshes that are not convex, Zhang, Lee and Kim
+/// 2006). In a time t, the clearance shrinks by at most t times the greatest closing speed of any
+/// two points. So the bodies can move on until the clearance minus half of the tolerance could be
+/// used up. Nothing is sampled, so thin or fast bodies cannot pass through each other. The
+/// velocities of the instances are not used; pass them as [`Motion::Linear`].
 ///
-/// Bodies that penetrate at the start have time 0 and their negative distance; those within the tolerance have time 0.
+/// Bodies that penetrate at the start have time 0 and their negative distance. Bodies within the
+/// tolerance have time 0.
 ///
 /// ```
-/// use tesdf::collide::{Instance, Motion, Pose, Scene, Shape, TimeOfImpactOptions, Velocity, time_of_impact};
+/// use tesdf::collide::{
+///     Instance, Motion, Pose, Scene, Shape, TimeOfImpactOptions, Velocity, time_of_impact,
+/// };
 /// use tesdf::glam::DVec3;
 ///
 /// let mut scene = Scene::new();
-/// let (floor, ball) = (scene.add_shape(Shape::Plane)?, scene.add_shape(Shape::Sphere { radius: 1.0 })?);
+/// let floor = scene.add_shape(Shape::Plane)?;
+/// let ball = scene.add_shape(Shape::Sphere { radius: 1.0 })?;
 /// let floor = scene.add(Instance::new(floor, Pose::IDENTITY))?;
 /// let ball = scene.add(Instance::new(ball, Pose::at(DVec3::new(0.0, 0.0, 5.0))))?;
-/// let down = Motion::Linear { velocity: Velocity { linear: DVec3::new(0.0, 0.0, -8.0), ..Velocity::default() } };
-/// let impact = time_of_impact(&scene, ball, floor, down, Motion::Rest, &TimeOfImpactOptions::default())?;
+/// let velocity = Velocity { linear: DVec3::new(0.0, 0.0, -8.0), ..Velocity::default() };
+/// let down = Motion::Linear { velocity };
+/// let options = TimeOfImpactOptions::default();
+/// let impact = time_of_impact(&scene, ball, floor, down, Motion::Rest, &options)?;
 /// assert!(impact.is_some_and(|i| (i.time - 0.5).abs() < 1e-6 && i.clearance.distance >= 0.0));
 /// # Ok::<(), tesdf::collide::CollideError>(())
 /// ```
 ///
 /// # Errors
-/// As [`clearance`](super::clearance()); a motion that is not finite, a plane that turns, an option that makes no sense.
+/// As [`clearance`](super::clearance()); also for a motion that is not finite, a rotating plane, or
+/// an invalid option.
 pub fn time_of_impact(
     scene: &Scene,
     a: InstanceId,
@@ -89,7 +99,7 @@ pub fn time_of_impact(
         return Err(CollideError::Option { option, found: options.iterations.to_string(), expected });
     }
     let speed = closing_speed([moving(&start.a, motion_a)?, moving(&start.b, motion_b)?]);
-    // Small against the half of the tolerance that is kept.
+    // Small relative to the half of the tolerance that is kept.
     let exactness = tolerance / 8.0;
     let mut now = start.clearance(exactness)?;
     if now.distance <= tolerance {
@@ -98,13 +108,14 @@ pub fn time_of_impact(
     let mut time = 0.0;
     for iteration in 1..=options.iterations {
         let next = time + (now.distance - 0.5 * tolerance) / speed;
-        // Endless when nothing moves.
+        // `next` is infinite when nothing moves.
         if next > options.end {
             return Ok(None);
         }
         time = next;
         let at = Pair { a: at_time(start.a, motion_a, time), b: at_time(start.b, motion_b, time) };
-        // Apart at the start and never touching since, neither is inside of the other.
+        // The bodies were apart at the start and have not touched since, so neither is inside the
+        // other.
         now = at.apart(exactness)?;
         if now.distance <= tolerance {
             return Ok(Some(Impact { time, clearance: now, iterations: iteration, touches: true }));

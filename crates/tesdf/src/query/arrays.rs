@@ -5,60 +5,65 @@ use crate::asset::{Conforming, FaceRecord};
 use crate::domain::DomainCube;
 use crate::geometry::{Aabb, LocalFrame};
 
-/// The arrays of an asset, as kernels of other devices read them. [`layout`](crate::asset::layout) explains the words.
+/// The arrays of an asset, as kernels on other devices read them. [`layout`](crate::asset::layout)
+/// explains the words.
 ///
-/// Lengths are in the local frame; `f32` positions are relative to the middle of the cube.
+/// Lengths are in the local frame. `f32` positions are relative to the centre of the cube.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrays<'a> {
-    /// From the mesh's unit to the local frame.
+    /// Maps the mesh's unit to the local frame.
     pub frame: LocalFrame,
     /// The cube of the bisection forest.
     pub cube: DomainCube,
-    /// The forest: see [`Node`](crate::asset::layout::Node). The first words are its roots.
+    /// The forest; see [`Node`](crate::asset::layout::Node). The first words are its roots.
     pub nodes: &'a [u32],
-    /// The lists: see [`List`](crate::asset::layout::List).
+    /// The lists; see [`List`](crate::asset::layout::List).
     pub lists: &'a [u8],
-    /// Where each palette begins, and where the last one ends.
+    /// Start of each palette, then the end of the last palette.
     pub palette_starts: &'a [u32],
     /// Low 16 bits of the palette faces.
     pub palettes: &'a [u16],
-    /// The eight bits above them.
+    /// Bits 16 to 23 of the palette faces; `None` with at most 65,536 faces.
     pub palettes_high: Option<&'a [u8]>,
     /// Boxes of the two children of each node of the face tree.
     pub tree_boxes: &'a [[f32; 12]],
-    /// The children: see [`TreeChild`](crate::asset::layout::TreeChild).
+    /// The children; see [`TreeChild`](crate::asset::layout::TreeChild).
     pub tree_children: &'a [[u32; 2]],
     /// Corner vertices of the faces.
     pub faces: &'a [[u32; 3]],
     /// Ids of the faces in the source mesh.
     pub face_ids: &'a [u32],
-    /// For each vertex the lowest id of a face that has it; [`u32::MAX`] for one that no face has.
+    /// For each vertex, the lowest id of a face that has it; [`u32::MAX`] when no face has it.
     pub lowest_faces: &'a [u32],
     /// The faces in `f32`, with their sign hints.
     pub records: &'a [FaceRecord],
-    /// For every word of the forest the square root of a lower bound of the signed distances in its cell.
+    /// For each word of the forest, the square root of a lower bound of the signed distances in its
+    /// cell.
     pub cell_bounds: &'a [u8],
-    /// What a squared entry of [`cell_bounds`](Self::cell_bounds) is worth.
+    /// The bound is the squared entry of [`cell_bounds`](Self::cell_bounds) times this value.
     pub cell_bound_unit: f64,
     /// Bounds of the mesh.
     pub bounds: Aabb,
-    /// How far around the solid the domain is sure to reach.
+    /// Distance around the solid that the domain covers at least.
     pub band: f64,
-    /// Middle and radius of a ball inside of the solid; see [`Shape::inner_ball`](crate::collide::Shape::inner_ball).
+    /// Centre and radius of a ball inside the solid; see
+    /// [`Shape::inner_ball`](crate::collide::Shape::inner_ball).
     pub inner_ball: Option<(DVec3, f64)>,
-    /// Whether every list is proved to be exact where the vertices are now.
+    /// Whether every list is proved exact for the current vertices.
     pub has_exact_lists: bool,
-    /// Corner vertices of the tetrahedra of a conforming domain, each a root of the forest; none for the bisection domain, whose roots are
-    /// the six of the cube. The mesh's vertices come first, then the domain's own.
+    /// Corner vertices of the tetrahedra of a conforming domain; each tetrahedron is a root of the
+    /// forest. The mesh's vertices come first, then the domain's own. Empty for the bisection
+    /// domain, whose roots are the six tetrahedra of the cube.
     pub tetrahedra: &'a [[u32; 4]],
-    /// Vertices of the mesh where they are now, in its unit.
+    /// Current vertices of the mesh, in its unit.
     pub vertices: &'a [[f64; 3]],
-    /// Vertices of a conforming domain that are not of the mesh, likewise.
+    /// Current vertices of a conforming domain that are not of the mesh, in the mesh's unit.
     pub domain_vertices: &'a [[f64; 3]],
 }
 
 impl TeSdf {
-    /// What kernels of other devices read. Makes the bounds of the cells when nothing has made them yet.
+    /// The arrays that kernels on other devices read. Computes the bounds of the cells on first
+    /// use.
     pub fn arrays(&self) -> Arrays<'_> {
         let (cell_bounds, cell_bound_unit) = self.cell_bounds().bytes();
         let ball = self.inner_ball();

@@ -1,4 +1,4 @@
-//! Lower bounds of the signed distances in cells: what a detection skips cells by.
+//! Lower bounds of the signed distances in cells, by which a detection skips cells.
 use glam::DVec3;
 
 use super::{Place, Precision};
@@ -8,15 +8,16 @@ use crate::asset::layout::{Label, Node};
 use crate::base::Side;
 use crate::domain::Cell;
 
-/// What rounding may have added to a bound: that of `f32`, and its conversion.
+/// Rounding that a bound may contain: of `f32` values and of the conversion.
 const ROUNDING: f64 = 4e-6;
 
 impl TeSdf {
-    /// The least signed distances of the cells; made on first use.
+    /// Lower bounds of the signed distances in the cells; computed on first use.
     pub(crate) fn cell_bounds(&self) -> &CellBounds {
         self.cell_bounds.get_or_init(|| {
             let mut bounds = vec![0.0f32; self.nodes.len()];
-            // Children follow their parents: cells on the way down, bounds on the way up.
+            // Children follow their parents in the file. So cells are visited downwards, and bounds
+            // are combined upwards.
             let mut stack: Vec<(u32, Cell)> =
                 (0..self.root_count()).map(|root| (root as u32, self.root(root))).collect();
             while let Some((word, cell)) = stack.pop() {
@@ -45,7 +46,7 @@ impl TeSdf {
             }),
             Node::Far(Side::Outside) => at_center(Place::Far(Side::Outside)),
             Node::NotOfDomain => {
-                // Far out nothing is as near as the bounds.
+                // A cell outside the domain is at least as far away as the band.
                 let low = at_center(Place::NotOfDomain).max(0.0);
                 low.max(self.band() * (1.0 - 1e-9))
             }
@@ -54,8 +55,8 @@ impl TeSdf {
         (least - ROUNDING).max(0.0)
     }
 
-    /// The distance to a face is convex, so its tangent at the centre is below it: a bound of the second order in the size of
-    /// the cell.
+    /// Lower bound of the distance to a face over a cell. The distance is convex, so its tangent at
+    /// the centre lies below it. The error is of second order in the size of the cell.
     fn least_to_face(&self, face: u32, center: DVec3, corners: &[DVec3; 4]) -> f64 {
         let closest = self.records[face as usize].triangle().closest(center - self.cube.middle());
         let outward = center - self.cube.middle() - closest.point;

@@ -1,4 +1,4 @@
-//! Points so far out that they are answered from nearer by.
+//! Answers points that are very far out by a nearer point in the same direction.
 use glam::DVec3;
 
 use super::{Answer, Faces, Place};
@@ -6,25 +6,26 @@ use crate::TeSdf;
 use crate::base::Side;
 use crate::geometry::length_and_direction;
 
-/// A point with a coordinate above this (local frame) is far: squares of larger numbers leave the range of 64-bit floats
-/// in the end, and before that rounding hides which face is the nearest.
+/// A point is far when a coordinate in the local frame exceeds this. Much farther out, squares
+/// leave the range of 64-bit floats; before that, rounding hides which face is the nearest.
 const FAR: f64 = 1e8;
 
 /// Whether a point of the local frame is finite and not far.
 #[inline]
 pub(super) fn is_near(local: DVec3) -> bool {
-    // NaN fails the comparison.
+    // The comparison is false for NaN.
     local.abs().cmple(DVec3::splat(FAR)).all()
 }
 
-/// Where a far point is answered from, in the same direction.
+/// Distance of the point, in the same direction, from which a far point is answered.
 ///
-/// The nearest point `x` of the body to there is as good as the nearest to the far point up to `1 / (2 NEARER)`: with
-/// `p = r u`, `|p − x| = r − u·x + |x⊥|²/(2r) + …`, and the body is within 1. That is less than the rounding of coordinates from `FAR` on.
+/// Let `x` be the nearest point of the body as seen from there. For the far point, `x` is the
+/// nearest up to `1 / (2 NEARER)`: with `p = r u`, `|p − x| = r − u·x + |x⊥|²/(2r) + …`, and the
+/// body is within 1. From `FAR` on, this is below the rounding of coordinates.
 const NEARER: f64 = 1e7;
 
 impl TeSdf {
-    /// The answer for a point that is far or not finite; `point` is in the mesh's unit.
+    /// The answer at a point that is far or not finite. `point` is in the mesh's unit.
     #[cold]
     pub(super) fn answer_far(&self, point: DVec3) -> Answer {
         if !point.is_finite() {

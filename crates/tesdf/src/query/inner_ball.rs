@@ -1,20 +1,22 @@
-//! How thick a solid is, and how much of its surface its vertices tell: what the search for hidden overlaps goes by.
+//! The thickness of a solid, and how finely its vertices sample its surface. The search for hidden
+//! overlaps uses both.
 use glam::DVec3;
 
 use crate::TeSdf;
 use crate::asset::InnerBall;
 use crate::asset::layout::TreeChild;
 
-/// Faces from which inner balls are grown.
+/// Largest number of faces at which inner balls are computed.
 const TRIES: usize = 64;
-/// Most steps of each; they shrink the ball to a thousandth within ten.
+/// Largest number of shrinking steps per ball. Ten steps can shrink it to a thousandth.
 const STEPS: usize = 32;
-/// A ball is inside when it is at most this share larger than the distance to the surface.
+/// A ball counts as inside when its radius exceeds the distance to the surface by at most this
+/// fraction.
 const FITS: f64 = 1e-3;
 
 impl TeSdf {
-    /// The largest of the balls that touch the surface from inside at the middles of some faces: a lower bound of the radius of the
-    /// largest ball inside. Made on first use.
+    /// The largest of the balls that touch the surface from inside at the centroids of some faces.
+    /// Its radius is a lower bound of the radius of the largest ball inside. Computed on first use.
     pub(crate) fn inner_ball(&self) -> InnerBall {
         *self.inner_ball.get_or_init(|| {
             let step = self.face_count().div_ceil(TRIES);
@@ -30,7 +32,8 @@ impl TeSdf {
         })
     }
 
-    /// The middle of the ball that touches a face's middle from inside and the surface elsewhere, by shrinking (Ma, Bae and Choi 2012).
+    /// Centre of the ball that touches the centroid of a face from inside and the surface
+    /// elsewhere, by shrinking (Ma, Bae and Choi 2012).
     fn middle_below(&self, face: usize) -> DVec3 {
         let triangle = self.local_triangle(face);
         let on_face = triangle.corners.iter().sum::<DVec3>() / 3.0;
@@ -40,7 +43,7 @@ impl TeSdf {
             if nearest.signed_distance.abs() >= radius * (1.0 - FITS) {
                 break;
             }
-            // The ball through both points that has the face's plane for a tangent.
+            // The ball through both points that is tangent to the face's plane.
             let apart = on_face - nearest.closest_point;
             let through = apart.length_squared() / (2.0 * apart.dot(triangle.normal));
             radius = if through > 0.0 && through < radius { through } else { 0.5 * radius };
@@ -48,7 +51,8 @@ impl TeSdf {
         on_face - radius * triangle.normal
     }
 
-    /// For each node of the face tree the greatest [`corner_reach`] of the faces below it, in the local frame, rounded up. Made on first use.
+    /// For each node of the face tree, the greatest [`corner_reach`] of the faces below it, in the
+    /// local frame, rounded up. Computed on first use.
     pub(crate) fn corner_reaches(&self) -> &[f32] {
         self.corner_reaches.get_or_init(|| {
             let of_faces = |start: u32, count: u32| {
@@ -71,22 +75,23 @@ impl TeSdf {
     }
 }
 
-/// The greatest distance of a point of a triangle from its nearest corner. A function that is 1-Lipschitz is nowhere on the triangle
-/// lower than at all corners by more than this.
+/// The greatest distance of a point of a triangle from its nearest corner. A 1-Lipschitz function
+/// is nowhere on the triangle lower than its least value at the corners by more than this.
 pub fn corner_reach(corners: [DVec3; 3]) -> f64 {
     let [p, q, r] = corners;
     let mut sides = [p.distance_squared(q), q.distance_squared(r), r.distance_squared(p)];
     sides.sort_unstable_by(f64::total_cmp);
     let [c, b, a] = sides;
     let longest = a.sqrt();
-    // Acute: the middle of the circle through all corners. Else a point of the longest side, on the bisector of another.
+    // For an acute triangle it is the circumradius. Otherwise the point lies on the longest side,
+    // on the bisector of another side.
     let reach = if a < b + c {
         (a * b * c).sqrt() / (2.0 * (q - p).cross(r - p).length())
     } else {
         let on_longest = |side: f64, other: f64| longest * side / (a + side - other);
         on_longest(b, c).max(on_longest(c, b))
     };
-    // What rounding makes of needles; NaN too.
+    // Limits the rounding error of needles, and replaces NaN.
     reach.min(longest / 3f64.sqrt())
 }
 
@@ -101,7 +106,7 @@ mod tests {
     }
 
     proptest! {
-        /// Well-shaped triangles, needles and caps, and what is no more than a segment.
+        /// Well-shaped triangles, needles, caps and segments.
         #[test]
         fn no_point_is_farther_from_the_corners_and_one_is_as_far(
             (a, b, c) in (point(), point(), point()), along in 0.0f64..1.0, thin in proptest::sample::select(vec![1.0, 0.3, 1e-2, 1e-9, 0.0]),

@@ -1,7 +1,8 @@
 //! Squared distances from one point to the faces of a list, several faces at once.
 //!
-//! One source, compiled per instruction set and chosen when an asset is opened. With fused multiply-add the last
-//! bits differ from those without; only which of two equally near faces wins can follow from that.
+//! One source is compiled per instruction set; the set is chosen when an asset is opened. With
+//! fused multiply-add the last bits differ from those without. This can only change which of two
+//! equally near faces is chosen.
 
 use glam::Vec3;
 
@@ -10,8 +11,8 @@ use super::lanes::Lanes;
 use crate::asset::FaceRecord;
 use crate::base::Isa;
 
-/// The low bits of a squared distance say which part of the face it is to: they are worth 2^-22 of it, half of that of
-/// the distance, and cost no register.
+/// The low bits of a squared distance say which part of the face is nearest. They change the
+/// squared distance by a factor of 2^-22, the distance by half of that, and need no register.
 const PART: u32 = 3;
 
 /// The nearest face so far.
@@ -19,25 +20,26 @@ const PART: u32 = 3;
 pub struct Nearest {
     /// Squared distance, with the part in its low bits.
     pub distance_squared: f32,
-    /// Position of the face among the records.
+    /// Index of the face among the records.
     pub face: u32,
 }
 
 impl Nearest {
-    /// Nothing yet.
+    /// No face yet.
     pub const NONE: Self = Self { distance_squared: f32::INFINITY, face: u32::MAX };
 
-    /// What of the face: 0 its plane, 1 the edge a–b, 2 the edge b–c, 3 the edge c–a.
+    /// Part of the face: 0 its plane, 1 the edge a–b, 2 the edge b–c, 3 the edge c–a.
     #[inline]
     pub fn part(self) -> u32 {
         self.distance_squared.to_bits() & PART
     }
 }
 
-/// Lanes of the widest kernel: lists of faces are filled up to a multiple of it by repeating their last face.
+/// Lanes of the widest kernel. Lists are padded to a multiple of this by repeating their last face.
 pub const LANES: usize = 8;
 
-/// Improves `best` by `faces`, at least one and a multiple of [`LANES`]; of equally near ones the first of a lane wins.
+/// Improves `best` by `faces`, whose number is positive and a multiple of [`LANES`]. Among equally
+/// near faces of a lane, the first wins.
 #[inline]
 pub fn nearest(isa: Isa, records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best: Nearest) -> Nearest {
     match isa {
@@ -63,7 +65,8 @@ fn nearest_avx512(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best:
     nearest_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, best)
 }
 
-/// Adds to `near` those of `faces` whose squared distance is `limit` at most, without the repeated last one.
+/// Appends to `near` those of `faces` whose squared distance is at most `limit`, without
+/// repetitions of the last face.
 #[inline]
 pub fn within(
     isa: Isa,
@@ -147,10 +150,11 @@ fn nearest_lanes<L: Lanes<N>, const N: usize>(
     Nearest { distance_squared: least[lane], face: nearest.to_array()[lane].to_bits() }
 }
 
-// No closures and no iterators over lanes below: the compiler builds those without the caller's instruction set, and
-// each operation becomes a call (measured: ten times slower).
+// No closures and no iterators over lanes below. The compiler would build them without the caller's
+// instruction set, and each operation would become a call (measured: ten times slower).
 
-/// As [`Triangle::closest`], but free of branches: the squared distance, with the part of the face in its low bits.
+/// As [`Triangle::closest`](crate::geometry::Triangle::closest), but without branches: the squared
+/// distance, with the part of the face in its low bits.
 #[inline(always)]
 fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
     let (a, ab) = (V([v[0], v[1], v[2]]), V([v[3], v[4], v[5]]));
@@ -164,7 +168,8 @@ fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
     let inside = inside.and(bc.dot(bp.cross(n)).at_least(zero));
     let height = n.dot(ap);
     let (at_ab, at_bc, at_ca) = (ab.dot(ap).mul(v[12]), bc.dot(bp).mul(v[14]), ac.dot(ap).mul(v[13]));
-    // Beyond the tip of a narrow face both of its long sides are within rounding. What is over the face is beside its longest edge.
+    // Beyond the tip of a narrow face, both long sides differ only by rounding. A point over the
+    // face is also beside its longest edge.
     let at_longest = v[14].less(v[12]).select(at_bc, at_ab);
     let at_longest = v[13].less(v[12].min(v[14])).select(at_ca, at_longest);
     let inside = inside.and(at_longest.at_least(zero)).and(L::splat(1.0).at_least(at_longest));
@@ -175,7 +180,8 @@ fn distance_squared<L: Lanes<N>, const N: usize>(v: [L; 16], p: V<L>) -> L {
     inside.select(height.mul(height).and(keep), to_ab.min(to_bc).min(to_ca))
 }
 
-/// Squared distance to the segment from the origin of `from` to `along`, whose line is nearest `at` this multiple of `along`.
+/// Squared distance to the segment from 0 to `along`, from a point at `from`. The nearest point of
+/// the line is `at` · `along`.
 #[inline(always)]
 fn to_edge<L: Lanes<N>, const N: usize>(from: V<L>, along: V<L>, at: L) -> L {
     let t = at.max(L::splat(0.0)).min(L::splat(1.0));
@@ -224,7 +230,7 @@ mod tests {
     use crate::geometry::Triangle;
     use crate::testing::{degenerate, exact};
 
-    /// What `f32` promises of a body with a diagonal of 0.5, the least that there is: 1e-6 of it.
+    /// Error bound of `f32` for the smallest possible diagonal, 0.5: 1e-6 of the diagonal.
     const PROMISE: f64 = 5e-7;
 
     /// Every kernel finds the distance to a face.
@@ -248,7 +254,7 @@ mod tests {
         Ok(())
     }
 
-    // Within a ball of a diameter of about 1, as bodies are.
+    // Points are within a ball with a diameter of about 1, as bodies are.
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
         #[test]

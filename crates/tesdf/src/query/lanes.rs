@@ -1,34 +1,34 @@
-//! Several `f32` at once. Only what the distance kernel needs.
+//! Several `f32` at once, with the operations that the distance kernel needs.
 
 /// `N` numbers.
 pub trait Lanes<const N: usize>: Copy {
     /// The same number in all lanes.
     fn splat(x: f32) -> Self;
-    /// Numbers by their bits.
+    /// Numbers with the given bits.
     fn from_bits(bits: [u32; N]) -> Self;
-    /// Number `c` of each of `N` records as vector `c`.
+    /// Element `c` of the result has the `c`-th number of each of the `N` records.
     fn load(records: [&[f32; 16]; N]) -> [Self; 16];
     /// Difference.
     fn sub(self, o: Self) -> Self;
     /// Product.
     fn mul(self, o: Self) -> Self;
-    /// `self · o + plus`, rounded once where the instruction set can.
+    /// `self · o + plus`, rounded once where the instruction set allows.
     fn mul_add(self, o: Self, plus: Self) -> Self;
-    /// `plus − self · o`, likewise.
+    /// `plus − self · o`, rounded once where the instruction set allows.
     fn neg_mul_add(self, o: Self, plus: Self) -> Self;
-    /// The lesser; `o` where either is NaN.
+    /// The smaller number; `o` where either is NaN.
     fn min(self, o: Self) -> Self;
-    /// The greater; `o` where either is NaN.
+    /// The larger number; `o` where either is NaN.
     fn max(self, o: Self) -> Self;
-    /// A mask of the lanes in which `self ≥ o`; false where either is NaN.
+    /// Mask of the lanes where `self ≥ o`; false where either is NaN.
     fn at_least(self, o: Self) -> Self;
-    /// A mask of the lanes in which `self < o`; false where either is NaN.
+    /// Mask of the lanes where `self < o`; false where either is NaN.
     fn less(self, o: Self) -> Self;
-    /// Bits set in both.
+    /// Bitwise and.
     fn and(self, o: Self) -> Self;
-    /// Bits set in either.
+    /// Bitwise or.
     fn or(self, o: Self) -> Self;
-    /// `yes` in the lanes that this mask sets, else `no`.
+    /// `yes` in the lanes that this mask sets, `no` in the others.
     fn select(self, yes: Self, no: Self) -> Self;
     /// The lanes as an array.
     fn to_array(self) -> [f32; N];
@@ -125,7 +125,7 @@ mod avx2 {
         fn load(records: [&[f32; 16]; 8]) -> [Self; 16] {
             let mut out = [Self::splat(0.0); 16];
             for k in 0..4 {
-                // Rows l and l + 4 side by side, then two 4 × 4 transpositions at once.
+                // Places rows l and l + 4 side by side, then does two 4 × 4 transpositions at once.
                 let r0 = pair(records[0], records[4], k);
                 let r1 = pair(records[1], records[5], k);
                 let r2 = pair(records[2], records[6], k);

@@ -8,36 +8,37 @@ use crate::TeSdf;
 use crate::asset::layout::{TREE_LEAF, TreeChild};
 use crate::geometry::{AabbTree, Closest, Feature};
 
-/// What a query reads.
+/// Numbers of items that a query reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Reads {
     /// Faces of the cell's list.
     pub list_entries: usize,
-    /// Faces of leaves of the face tree.
+    /// Faces in leaves of the face tree.
     pub tree_faces: usize,
     /// Nodes of the face tree.
     pub tree_nodes: usize,
 }
 
 impl Reads {
-    /// Faces and nodes together.
+    /// Sum of faces and nodes.
     pub fn total(self) -> usize {
         self.list_entries + self.tree_faces + self.tree_nodes
     }
 }
 
-/// Twice what a distance of the `f32` kernel is off by, relative and absolute (local frame).
+/// Twice the error of a distance from the `f32` kernel, relative and absolute (local frame).
 ///
-/// Coordinates of points up to 4 from the middle are off by 2^-22 at most, those of faces, within 1, by 2^-25; a face taken for its edges
-/// costs 3.5e-7 ([`FaceRecord`](crate::asset::FaceRecord)); a squared distance of some twenty operations 2^-20 of it, with the low bits that
-/// say the part.
+/// Coordinates of points up to 4 from the centre have an error of at most 2^-22, those of faces,
+/// within 1, of 2^-25. A face that counts as its edges adds 3.5e-7
+/// ([`FaceRecord`](crate::asset::FaceRecord)). A squared distance of some twenty operations has a
+/// relative error of 2^-20, including the low bits that name the part.
 const F32_RELATIVE: f32 = 4e-6;
 const F32_ABSOLUTE: f32 = 4e-6;
 
 // A leaf of the face tree is one step of the kernel.
 const _: () = assert!(TREE_LEAF == kernel::LANES);
 
-/// Entries of a stack that visits the farther child later: one per level.
+/// Size of a stack that stores the farther child for later: one entry per level.
 const STACK: usize = AabbTree::MAX_DEPTH + 2;
 
 impl TeSdf {
@@ -46,7 +47,7 @@ impl TeSdf {
         kernel::nearest(self.isa, &self.records, faces.chunks(), p, Nearest::NONE)
     }
 
-    /// The nearest of all faces; `p` relative to the middle of the cube.
+    /// The nearest of all faces. `p` is relative to the centre of the cube.
     pub(super) fn nearest_in_tree_f32(&self, p: Vec3, reads: &mut Reads) -> Nearest {
         let mut best = Nearest::NONE;
         let bound = |b: &[f32]| {
@@ -63,10 +64,11 @@ impl TeSdf {
         best
     }
 
-    /// Visits the leaves of the face tree, the nearer child first, but for those whose `bound` is `beyond` the limit.
+    /// Visits the leaves of the face tree, the nearer child first, except leaves whose `bound` is
+    /// `beyond` the limit.
     ///
-    /// `leaf` takes the first face and the number of faces, and answers with the limit from then on. Returns the number
-    /// of nodes read.
+    /// `leaf` receives the first face and the number of faces, and returns the new limit. Returns
+    /// the number of nodes read.
     #[inline]
     fn walk_tree<D: Copy + PartialOrd + Default>(
         &self,
@@ -101,9 +103,10 @@ impl TeSdf {
         nodes
     }
 
-    /// The nearest face of a list, `p` in the local frame: its position, and where. Ties go to the lowest id.
+    /// The nearest face of a list: its index and closest point. `p` is in the local frame. Ties go
+    /// to the lowest id.
     ///
-    /// The `f32` kernel says which faces can be the nearest: those within its rounding of the least distance.
+    /// The `f32` kernel selects the candidates: faces within its rounding of the least distance.
     pub(super) fn nearest_in_list_f64(&self, faces: &Faces, p: DVec3) -> (u32, Closest) {
         thread_local! {
             static NEAR: RefCell<Vec<u32>> = const { RefCell::new(Vec::new()) };
@@ -123,7 +126,8 @@ impl TeSdf {
         (best.position, best.closest)
     }
 
-    /// Offers those faces of a list that can be nearest to a set of points within `radius` of `center`, one of them (local frame).
+    /// Offers those faces of a list that can be nearest to a set of points. The set lies within
+    /// `radius` of `center` and contains `center` (local frame).
     pub(crate) fn near_in_list(
         &self,
         faces: &Faces,
@@ -148,7 +152,8 @@ impl TeSdf {
         }
     }
 
-    /// The same of all faces, from the face tree; `offer` answers with the least distance so far, over the ball.
+    /// As [`near_in_list`](Self::near_in_list) for all faces, from the face tree. `offer` returns
+    /// the least distance so far, over the ball.
     pub(crate) fn near_in_tree(&self, center: DVec3, radius: f64, offer: &mut impl FnMut(u32) -> f64) {
         self.walk_tree(
             self.box_bound(center),
@@ -158,7 +163,8 @@ impl TeSdf {
         );
     }
 
-    /// Boxes hold their faces; the slack covers the rounding of the bound itself.
+    /// Lower bound of the distance from `p` to a box. The factor covers the rounding of the bound
+    /// itself.
     fn box_bound(&self, p: DVec3) -> impl Fn(&[f32]) -> f64 {
         let relative = p - self.cube.middle();
         move |b: &[f32]| {
@@ -167,10 +173,10 @@ impl TeSdf {
         }
     }
 
-    /// The nearest of all faces, likewise.
+    /// As [`nearest_in_list_f64`](Self::nearest_in_list_f64) for all faces.
     pub(super) fn nearest_in_tree_f64(&self, p: DVec3) -> (u32, Closest) {
         let mut best = Best::NONE;
-        // Faces at the same distance are looked at too: the lowest id wins.
+        // Faces at the same distance are visited too, because the lowest id wins.
         self.walk_tree(
             self.box_bound(p),
             |d: f64, limit: f64| d > limit,

@@ -7,7 +7,8 @@ use crate::asset::layout::{Label, SignHint, SignHints};
 use crate::base::Side;
 use crate::geometry::{Closest, Feature, signed_crossing};
 
-/// The side that the closest feature tells, where it tells one. `height` is that of the point over the face.
+/// The side that the closest feature implies; `None` when it implies none. `height` is the height
+/// of the point over the face.
 #[inline]
 pub fn hinted_side(hints: SignHints, feature: Feature, height: f64) -> Option<Side> {
     let k = match feature {
@@ -24,8 +25,9 @@ pub fn hinted_side(hints: SignHints, feature: Feature, height: f64) -> Option<Si
 }
 
 impl TeSdf {
-    /// The side of a point of a crossing cell, whose nearest face is known in `f64`: by the hint where the distance is more
-    /// than rounding can be about which feature is the nearest, else by winding number.
+    /// The side of a point in a crossing cell whose nearest face is known in `f64`. The hint
+    /// decides where the distance is large enough that rounding cannot change the nearest feature;
+    /// elsewhere the winding number decides.
     #[inline]
     pub(super) fn side_in_cell(&self, local: DVec3, position: u32, closest: &Closest) -> Side {
         if closest.distance < ON_SURFACE_F32 {
@@ -37,14 +39,14 @@ impl TeSdf {
             .unwrap_or_else(|| self.exact_side(local))
     }
 
-    /// The side by winding number, exact.
+    /// The side by winding number. Exact.
     #[cold]
     pub(super) fn exact_side(&self, local: DVec3) -> Side {
         if self.winding_in_cell(local) >= 1 { Side::Inside } else { Side::Outside }
     }
 
-    /// Winding number in a crossing cell: that at its centroid, plus the crossings on the way there. The list
-    /// names every face that meets the cell.
+    /// Winding number in a crossing cell: the number at its centroid plus the crossings on the
+    /// segment to it. The list names every face that meets the cell.
     pub(super) fn winding_in_cell(&self, local: DVec3) -> i32 {
         let (centroid, winding, offset) = match self.cell(local) {
             Some((cell, Label::Crossing(winding), offset)) => (cell.centroid(), winding, offset),

@@ -1,4 +1,5 @@
-//! The least signed distance over a polygon inside of the solid: the greatest of a minimum of convex functions.
+//! The least signed distance over a polygon inside the solid: the depth is a minimum of convex
+//! functions, and its maximum is sought.
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -12,7 +13,7 @@ use crate::collide::polygon::Polygon;
 use crate::geometry::Triangle;
 use crate::query::Precision;
 
-/// Evaluations after which a search gives up.
+/// Number of evaluations after which a search gives up.
 const MAX_EVALUATIONS: usize = 20_000;
 
 /// A corner of a part of the polygon.
@@ -22,9 +23,9 @@ struct Corner {
     value: FieldValue,
 }
 
-/// A part of the polygon that is still open.
+/// A part of the polygon that is still to be searched.
 struct Piece {
-    /// No point of it has a lower signed distance.
+    /// Lower bound of the signed distances on it.
     bound: f64,
     corners: [Corner; 3],
 }
@@ -42,12 +43,13 @@ impl PartialOrd for Piece {
 }
 impl Ord for Piece {
     fn cmp(&self, other: &Self) -> Ordering {
-        // The heap gives the lowest bound first.
+        // The heap returns the lowest bound first.
         other.bound.total_cmp(&self.bound)
     }
 }
 
-/// The least point to `tolerance`, if it is at most `reach`; what is found above `reach` is the least point seen, no more.
+/// The point with the least signed distance, within `tolerance`, if that distance is at most
+/// `reach`. Otherwise the result is only the lowest point seen.
 pub fn branch_and_bound(
     cell: &CellField,
     polygon: &Polygon,
@@ -87,7 +89,7 @@ struct Branches<'a> {
     tolerance: f64,
     reach: f64,
     best: (f64, DVec3),
-    /// Nearest to the best point.
+    /// The face nearest to the best point.
     best_face: u32,
     evaluations: usize,
 }
@@ -107,12 +109,12 @@ impl Branches<'_> {
         Corner { point, value: self.value(point) }
     }
 
-    /// Whether something that matters can be above this bound.
+    /// Whether a part with this bound can still improve the result.
     fn is_open(&self, bound: f64) -> bool {
         bound < self.best.0 - self.tolerance && bound <= self.reach
     }
 
-    /// Cuts the longest edge.
+    /// Halves the longest edge.
     fn halves(&mut self, [a, b, c]: [Corner; 3]) -> [[Corner; 3]; 2] {
         let edge = |p: Corner, q: Corner| p.point.distance_squared(q.point);
         let (ab, bc, ca) = (edge(a, b), edge(b, c), edge(c, a));
@@ -137,7 +139,8 @@ impl Branches<'_> {
             CellField::Mesh { asset, .. } => {
                 let triangle = |face: u32| asset.local_triangle(face as usize);
                 let distances = |t: &Triangle| points.map(|p| t.closest(p).distance);
-                // The distance to one face is convex: over a triangle at most what it is at a corner.
+                // The distance to one face is convex, so over a triangle it is at most its greatest
+                // value at a corner.
                 let near = distances(&triangle(value.position));
                 bound = bound.max(-near.into_iter().fold(0.0, f64::max));
                 if self.is_open(bound) {
@@ -147,12 +150,13 @@ impl Branches<'_> {
                 }
                 if self.is_open(bound) {
                     let [u, v, w] = corners.map(|c| distances(&triangle(c.value.position)));
-                    // One that matters at the deepest point may be the nearest at none of these.
+                    // A face that matters at the deepest point may not be the nearest at any of
+                    // these points.
                     let deepest = distances(&triangle(self.best_face));
                     bound = bound.max(-greatest_minimum([near, u, v, w, deepest]));
                 }
             }
-            // A convex function is above its tangents.
+            // A convex function lies above its tangents.
             CellField::Simple(_) => {
                 let tangent =
                     |v: &FieldValue, from: DVec3| points.map(|p| -(v.distance + v.gradient.dot(p - from)));
@@ -164,12 +168,13 @@ impl Branches<'_> {
     }
 }
 
-/// A bound of the least of some convex functions with these values at the corners of a triangle, over the triangle: the greatest minimum of
-/// the linear functions with these values.
+/// Upper bound, over a triangle, of the minimum of convex functions with these values at the
+/// corners: the greatest minimum of the linear functions with the same values.
 ///
-/// That is where the minimum is at a corner, where two are equal on an edge, or three inside: of all such points none is
-/// left out. To one wall, or between two or three, it errs by the curvature of the distances only, so that a search converges where
-/// the least is along a whole line.
+/// It is attained at a corner, on an edge where two functions are equal, or inside where three are
+/// equal; all these points are tested. Near one face, or between two or three, the error is only
+/// the curvature of the distances. So a search converges even when the minimum extends along a
+/// whole line.
 fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
     let least = |weights: [f64; 3]| {
         let at = |u: &[f64; 3]| u[0] * weights[0] + u[1] * weights[1] + u[2] * weights[2];
@@ -189,7 +194,7 @@ fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
                 }
             }
             for m in l + 1..N {
-                // Weights across both differences, of sum 1.
+                // Weights of sum 1 at which both differences are 0.
                 let e: [f64; 3] = std::array::from_fn(|i| values[k][i] - values[m][i]);
                 let w = DVec3::from(d).cross(DVec3::from(e));
                 let weights = (w / (w.x + w.y + w.z)).to_array();
@@ -199,14 +204,16 @@ fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
             }
         }
     }
-    // Rounding.
+    // Margin for rounding.
     greatest + 1e-15 * values.as_flattened().iter().fold(0.0, |m: f64, v| m.max(v.abs()))
 }
 
-/// A bound of the distance to two faces of one plane that share an edge, over a triangle; infinite when they are not such.
+/// Upper bound, over a triangle, of the distance to two coplanar faces that share an edge; infinite
+/// when the faces are not such a pair.
 ///
-/// Let the nearest points of the corners be in the union of the faces, and the segments between those that are in different ones go through
-/// the shared edge. Then the triangle between them is in the union, and every point is as near to its image as a corner at most.
+/// Suppose that the nearest points of the corners are in the union of the faces, and that segments
+/// between nearest points in different faces pass through the shared edge. Then the triangle of the
+/// nearest points lies in the union. Every point is as near to its image as some corner, or nearer.
 fn coplanar_pair(asset: &TeSdf, [f, g]: [u32; 2], points: [DVec3; 3]) -> f64 {
     if f == g {
         return f64::INFINITY;
@@ -221,7 +228,7 @@ fn coplanar_pair(asset: &TeSdf, [f, g]: [u32; 2], points: [DVec3; 3]) -> f64 {
     let (a, b) = (triangles[0].corners[(apex + 1) % 3], triangles[0].corners[(apex + 2) % 3]);
     let normal = triangles[0].normal;
     let off = triangles[1].corners.iter().map(|c| normal.dot(*c - a).abs()).fold(0.0, f64::max);
-    // Within the plane, across the shared edge.
+    // In-plane direction perpendicular to the shared edge.
     let across = normal.cross(b - a).normalize_or_zero();
     if off > COPLANAR || normal.dot(triangles[1].normal) < 0.5 || across == DVec3::ZERO {
         return f64::INFINITY;
@@ -245,7 +252,8 @@ fn coplanar_pair(asset: &TeSdf, [f, g]: [u32; 2], points: [DVec3; 3]) -> f64 {
     nearest.iter().map(|n| n.0.distance).fold(0.0, f64::max) + off
 }
 
-/// Faces that are this near to one plane (local frame) are taken for coplanar; what they are off is added to the bound.
+/// Faces within this distance of one plane (local frame) count as coplanar. Their deviation is
+/// added to the bound.
 const COPLANAR: f64 = 1e-12;
 
 #[cfg(test)]
@@ -254,7 +262,7 @@ mod tests {
 
     #[test]
     fn the_greatest_minimum_is_that_of_dense_samples() {
-        // A few numbers of no order.
+        // Numbers without a pattern.
         let number = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) >> 16) / 65536.0;
         for case in 0..200u32 {
             let values: [[f64; 3]; 4] =

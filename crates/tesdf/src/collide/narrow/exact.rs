@@ -10,15 +10,18 @@ use crate::collide::polygon::{MAX_VERTICES, Parts, Polygon};
 use crate::geometry::polygon_to_triangle;
 use crate::query::{Faces, Place, Precision};
 
-/// Closer to the surface than this (local frame) a polygon may cross it: where two faces cross, the distance between them is
-/// rarely 0 but some 1e-17, and the sign there may be either. Far below any sensible tolerance.
+/// Nearer to the surface than this (local frame), a polygon may cross it. Where two faces cross,
+/// their computed distance is rarely 0 but about 1e-17, and the sign there may be either. This is
+/// far below any sensible tolerance.
 const CLEAR: f64 = 1e-9;
 
-/// The least signed distance over a polygon to `tolerance`, both in the field's frame; `None` when it is above `reach`.
+/// The least signed distance over a polygon, within `tolerance`; both in the field's frame. `None`
+/// when it is above `reach`.
 ///
-/// Outside of the solid it is the least distance between the polygon and a face, in closed form. Inside it is the greatest of a
-/// minimum of convex functions, found by branch and bound; the field is 1-Lipschitz, and the distance to one face, being convex,
-/// is over a triangle at most what it is at a corner.
+/// Outside the solid it is the least distance between the polygon and a face, in closed form.
+/// Inside, the depth is a minimum of convex functions, and branch and bound finds its maximum. It
+/// uses that the field is 1-Lipschitz, and that the distance to one face is convex, so over a
+/// triangle it is at most its greatest value at a corner.
 pub fn lowest(
     cell: &CellField,
     polygon: &Polygon,
@@ -39,7 +42,7 @@ pub fn lowest(
     let crossing = matches!(place, Place::Listed { label: Label::Crossing(_), .. });
     let inside = match place {
         Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
-        // Nothing of the surface is nearer to the centre than its distance.
+        // No point of the surface is nearer to the centre than this distance.
         _ if crossing => first.distance < -radius - ROUNDING,
         _ => false,
     };
@@ -54,17 +57,17 @@ pub fn lowest(
     if crossing && distance <= CLEAR && !query.only_touches(cell, distance, point) {
         return query.lowest_of_parts(cell, precision);
     }
-    // Clear of the surface, the polygon is all on one side of it.
+    // A polygon that keeps clear of the surface is on one side of it.
     if crossing && distance > CLEAR && cell.value(point, Precision::F64).distance < 0.0 {
         return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     }
     (distance <= reach).then_some(Lowest { point, converged: true })
 }
 
-/// Cuts after which what is left of a polygon is searched as it is.
+/// Number of cuts after which the rest of a polygon is searched without further cuts.
 const MAX_CUTS: usize = 64;
 
-/// A polygon and the faces that can be nearest to its points; all of it is within a ball.
+/// A polygon, and the faces that can be nearest to its points. A ball contains the polygon.
 #[derive(Clone, Copy)]
 struct Query<'a> {
     asset: &'a TeSdf,
@@ -79,17 +82,18 @@ struct Query<'a> {
 }
 
 impl Query<'_> {
-    /// The least distance between the polygon and a face, up to the tolerance, and where on the polygon; `likely` is looked at
-    /// first. Endless, and the ball's middle, when all are beyond reach.
+    /// The least distance between the polygon and a face, within the tolerance, with the nearest
+    /// point of the polygon. `likely` is tested first. Infinite, with the centre of the ball, when
+    /// all faces are out of reach.
     fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3) {
         let mut points = [DVec3::ZERO; MAX_VERTICES];
         points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
         let points = &points[..self.polygon.vertices().len()];
-        // A polygon that may cross the surface is always seen.
+        // Keeps all polygons that may cross the surface.
         let farthest = self.reach.max(0.0) + 2.0 * CLEAR;
         let mut best = (f64::INFINITY, self.center);
         let mut offer = |face: u32| {
-            // What is nearer by less than the tolerance does not count, unless the polygon may go through it.
+            // Improvements below the tolerance are skipped, unless the polygon may cross the face.
             let limit = if best.0 > self.tolerance + CLEAR { best.0 - self.tolerance } else { best.0 };
             let limit = limit.min(farthest);
             if !self.plane_is_beyond(points, face, limit) {
@@ -110,11 +114,11 @@ impl Query<'_> {
         best
     }
 
-    /// The least of a polygon that crosses the surface: it is cut along the faces that it crosses, so that each part is all on
-    /// one side.
+    /// The lowest point of a polygon that crosses the surface. The polygon is cut along the faces
+    /// that it crosses, so that each part is on one side.
     ///
-    /// Branch and bound alone needs pieces as small as the gap on the outer side: two flanks a micrometre apart that touch
-    /// somewhere took all evaluations there are.
+    /// Branch and bound alone would need pieces as small as the gap on the outer side. For two
+    /// flanks a micrometre apart that touch somewhere, it used all allowed evaluations.
     fn lowest_of_parts(&self, cell: &CellField, precision: Precision) -> Option<Lowest> {
         let mut least = (f64::INFINITY, self.center);
         let mut converged = true;
@@ -147,7 +151,8 @@ impl Query<'_> {
         (least.0 <= self.reach).then_some(Lowest { point: least.1, converged })
     }
 
-    /// The polygon cut along the plane of the face that it goes through deepest; `None` when it goes through none.
+    /// Cuts the polygon along the plane of the face that it crosses deepest; `None` when it crosses
+    /// no face.
     fn cut(&self) -> Option<(Polygon, Polygon)> {
         let mut points = [DVec3::ZERO; MAX_VERTICES];
         points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
@@ -175,8 +180,9 @@ impl Query<'_> {
         }
     }
 
-    /// Whether the polygon, `distance` from the surface at `point`, touches it along an edge or a whole face but does not go in: it is then free a
-    /// hair's breadth out, or back, and its least is 0 up to that.
+    /// Whether the polygon, which is `distance` from the surface at `point`, only touches it along
+    /// an edge or a whole face. It then has no contact after a tiny move outwards or backwards, and
+    /// its least distance is 0 up to that move.
     fn only_touches(&self, cell: &CellField, distance: f64, point: DVec3) -> bool {
         let hair = self.tolerance.min(CLEAR);
         let is_free = |outward: DVec3| {
@@ -190,8 +196,8 @@ impl Query<'_> {
         distance <= hair && (is_free(cell.value(point, Precision::F64).gradient) || is_free(-self.normal))
     }
 
-    /// Whether all of the polygon is farther than `limit` from the plane of a face: in `f32` already, without making the face's
-    /// normal.
+    /// Whether the whole polygon is farther than `limit` from the plane of a face. Decided in
+    /// `f32`, without computing the face's normal.
     fn plane_is_beyond(&self, points: &[DVec3], face: u32, limit: f64) -> bool {
         let plane = self.asset.records[face as usize].triangle();
         let middle = self.asset.cube.middle() + plane.corners[0];

@@ -3,12 +3,13 @@ use crate::collide::field::{CellField, ROUNDING};
 use crate::collide::polygon::Polygon;
 use crate::query::Precision;
 
-/// Eq. (9) by Frank–Wolfe: from the best of centre and vertices, steps of 2 / (k + 2) towards the vertex that lies farthest
-/// down the gradient; the best point seen. `None` when no point can be within `reach`.
+/// Eq. (9) by Frank–Wolfe. It starts at the best of the centre and the vertices, and makes steps of
+/// 2 / (k + 2) towards the vertex that is lowest along the gradient. The result is the best point
+/// seen. `None` when no point can be within `reach`.
 ///
-/// The paper's Appendix C is not public. Starting from the best vertex and keeping the best point seen costs one evaluation per vertex
-/// and is never worse than the last iterate from the centre: on a bolt, outside, p99 of the error falls from 1e-3 to 2e-6 of the
-/// diagonal.
+/// The paper's Appendix C is not public. Starting at the best vertex and keeping the best point
+/// costs one evaluation per vertex and is never worse than the last iterate from the centre. On a
+/// bolt, outside, the p99 error falls from 1e-3 to 2e-6 of the diagonal.
 pub fn lowest(cell: &CellField, polygon: &Polygon, iterations: u32, reach: f64) -> Option<Lowest> {
     let center = polygon.center();
     let first = cell.value(center, Precision::F32);
@@ -26,7 +27,8 @@ pub fn lowest(cell: &CellField, polygon: &Polygon, iterations: u32, reach: f64) 
     for k in 0..iterations {
         let down = |p: &glam::DVec3| value.gradient.dot(*p);
         let Some(target) = polygon.points().min_by(|p, q| down(p).total_cmp(&down(q))) else { break };
-        // At a vertex that is the target itself every further step stays there: most minima are such.
+        // When the current vertex is the target itself, all further steps stay there. Most minima
+        // are of this kind.
         if target == at {
             break;
         }
