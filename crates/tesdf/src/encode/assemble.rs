@@ -1,4 +1,4 @@
-//! Turns refined trees into the sections of an asset.
+//! Lays out refined trees as the sections of an asset.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -8,24 +8,28 @@ use super::refine::{Leaf, Tree};
 use crate::asset::layout::{LONG_WINDING, Label, List, MAX_LIST_OFFSET, NO_PALETTE, Node, PALETTE_SIZE};
 use crate::base::Side;
 
-/// The forest and its lists, as they are stored.
+/// The forest and its lists, as the file stores them.
 #[derive(Debug, Default)]
 pub struct Forest {
     /// Words of the forest.
     pub nodes: Vec<u32>,
     /// Bytes of the lists.
     pub lists: Vec<u8>,
-    /// Where each palette begins.
+    /// Where each palette begins among the palette faces.
     pub palette_starts: Vec<u32>,
     /// Faces of the palettes.
     pub palettes: Vec<u32>,
 }
 
-/// Lays out the trees of all roots. `labels` are of the leaves in depth-first order; `position` maps a face to its place in the
-/// asset; lists are sorted by it. `order` names each root once, near ones after each other: such small trees share palettes.
+/// Lays out the trees of all roots.
+///
+/// - `labels` has one label for each leaf, in depth-first order.
+/// - `position` maps a face to its place in the asset. Lists are sorted by it.
+/// - `order` names each root once. Near roots follow each other, so that small trees can share a
+///   palette.
 ///
 /// # Errors
-/// When the asset has more palettes or bytes of lists than its words can name.
+/// The asset has more palettes, or more bytes of lists, than the words of the file can name.
 pub fn assemble(
     roots: &mut [Tree],
     labels: &[Label],
@@ -86,7 +90,7 @@ pub fn collect<'a>(tree: &'a mut Tree, visit: &mut impl FnMut(&'a mut Leaf)) {
     }
 }
 
-/// Both, ascending.
+/// The union of two sets of faces, ascending.
 fn united(a: &[u32], b: &[u32]) -> Vec<u32> {
     let mut all = [a, b].concat();
     all.sort_unstable();
@@ -94,16 +98,17 @@ fn united(a: &[u32], b: &[u32]) -> Vec<u32> {
     all
 }
 
-/// The faces of a subtree, unless they are too many for one palette.
+/// The faces of a subtree, unless there are too many for one palette.
 enum Union {
     Small(Vec<u32>),
     Large,
 }
 
 impl Forest {
-    /// Gives each of the largest subtrees that name at most 256 faces a palette.
+    /// Gives a palette to each of the largest subtrees that name at most 256 faces.
     ///
-    /// `palette_of` grows by one entry per leaf of `tree`; those of a subtree that is still `Small` are open.
+    /// `palette_of` grows by one entry for each leaf of `tree`. The leaves of a subtree that is
+    /// still `Small` have no palette yet.
     fn find_palettes(&mut self, tree: &Tree, palette_of: &mut Vec<Option<u16>>) -> Union {
         match tree {
             Tree::Leaf(Leaf::Listed { faces, .. }) => {
@@ -138,12 +143,12 @@ impl Forest {
         }
     }
 
-    /// Its number; no faces need no palette.
+    /// Adds a palette and returns its number. A subtree without faces needs no palette.
     fn add_palette(&mut self, faces: &[u32]) -> Option<u16> {
         if faces.is_empty() {
             return None;
         }
-        // More palettes than u16 names are reported by the caller, which counts them.
+        // The caller counts the palettes and reports more of them than a `u16` can name.
         let number = (self.palette_starts.len() - 1).min(usize::from(NO_PALETTE)) as u16;
         self.palettes.extend(faces);
         self.palette_starts.push(self.palettes.len() as u32);
@@ -173,7 +178,7 @@ struct Writer<'a> {
     labels: &'a [Label],
     palette_of: &'a [Option<u16>],
     next: usize,
-    /// Where equal bytes are stored already.
+    /// Where the same bytes of a list are stored already.
     seen: HashMap<Vec<u8>, u32>,
 }
 

@@ -1,4 +1,4 @@
-//! Refines all roots within an effort, and says what becomes of meshes for which that is not enough.
+//! Refines all roots within an effort, and refuses meshes for which the effort is not enough.
 use rayon::prelude::*;
 
 use super::effort::Effort;
@@ -7,7 +7,7 @@ use super::refine::{ROOT_VOLUME, Refiner, Tree};
 use crate::base::Stage;
 use crate::domain::Cell;
 
-/// Refines all roots; `None` when cancelled, or the effort is exceeded.
+/// Refines all roots. Returns `None` when the work was cancelled or the effort is exceeded.
 pub fn refine(
     refiner: &Refiner,
     cells: &[Cell],
@@ -17,8 +17,9 @@ pub fn refine(
     cells.par_iter().map(|cell| refiner.root(*cell, &candidates(cell))).collect()
 }
 
-/// Refines the bisection domain with an effort in proportion to the faces: the more long faces there are, the earlier cells that list
-/// many are left as they are.
+/// Refines the bisection domain with an effort in proportion to the number of faces.
+///
+/// The more long faces the mesh has, the earlier a cell that lists many of them is left whole.
 pub fn refine_within_effort(
     mut refiner: Refiner,
     cells: &[Cell],
@@ -45,16 +46,21 @@ pub fn refine_within_effort(
     Err(EncodeError::NoShortLists { face, slenderness, compared: limit })
 }
 
-/// Faces held against cells while refining, for each face of the mesh. A bolt of 25,000 faces takes 1,783, a gear of 20,000 needles 4,789.
+/// Faces that refining may hold against cells, for each face of the mesh. A bolt of 25,000 faces
+/// takes 1,783, a gear of 20,000 needles takes 4,789.
 pub const EFFORT_PER_FACE: u64 = 10_000;
-/// Faces that a small mesh counts as in addition.
+/// Faces that are added to the count, so that a small mesh has enough effort.
 const SMALL_MESH: u64 = 1000;
-/// The [`needleness`](Surface::needleness) from which cells with many long faces are held back from the start.
+/// From this [`needleness`](Surface::needleness) on, cells with many long faces are held back from
+/// the start.
 const NEEDLES: f64 = 15.0;
-/// The needleness at which such a cell has to be worth a byte. (Fans of 1,000 to 5,000
-/// faces, 18 to 50, take 2 to 3 times as long a face as a bolt with this; without it, the time grows with the cube of their faces.)
+/// The needleness at which such a cell must be worth one byte.
+///
+/// With this limit, fans of 1,000 to 5,000 faces (needleness 18 to 50) take 2 to 3 times as long
+/// per face as a bolt. Without it, the time grows with the cube of the number of faces.
 const WORTH_A_BYTE: f64 = 12.0;
-/// Times that refining begins anew, with cells held back eight times as much, before it is given up.
+/// How often refining begins anew before it gives up. Each time, cells are held back eight times as
+/// much.
 const ATTEMPTS: u32 = 5;
 
 #[cfg(test)]
@@ -69,7 +75,8 @@ mod tests {
     use crate::geometry::Aabb;
     use crate::mesh::TriangleMesh;
 
-    /// A cone over a regular polygon, whose bottom is a fan as well; face 0 is as slender as all around the tip.
+    /// A cone over a regular polygon. Its bottom is a fan too. Face 0 is as slender as all faces
+    /// around the tip.
     fn cone(sides: u32) -> TriangleMesh {
         let at = |k: u32| {
             let angle = std::f64::consts::TAU * f64::from(k) / f64::from(sides);
@@ -129,7 +136,7 @@ mod tests {
 
         let error = refined(&mesh, 2).expect_err("not even the roots");
         let EncodeError::NoShortLists { face, slenderness, .. } = &error else { panic!("{error}") };
-        // Sides of 0.71 with a base of 0.0079; those of the bottom are 0.5 long.
+        // The sides are 0.71 long with a base of 0.0079. The faces of the bottom are 0.5 long.
         assert!(*face % 2 == 0 && (80.0..100.0).contains(slenderness), "{error}");
         assert!(error.to_string().contains("tesdf check"), "{error}");
     }

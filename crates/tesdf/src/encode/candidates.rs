@@ -1,7 +1,8 @@
-//! The faces that a cell has to choose from, side by side in rows, with what its corners see of them.
+//! The faces that can be in the list of a cell, stored in rows, with the distances from the corners
+//! of the cell.
 //!
-//! A bisection makes one new corner. So what the four old corners see is handed on, the new one is looked from once, and
-//! both children read the same rows.
+//! A bisection makes one new corner. The rows of the four old corners are passed on to the
+//! children. The new corner is computed once, and both children read the same rows.
 
 use glam::DVec3;
 
@@ -15,16 +16,17 @@ const SHAPE: usize = 13;
 const NORMAL: usize = 9;
 const NEEDLE: usize = 12;
 
-/// Rows of what a point sees that are handed on: distance, its gradient, regions as a number.
+/// Rows for one point that are passed on to children: the distance, its gradient, and the regions
+/// as a number.
 pub(super) const SEEN: usize = 5;
 pub(super) const GRADIENT: usize = 1;
 const REGIONS: usize = 4;
-/// And those that are not: the closest points.
+/// The first row that is not passed on: the closest points.
 const POINT: usize = 5;
 /// Rows that [`look`] writes.
 pub(super) const LOOK: usize = 8;
 
-/// The face that is closest to a point, of equal ones the first.
+/// The face that is closest to a point. Of several equally close faces it is the first.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
     /// Index among the candidates.
@@ -33,7 +35,8 @@ pub struct Nearest {
     pub distance: f64,
     /// The closest point of the face.
     pub point: DVec3,
-    /// The part of the face that the closest point lies on, the least if several.
+    /// The part of the face that the closest point lies on. If it lies on several parts, it is the
+    /// least of them.
     pub feature: Feature,
 }
 
@@ -47,24 +50,24 @@ impl Nearest {
 pub struct Candidates<'a> {
     /// Face ids.
     pub faces: &'a [u32],
-    /// Length of a row: a multiple of [`GROUP`], the last face repeated.
+    /// Length of a row: a multiple of [`GROUP`]. The last face is repeated to fill the row.
     pub(super) stride: usize,
     shape: &'a [f64],
-    /// What the corners see: rows as [`look`] writes them.
+    /// The rows of the four corners, as [`look`] writes them.
     pub(super) seen: [&'a [f64]; 4],
-    /// The closest candidate to each corner.
+    /// The closest candidate of each corner.
     pub nearest: [Nearest; 4],
 }
 
 impl Candidates<'_> {
-    /// The part of candidate `index` that is closest all over the cell: the face, unless all corners say so of one and
-    /// the same edge or corner.
+    /// The part of candidate `index` that is closest in the whole cell. It is the whole face,
+    /// unless all corners have the same edge or vertex of the face as the closest part.
     pub(super) fn feature(&self, index: usize) -> Feature {
         let seen_from = |k: usize| Regions(self.seen[k][REGIONS * self.stride + index] as u8);
         seen_from(0).and(seen_from(1)).and(seen_from(2)).and(seen_from(3)).least()
     }
 
-    /// Looks at all candidates from `p`, into `out`.
+    /// Computes the distances of all candidates from `p` into `out`.
     pub(super) fn look_from(&self, surface: &Surface, p: DVec3, out: &mut Vec<f64>) -> Nearest {
         grow(out, LOOK * self.stride);
         look(surface.isa, &surface.triangles, self.faces, self.shape, p, out);
@@ -77,22 +80,23 @@ impl Candidates<'_> {
 pub struct Survivor {
     /// Index among the candidates.
     pub index: u32,
-    /// What of the face the cell needs.
+    /// The part of the face that the cell needs.
     pub requirement: Requirement,
     /// Whether the face comes within [`PAD`](super::filter::PAD) of the cell.
     pub meets: bool,
 }
 
-/// Memory of candidates as seen from up to five points: the corners of a cell, and the middle of the edge where it is
-/// bisected.
+/// Memory for candidates and for what up to five points see of them: the corners of a cell, and the
+/// midpoint of the edge at which the cell is bisected.
 #[derive(Debug, Default)]
 pub struct Pool {
     faces: Vec<u32>,
     stride: usize,
-    /// Shapes, what each corner sees, what the midpoint sees; only the last where [`is_shared`](Self::is_shared).
+    /// The shapes, the rows of each corner, the rows of the midpoint. Where
+    /// [`is_shared`](Self::is_shared) is set, it has only the rows of the midpoint.
     rows: Vec<f64>,
     nearest: Vec<Nearest>,
-    /// All candidates survived: their rows are read where they are.
+    /// Whether all candidates survived. Then their other rows are read where they are.
     is_shared: bool,
 }
 
@@ -104,7 +108,7 @@ impl Pool {
         pool
     }
 
-    /// As [`new`](Self::new), in the memory of this pool.
+    /// Does the same as [`new`](Self::new), in the memory of this pool.
     pub fn fill(&mut self, surface: &Surface, faces: &[u32], cell: &Cell) {
         self.start(faces.iter().copied());
         let stride = self.stride;
@@ -132,12 +136,13 @@ impl Pool {
         }
     }
 
-    /// The candidates of a cell that was [filled](Self::fill) in.
+    /// The candidates of the cell that [`fill`](Self::fill) was called with.
     pub fn candidates(&self) -> Candidates<'_> {
         self.seen_from([0, 1, 2, 3])
     }
 
-    /// The survivors among a cell's candidates, seen from its corners and from its midpoint.
+    /// Fills the pool with the survivors among the candidates of a cell, as seen from its corners
+    /// and from its midpoint.
     pub fn narrow(&mut self, surface: &Surface, cell: &Cell, from: &Candidates, survivors: &[Survivor]) {
         let midpoint = cell.midpoint();
         if survivors.len() == from.faces.len() && (0..).zip(survivors).all(|(i, s)| s.index == i) {
@@ -173,8 +178,9 @@ impl Pool {
         self.nearest.push(nearest_seen(self.faces.len(), stride, out));
     }
 
-    /// The candidates of a child of the cell whose candidates `from` were [narrowed](Self::narrow); its corners are these
-    /// of the cell's and, as number 4, the midpoint.
+    /// The candidates of a child. `from` are the candidates of its parent, for which
+    /// [`narrow`](Self::narrow) was called. `corners` are the corners of the child: 0 to 3 are
+    /// those of the parent, 4 is the midpoint.
     pub fn of_child<'a>(&'a self, from: &Candidates<'a>, corners: [usize; 4]) -> Candidates<'a> {
         if !self.is_shared {
             return self.seen_from(corners);
@@ -224,7 +230,7 @@ fn pick_rows(to: &mut [f64], to_stride: usize, from: &[f64], from_stride: usize,
     }
 }
 
-/// The first least of some distances, and where it is.
+/// The index of the least distance, and the distance. Of equal distances it is the first.
 fn least(distances: &[f64]) -> (usize, f64) {
     let first = |best: (usize, f64), (i, &d): (usize, &f64)| if d < best.1 { (i, d) } else { best };
     distances.iter().enumerate().fold((0, f64::INFINITY), first)
@@ -242,7 +248,8 @@ fn nearest_seen(n: usize, stride: usize, rows: &[f64]) -> Nearest {
 }
 
 dispatch! {
-    /// What `p` sees of each face: the same bits as [`Triangle::closest_and_regions`].
+    /// Computes what `p` sees of each face, with the same bits as
+    /// [`Triangle::closest_and_regions`].
     fn look(triangles: &[Triangle], faces: &[u32], shape: &[f64], p: DVec3, out: &mut [f64]) = look_lanes
 }
 
@@ -260,7 +267,7 @@ fn look_lanes<L: Doubles>(triangles: &[Triangle], faces: &[u32], shape: &[f64], 
     }
 }
 
-/// Needles by the scalar code, which looks at their sides again from the nearer ends.
+/// Handles needles by the scalar code, which measures their sides again from the nearer ends.
 #[cold]
 #[inline(never)]
 fn look_at_needles(
@@ -293,7 +300,7 @@ fn look_at_needles(
     }
 }
 
-/// Looks at the faces of one vector; returns which of them are needles that `p` seems to be over.
+/// Computes one vector of faces. Returns which of them are needles that `p` seems to be over.
 #[inline(always)]
 fn look_at<L: Doubles>(shape: &[f64], stride: usize, p: Vector<L>, out: &mut [f64], at: usize) -> u8 {
     let zero = L::splat(0.0);
@@ -309,14 +316,14 @@ fn look_at<L: Doubles>(shape: &[f64], stride: usize, p: Vector<L>, out: &mut [f6
     let start = [along[0].dot(from[0]), along[1].dot(from[1]), along[2].dot(from[2])];
     let end = [along[0].dot(from[1]), along[1].dot(from[2]), along[2].dot(from[0])];
 
-    // A zero normal makes all sides zero: such faces are no more than their edges.
+    // A zero normal makes all sides zero. Such a face counts as its edges alone.
     let n = normal.0;
     let has_area = L::less(zero, n[0].abs().max(n[1].abs()).max(n[2].abs()));
     let inside = L::both(side[0].at_least(zero), side[1].at_least(zero));
     let inside = L::both(inside, L::both(side[2].at_least(zero), has_area));
     let needle = L::less(zero, L::load(&shape[NEEDLE * stride..], at));
 
-    // The closest edge, the first of equal ones.
+    // The closest edge. Of equally close edges it is the first.
     let mut point = edge_point(corners[0], corners[1], along[0], start[0], end[0]);
     let mut distance = length(p.minus(point));
     let point_1 = edge_point(corners[1], corners[2], along[1], start[1], end[1]);
@@ -379,12 +386,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn coordinate() -> impl Strategy<Value = f64> {
-        // A coarse lattice, so that ties and degenerate triangles are common, and needles beside it.
+        // A coarse lattice makes ties and degenerate triangles common. Needles are added to it.
         prop_oneof![3 => (-3i32..4).prop_map(f64::from), 1 => -3.0..3.0f64, 1 => (0i32..4).prop_map(|x| 1e-3 * f64::from(x))]
     }
 
     proptest! {
-        /// Faces of degenerate shapes: the bits of the scalar code, which is exact.
+        /// Checks degenerate faces: the bits are those of the scalar code, which is exact.
         #[test]
         fn looks_at_degenerate_faces_like_the_scalar_code(
             corners in prop::collection::vec(degenerate::face(), 1..20),
@@ -394,7 +401,7 @@ mod tests {
             compare(vertices, p)?;
         }
 
-        /// Every instruction set sees the bits that the scalar code computes.
+        /// Checks that every instruction set gives the bits of the scalar code.
         #[test]
         fn looks_like_the_scalar_code(
             corners in prop::collection::vec([coordinate(), coordinate(), coordinate()], 9..40),

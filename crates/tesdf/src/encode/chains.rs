@@ -1,13 +1,15 @@
-//! What rounding may cost rule C, counted link by link: see [`Chains`](crate::base::Chains).
+//! How much rounding may cost rule C, counted link by link: see [`Chains`](crate::base::Chains).
 use super::surface::{Part, Requirement, Surface, Touching};
 use crate::domain::Cell;
 
-/// Weight of a link over an edge, or over a vertex at which the face has an angle up to 120°: Δ is two roundings.
+/// Weight of a link over an edge, or over a vertex at which the face has an angle of at most 120°.
+/// There, Δ is two roundings.
 const PLAIN: u32 = 1;
-/// Weight of a link over a vertex with a larger angle: Δ is ten roundings.
+/// Weight of a link over a vertex at which the face has a larger angle. There, Δ is ten roundings.
 const OBTUSE: u32 = 25;
 
-/// What a link weighs that drops `face` as all that the cell sees of it is one edge or vertex; `None` where Δ has no bound.
+/// The weight of a link that drops `face` because the cell needs only one edge or vertex of it.
+/// `None` where Δ has no bound.
 pub(super) fn link_weight(
     surface: &Surface,
     cell: &Cell,
@@ -36,7 +38,8 @@ mod tests {
     use crate::geometry::Aabb;
     use crate::mesh::TriangleMesh;
 
-    /// A pyramid over a square, seen from above its tip: all four sides are one vertex there.
+    /// A pyramid over a square, seen from above its tip. From there, the closest point of all four
+    /// sides is one vertex.
     fn pyramid() -> Surface {
         let base = [(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)];
         let mut vertices: Vec<DVec3> = base.into_iter().map(|(x, y)| DVec3::new(x, y, -0.3)).collect();

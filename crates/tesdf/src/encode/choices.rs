@@ -1,5 +1,7 @@
-//! What a person chooses, by the names that commands and bindings give it: in go choices, out come options and a domain. Some choices
-//! exclude others; one that would be without effect is an error.
+//! The choices of a user, by the names that the commands and the bindings give them.
+//!
+//! Choices become options and a domain. Some choices exclude each other. A choice that would have
+//! no effect is an error.
 use std::convert::Infallible;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
@@ -14,12 +16,12 @@ use crate::mesh::SolidMesh;
 /// Ways to cut space into tetrahedra.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum DomainChoice {
-    /// Cubes and their halves, finer near the surface; no other program is needed.
+    /// Cubes and their halves, finer near the surface. No other program is needed.
     #[default]
     Bisection,
-    /// Gmsh, as a program of its own.
+    /// Gmsh, run as a separate program.
     Gmsh,
-    /// A file of tetrahedra whose sides are the mesh's faces.
+    /// A file of tetrahedra whose sides are the faces of the mesh.
     File(PathBuf),
 }
 
@@ -39,64 +41,65 @@ impl FromStr for DomainChoice {
 /// Ways to find the closest faces of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EncoderChoice {
-    /// Proven: no face that can be closest is left out.
+    /// By proof: no face that can be closest is left out.
     Certified,
-    /// Faces that are closest at samples, as in the paper.
+    /// By samples: the faces that are closest at samples, as in the paper.
     Sampled,
 }
 
-/// What a person may choose; `None` is what the preset says.
+/// What a user may choose. `None` stands for the value of the preset.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EncodeChoices {
-    /// What the others change.
+    /// The preset that the other choices change.
     pub preset: Preset,
     /// How space is cut into tetrahedra.
     pub domain: DomainChoice,
-    /// How the closest faces of each are found.
+    /// How the closest faces of each tetrahedron are found.
     pub encoder: Option<EncoderChoice>,
-    /// Samples along an edge of a tetrahedron, less one; 32 unless the preset has its own.
+    /// Samples along an edge of a tetrahedron, less one. The default is 32, unless the preset has
+    /// its own value.
     pub resolution: Option<u32>,
-    /// How much farther than the closest face a listed one may be at a sample.
+    /// How much farther than the closest face a listed face may be at a sample.
     pub threshold: Option<Threshold>,
-    /// E_max: lists are cut to this many faces.
+    /// E_max: longer lists are cut to this many faces.
     pub max_entries: Option<NonZeroU32>,
     /// Whether the vertices will move.
     pub deformation: Deformation,
-    /// What becomes of the tetrahedra of a conforming domain.
+    /// How the tetrahedra of a conforming domain are refined.
     pub refinement: Option<Refinement>,
-    /// Width of the layer around the solid that is encoded too, in the mesh's unit.
+    /// Width of the layer around the solid that is encoded too, in the unit of the mesh.
     pub band: Option<f64>,
-    /// Boxes that are encoded too, in the mesh's unit: `[min x y z, max x y z]`.
+    /// Boxes that are encoded too, in the unit of the mesh: `[min x y z, max x y z]`.
     pub regions: Vec<[f64; 6]>,
-    /// Name of the mesh's unit; nothing is scaled.
+    /// Name of the unit of the mesh. Nothing is scaled.
     pub unit: Option<String>,
 }
 
 /// Choices that exclude each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ChoiceError {
-    /// A preset of the sampled encoder, with the other encoder.
+    /// A preset of the sampled encoder together with the certified encoder.
     #[error("encoder `certified`: the preset is one of the encoder `sampled`; leave one of them out")]
     CertifiedPreset,
-    /// Options of samples without samples.
+    /// Options for samples together with an encoder that takes no samples.
     #[error(
         "resolution and threshold are of the encoder `sampled`, which was not chosen; choose it, or leave them out"
     )]
     NotSampled,
-    /// A layer around tetrahedra that are given.
+    /// A band or regions together with tetrahedra from a file.
     #[error("band and region: the tetrahedra of the file are the domain; leave these options out")]
     BesidesFile,
-    /// No bisections of a domain that is nothing but bisections.
+    /// No refinement together with the bisection domain, which consists of bisections.
     #[error(
         "plain: the bisection domain is nothing but bisections; choose the domain `gmsh` or a file of tetrahedra"
     )]
     PlainBisection,
 }
 
-/// Why there are no tetrahedra of the domain that was chosen.
+/// Why the tetrahedra of the chosen domain could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum DomainError {
-    /// Gmsh made none.
+    /// Gmsh gave no valid tetrahedra.
     #[error(transparent)]
     Gmsh(#[from] GmshError),
     /// The file cannot be read.
@@ -107,7 +110,7 @@ pub enum DomainError {
         /// What is wrong with it.
         source: ReadTetrahedraError,
     },
-    /// The tetrahedra of the file are not of this solid.
+    /// The tetrahedra of the file do not conform to this solid.
     #[error("{}: {source}", path.display())]
     Conforming {
         /// The file.
@@ -117,11 +120,12 @@ pub enum DomainError {
     },
 }
 
-/// Samples along an edge, less one, unless asked for: the paper's 128 takes minutes on a processor.
+/// Samples along an edge, less one, unless the user asks for another number. The 128 of the paper
+/// takes minutes on a processor.
 const RESOLUTION: u32 = 32;
 
 impl EncodeChoices {
-    /// What the encoder is asked for.
+    /// The options for the encoder.
     ///
     /// # Errors
     /// [`ChoiceError`]: choices that exclude each other.
@@ -167,10 +171,12 @@ impl EncodeChoices {
         })
     }
 
-    /// The tetrahedra of a conforming domain; `None` for the bisection domain. Gmsh is ended when `progress` is cancelled.
+    /// Makes or reads the tetrahedra of a conforming domain. Returns `None` for the bisection
+    /// domain. When `progress` is cancelled, Gmsh is ended.
     ///
     /// # Errors
-    /// [`DomainError`]: the file cannot be read, Gmsh is not there or gives nothing valid, or the tetrahedra do not conform to the solid.
+    /// [`DomainError`]: the file cannot be read, Gmsh is missing or gives no valid tetrahedra, or
+    /// the tetrahedra do not conform to the solid.
     pub fn tetrahedra(
         &self,
         solid: &SolidMesh,
@@ -196,7 +202,7 @@ impl EncodeChoices {
     }
 }
 
-/// The file's name, where the error does not say it itself.
+/// The name of the file, where the error does not contain it.
 fn prefix(path: &std::path::Path, source: &ReadTetrahedraError) -> String {
     match source {
         ReadTetrahedraError::Open { .. } | ReadTetrahedraError::UnknownExtension { .. } => String::new(),

@@ -1,22 +1,22 @@
-//! Several `f64` at once. Only what the filter needs.
+//! Several `f64` at once, with the operations that the filter needs.
 //!
-//! Every operation is rounded as IEEE 754 says and none are fused, so all widths give the same bits: the width is the
-//! processor's, the file is not.
+//! Every operation is rounded as IEEE 754 says, and no operations are fused. So all widths give the
+//! same bits: the width depends on the processor, the file does not.
 //!
-//! No closures and no iterators over lanes in what uses this: the compiler builds those without the caller's
-//! instruction set, and each operation becomes a call.
+//! Code that uses this has no closures and no iterators over lanes. The compiler would build them
+//! without the caller's instruction set, and each operation would become a call.
 
-/// [`LANES`](Self::LANES) numbers.
+/// A vector of [`LANES`](Self::LANES) numbers.
 pub trait Doubles: Copy {
-    /// How many; divides [`GROUP`].
+    /// Number of lanes. It divides [`GROUP`].
     const LANES: usize;
-    /// One bit of each lane.
+    /// A mask: one bit for each lane.
     type Mask: Copy;
     /// The same number in all lanes.
     fn splat(x: f64) -> Self;
-    /// The numbers of `row` from `at` on.
+    /// Loads numbers of `row`, beginning at `at`.
     fn load(row: &[f64], at: usize) -> Self;
-    /// Writes them to `row` from `at` on.
+    /// Stores the numbers to `row`, beginning at `at`.
     fn store(self, row: &mut [f64], at: usize);
     /// Sum.
     fn add(self, o: Self) -> Self;
@@ -30,26 +30,27 @@ pub trait Doubles: Copy {
     fn sqrt(self) -> Self;
     /// Absolute value.
     fn abs(self) -> Self;
-    /// The lesser; neither may be NaN.
+    /// The lesser number. Neither may be NaN.
     fn min(self, o: Self) -> Self;
-    /// The greater; neither may be NaN.
+    /// The greater number. Neither may be NaN.
     fn max(self, o: Self) -> Self;
-    /// `self ≥ o`; false where either is NaN.
+    /// The mask of `self ≥ o`. It is false where either number is NaN.
     fn at_least(self, o: Self) -> Self::Mask;
-    /// `self < o`; false where either is NaN.
+    /// The mask of `self < o`. It is false where either number is NaN.
     fn less(self, o: Self) -> Self::Mask;
-    /// Where both hold.
+    /// The mask of the lanes in which both masks hold.
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// `yes` where the mask holds, else `no`.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
-    /// The mask, lane 0 the lowest bit.
+    /// The bits of the mask. Lane 0 is the lowest bit.
     fn bits(mask: Self::Mask) -> u8;
 }
 
-/// Rows are filled up to a multiple of this many numbers.
+/// The length of a row is a multiple of this number.
 pub const GROUP: usize = 8;
 
-/// Visits the indices in either of two sets, ascending; tells whether each is in the first. A set is a bit per index.
+/// Visits the indices that are in one of two sets, ascending. `visit` is told whether the index is
+/// in the first set. A set has one bit for each index.
 pub(super) fn visit_members(first: &[u8], second: &[u8], mut visit: impl FnMut(usize, bool)) {
     for (group, (&a, &b)) in first.iter().zip(second).enumerate() {
         let mut open = a | b;
@@ -66,13 +67,13 @@ pub(super) fn visit_members(first: &[u8], second: &[u8], mut visit: impl FnMut(u
 pub struct Vector<L>(pub [L; 3]);
 
 impl<L: Doubles> Vector<L> {
-    /// Three rows that follow each other, from `at` on.
+    /// Loads three rows that follow each other, beginning at `at`.
     #[inline(always)]
     pub fn load(rows: &[f64], stride: usize, at: usize) -> Self {
         Self([L::load(rows, at), L::load(rows, stride + at), L::load(rows, 2 * stride + at)])
     }
 
-    /// Writes to three rows that follow each other, from `at` on.
+    /// Stores to three rows that follow each other, beginning at `at`.
     #[inline(always)]
     pub fn store(self, rows: &mut [f64], stride: usize, at: usize) {
         self.0[0].store(rows, at);
@@ -98,13 +99,13 @@ impl<L: Doubles> Vector<L> {
         Self([self.0[0].add(o.0[0]), self.0[1].add(o.0[1]), self.0[2].add(o.0[2])])
     }
 
-    /// Multiple.
+    /// Product with a number.
     #[inline(always)]
     pub fn times(self, factor: L) -> Self {
         Self([factor.mul(self.0[0]), factor.mul(self.0[1]), factor.mul(self.0[2])])
     }
 
-    /// Quotient.
+    /// Quotient by a number.
     #[inline(always)]
     pub fn over(self, divisor: L) -> Self {
         Self([self.0[0].div(divisor), self.0[1].div(divisor), self.0[2].div(divisor)])
@@ -116,7 +117,7 @@ impl<L: Doubles> Vector<L> {
         self.0[0].mul(o.0[0]).add(self.0[1].mul(o.0[1])).add(self.0[2].mul(o.0[2]))
     }
 
-    /// Vector product, rounded as `DVec3::cross`.
+    /// Vector product, rounded like `DVec3::cross`.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         let ([a, b, c], [x, y, z]) = (self.0, o.0);
@@ -200,12 +201,13 @@ impl Doubles for f64 {
     }
 }
 
-/// Implements [`Doubles`] for a vector type of `std::arch` by the names of its intrinsics.
+/// Implements [`Doubles`] for a vector type of `std::arch`, given the names of its intrinsics.
 #[cfg(target_arch = "x86_64")]
 macro_rules! doubles {
     ($vector:ty, $lanes:literal, $mask:ty, $set:ident $load:ident $store:ident $add:ident $sub:ident $mul:ident $div:ident
      $sqrt:ident $min:ident $max:ident, { $($rest:item)* }) => {
-        // SAFETY of all blocks: reached only from functions with the instruction set; slices are as long as what is read.
+        // SAFETY of all blocks: the code is reached only from functions with the instruction set,
+        // and slices are at least as long as what is read.
         impl Doubles for $vector {
             const LANES: usize = $lanes;
             type Mask = $mask;
@@ -306,8 +308,11 @@ mod x86_64 {
     });
 }
 
-/// `dispatch! { fn name(a: A, …) -> R = generic }` makes `fn name(isa: Isa, a: A, …) -> R`, which runs the function `generic::<L>`,
-/// `L` of [`Doubles`], compiled for the instruction set; it must be `#[inline(always)]`, as all that it calls with an `L`.
+/// `dispatch! { fn name(a: A, …) -> R = generic }` makes the function `fn name(isa: Isa, a: A, …)
+/// -> R`.
+///
+/// It calls `generic::<L>`, compiled for the instruction set, where `L` implements [`Doubles`].
+/// `generic`, and all functions that it calls with an `L`, must be `#[inline(always)]`.
 macro_rules! dispatch {
     ($(#[$doc:meta])* fn $name:ident($($arg:ident: $ty:ty),* $(,)?) $(-> $out:ty)? = $generic:ident) => {
         $(#[$doc])*

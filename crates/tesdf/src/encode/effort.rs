@@ -1,9 +1,10 @@
-//! How much refining has cost, and how much it may.
+//! How many comparisons refining has made, and how many it may make.
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// How many faces a refinement has held against cells, and how many it may.
+/// Counts how often a refinement has compared a face with a cell, up to a limit.
 ///
-/// Whether it is too much depends on the mesh alone: the sum over all cells does, and only grows.
+/// Whether the limit is exceeded depends on the mesh alone: the sum over all cells does, and it
+/// only grows.
 #[derive(Debug)]
 pub struct Effort {
     spent: AtomicU64,
@@ -11,12 +12,12 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// None spent.
+    /// Nothing is spent yet.
     pub fn new(limit: u64) -> Self {
         Self { spent: AtomicU64::new(0), limit }
     }
 
-    /// Whether more was asked for than there is.
+    /// Whether more was spent than the limit allows.
     pub fn is_exceeded(&self) -> bool {
         self.spent.load(Ordering::Relaxed) > self.limit
     }

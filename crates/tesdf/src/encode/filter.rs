@@ -1,4 +1,4 @@
-//! The certified filter: which faces can be closest somewhere in a cell.
+//! The certified filter: finds the faces that can be closest somewhere in a cell.
 
 use super::candidates::{Candidates, Pool, Survivor};
 use super::chains::link_weight;
@@ -10,33 +10,35 @@ use crate::base::Chains;
 use crate::domain::Cell;
 use crate::geometry::{Feature, triangle_meets_tetrahedron};
 
-/// How near to a cell a face counts as meeting it, in the local frame.
+/// A face that comes this near to a cell counts as meeting it. The length is in the local frame.
 ///
-/// More than the rounding of point location (2^-52 of the cube), and more than the 1e-9 × diagonal
-/// under which the gradient comes from the faces around the closest feature: those are listed, too.
+/// It is more than the rounding of point location (2^-52 of the cube). It is also more than 1e-9 ×
+/// diagonal: nearer to the surface than that, the gradient comes from the faces around the closest
+/// feature, so these faces must be in the list.
 pub const PAD: f64 = 2.5e-9;
 
-/// What the filter found out about a cell.
+/// The result of the filter for a cell.
 #[derive(Debug)]
 pub struct Filtered {
     /// Faces that may be closest somewhere in the cell, or that meet it.
     pub survivors: Vec<Survivor>,
     /// Whether a face comes within [`PAD`] of the cell.
     pub crossing: bool,
-    /// Radius of the least ball around the centroid that holds the cell.
+    /// Radius of the least ball around the centroid that contains the cell.
     pub radius: f64,
     /// Least distance at the centroid.
     pub distance: f64,
-    /// The closest candidate, and what of it, at each corner and the centroid.
+    /// The closest candidate of each corner and of the centroid, and the part of it that is
+    /// closest.
     pub closest: [(u32, Feature); 5],
-    /// The chains of rule C up to this cell, its own filter included.
+    /// The chains of rule C up to this cell, with those of its own filter.
     pub chains: Chains,
 }
 
-/// Buffers that one thread uses again from cell to cell.
+/// Buffers that a thread uses again for each cell.
 #[derive(Debug, Default)]
 pub struct Scratch {
-    /// What the centroid of the last cell sees of its candidates.
+    /// The distances of the last cell's candidates from its centroid.
     pub(super) centroid: Vec<f64>,
     alive: Vec<u8>,
     near: Vec<u8>,
@@ -44,48 +46,50 @@ pub struct Scratch {
     rivals: Rivals,
     survivors: Vec<Survivor>,
     meeting: Vec<Survivor>,
-    /// By survivor: the weight of the longest chain of rule C that ends there, or [`DROPPED`].
+    /// For each survivor the weight of the longest chain of rule C that ends there, or [`DROPPED`].
     chained: Vec<u32>,
     pools: Vec<Pool>,
     pub(super) settled: Settled,
 }
 
 impl Scratch {
-    /// Keeps the memory of a result that was read.
+    /// Keeps the memory of a result that is no longer needed.
     pub fn reuse(&mut self, filtered: Filtered) {
         self.survivors = filtered.survivors;
     }
 
-    /// Memory for candidates.
+    /// Gives memory for candidates.
     pub fn pool(&mut self) -> Pool {
         self.pools.pop().unwrap_or_default()
     }
 
-    /// Keeps memory for [`pool`](Self::pool).
+    /// Takes the memory back for the next [`pool`](Self::pool).
     pub fn give_back(&mut self, pool: Pool) {
         self.pools.push(pool);
     }
 }
 
-/// Cells with more survivors than this are bisected anyway: below, rule C looks at them again.
+/// A cell with more survivors than this is bisected anyway, and rule C looks at its children again.
 const MAX_SHARING: usize = 256;
-/// Vertices with more faces than this are looked at in such cells too: where the vertex is the closest point of all of its faces,
-/// bisecting drops none of them.
+/// A vertex with more faces than this is looked at in such a cell too. Where the vertex is the
+/// closest point of all of its faces, bisection drops none of them.
 const LARGE_FAN: usize = 512;
 
-/// Marks survivors that rule C has dropped; no chain weighs so much.
+/// Marks a survivor that rule C has dropped. No chain has this weight.
 const DROPPED: u32 = u32::MAX;
 
-/// More candidates than this are only thinned out by rule A.
+/// More candidates than this are thinned out by rule A alone.
 const MANY: usize = 1 << 12;
 
 /// Applies rules A (point), B (plane) and C (shared feature) to the candidates of a cell.
 ///
-/// See `docs/math.md` for the proofs. Rules A and B drop a face only for one that is closer in all of
-/// the cell by [`MARGIN`](super::surface::MARGIN), a strict partial order, so that their sequence does not matter; rule C then
-/// goes through the rest in order. Faces that meet the cell are kept whole whatever the rules say.
+/// The proofs are in `docs/math.md`. Rules A and B drop a face only when another face is closer in
+/// the whole cell by more than [`MARGIN`](super::surface::MARGIN). This is a strict partial order,
+/// so the sequence of these tests does not matter. Rule C then goes through the remaining faces in
+/// order. A face that meets the cell is kept whatever the rules say.
 ///
-/// `chains` are those of the filters that left the candidates: rule C stops where their budget is used up.
+/// `chains` are those of the filters that left the candidates. Rule C stops where their budget is
+/// used up.
 pub fn filter(
     surface: &Surface,
     cell: &Cell,
@@ -98,7 +102,7 @@ pub fn filter(
     let radius = cell.radius();
     let at_centroid = candidates.look_from(surface, m, &mut scratch.centroid);
 
-    // The closest points seen from the corners and the centroid: the strongest rivals for rule A.
+    // The closest points of the corners and of the centroid: the strongest rivals for rule A.
     let [a, b, c, d] = candidates.nearest;
     let nearest = [a, b, c, d, at_centroid];
     let reach = nearest.map(|h| cell.corners.map(|c| c.distance(h.point) + surface.margin));
@@ -126,8 +130,8 @@ pub fn filter(
     }
 
     if n > MANY {
-        // Shallow cells are bisected anyway, and rules B and C compare pairs. Whatever may come within the padding
-        // of the cell stays.
+        // Shallow cells are bisected anyway, and rules B and C compare pairs of faces. Every face
+        // that may come within the padding of the cell stays.
         let kept = surface.touching == Touching::Kept;
         visit_members(&scratch.alive, &scratch.near, |index, _| {
             let requirement = surface.requirement(candidates.faces[index], Feature::Face);
@@ -168,8 +172,9 @@ pub fn filter(
 }
 
 dispatch! {
-    /// Rule A: which candidates are not farther than one of five points as seen from all corners; and which come `near`
-    /// the centroid. A bit each.
+    /// Rule A: sets a bit in `alive` for each candidate that is not farther than one of five points
+    /// as seen from all corners. Sets a bit in `near` for each candidate that comes near the
+    /// centroid.
     fn point_rule(
         distances: [&[f64]; 4],
         reach: &[[f64; 4]; 5],
@@ -213,10 +218,11 @@ fn point_rule_lanes<L: Doubles>(
     }
 }
 
-/// Rule C: of the faces that are one and the same edge or vertex to the whole cell, one is enough.
+/// Rule C: of the faces of which the whole cell needs one and the same edge or vertex, one face is
+/// enough.
 ///
-/// Goes through the survivors in order, and drops one when another that is still there has what the cell needs of it: the last
-/// such one, so that chains stay short.
+/// Goes through the survivors in order. A survivor is dropped when another remaining survivor has
+/// the part that the cell needs. Of several it takes the last, so that chains stay short.
 fn share_features(
     surface: &Surface,
     cell: &Cell,
@@ -229,7 +235,7 @@ fn share_features(
     chained.clear();
     chained.resize(survivors.len(), 0);
     let mut heaviest = 0;
-    // The faces of a fan ask one after the other for the same vertex.
+    // Faces of a fan often ask for the same vertex one after the other.
     let mut before = None;
     for (i, g) in survivors.iter().enumerate() {
         let part = g.requirement;

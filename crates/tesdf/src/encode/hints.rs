@@ -1,4 +1,4 @@
-//! How the closest feature tells the sign, where it does so beyond doubt.
+//! How the closest feature tells the sign, where there is no doubt.
 
 use std::cell::Cell;
 
@@ -8,32 +8,37 @@ use super::surface::Surface;
 use crate::asset::layout::{SignHint, SignHints};
 use crate::geometry::{Aabb, AabbTree, Triangle};
 
-/// Whether the mesh meets itself or folds in ways that only the winding number sorts out.
+/// Whether the mesh meets itself or folds in ways that need the winding number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Simplicity {
-    /// No self-intersections; every edge and vertex is manifold; no duplicate or flat faces.
+    /// No self-intersections, all edges and vertices manifold, no duplicate or flat faces.
     Simple,
-    /// Anything else.
+    /// Any other mesh.
     Involved,
 }
 
-/// Sheets nearer to each other than this (local frame) are left to the winding number: `f32` storage
-/// could take one for the other. Twenty times its error.
+/// Sheets that are nearer to each other than this (local frame) are left to the winding number,
+/// because `f32` storage could take one sheet for the other. It is twenty times the error of `f32`.
 const THIN: f64 = 2e-6;
-/// Faces whose height is a smaller share of their length than this have no trustworthy normal in `f32`.
+/// A face whose height is a smaller share of its length than this has no reliable normal in `f32`.
 const SLIVER: f64 = 1e-5;
-/// Cosine of the largest angle between normals across which the plane of either face tells the sign.
+/// Cosine of the largest angle between the normals of two faces at which the plane of either face
+/// tells the sign.
 ///
-/// The direction from the feature to the point lies between the normals, so its angle to either is at
-/// most theirs, 60 degrees: the sine left over is far above any rounding.
+/// The direction from the feature to the point lies between the normals, so its angle to either
+/// normal is at most the angle between them, 60 degrees. The sine that is left is far above any
+/// rounding.
 const FLAT: f64 = 0.5;
-/// Two faces at one vertex that come this near to each other on the unit sphere around it are as good as folded.
+/// Two faces at one vertex that come this near to each other on the unit sphere around the vertex
+/// count as folded.
 const NARROW: f64 = 0.3;
-/// Cosine beyond which two faces fold back onto each other: blades of under 37 degrees. (Of 9 degrees, `f32` storage
-/// took one side for the other up to 4e-6 × diagonal away; from 20 degrees on never beyond 1e-6.)
+/// Cosine beyond which two faces fold back onto each other: blades of less than 37 degrees.
+///
+/// For a blade of 9 degrees, `f32` storage took one side for the other up to 4e-6 × diagonal away.
+/// From 20 degrees on this never happened beyond 1e-6.
 const FOLDED: f64 = -0.8;
 
-/// The hints of all faces. See `docs/math.md`, "The sign rule".
+/// The hints of all faces. See "The sign rule" in `docs/math.md`.
 pub fn sign_hints(surface: &Surface, tree: &AabbTree, simplicity: Simplicity) -> Vec<SignHints> {
     use rayon::prelude::*;
     if simplicity == Simplicity::Involved {
@@ -61,18 +66,20 @@ pub fn sign_hints(surface: &Surface, tree: &AabbTree, simplicity: Simplicity) ->
         .collect()
 }
 
-/// What is known of a face from its corners with more than [`MAX_RING`] faces, without a look at pairs.
+/// What is known of a face from those of its corners that have more than [`MAX_RING`] faces,
+/// without a comparison of pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum LargeFan {
     /// It has no such corner.
     None,
     /// No two faces around this vertex fold back onto each other.
     Open(u32),
-    /// Faces may.
+    /// Faces around such a corner may fold back onto each other.
     MayFold,
 }
 
-/// Cosine to their middle up to which no two normals are as far apart as [`FOLDED`]: of 71.3 degrees, half of 142.7.
+/// Cosine of the angle of all normals to their middle up to which no two of them are as far apart
+/// as [`FOLDED`]: 71.3 degrees, half of 142.7.
 const OPEN: f64 = 0.32;
 
 fn large_fans(surface: &Surface) -> Vec<LargeFan> {
@@ -98,7 +105,7 @@ fn large_fans(surface: &Surface) -> Vec<LargeFan> {
     fans
 }
 
-/// A sliver, or so near to another sheet that rounding could confuse them.
+/// Whether a face is a sliver, or so near to another sheet that rounding could confuse the two.
 fn is_delicate(surface: &Surface, tree: &AabbTree, fans: &[LargeFan], face: usize) -> bool {
     let fan = fans[face];
     let triangle = &surface.triangles[face];
@@ -135,11 +142,13 @@ fn is_delicate(surface: &Surface, tree: &AabbTree, fans: &[LargeFan], face: usiz
     delicate.get()
 }
 
-/// Whether two faces that share one vertex come within some 17 degrees of each other beside it.
+/// Whether two faces that share one vertex come within some 17 degrees of each other beside the
+/// vertex.
 fn narrow_fold(surface: &Surface, face: usize, other: usize) -> bool {
     let (f, o) = (surface.faces[face], surface.faces[other]);
     let Some(v) = f.iter().find(|v| o.contains(v)) else { return false };
-    // The directions that a face takes up from the vertex, as a triangle with its corners on the unit sphere.
+    // The directions from the vertex to the face, as a triangle with its corners on the unit
+    // sphere.
     let sector = |which: usize, corners: [u32; 3]| {
         let t = &surface.triangles[which];
         let k = corners.iter().position(|c| c == v).unwrap_or(0);
@@ -149,7 +158,7 @@ fn narrow_fold(surface: &Surface, face: usize, other: usize) -> bool {
     within(&sector(face, f), &sector(other, o), NARROW)
 }
 
-/// Whether two triangles come within `distance`; may say yes without need.
+/// Whether two triangles come within `distance`. May say yes where they do not.
 fn within(a: &Triangle, b: &Triangle, distance: f64) -> bool {
     let edges = |t: &Triangle| {
         [t.corners[1] - t.corners[0], t.corners[2] - t.corners[1], t.corners[0] - t.corners[2]]
@@ -175,7 +184,7 @@ fn within(a: &Triangle, b: &Triangle, distance: f64) -> bool {
 fn edge_hint(surface: &Surface, face: u32, k: usize, delicate: &[bool]) -> SignHint {
     let [f, g] = surface.edge_faces(surface.edges[face as usize][k]) else { return SignHint::Winding };
     let other = if *f == face { *g } else { *f };
-    // A sliver's normal may be noise, and its other edges are as near as this one.
+    // The normal of a sliver may be noise, and its other edges are as near as this one.
     if delicate[other as usize] {
         return SignHint::Winding;
     }
@@ -187,7 +196,7 @@ fn edge_hint(surface: &Surface, face: u32, k: usize, delicate: &[bool]) -> SignH
     if cosine < FOLDED {
         return SignHint::Winding;
     }
-    // Convex when the other face's far corner lies behind this face.
+    // The edge is convex when the far corner of the other face lies behind this face.
     let a = t.corners[k];
     let apex = o
         .corners
@@ -197,23 +206,24 @@ fn edge_hint(surface: &Surface, face: u32, k: usize, delicate: &[bool]) -> SignH
     if apex < 0.0 { SignHint::Outside } else { SignHint::Inside }
 }
 
-/// Slack of "on or below" for the ring of a vertex, as a share of the ring edge's length.
+/// Slack of "on or below" for the ring of a vertex, as a share of the length of the ring's edge.
 const RING: f64 = 1e-12;
 
 /// The shape of the surface around a vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Corner {
-    /// Delicate faces, or more than [`MAX_RING`].
+    /// Some faces are delicate, or there are more than [`MAX_RING`].
     Unknown,
-    /// All faces are on or below the planes of the others.
+    /// Every face lies on or below the planes of the others.
     Convex,
-    /// The same, with inside and outside swapped.
+    /// The same with inside and outside swapped.
     Concave,
-    /// Anything else.
+    /// Any other shape.
     Other,
 }
 
-/// Vertices with more faces are left to the winding number: what tells their shape compares pairs.
+/// A vertex with more faces than this is left to the winding number, because finding its shape
+/// compares pairs of faces.
 const MAX_RING: usize = 1024;
 
 fn corner(surface: &Surface, vertex: u32, delicate: &[bool]) -> Corner {
@@ -221,7 +231,7 @@ fn corner(surface: &Surface, vertex: u32, delicate: &[bool]) -> Corner {
     if around.len() > MAX_RING || around.iter().any(|&f| delicate[f as usize]) {
         return Corner::Unknown;
     }
-    // Heights of all ring vertices over all planes around the vertex.
+    // The heights of all ring vertices over all planes around the vertex.
     let (mut below, mut above) = (true, true);
     for &f in around {
         let t = &surface.triangles[f as usize];

@@ -1,4 +1,4 @@
-//! Whether a list that came from elsewhere is exact: by the certified filter.
+//! Proves, by the certified filter, that a list from elsewhere is exact.
 use super::candidates::Candidates;
 use super::filter::{Scratch, filter};
 use super::settled::Settled;
@@ -6,12 +6,14 @@ use super::surface::Surface;
 use crate::base::Chains;
 use crate::domain::Cell;
 
-/// Bisections below a cell that tell whether its list is exact.
+/// How many bisections below a cell the proof may make.
 const LEVELS: u32 = 12;
 
-/// Proves that `list` is exact in `cell`, where only `candidates` can be closest: the chains of rule C that the proof rests on.
+/// Proves that `list` is exact in `cell`, where only `candidates` can be closest. Returns the
+/// chains of rule C that the proof rests on.
 ///
-/// `None`: the filter asks for a face, edge or vertex that the list does not have. The list can be exact all the same.
+/// Returns `None` when the filter asks for a face, edge or vertex that the list does not have. The
+/// list can still be exact then.
 pub fn holds(
     surface: &Surface,
     cell: &Cell,

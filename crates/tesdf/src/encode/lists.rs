@@ -1,4 +1,5 @@
-//! From refined trees to the final lists: tightened or sampled, made ready for deformation, truncated; and the labels.
+//! Makes the final lists of refined trees: tightened or sampled, completed for deformation,
+//! truncated. Labels the cells.
 use rayon::prelude::*;
 
 use super::assemble::collect;
@@ -24,42 +25,44 @@ pub struct Lists<'a> {
     pub surface: &'a Surface,
     /// A tree over its faces.
     pub tree: &'a AabbTree,
-    /// Encoder, tightening, truncation, deformation.
+    /// The options for encoder, tightening, truncation and deformation.
     pub options: &'a EncodeOptions,
-    /// Local frame over the mesh's unit.
+    /// Lengths of the local frame per unit of the mesh.
     pub scale: f64,
 }
 
-/// The list of a cell, and what is known of it.
+/// The list of a cell, and what is proved of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct List {
     /// Face ids, ascending.
     pub faces: Vec<u32>,
-    /// Distance from the surface within which the list is exact (local frame); infinite unless it was truncated.
+    /// Distance from the surface within which the list is exact (local frame). It is infinite,
+    /// unless the list was truncated.
     pub exact_within: f64,
-    /// The chains of rule C that the proof of it rests on; `None`: nothing is proved.
+    /// The chains of rule C that the proof rests on. `None`: nothing is proved.
     pub proof: Option<Chains>,
 }
 
-/// The labels of all cells in depth-first order, and what is known of all lists.
+/// The labels of all cells in depth-first order, and what is proved of all lists.
 #[derive(Clone, Debug)]
 pub struct Finished {
     /// The labels.
     pub labels: Vec<Label>,
-    /// The least of all lists.
+    /// The least distance of all lists.
     pub exact_within: f64,
-    /// The heaviest of all lists; `None` when one list is not proved.
+    /// The heaviest chains of all lists. `None`: at least one list is not proved.
     pub proof: Option<Chains>,
 }
 
-/// Faces of a list before anything is added or dropped.
+/// The faces of a list before any are added or dropped.
 struct Found {
     ranked: Vec<Ranked>,
     proof: Option<Chains>,
 }
 
 impl Lists<'_> {
-    /// Finishes the lists and labels the cells. `winding` labels the bisection domain, `sampler` is of the sampled encoder.
+    /// Finishes the lists and labels the cells. `winding` labels the cells of the bisection domain.
+    /// `sampler` is for the sampled encoder.
     pub fn finish(
         &self,
         trees: &mut [Tree],
@@ -82,7 +85,7 @@ impl Lists<'_> {
         progress.begin(Stage::Tighten, leaves.len() as u64);
         let (sampled, step) = match &self.options.encoder {
             Encoder::Certified => (leaves.iter().map(|_| None).collect(), 1),
-            // Nearly all of the work is done then.
+            // The sampler has done nearly all of the work by then.
             Encoder::Sampled(sampling) => (self.sampled(&leaves, &cells, sampling, sampler, progress)?, 0),
         };
         let finished: Option<Vec<(Label, f64, Option<Chains>)>> = leaves
@@ -102,7 +105,7 @@ impl Lists<'_> {
                     let tetrahedron = roots.tetrahedra.get(root);
                     let levels = match tetrahedron {
                         None => levels.of(faces),
-                        // Wide ones have long lists that shorten well.
+                        // Wide cells have long lists, which shorten well.
                         Some(_) => self.options.tighten_levels,
                     };
                     let found = sampled.unwrap_or_else(|| self.found(&cell, faces, levels, *chains, scratch));
@@ -113,7 +116,8 @@ impl Lists<'_> {
                     (Leaf::Outside, _) | (_, Some(Side::Outside)) => Label::Outside,
                     (_, Some(Side::Inside)) => Label::Inside,
                     (_, None) => match (crosses, winding.at_perturbed(cell.centroid())) {
-                        // Read back as i32: it is negative where the surface is inside out.
+                        // The number is read back as an `i32`: it is negative where the surface is
+                        // inside out.
                         (true, w) => Label::Crossing(w as u32),
                         (false, w) if w >= 1 => Label::Inside,
                         _ => Label::Outside,
@@ -128,8 +132,11 @@ impl Lists<'_> {
         Ok(Finished { labels: finished.into_iter().map(|f| f.0).collect(), exact_within, proof })
     }
 
-    /// The list of a cell of a conforming domain's `tetrahedron`, or of no tetrahedron, from `faces`, among which are all that it
-    /// needs; `chains` are those of the filters that left them.
+    /// Makes the list of a cell.
+    ///
+    /// `tetrahedron` is the tetrahedron of the conforming domain that has the cell, or `None`.
+    /// `faces` contains all faces that the cell needs, and `chains` are those of the filters that
+    /// left `faces`.
     pub fn of_cell(
         &self,
         cell: &Cell,
@@ -142,7 +149,8 @@ impl Lists<'_> {
         self.completed(cell, tetrahedron, faces, false, found)
     }
 
-    /// What Alg. 1 finds in the listed cells, before anything is added or dropped; `None` for other leaves.
+    /// The faces that Alg. 1 finds in each listed cell, before any are added or dropped. `None` for
+    /// other leaves.
     fn sampled(
         &self,
         leaves: &[&mut Leaf],
@@ -173,7 +181,8 @@ impl Lists<'_> {
         Ok(found)
     }
 
-    /// The faces of a cell's list, before anything is added or dropped; `chains` are those of the filters that left `faces`.
+    /// The faces of a cell's list, before any are added or dropped. `chains` are those of the
+    /// filters that left `faces`.
     fn found(&self, cell: &Cell, faces: &[u32], levels: u32, chains: Chains, scratch: &mut Scratch) -> Found {
         match &self.options.encoder {
             Encoder::Certified => {
@@ -191,7 +200,7 @@ impl Lists<'_> {
         }
     }
 
-    /// An exact list, ranked where it is to be cut.
+    /// The faces of an exact list, ranked where the list is to be cut.
     fn proved(&self, cell: &Cell, list: &[u32], chains: Chains, scratch: &mut Scratch) -> Found {
         let (ranked, chains) = match self.options.max_entries {
             Some(most) if list.len() > most as usize => rank(self.surface, cell, list, chains, scratch),
@@ -202,8 +211,9 @@ impl Lists<'_> {
 
     /// E_t of Alg. 1: the candidates with a d_f.
     ///
-    /// A threshold as wide as the grid makes it exact (docs/math.md, 3), if the samples were looked at as they should. What a [`Sampler`] says is
-    /// no proof: the certified filter has to agree, and only its own bounds say from what distance on a face is needed.
+    /// A threshold as wide as the grid makes the list exact (docs/math.md, 3), if the sampler did
+    /// its work correctly. The result of a [`Sampler`] is no proof. So the certified filter has to
+    /// agree, and only its own bounds tell the distance from which on a face is needed.
     fn sampled_found(
         &self,
         cell: &SampledCell,
@@ -222,7 +232,8 @@ impl Lists<'_> {
         }
     }
 
-    /// What the encoder found, with the faces that a cell has whatever that is, truncated; as [`of_cell`](Self::of_cell).
+    /// Adds the faces that the cell must have whatever the encoder found, and truncates the list.
+    /// The arguments are those of [`of_cell`](Self::of_cell).
     fn completed(
         &self,
         cell: &Cell,
@@ -232,7 +243,7 @@ impl Lists<'_> {
         Found { mut ranked, proof }: Found,
     ) -> List {
         if crossing {
-            // The sign of a point is counted over these.
+            // The sign of a point is counted over these faces.
             let corners = |&face: &u32| self.surface.triangles[face as usize].corners;
             let meets = |face: &u32| triangle_meets_tetrahedron(&corners(face), &cell.corners, PAD);
             raise(&mut ranked, faces.iter().copied().filter(meets), f64::NEG_INFINITY);
@@ -248,10 +259,10 @@ impl Lists<'_> {
     }
 }
 
-/// Cells whose candidates are held at once, by the sampled encoder.
+/// Number of cells whose candidates the sampled encoder holds at a time.
 const SAMPLED_AT_ONCE: usize = 1 << 10;
 
-/// Gives some faces an order, and a place in the list.
+/// Adds `faces` to the list where they are missing, and lowers their order to `order`.
 fn raise(ranked: &mut Vec<Ranked>, faces: impl Iterator<Item = u32>, order: f64) {
     ranked.sort_unstable_by_key(|r| r.face);
     let known = ranked.len();
@@ -265,14 +276,16 @@ fn raise(ranked: &mut Vec<Ranked>, faces: impl Iterator<Item = u32>, order: f64)
     ranked.dedup_by_key(|r| r.face);
 }
 
-/// The first `most` faces by order, ascending by id; and the least distance that a dropped one may be needed at.
+/// The first `most` faces by order, with their ids ascending. Also the least distance at which a
+/// dropped face may be needed.
 ///
-/// Distance-ordered truncation (Sec. V-C). Faces of order −∞ are never dropped.
+/// This is distance-ordered truncation (Sec. V-C). Faces of order −∞ are never dropped.
 fn truncated(mut ranked: Vec<Ranked>, most: Option<u32>) -> (Vec<u32>, f64) {
     let most = most.map_or(ranked.len(), |most| most as usize);
     let mut exact_within = f64::INFINITY;
     if ranked.len() > most {
-        // Of those for deformation, whose order is 0, first what is needed nearest to the surface at rest.
+        // The faces for deformation have the order 0. Of these, the faces that are needed nearest
+        // to the surface at rest come first.
         let key =
             |a: &Ranked, b: &Ranked| a.order.total_cmp(&b.order).then(a.distance.total_cmp(&b.distance));
         ranked.sort_by(|a, b| key(a, b).then(a.face.cmp(&b.face)));
@@ -285,7 +298,7 @@ fn truncated(mut ranked: Vec<Ranked>, most: Option<u32>) -> (Vec<u32>, f64) {
     (faces, exact_within)
 }
 
-/// The cells of the leaves in depth-first order, with their root.
+/// Collects the cells of the leaves in depth-first order, each with its root.
 fn place(tree: &Tree, cell: Cell, root: usize, cells: &mut Vec<(Cell, usize)>) {
     match tree {
         Tree::Leaf(_) => cells.push((cell, root)),

@@ -1,10 +1,12 @@
-//! Which faces can be closest in each cell: from a solid mesh to an encoded asset.
+//! The encoder: finds the faces that can be closest in each cell. A solid mesh becomes an encoded
+//! asset.
 //!
-//! 1. `roots`: the tetrahedra to begin with, of the cube or of a conforming mesh.
-//! 2. `refine`: bisects them, hands the surviving faces of each cell to its children
-//!    (`filter`), and merges cells while unwinding where that costs less.
-//! 3. `lists`: for each cell that is kept a label, and its list: certified (`tighten`) or `sampled`, truncated by `rank`.
-//! 4. `assemble`: lays the forest and its lists out as bytes.
+//! 1. `roots` gives the first tetrahedra, of the cube or of a conforming mesh.
+//! 2. `refine` bisects them, passes the surviving faces of each cell to its children (`filter`),
+//!    and merges cells on the way back where that costs less.
+//! 3. `lists` gives each remaining cell a label and a list. The list is certified (`tighten`) or
+//!    `sampled`, and may be truncated (`rank`).
+//! 4. `assemble` lays the forest and its lists out as bytes.
 mod assemble;
 mod attempts;
 pub(crate) mod candidates;
@@ -30,7 +32,7 @@ mod statistics;
 pub(crate) mod surface;
 mod tighten;
 
-/// What the crate for devices and the tests look into. Not for others: it changes without notice.
+/// For the GPU crate and for tests only: it may change in any version.
 #[doc(hidden)]
 pub mod internal {
     pub use super::filter::PAD;

@@ -18,8 +18,8 @@ use crate::geometry::{Aabb, AabbTree, Child, LocalFrame};
 use crate::mesh::{MeshError, SolidMesh, TriangleMesh, WindingNumber};
 use crate::verify::self_check;
 
-/// Encodes a solid in the bisection domain; the same mesh and options give the same bytes on any number of threads (it
-/// runs in the current rayon pool).
+/// Encodes a solid in the bisection domain; the same mesh and options give the same bytes on any
+/// number of threads (it runs in the current rayon pool).
 ///
 /// # Errors
 /// [`EncodeError`]; nothing is written anywhere.
@@ -110,7 +110,7 @@ pub fn encode_with(
     let mut trees = match domain {
         Domain::Bisection => refine_within_effort(refiner, &roots.cells, EFFORT_PER_FACE)?,
         Domain::Conforming(_) => {
-            // All of it is the domain, and every cell gets a list.
+            // The whole mesh of tetrahedra is the domain, and every cell gets a list.
             refiner.band = f64::INFINITY;
             refiner.weights.far_list = usize::MAX;
             if options.refinement == Refinement::None {
@@ -191,15 +191,17 @@ pub fn encode_with(
     Ok(asset)
 }
 
-/// Half width of the layer around the surface whose queries count full, as a share of the diagonal.
+/// Half width of the layer around the surface in which a query counts in full, as a share of the
+/// diagonal.
 const NEAR: f64 = 0.01;
-/// Faces and nodes that a query by the face tree reads where lists are long: 270 to 330 on bolt and nut.
+/// Faces and nodes that a query by the face tree reads where lists are long. On bolt and nut it
+/// reads 270 to 330.
 const FAR_FACES: f64 = 250.0;
-/// Shorter lists are never left to the face tree.
+/// A cell with a shorter list is never left to the face tree.
 const FAR_LIST: usize = 48;
-/// Share of the diagonal within which nothing is left to the face tree.
+/// A cell nearer to the surface than this share of the diagonal is never left to the face tree.
 const FAR_DISTANCE: f64 = 0.025;
-/// Refinement is not expected to make lists shorter than this.
+/// Refinement is not expected to make a list shorter than this.
 const FLOOR: f64 = 6.0;
 
 fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<f64, EncodeError> {
@@ -266,7 +268,7 @@ fn local_mesh(mesh: &TriangleMesh, frame: LocalFrame) -> Result<TriangleMesh, Me
     TriangleMesh::new(vertices, mesh.faces().to_vec())
 }
 
-/// The face tree in `f32`, relative to the middle of the cube, boxes rounded outward.
+/// The face tree in `f32`, relative to the middle of the cube. Boxes are rounded outward.
 fn face_tree(tree: &AabbTree, cube: &DomainCube) -> (Vec<[f32; 12]>, Vec<[u32; 2]>) {
     let middle = cube.middle();
     let child = |c: Child| match c {
@@ -275,7 +277,8 @@ fn face_tree(tree: &AabbTree, cube: &DomainCube) -> (Vec<[f32; 12]>, Vec<[u32; 2
     };
     let mut nodes = tree.nodes().to_vec();
     if let (bounds, Child::Leaf { start, end }) = tree.root() {
-        // A tree of one leaf is written as a node with two: a closed mesh has at least two faces.
+        // A tree that is a single leaf is written as a node with two leaves. A closed mesh has at
+        // least two faces.
         let half = start + (end - start) / 2;
         nodes.push([(bounds, Child::Leaf { start, end: half }), (bounds, Child::Leaf { start: half, end })]);
     }

@@ -1,4 +1,5 @@
-//! Rule B of the filter: a linear lower bound of a face's distance against a rival's chord.
+//! Rule B of the filter: compares a linear lower bound of a face's distance with the chord of
+//! another face, the rival.
 
 use glam::DVec3;
 
@@ -7,10 +8,11 @@ use super::doubles::{Doubles, GROUP, Vector, dispatch, visit_members};
 use super::surface::{Surface, Touching};
 use crate::domain::Cell;
 
-/// Share of the margin within which a corner is on a face: rounding of the distance to a face that it is on.
+/// A corner counts as lying on a face when its distance is below this share of the margin: the
+/// rounding of the distance to a face that the corner lies on.
 const TIE: f64 = 0.25;
 
-/// At most this many faces stand against each candidate; the nearest ones.
+/// The largest number of rivals that a candidate is compared with. The nearest faces are taken.
 const MAX_RIVALS: usize = 96;
 
 /// Buffers for the chords of chosen rivals.
@@ -20,19 +22,20 @@ pub struct Rivals {
     rows: [Vec<f64>; 4],
 }
 
-/// The chords that candidates are held against: values at the four corners, in rows.
+/// The chords that candidates are compared with: their values at the four corners, in rows.
 #[derive(Clone, Copy)]
 pub struct Chords<'a> {
     rows: [&'a [f64]; 4],
-    /// The least at each corner.
+    /// The least value at each corner.
     least: [f64; 4],
 }
 
 impl Rivals {
-    /// All candidates where they are few, else the [`MAX_RIVALS`] of those `alive` whose chords have the least sum.
+    /// Chooses all candidates where there are few, and otherwise the [`MAX_RIVALS`] of those
+    /// `alive` whose chords have the least sum.
     ///
-    /// It makes no difference that rule A has dropped some of the few: the point that beats one is of a face whose chord
-    /// lies lower at all corners.
+    /// Where there are few, it does not matter that rule A has dropped some of them: the point that
+    /// beats such a face belongs to a face whose chord lies lower at all corners.
     pub fn choose<'a>(&'a mut self, candidates: &Candidates<'a>, alive: &[u8]) -> Chords<'a> {
         let distances = candidates.seen.map(|rows| &rows[..candidates.stride]);
         let least = candidates.nearest.map(|h| h.distance);
@@ -57,7 +60,7 @@ impl Rivals {
     }
 }
 
-/// What the rule says of each candidate.
+/// The result of the rule for each candidate.
 #[derive(Debug, Default)]
 pub struct Verdict {
     low: Vec<f64>,
@@ -65,7 +68,8 @@ pub struct Verdict {
 }
 
 impl Verdict {
-    /// A lower bound of the candidate's distance all over the cell, and whether it is beaten.
+    /// A lower bound of the candidate's distance in the whole cell, and whether a rival beats the
+    /// candidate.
     pub fn of(&self, index: usize) -> (f64, bool) {
         (self.low[index], self.beaten[index / GROUP] >> (index % GROUP) & 1 == 1)
     }
@@ -73,21 +77,21 @@ impl Verdict {
 
 /// All that the rule reads.
 pub struct PlaneRule<'a> {
-    /// What the centroid and the corners see of each candidate.
+    /// The rows of the centroid and of the corners.
     seen: [&'a [f64]; 5],
     stride: usize,
-    /// From the centroid and from each corner to the corners.
+    /// The vectors from the centroid and from each corner to the corners.
     offsets: [[DVec3; 4]; 5],
     margin: f64,
     /// The margin times the width of the cell.
     turn: f64,
-    /// Faces this near to a corner share it; negative where ties are left alone.
+    /// A face that is this near to a corner shares it. Negative where the rule leaves ties alone.
     tie: f64,
     rivals: Chords<'a>,
 }
 
 impl<'a> PlaneRule<'a> {
-    /// For a cell whose centroid sees `centroid`.
+    /// The rule for a cell. `centroid` has the distances from its centroid.
     pub fn new(
         surface: &Surface,
         cell: &Cell,
@@ -112,15 +116,17 @@ impl<'a> PlaneRule<'a> {
         }
     }
 
-    /// Judges the candidates that are `alive`, and bounds those that are `near` as well.
+    /// Judges the candidates that are `alive`, and also bounds those that are `near`.
     ///
-    /// d(·, g) is convex, so it lies above its tangent at the centroid and at each corner. The slope is off by the
-    /// rounding of the closest point over the distance, so the bound is lowered by as much times the width of the cell,
-    /// and once more by the margin that the rule asks for. A candidate is beaten when some rival's chord lies below one
-    /// of its tangents at all four corners.
+    /// d(·, g) is convex, so it lies above its tangent at the centroid and at each corner. The
+    /// slope has an error: the rounding of the closest point over the distance. So the bound is
+    /// lowered by this error times the width of the cell, and once more by the margin that the rule
+    /// asks for. A candidate is beaten when the chord of a rival lies below one of the candidate's
+    /// tangents at all four corners.
     ///
-    /// Where a corner of the cell is on both faces, both distances are 0 there and no margin is to be had. The margin at the
-    /// other corners is enough: the tangent may pass the shared corner at 0 (docs/math.md, 4).
+    /// Where a corner of the cell lies on both faces, both distances are 0 there, so there can be
+    /// no margin. The margin at the other corners is enough: the tangent may pass the shared corner
+    /// at 0 (docs/math.md, 4).
     pub fn judge(&self, isa: crate::base::Isa, alive: &[u8], near: &[u8], verdict: &mut Verdict) {
         if verdict.low.len() < self.stride {
             verdict.low.resize(self.stride, 0.0);
@@ -150,7 +156,8 @@ fn judge_lanes<L: Doubles>(rule: &PlaneRule, alive: &[u8], near: &[u8], low: &mu
     }
 }
 
-/// The bounds of one vector of candidates; returns which of those in question are beaten.
+/// Computes the bounds of one vector of candidates. Returns which candidates of `in_question` are
+/// beaten.
 #[inline(always)]
 fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut [f64]) -> u8 {
     let least = &rule.rivals.least;
@@ -188,7 +195,7 @@ fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut 
                 let lane = open.trailing_zeros() as usize;
                 open &= open - 1;
                 let t = [values[0][lane], values[1][lane], values[2][lane], values[3][lane]];
-                // A cell that is no thicker than the tie tells nothing apart.
+                // A cell that is no thicker than the tie cannot tell faces apart.
                 let tied = t[0] == rule.tie && t[1] == rule.tie && t[2] == rule.tie && t[3] == rule.tie;
                 beaten |= u8::from(!tied && any_below::<L>(&rule.rivals.rows, t)) << lane;
             }
@@ -198,7 +205,8 @@ fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut 
     beaten
 }
 
-/// The value of a tangent at a corner that the candidates may be on: not below 0 there, before it was lowered, is enough.
+/// The value of a tangent at a corner that may lie on the candidates. It is enough that the
+/// tangent, before it was lowered, is not below 0 there.
 #[inline(always)]
 fn at_tie<L: Doubles>(rule: &PlaneRule, at: usize, corner: usize, value: L, lowered_by: L) -> L {
     let tie = L::splat(rule.tie);

@@ -1,4 +1,5 @@
-//! The filter, the cover and the tightening of random tetrahedra amid random triangles, against brute force.
+//! Checks the filter, the cover and the tightening against brute force, on random tetrahedra among
+//! random triangles.
 use glam::DVec3;
 use proptest::prelude::*;
 
@@ -12,7 +13,7 @@ use crate::geometry::Aabb;
 use crate::mesh::TriangleMesh;
 use crate::sampling::Random;
 
-/// In the cube from -1 to 1.
+/// A random point in the cube from -1 to 1.
 fn in_cube(random: &mut Random) -> DVec3 {
     random.in_box(Aabb { min: DVec3::NEG_ONE, max: DVec3::ONE })
 }

@@ -1,33 +1,37 @@
-//! From what distance on a cell needs each face of its list: Eq. (7), by bounds.
+//! The distance from which on a cell needs each face of its list: Eq. (7), by bounds.
 use super::candidates::{Candidates, GRADIENT};
 use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
 use crate::base::Chains;
 use crate::domain::Cell;
 
-/// A face of a list, with what truncation asks.
+/// A face of a list, with the numbers that truncation uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ranked {
     /// The face.
     pub face: u32,
-    /// Less comes first.
+    /// Faces with a lower order come first.
     pub order: f64,
-    /// At points nearer to the surface than this the cell does not need the face (local frame).
+    /// At points nearer to the surface than this (local frame), the cell does not need the face.
     pub distance: f64,
 }
 
-/// Bisections below a cell that tell from what distance on it needs a face.
+/// How many bisections below a cell the ranking makes.
 const LEVELS: u32 = 8;
-/// Sub-cells this small against their distance from the surface are not bisected on: their bounds are as sharp as they need be.
+/// A sub-cell is not bisected on when its size is below this share of its distance from the
+/// surface: its bounds are sharp enough.
 const SMALL: f64 = 0.02;
 
-/// For each face of a list a lower bound of d_f, Eq. (7): the least distance over the sub-cells in which the face, or an edge or
-/// vertex that it stands in for, survives the filter. Infinite for a face that no sub-cell needs.
+/// Finds for each face of a list a lower bound of d_f, Eq. (7): the least distance over the
+/// sub-cells in which the face survives the filter, or in which an edge or vertex survives that the
+/// face stands in for. The bound is infinite for a face that no sub-cell needs.
 ///
-/// A point that is nearer to the surface than the bounds of all faces that are left out has its closest feature in the list: the
-/// feature survives in its sub-cell, so the face that has it, or stands in for it, has a bound of at most its distance.
+/// Take a point that is nearer to the surface than the bounds of all faces that are left out. Its
+/// closest feature survives in its sub-cell. So the face that has the feature, or stands in for it,
+/// has a bound of at most the point's distance, and the face is in the list.
 ///
-/// `chains` are those that the list rests on; what comes back besides are those that the bounds rest on.
+/// `chains` are the chains that the list rests on. The returned chains are those that the bounds
+/// rest on.
 pub fn rank(
     surface: &Surface,
     cell: &Cell,
@@ -54,8 +58,9 @@ pub fn rank(
     (list.iter().zip(distances).map(ranked).collect(), heaviest)
 }
 
-/// Lets one face stand in for each edge or vertex: of those that have it the one that is needed nearest to the surface anyway. Were it all of
-/// them, the faces around every vertex of the cell would be needed at distance 0.
+/// Chooses one face that stands in for each edge or vertex: of the faces that have it, the face
+/// that is needed nearest to the surface anyway. If all of them were taken, the faces around every
+/// vertex of the cell would be needed at distance 0.
 fn stand_in(surface: &Surface, list: &[u32], mut parts: Vec<(Requirement, f64)>, distances: &mut [f64]) {
     parts.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
     for (part, distance) in parts {
@@ -66,11 +71,11 @@ fn stand_in(surface: &Surface, list: &[u32], mut parts: Vec<(Requirement, f64)>,
     }
 }
 
-/// What sub-cells need, each with a lower bound of the distance where they do.
+/// The parts that sub-cells need, each with a lower bound of the distance at which they need it.
 struct Needs<'a> {
     surface: &'a Surface,
     found: Vec<(Requirement, f64)>,
-    /// The heaviest chains of rule C on a way down so far.
+    /// The heaviest chains of rule C on the way down so far.
     heaviest: Chains,
 }
 
@@ -92,7 +97,8 @@ impl Needs<'_> {
             for s in &filtered.survivors {
                 let at = |row: usize| scratch.centroid[row * candidates.stride + s.index as usize];
                 let gradient = glam::DVec3::new(at(GRADIENT), at(GRADIENT + 1), at(GRADIENT + 2));
-                // The distance is convex: its tangent is below it. No tangent (NaN) on the face itself.
+                // The distance is convex, so its tangent lies below it. On the face itself there is
+                // no tangent (NaN).
                 let below =
                     cell.corners.iter().map(|c| gradient.dot(*c - center)).fold(f64::INFINITY, f64::min);
                 let least = if s.meets { 0.0 } else { (at(0) + below - surface.margin).max(0.0) };

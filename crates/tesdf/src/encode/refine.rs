@@ -1,4 +1,4 @@
-//! Over-refines the domain and prunes it while unwinding.
+//! Refines the domain more than needed, and prunes it on the way back.
 
 use super::candidates::{Candidates, Pool, Survivor};
 use super::effort::Effort;
@@ -17,7 +17,7 @@ pub enum Tree {
     Split(Box<[Tree; 2]>),
 }
 
-/// What a leaf answers from.
+/// Where a leaf takes its answers from.
 #[derive(Debug)]
 pub enum Leaf {
     /// The faces that can be closest in the cell, in ascending order.
@@ -29,49 +29,52 @@ pub enum Leaf {
         /// The heaviest chains of rule C that the list rests on.
         chains: Chains,
     },
-    /// Far from the surface with a long list: the face tree answers, the cell knows the sign.
+    /// The cell is far from the surface and its list would be long. The face tree answers, and the
+    /// cell knows the sign.
     Far,
-    /// Farther out than the band: not of the domain.
+    /// The cell is farther out than the band, so it is not of the domain.
     Outside,
 }
 
-/// What the pruning weighs: everything in the local frame.
+/// The weights of the pruning. Everything is in the local frame.
 #[derive(Clone, Debug)]
 pub struct Weights {
-    /// Faces per query that one stored byte is worth.
+    /// How many faces per query one stored byte is worth.
     pub byte: f64,
-    /// Divides volumes into the average over a layer of this half width around the surface.
+    /// Half width of the layer around the surface over which volumes are averaged.
     pub near: f64,
     /// Normalisation: 1 / (area · 4 near).
     pub per_volume: f64,
-    /// Faces that a query by the face tree counts as.
+    /// How many faces a query by the face tree counts as.
     pub far_faces: f64,
-    /// Lists shorter than this are never left to the face tree.
+    /// A cell with a shorter list is never left to the face tree.
     pub far_list: usize,
-    /// Nothing nearer to the surface than this is left to the face tree.
+    /// A cell nearer to the surface than this is never left to the face tree.
     pub far_distance: f64,
-    /// List length that no refinement is expected to get below.
+    /// Length below which no refinement is expected to bring a list.
     pub floor: f64,
-    /// How many stored bytes a cell must weigh to be bisected where it lists many faces that are longer than it.
+    /// For cells with many faces that are longer than the cell: how many stored bytes the cell must
+    /// weigh to be bisected.
     pub long_faces: f64,
 }
 
 impl Weights {
-    /// What a cell of this weight costs that the face tree answers.
+    /// The cost of a cell of this weight when the face tree answers.
     fn by_tree(&self, weight: f64) -> f64 {
         weight * self.far_faces + self.byte * LEAF_BYTES
     }
 }
 
-/// Bytes of a leaf besides its entries: two words of the tree, its share of headers and palettes.
+/// Bytes of a leaf besides its entries: two words of the tree, and its share of headers and
+/// palettes.
 const LEAF_BYTES: f64 = 14.0;
-/// Requirement sets longer than this are not merged: such a cell is never worth keeping.
+/// Longer sets of requirements are not merged: such a cell is never worth keeping.
 const MAX_UNION: usize = 256;
 
-/// More faces than this that are longer than their cell are many.
+/// More faces than this that are longer than their cell count as many.
 const MANY_LONG: usize = 64;
 
-/// Progress of a whole root.
+/// The progress that a whole root counts for.
 pub const ROOT_VOLUME: u64 = 1 << 40;
 
 /// All that the recursion reads.
@@ -82,17 +85,19 @@ pub struct Refiner<'a> {
     pub weights: Weights,
     /// Outer band, local frame.
     pub band: f64,
-    /// Bounds of the mesh, local frame: beyond the band, cells in here are listed where that pays.
+    /// Bounds of the mesh, local frame. Cells in here that are beyond the band are listed where
+    /// that pays.
     pub bounds: Aabb,
-    /// Boxes that belong to the domain besides the band, local frame.
+    /// Boxes that belong to the domain in addition to the band, local frame.
     pub regions: &'a [Aabb],
-    /// Winding number at a point, local frame.
+    /// Whether a point of the local frame is inside.
     pub inside: &'a (dyn Fn(glam::DVec3) -> bool + Sync),
-    /// Bisections from a root to the deepest cell, at most [`MAX_DEPTH`](crate::domain::MAX_DEPTH); 0 leaves the roots whole.
+    /// Bisections from a root to the deepest cell, at most [`MAX_DEPTH`](crate::domain::MAX_DEPTH).
+    /// 0 leaves the roots whole.
     pub max_depth: u32,
-    /// Told of the volume done, in units of 2^-40 of a root; asked whether to stop.
+    /// Is told the volume done, in units of 2^-40 of a root, and says whether to stop.
     pub progress: &'a Progress,
-    /// What the roots together may cost.
+    /// How much effort all roots together may take.
     pub effort: &'a Effort,
 }
 
@@ -113,7 +118,8 @@ struct Own {
 }
 
 impl Refiner<'_> {
-    /// Refines a root, whose lists can only name `faces`. `None` when cancelled, or the effort is exceeded.
+    /// Refines a root whose lists can only name `faces`. Returns `None` when the work was cancelled
+    /// or the effort is exceeded.
     pub fn root(&self, cell: Cell, faces: &[u32]) -> Option<Tree> {
         let pool = Pool::new(self.surface, faces, &cell);
         self.refine(cell, &pool.candidates(), Chains::NONE, &mut Scratch::default()).map(|p| p.tree)
@@ -206,11 +212,12 @@ impl Refiner<'_> {
         Some(self.prune(left, right, Own { requirements: own, crossing: false, chains }, weight, unlisted))
     }
 
-    /// Whether a bisection can pay for what it makes of faces that are longer than the cell.
+    /// Whether a bisection can pay, given the faces that are longer than the cell.
     ///
-    /// Of cells half as wide, each such face is in two or more: lists get shorter by half, and there are twice as many entries, where
-    /// lists of small faces get shorter to a quarter, at no more entries. So a cell with n of them gives n bytes away to gain n / 2 times its
-    /// weight. Near the vertex of a fan of n faces this would go on and on, for n² entries in all.
+    /// Each such face is in two or more of the cells that are half as wide. So lists become half as
+    /// long, with twice as many entries in all. (Lists of small faces become a quarter as long,
+    /// with no more entries.) A cell with n such faces therefore gives n bytes to gain n / 2 times
+    /// its weight. Near the vertex of a fan of n faces this would go on until there are n² entries.
     fn long_faces_pay(
         &self,
         cell: &Cell,
@@ -249,7 +256,7 @@ impl Refiner<'_> {
         }
     }
 
-    /// Keeps the split, or merges it when one cell costs less.
+    /// Keeps the two children, or merges them when one cell costs less.
     fn prune(&self, left: Pruned, right: Pruned, own: Own, weight: f64, unlisted: Option<Leaf>) -> Pruned {
         let split = left.cost + right.cost;
         let crossing = left.crossing || right.crossing;

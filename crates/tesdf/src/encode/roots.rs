@@ -1,4 +1,4 @@
-//! The tetrahedra that the forest grows from.
+//! The tetrahedra that the bisection forest grows from.
 use glam::DVec3;
 
 use super::error::EncodeError;
@@ -6,17 +6,18 @@ use crate::base::Side;
 use crate::domain::{Cell, ConformingMesh, DomainCube};
 use crate::geometry::{Aabb, AabbTree, LocalFrame};
 
-/// The tetrahedra that an asset's cells come from.
+/// The domain of an asset: where its cells come from.
 #[derive(Clone, Copy, Debug)]
 pub enum Domain<'a> {
-    /// Six tetrahedra of a cube around the solid and its band, bisected where that pays.
+    /// Six tetrahedra of a cube around the solid and its band. They are bisected where that pays.
     Bisection,
-    /// Tetrahedra that conform to the surface, bisected or not ([`Refinement`](super::Refinement)).
+    /// Tetrahedra that conform to the surface. They are bisected, or left whole
+    /// ([`Refinement`](super::Refinement)).
     Conforming(&'a ConformingMesh),
 }
 
 impl Domain<'_> {
-    /// How the certificate calls it.
+    /// The name of the domain in the certificate.
     pub(super) fn name(&self) -> &'static str {
         match self {
             Self::Bisection => "bisection",
@@ -25,24 +26,27 @@ impl Domain<'_> {
     }
 }
 
-/// Widest domain, in diagonals of the mesh: rounding, and with it the certificate's delta, grows with it.
+/// Largest width of the domain, in diagonals of the mesh. Rounding grows with it, and so does the
+/// certificate's delta.
 pub(super) const MAX_SIZE: f64 = 8.0;
 
 /// The roots of a domain, in the local frame.
 #[derive(Debug)]
 pub struct Roots {
-    /// Around the domain; the bisection domain is the cube.
+    /// A cube around the domain. For the bisection domain it is the domain.
     pub cube: DomainCube,
     /// The roots.
     pub cells: Vec<Cell>,
-    /// Of a conforming domain: corners of the roots, in the order of their cells' corners.
+    /// For a conforming domain: the corners of the roots, in the order of the corners of their
+    /// cells.
     pub tetrahedra: Vec<[u32; 4]>,
-    /// Of a conforming domain: where each root lies.
+    /// For a conforming domain: the side of the surface that each root is on.
     pub sides: Vec<Side>,
 }
 
 impl Roots {
-    /// `bounds` are those of mesh and band, local frame like `regions` and `diagonal`.
+    /// The roots of `domain`. `bounds` are the bounds of the mesh and its band. All lengths are in
+    /// the local frame.
     pub fn of(
         domain: &Domain,
         bounds: Aabb,
@@ -79,16 +83,17 @@ impl Roots {
         Ok(Self { cube, cells, tetrahedra, sides })
     }
 
-    /// The roots in an order in which near ones follow each other.
+    /// The roots, ordered so that near roots follow each other.
     pub fn order(&self) -> Vec<u32> {
         let boxes: Vec<Aabb> = self.cells.iter().map(|cell| Aabb::of(&cell.corners)).collect();
         AabbTree::build(&boxes, 1).order().to_vec()
     }
 }
 
-/// The corners in an order whose first bisection, of edge 0–3, halves the longest edge; orientation is kept.
+/// Orders the corners so that the first bisection, of the edge 0–3, halves the longest edge. The
+/// orientation is kept.
 fn for_bisection(ids: &[u32; 4], corners: &[DVec3; 4]) -> [u32; 4] {
-    // Even permutations that bring each edge to the ends.
+    // Even permutations that bring each edge to the positions 0 and 3.
     const ORDERS: [[usize; 4]; 6] =
         [[0, 2, 3, 1], [0, 3, 1, 2], [0, 1, 2, 3], [1, 0, 3, 2], [1, 2, 0, 3], [2, 0, 1, 3]];
     let length = |order: &[usize; 4]| corners[order[0]].distance_squared(corners[order[3]]);

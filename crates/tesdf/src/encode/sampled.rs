@@ -1,8 +1,9 @@
-//! Algorithm 1: which faces are closest at the points of a grid. It can miss those that are closest only between them, unless the
-//! threshold is as wide as the grid ([`Threshold::CoveringRadius`]).
+//! Algorithm 1: finds the faces that are closest at the points of a grid. It can miss faces that
+//! are closest only between these points, unless the threshold is as wide as the grid
+//! ([`Threshold::CoveringRadius`]).
 //!
-//! [`SampledCell`] is a cell with what Lemma 1 leaves, a [`Sampler`] looks at its samples: the [`Processor`] here, or a device that
-//! another crate brings.
+//! A [`SampledCell`] is a cell with the candidates that Lemma 1 leaves. A [`Sampler`] looks at the
+//! samples: the [`Processor`] here, or a device of another crate.
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -14,23 +15,24 @@ use crate::base::Progress;
 use crate::domain::Cell;
 use crate::geometry::AabbTree;
 
-/// A cell, with what Lemma 1 leaves of the faces; everything in the local frame.
+/// A cell with the candidates that Lemma 1 leaves. Everything is in the local frame.
 #[derive(Clone, Debug)]
 pub struct SampledCell {
     /// The cell.
     pub cell: Cell,
     /// Its candidates, ascending.
     pub faces: Vec<u32>,
-    /// ε: how much farther than the closest face one of E_t may be at a sample.
+    /// ε: how much farther than the closest face a face of E_t may be at a sample.
     pub threshold: f64,
 }
 
 impl SampledCell {
-    /// Lines 2 to 8 of Alg. 1. `scale` is that of the local frame; a threshold is in the mesh's unit.
+    /// Lines 2 to 8 of Alg. 1. `scale` is that of the local frame. The threshold of `sampling` is
+    /// in the unit of the mesh.
     pub fn new(surface: &Surface, tree: &AabbTree, cell: Cell, sampling: &Sampling, scale: f64) -> Self {
         let threshold = match sampling.threshold {
             Threshold::Absolute(length) => length * scale,
-            // The margin is for what rounding does to a gap.
+            // The margin covers the rounding of a gap.
             Threshold::CoveringRadius => 2.0 * covering_radius(&cell, sampling) + surface.margin,
         };
         Self { cell, faces: lipschitz_candidates(surface, tree, &cell), threshold }
@@ -39,13 +41,14 @@ impl SampledCell {
 
 /// Lines 9 to 19 of Alg. 1, for many cells.
 pub trait Sampler: Sync {
-    /// How the certificate calls lists that this made.
+    /// The name, in the certificate, of lists that this sampler made.
     fn name(&self) -> String;
 
-    /// For each cell and each of its candidates d_f of Eq. (8), local frame; infinite for a face that is not in E_t.
+    /// For each cell, and each of its candidates, d_f of Eq. (8) in the local frame. It is infinite
+    /// for a face that is not in E_t.
     ///
     /// # Errors
-    /// [`EncodeError::Cancelled`]; [`EncodeError::Sampler`] for what a device refuses.
+    /// [`EncodeError::Cancelled`]; [`EncodeError::Sampler`] when a device refuses the work.
     fn sample(
         &self,
         surface: &Surface,
@@ -55,7 +58,7 @@ pub trait Sampler: Sync {
     ) -> Result<Vec<Vec<f64>>, EncodeError>;
 }
 
-/// Samples on the processor, in `f64`.
+/// Looks at samples on the processor, in `f64`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Processor;
 
@@ -79,7 +82,8 @@ impl Sampler for Processor {
     }
 }
 
-/// The faces that Lemma 1, Eq. (6), does not drop: those with a gap below twice the cell's radius at its centroid, ascending.
+/// The faces that Lemma 1, Eq. (6), does not drop, ascending. At the centroid of the cell, their
+/// gap is below twice the radius of the cell.
 pub fn lipschitz_candidates(surface: &Surface, tree: &AabbTree, cell: &Cell) -> Vec<u32> {
     let center = cell.centroid();
     let distance = |face: u32| surface.triangles[face as usize].closest(center).distance;
@@ -94,13 +98,15 @@ pub fn lipschitz_candidates(surface: &Surface, tree: &AabbTree, cell: &Cell) -> 
     faces
 }
 
-/// No point of the cell is farther than this from a point of the grid (docs/math.md, 3).
+/// The covering radius: no point of the cell is farther than this from a point of the grid
+/// (docs/math.md, 3).
 pub fn covering_radius(cell: &Cell, sampling: &Sampling) -> f64 {
     let grid = 0.75f64.sqrt() * sampling.shrink * cell.width() / f64::from(sampling.resolution);
     grid + (1.0 - sampling.shrink) * cell.radius()
 }
 
-/// d_f of Eq. (8) for each candidate: the least distance at samples where it is within the threshold of the closest.
+/// d_f of Eq. (8) for each candidate: the least distance at the samples at which the candidate is
+/// within the threshold of the closest face.
 pub fn sample(
     surface: &Surface,
     SampledCell { cell, faces, threshold }: &SampledCell,
@@ -123,7 +129,8 @@ pub fn sample(
     least
 }
 
-/// The points with barycentric coordinates i/Q, j/Q, k/Q, l/Q in the cell shrunk towards its centroid.
+/// The points with the barycentric coordinates i/Q, j/Q, k/Q, l/Q in the cell, which is shrunk
+/// towards its centroid before.
 fn grid(cell: &Cell, sampling: &Sampling) -> impl Iterator<Item = DVec3> {
     let center = cell.centroid();
     let [a, b, c, d] = cell.corners.map(|p| center + sampling.shrink * (p - center));

@@ -1,11 +1,12 @@
 use super::surface::{Part, Requirement, Surface};
 use crate::geometry::Feature;
 
-/// A set of requirements, with what its faces imply.
+/// A set of requirements, with the requirements that its faces imply.
 #[derive(Debug, Default)]
 pub struct Settled {
     list: Vec<Requirement>,
-    /// By the index of a requirement: the round in which it was implied (doubled), or settled (and one more).
+    /// By the index of a requirement, a mark: `round` when it was implied in this round, `round +
+    /// 1` when it was settled.
     mark: Vec<u64>,
     round: u64,
 }
@@ -37,13 +38,13 @@ impl Settled {
         }
     }
 
-    /// What was settled, ascending.
+    /// The settled requirements, ascending.
     pub(super) fn sorted(&mut self) -> &[Requirement] {
         self.list.sort_unstable();
         &self.list
     }
 
-    /// Whether it, or a face that has it, is in the set.
+    /// Whether the requirement is in the set, or a face that has it.
     pub(super) fn holds(&self, requirement: Requirement) -> bool {
         self.mark[requirement.index()] >= self.round
     }

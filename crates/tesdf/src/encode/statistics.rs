@@ -1,4 +1,4 @@
-//! Counts what was encoded.
+//! Counts cells and entries of an encoding.
 use super::refine::{Leaf, Tree};
 use crate::asset::about::Statistics;
 use crate::asset::layout::Label;
@@ -6,7 +6,7 @@ use crate::domain::Cell;
 use crate::geometry::LocalFrame;
 use crate::mesh::TriangleMesh;
 
-/// Counts the leaves of the trees that grow from `cells`, with their labels.
+/// Counts the leaves of the trees that grow from `cells`. `labels` are those of the leaves.
 pub fn statistics(
     roots: &[Tree],
     labels: &[Label],

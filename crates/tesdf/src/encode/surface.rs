@@ -1,4 +1,5 @@
-//! The mesh as the encoder sees it: triangles, edges, incident faces, and the parts that a cell can need.
+//! The mesh in the form that the encoder uses: triangles, edges, incident faces, and the parts that
+//! a cell can need.
 
 use std::cmp::Reverse;
 use std::collections::HashMap;
@@ -7,27 +8,27 @@ use crate::base::Isa;
 use crate::geometry::{Feature, Triangle};
 use crate::mesh::TriangleMesh;
 
-/// Rounding margin of the rules, in the local frame, where the body's diagonal is 0.5 to 1.
+/// Rounding margin of the rules, in the local frame, where the diagonal of the body is 0.5 to 1.
 ///
-/// A computed distance is off by a few 2^-53 of the coordinates' size, which is the cube's side. A face is dropped only
-/// when another one is closer by more than this times the side (at least 1), so that rounding cannot make two
-/// faces drop each other.
+/// A computed distance has an error of a few 2^-53 of the size of the coordinates, which is the
+/// side of the cube. A face is dropped only when another face is closer by more than this margin
+/// times the side (at least 1). So rounding cannot make two faces drop each other.
 pub const MARGIN: f64 = 4e-15;
 
 /// A part of the surface whose distance a cell needs: a face, an edge or a vertex.
 ///
-/// Ordered: faces, then edges, then vertices, each by its id.
+/// The order is: faces, then edges, then vertices, each by id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Requirement(u32);
 
 impl Requirement {
-    /// Faces first, then edges, then vertices; less than [`Surface::parts`].
+    /// The index: faces first, then edges, then vertices. It is below [`Surface::parts`].
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
-/// What a [`Requirement`] names.
+/// The part that a [`Requirement`] names.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// A face.
@@ -38,23 +39,25 @@ pub enum Part {
     Vertex(u32),
 }
 
-/// What becomes of faces that come near to a cell.
+/// How the filter treats faces that come near to a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Touching {
-    /// They are listed whatever the rules say, as the sign of a crossing cell is counted over them.
+    /// They are listed whatever the rules say, because the sign in a crossing cell is counted over
+    /// them.
     Kept,
-    /// They are faces like others: the cells' borders are on the surface and tell the sign.
+    /// They are treated like other faces: the borders of the cells lie on the surface and tell the
+    /// sign.
     Ignored,
 }
 
-/// The mesh in the local frame, with what the encoder looks up: normals, edges, incident faces.
+/// A mesh in the local frame, with the tables of the encoder: normals, edges, incident faces.
 #[derive(Debug)]
 pub struct Surface {
     /// Faces in the local frame.
     pub triangles: Vec<Triangle>,
     /// Vertex ids of each face.
     pub(crate) faces: Vec<[u32; 3]>,
-    /// Edge ids of each face; edge `k` joins corners `k` and `k + 1`.
+    /// Edge ids of each face. Edge `k` joins the corners `k` and `k + 1`.
     pub(crate) edges: Vec<[u32; 3]>,
     edge_count: u32,
     /// Faces of each edge.
@@ -66,16 +69,16 @@ pub struct Surface {
     /// Longest edge of each face, local frame.
     longest: Vec<f64>,
     needleness: f64,
-    /// What a distance must be less by to count as less: [`MARGIN`] times the size of the domain.
+    /// A distance counts as less when it is less by this: [`MARGIN`] times the size of the domain.
     pub(crate) margin: f64,
-    /// What becomes of faces that come near to a cell.
+    /// How the filter treats faces that come near to a cell.
     pub(crate) touching: Touching,
-    /// What the filter computes with; the results are the same.
+    /// The instruction set of the filter. The results do not depend on it.
     pub(crate) isa: Isa,
 }
 
 impl Surface {
-    /// Looks up what the encoder needs of a mesh that is in the local frame already, for a domain of this `side`.
+    /// Makes the tables for a mesh that is in the local frame already. The domain has this `side`.
     pub fn new(mesh: &TriangleMesh, side: f64, touching: Touching) -> Self {
         let local = mesh.vertices();
         let faces = mesh.faces().to_vec();
@@ -128,13 +131,16 @@ impl Surface {
         self.longest[face as usize]
     }
 
-    /// How much the faces are needles: their mean longest edge over the root of their mean area. 1.5 for a mesh of
-    /// equilateral triangles, 2 to 4 for most meshes, 14 for a gear of 20,000 faces each as long as it is thick.
+    /// How needle-like the faces are: their mean longest edge over the root of their mean area.
+    ///
+    /// It is 1.5 for a mesh of equilateral triangles, 2 to 4 for most meshes, and 14 for a gear of
+    /// 20,000 faces that are each as long as the gear is thick.
     pub(crate) fn needleness(&self) -> f64 {
         self.needleness
     }
 
-    /// The face whose longest edge is the most times its height, the first of equals, and how many.
+    /// The face with the largest ratio of longest edge to height, and the ratio. Of equal faces it
+    /// is the first.
     pub(crate) fn most_slender(&self) -> (u32, f64) {
         let slenderness = |face: usize| {
             let [a, b, c] = self.triangles[face].corners;
@@ -144,7 +150,7 @@ impl Surface {
         faces.fold((0, 0.0), |most, next| if next.1 > most.1 { next } else { most })
     }
 
-    /// The requirement of a face's feature.
+    /// The requirement that names a feature of a face.
     pub(crate) fn requirement(&self, face: u32, feature: Feature) -> Requirement {
         let (f, e) = (self.faces.len() as u32, self.edge_count);
         Requirement(match feature {
@@ -154,12 +160,12 @@ impl Surface {
         })
     }
 
-    /// How many requirements there are: faces, edges and vertices.
+    /// The number of requirements: faces, edges and vertices.
     pub(crate) fn parts(&self) -> usize {
         self.faces.len() + self.edge_faces.len() + self.vertex_faces.len()
     }
 
-    /// What a requirement names.
+    /// The part that a requirement names.
     pub(crate) fn part(&self, requirement: Requirement) -> Part {
         let (f, e) = (self.faces.len() as u32, self.edge_count);
         match requirement.0 {
@@ -205,10 +211,11 @@ impl Surface {
         [a, b, c, d, e, f]
     }
 
-    /// The fewest faces, greedily, that hold all of `requirements` (sorted, some of them more than once), in ascending order.
+    /// Chooses few faces that hold all of `requirements`, greedily. `requirements` is sorted, and
+    /// may contain an entry several times. The result is ascending.
     ///
-    /// Faces are taken as they are; then each edge that none of them has takes the one of its faces that
-    /// meets most of what is still open; then vertices likewise.
+    /// Required faces are taken as they are. Then each edge that no chosen face has takes, of its
+    /// faces, the face that has most of the open requirements. Then vertices do likewise.
     pub(crate) fn cover(&self, requirements: &[Requirement]) -> Vec<u32> {
         let first_part = requirements.partition_point(|&r| self.is_face(r));
         let mut kept: Vec<u32> = requirements[..first_part].iter().map(|r| r.0).collect();
@@ -216,7 +223,7 @@ impl Surface {
         let mut open = Open::default();
         for asked in requirements[first_part..].chunk_by(|a, b| a == b) {
             let faces = self.faces_of(asked[0]);
-            // Whole faces ascend too.
+            // The whole faces are in ascending order too.
             let held = if faces.len() < whole {
                 faces.iter().any(|face| kept.binary_search(face).is_ok())
             } else {
@@ -243,7 +250,8 @@ impl Surface {
         kept
     }
 
-    /// Of the faces that hold the part at `first`, the one that holds most of what is open; the least of equals.
+    /// Of the faces that hold the part at `first`, the face that holds most of the open
+    /// requirements. Of equal faces it is the lowest.
     fn most_shared(&self, open: &Open, first: usize) -> Option<u32> {
         let part = open.parts[first];
         let own = self.faces_of(part);
@@ -252,7 +260,8 @@ impl Surface {
             let gain = |face: u32| self.implied(face).iter().map(times).sum::<usize>();
             return own.iter().copied().max_by_key(|&f| (gain(f), Reverse(f)));
         }
-        // Few of them hold anything else: found from what else is open. Earlier parts are not.
+        // Few of these faces hold anything else, so they are found from the other open parts.
+        // Earlier parts are no longer open.
         let others = open.parts.iter().zip(&open.times).skip(first + 1).filter(|(_, times)| **times > 0);
         let mut shared: Vec<(u32, usize)> = others
             .flat_map(|(&other, &times)| self.faces_of(other).iter().map(move |&face| (face, times)))
@@ -266,7 +275,7 @@ impl Surface {
             .map_or(own.first().copied(), |(face, _)| Some(face))
     }
 
-    /// The faces that hold an edge or a vertex, ascending.
+    /// The faces that hold an edge or a vertex, ascending. Empty for a face.
     pub(crate) fn faces_of(&self, requirement: Requirement) -> &[u32] {
         match self.part(requirement) {
             Part::Face(_) => &[],
@@ -276,16 +285,16 @@ impl Surface {
     }
 }
 
-/// Edges and vertices that no face has been kept for yet.
+/// Edges and vertices that no chosen face has yet.
 #[derive(Default)]
 struct Open {
-    /// Ascending, each once.
+    /// The parts, ascending, each once.
     parts: Vec<Requirement>,
-    /// How often each is asked for; 0 once a kept face has it.
+    /// How often each part is asked for. 0 once a chosen face has it.
     times: Vec<usize>,
 }
 
-/// Faces of a vertex that are each asked what else they hold.
+/// In a fan of up to this many faces, each face is asked what else it holds.
 const SMALL_FAN: usize = 32;
 
 fn longest_edge(t: &Triangle) -> f64 {

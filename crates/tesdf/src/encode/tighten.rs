@@ -1,4 +1,4 @@
-//! Shortens the list of a finished cell to what some point of it needs.
+//! Shortens the list of a finished cell to the faces that some point of the cell needs.
 
 use super::candidates::Candidates;
 use super::filter::{Scratch, filter};
@@ -8,26 +8,29 @@ use crate::base::Chains;
 use crate::domain::Cell;
 use crate::geometry::Feature;
 
-/// Entries per face, before tightening, that all levels are worth. Meshes of well-shaped faces have about 100, a gear of 20,000 needles 211.
+/// Entries per face, before tightening, for which all levels are affordable. Meshes of well-shaped
+/// faces have about 100, a gear of 20,000 needles has 211.
 const ENTRIES_PER_FACE: f64 = 250.0;
-/// Faces that a small mesh counts as in addition.
+/// Faces that are added to the count, so that a small mesh gets enough levels.
 const SMALL_MESH: f64 = 1000.0;
-/// What a level multiplies the work by: measured from 2 to 12 levels.
+/// Factor of the work for each further level, measured from 2 to 12 levels.
 const WORK_PER_LEVEL: f64 = 1.28;
-/// A list gets three levels less each time that it is twice as long as this, as its own work grows faster than it.
+/// A list gets three levels fewer each time that it is twice as long as this, because its work
+/// grows faster than its length.
 const LONG: usize = 512;
 
-/// How many levels lists are worth, so that the work stays in proportion to the faces of the mesh.
+/// How many levels the lists get, so that the work stays in proportion to the faces of the mesh.
 ///
-/// An entry costs some 65 looks at faces at 12 levels. Where needles lie side by side there are many entries, and nearly all are needed:
-/// tightening takes away a tenth, not the half that it takes elsewhere.
+/// With 12 levels, an entry costs some 65 looks at faces. Where needles lie side by side, there are
+/// many entries and nearly all of them are needed: tightening removes a tenth of them, and not the
+/// half that it removes elsewhere.
 #[derive(Clone, Copy, Debug)]
 pub struct Levels {
     all: u32,
 }
 
 impl Levels {
-    /// At most `levels`, for lists that have so many `entries` together before they are tightened.
+    /// At most `levels`, for lists that together have `entries` before tightening.
     pub fn new(levels: u32, entries: usize, faces: usize) -> Self {
         let mut affordable = ENTRIES_PER_FACE * (faces as f64 + SMALL_MESH);
         let mut all = levels;
@@ -38,20 +41,21 @@ impl Levels {
         Self { all }
     }
 
-    /// For one list.
+    /// The levels for one list.
     pub fn of(self, list: &[u32]) -> u32 {
         let doublings = (list.len() / LONG).max(1).ilog2();
         self.all.saturating_sub(3 * doublings).max(self.all.min(1))
     }
 }
 
-/// The shortest list that the filter can certify by bisecting up to `levels` deeper.
+/// Finds the shortest list that the filter can certify with up to `levels` more bisections.
 ///
-/// The cells of the deeper levels are not kept: they only tell the faces apart. A requirement is
-/// settled once some probed point has it closest; bisection goes on only where a survivor is not
-/// settled yet, so that nearly all of the work goes to the faces in doubt.
+/// The cells of these bisections are not kept: they only tell the faces apart. A requirement is
+/// settled when it is closest at some probed point. Bisection goes on only where a survivor is not
+/// settled yet, so nearly all of the work is spent on faces in doubt.
 ///
-/// `chains` are those of the filters that left the list; what comes back besides it are those that the new list rests on.
+/// `chains` are those of the filters that left the list. The returned chains are those that the new
+/// list rests on.
 pub fn tighten(
     surface: &Surface,
     cell: &Cell,
@@ -75,7 +79,7 @@ pub fn tighten(
 struct Needed<'a> {
     surface: &'a Surface,
     settled: Settled,
-    /// The heaviest chains of rule C on a way down so far.
+    /// The heaviest chains of rule C on the way down so far.
     heaviest: Chains,
 }
 
@@ -88,7 +92,7 @@ impl Needed<'_> {
         chains: Chains,
         scratch: &mut Scratch,
     ) {
-        // Nothing below can add what these faces do not imply.
+        // No cell below can add a requirement that these faces do not imply.
         if candidates.faces.iter().all(|&face| self.holds_whole(face)) {
             return;
         }
