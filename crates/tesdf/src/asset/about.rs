@@ -1,4 +1,4 @@
-//! What an asset says of itself, as JSON in the container's metadata.
+//! What an asset says about itself, stored as JSON in the metadata of the container.
 
 use std::collections::BTreeMap;
 
@@ -12,30 +12,30 @@ use crate::base::{Certificate, Written};
 /// The file that a mesh came from.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Source {
-    /// File name without folders; empty for a mesh made in memory.
+    /// File name without folders. Empty for a mesh made in memory.
     pub name: String,
-    /// BLAKE3 of the file's bytes, in hex; empty likewise.
+    /// BLAKE3 of the bytes of the file, in hex. Empty for a mesh made in memory.
     pub blake3: String,
 }
 
-/// Counts taken while encoding. Volumes are in the mesh's unit, cubed.
+/// Counts of an encoding. Volumes are in the unit of the mesh, cubed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Statistics {
     /// Faces of the mesh.
     pub faces: usize,
     /// Vertices of the mesh.
     pub vertices: usize,
-    /// Diagonal of the mesh's bounds, in its unit.
+    /// Diagonal of the bounds of the mesh, in its unit.
     pub diagonal: f64,
     /// Cells with a list.
     pub listed_cells: usize,
-    /// Those of them that the surface passes through.
+    /// Cells with a list that the surface passes through.
     pub crossing_cells: usize,
     /// Cells of the domain that the face tree answers.
     pub far_cells: usize,
     /// Cells farther out than the band.
     pub outside_cells: usize,
-    /// Sum of the lengths of all lists, equal lists counted for each cell.
+    /// Sum of the lengths of all lists. A list that several cells share counts for each cell.
     pub entries: usize,
     /// Longest list.
     pub longest_list: usize,
@@ -43,29 +43,29 @@ pub struct Statistics {
     pub domain_volume: f64,
     /// Volume of the far cells.
     pub far_volume: f64,
-    /// Mean list length weighted by volume, far cells left out.
+    /// Mean length of the lists, weighted by volume. Far cells are left out.
     pub volume_weighted_list: f64,
 }
 
-/// Everything that an asset says of itself.
+/// Everything that an asset says about itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct About {
     /// Where the mesh came from.
     pub source: Source,
-    /// What was asked for.
+    /// The options that the asset was encoded with.
     pub options: EncodeOptions,
     pub(crate) certificate: Certificate,
-    /// What was counted.
+    /// The counts of the encoding.
     pub statistics: Statistics,
 }
 
 impl About {
-    /// What was proved.
+    /// What the encoder proved of the lists.
     pub fn certificate(&self) -> &Certificate {
         &self.certificate
     }
 
-    /// As metadata, one JSON text per key.
+    /// The metadata of a container, with one JSON text for each key.
     pub fn to_metadata(&self) -> BTreeMap<String, String> {
         let json = |v: serde_json::Result<String>| v.unwrap_or_default();
         BTreeMap::from([
@@ -79,7 +79,7 @@ impl About {
     /// Reads the metadata of a container.
     ///
     /// # Errors
-    /// Names the key that is missing or does not parse.
+    /// Names the key that is missing, or whose text does not parse.
     pub fn from_metadata(metadata: &BTreeMap<String, String>) -> Result<Self, AssetError> {
         Ok(Self {
             source: read(metadata, "source")?,

@@ -6,18 +6,19 @@ use super::layout::{Label, List, Node};
 use crate::base::Side;
 use crate::domain::Cell;
 
-/// A tetrahedron of the domain.
+/// A cell: a tetrahedron of the domain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellView {
-    /// The cell's name: the number of its word in `domain.nodes`, as [`Contact::tet_b`](crate::collide::Contact::tet_b) gives it.
+    /// The name of the cell: the number of its word in `domain.nodes`, which is also
+    /// [`Contact::tet_b`](crate::collide::Contact::tet_b).
     pub id: u32,
-    /// Corners, in the mesh's unit.
+    /// The corners, in the unit of the mesh.
     pub corners: [DVec3; 4],
     /// Number of bisections from a sixth of the cube, or from a tetrahedron of a conforming domain.
     pub depth: u32,
-    /// Where it lies, and what answers for its points.
+    /// Where the cell lies, and what answers for its points.
     pub kind: CellKind,
-    /// Faces of its list; 0 when it has none.
+    /// Number of faces in its list. 0 for a cell without a list.
     pub list_length: usize,
 }
 
@@ -25,15 +26,15 @@ pub struct CellView {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CellKind {
-    /// Outside of the solid, with a list.
+    /// Outside of the solid. The cell has a list.
     Outside,
-    /// Inside, with a list.
+    /// Inside of the solid. The cell has a list.
     Inside,
-    /// The surface comes into the cell or close to it; with a list.
+    /// The surface comes into the cell, or close to it. The cell has a list.
     Crossing,
-    /// Outside, far from the surface: the face tree answers.
+    /// Outside of the solid and far from the surface. The face tree answers.
     FarOutside,
-    /// Inside, far from the surface: the face tree answers.
+    /// Inside of the solid and far from the surface. The face tree answers.
     FarInside,
     /// Farther out than the band.
     NotOfDomain,
@@ -47,8 +48,9 @@ impl CellKind {
 }
 
 impl TeSdf {
-    /// The faces that a cell lists, ascending, by their ids in the source; none for a cell without a list. `cell` is its
-    /// [id](CellView::id); none for a word that is no cell.
+    /// The faces in the list of a cell, by their ids in the source, ascending. `cell` is the
+    /// [id](CellView::id) of the cell. Empty for a cell without a list, and for an id that is no
+    /// cell.
     pub fn list_of(&self, cell: u32) -> Vec<u32> {
         let Some(&word) = self.nodes.get(cell as usize) else { return Vec::new() };
         let Node::Listed(_, offset) = Node::decode(word, &self.lists) else { return Vec::new() };
@@ -58,12 +60,13 @@ impl TeSdf {
         faces
     }
 
-    /// Shows every cell, depth first: always in the same order.
+    /// Calls `visit` with every cell, depth first, always in the same order.
     ///
-    /// The cells fill a cube around the solid, or the tetrahedra of a conforming domain; together, without those of
-    /// [`CellKind::NotOfDomain`], they are the domain.
+    /// The cells fill a cube around the solid, or are the tetrahedra of a conforming domain,
+    /// bisected or not. All cells together, without those of the kind [`CellKind::NotOfDomain`],
+    /// are the domain.
     pub fn visit_cells(&self, mut visit: impl FnMut(&CellView)) {
-        // Opening has checked that children follow their parents, so this ends.
+        // Opening has checked that children follow their parents, so this loop ends.
         let mut stack: Vec<(u32, Cell)> =
             (0..self.root_count()).rev().map(|root| (root as u32, self.root(root))).collect();
         while let Some((word, cell)) = stack.pop() {

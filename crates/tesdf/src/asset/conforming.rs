@@ -5,27 +5,29 @@ use super::layout::{DOMAIN_VERTICES, TETRAHEDRA};
 use super::{AssetError, Container, SharedSection};
 use crate::geometry::{Aabb, AabbTree, LocalFrame};
 
-/// The tetrahedra of a conforming domain, each the root of a bisection tree, and a tree of boxes that finds them.
+/// The tetrahedra of a conforming domain, each the root of a bisection tree, and a tree of boxes to
+/// locate them.
 #[derive(Clone, Debug)]
 pub(crate) struct Conforming {
     tetrahedra: SharedSection<[u32; 4]>,
-    /// Of the domain and not of the mesh.
+    /// The vertices of the domain that are not of the mesh.
     vertices: SharedSection<[f64; 3]>,
     tree: AabbTree,
 }
 
-/// Where the vertices of the mesh are: those of a conforming domain begin with them.
+/// The positions of the vertices of the mesh. The vertices of a conforming domain begin with them.
 #[derive(Clone, Copy)]
 pub(crate) struct Placed<'a> {
-    /// In the mesh's unit.
+    /// In the unit of the mesh.
     pub vertices: &'a [[f64; 3]],
-    /// From there to the local frame.
+    /// From the unit of the mesh to the local frame.
     pub frame: LocalFrame,
 }
 
 /// Tetrahedra in a leaf of the tree of boxes.
 const LEAF: usize = 4;
-/// What boxes are grown by, in the local frame: by rounding, a point of the border may be a little out of all tetrahedra.
+/// Boxes are grown by this length (local frame), because by rounding a point of the border may be a
+/// little out of all tetrahedra.
 const PAD: f64 = 1e-14;
 
 impl Conforming {
@@ -60,7 +62,7 @@ impl Conforming {
         Ok(Some(domain))
     }
 
-    /// Fits the tree of boxes to where some tetrahedra are now.
+    /// Fits the tree of boxes to the current positions of some tetrahedra.
     pub fn refit(&mut self, placed: Placed, tetrahedra: &[u32], incidence: &Incidence) {
         let mut tree = std::mem::replace(&mut self.tree, AabbTree::build(&[], LEAF));
         let places = tetrahedra.iter().map(|&t| incidence.place[t as usize]);
@@ -80,7 +82,7 @@ impl Conforming {
         self.corners_in_unit(placed, tetrahedron).map(|p| placed.frame.to_local(p))
     }
 
-    /// Corners of a tetrahedron, in the mesh's unit.
+    /// Corners of a tetrahedron, in the unit of the mesh.
     pub fn corners_in_unit(&self, placed: Placed, tetrahedron: usize) -> [DVec3; 4] {
         let mesh = placed.vertices;
         self.tetrahedra[tetrahedron].map(|v| {
@@ -94,17 +96,17 @@ impl Conforming {
         &self.tetrahedra
     }
 
-    /// The vertices that are not of the mesh, in its unit.
+    /// The vertices that are not of the mesh, in the unit of the mesh.
     pub fn vertices(&self) -> &[[f64; 3]] {
         &self.vertices
     }
 
-    /// Replaces them; [`refit`](Self::refit) is next.
+    /// Replaces these vertices. The caller then calls [`refit`](Self::refit).
     pub fn set_vertices(&mut self, vertices: &[[f64; 3]]) {
         self.vertices = SharedSection::of_rows(vertices);
     }
 
-    /// What each vertex moves; of the mesh's faces and their tree.
+    /// What each vertex moves. `faces` and `face_tree` are those of the mesh.
     pub fn incidence(&self, placed: Placed, faces: &[[u32; 3]], face_tree: &[[u32; 2]]) -> Incidence {
         let mesh_vertices = placed.vertices.len();
         let vertices = mesh_vertices + self.vertices.len();
@@ -116,7 +118,7 @@ impl Conforming {
         &self.tree
     }
 
-    /// Size in bytes of what opening made.
+    /// Size in bytes of the data that opening made.
     pub fn derived_bytes(&self) -> usize {
         std::mem::size_of_val(self.tree.nodes()) + std::mem::size_of_val(self.tree.order())
     }

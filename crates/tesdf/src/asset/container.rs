@@ -15,15 +15,18 @@ use crate::input;
 #[cfg(target_endian = "big")]
 compile_error!("sections are read in place and are little-endian; this target is big-endian");
 
-/// Bytes that tell whether what comes from a pipe is a `.tesdf` file.
+/// Number of bytes by which data from a pipe is recognised as a `.tesdf` file.
 const PREFIX: u64 = 512;
 
-/// Sections and metadata as the bytes of a `.tesdf` file; the same input gives the same bytes.
+/// Writes sections and metadata as the bytes of a `.tesdf` file. The same input gives the same
+/// bytes.
 ///
-/// `metadata` are the caller's keys; `format`, `version`, `checksum` and `checksum.*` are added here.
+/// `metadata` has the keys of the caller. This function adds `format`, `version`, `checksum` and
+/// `checksum.*`.
 ///
 /// # Errors
-/// A section that is given twice or is not whole rows, a metadata key that is reserved, more than 1 MiB of header.
+/// A section is given twice or does not have whole rows, a metadata key is reserved, or the header
+/// has more than 1 MiB.
 pub fn write_container(
     sections: &[Section<'_>],
     metadata: &BTreeMap<String, String>,
@@ -31,7 +34,8 @@ pub fn write_container(
     if let Some(key) = metadata.keys().find(|key| header::is_reserved(key)) {
         return Err(AssetError::header(format!("the metadata key {key} is reserved; use another")));
     }
-    // Widest first: safetensors forbids gaps, and this order alone keeps every section aligned.
+    // The widest elements come first. safetensors forbids gaps, and only this order keeps every
+    // section aligned.
     let mut ordered: Vec<_> = sections.iter().collect();
     ordered.sort_by_key(|s| std::cmp::Reverse(s.spec.element.size()));
     let mut metadata = metadata.clone();
@@ -68,12 +72,13 @@ fn shape_of(spec: &SectionSpec, rows: u64) -> Shape {
     Shape { rows, columns: (spec.columns != 1).then_some(spec.columns as u64) }
 }
 
-/// An open `.tesdf` file: the bytes, and where each section lies in them.
+/// An open `.tesdf` file: its bytes, and the place of each section in them.
 ///
-/// Opening checks the structure: magic, version, that every section of the table is there with its element type and
-/// columns, that sections are aligned and follow each other without gaps, and that the file ends where the last one ends.
-/// It reads only the header, so it costs the same for every size; [`verify_checksums`](Self::verify_checksums) reads the
-/// whole file. What the numbers in the sections mean is not checked here.
+/// Opening checks the structure: magic and version; that the file has every section of the table
+/// with its element type and columns; that sections are aligned and follow each other without gaps;
+/// and that the file ends where the last section ends. Opening reads only the header, so it takes
+/// the same time for files of all sizes. [`verify_checksums`](Self::verify_checksums) reads the
+/// whole file. The meaning of the numbers in the sections is not checked here.
 ///
 /// Cloning is cheap: clones share the bytes.
 #[derive(Clone, Debug)]
@@ -82,14 +87,14 @@ pub struct Container {
     metadata: BTreeMap<String, String>,
     sections: Vec<Placed>,
     header_end: usize,
-    /// Position of the header checksum's digits.
+    /// Position of the digits of the header's checksum.
     digits: usize,
 }
 
 #[derive(Debug)]
 enum Storage {
     Mapped(Mmap),
-    /// `u64` for the alignment; the last word may be partly unused.
+    /// Words of `u64` for the alignment. The last word may be partly unused.
     Owned {
         words: Vec<u64>,
         length: usize,
@@ -115,10 +120,12 @@ struct Placed {
 impl Container {
     /// Maps the file at `path`, read-only, and checks its structure against `table`.
     ///
-    /// The file must not be changed in place while it is open: a reader would see the change, and after a truncation the
-    /// operating system ends the process (SIGBUS). Replacing it by a rename, as [`save_atomic`](super::save_atomic) does,
-    /// is safe. What comes from a pipe or a device is held in memory; see [`input::read`](crate::input::read). For a file that
-    /// others may write to, read it and use [`from_bytes`](Self::from_bytes).
+    /// The file must not be changed in place while it is open. A reader would see the change, and
+    /// after a truncation the operating system ends the process (SIGBUS). To replace the file by a
+    /// rename, as [`save_atomic`](super::save_atomic) does, is safe. For a file that others may
+    /// write to, read it and call [`from_bytes`](Self::from_bytes).
+    ///
+    /// Data from a pipe or a device is held in memory; see [`input::read`](crate::input::read).
     ///
     /// # Errors
     /// [`AssetError`] names what was found, in which section, and what was expected.
@@ -127,19 +134,21 @@ impl Container {
         let mut file = File::open(path).map_err(io("open"))?;
         let kind = file.metadata().map_err(io("open"))?;
         if !kind.is_file() || kind.len() == 0 {
-            // A pipe cannot be mapped, an empty file not on every system, and a folder cannot be read.
+            // A pipe cannot be mapped, an empty file can be mapped only on some systems, and a
+            // folder cannot be read.
             let mut bytes = Vec::new();
             file.by_ref().take(PREFIX).read_to_end(&mut bytes).map_err(io("read"))?;
             if let Err(e @ (AssetError::NotTesdf { .. } | AssetError::Version { .. })) =
                 header::read_prefix(&bytes)
             {
-                // It may never end.
+                // A pipe may never end.
                 return Err(e);
             }
             input::read_rest(&mut file, &mut bytes).map_err(io("read"))?;
             return Self::from_bytes(&bytes, table);
         }
-        // SAFETY: nothing in this process writes to the mapping; what other processes may do is documented above.
+        // SAFETY: nothing in this process writes to the mapping. The documentation above says what
+        // other processes may do.
         let map = unsafe { Mmap::map(&file) }.map_err(io("map"))?;
         Self::new(Storage::Mapped(map), table)
     }
@@ -147,7 +156,7 @@ impl Container {
     /// Copies `bytes` into aligned memory and checks the structure against `table`.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// The same as for [`open`](Self::open).
     pub fn from_bytes(bytes: &[u8], table: &[SectionSpec]) -> Result<Self, AssetError> {
         let mut words = Vec::new();
         let count = bytes.len().div_ceil(size_of::<u64>());
@@ -206,7 +215,7 @@ impl Container {
                      copy or encode it again"
                 )));
             }
-            // Both are within the file, so they fit a usize.
+            // Both ends are within the file, so they fit a usize.
             let range = header_end + from as usize..header_end + to as usize;
             sections.push(Placed { spec: *spec, range, checksum });
             end = to;
@@ -232,7 +241,7 @@ impl Container {
         Ok(Self { storage: Arc::new(storage), metadata, sections, header_end, digits })
     }
 
-    /// The caller's metadata, as given to [`write_container`].
+    /// The metadata of the caller, as given to [`write_container`].
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.metadata
     }
@@ -242,21 +251,22 @@ impl Container {
         self.storage.bytes()
     }
 
-    /// Bytes of length field and header, before the first section.
+    /// Number of bytes before the first section: the length field and the header.
     pub fn header_size(&self) -> usize {
         self.header_end
     }
 
-    /// The sections present, in the order of the file, with their bytes.
+    /// The sections of this file, in the order of the file, with their bytes.
     pub fn sections(&self) -> impl Iterator<Item = Section<'_>> {
         self.sections.iter().map(|s| Section { spec: s.spec, bytes: &self.as_bytes()[s.range.clone()] })
     }
 
-    /// Section `name` in place, one `T` per number or per row; `None` when the file lacks it.
+    /// The section `name` in place, with one `T` for each number or for each row. `None` when the
+    /// file does not have it.
     ///
     /// # Errors
-    /// [`AssetError::Section`] when `T` is neither as large as one number nor as one row, or is aligned to more than
-    /// the section is.
+    /// [`AssetError::Section`] when the size of `T` is neither that of a number nor that of a row,
+    /// or when the alignment of `T` is larger than that of the section.
     pub fn section<T: bytemuck::Pod>(&self, name: &str) -> Result<Option<&[T]>, AssetError> {
         let Some(Placed { spec, range, .. }) = self.sections.iter().find(|s| s.spec.name == name) else {
             return Ok(None);
@@ -277,10 +287,12 @@ impl Container {
             .map_err(|e| AssetError::section(name, format!("cannot be read in place: {e}")))
     }
 
-    /// As [`section`](Self::section), but owning a share of the bytes, for types that keep a section.
+    /// The same as [`section`](Self::section), but the result shares the ownership of the bytes. It
+    /// is for types that keep a section.
     ///
     /// # Errors
-    /// As [`section`](Self::section); a section that the file lacks is an error here.
+    /// The same as for [`section`](Self::section). A section that the file does not have is an
+    /// error here.
     pub fn shared_section<T: bytemuck::Pod>(&self, name: &str) -> Result<SharedSection<T>, AssetError> {
         let slice: &[T] = self.section(name)?.ok_or_else(|| AssetError::section(name, "it is missing"))?;
         let (start, length) = (slice.as_ptr(), slice.len());
@@ -310,7 +322,8 @@ impl Container {
     }
 }
 
-/// A section of a [`Container`] that keeps the container's bytes alive; derefs to a slice at no cost.
+/// A section of a [`Container`] that keeps the bytes of the container alive. It dereferences to a
+/// slice at no cost.
 #[derive(Clone)]
 pub struct SharedSection<T> {
     storage: Arc<Storage>,
@@ -320,7 +333,7 @@ pub struct SharedSection<T> {
 }
 
 impl<T: bytemuck::Pod> SharedSection<T> {
-    /// A copy of rows that are of no file.
+    /// A copy of rows that come from no file.
     pub(crate) fn of_rows(rows: &[T]) -> Self {
         let bytes: &[u8] = bytemuck::cast_slice(rows);
         let mut words = vec![0u64; bytes.len().div_ceil(8)];
@@ -331,7 +344,8 @@ impl<T: bytemuck::Pod> SharedSection<T> {
     }
 }
 
-// SAFETY: the bytes are immutable and owned by `storage`, itself `Send + Sync`; `start` is only read.
+// SAFETY: the bytes are immutable and owned by `storage`, which is `Send + Sync`. `start` is only
+// read.
 unsafe impl<T: bytemuck::Pod + Send + Sync> Send for SharedSection<T> {}
 // SAFETY: as above.
 unsafe impl<T: bytemuck::Pod + Send + Sync> Sync for SharedSection<T> {}
@@ -341,8 +355,9 @@ impl<T: bytemuck::Pod> Deref for SharedSection<T> {
 
     #[inline]
     fn deref(&self) -> &[T] {
-        // SAFETY: `start` and `length` are of a slice checked by bytemuck; its memory (a mapping, or the heap block of a
-        // vector that nobody can reach mutably) neither moves nor goes before `storage` does.
+        // SAFETY: `start` and `length` are those of a slice that bytemuck has checked. Its memory
+        // (a mapping, or the heap block of a vector that nobody can reach mutably) does not move,
+        // and lives as long as `storage`.
         unsafe { std::slice::from_raw_parts(self.start, self.length) }
     }
 }

@@ -3,20 +3,22 @@ use glam::DVec3;
 use super::layout::Node;
 use crate::domain::{Barycentric, Cell};
 
-/// Where the descents of an asset begin: the words of all cells of one depth, made on opening.
+/// The words at which the location of a point begins: those of all cells of one depth. Made on
+/// opening.
 ///
-/// The upper levels of the forest are nearly all bisected; a grid that holds them saves half of the way.
+/// The upper levels of the forest are nearly all bisected. A grid that holds these words saves half
+/// of the way down.
 #[derive(Clone, Debug)]
 pub(crate) struct Entries {
     pub level: u32,
     pub words: Vec<u32>,
 }
 
-/// Share of the forest's words that the entries may take.
+/// The entries take at most one word for this many words of the forest.
 const ENTRY_SHARE: usize = 2;
 
 impl Entries {
-    /// The deepest grid that takes at most half of the forest's own words.
+    /// Makes the deepest grid that takes at most half as many words as the forest.
     pub fn new(nodes: &[u32]) -> Self {
         if nodes.len() < 6 {
             return Self { level: 0, words: Vec::new() };
@@ -38,7 +40,7 @@ impl Entries {
             return;
         }
         for side in 0..2 {
-            // A leaf above the grid stands for all of its part of the grid.
+            // A leaf above the grid stands for its whole part of the grid.
             let below = match Node::decode(nodes[word], &[]) {
                 Node::Split(children) => children as usize + side,
                 _ => word,

@@ -9,23 +9,23 @@ pub enum AssetError {
     /// The file cannot be written.
     #[error(transparent)]
     Save(#[from] SaveError),
-    /// The operating system refused.
+    /// The operating system refused an action.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried: `open`, `map`, …
+        /// The action: `open`, `map`, …
         action: &'static str,
         /// The file or folder.
         path: PathBuf,
-        /// The operating system's answer.
+        /// The answer of the operating system.
         source: io::Error,
     },
-    /// The memory does not hold the file, or what is made of it.
+    /// The memory does not hold the file, or the data that is made of it.
     #[error("no memory is left for {bytes} bytes; free some, or open the file where there is more")]
     Memory {
-        /// Bytes asked for.
+        /// Number of bytes asked for.
         bytes: usize,
     },
-    /// The bytes are of another format.
+    /// The bytes are not those of a `.tesdf` file.
     #[error("this is {found}, not a .tesdf file; {next}")]
     NotTesdf {
         /// What the bytes look like, with its article.
@@ -33,40 +33,41 @@ pub enum AssetError {
         /// What to do next.
         next: &'static str,
     },
-    /// The file is of a version that this build does not read.
+    /// The file has a version that this build does not read.
     #[error("file-format version {found}; this build reads version {}; {}", super::FORMAT_VERSION, next_for_version(.found))]
     Version {
         /// The version found, as written in the file.
         found: String,
     },
-    /// The file ends before its header does; one that ends later names the [`Section`](Self::Section).
+    /// The file ends before its header does. A file that ends later is an error of a
+    /// [`Section`](Self::Section).
     #[error(
         "the file has {found} bytes, but its header needs {expected}; it was cut short, copy or encode it again"
     )]
     Truncated {
-        /// Bytes found.
+        /// Number of bytes found.
         found: u64,
-        /// Bytes that must be there at least.
+        /// Least number of bytes that must be there.
         expected: u64,
     },
-    /// Bytes follow the last section.
+    /// There are bytes after the last section.
     #[error(
         "{} the last section, which ends at byte {expected}; copy or encode the file again",
         bytes_follow(.extra)
     )]
     TrailingBytes {
-        /// Length of the file by its header.
+        /// Length of the file, according to its header.
         expected: u64,
-        /// Bytes after that.
+        /// Number of bytes after that.
         extra: u64,
     },
-    /// The header is not what the format says.
+    /// The header does not follow the format.
     #[error("header: {reason}")]
     Header {
         /// What was found and what was expected.
         reason: String,
     },
-    /// A section's entry is not what the format says.
+    /// The entry of a section does not follow the format.
     #[error("section {name}: {reason}")]
     Section {
         /// The section.
@@ -74,16 +75,16 @@ pub enum AssetError {
         /// What was found and what was expected.
         reason: String,
     },
-    /// A checksum does not match: the file was damaged or edited.
+    /// A checksum does not match, so the file was damaged or edited.
     #[error(
         "{part}: the checksum is {found}, the file says {expected}; the file was damaged, copy or encode it again"
     )]
     Checksum {
         /// `header` or `section NAME`.
         part: String,
-        /// Checksum of the bytes found, in hex.
+        /// Checksum of the bytes, in hex.
         found: String,
-        /// Checksum written in the file.
+        /// Checksum that is written in the file.
         expected: String,
     },
 }
@@ -109,7 +110,7 @@ impl AssetError {
     }
 }
 
-/// Names come from the file: control characters are escaped and the length is bounded.
+/// A name from the file for a message. Control characters are escaped, and the length is limited.
 pub(super) fn shown(name: &str) -> String {
     const LONGEST: usize = 64;
     let mut s: String = name.chars().take(LONGEST).flat_map(char::escape_debug).collect();

@@ -3,11 +3,14 @@ use glam::{DVec3, Vec3};
 use super::layout::SignHints;
 use crate::geometry::{Triangle, is_flat};
 
-/// A face in `f32`, relative to the middle of the cube, in one cache line: corner a, b − a, c − a, unit normal,
-/// inverse squared lengths of b − a, c − a, c − b, and the bits of the sign hints.
+/// A face in `f32`, relative to the middle of the cube, in one cache line.
 ///
-/// Without area, or nearly so, the normal is NaN, which fails the test for the prism over the face: only edges count. The inverse
-/// of a length of zero is 0, which makes the closest point of that edge its start.
+/// Its numbers are: corner a, b − a, c − a, the unit normal, the inverse squared lengths of b − a,
+/// c − a and c − b, and the bits of the sign hints.
+///
+/// The normal of a face with no area, or nearly none, is NaN. NaN fails the test for the prism over
+/// the face, so only the edges count. The inverse of a length of zero is 0, so the closest point of
+/// that edge is its start.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct FaceRecord(Record);
@@ -16,11 +19,12 @@ type Record = [f32; 16];
 const HINTS: usize = 15;
 
 impl FaceRecord {
-    /// Faces of less height than this (local frame) are no more than their edges: rounding may have turned them over, and
-    /// then no prism stands on them. Half of it is within what `f32` promises, 1e-6 × diagonal.
+    /// A face with a height below this (local frame) counts as its edges alone: rounding may have
+    /// turned it over, and then no prism stands on it. Half of this height is within the promise of
+    /// `f32`, 1e-6 × diagonal.
     pub const LEAST_HEIGHT: f64 = 7e-7;
 
-    /// Rounds a triangle of the local frame.
+    /// Rounds a triangle of the local frame to `f32`.
     pub fn new(triangle: &Triangle, middle: DVec3, hints: SignHints) -> Self {
         let [a, b, c] = triangle.corners.map(|p| (p - middle).as_vec3());
         let (u, v) = ((b - a).as_dvec3(), (c - a).as_dvec3());
@@ -39,7 +43,7 @@ impl FaceRecord {
         Self(record)
     }
 
-    /// The numbers, in the order of the type's documentation.
+    /// The numbers, in the order that the documentation of the type gives.
     #[inline(always)]
     pub fn as_array(&self) -> &[f32; 16] {
         &self.0
@@ -54,7 +58,7 @@ impl FaceRecord {
         Triangle::with_normal([v(0), v(0) + v(1), v(0) + v(2)], normal)
     }
 
-    /// From now on only the winding number tells the sign.
+    /// Clears the hints, so that only the winding number tells the sign.
     pub fn forget_hints(&mut self) {
         self.0[HINTS] = f32::from_bits(SignHints::default().0.into());
     }

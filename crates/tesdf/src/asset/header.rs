@@ -1,6 +1,9 @@
-//! The JSON header. It is written here, not by the `safetensors` crate: that keeps metadata in a `HashMap`, whose order
-//! differs from run to run, and the same mesh must give the same bytes. It is read here too, because the crate's errors
-//! do not name the section and it takes the last of two entries with one name.
+//! The JSON header.
+//!
+//! It is written here and not by the `safetensors` crate. That crate keeps metadata in a `HashMap`,
+//! whose order differs from run to run, and the same mesh must give the same bytes. It is read here
+//! too: the errors of that crate do not name the section, and of two entries with one name it takes
+//! the last.
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -9,25 +12,26 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use super::error::shown;
 use super::{AssetError, FORMAT_VERSION};
 
-/// Bytes of the length field.
+/// Number of bytes of the length field.
 pub(super) const LENGTH_FIELD: usize = 8;
-/// The header is metadata: a larger one is not ours. Bounds what a reader parses.
+/// Largest size of a header. The header has only metadata, so a larger one is not ours. This bounds
+/// what a reader parses.
 pub(super) const MAX_HEADER: usize = 1 << 20;
 const MAX_ENTRIES: usize = 1 << 10;
-/// What every header starts with; the version follows.
+/// The start of every header. The version follows.
 const MAGIC: &str = r#"{"__metadata__":{"format":"tesdf","version":""#;
 const BEFORE_CHECKSUM: &str = r#"","checksum":""#;
 pub(super) const DIGITS: usize = 2 * blake3::OUT_LEN;
 /// Metadata keys with this prefix hold the checksums of sections.
 pub(super) const SECTION_CHECKSUM: &str = "checksum.";
 
-/// Header as parsed, nothing but its syntax checked.
+/// A header as parsed. Only its syntax was checked.
 pub(super) struct Header {
     pub metadata: BTreeMap<String, String>,
     pub entries: Vec<(String, Entry)>,
 }
 
-/// What the header says of one section.
+/// The entry of one section in the header.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Entry {
@@ -65,7 +69,7 @@ pub(super) fn is_reserved(key: &str) -> bool {
     matches!(key, "format" | "version" | "checksum") || key.starts_with(SECTION_CHECKSUM)
 }
 
-/// Length field, JSON and padding, with the header's checksum in place.
+/// Makes the length field, the JSON and the padding, with the checksum of the header in place.
 pub(super) fn write_header(
     metadata: &BTreeMap<String, String>,
     lines: &[Line<'_>],
@@ -109,7 +113,7 @@ pub(super) fn header_checksum(header: &[u8], at: usize) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-/// Checks magic and version, and says where the checksum's digits are and where the header ends.
+/// Checks magic and version. Returns the place of the checksum's digits and the end of the header.
 pub(super) fn read_prefix(bytes: &[u8]) -> Result<(usize, usize), AssetError> {
     let after = bytes.get(LENGTH_FIELD..).unwrap_or_default();
     let seen = after.len().min(MAGIC.len());
@@ -162,7 +166,7 @@ pub(super) fn read_prefix(bytes: &[u8]) -> Result<(usize, usize), AssetError> {
 }
 
 fn could_be_length(bytes: &[u8]) -> bool {
-    // A header is shorter than 2^24 bytes: all but three bytes of its length are 0.
+    // A header is shorter than 2^24 bytes, so all but three bytes of its length are 0.
     bytes.iter().skip(3).all(|&b| b == 0)
 }
 
@@ -202,7 +206,7 @@ fn is_binary_stl(bytes: &[u8]) -> bool {
     count > 0 && bytes.len() as u64 == 84 + 50 * count
 }
 
-/// Parses the JSON of a header, `bytes` without the length field.
+/// Parses the JSON of a header. `bytes` does not include the length field.
 pub(super) fn parse(bytes: &[u8]) -> Result<Header, AssetError> {
     serde_json::from_slice(bytes).map_err(|e| AssetError::header(format!("not the expected JSON: {e}")))
 }

@@ -3,23 +3,24 @@ use std::collections::BTreeSet;
 use super::layout::TreeChild;
 use crate::geometry::{AabbTree, Child};
 
-/// What a vertex moves: made when the first one does.
+/// What each vertex moves. Made when the first vertex moves.
 #[derive(Debug)]
 pub struct Incidence {
     /// Faces of each vertex of the mesh, by position.
     pub faces: Rows,
     /// Tetrahedra of each vertex of the domain.
     pub tetrahedra: Rows,
-    /// Of the face tree; its leaves are runs of faces.
+    /// Parents in the face tree. Its leaves are runs of faces.
     pub face_tree: Parents,
-    /// Of the tree over tetrahedra; its leaves are runs of its order.
+    /// Parents in the tree over tetrahedra. Its leaves are runs of the tree's order.
     pub tetrahedron_tree: Parents,
-    /// Where each tetrahedron is in that order.
+    /// The place of each tetrahedron in that order.
     pub place: Vec<u32>,
 }
 
 impl Incidence {
-    /// Of faces and of the tetrahedra of a conforming domain, each with the number of vertices that they use, and of the trees over both.
+    /// Makes the tables for faces, for the tetrahedra of a conforming domain, and for the trees
+    /// over both. Each pair has the elements and the number of vertices that they use.
     pub fn new(
         (faces, mesh_vertices): (&[[u32; 3]], usize),
         face_tree: &[[u32; 2]],
@@ -47,7 +48,7 @@ impl Incidence {
     }
 }
 
-/// For each key a list of items, one after the other.
+/// A list of items for each key, one list after the other.
 #[derive(Debug)]
 pub struct Rows {
     starts: Vec<u32>,
@@ -78,12 +79,14 @@ impl Rows {
     }
 }
 
-/// The way up in a tree whose nodes have two children each. A *slot* is a child of a node: 2 · node + side.
+/// The parents in a tree whose nodes have two children each. A *slot* is a child of a node: 2 ·
+/// node + side.
 #[derive(Debug)]
 pub struct Parents {
-    /// The slot that holds each position of the leaves' runs; [`NONE`] when the tree is a single leaf.
+    /// The slot that has each position of the runs of the leaves. [`NONE`] when the tree is a
+    /// single leaf.
     leaf: Vec<u32>,
-    /// The slot that holds each node.
+    /// The slot that has each node.
     node: Vec<u32>,
 }
 
@@ -104,7 +107,8 @@ impl Parents {
         parents
     }
 
-    /// Calls `refit` with each slot whose box may change, a node's before that of its parent; `refit` tells whether it did.
+    /// Calls `refit` with each slot whose box may change, children before their parents. `refit`
+    /// says whether the box did change.
     pub fn climb(&self, positions: impl Iterator<Item = u32>, mut refit: impl FnMut(u32) -> bool) {
         let leaves = positions.map(|p| self.leaf[p as usize]).filter(|&slot| slot != NONE);
         let mut open: BTreeSet<u32> = leaves.collect();

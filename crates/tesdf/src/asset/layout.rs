@@ -1,36 +1,39 @@
-//! The sections of an asset and the words in them; the one place that knows the byte layout.
+//! The sections of an asset and the words in them. Only this module knows the byte layout.
 
 use super::{Element, SectionSpec};
 use crate::base::Side;
 
-/// `[V, 3]` vertex positions in the mesh's unit, in the order of the source.
+/// `[V, 3]` positions of the vertices, in the unit of the mesh and in the order of the source.
 pub const VERTICES: SectionSpec = SectionSpec::required("mesh.vertices", Element::F64, 3);
 /// `[F, 3]` corner vertices of the faces, in the order of the face tree's leaves.
 pub const FACES: SectionSpec = SectionSpec::required("mesh.faces", Element::U32, 3);
 /// `[F]` id of each face in the source mesh.
 pub const FACE_IDS: SectionSpec = SectionSpec::required("mesh.face_ids", Element::U32, 1);
-/// `[F]` how each feature of a face tells the sign: see [`SignHints`].
+/// `[F]` how each feature of a face tells the sign; see [`SignHints`].
 pub const SIGN_HINTS: SectionSpec = SectionSpec::required("mesh.sign_hints", Element::U16, 1);
 /// `[8]` local frame and cube: offset x y z, scale, cube origin x y z, cube side.
 pub const FRAME: SectionSpec = SectionSpec::required("domain.frame", Element::F64, 1);
-/// `[W, 3]` positions, in the mesh's unit, of the vertices of a conforming domain that are not of the mesh.
+/// `[W, 3]` positions, in the unit of the mesh, of those vertices of a conforming domain that are
+/// not of the mesh.
 pub const DOMAIN_VERTICES: SectionSpec = SectionSpec::optional("domain.vertices", Element::F64, 3);
-/// `[T, 4]` corners of the tetrahedra of a conforming domain: vertices of the mesh, then those of [`DOMAIN_VERTICES`]. A file
-/// without them has the bisection domain.
+/// `[T, 4]` corners of the tetrahedra of a conforming domain: first the vertices of the mesh, then
+/// those of [`DOMAIN_VERTICES`]. A file without this section has the bisection domain.
 pub const TETRAHEDRA: SectionSpec = SectionSpec::optional("domain.tetrahedra", Element::U32, 4);
-/// `[N]` the bisection forest: see [`Node`]. First the roots: 6, or one for each of [`TETRAHEDRA`]; children are neighbours.
+/// `[N]` the bisection forest; see [`Node`]. The roots come first: 6, or one for each of
+/// [`TETRAHEDRA`]. The two children of a node are neighbours.
 pub const NODES: SectionSpec = SectionSpec::required("domain.nodes", Element::U32, 1);
-/// Encoded faces of the cells: see [`List`].
+/// The encoded lists of the cells; see [`List`].
 pub const LISTS: SectionSpec = SectionSpec::required("lists.bytes", Element::U8, 1);
 /// `[P + 1]` where each palette begins among the palette faces.
 pub const PALETTE_STARTS: SectionSpec = SectionSpec::required("lists.palette_starts", Element::U32, 1);
 /// Low 16 bits of the palette faces (positions in [`FACES`]).
 pub const PALETTES: SectionSpec = SectionSpec::required("lists.palettes", Element::U16, 1);
-/// Bits 16–23 of the palette faces; only for meshes of more than 65,536 faces.
+/// Bits 16–23 of the palette faces. Only for meshes of more than 65,536 faces.
 pub const PALETTES_HIGH: SectionSpec = SectionSpec::optional("lists.palettes_high", Element::U8, 1);
-/// `[M, 12]` boxes of the two children of each node of the face tree, relative to the middle of the cube, local frame: min x y z, max x y z, twice.
+/// `[M, 12]` boxes of the two children of each node of the face tree: min x y z, max x y z, twice.
+/// They are relative to the middle of the cube, in the local frame.
 pub const TREE_BOXES: SectionSpec = SectionSpec::required("tree.boxes", Element::F32, 12);
-/// `[M, 2]` children of each node of the face tree: see [`TreeChild`].
+/// `[M, 2]` children of each node of the face tree; see [`TreeChild`].
 pub const TREE_CHILDREN: SectionSpec = SectionSpec::required("tree.children", Element::U32, 2);
 
 /// All sections of a file.
@@ -51,9 +54,9 @@ pub const SECTIONS: [SectionSpec; 14] = [
     TREE_CHILDREN,
 ];
 
-/// Most faces that an asset can hold: palette faces have 24 bits.
+/// Largest number of faces of an asset: palette faces have 24 bits.
 pub const MAX_FACES: usize = 1 << 24;
-/// Most faces in a leaf of the face tree.
+/// Largest number of faces in a leaf of the face tree.
 pub const TREE_LEAF: usize = 8;
 
 /// Where a cell lies.
@@ -63,7 +66,8 @@ pub enum Label {
     Outside,
     /// Winding number 1 or more in the whole cell.
     Inside,
-    /// The surface comes within the padding of the cell; the winding number at its centroid.
+    /// The surface comes within the padding of the cell. The number is the winding number at its
+    /// centroid.
     Crossing(u32),
 }
 
@@ -80,25 +84,25 @@ pub enum Label {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Node {
-    /// Children are this word and the next.
+    /// The cell is bisected. Its children are this word and the next.
     Split(u32),
-    /// A cell with a list at this byte of [`LISTS`].
+    /// The cell has a list that begins at this byte of [`LISTS`].
     Listed(Label, u32),
-    /// A cell far from the surface, answered by the face tree; whether it is inside.
+    /// The cell is far from the surface, on this side of it. The face tree answers.
     Far(Side),
-    /// Farther out than the band.
+    /// The cell is farther out than the band.
     NotOfDomain,
 }
 
 const LEAF: u32 = 1 << 31;
 const CODE: u32 = 28;
-/// Offsets of lists are below this.
+/// The offsets of lists are below this.
 pub const MAX_LIST_OFFSET: u32 = 1 << CODE;
-/// Winding numbers from here on are written before their list.
+/// From this winding number on, the number is written before the list.
 pub const LONG_WINDING: u32 = 3;
 
 impl Node {
-    /// Whether a word is of a bisected cell; its value is then where the children are.
+    /// Whether the word is that of a bisected cell. The word is then the place of its children.
     #[inline]
     pub fn is_split(word: u32) -> bool {
         word & LEAF == 0
@@ -144,23 +148,23 @@ impl Node {
     }
 }
 
-/// Palette number that says "no palette": the list is a u32 count and u32 faces.
+/// The palette number that stands for "no palette". The list then has a u32 count and u32 faces.
 pub const NO_PALETTE: u16 = u16::MAX;
-/// Most faces of a palette, so that a byte names each.
+/// Largest number of faces in a palette, so that one byte names each face.
 pub const PALETTE_SIZE: usize = 256;
 
-/// The list of a cell: `palette u16, count u8, count × u8` slots of the palette, or
-/// `NO_PALETTE u16, count u32, count × u32` faces. Little-endian, unaligned.
+/// The list of a cell, little-endian and unaligned. It is `palette u16, count u8, count × u8` with
+/// slots of the palette, or `NO_PALETTE u16, count u32, count × u32` with faces.
 #[derive(Clone, Copy, Debug)]
 pub enum List<'a> {
     /// Slots of a palette.
     Slots(u16, &'a [u8]),
-    /// Faces, four bytes each.
+    /// Faces, with four bytes each.
     Faces(&'a [u8]),
 }
 
 impl<'a> List<'a> {
-    /// Reads the list at `offset`; `None` when it does not lie in `bytes`.
+    /// Reads the list at `offset`. `None` when the list does not lie in `bytes`.
     #[inline]
     pub fn decode(bytes: &'a [u8], offset: u32) -> Option<Self> {
         let rest = bytes.get(offset as usize..)?;
@@ -208,9 +212,9 @@ impl<'a> List<'a> {
 /// A child of a node of the face tree: `0 node(31)`, or `1 start(28) count-1(3)`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TreeChild {
-    /// A node, of a greater index than its parent.
+    /// A node. Its index is greater than that of its parent.
     Node(u32),
-    /// Faces `start .. start + count`, `count` from 1 to [`TREE_LEAF`].
+    /// Faces `start .. start + count`. `count` is from 1 to [`TREE_LEAF`].
     Leaf(u32, u32),
 }
 
@@ -230,26 +234,27 @@ impl TreeChild {
     }
 }
 
-/// How the sign follows from a closest feature, two bits each: the face, edges 0–2, corners 0–2.
+/// How the closest feature tells the sign, with two bits each for the face, the edges 0–2 and the
+/// corners 0–2.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct SignHints(pub u16);
 
-/// How a feature tells the sign of a point that it is closest to.
+/// How a feature tells the sign of a point to which it is closest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 pub enum SignHint {
-    /// Only the winding number does.
+    /// The feature does not tell the sign. The winding number does.
     Winding = 0,
-    /// The side of the face's plane.
+    /// The side of the face's plane tells the sign.
     Plane = 1,
-    /// Such points are outside: the feature is convex.
+    /// The point is outside, because the feature is convex.
     Outside = 2,
-    /// Such points are inside: the feature is concave.
+    /// The point is inside, because the feature is concave.
     Inside = 3,
 }
 
 impl SignHints {
-    /// The hint of feature `k`: 0 the face, 1–3 edges, 4–6 corners.
+    /// The hint of feature `k`: 0 is the face, 1–3 are the edges, 4–6 are the corners.
     #[inline]
     pub fn get(self, k: usize) -> SignHint {
         match (self.0 >> (2 * k)) & 3 {

@@ -1,18 +1,20 @@
-//! The `.tesdf` file: one open container, memory-mapped, checked before anything is read from it.
+//! The `.tesdf` file: an open container, memory-mapped, and checked before any section is read.
 //!
-//! In goes a list of named arrays ([`Section`]) and text metadata; out comes one byte string that is the same for the
-//! same input. It is a valid [safetensors](https://github.com/huggingface/safetensors) file, so that
-//! `safetensors.numpy.load_file` and every other reader of that format gives the arrays with no code of ours.
+//! The input is a list of named arrays ([`Section`]) and text metadata. The output is one string of
+//! bytes, the same for the same input. It is a valid
+//! [safetensors](https://github.com/huggingface/safetensors) file: `safetensors.numpy.load_file`
+//! and all other readers of that format read its arrays without code of ours.
 //!
 //! ```text
 //! byte 0   length n of the header, u64 little-endian, a multiple of 8
 //!      8   {"__metadata__":{"format":"tesdf","version":"1","checksum":"<64 hex digits>",…},
-//!           "name":{"dtype":"F32","shape":[1000,3],"data_offsets":[0,12000]},…}      padded with spaces to n bytes
+//!           "name":{"dtype":"F32","shape":[1000,3],"data_offsets":[0,12000]},…}
+//!          padded with spaces to n bytes
 //!  8 + n   the sections, back to back, widest element first, so that each is aligned to its element
 //! ```
 //!
-//! `checksum` is BLAKE3 of the first 8 + n bytes with its own 64 digits set to `0`; `checksum.NAME` is BLAKE3 of section
-//! NAME. Together they cover every byte of the file.
+//! `checksum` is BLAKE3 of the first 8 + n bytes, with its own 64 digits set to `0`.
+//! `checksum.NAME` is BLAKE3 of section NAME. Together they cover every byte of the file.
 pub mod about;
 mod cell_bounds;
 mod cells;
@@ -44,5 +46,5 @@ pub(crate) use motion::Motion;
 pub use section::{Element, Presence, Section, SectionSpec};
 pub use te_sdf::TeSdf;
 
-/// The version of the file format that this build writes, and the only one that it reads.
+/// The version of the file format that this build writes. It reads only this version.
 pub const FORMAT_VERSION: u32 = 1;

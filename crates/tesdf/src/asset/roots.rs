@@ -1,4 +1,5 @@
-//! The tetrahedra that the bisection forest grows from: those of the cube, or of a conforming domain.
+//! The tetrahedra that the bisection forest grows from: those of the cube, or of a conforming
+//! domain.
 use glam::DVec3;
 
 use super::TeSdf;
@@ -8,11 +9,13 @@ use crate::base::Side;
 use crate::domain::{Cell, Classes};
 use crate::geometry::{Aabb, AabbTree, Child, barycentric};
 
-/// A point of the border may be out of all tetrahedra by rounding: by less than this, in barycentric coordinates.
+/// By rounding, a point of the border may be out of all tetrahedra, by less than this in
+/// barycentric coordinates.
 const OUTSIDE: f64 = -1e-12;
 
 impl TeSdf {
-    /// How many vertices and tetrahedra of a conforming domain there are of each class (Sec. III-A); `None` for the bisection domain.
+    /// The numbers of vertices and tetrahedra of a conforming domain by class (Sec. III-A). `None`
+    /// for the bisection domain.
     pub fn classes(&self) -> Option<Classes> {
         let domain = self.conforming.as_ref()?;
         let sides = (0..domain.tetrahedra().len()).map(|root| self.side_of_root(root));
@@ -21,7 +24,7 @@ impl TeSdf {
         Some(Classes::count(vertices, tetrahedra, |v| (v as usize) < self.vertices.len()))
     }
 
-    /// All cells of a root are on its side.
+    /// The side of a root. All of its cells are on this side.
     fn side_of_root(&self, root: usize) -> Side {
         let mut word = self.nodes[root];
         loop {
@@ -33,7 +36,7 @@ impl TeSdf {
         }
     }
 
-    /// Where the vertices of the mesh are.
+    /// The positions of the vertices of the mesh.
     pub(crate) fn placed(&self) -> Placed<'_> {
         Placed { vertices: &self.vertices, frame: self.frame }
     }
@@ -43,7 +46,7 @@ impl TeSdf {
         self.conforming.as_ref().map_or(6, |domain| domain.tetrahedra().len())
     }
 
-    /// One of them, in the local frame.
+    /// A root of the forest, in the local frame.
     pub(crate) fn root(&self, root: usize) -> Cell {
         match &self.conforming {
             None => self.cube.root(root),
@@ -51,8 +54,11 @@ impl TeSdf {
         }
     }
 
-    /// The tetrahedron of a conforming domain that holds a point of the local frame, with the point's coordinates in it. On a border the
-    /// first one found; by rounding a point may be a little out of all, and then the one that it is the least out of.
+    /// Locates a point of the local frame: the tetrahedron of a conforming domain that has the
+    /// point, and the coordinates of the point in it.
+    ///
+    /// On a border it is the first tetrahedron found. By rounding, a point may be a little out of
+    /// all tetrahedra. Then it is the tetrahedron that the point is the least out of.
     pub(crate) fn locate_root(&self, domain: &Conforming, p: DVec3) -> Option<(usize, [f64; 4])> {
         let placed = self.placed();
         let mut best: Option<(f64, usize, [f64; 4])> = None;
@@ -89,20 +95,22 @@ impl TeSdf {
         best.map(|(_, root, lambda)| (root, lambda))
     }
 
-    /// The tetrahedra of a conforming domain whose boxes overlap `bounds` (local frame), in no order that matters.
+    /// Calls `visit` with the tetrahedra of a conforming domain whose boxes overlap `bounds` (local
+    /// frame). The order does not matter.
     pub(crate) fn visit_roots(&self, domain: &Conforming, bounds: Aabb, mut visit: impl FnMut(usize)) {
         domain.tree().visit(|b| b.overlaps(bounds), |leaf| leaf.iter().for_each(|&t| visit(t as usize)));
     }
 }
 
-/// Whether a point is in front of a side by more than rounding: most tetrahedra whose boxes hold it.
+/// Whether a point is in front of a side by more than rounding. This is so for most tetrahedra
+/// whose boxes have the point.
 fn is_clearly_outside([a, b, c, d]: &[DVec3; 4], p: DVec3) -> bool {
     let (ab, ac, ad, ap) = (*b - *a, *c - *a, *d - *a, p - *a);
-    // Six times the volumes that the point has with three of the sides.
+    // Six times the volumes of the point with three of the sides.
     let across = [ac.cross(ad), ad.cross(ab), ab.cross(ac)];
     let whole = ab.dot(across[0]);
     let parts = across.map(|side| ap.dot(side) * whole.signum());
-    // The second part is what slivers need: the rounding of volumes of edges up to 4.
+    // Slivers need the second term: the rounding of volumes with edges up to 4.
     let slack = 1e-9 * whole.abs() + 1e-13;
     parts.iter().any(|&part| part < -slack) || parts.iter().sum::<f64>() > whole.abs() + slack
 }

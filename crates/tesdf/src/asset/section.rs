@@ -14,7 +14,7 @@ pub enum Element {
 }
 
 impl Element {
-    /// Size in bytes, which is its alignment too.
+    /// Size in bytes. It is also the alignment.
     pub const fn size(self) -> usize {
         match self {
             Self::U8 => 1,
@@ -24,7 +24,7 @@ impl Element {
         }
     }
 
-    /// Name in the header, as safetensors spells it.
+    /// The name in the header, as safetensors spells it.
     pub const fn name(self) -> &'static str {
         match self {
             Self::U8 => "U8",
@@ -39,22 +39,22 @@ impl Element {
 /// Whether a file may lack a section.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Presence {
-    /// Every file has it, possibly with no rows.
+    /// Every file has the section. It may have no rows.
     Required,
-    /// A file may lack it.
+    /// A file may lack the section.
     Optional,
 }
 
-/// Layout of one section; a table of these is the layout of the file.
+/// Layout of one section. A table of these is the layout of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SectionSpec {
     /// Name in the header.
     pub name: &'static str,
     /// Number type.
     pub element: Element,
-    /// Numbers per row: 1 gives an array of shape `[n]`, more give `[n, columns]`.
+    /// Numbers in a row. With 1 the array has the shape `[n]`, with more it has `[n, columns]`.
     pub columns: usize,
-    /// Whether a file may lack it.
+    /// Whether a file may lack the section.
     pub presence: Presence,
 }
 
@@ -75,7 +75,7 @@ impl SectionSpec {
     }
 }
 
-/// A section to be written: its layout and its bytes.
+/// A section to write: its layout and its bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Section<'a> {
     /// Layout.
@@ -85,7 +85,7 @@ pub struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
-    /// The rows of `values` as a section; the length is checked when the section is written.
+    /// Makes a section of the rows of `values`. Writing the section checks its length.
     pub fn new<T: bytemuck::Pod>(spec: SectionSpec, values: &'a [T]) -> Self {
         Self { spec, bytes: bytemuck::cast_slice(values) }
     }

@@ -17,10 +17,10 @@ use crate::base::Isa;
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
 
-/// A Tetra-Encoded Signed Distance Field: an encoded mesh, immutable, shared by all that use it.
+/// A Tetra-Encoded Signed Distance Field: an encoded mesh, immutable, shared by all its users.
 ///
-/// The space around a solid is cut into tetrahedra. Each tetrahedron `t` carries the list `E_t` of the
-/// faces that can be closest to a point of it, so a signed distance is the least of a few exact
+/// The space around a solid is cut into tetrahedra. Each tetrahedron `t` has a list `E_t` of the
+/// faces that can be closest to a point in it. So a signed distance is the least of a few exact
 /// point–triangle distances, and its sign is that of the tetrahedron:
 ///
 /// ```text
@@ -31,18 +31,18 @@ use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
 ///         ___╱ ╲___ t             through t, the closest feature tells
 /// ```
 ///
-/// The tetrahedra are the leaves of a bisection forest over a cube ([`Cell`](crate::domain::Cell)):
-/// their geometry follows from their path, so nothing is stored for a cell but its list. A list names
-/// its faces by one byte each, as slots of a palette of up to 256 faces that a subtree shares.
+/// The tetrahedra are the leaves of a bisection forest over a cube ([`Cell`](crate::domain::Cell)).
+/// The geometry of a cell follows from its path, so only its list is stored. A list names each of
+/// its faces by one byte: a slot in a palette of up to 256 faces, which a subtree shares.
 ///
-/// All lengths are in the mesh's own unit. The type is `Send + Sync` and cheap to share by `Arc`.
+/// All lengths are in the unit of the mesh. The type is `Send + Sync`, and cheap to share by `Arc`.
 #[derive(Clone, Debug)]
 pub struct TeSdf {
     container: Container,
     about: About,
     pub(crate) frame: LocalFrame,
     pub(crate) cube: DomainCube,
-    /// The tetrahedra that the forest grows from, unless they are those of the cube.
+    /// The tetrahedra that the forest grows from. `None` when they are those of the cube.
     pub(crate) conforming: Option<Conforming>,
     pub(crate) vertices: SharedSection<[f64; 3]>,
     pub(crate) faces: SharedSection<[u32; 3]>,
@@ -57,13 +57,13 @@ pub struct TeSdf {
     pub(crate) tree_children: SharedSection<[u32; 2]>,
     /// Faces in `f32`, made on opening.
     pub(crate) records: Vec<FaceRecord>,
-    /// Where descents begin, made on opening.
+    /// The words at which locating a point begins, made on opening.
     pub(crate) entries: Entries,
     pub(crate) isa: Isa,
-    /// Of the faces' corners, in the mesh's unit; made on opening.
+    /// Bounds of the corners of the faces, in the unit of the mesh. Made on opening.
     bounds: Aabb,
     pub(crate) cell_bounds: OnceLock<CellBounds>,
-    /// What has moved since it was opened, if anything has.
+    /// What has moved since the asset was opened. `None` when nothing has.
     pub(crate) motion: Option<Motion>,
     lowest_faces: OnceLock<Vec<u32>>,
     pub(crate) inner_ball: OnceLock<InnerBall>,
@@ -154,7 +154,7 @@ impl TeSdf {
         &self.about
     }
 
-    /// Name of the mesh's unit as it was recorded, if it was; see [`unit`](crate::base::unit).
+    /// Name of the unit of the mesh, if it was recorded; see [`unit`](crate::base::unit).
     pub fn unit(&self) -> Option<&str> {
         self.about.options.unit.as_deref().map(str::trim).filter(|unit| !unit.is_empty())
     }
@@ -163,7 +163,7 @@ impl TeSdf {
         &mut self.about
     }
 
-    /// Forgets what depends on where vertices are, but for what is refitted.
+    /// Forgets all data that depends on the positions of vertices, except data that is refitted.
     pub(crate) fn shape_changed(&mut self) {
         self.bounds = self.bounds_of_faces();
         self.cell_bounds = OnceLock::from(CellBounds::none());
@@ -175,13 +175,13 @@ impl TeSdf {
         (0..self.faces.len()).map(|f| Aabb::of(&self.face_corners(f))).fold(Aabb::EMPTY, Aabb::union)
     }
 
-    /// Whether every list is proved to be exact where the vertices are now.
+    /// Whether every list is proved to be exact for the current positions of the vertices.
     pub(crate) fn has_exact_lists(&self) -> bool {
         let certificate = &self.about.certificate;
         certificate.delta().is_some() && certificate.exactness_distance().is_none()
     }
 
-    /// The whole file as it was opened, whatever has moved since.
+    /// The whole file as it was opened, even if vertices have moved since.
     pub fn as_bytes(&self) -> &[u8] {
         self.container.as_bytes()
     }
@@ -191,7 +191,8 @@ impl TeSdf {
         &self.container
     }
 
-    /// Writes the file, replacing one at `path` atomically; with vertices and lists as they are now.
+    /// Writes the file, replacing one at `path` atomically; with vertices and lists as they are
+    /// now.
     ///
     /// # Errors
     /// As [`save_atomic`]; no half file is left.
@@ -199,10 +200,10 @@ impl TeSdf {
         Ok(save_atomic(path, &self.to_bytes()?)?)
     }
 
-    /// The whole file, with vertices and lists as they are now. It does not say which lists are stale.
+    /// The whole file, with the current vertices and lists. It does not say which lists are stale.
     ///
     /// # Errors
-    /// As [`write_container`].
+    /// The same as for [`write_container`].
     pub fn to_bytes(&self) -> Result<Cow<'_, [u8]>, AssetError> {
         if self.motion.is_none() {
             return Ok(Cow::Borrowed(self.as_bytes()));
@@ -211,7 +212,8 @@ impl TeSdf {
         Ok(Cow::Owned(write_container(&sections, &self.about.to_metadata())?))
     }
 
-    /// The sections as they are now, in the order of the file. They stay where they are in memory until vertices move or lists are made anew.
+    /// The current sections, in the order of the file. They stay at the same place in memory until
+    /// vertices move or lists are made anew.
     pub fn sections(&self) -> impl Iterator<Item = Section<'_>> {
         self.container.sections().map(|Section { spec, bytes }| {
             let bytes: &[u8] = match spec {
@@ -232,7 +234,7 @@ impl TeSdf {
     /// Compares every byte with the checksums.
     ///
     /// # Errors
-    /// Names the header or the first section that was damaged.
+    /// Names the header or the first damaged section.
     pub fn verify_checksums(&self) -> Result<(), AssetError> {
         self.container.verify_checksums()
     }
@@ -252,7 +254,8 @@ impl TeSdf {
         Aabb { min: self.frame.to_local(self.bounds.min), max: self.frame.to_local(self.bounds.max) }
     }
 
-    /// For each vertex the lowest id of a face that has it; made on first use. [`u32::MAX`] for one that no face has.
+    /// For each vertex the lowest id of a face that has it, and [`u32::MAX`] for a vertex without a
+    /// face. Made on first use.
     pub(crate) fn lowest_faces(&self) -> &[u32] {
         self.lowest_faces.get_or_init(|| {
             let mut lowest = vec![u32::MAX; self.vertices.len()];
@@ -263,7 +266,8 @@ impl TeSdf {
         })
     }
 
-    /// How far around the solid the domain is sure to reach (local frame): the width of the outer band.
+    /// How far around the solid the domain reaches for certain (local frame): the width of the
+    /// outer band.
     pub(crate) fn band(&self) -> f64 {
         if self.conforming.is_some() {
             return 0.0;
@@ -272,28 +276,31 @@ impl TeSdf {
         self.about.options.band.resolve(diagonal) * self.frame.scale
     }
 
-    /// Corners of the face at `position`, its place in the file, in the mesh's unit.
+    /// Corners of the face at `position`, its place in the file, in the unit of the mesh.
     pub fn face_corners(&self, position: usize) -> [DVec3; 3] {
         self.faces[position].map(|v| DVec3::from_array(self.vertices[v as usize]))
     }
 
-    /// Vertices of the face at `position`, its place in the file; 0-based ids of the encoded mesh.
+    /// Vertices of the face at `position`, its place in the file. They are 0-based ids of the
+    /// encoded mesh.
     pub fn face_vertices(&self, position: usize) -> [u32; 3] {
         self.faces[position]
     }
 
-    /// Id in the source mesh of the face at `position`, its place in the file; below [`face_count`](Self::face_count).
+    /// Id, in the source mesh, of the face at `position`, its place in the file. It is below
+    /// [`face_count`](Self::face_count).
     pub fn face_id(&self, position: usize) -> u32 {
         self.face_ids[position]
     }
 
-    /// What opening made besides the file, in bytes: the faces in `f32`, and where descents begin.
+    /// Sizes in bytes of the data that opening makes in addition to the file: the faces in `f32`,
+    /// and the words at which locating a point begins.
     pub fn derived_bytes(&self) -> (usize, usize) {
         let entries = self.conforming.as_ref().map_or(self.entries.bytes(), Conforming::derived_bytes);
         (std::mem::size_of_val(self.records.as_slice()), entries)
     }
 
-    /// The face at a position, in the local frame.
+    /// The face at `position`, in the local frame.
     pub(crate) fn local_triangle(&self, position: usize) -> Triangle {
         Triangle::new(self.face_corners(position).map(|p| self.frame.to_local(p)))
     }
@@ -352,14 +359,14 @@ impl TeSdf {
                 format!("entry {i} names a face that does not exist ({f} faces)"),
             );
         }
-        // Children follow their parents, so depths are known when a word is reached.
+        // Children follow their parents, so the depth of a word is known when the word is reached.
         let (n, roots) = (self.nodes.len(), self.root_count());
         if n < roots {
             return wrong(layout::NODES, format!("{n} words; expected the {roots} roots at least"));
         }
         let mut depth = vec![u8::MAX; n];
         depth[..roots].fill(0);
-        // Many cells may have one list, which is looked at once; no two lists share a part.
+        // Many cells may share a list, which is checked once. No two lists overlap.
         let (mut known, mut listed) = (vec![0_u64; self.lists.len() / 64 + 1], 0);
         for (i, &word) in self.nodes.iter().enumerate() {
             let bad = |reason: String| wrong(layout::NODES, format!("word {i}: {reason}"));
@@ -399,7 +406,7 @@ impl TeSdf {
         Ok(())
     }
 
-    /// The number of faces of a list, each of which exists.
+    /// The number of faces of a list. It checks that each face exists.
     fn check_list(&self, offset: u32) -> Result<usize, String> {
         let list = List::decode(&self.lists, offset).ok_or("it runs out of the section")?;
         if list.is_empty() {
