@@ -2,12 +2,14 @@ use serde::{Deserialize, Serialize};
 
 use super::Chains;
 
-/// What the encoder proved.
+/// The certificate of an asset: what the encoder proved of its lists.
 ///
-/// For every point `x` of every cell `t` that has a list `E_t`: the least distance from `x` to a face of
-/// `E_t` is the distance from `x` to the mesh, up to [`delta`](Self::delta). Faces at equal distance may be left out.
+/// For every point `x` of every cell `t` with a list `E_t`, the least distance from `x` to a face
+/// of `E_t` is the distance from `x` to the mesh, up to [`delta`](Self::delta). A face may be left
+/// out when another face is as near.
 ///
-/// Only the encoder makes one. The certificate of a file is what its writer says; `tesdf verify --prove` proves it again.
+/// Only the encoder makes a certificate. The certificate of a file is the claim of its writer.
+/// `tesdf verify --prove` proves it again.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Certificate {
     encoder: String,
@@ -19,7 +21,7 @@ pub struct Certificate {
     chains: Option<u32>,
 }
 
-/// A certificate as it is in a file.
+/// A certificate as a file stores it.
 #[derive(Deserialize)]
 pub(crate) struct Written {
     encoder: String,
@@ -40,27 +42,30 @@ impl From<Written> for Certificate {
     }
 }
 
-/// What the certified filter established of all lists.
+/// What the certified filter proved of all lists.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Proved {
-    /// Distance from the surface within which every list is exact, in the mesh's unit; infinite without truncation.
+    /// Distance from the surface within which every list is exact, in the unit of the mesh. It is
+    /// infinite without truncation.
     pub within: f64,
-    /// The chains of rule C that the proof rests on; `None`: there is no proof.
+    /// The chains of rule C that the proof rests on. `None`: there is no proof.
     pub chains: Option<Chains>,
 }
 
 impl Proved {
-    /// Of the lists of both.
+    /// What is proved of the lists of both.
     pub fn and(self, other: Self) -> Self {
         Self { within: self.within.min(other.within), chains: Chains::of_both(self.chains, other.chains) }
     }
 }
 
 impl Certificate {
-    /// Share of the diagonal that rounding is granted, in a domain of a local side up to 1: docs/math.md, 9.
+    /// Share of the diagonal by which rounding may change distances, in a domain with a local side
+    /// of at most 1: docs/math.md, 9.
     pub const DELTA: f64 = 1e-13;
 
-    /// Of lists that `encoder` made in `domain`, with a cube of this side around it (local frame).
+    /// The certificate of lists that `encoder` made in `domain`. `side` is that of the cube around
+    /// the domain, in the local frame.
     pub(crate) fn new(encoder: String, domain: String, diagonal: f64, side: f64, proved: Proved) -> Self {
         let delta = Self::DELTA * side.max(1.0);
         let unproved = Self {
@@ -75,7 +80,7 @@ impl Certificate {
         unproved.with(proved)
     }
 
-    /// The same encoding, of which this is proved.
+    /// The certificate of the same encoding with this proof.
     pub(crate) fn with(self, proved: Proved) -> Self {
         let is_proved = proved.chains.is_some();
         Self {
@@ -88,13 +93,14 @@ impl Certificate {
         }
     }
 
-    /// What is known of the lists, wherever vertices have moved since.
+    /// The proof of the lists, whether or not vertices have moved since.
     pub(crate) fn proved(&self) -> Proved {
         let within = self.exactness_distance.unwrap_or(f64::INFINITY);
         Proved { within, chains: self.chains.map(Chains::of_weight) }
     }
 
-    /// How the lists were made: `certified`; `sampled`, and on what, unless it was the processor in `f64`.
+    /// How the lists were made: `certified`, or `sampled` with the device that looked at the
+    /// samples, unless it was the processor in `f64`.
     pub fn encoder(&self) -> &str {
         &self.encoder
     }
@@ -104,12 +110,13 @@ impl Certificate {
         &self.domain
     }
 
-    /// Bound on the distance that rounding in the encoder can cost, in the mesh's unit; `None`: nothing is proved.
+    /// Bound on the error of distances by rounding in the encoder, in the unit of the mesh. `None`:
+    /// nothing is proved.
     pub fn delta(&self) -> Option<f64> {
         self.delta
     }
 
-    /// [`delta`](Self::delta) as a share of the mesh's diagonal.
+    /// [`delta`](Self::delta) as a share of the diagonal of the mesh.
     pub fn delta_of_diagonal(&self) -> Option<f64> {
         self.delta_of_diagonal
     }
@@ -119,13 +126,14 @@ impl Certificate {
         self.truncated
     }
 
-    /// Distance from the surface within which every cell is exact, in the mesh's unit; `None`: everywhere.
+    /// Distance from the surface within which every cell is exact, in the unit of the mesh. `None`:
+    /// every cell is exact everywhere.
     pub fn exactness_distance(&self) -> Option<f64> {
         self.exactness_distance
     }
 
-    /// Weight of the heaviest chain of shared features that a list rests on, at most 400; `None`: nothing is proved, or the
-    /// file is of a version that did not count them.
+    /// Weight of the heaviest chain of shared features that a list rests on, at most 400. `None`:
+    /// nothing is proved, or the version that wrote the file did not count chains.
     pub fn chains(&self) -> Option<u32> {
         self.chains
     }

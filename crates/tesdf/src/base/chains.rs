@@ -1,38 +1,41 @@
-/// The links that rule C has made from a cell's root to the cell: the longest chain of each filter, added up.
+/// The weight of the links that rule C has made on the way from a root to a cell: the sum of the
+/// heaviest chain of each filter.
 ///
-/// A link replaces a face by another face that has the same edge or vertex. Rounding can make the new one a little farther:
-/// `d²(x, h) ≤ d²(x, g) + 2Δ²`, where Δ is what the test for the region of the edge or vertex can be off by (docs/math.md, 9). So a link
-/// has a weight, and the weights have a budget. Where it is used up, rule C drops nothing more, and lists get longer.
+/// A link replaces a face by another face that has the same edge or vertex. By rounding, the new
+/// face can be a little farther: `d²(x, h) ≤ d²(x, g) + 2Δ²`, where Δ bounds the error of the test
+/// for the region of the edge or vertex (docs/math.md, 9). So a link has a weight, and the weights
+/// have a budget. Where it is used up, rule C drops nothing more, and lists get longer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Chains(u32);
 
 impl Chains {
-    /// None yet: at a root.
+    /// No links: at a root.
     pub const NONE: Self = Self(0);
-    /// Where rule C stops. A rounding is 1.4e-15 of the side of the domain: √(2 · 400) · 2 · 1.4e-15 = 7.9e-14.
+    /// The budget. A rounding is 1.4e-15 of the side of the domain: √(2 · 400) · 2 · 1.4e-15 =
+    /// 7.9e-14.
     pub const BUDGET: u32 = 400;
 
-    /// As stored in a file.
+    /// The weight that a file stores.
     pub(crate) fn of_weight(used: u32) -> Self {
         Self(used)
     }
 
-    /// What the links weigh.
+    /// The weight of the links.
     pub fn used(self) -> u32 {
         self.0
     }
 
-    /// Whether the budget has room for so much more.
+    /// Whether the budget allows this further weight.
     pub(crate) fn allow(self, weight: u32) -> bool {
         self.0 + weight <= Self::BUDGET
     }
 
-    /// With the heaviest chain of one more filter.
+    /// Adds the heaviest chain of a further filter.
     pub(crate) fn and(self, weight: u32) -> Self {
         Self(self.0 + weight)
     }
 
-    /// The heavier of two proofs' chains; `None` where one of the two proves nothing.
+    /// The heavier chains of two proofs. `None` where one of the two proves nothing.
     pub(crate) fn of_both(a: Option<Self>, b: Option<Self>) -> Option<Self> {
         Some(a?.max(b?))
     }

@@ -1,18 +1,19 @@
 /// Instruction set that the kernels are compiled for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Isa {
-    /// Whatever the build targets.
+    /// The instruction set that the build targets.
     Baseline,
-    /// AVX2 and FMA: eight lanes.
+    /// AVX2 and FMA, with eight lanes.
     #[cfg(target_arch = "x86_64")]
     Avx2,
-    /// The same eight lanes with the 32 registers of AVX-512, which the kernel needs not to spill.
+    /// The same eight lanes with the 32 registers of AVX-512. The kernel needs them to avoid
+    /// spilling.
     #[cfg(target_arch = "x86_64")]
     Avx512,
 }
 
 impl Isa {
-    /// The widest that this processor has.
+    /// The widest instruction set of this processor.
     pub fn detect() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
@@ -24,7 +25,7 @@ impl Isa {
         Self::Baseline
     }
 
-    /// All that this processor has, for tests of each.
+    /// All instruction sets of this processor, for tests of each.
     #[cfg(test)]
     pub(crate) fn all_here() -> Vec<Self> {
         let mut all = vec![Self::Baseline];

@@ -1,4 +1,6 @@
-//! Ground types that every stage may use: lengths, sides, progress, certificates, names of units. They use no other module.
+//! Ground types that every stage may use: lengths, sides, progress, certificates, names of units.
+//!
+//! This module uses no other module.
 mod certificate;
 mod chains;
 mod isa;

@@ -1,17 +1,18 @@
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU64, Ordering};
 
-/// What the encoder is at.
+/// The stage of an encoding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Bisecting the domain.
     Refine,
     /// Shortening lists and labelling cells.
     Tighten,
-    /// Laying out bytes.
+    /// Laying out the bytes of the file.
     Assemble,
 }
 
-/// Shared between the thread that encodes and one that watches: how far it is, and the wish to stop.
+/// Progress, shared between the thread that works and a thread that watches. It tells how far the
+/// work is, and carries the request to stop.
 #[derive(Debug, Default)]
 pub struct Progress {
     cancel: AtomicBool,
@@ -21,7 +22,8 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// Asks the encoder to stop; it answers [`EncodeError::Cancelled`](crate::encode::EncodeError::Cancelled).
+    /// Asks the work to stop. An encoding then returns
+    /// [`EncodeError::Cancelled`](crate::encode::EncodeError::Cancelled).
     pub fn cancel(&self) {
         self.cancel.store(true, Ordering::Relaxed);
     }
@@ -31,7 +33,7 @@ impl Progress {
         self.cancel.load(Ordering::Relaxed)
     }
 
-    /// The stage and the share of it that is done, 0 to 1.
+    /// The stage, and the share of the stage that is done, from 0 to 1.
     pub fn state(&self) -> (Stage, f64) {
         let stage = match self.stage.load(Ordering::Relaxed) {
             0 => Stage::Refine,

@@ -1,4 +1,4 @@
-/// Which side of the surface.
+/// A side of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Winding number 0.

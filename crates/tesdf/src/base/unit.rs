@@ -1,9 +1,10 @@
 //! Names of units of length, as people record them.
 
-/// Metres of a unit by its name or sign, such as `mm`, `millimetre` or `inches`; `None` for a name that is not known.
+/// The length in metres of a unit, by its name or sign, such as `mm`, `millimetre` or `inches`.
+/// `None` for an unknown name.
 pub fn metres(name: &str) -> Option<f64> {
     let name = name.trim().to_lowercase();
-    // `metres`, `meter` and `meters` are `metre`.
+    // `metres`, `meter` and `meters` become `metre`.
     let name = name.strip_suffix('s').unwrap_or(&name).replace("meter", "metre");
     Some(match name.as_str() {
         "nm" | "nanometre" => 1e-9,
@@ -21,7 +22,8 @@ pub fn metres(name: &str) -> Option<f64> {
     })
 }
 
-/// Whether two names are of one unit: of the same length, or, where one is not known, the same in any case.
+/// Whether two names stand for the same unit: units of the same length or, where a name is unknown,
+/// the same name in any case.
 pub fn is_same_unit(a: &str, b: &str) -> bool {
     match (metres(a), metres(b)) {
         (Some(a), Some(b)) => a == b,

@@ -1,7 +1,8 @@
-//! Moved vertices of an asset with a conforming domain: trees are refitted, lists that no longer hold are found and made anew.
+//! Moves the vertices of an asset with a conforming domain. Its trees are refitted, and lists that
+//! no longer hold are found and made anew.
 //!
-//! In go moves of vertices; out come the asset itself, changed in place, and what was inverted. All cost follows what moved, but for
-//! copies of flat arrays.
+//! The input is a list of moves. The asset is changed in place, and inverted tetrahedra are
+//! reported. The cost follows the number of moved vertices, except for copies of flat arrays.
 mod move_vertices;
 mod stale;
 

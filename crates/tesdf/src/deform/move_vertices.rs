@@ -7,58 +7,62 @@ use crate::asset::layout::{SignHints, TreeChild};
 use crate::asset::{Conforming, FaceRecord, Incidence, Motion, SharedSection};
 use crate::geometry::{Aabb, orientation};
 
-/// Why vertices cannot be moved; nothing was.
+/// Why vertices cannot be moved. Nothing has moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DeformError {
-    /// The cells do not follow the surface.
+    /// The asset has the bisection domain, whose cells do not follow the surface.
     #[error(
         "the asset has the bisection domain, whose cells do not follow the surface; encode it in a conforming domain"
     )]
     NotConforming,
-    /// A vertex that there is not.
+    /// A vertex does not exist.
     #[error("vertex {vertex} of {count}; the mesh's come first, then those of the domain")]
     Vertex {
-        /// The number given.
+        /// The number of the vertex.
         vertex: u32,
-        /// How many there are.
+        /// Number of vertices.
         count: usize,
     },
-    /// A position that is not finite, or farther out than `f32` can tell faces apart.
+    /// A position is not finite, or is so far out that `f32` cannot tell faces apart.
     #[error("vertex {vertex} would be at {position}; expected finite numbers within {limit} of {middle}")]
     Position {
         /// The vertex.
         vertex: u32,
-        /// Where it was to go.
+        /// The position asked for.
         position: DVec3,
         /// Middle of the domain.
         middle: DVec3,
-        /// How far from there a coordinate may be, in the mesh's unit.
+        /// Largest distance of a coordinate from there, in the unit of the mesh.
         limit: f64,
     },
 }
 
-/// What [`TeSdf::move_vertices`] has changed.
+/// The changes of [`TeSdf::move_vertices`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Moved {
     /// Faces with a vertex that moved.
     pub faces: usize,
     /// Tetrahedra with a vertex that moved.
     pub tetrahedra: usize,
-    /// Those of them that are now inside out or flat, ascending: points of them may be found in several cells or in none.
+    /// The moved tetrahedra that are now inside out or flat, ascending. Points of such a
+    /// tetrahedron may be located in several cells or in none.
     pub inverted: Vec<u32>,
 }
 
 impl TeSdf {
-    /// Moves vertices of a conforming domain to new positions, in the mesh's unit. Numbers are those of
-    /// [`ConformingMesh::vertices`](crate::domain::ConformingMesh::vertices): the mesh's vertices, then the domain's own.
+    /// Moves vertices of a conforming domain to new positions, in the unit of the mesh. The numbers
+    /// of vertices are those of
+    /// [`ConformingMesh::vertices`](crate::domain::ConformingMesh::vertices): first the vertices of
+    /// the mesh, then the others of the domain.
     ///
-    /// Connectivity, lists and labels stay. Distances are then those to the listed faces where they are now; what the
-    /// certificate says of them is void until [`reencode_stale`](Self::reencode_stale). Outside of the domain the face tree answers,
-    /// refitted and exact. [`as_bytes`](Self::as_bytes) remains the file of the shape at rest, [`save`](Self::save) writes the
-    /// shape as it is.
+    /// Connectivity, lists and labels do not change. From then on, distances are those to the
+    /// listed faces at their new positions. The certificate does not hold until
+    /// [`reencode_stale`](Self::reencode_stale). Outside of the domain the face tree answers. It is
+    /// refitted, so its answers are exact. [`as_bytes`](Self::as_bytes) still gives the file of the
+    /// shape at rest, and [`save`](Self::save) writes the current shape.
     ///
     /// # Errors
-    /// [`DeformError`]; nothing has moved then.
+    /// [`DeformError`]. Nothing has moved then.
     pub fn move_vertices(&mut self, moves: &[(u32, DVec3)]) -> Result<Moved, DeformError> {
         let Some(mut domain) = self.conforming.take() else { return Err(DeformError::NotConforming) };
         let moved = self.checked(moves, &domain).map(|()| self.apply(moves, &mut domain));
@@ -86,7 +90,8 @@ impl TeSdf {
     fn apply(&mut self, moves: &[(u32, DVec3)], domain: &mut Conforming) -> Moved {
         let mesh_count = self.vertices.len() as u32;
         let mut motion = self.motion.take().unwrap_or_else(|| {
-            // How a feature tells the sign depends on the faces around it: what told it at rest need not tell it now.
+            // The sign that a feature tells depends on the faces around it, so a hint for the shape
+            // at rest may be wrong now.
             self.sign_hints = SharedSection::of_rows(&vec![0; self.faces.len()]);
             self.records.iter_mut().for_each(|record| record.forget_hints());
             Motion {

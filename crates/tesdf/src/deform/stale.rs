@@ -16,14 +16,15 @@ use crate::encode::surface::{Surface, Touching};
 use crate::geometry::{Aabb, AabbTree};
 use crate::mesh::TriangleMesh;
 
-/// What [`TeSdf::reencode_stale`] has done.
+/// The result of [`TeSdf::reencode_stale`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Reencoded {
-    /// Cells with a list.
+    /// Number of cells with a list.
     pub cells: usize,
-    /// Those of them that a moved face is, or may come, near enough to matter to: only they cost more than a look.
+    /// Number of these cells that had to be checked, because a moved face is, or may come, near
+    /// enough to matter. Only these cells cost more than a look.
     pub checked: usize,
-    /// Those whose list was made anew, by their [id](crate::asset::CellView::id), ascending.
+    /// The cells whose list was made anew, by their [id](crate::asset::CellView::id), ascending.
     pub stale: Vec<u32>,
 }
 
@@ -36,38 +37,41 @@ struct Listed {
     offset: u32,
 }
 
-/// A list that no longer holds, with what is to take its place: positions of faces, and the distance that they are exact within.
+/// A list that no longer holds, with its replacement: positions of faces, and the distance within
+/// which they are exact.
 struct Stale {
     word: u32,
     label: Label,
     faces: Vec<u32>,
 }
 
-/// A cell that was looked at.
+/// A cell that was checked.
 struct Checked {
-    /// Its new list, if the one that it has does not hold.
+    /// Its new list, if the present list does not hold.
     stale: Option<Stale>,
     proved: Proved,
 }
 
 impl TeSdf {
-    /// The cells whose lists may not hold where the vertices are now, by their [id](crate::asset::CellView::id), ascending.
+    /// The cells whose lists may not hold for the current positions of the vertices, by their
+    /// [id](crate::asset::CellView::id), ascending.
     ///
-    /// A cell is left out only with a proof: nothing that moved can matter to it, or the certified filter, run where the vertices
-    /// are now, asks for nothing that its list does not have.
+    /// A cell is left out only with a proof. Either nothing that moved can matter to the cell, or
+    /// the certified filter, run with the current positions, asks only for parts that the list has.
     ///
     /// # Errors
-    /// [`EncodeError::Mesh`] when the moved mesh cannot be looked at.
+    /// [`EncodeError::Mesh`] when the moved mesh is not valid.
     pub fn stale_cells(&self) -> Result<Vec<u32>, EncodeError> {
         let Some(motion) = &self.motion else { return Ok(Vec::new()) };
         Ok(self.stale(motion)?.stale.into_iter().map(|s| s.word).collect())
     }
 
-    /// Makes the lists of stale cells anew, with the options that the asset was encoded with, and leaves the others alone. The
-    /// certificate then holds for the shape as it is.
+    /// Makes the lists of stale cells anew, with the options of the encoding, and leaves the other
+    /// lists as they are. The certificate then holds for the current shape.
     ///
     /// # Errors
-    /// [`EncodeError`] when the moved mesh cannot be looked at, or the lists outgrow what a file can name; nothing has changed then.
+    /// [`EncodeError`] when the moved mesh is not valid, or when the lists outgrow the numbers that
+    /// a file can store. Nothing has changed then.
     pub fn reencode_stale(&mut self) -> Result<Reencoded, EncodeError> {
         let Some(mut motion) = self.motion.take() else { return Ok(Reencoded::default()) };
         let reencoded = self.stale(&motion).and_then(|found| {
@@ -156,20 +160,20 @@ impl TeSdf {
         Ok(())
     }
 
-    /// What was proved at rest holds again, less what the new lists are short of.
+    /// Restores the proof for the shape at rest, reduced to the part that the new lists keep.
     fn prove_again(&mut self, proved: Proved) {
-        // Opening has read it.
+        // Opening has read the metadata before.
         let Ok(rest) = About::from_metadata(self.container().metadata()) else { return };
         self.about_mut().certificate = rest.certificate.with(proved);
     }
 }
 
-/// What has become of the lists since the vertices moved.
+/// The state of the lists since the vertices moved.
 struct StaleCells {
     cells: usize,
     checked: usize,
     stale: Vec<Stale>,
-    /// Of all lists, the new ones included.
+    /// The proof of all lists, with the new lists.
     proved: Proved,
 }
 
@@ -179,7 +183,7 @@ impl StaleCells {
     }
 }
 
-/// All that the check of a cell reads.
+/// The data that the check of a cell reads.
 struct Search<'a> {
     asset: &'a TeSdf,
     motion: &'a Motion,
@@ -188,24 +192,25 @@ struct Search<'a> {
     /// Faces that moved, and a tree over them.
     moved: Vec<u32>,
     moved_tree: AabbTree,
-    /// The chains of rule C that the lists rest on as they are.
+    /// The chains of rule C that the present lists rest on.
     known: Chains,
 }
 
 impl Search<'_> {
-    /// `None`: nothing that moved matters to the cell.
+    /// Checks a cell. Returns `None` when nothing that moved matters to it.
     fn check(&self, listed: &Listed, scratch: &mut Scratch) -> Option<Checked> {
         let mut list: Vec<u32> = self.asset.with_list(listed.offset, |faces| faces.ids().to_vec());
         list.sort_unstable();
         let Lists { surface, tree, .. } = self.lists;
-        // Chains go on from those of the list, unless these have used up too much.
+        // The chains go on from those of the list, unless these have used up too much of the
+        // budget.
         let go_on = 2 * self.known.used() <= Chains::BUDGET;
         let (candidates, chains) = if go_on && self.is_where_it_was(listed, &list) {
             let mut all = self.newcomers(&listed.cell, &list);
             if all.is_empty() {
                 return None;
             }
-            // What is listed beats what is not, and has not moved.
+            // Listed faces beat faces that are not listed, and have not moved.
             all.extend(&list);
             all.sort_unstable();
             (all, self.known)
@@ -228,15 +233,15 @@ impl Search<'_> {
         Some(Checked { stale: (!holds).then_some(stale), proved })
     }
 
-    /// Whether neither the cell nor a face of its list has moved, and the list is a whole one.
+    /// Whether neither the cell nor a face of its list has moved, and the list is not truncated.
     fn is_where_it_was(&self, listed: &Listed, list: &[u32]) -> bool {
         self.lists.options.max_entries.is_none()
             && !self.motion.tetrahedra[listed.root]
             && !list.iter().any(|&f| self.motion.faces[f as usize])
     }
 
-    /// The moved faces that may now be closest somewhere in a cell that is where it was: those that neither Lemma 1 nor rule A drops, as
-    /// seen from what is listed.
+    /// For a cell that has not moved, the moved faces that may now be closest somewhere in it:
+    /// those that neither Lemma 1 nor rule A drops, compared with the listed faces.
     fn newcomers(&self, cell: &Cell, list: &[u32]) -> Vec<u32> {
         let surface = self.lists.surface;
         let center = cell.centroid();

@@ -1,18 +1,20 @@
 use glam::DVec3;
 
-/// Deepest cell. Three levels halve the edges: 66 levels reach `side / 2^22`.
+/// Depth of the deepest cell. Three levels halve the edges, so 66 levels reach `side / 2^22`.
 pub const MAX_DEPTH: u32 = 66;
 
-/// The axes of the unit cube in the order in which the six Kuhn tetrahedra walk them.
+/// The axes of the unit cube, in the order in which each of the six Kuhn tetrahedra walks along
+/// them.
 ///
-/// Root `r` has the corners `0, e_i, e_i + e_j, (1, 1, 1)` with `(i, j, k) = ROOTS[r]`: it holds the
-/// points with `x_i ≥ x_j ≥ x_k`.
+/// Root `r` has the corners `0, e_i, e_i + e_j, (1, 1, 1)` with `(i, j, k) = ROOTS[r]`. It contains
+/// the points with `x_i ≥ x_j ≥ x_k`.
 pub const ROOTS: [[usize; 3]; 6] = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
 
-/// The root by whether `x ≥ y`, `x ≥ z`, `y ≥ z`, as bits 2, 1, 0; two of the eight cannot be.
+/// The root, by whether `x ≥ y`, `x ≥ z`, `y ≥ z` (bits 2, 1, 0). Two of the eight combinations are
+/// impossible.
 const ROOT_OF_ORDER: [usize; 8] = [5, 3, 5, 2, 4, 4, 1, 0];
 
-/// A tetrahedron of the bisection forest.
+/// A cell: a tetrahedron of the bisection forest.
 ///
 /// ```text
 ///   k = 3: bisect edge 0–3      child 0: c0 c1 c2 m     child 1: c1 c2 c3 m
@@ -20,12 +22,12 @@ const ROOT_OF_ORDER: [usize; 8] = [5, 3, 5, 2, 4, 4, 1, 0];
 ///   k = 1: bisect edge 0–1      child 0: c0 m  c2 c3    child 1: c1 m  c2 c3
 /// ```
 ///
-/// `k` cycles 3, 2, 1 (Maubach 1995, *Local bisection refinement for n-simplicial grids*). All cells
-/// of one depth are congruent up to three shapes, so no refinement makes slivers. Corners are exact:
-/// every coordinate is a dyadic fraction of the cube.
+/// `k` goes through 3, 2, 1 again and again (Maubach 1995, *Local bisection refinement for
+/// n-simplicial grids*). The cells of one depth have at most three shapes, up to congruence, so no
+/// refinement makes slivers. Corners are exact: every coordinate is a dyadic fraction of the cube.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Corners, in the order that the bisection needs.
+    /// The corners, in the order that the bisection needs.
     pub corners: [DVec3; 4],
     /// Number of bisections from the root.
     pub depth: u32,
@@ -42,17 +44,18 @@ impl Cell {
         Self { corners: corners.map(|c| origin + side * c), depth: 0 }
     }
 
-    /// Which corner the refinement edge joins to corner 0.
+    /// The corner that the refinement edge joins to corner 0.
     fn k(&self) -> usize {
         3 - (self.depth % 3) as usize
     }
 
-    /// The midpoint of the refinement edge: the one new corner of both children.
+    /// The midpoint of the refinement edge. It is the only new corner of both children.
     pub fn midpoint(&self) -> DVec3 {
         0.5 * (self.corners[0] + self.corners[self.k()])
     }
 
-    /// Where each corner of child `side` (0 or 1) comes from: a corner of this cell, or its midpoint (4).
+    /// For each corner of child `side` (0 or 1) where it comes from: the number of a corner of this
+    /// cell, or 4 for its midpoint.
     pub fn child_corners(&self, side: usize) -> [usize; 4] {
         match (self.k(), side) {
             (3, 0) => [0, 1, 2, 4],
@@ -71,8 +74,9 @@ impl Cell {
         Self { corners: self.child_corners(side).map(corner), depth: self.depth + 1 }
     }
 
-    /// Barycentric coordinates in child `side` of a point with coordinates `lambda` in a cell whose refinement edge ends at
-    /// corner `k`; see [`Barycentric::descend`], of which this is the form in floating point.
+    /// The barycentric coordinates, in child `side`, of a point with the coordinates `lambda` in a
+    /// cell whose refinement edge ends at corner `k`. It is the floating-point form of
+    /// [`Barycentric::descend`].
     #[inline(always)]
     pub fn lambda_of_child(lambda: [f64; 4], k: usize, side: usize) -> [f64; 4] {
         let [a, l1, l2, l3] = lambda;
@@ -99,7 +103,8 @@ impl Cell {
         edges.into_iter().map(|(i, j)| c[i].distance(c[j])).fold(0.0, f64::max)
     }
 
-    /// Greatest distance of a corner from the centroid: that of the least ball around it that holds the cell.
+    /// Greatest distance of a corner from the centroid. It is the radius of the least ball around
+    /// the centroid that contains the cell.
     pub fn radius(&self) -> f64 {
         let center = self.centroid();
         self.corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max)
@@ -110,18 +115,19 @@ impl Cell {
         crate::geometry::tetrahedron_volume(&self.corners)
     }
 
-    /// Whether the ball inside of the cell has a radius of at least a tenth of the longest edge: so do all cells of the bisection
-    /// domain.
+    /// Whether the inscribed ball has a radius of at least a tenth of the longest edge. This is so
+    /// for all cells of the bisection domain.
     pub fn is_fat(&self) -> bool {
         let [a, b, c, d] = self.corners;
         let twice_area = |a: DVec3, b: DVec3, c: DVec3| (b - a).cross(c - a).length();
         let around = twice_area(a, b, c) + twice_area(a, b, d) + twice_area(a, c, d) + twice_area(b, c, d);
-        // The radius is three times the volume over the area of the sides.
+        // The radius is three times the volume, over the area of the sides.
         60.0 * self.volume() >= around * self.width()
     }
 }
 
-/// A point as fixed-point barycentric coordinates of the cell that holds it; exact from cell to child.
+/// A point as fixed-point barycentric coordinates of its cell. They are exact from a cell to its
+/// child.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Barycentric {
     lambda: [u64; 4],
@@ -131,7 +137,7 @@ impl Barycentric {
     /// Fixed-point one: coordinates are whole multiples of `side / 2^52`.
     pub const ONE: u64 = 1 << 52;
 
-    /// The root tetrahedron that holds a point of the unit cube, and the point's coordinates in it.
+    /// The root tetrahedron of a point of the unit cube, and the coordinates of the point in it.
     ///
     /// `None` outside of the closed unit cube, and for NaN.
     #[inline]
@@ -139,11 +145,14 @@ impl Barycentric {
         Self::in_grid(p, 0)
     }
 
-    /// The cell of depth `3 · level` that holds a point of the unit cube, and the point's coordinates in it.
+    /// The cell of depth `3 · level` of a point of the unit cube, and the coordinates of the point
+    /// in it.
     ///
-    /// Three uniform bisections of the Kuhn cube make eight half cubes, each cut like the whole, mirrored along the axes
-    /// on which its index is odd. So the cells of depth `3 · level` are those of a grid of `2^level` cubes a side, six to
-    /// a cube: cell `6 · (x + (y << level) + (z << 2 level)) + root`. `None` as in [`in_unit_cube`](Self::in_unit_cube).
+    /// Three uniform bisections of the Kuhn cube make eight half cubes. Each is cut like the whole
+    /// cube, but mirrored along the axes on which its index is odd. So the cells of depth `3 ·
+    /// level` are those of a grid with `2^level` cubes along a side and six cells in each cube:
+    /// cell `6 · (x + (y << level) + (z << 2 level)) + root`. `None` as in
+    /// [`in_unit_cube`](Self::in_unit_cube).
     #[inline]
     pub fn in_grid(p: DVec3, level: u32) -> Option<(usize, Self)> {
         let inside = p.cmpge(DVec3::ZERO).all() && p.cmple(DVec3::ONE).all();
@@ -153,14 +162,16 @@ impl Barycentric {
         let last = (1u64 << level) - 1;
         let mut cube = 0;
         let u: [u64; 3] = std::array::from_fn(|axis| {
-            // In [1, 2] the bits of a double are fixed point: no conversion, rounded to nearest.
+            // In [1, 2] the bits of a double are a fixed-point number, rounded to nearest, so no
+            // conversion is needed.
             let x = (p[axis] + 1.0).to_bits() - 1f64.to_bits();
             let index = (x >> (52 - level)).min(last);
             cube |= (index as usize) << (axis as u32 * level);
             let within = (x << level) - index * Self::ONE;
             if index & 1 == 0 { within } else { Self::ONE - within }
         });
-        // Index of the permutation that sorts u in descending order, equal coordinates in axis order.
+        // Index of the permutation that sorts u in descending order. Equal coordinates are in the
+        // order of the axes.
         let (xy, xz, yz) = (u[0] >= u[1], u[0] >= u[2], u[1] >= u[2]);
         let root = ROOT_OF_ORDER[usize::from(xy) << 2 | usize::from(xz) << 1 | usize::from(yz)];
         let [i, j, k] = ROOTS[root];
@@ -168,7 +179,8 @@ impl Barycentric {
         Some((6 * cube + root, Self { lambda }))
     }
 
-    /// Moves to the child that holds the point: its side, 0 or 1. On the shared face, side 0.
+    /// Moves to the child of the point, and returns the side of the child, 0 or 1. A point of the
+    /// shared face goes to side 0.
     #[inline]
     pub fn descend(&mut self, depth: u32) -> usize {
         match depth % 3 {
@@ -178,11 +190,11 @@ impl Barycentric {
         }
     }
 
-    /// As [`descend`](Self::descend), for a cell whose refinement edge ends at corner `K`.
+    /// The same as [`descend`](Self::descend), for a cell whose refinement edge ends at corner `K`.
     ///
-    /// Of the two halves of the refinement edge, the point's own has the corner with the greater coordinate; that
-    /// corner keeps the difference, and the midpoint gets twice the lesser. Free of branches: which way a point goes is
-    /// a coin toss that no processor predicts.
+    /// The point is in the half of the refinement edge whose corner has the greater coordinate.
+    /// That corner keeps the difference, and the midpoint gets twice the lesser coordinate. The
+    /// code has no branches, because no processor could predict which child a point is in.
     #[inline(always)]
     pub fn descend_k<const K: usize>(&mut self) -> usize {
         let [a, l1, l2, l3] = self.lambda;

@@ -2,10 +2,10 @@ use serde::Serialize;
 
 use crate::base::Side;
 
-/// Numbers of vertices and tetrahedra by class, as the paper has them in Sec. III-A.
+/// Numbers of vertices and tetrahedra by class, as in Sec. III-A of the paper.
 ///
-/// A tetrahedron at the boundary has a surface vertex. A vertex that is on no face is inner or outer, as the
-/// tetrahedra around it are.
+/// A tetrahedron at the boundary has a surface vertex. A vertex that is on no face is inner or
+/// outer, like the tetrahedra around it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Classes {
     /// `V_S`: vertices of the surface, one for each position.
@@ -16,16 +16,16 @@ pub struct Classes {
     pub outer_vertices: usize,
     /// `T_BI`: tetrahedra inside with a surface vertex.
     pub boundary_inner_tetrahedra: usize,
-    /// `T_I`: tetrahedra inside without one.
+    /// `T_I`: tetrahedra inside without a surface vertex.
     pub inner_tetrahedra: usize,
     /// `T_BO`: tetrahedra outside with a surface vertex.
     pub boundary_outer_tetrahedra: usize,
-    /// `T_O`: tetrahedra outside without one.
+    /// `T_O`: tetrahedra outside without a surface vertex.
     pub outer_tetrahedra: usize,
 }
 
 impl Classes {
-    /// Counts tetrahedra, and those of so many vertices that they use.
+    /// Counts tetrahedra, and the vertices that they use. `vertices` is the number of all vertices.
     pub(crate) fn count(
         vertices: usize,
         tetrahedra: impl IntoIterator<Item = ([u32; 4], Side)>,

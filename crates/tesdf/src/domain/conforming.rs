@@ -12,31 +12,39 @@ pub use error::{ConformingError, MissingFace};
 use weld::Welded;
 pub(super) use weld::first_at_position;
 
-/// A tetrahedralisation that conforms to a solid's surface: each face is a side of tetrahedra, and none passes through one.
+/// A tetrahedralisation that conforms to the surface of a solid: each face is a side of tetrahedra,
+/// and no face passes through a tetrahedron.
 ///
-/// It covers the whole inside, and perhaps some of the outside. Valid by construction.
+/// It covers the whole inside, and may cover a part of the outside. It is valid by construction.
 ///
 /// # What is checked
-/// In this order; the errors of [`new`](Self::new) name the check first.
+/// The checks are made in this order. The errors of [`new`](Self::new) begin with the name of the
+/// check.
 ///
 /// 1. **Range**: predicates are exact.
 /// 2. **Surface vertices**: each is a corner, bit for bit.
-/// 3. **Orientation**: no tetrahedron is flat. Exact. Those in negative order are turned over.
-/// 4. **Sharing**: a triangle has one tetrahedron or two, and then one on each side.
+/// 3. **Orientation**: no tetrahedron is flat. The test is exact. Tetrahedra in negative order are
+///    turned over.
+/// 4. **Sharing**: a triangle has one tetrahedron, or two with one on each side.
 /// 5. **Faces**: each face of the surface is a triangle of tetrahedra.
-/// 6. **Labels**: what is connected without passing a face has one winding number, that of a point inside of it, exact.
-///    Behind a face it is one more than in front; where one side of a triangle has no tetrahedron, it is 0 there.
+/// 6. **Labels**: tetrahedra that are connected without passing a face have one winding number:
+///    that of a point inside of them, which is exact. Behind a face it is one more than in front of
+///    the face. Where one side of a triangle has no tetrahedron, it is 0 there.
 /// 7. **Volume**: the tetrahedra inside have the volume that the surface encloses, to 1e-9.
-/// 8. **Overlap**: the outer boundary, all triangles with one tetrahedron, does not meet itself and goes around no place
-///    twice.
+/// 8. **Overlap**: the outer boundary consists of all triangles with one tetrahedron. It does not
+///    meet itself, and goes around no place twice.
 ///
 /// # Why that is enough
-/// By 4 the triangles between tetrahedra cancel, so what is left of the boundaries of all tetrahedra is the outer
-/// boundary, and the number of tetrahedra around a point is the winding number of the outer boundary there. By 8 that is 0
-/// or 1: no two overlap. By 6 each part of the boundary of the tetrahedra, weighted by winding number, is a face: the
-/// weighted tetrahedra around a point add up to the winding number of the surface, so every point with a winding number of
-/// 1 or more is in a tetrahedron. Volume alone would not show an overlap: the volume of all tetrahedra is that of the outer
-/// boundary whether they overlap or not. It guards the arithmetic instead.
+/// By 4, the triangles between tetrahedra cancel. So the boundaries of all tetrahedra together are
+/// the outer boundary, and the number of tetrahedra around a point is the winding number of the
+/// outer boundary there. By 8, this number is 0 or 1, so no two tetrahedra overlap.
+///
+/// By 6, each part of the boundary of the tetrahedra, weighted by winding number, is a face. So the
+/// weighted tetrahedra around a point add up to the winding number of the surface, and every point
+/// with a winding number of 1 or more is in a tetrahedron.
+///
+/// The volume alone would not show an overlap: whether tetrahedra overlap or not, the volume of all
+/// of them is that of the outer boundary. The check of the volume guards the arithmetic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ConformingMesh {
     vertices: Vec<DVec3>,
@@ -46,13 +54,14 @@ pub struct ConformingMesh {
 }
 
 impl ConformingMesh {
-    /// Matches tetrahedra with a surface and checks that they conform to it.
+    /// Matches tetrahedra with a surface, and checks that they conform to it.
     ///
-    /// Vertices are matched bit for bit (0 and -0 are equal), those that no tetrahedron uses are dropped, and vertices at the
-    /// same position become one. A tetrahedron whose corners are in negative order gets its last two swapped.
+    /// Vertices are matched bit for bit (0 and -0 are equal). Vertices that no tetrahedron uses are
+    /// dropped, and vertices at the same position become one vertex. Where the corners of a
+    /// tetrahedron are in negative order, the last two are swapped.
     ///
     /// # Errors
-    /// [`ConformingError`] names the check that failed, where, and what to do next.
+    /// [`ConformingError`] names the check that failed, the place, and what to do next.
     pub fn new(solid: &SolidMesh, tets: &TetMesh) -> Result<Self, ConformingError> {
         let mut welded = weld::weld(solid, tets)?;
         orient(&mut welded)?;
@@ -72,23 +81,25 @@ impl ConformingMesh {
         Ok(Self { vertices: welded.vertices, tetrahedra: welded.tetrahedra, sides, classes })
     }
 
-    /// Positions in the mesh's unit: the solid's vertices, in their order and bit for bit, then the others in the order of
-    /// the [`TetMesh`]. Of several vertices of the solid at the same position tetrahedra use the first.
+    /// Positions in the unit of the mesh: first the vertices of the solid, in their order and bit
+    /// for bit, then the others in the order of the [`TetMesh`]. Where several vertices of the
+    /// solid have the same position, tetrahedra use the first.
     pub fn vertices(&self) -> &[DVec3] {
         &self.vertices
     }
 
-    /// Corner ids, in the order of the [`TetMesh`] and positively oriented: `(b − a) × (c − a) · (d − a) > 0`.
+    /// Corner ids, in the order of the [`TetMesh`] and positively oriented: `(b − a) × (c − a) · (d
+    /// − a) > 0`.
     pub fn tetrahedra(&self) -> &[[u32; 4]] {
         &self.tetrahedra
     }
 
-    /// Where each tetrahedron lies.
+    /// The side of the surface that each tetrahedron is on.
     pub fn sides(&self) -> &[Side] {
         &self.sides
     }
 
-    /// How many vertices and tetrahedra there are of each class.
+    /// The numbers of vertices and tetrahedra of each class.
     pub fn classes(&self) -> Classes {
         self.classes
     }
@@ -108,7 +119,7 @@ impl Welded {
     }
 }
 
-/// Turns tetrahedra over that are in negative order.
+/// Turns tetrahedra in negative order over.
 fn orient(welded: &mut Welded) -> Result<(), ConformingError> {
     let mut first = None;
     let mut flat = 0;
@@ -119,7 +130,7 @@ fn orient(welded: &mut Welded) -> Result<(), ConformingError> {
                 flat += 1;
                 first.get_or_insert(t);
             }
-            // Behind: negative order.
+            // The corner lies behind, so the order is negative.
             1.. => welded.tetrahedra[t].swap(2, 3),
             _ => {}
         }

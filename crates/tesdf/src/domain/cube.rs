@@ -5,7 +5,7 @@ use crate::geometry::Aabb;
 
 /// The cube that the six roots fill, in the local frame.
 ///
-/// Origin and side are multiples of 2^-20, so that all corners of all cells are exact in `f64`.
+/// Its origin and its side are multiples of 2^-20. So all corners of all cells are exact in `f64`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DomainCube {
     origin: DVec3,
@@ -17,7 +17,7 @@ pub struct DomainCube {
 const GRAIN: f64 = 1.0 / (1 << 20) as f64;
 
 impl DomainCube {
-    /// The least such cube around `bounds` (local frame), centred on it.
+    /// The least such cube around `bounds` (local frame). It has the same centre.
     pub fn around(bounds: Aabb) -> Self {
         let up = |x: f64, grain: f64| (x / grain).ceil() * grain;
         let side = up(bounds.extent().max_element() + 4.0 * GRAIN, 1024.0 * GRAIN);
@@ -30,7 +30,7 @@ impl DomainCube {
         Self { origin, side, inverse: 1.0 / side }
     }
 
-    /// Least corner, in the local frame.
+    /// The least corner, in the local frame.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
@@ -45,13 +45,14 @@ impl DomainCube {
         self.origin + 0.5 * self.side
     }
 
-    /// Root tetrahedron `root`, 0 to 5.
+    /// Root tetrahedron number `root`, from 0 to 5.
     pub fn root(&self, root: usize) -> Cell {
         Cell::root(self.origin, self.side, root)
     }
 
-    /// The cell of depth `3 · level` that holds a point of the local frame, with the point's coordinates in it;
-    /// see [`Barycentric::in_grid`]. Off by at most 2^-51 of the side, which the padding of the cells covers.
+    /// The cell of depth `3 · level` of a point of the local frame, and the coordinates of the
+    /// point in it; see [`Barycentric::in_grid`]. The error is at most 2^-51 of the side, which the
+    /// padding of the cells covers.
     #[inline]
     pub fn locate(&self, p: DVec3, level: u32) -> Option<(usize, Barycentric)> {
         Barycentric::in_grid((p - self.origin) * self.inverse, level)

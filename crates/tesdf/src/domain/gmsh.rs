@@ -1,8 +1,10 @@
-//! Tetrahedra by Gmsh, run as a program of its own and never linked, as its licence is the GPL.
+//! Tetrahedra by Gmsh. Gmsh is run as a separate program and never linked, because its licence is
+//! the GPL.
 //!
-//! Comes in: a [`SolidMesh`]. Goes out: a [`ConformingMesh`]. Whatever Gmsh returns goes through the gate of
-//! [`ConformingMesh::new`]; when that refuses it, the next settings are tried. Gmsh runs on one thread, in a folder of its
-//! own and without the user's configuration, so that the same solid, options and version of Gmsh give the same tetrahedra.
+//! The input is a [`SolidMesh`], the output is a [`ConformingMesh`]. The tetrahedra of Gmsh go
+//! through the checks of [`ConformingMesh::new`]. When these refuse them, the next settings are
+//! tried. Gmsh runs on one thread, in a folder of its own and without the configuration of the
+//! user. So the same solid, options and version of Gmsh give the same tetrahedra.
 use std::{path::PathBuf, time::Duration};
 
 use glam::DVec3;
@@ -18,7 +20,7 @@ use crate::geometry::{Aabb, LocalFrame};
 use crate::mesh::SolidMesh;
 pub use error::{GmshError, Refused, RefusedBecause};
 
-/// How Gmsh fills the volume: its option `Mesh.Algorithm3D`.
+/// How Gmsh fills the volume: the option `Mesh.Algorithm3D` of Gmsh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GmshAlgorithm {
@@ -30,7 +32,7 @@ pub enum GmshAlgorithm {
     Hxt,
 }
 
-/// How Gmsh improves the tetrahedra: its options `Mesh.Optimize` and `Mesh.OptimizeNetgen`.
+/// How Gmsh improves the tetrahedra: the options `Mesh.Optimize` and `Mesh.OptimizeNetgen` of Gmsh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum GmshOptimizer {
@@ -42,7 +44,7 @@ pub enum GmshOptimizer {
     Netgen,
 }
 
-/// One way to run Gmsh.
+/// The settings of one run of Gmsh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GmshSettings {
     /// How the volume is filled.
@@ -78,24 +80,26 @@ impl GmshOptimizer {
     }
 }
 
-/// Which part of space to fill, and how to run Gmsh. Every field is used.
+/// The part of space to fill, and how to run Gmsh. Every field is used.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GmshOptions {
-    /// Fills the bounds grown by this width; `None` fills no layer around the solid.
+    /// Width of the layer around the solid that is filled too: the bounds are grown by it. `None`
+    /// fills no layer.
     pub band: Option<Length>,
-    /// Boxes that are filled as well, in the mesh's unit: `[min x y z, max x y z]`. Tetrahedra outside that meet no box and
-    /// no layer are left out.
+    /// Boxes that are filled too, in the unit of the mesh: `[min x y z, max x y z]`. Outer
+    /// tetrahedra that meet neither a box nor the layer are left out.
     pub regions: Vec<[f64; 6]>,
-    /// Tried in this order until the result conforms.
+    /// The settings, tried in this order until the tetrahedra conform.
     pub settings: Vec<GmshSettings>,
-    /// The program. `None`: what the environment variable `TESDF_GMSH` names, or else `gmsh`.
+    /// The program. `None` stands for the program that the environment variable `TESDF_GMSH` names,
+    /// or else `gmsh`.
     pub executable: Option<PathBuf>,
-    /// Longest time for one of the settings.
+    /// Time limit for each of the settings.
     pub time_limit: Duration,
 }
 
 impl Default for GmshOptions {
-    /// Only the inside.
+    /// Fills only the inside.
     fn default() -> Self {
         use {GmshAlgorithm::*, GmshOptimizer::*};
         let settings = [(Delaunay, Gmsh), (Hxt, Gmsh), (Delaunay, Netgen), (Delaunay, Off), (Hxt, Off)];
@@ -109,29 +113,31 @@ impl Default for GmshOptions {
     }
 }
 
-/// Tetrahedra by Gmsh, and what it took.
+/// The tetrahedra of Gmsh, with the settings that gave them.
 #[derive(Debug)]
 pub struct GmshMesh {
     /// The tetrahedra.
     pub mesh: ConformingMesh,
     /// The settings that gave them.
     pub settings: GmshSettings,
-    /// The settings that were tried before.
+    /// The settings that were tried before and refused.
     pub refused: Vec<Refused>,
 }
 
-/// Fills a solid, and what the options say around it, with tetrahedra.
+/// Fills a solid with tetrahedra, and the space around it that the options name.
 ///
 /// # Errors
-/// [`GmshError`] says how to install Gmsh, which option is wrong, or for each of the settings what failed.
+/// [`GmshError`] says how to install Gmsh, which option is wrong, or why each of the settings
+/// failed.
 pub fn tetrahedralise(solid: &SolidMesh, options: &GmshOptions) -> Result<ConformingMesh, GmshError> {
     Ok(tetrahedralise_and_report(solid, options, &Progress::default())?.mesh)
 }
 
-/// As [`tetrahedralise`], with the settings that it took. Gmsh is ended when `progress` is cancelled.
+/// The same as [`tetrahedralise`], with the settings that gave the tetrahedra. When `progress` is
+/// cancelled, Gmsh is ended.
 ///
 /// # Errors
-/// As [`tetrahedralise`], and [`GmshError::Cancelled`].
+/// The same as for [`tetrahedralise`], and [`GmshError::Cancelled`].
 pub fn tetrahedralise_and_report(
     solid: &SolidMesh,
     options: &GmshOptions,
@@ -155,7 +161,8 @@ pub fn tetrahedralise_and_report(
     Err(GmshError::AllRefused(refused))
 }
 
-/// Back to the mesh's unit, through the gate, and without what nobody asked for.
+/// Takes the tetrahedra back to the unit of the mesh, checks them, and leaves out tetrahedra that
+/// were not asked for.
 fn conform(
     solid: &SolidMesh,
     found: &TetMesh,
@@ -173,14 +180,15 @@ fn conform(
     Ok(ConformingMesh::new(solid, &TetMesh::new(whole.vertices().to_vec(), kept)?)?)
 }
 
-/// The boxes that are to be filled besides the solid, in the mesh's unit.
+/// The boxes to fill in addition to the solid, in the unit of the mesh.
 struct Layers {
     boxes: Vec<Aabb>,
-    /// Around all of them and, with some room, around the solid.
+    /// A box around all of them and, with some room, around the solid.
     hull: Option<Aabb>,
 }
 
-/// Room between the solid and the box around the regions, relative to the diagonal: about a face of the box.
+/// Room between the solid and the box around the regions, relative to the diagonal. It is about one
+/// face of the box.
 const ROOM: f64 = 0.05;
 
 impl Layers {
@@ -199,7 +207,7 @@ impl Layers {
         if let Some(band) = options.band {
             room = band.resolve(diagonal);
             let layer = bounds.grown(room);
-            // Also where the width is lost to rounding, far from the origin.
+            // This also covers a width that is lost to rounding, far from the origin.
             let is_around = layer.min.cmplt(bounds.min).all() && layer.max.cmpgt(bounds.max).all();
             if !is_around || !room.is_finite() {
                 return Err(GmshError::Band { width: room, diagonal });

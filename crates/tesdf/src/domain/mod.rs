@@ -1,9 +1,11 @@
-//! What the encoder fills with lists: tetrahedra around a surface.
+//! Domains: the tetrahedra around a surface, to which the encoder gives lists.
 //!
-//! - The embedded domain, always there: a cube of six Kuhn tetrahedra, refined by newest-vertex bisection. Comes in:
-//!   bounds and an outer band. Goes out: cells, named by their path from a root, whose geometry nothing stores.
-//! - The conforming domain: tetrahedra that have the faces of the surface as sides. Comes in: a [`SolidMesh`] and a
-//!   [`TetMesh`] from a file or a mesher. Goes out: a [`ConformingMesh`], checked.
+//! - The bisection domain is a cube of six Kuhn tetrahedra, refined by newest-vertex bisection. The
+//!   input is bounds and an outer band. The output is cells, each named by its path from a root, so
+//!   that their geometry needs no storage.
+//! - The conforming domain consists of tetrahedra that have the faces of the surface as sides. The
+//!   input is a [`SolidMesh`] and a [`TetMesh`] from a file or a mesher. The output is a
+//!   [`ConformingMesh`], which was checked.
 //!
 //! [`SolidMesh`]: crate::mesh::SolidMesh
 mod bisection;

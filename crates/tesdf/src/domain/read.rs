@@ -1,11 +1,12 @@
-//! Files of tetrahedra to [`TetMesh`]: Gmsh, TetGen, VTK's XML.
+//! Reads files of tetrahedra to a [`TetMesh`]: Gmsh, TetGen, and VTK's XML.
 //!
-//! Only tetrahedra of four vertices are taken. Points, lines and surface elements are skipped and counted; other
-//! volumes are an error. Nothing is allocated by a count in a header, only by bytes that are there.
+//! Only tetrahedra of four vertices are read. Points, lines and surface elements are skipped and
+//! counted. Other volumes are an error. Memory is allocated for bytes that are there, and never by
+//! a count in a header.
 //!
-//! The parsers are our own. `mshio` 0.4.2 reads MSH 4.1 only, its last release is of 2020, and its errors are positions of
-//! a parser's input; `vtkio` 0.6.3 (0.7 is a release candidate) gives errors without a place. XML is parsed by
-//! `roxmltree`, zlib by `flate2`.
+//! The parsers are our own. `mshio` 0.4.2 reads MSH 4.1 only, its last release is of 2020, and its
+//! errors are positions in the input of a parser. `vtkio` 0.6.3 (0.7 is a release candidate) gives
+//! errors without a place. XML is parsed by `roxmltree`, zlib by `flate2`.
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -27,11 +28,12 @@ use error::malformed;
 pub enum TetFormat {
     /// Gmsh's MSH 2.2 and 4.1, ASCII and binary.
     Msh,
-    /// TetGen's vertices; the tetrahedra are in the `.ele` beside it.
+    /// TetGen's vertices. The tetrahedra are in the `.ele` file beside it.
     Node,
-    /// TetGen's tetrahedra; the vertices are in the `.node` beside it.
+    /// TetGen's tetrahedra. The vertices are in the `.node` file beside it.
     Ele,
-    /// VTK's unstructured grid as XML: ASCII, base64 inline or appended, raw appended; zlib or not compressed.
+    /// VTK's unstructured grid as XML: ASCII, base64 inline or appended, raw appended. Compressed
+    /// by zlib or not compressed.
     Vtu,
 }
 
@@ -39,10 +41,10 @@ impl TetFormat {
     /// All formats, in the order in which messages list them.
     pub const ALL: [Self; 4] = [Self::Msh, Self::Node, Self::Ele, Self::Vtu];
 
-    /// The format that a file's extension names, in upper or lower case.
+    /// The format of a file by its extension, in upper or lower case.
     ///
     /// # Errors
-    /// [`ReadTetrahedraError::UnknownExtension`] lists the extensions there are.
+    /// [`ReadTetrahedraError::UnknownExtension`] lists the known extensions.
     pub fn of_path(path: &Path) -> Result<Self, ReadTetrahedraError> {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         Self::ALL
@@ -84,18 +86,19 @@ pub struct Skipped {
     pub surfaces: usize,
 }
 
-/// Tetrahedra that were read, and what reading left out.
+/// The tetrahedra of a file, and the elements that were skipped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedTetrahedra {
-    /// Vertices and tetrahedra in file order, vertices numbered from 0 whatever the file calls them.
+    /// Vertices and tetrahedra in the order of the file. Vertices are numbered from 0, whatever
+    /// numbers the file gives them.
     pub mesh: TetMesh,
     /// The format of the file.
     pub format: TetFormat,
-    /// What was left out.
+    /// The elements that were skipped.
     pub skipped: Skipped,
 }
 
-/// What a parser gives: corners are ids of `vertices`, checked.
+/// The result of a parser. Corners are valid ids of `vertices`.
 #[derive(Default)]
 struct Parsed {
     vertices: Vec<DVec3>,
@@ -103,18 +106,19 @@ struct Parsed {
     skipped: Skipped,
 }
 
-/// Reads a file of tetrahedra; its extension names the format. Of TetGen's pair either path will do.
+/// Reads a file of tetrahedra. Its extension names the format. Of TetGen's pair, either path is
+/// accepted.
 ///
 /// # Errors
-/// [`ReadTetrahedraError`] names what is at fault, the line, byte or element, and what to do.
+/// [`ReadTetrahedraError`] names what is wrong, the line, byte or element, and what to do.
 pub fn read_tetrahedra(path: &Path) -> Result<TetMesh, ReadTetrahedraError> {
     Ok(load_tetrahedra(path)?.mesh)
 }
 
-/// As [`read_tetrahedra`], with a report of what was left out.
+/// The same as [`read_tetrahedra`], with a report of the skipped elements.
 ///
 /// # Errors
-/// As [`read_tetrahedra`].
+/// The same as for [`read_tetrahedra`].
 pub fn load_tetrahedra(path: &Path) -> Result<LoadedTetrahedra, ReadTetrahedraError> {
     let format = TetFormat::of_path(path)?;
     let bytes = |path: &Path| {
@@ -131,7 +135,8 @@ pub fn load_tetrahedra(path: &Path) -> Result<LoadedTetrahedra, ReadTetrahedraEr
     Ok(LoadedTetrahedra { mesh, format, skipped: parsed.skipped })
 }
 
-/// The files that [`read_tetrahedra`] opens for `path`: the file itself, and the other file of TetGen's pair.
+/// The files that [`read_tetrahedra`] opens for `path`: the file itself, and the other file of
+/// TetGen's pair.
 pub fn tetrahedra_files(path: &Path) -> Vec<PathBuf> {
     let other = match TetFormat::of_path(path) {
         Ok(TetFormat::Node) => Some(beside(path, TetFormat::Ele)),
@@ -141,7 +146,7 @@ pub fn tetrahedra_files(path: &Path) -> Vec<PathBuf> {
     std::iter::once(path.to_path_buf()).chain(other).collect()
 }
 
-/// The other file of a pair, in upper case where the first is.
+/// The other file of a pair. Its extension is in upper case where that of `path` is.
 fn beside(path: &Path, format: TetFormat) -> PathBuf {
     let upper = path.extension().is_some_and(|e| e.to_string_lossy().chars().all(char::is_uppercase));
     let extension = format.extension();
@@ -192,11 +197,11 @@ mod tests {
         all
     }
 
-    /// What a parser gives is sound whatever it read.
+    /// Checks that the result of a parser is valid, whatever the parser has read.
     fn assert_sound(name: &str, bytes: &[u8], result: &Result<Parsed, ReadTetrahedraError>) {
         match result {
             Ok(parsed) => {
-                // Deflate packs at most 1032 to 1.
+                // Deflate packs at most 1032 bytes to one.
                 assert!(parsed.vertices.len() + parsed.tetrahedra.len() <= 1032 * bytes.len(), "{name}");
                 let corners = parsed.tetrahedra.iter().flatten();
                 assert!(corners.into_iter().all(|&v| (v as usize) < parsed.vertices.len()), "{name}");
@@ -206,13 +211,14 @@ mod tests {
         }
     }
 
-    /// A file that is cut short is refused, or all of it is there but for what has no numbers.
+    /// Checks that a file which is cut short is refused, unless only bytes without numbers are
+    /// missing.
     #[test]
     fn prefixes_are_refused() {
         for (name, bytes, parse) in samples() {
             let whole = parse(bytes).unwrap();
             let is_text = matches!(name, "node" | "ele");
-            // Of a number at the end of a text any beginning is a number.
+            // Where a text ends in a number, every beginning of this number is a number too.
             for end in (0..bytes.len()).filter(|&end| !is_text || bytes[end] == b'\n') {
                 let result = parse(&bytes[..end]);
                 assert_sound(name, bytes, &result);
@@ -225,12 +231,12 @@ mod tests {
         }
     }
 
-    /// Any count may be anything: nothing is allocated for it.
+    /// Checks that any count may have any value: no memory is allocated by it.
     #[test]
     fn counts_allocate_nothing() {
         for (name, bytes, parse) in samples() {
             for huge in ["4294967295", "18446744073709551615", "-1"] {
-                // Every whole number of a text, one at a time.
+                // Changes every whole number of a text, one at a time.
                 let is_digit = |i: usize| bytes.get(i).is_some_and(u8::is_ascii_digit);
                 let starts =
                     (0..bytes.len().min(700)).filter(|&i| is_digit(i) && (i == 0 || !is_digit(i - 1)));
@@ -240,7 +246,7 @@ mod tests {
                     assert_sound(name, &changed, &parse(&changed));
                 }
             }
-            // Every byte of a binary number.
+            // Changes every byte of a binary number.
             for at in 0..bytes.len().saturating_sub(8).min(800) {
                 let mut changed = bytes.to_vec();
                 changed[at..at + 8].fill(0x7f);

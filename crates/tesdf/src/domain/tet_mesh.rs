@@ -8,11 +8,11 @@ use crate::{
     mesh::{MeshError, TriangleMesh},
 };
 
-/// Tetrahedra as they come from a mesher: positions and corner ids.
+/// The tetrahedra of a mesher: positions and corner ids.
 ///
-/// Coordinates are finite, ids are in range, there is at least one tetrahedron. Nothing else is promised: tetrahedra may
-/// be flat, overlap, or come in either order of corners. [`ConformingMesh`](super::ConformingMesh) matches them with a
-/// surface and validates them.
+/// Coordinates are finite, ids are in range, and there is at least one tetrahedron. Nothing else is
+/// certain: tetrahedra may be flat, may overlap, and may have their corners in either order.
+/// [`ConformingMesh`](super::ConformingMesh) matches them with a surface and checks them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TetMesh {
     vertices: Vec<DVec3>,
@@ -45,7 +45,7 @@ pub enum TetMeshError {
         /// The value found.
         value: f64,
     },
-    /// More vertices or tetrahedra than can be encoded.
+    /// There are more vertices or tetrahedra than can be encoded.
     #[error("{found} {what} are more than the limit of {limit}; split the mesh")]
     TooLarge {
         /// `vertices` or `tetrahedra`.
@@ -99,10 +99,12 @@ impl TetMesh {
         &self.tetrahedra
     }
 
-    /// The outer boundary: sides that one tetrahedron alone has, outward, in the order of the tetrahedra.
+    /// The outer boundary: the sides of only one tetrahedron, outward, in the order of the
+    /// tetrahedra.
     ///
-    /// For tetrahedra that fill a solid, as those of a finite-element mesh, this is the surface that they conform to. Its
-    /// vertices are those that it uses, in the order of this mesh.
+    /// For tetrahedra that fill a solid, for example those of a finite-element mesh, this is the
+    /// surface that they conform to. It has only the vertices that it uses, in the order of this
+    /// mesh.
     ///
     /// # Errors
     /// [`MeshError::Empty`] when no side is on a boundary.
@@ -148,7 +150,7 @@ impl TetMesh {
 mod tests {
     use super::*;
 
-    /// Two tetrahedra, one of them in negative order: six sides, outward.
+    /// Two tetrahedra, one of them in negative order, have six outer sides.
     #[test]
     fn the_surface_is_outward() {
         let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::splat(9.0), DVec3::Y, DVec3::Z, DVec3::ONE];

@@ -1,7 +1,10 @@
 use glam::DVec3;
 
-/// Which check of the gate a tetrahedralisation did not pass. All ids are 0-based; tetrahedra count as in the
-/// [`TetMesh`](crate::domain::TetMesh), vertices `v` of a triangle or place as in its vertices, faces as in the surface.
+/// The check that a tetrahedralisation did not pass.
+///
+/// All ids are 0-based. Ids of tetrahedra are those of the [`TetMesh`](crate::domain::TetMesh). Ids
+/// `v` of the vertices of a triangle or a place are those of its vertices. Ids of faces are those
+/// of the surface.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConformingError {
     /// A coordinate is outside of the range in which predicates are exact.
@@ -28,14 +31,14 @@ pub enum ConformingError {
         missing: usize,
         /// Number of vertices that faces use.
         of: usize,
-        /// The first of them, as in the surface.
+        /// The first such vertex, by its id in the surface.
         vertex: usize,
-        /// Where it is, in the mesh's unit.
+        /// Its position, in the unit of the mesh.
         position: DVec3,
-        /// From it to the nearest corner, in the mesh's unit.
+        /// Its distance from the nearest corner, in the unit of the mesh.
         distance: f64,
     },
-    /// The corners of a tetrahedron are in one plane, exactly.
+    /// The corners of a tetrahedron lie exactly in one plane.
     #[error(
         "orientation: {flat} of {of} tetrahedra are flat (volume exactly 0); first tetrahedron {tetrahedron} at {position}. \
          Mesh again with another algorithm or optimiser"
@@ -45,7 +48,7 @@ pub enum ConformingError {
         flat: usize,
         /// Number of tetrahedra.
         of: usize,
-        /// The first of them.
+        /// The first such tetrahedron.
         tetrahedron: usize,
         /// Its centroid, in the mesh's unit.
         position: DVec3,
@@ -58,7 +61,7 @@ pub enum ConformingError {
     Overfull {
         /// Number of tetrahedra with the triangle.
         users: usize,
-        /// The first two of them.
+        /// The first two of these tetrahedra.
         tetrahedra: [u32; 2],
         /// Centroid of the triangle, in the mesh's unit.
         position: DVec3,
@@ -69,7 +72,7 @@ pub enum ConformingError {
          Mesh again", tetrahedra[0], tetrahedra[1]
     )]
     SameSide {
-        /// The two.
+        /// The two tetrahedra.
         tetrahedra: [u32; 2],
         /// Centroid of the triangle, in the mesh's unit.
         position: DVec3,
@@ -93,12 +96,13 @@ pub enum ConformingError {
         missing: usize,
         /// Number of faces.
         of: usize,
-        /// The first of them.
+        /// The first such face.
         face: usize,
-        /// What is known about it.
+        /// What is known about this face.
         reason: MissingFace,
     },
-    /// A tetrahedron of the inside has a side that is neither of the surface nor of another tetrahedron.
+    /// A tetrahedron inside has a side that belongs neither to the surface nor to another
+    /// tetrahedron.
     #[error(
         "labels: tetrahedron {tetrahedron} is inside, and its side at {position} is neither a face of the surface nor \
          shared with another tetrahedron: the inside is not filled. Mesh the whole inside"
@@ -120,7 +124,8 @@ pub enum ConformingError {
         /// Winding number on that side.
         winding: i32,
     },
-    /// Winding numbers on the two sides of a face do not differ by the face.
+    /// The winding numbers on the two sides of a face do not differ by the number that the face
+    /// stands for.
     #[error(
         "labels: tetrahedra {} and {} on the two sides of face {face} of the surface have the winding numbers {} and {}: \
          tetrahedra overlap. Mesh again", tetrahedra[0], tetrahedra[1], windings[0], windings[1]
@@ -128,12 +133,13 @@ pub enum ConformingError {
     Labels {
         /// The face.
         face: usize,
-        /// On its sides.
+        /// The tetrahedra on its sides.
         tetrahedra: [u32; 2],
         /// Their winding numbers.
         windings: [i32; 2],
     },
-    /// No tetrahedron of a connected part is fat enough for its centroid, rounded, to be inside of it.
+    /// No tetrahedron of a connected part is fat enough that its rounded centroid lies inside of
+    /// it.
     #[error(
         "labels: no tetrahedron of the part with tetrahedron {tetrahedron} is thick enough for 64-bit floats to hold a point \
          inside of it. Mesh again with another optimiser"
@@ -148,12 +154,13 @@ pub enum ConformingError {
          1e-9. Mesh again from the same surface"
     )]
     Volume {
-        /// Of the tetrahedra, each counted as often as its winding number says.
+        /// Volume of the tetrahedra, each counted as often as its winding number says.
         inside: f64,
-        /// Enclosed by the surface.
+        /// Volume that the surface encloses.
         surface: f64,
     },
-    /// The outer boundary of the domain meets itself, or goes around some place twice: tetrahedra overlap or do not fit.
+    /// The outer boundary of the domain meets itself, or goes around some place twice. So
+    /// tetrahedra overlap or do not fit.
     #[error(
         "overlap: the outer boundary of the tetrahedra is not embedded: {found}, at {position}. Tetrahedra overlap, or \
          meet in parts of triangles. Mesh again, the outer region with vertices that match"
@@ -161,7 +168,7 @@ pub enum ConformingError {
     Overlap {
         /// What was found.
         found: String,
-        /// Where, in the mesh's unit.
+        /// The place, in the unit of the mesh.
         position: DVec3,
     },
 }
@@ -171,10 +178,10 @@ pub enum ConformingError {
 pub enum MissingFace {
     /// A vertex that the surface does not have lies on it.
     Split {
-        /// Of the tetrahedral mesh.
+        /// Its id in the tetrahedral mesh.
         vertex: usize,
     },
-    /// Its corners are there, but not the face: the mesher cut the surface in another way.
+    /// Its corners are there, but the face is not: the mesher cut the surface in another way.
     Recut,
 }
 

@@ -1,4 +1,5 @@
-//! Winding numbers of tetrahedra: constant on what is connected without passing the surface, tested once for each such part.
+//! Winding numbers of tetrahedra. Tetrahedra that are connected without passing the surface have
+//! the same number, which is computed once for each such part.
 use glam::DVec3;
 
 use super::{
@@ -14,7 +15,8 @@ use crate::{
 /// The winding number of each tetrahedron.
 ///
 /// # Errors
-/// When winding numbers do not fit across a face, or a place with a winding number other than 0 has no tetrahedron.
+/// The winding numbers do not fit across a face, or a place with a winding number other than 0 has
+/// no tetrahedron.
 pub(super) fn windings(
     solid: &SolidMesh,
     welded: &Welded,
@@ -28,8 +30,8 @@ pub(super) fn windings(
     }
     let part: Vec<u32> = (0..welded.tetrahedra.len() as u32).map(|t| parts.root(t)).collect();
 
-    // The largest tetrahedron whose centroid, rounded, is inside of it. No face passes through a tetrahedron, so that
-    // point is not on the surface and its winding number is exact.
+    // The largest tetrahedron whose rounded centroid lies inside of it. No face passes through a
+    // tetrahedron, so this point is not on the surface and its winding number is exact.
     let mut seeds: Vec<Option<(f64, DVec3)>> = vec![None; part.len()];
     for (t, &part) in part.iter().enumerate() {
         let corners = welded.corners(t);
@@ -57,7 +59,8 @@ fn is_strictly_inside(&[a, b, c, d]: &[DVec3; 4], p: DVec3) -> bool {
         .all(|&[a, b, c, d]| orientation(a, b, c, d) < 0)
 }
 
-/// Whether the winding numbers change by the faces at faces, and are 0 where there is no tetrahedron.
+/// Whether the winding numbers change at each face by the number of the face, and are 0 where there
+/// is no tetrahedron.
 fn fit(windings: &[i32], triangles: &[Triangle], vertices: &[DVec3]) -> Result<(), ConformingError> {
     for triangle in triangles {
         let of = |side: usize| triangle.sides[side].map(|t| (t, windings[t as usize]));
@@ -86,7 +89,7 @@ fn fit(windings: &[i32], triangles: &[Triangle], vertices: &[DVec3]) -> Result<(
     Ok(())
 }
 
-/// Disjoint sets of tetrahedra; the least id stands for its set.
+/// Disjoint sets of tetrahedra. The least id stands for its set.
 struct Parts {
     parent: Vec<u32>,
 }

@@ -1,4 +1,4 @@
-//! Checks of the whole: volume, and an outer boundary that does not meet itself.
+//! Checks of the whole: the volume, and that the outer boundary does not meet itself.
 use std::collections::HashMap;
 
 use glam::DVec3;
@@ -6,13 +6,14 @@ use glam::DVec3;
 use super::{ConformingError, triangles::Triangle, weld::Welded};
 use crate::mesh::{Defect, DefectKind, MeshError, Severity, SolidMesh, TriangleMesh, check};
 
-/// How far the volumes inside may differ, relative to the volume.
+/// Largest difference of the volumes inside, relative to the volume.
 const VOLUME_TOLERANCE: f64 = 1e-9;
 
-/// Rounding of a compensated sum, relative to the sum of absolute values: some units in the last place of each term.
+/// Rounding of a compensated sum, relative to the sum of absolute values: some units in the last
+/// place of each term.
 const ROUNDING: f64 = 1e-15;
 
-/// A sum with the bits that rounding drops (Neumaier), and the sum of absolute values.
+/// A sum with the bits that rounding drops (Neumaier), and the sum of the absolute values.
 #[derive(Default)]
 struct Sum {
     sum: f64,
@@ -33,7 +34,8 @@ impl Sum {
     }
 }
 
-/// Whether the tetrahedra, each as often as its winding number says, have the volume that the surface encloses.
+/// Whether the tetrahedra have the volume that the surface encloses, when each counts as often as
+/// its winding number says.
 pub(super) fn volumes_agree(
     solid: &SolidMesh,
     welded: &Welded,
@@ -53,11 +55,11 @@ pub(super) fn volumes_agree(
     }
     let within = VOLUME_TOLERANCE * surface.value().abs() + ROUNDING * (surface.absolute + inside.absolute);
     let (inside, surface) = (inside.value(), surface.value());
-    // Not `>`: an overflow to NaN must not pass.
+    // The comparison is not `>`, because an overflow to NaN must not pass.
     if (inside - surface).abs() <= within { Ok(()) } else { Err(ConformingError::Volume { inside, surface }) }
 }
 
-/// The outer boundary as a mesh; its faces are the triangles in their order.
+/// The outer boundary as a mesh. Its faces are the triangles, in the same order.
 fn boundary(outer: &[&Triangle], vertices: &[DVec3]) -> Result<TriangleMesh, MeshError> {
     let mut ids = HashMap::new();
     let mut positions = Vec::new();
@@ -71,7 +73,7 @@ fn boundary(outer: &[&Triangle], vertices: &[DVec3]) -> Result<TriangleMesh, Mes
     TriangleMesh::new(positions, faces)
 }
 
-/// Whether the outer boundary does not meet itself and goes around no place twice.
+/// Whether the outer boundary does not meet itself, and goes around no place twice.
 pub(super) fn is_embedded(
     solid: &SolidMesh,
     welded: &Welded,
@@ -82,7 +84,7 @@ pub(super) fn is_embedded(
         && outer.len() == solid.mesh().faces().len()
         && outer.iter().all(|t| t.face.is_some())
     {
-        // The outer boundary is the surface, and the check of the solid has seen it.
+        // The outer boundary is the surface, which the check of the solid has checked already.
         return Ok(());
     }
     let refused = |found: String, position| Err(ConformingError::Overlap { found, position });
@@ -96,7 +98,7 @@ pub(super) fn is_embedded(
             || matches!(d.kind, DefectKind::SelfIntersection | DefectKind::WindingAboveOne)
     };
     match report.defects.iter().find(bad) {
-        // Ids of the boundary's faces say nothing to a user; those of tetrahedra do.
+        // The ids of the faces of the boundary mean nothing to a user. Those of tetrahedra do.
         Some(defect) => {
             let of = |&f: &u32| outer[f as usize].sides.iter().flatten().next().copied();
             let tetrahedra: Vec<String> =
@@ -120,7 +122,8 @@ mod tests {
     use super::*;
     use crate::{domain::TetMesh, domain::conforming::weld::weld};
 
-    /// The labels guarantee the volume, so only the sum itself can be tested: it counts each tetrahedron by its winding number.
+    /// The labels guarantee the volume, so only the sum itself can be tested. It counts each
+    /// tetrahedron by its winding number.
     #[test]
     fn volumes_are_weighted() {
         let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];

@@ -1,4 +1,5 @@
-//! The triangles of a tetrahedralisation, each with the tetrahedra on its sides and the faces of the surface on it.
+//! The triangles of a tetrahedralisation, each with the tetrahedra on its sides and with the face
+//! of the surface that it is.
 use glam::DVec3;
 
 use super::{ConformingError, MissingFace, weld::Welded};
@@ -8,26 +9,29 @@ use crate::{
     mesh::SolidMesh,
 };
 
-/// A vertex farther than this from a missing face, relative to the diagonal, does not lie on it.
+/// A vertex that is farther from a missing face than this, relative to the diagonal, does not lie
+/// on it.
 const ON_FACE: f64 = 1e-9;
 
-/// A triangle of the tetrahedralisation. Its front is where its corners, in ascending order, turn counter-clockwise.
+/// A triangle of the tetrahedralisation. Seen from its front, its corners in ascending order go
+/// counter-clockwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Triangle {
     /// Ascending.
     pub corners: [u32; 3],
     /// The tetrahedra in front and behind.
     pub sides: [Option<u32>; 2],
-    /// A face of the surface on it, the first of several.
+    /// The face of the surface that the triangle is, or the first of several.
     pub face: Option<u32>,
-    /// Winding number behind less that in front: 1 for each face with its front on the same side, -1 for each other.
+    /// Winding number behind the triangle minus that in front: 1 for each face with its front on
+    /// the same side, -1 for each other face.
     pub jump: i32,
 }
 
 pub(super) const FRONT: usize = 0;
 pub(super) const BEHIND: usize = 1;
 
-/// Ascending corners, and whether that took an odd number of swaps.
+/// The corners in ascending order, and whether sorting took an odd number of swaps.
 fn sorted([mut a, mut b, mut c]: [u32; 3]) -> ([u32; 3], bool) {
     let mut odd = false;
     for _ in 0..2 {
@@ -66,7 +70,8 @@ pub(super) fn triangles(welded: &Welded) -> Result<Vec<Triangle>, ConformingErro
     let mut uses: Vec<([u32; 3], u32, usize)> = Vec::with_capacity(4 * welded.tetrahedra.len());
     for (t, &corners) in (0u32..).zip(&welded.tetrahedra) {
         for side in sides_of(corners) {
-            // Outward is ahead of the tetrahedron: it is behind the triangle, unless sorting turned it over.
+            // The side is ordered outward, so the tetrahedron is behind the triangle, unless
+            // sorting turned the triangle over.
             let (key, odd) = sorted(side);
             uses.push((key, t, if odd { FRONT } else { BEHIND }));
         }
@@ -94,7 +99,7 @@ pub(super) fn triangles(welded: &Welded) -> Result<Vec<Triangle>, ConformingErro
     Ok(found)
 }
 
-/// Puts each face of the surface on its triangle.
+/// Assigns each face of the surface to its triangle.
 pub(super) fn place_faces(
     triangles: &mut [Triangle],
     solid: &SolidMesh,

@@ -1,4 +1,4 @@
-//! Which vertices of the tetrahedra are which of the surface.
+//! Matches the vertices of the tetrahedra with those of the surface.
 use std::collections::HashMap;
 
 use glam::DVec3;
@@ -6,23 +6,23 @@ use glam::DVec3;
 use super::{ConformingError, TetMesh};
 use crate::mesh::{SolidMesh, coordinate_in_range};
 
-/// Tetrahedra over the vertices of a surface and those of their own.
+/// Tetrahedra over the vertices of a surface and further vertices.
 pub(super) struct Welded {
-    /// The surface's, then those that only tetrahedra use.
+    /// The vertices of the surface, then the vertices that only tetrahedra use.
     pub vertices: Vec<DVec3>,
     pub tetrahedra: Vec<[u32; 4]>,
-    /// For each vertex of the surface the first one at its position.
+    /// For each vertex of the surface, the first vertex at its position.
     pub surface: Vec<u32>,
-    /// For each vertex after the surface's, its id in the [`TetMesh`].
+    /// For each vertex after those of the surface, its id in the [`TetMesh`].
     pub origin: Vec<u32>,
 }
 
-/// The position's bits, where -0 is 0.
+/// The bits of the position, with 0 in place of -0.
 fn key(p: DVec3) -> [u64; 3] {
     (p + DVec3::ZERO).to_array().map(f64::to_bits)
 }
 
-/// For each position the first one that is equal to it, bit for bit but for the sign of 0.
+/// For each position the first position that is equal to it, bit for bit except for the sign of 0.
 pub(in crate::domain) fn first_at_position(positions: &[DVec3]) -> Vec<u32> {
     let mut ids = HashMap::with_capacity(positions.len());
     (0u32..).zip(positions).map(|(id, &p)| *ids.entry(key(p)).or_insert(id)).collect()

@@ -8,16 +8,16 @@ use crate::domain::{ConformingError, ReadTetrahedraError, TetMeshError};
 /// Why Gmsh did not give tetrahedra.
 #[derive(Debug, thiserror::Error)]
 pub enum GmshError {
-    /// The program is not there, or does not start.
+    /// The program does not exist, or does not start.
     #[error(
         "cannot run Gmsh as '{}': {source}. Install it with `pip install gmsh` or `apt install gmsh`, or set TESDF_GMSH to \
          the path of the program",
         executable.display()
     )]
     NotFound {
-        /// What was started.
+        /// The program that was started.
         executable: PathBuf,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The program starts and ends without doing anything.
@@ -27,9 +27,9 @@ pub enum GmshError {
         executable.display()
     )]
     Broken {
-        /// What was started.
+        /// The program that was started.
         executable: PathBuf,
-        /// The end of what it printed.
+        /// The end of its output.
         output: String,
     },
     /// Files cannot be written to or read from the temporary folder.
@@ -41,9 +41,9 @@ pub enum GmshError {
          band"
     )]
     Band {
-        /// In the mesh's unit.
+        /// The width, in the unit of the mesh.
         width: f64,
-        /// Of the solid, in the mesh's unit.
+        /// The diagonal of the solid, in the unit of the mesh.
         diagonal: f64,
     },
     /// A region is no box.
@@ -51,20 +51,20 @@ pub enum GmshError {
         "region {index} (0-based) from {min} to {max} is no box; expected finite corners, the lesser first"
     )]
     Region {
-        /// Which one.
+        /// Number of the region.
         index: usize,
         /// First corner.
         min: DVec3,
         /// Second corner.
         max: DVec3,
     },
-    /// The wish to stop was heard.
+    /// The caller asked to stop.
     #[error("the run of Gmsh was cancelled")]
     Cancelled,
     /// No settings gave tetrahedra that conform.
     #[error("{}", describe(.0))]
     AllRefused(
-        /// One for each of the settings.
+        /// The error of each of the settings.
         Vec<Refused>,
     ),
 }
@@ -74,32 +74,32 @@ pub enum GmshError {
 pub struct Refused {
     /// The settings.
     pub settings: GmshSettings,
-    /// Why.
+    /// The reason.
     pub because: RefusedBecause,
 }
 
-/// What was wrong.
+/// Why settings did not give tetrahedra that conform.
 #[derive(Debug, thiserror::Error)]
 pub enum RefusedBecause {
-    /// Gmsh gave up.
+    /// Gmsh ended with an error.
     #[error("Gmsh gave no tetrahedra: {0}")]
     Gmsh(
-        /// The end of what it printed.
+        /// The end of its output.
         String,
     ),
     /// Gmsh took too long.
     #[error("Gmsh was stopped after {0:?}")]
     TimeLimit(
-        /// The limit.
+        /// The time limit.
         std::time::Duration,
     ),
-    /// Its file cannot be read.
+    /// The file that Gmsh wrote cannot be read.
     #[error(transparent)]
     Read(ReadTetrahedraError),
-    /// Its tetrahedra are no mesh.
+    /// The tetrahedra of Gmsh do not make a mesh.
     #[error(transparent)]
     Mesh(#[from] TetMeshError),
-    /// Its tetrahedra do not conform to the surface.
+    /// The tetrahedra of Gmsh do not conform to the surface.
     #[error(transparent)]
     Gate(#[from] ConformingError),
 }

@@ -1,4 +1,5 @@
-//! What Gmsh gets: the surface, perhaps with a box around it, in the local frame, and a script.
+//! The input of Gmsh: the surface in the local frame, with a box around it if one is needed, and a
+//! script.
 use std::fmt::Write;
 
 use glam::DVec3;
@@ -10,14 +11,14 @@ use crate::{
     mesh::SolidMesh,
 };
 
-/// Rows of squares along the longest side of the box. Undivided, its corners see the whole surface and the tetrahedra
-/// between get lists of thousands of faces.
+/// Rows of squares along the longest side of the box. Without rows, the corners of the box see the
+/// whole surface, and the tetrahedra in between get lists of thousands of faces.
 const BOX_ROWS: f64 = 8.0;
 
 /// The file that the script merges.
 pub(super) const SURFACE: &str = "surface.msh";
 
-/// MSH 2.2: the surface as entity 1, the box as entity 2.
+/// The surface as entity 1 and the box as entity 2, in MSH 2.2.
 pub(super) fn surface(solid: &SolidMesh, frame: &LocalFrame, hull: Option<Aabb>) -> String {
     let mesh = solid.mesh();
     let first = first_at_position(mesh.vertices());
@@ -35,7 +36,8 @@ pub(super) fn surface(solid: &SolidMesh, frame: &LocalFrame, hull: Option<Aabb>)
         triangles.extend(faces.into_iter().map(|face| (2, face.map(|v| offset + v))));
     }
     let mut out = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n", nodes.len());
-    // Writing to a String cannot fail. `{:e}` is the shortest decimal that reads back as the same number.
+    // Writing to a String cannot fail. `{:e}` gives the shortest decimal that reads back as the
+    // same number.
     for (id, p) in nodes {
         let _ = writeln!(out, "{id} {:e} {:e} {:e}", p.x, p.y, p.z);
     }
@@ -79,7 +81,7 @@ fn lattice(bounds: Aabb) -> (Vec<DVec3>, Vec<[usize; 3]>) {
     (vertices, faces)
 }
 
-/// The script. Sizes come from nowhere but the surface, so that no vertex is added where none is needed.
+/// The script. Sizes come from the surface alone, so that no vertex is added where none is needed.
 pub(super) fn script(settings: GmshSettings, has_box: bool) -> String {
     let algorithm = settings.algorithm.number();
     let [optimize, netgen] = settings.optimizer.numbers();

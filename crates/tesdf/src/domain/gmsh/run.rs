@@ -13,14 +13,15 @@ use super::{GmshError, GmshOptions, RefusedBecause, input::SURFACE};
 use crate::base::Progress;
 use crate::domain::{TetMesh, read_tetrahedra};
 
-/// Between two looks at whether Gmsh has ended.
+/// Time between two looks at whether Gmsh has ended.
 const PAUSE: Duration = Duration::from_millis(5);
 
 const SCRIPT: &str = "domain.geo";
 const RESULT: &str = "domain.msh";
 const LOG: &str = "log.txt";
 
-/// Tetrahedra in the local frame; the inner error is one that other settings may not have.
+/// Runs Gmsh and returns its tetrahedra, in the local frame. The inner error is one that other
+/// settings may not have.
 pub(super) fn run(
     surface: &str,
     script: &str,
@@ -38,7 +39,8 @@ pub(super) fn run(
     let started = Command::new(&executable)
         .args([SCRIPT, "-3", "-format", "msh2", "-bin", "-o", RESULT, "-nt", "1", "-v", "3"])
         .current_dir(folder.path())
-        // Where Gmsh looks for the user's configuration, which must not change the result.
+        // Gmsh looks in this folder for the configuration of the user, which must not change the
+        // result.
         .env("GMSH_HOME", folder.path())
         .env("OMP_NUM_THREADS", "1")
         .stdin(Stdio::null())
@@ -58,20 +60,23 @@ pub(super) fn run(
     let result = path(RESULT);
     if !result.exists() {
         let output = last_words(&printed, status);
-        // Gmsh says "Info" and its version when it starts; a shell, a loader or an interpreter does not.
+        // Gmsh prints "Info" and its version when it starts. A shell, a loader or an interpreter
+        // does not.
         if !printed.contains("Info    :") {
             return Err(GmshError::Broken { executable, output });
         }
         return Ok(Err(RefusedBecause::Gmsh(output)));
     }
     Ok(read_tetrahedra(&result).map_err(|error| match first_error(&printed) {
-        // Such as "no elements in volume", which says more than that the file has no tetrahedra.
+        // Such a message, for example "no elements in volume", says more than that the file has no
+        // tetrahedra.
         Some(said) => RefusedBecause::Gmsh(said),
         None => RefusedBecause::Read(error),
     }))
 }
 
-/// A path with a folder is made absolute, since the program runs in another one.
+/// The program to start. A path with a folder is made absolute, because the program runs in another
+/// folder.
 fn executable(options: &GmshOptions) -> PathBuf {
     let named = options.executable.clone();
     let path = named.or_else(|| env::var_os("TESDF_GMSH").filter(|v| !v.is_empty()).map(PathBuf::from));
@@ -80,7 +85,7 @@ fn executable(options: &GmshOptions) -> PathBuf {
     if has_folder { std::path::absolute(&path).unwrap_or(path) } else { path }
 }
 
-/// `None` when it took too long or is no longer wanted, and was ended.
+/// Waits for the program. Returns `None` when it took too long or was cancelled. It is ended then.
 fn wait(mut child: Child, limit: Duration, progress: &Progress) -> std::io::Result<Option<ExitStatus>> {
     let start = Instant::now();
     loop {
@@ -89,7 +94,7 @@ fn wait(mut child: Child, limit: Duration, progress: &Progress) -> std::io::Resu
         }
         if start.elapsed() > limit || progress.is_cancelled() {
             match child.kill() {
-                // It ended in between.
+                // The program has ended in between.
                 Err(error) if error.kind() == ErrorKind::InvalidInput => {}
                 other => other?,
             }
@@ -100,12 +105,12 @@ fn wait(mut child: Child, limit: Duration, progress: &Progress) -> std::io::Resu
     }
 }
 
-/// The first line with which Gmsh tells an error.
+/// The first line in which Gmsh reports an error.
 fn first_error(printed: &str) -> Option<String> {
     printed.lines().find_map(|line| line.strip_prefix("Error   : ")).map(|said| said.trim().to_owned())
 }
 
-/// The first error, or else the last line.
+/// The first error, or the last line if there is no error.
 fn last_words(printed: &str, status: ExitStatus) -> String {
     let last = || printed.lines().rev().map(str::trim).find(|l| !l.is_empty()).map(str::to_owned);
     first_error(printed).or_else(last).unwrap_or_else(|| format!("it printed nothing ({status})"))

@@ -1,4 +1,4 @@
-//! Numbers from text or binary data, with the place of each.
+//! Reads numbers from text or binary data, with the place of each number.
 use glam::DVec3;
 
 use super::{ReadTetrahedraError, TetFormat, malformed};
@@ -15,12 +15,12 @@ pub(super) enum Encoding {
     Big,
 }
 
-/// A place in a file that moves on as lines and numbers are read.
+/// A place in a file. It moves on as lines and numbers are read.
 pub(super) struct Cursor<'a> {
     bytes: &'a [u8],
-    /// Of the next byte.
+    /// Position of the next byte.
     at: usize,
-    /// Of the next byte, 1-based.
+    /// Line of the next byte, 1-based.
     line: u64,
     format: TetFormat,
     pub encoding: Encoding,
@@ -31,7 +31,7 @@ impl<'a> Cursor<'a> {
         Self { bytes, at: 0, line: 1, format, encoding: Encoding::Ascii }
     }
 
-    /// The line in a text file, the byte in a binary one.
+    /// The line in a text file, or the byte in a binary file.
     pub fn place(&self) -> Place {
         match self.encoding {
             Encoding::Ascii => Place::Line(self.line),
@@ -56,14 +56,15 @@ impl<'a> Cursor<'a> {
         self.advance(self.at + space);
     }
 
-    /// The rest of the line, without its end; the cursor stands behind it.
+    /// The rest of the line, without its end. The cursor moves behind it.
     pub fn rest_of_line(&mut self) -> &'a [u8] {
         let rest = &self.bytes[self.at..];
         let end = rest.iter().position(|&b| b == b'\n').map_or(self.bytes.len(), |n| self.at + n + 1);
         self.advance(end).trim_ascii_end()
     }
 
-    /// The next word, empty at the end of the file; the cursor stands behind it, on the same line.
+    /// The next word, empty at the end of the file. The cursor moves behind it and stays on the
+    /// same line.
     pub fn word(&mut self) -> &'a [u8] {
         self.skip_space();
         let rest = &self.bytes[self.at..];
@@ -71,7 +72,7 @@ impl<'a> Cursor<'a> {
         self.advance(self.at + length)
     }
 
-    /// Moves behind the next place where these bytes are; false when there is none.
+    /// Moves behind the next occurrence of these bytes. Returns false when there is none.
     pub fn skip_past(&mut self, pattern: &[u8]) -> bool {
         let rest = &self.bytes[self.at..];
         match rest.windows(pattern.len()).position(|w| w == pattern) {
@@ -110,7 +111,7 @@ impl<'a> Cursor<'a> {
         })
     }
 
-    /// A whole number; four bytes where binary.
+    /// A whole number. It has four bytes in binary data.
     pub fn int(&mut self, what: &str) -> Result<i32, ReadTetrahedraError> {
         match self.encoding {
             Encoding::Ascii => self.parse(what, "a whole number"),
@@ -118,7 +119,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A number of things or an id; eight bytes where binary.
+    /// A count or an id. It has eight bytes in binary data.
     pub fn size(&mut self, what: &str) -> Result<u64, ReadTetrahedraError> {
         match self.encoding {
             Encoding::Ascii => self.parse(what, "a whole number that is not negative"),
@@ -126,7 +127,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// A number; eight bytes where binary.
+    /// A floating-point number. It has eight bytes in binary data.
     pub fn double(&mut self, what: &str) -> Result<f64, ReadTetrahedraError> {
         match self.encoding {
             Encoding::Ascii => self.parse(what, "a decimal number such as -1.5e-3"),
@@ -134,7 +135,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Three numbers.
+    /// Three floating-point numbers.
     pub fn point(&mut self) -> Result<DVec3, ReadTetrahedraError> {
         Ok(DVec3::new(self.double("x")?, self.double("y")?, self.double("z")?))
     }

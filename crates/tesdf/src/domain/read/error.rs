@@ -9,9 +9,9 @@ pub enum ReadTetrahedraError {
     /// A file cannot be read from disk.
     #[error("cannot read {}: {source}", path.display())]
     Open {
-        /// The path, for TetGen perhaps that of the other file of the pair.
+        /// The path. For TetGen it may be that of the other file of the pair.
         path: PathBuf,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// The extension names no format.
@@ -24,19 +24,19 @@ pub enum ReadTetrahedraError {
         /// The path asked for.
         path: PathBuf,
     },
-    /// The bytes break the format's rules.
+    /// The bytes do not follow the rules of the format.
     #[error("{format}, {place}: {found}; {help}")]
     Malformed {
         /// The format.
         format: TetFormat,
-        /// Where.
+        /// The place in the file.
         place: Place,
         /// What was found there.
         found: String,
-        /// What is expected, or what to do.
+        /// What was expected, or what to do.
         help: String,
     },
-    /// An element has a volume and is no tetrahedron with four corners.
+    /// An element has a volume and is not a tetrahedron with four corners.
     #[error(
         "{format}, {place}: element {element} is {kind}; expected tetrahedra of four vertices: save the mesh in first order, \
          without hexahedra, prisms and pyramids"
@@ -44,24 +44,24 @@ pub enum ReadTetrahedraError {
     Element {
         /// The format.
         format: TetFormat,
-        /// Where.
+        /// The place in the file.
         place: Place,
-        /// The element's number in the file.
+        /// The number of the element in the file.
         element: u64,
-        /// What it is, as `a hexahedron`.
+        /// The kind of the element, such as `a hexahedron`.
         kind: String,
     },
-    /// Vertices and tetrahedra do not make a mesh; ids count as in the file's order.
+    /// Vertices and tetrahedra do not make a mesh. Ids are in the order of the file.
     #[error("{format}: {source}")]
     Mesh {
         /// The format.
         format: TetFormat,
-        /// What is wrong.
+        /// The error of the mesh.
         source: TetMeshError,
     },
 }
 
-/// An error about the bytes of one format.
+/// An error about the bytes of a format.
 pub(super) fn malformed(
     format: TetFormat,
     place: Place,

@@ -1,4 +1,5 @@
-//! Gmsh MSH 2.2 and 4.1, ASCII and binary. Sections other than nodes and elements are skipped.
+//! Reads Gmsh's MSH 2.2 and 4.1, ASCII and binary. Only the sections of nodes and elements are
+//! read.
 use std::collections::HashMap;
 
 use super::cursor::{Cursor, Encoding};
@@ -16,7 +17,7 @@ enum Version {
 struct Reader<'a> {
     cursor: Cursor<'a>,
     version: Version,
-    /// Where each node is in `parsed.vertices`.
+    /// The index of each node in `parsed.vertices`.
     nodes: HashMap<u64, u32>,
     parsed: Parsed,
 }
@@ -179,7 +180,7 @@ impl Reader<'_> {
             let found = format!("node {id} has {} = {}", ['x', 'y', 'z'][axis], p[axis]);
             return Err(self.cursor.error(found, "coordinates must be finite"));
         }
-        // Ids beyond 32 bits would need a file of 100 GB; the limit of `TetMesh` is below.
+        // Ids beyond 32 bits would need a file of 100 GB. The limit of `TetMesh` is below that.
         let at = self.parsed.vertices.len() as u32;
         if self.nodes.insert(id, at).is_some() {
             return Err(self.cursor.error(format!("node {id} is there twice"), "expected different numbers"));
@@ -234,7 +235,7 @@ impl Reader<'_> {
         end(&mut self.cursor, b"$EndElements")
     }
 
-    /// The tags and nodes of an element.
+    /// Reads the tags and the nodes of an element.
     fn element(&mut self, element: u64, kind: i32, tags: i32) -> Result<()> {
         for _ in 0..tags {
             self.cursor.int("a tag")?;
@@ -281,7 +282,7 @@ impl Reader<'_> {
     }
 }
 
-/// What an element is, with its number of nodes where it is skipped.
+/// The kind of an element, with its number of nodes for elements that are skipped.
 enum Kind {
     Tetrahedron,
     Point(usize),
@@ -290,7 +291,7 @@ enum Kind {
     Volume(&'static str),
 }
 
-/// The element types of Gmsh's reference manual.
+/// The element types of the reference manual of Gmsh.
 fn element_kind(kind: i32) -> Option<Kind> {
     Some(match kind {
         4 => Kind::Tetrahedron,

@@ -1,4 +1,5 @@
-//! TetGen's `.node` and `.ele`. Vertices count from 0 or 1, as the first line of the `.node` says.
+//! Reads TetGen's `.node` and `.ele`. Vertices count from 0 or 1, as the first line of the `.node`
+//! file says.
 use glam::DVec3;
 
 use super::{Parsed, ReadTetrahedraError, TetFormat, malformed};
@@ -15,7 +16,7 @@ pub(super) fn parse(node: &[u8], ele: &[u8]) -> Result<Parsed> {
     Ok(Parsed { vertices, tetrahedra, ..Parsed::default() })
 }
 
-/// A header of counts and as many rows as its first says.
+/// A header of counts, followed by the number of rows that its first count gives.
 struct Table<'a> {
     format: TetFormat,
     lines: Lines<'a>,
@@ -54,7 +55,8 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Row `row`, its words after its id, which must count on from `base`.
+    /// Reads row `row`. Returns the words after its id. The id must be `base` plus the number of
+    /// the row.
     fn row(&mut self, row: u64, base: u64) -> Result<(u64, Vec<&'a [u8]>)> {
         let Some((line, text)) = self.next_content() else {
             let found = format!("the file ends after {row} of {} rows", self.rows);
@@ -81,7 +83,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// The vertices, and what they count from.
+/// The vertices, and the number from which they count.
 fn nodes(mut table: Table<'_>) -> Result<(Vec<DVec3>, u64)> {
     if table.header.first().is_some_and(|&dimension| dimension != 3) {
         let found = format!("dimension {}", table.header[0]);
@@ -94,7 +96,7 @@ fn nodes(mut table: Table<'_>) -> Result<(Vec<DVec3>, u64)> {
             "expected those that TetGen wrote, as in NAME.1.node",
         ));
     }
-    // The id of the first row says what they count from.
+    // The id of the first row gives the number from which they count.
     let mut lines = Lines::after(table.lines.rest(), table.lines.number());
     let first = lines.find_map(|(_, l)| words(without_comment(l)).next());
     let base = if first == Some(b"1") { 1 } else { 0 };

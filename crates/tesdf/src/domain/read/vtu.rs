@@ -1,4 +1,4 @@
-//! VTK's unstructured grid as XML.
+//! Reads VTK's unstructured grid as XML.
 use glam::DVec3;
 use roxmltree::{Document, Node};
 
@@ -49,13 +49,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed> {
 /// Data that is appended to the XML.
 #[derive(Clone, Copy)]
 struct Appended<'a> {
-    /// What follows the underscore.
+    /// The bytes after the underscore.
     bytes: &'a [u8],
-    /// Where that is in the file.
+    /// The place of these bytes in the file.
     start: usize,
 }
 
-/// The XML, with appended data cut out, since raw data is not XML; and that data.
+/// Splits a file into the XML and the appended data. The appended data is cut out, because raw data
+/// is not XML.
 fn split(bytes: &[u8]) -> Result<(Vec<u8>, Option<Appended<'_>>)> {
     let Some(tag) = bytes.windows(APPENDED.len()).position(|w| w == APPENDED) else {
         return Ok((bytes.to_vec(), None));
@@ -158,7 +159,7 @@ fn read_piece(piece: &Node<'_, '_>, arrays: &Arrays<'_>, parsed: &mut Parsed) ->
     Ok(())
 }
 
-/// Whether a cell of a type is to be taken; the types are those of `vtkCellType.h`.
+/// Whether a cell of this type is read. The types are those of `vtkCellType.h`.
 fn takes(kind: i64, cell: usize, array: &Node<'_, '_>, skipped: &mut Skipped) -> Result<bool> {
     let volume = |kind: &str| ReadTetrahedraError::Element {
         format: VTU,

@@ -1,4 +1,4 @@
-//! Arrays of a VTU file: their numbers, whichever way they are written.
+//! Reads the numbers of the arrays of a VTU file, in all encodings.
 use std::str::FromStr;
 
 use roxmltree::Node;
@@ -13,7 +13,7 @@ pub(super) enum Values {
     Whole(Vec<i64>),
 }
 
-/// What all arrays of a file have in common.
+/// The data that all arrays of a file share.
 pub(super) struct Arrays<'a> {
     appended: Option<(Appended<'a>, Encoding)>,
     block: Block,
@@ -27,7 +27,7 @@ enum Encoding {
 }
 
 impl<'a> Arrays<'a> {
-    /// `file` is the number of its bytes.
+    /// `file` is the number of bytes of the file.
     pub fn new(root: &Node<'_, '_>, appended: Option<Appended<'a>>, file: usize) -> Result<Self> {
         let big_endian = match root.attribute("byte_order") {
             None | Some("LittleEndian") => false,
@@ -140,7 +140,7 @@ impl<'a> Arrays<'a> {
             "UInt16" => Values::Whole(numbers!(u16 as i64)),
             "Int32" => Values::Whole(numbers!(i32 as i64)),
             "UInt32" => Values::Whole(numbers!(u32 as i64)),
-            // Ids beyond 63 bits become negative, and are refused as ids.
+            // Ids beyond 63 bits become negative, and negative ids are refused.
             "Int64" | "UInt64" => Values::Whole(numbers!(i64 as i64)),
             _ => return Err(unknown(array, kind)),
         })
@@ -155,7 +155,7 @@ fn unknown(array: &Node<'_, '_>, kind: &str) -> super::ReadTetrahedraError {
     )
 }
 
-/// The text of an array, without that of the elements in it: VTK puts ranges there.
+/// The text of an array, without the text of elements in it, where VTK puts ranges.
 fn text_of(array: &Node<'_, '_>) -> String {
     array.children().filter(Node::is_text).filter_map(|n| n.text()).collect()
 }

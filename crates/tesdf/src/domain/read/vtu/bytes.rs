@@ -1,4 +1,4 @@
-//! The bytes of an array: base64 or raw, with a header of sizes, perhaps compressed.
+//! Reads the bytes of an array: base64 or raw, with a header of sizes, compressed or not.
 use std::cell::Cell;
 use std::io::Read;
 
@@ -8,10 +8,11 @@ use flate2::read::ZlibDecoder;
 use super::Result;
 use crate::domain::read::ReadTetrahedraError;
 
-/// Where bytes come from.
+/// The source of the bytes.
 pub(super) enum Bytes<'a> {
     Raw(&'a [u8]),
-    /// Base64, in parts: what follows padding is a part of its own, as VTK encodes sizes and data apart.
+    /// Base64, in parts. A new part begins after padding, because VTK encodes sizes and data
+    /// separately.
     Base64 {
         text: &'a [u8],
         decoded: Vec<u8>,
@@ -23,7 +24,7 @@ impl<'a> Bytes<'a> {
         Self::Base64 { text, decoded: Vec::new() }
     }
 
-    /// The next `count` bytes, `None` when there are not so many or they are not base64.
+    /// The next `count` bytes. `None` when there are not as many, or when they are not base64.
     fn take(&mut self, count: usize) -> Option<Vec<u8>> {
         match self {
             Self::Raw(rest) => {
@@ -43,7 +44,8 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// Characters that encode at least `count` bytes, or fewer up to padding or the end; whole groups of four.
+/// Takes characters that encode at least `count` bytes, or fewer up to padding or the end. It takes
+/// whole groups of four.
 fn next_part(text: &mut &[u8], count: usize) -> Option<Vec<u8>> {
     let wanted = count.div_ceil(3).checked_mul(4)?;
     let mut part = Vec::new();
@@ -59,43 +61,44 @@ fn next_part(text: &mut &[u8], count: usize) -> Option<Vec<u8>> {
     (!part.is_empty()).then_some(part)
 }
 
-/// How arrays are stored in bytes.
+/// How the file stores arrays in bytes.
 #[derive(Clone, Copy)]
 pub(super) struct Block {
     pub big_endian: bool,
-    /// Bytes of a size: 4 or 8.
+    /// Number of bytes of a size: 4 or 8.
     pub word: usize,
     pub zlib: bool,
 }
 
 const CUT: &str = "is the file cut short?";
 
-/// What the arrays of a file may take together.
+/// A limit on the memory of all arrays of a file together.
 ///
-/// Zlib packs at most 1032 to 1, so a file of 2 MB can hold 2 GB; and many arrays can name the same appended bytes. Numbers of meshes are
-/// packed 20 to 1 at best.
+/// Zlib packs at most 1032 bytes to one, so a file of 2 MB can give 2 GB. Several arrays can also
+/// name the same appended bytes. Numbers of meshes are packed at most 20 to 1.
 #[derive(Debug)]
 pub(super) struct Budget {
-    /// Bytes of the file.
+    /// Number of bytes of the file.
     file: u64,
-    /// Bytes taken from the file so far, and bytes that they gave.
+    /// Number of bytes taken from the file so far, and number of bytes that they gave.
     taken: Cell<[u64; 2]>,
 }
 
-/// Bytes that the arrays may give whatever they are packed to.
+/// The arrays may give this many bytes, however they are packed.
 const SMALL: u64 = 1 << 28;
-/// Bytes that they may give per byte that they take, beyond that.
+/// Beyond that, the number of bytes that arrays may give for each byte of the file that they take.
 const RATIO: u64 = 100;
-/// Times that they may take all bytes of the file.
+/// How many times arrays may take all bytes of the file.
 const TIMES: u64 = 4;
 
 impl Budget {
-    /// For a file of so many bytes.
+    /// The limit for a file with this number of bytes.
     pub fn new(file: usize) -> Self {
         Self { file: file as u64, taken: Cell::new([0; 2]) }
     }
 
-    /// Takes `packed` bytes of the file, which give `unpacked`; an error says what is too much.
+    /// Takes `packed` bytes of the file, which give `unpacked` bytes. An error says which limit is
+    /// exceeded.
     fn spend(&self, packed: usize, unpacked: usize) -> std::result::Result<(), String> {
         let [all, given] = self.taken.get();
         let (all, given) = (all.saturating_add(packed as u64), given.saturating_add(unpacked as u64));
@@ -111,7 +114,7 @@ impl Budget {
 }
 
 impl Block {
-    /// The bytes of an array. `error` makes an error of what was found and a hint.
+    /// The bytes of an array. `error` makes an error of what was found and of a hint.
     pub fn read(
         &self,
         mut bytes: Bytes<'_>,
@@ -154,7 +157,8 @@ impl Block {
             let before = out.len();
             let packed = take(&mut bytes, compressed)?;
             spend(compressed, expected)?;
-            // One byte more than expected shows that there are too many, and no more are unpacked.
+            // One byte more than expected shows that there are too many. No further bytes are
+            // unpacked.
             let mut unpacked = ZlibDecoder::new(packed.as_slice()).take((expected as u64).saturating_add(1));
             unpacked
                 .read_to_end(&mut out)
