@@ -6,7 +6,7 @@ use crate::verify::Worst;
 /// Why a solid cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeError {
-    /// [`Progress::cancel`] was called.
+    /// [`Progress::cancel`](crate::base::Progress::cancel) was called.
     #[error("the encoding was cancelled")]
     Cancelled,
     /// An option has an invalid value.
