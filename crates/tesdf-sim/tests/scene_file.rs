@@ -8,7 +8,7 @@ use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh, write};
 use tesdf_sim::record::{RecordError, RunRecord};
-use tesdf_sim::scene_file::{DetectorMode, LoadedScene, MOST_BODIES, SceneError};
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene, MAX_BODIES, SceneError};
 use tesdf_sim::{Mass, SimulateError, simulate};
 
 const DROP: &str = r#"
@@ -182,7 +182,7 @@ fn what_a_scene_asks_for_is_bounded() {
     ] {
         assert!(error.contains(expected), "no {expected:?} in {error}");
     }
-    let bodies: String = (0..=MOST_BODIES)
+    let bodies: String = (0..=MAX_BODIES)
         .map(|k| format!("[[bodies]]\nname = \"{k}\"\nshape = \"plane\"\nfixed = true\n"))
         .collect();
     let error = refusal(&format!("time_step = 1\nduration = 1\n{bodies}"));

@@ -106,7 +106,7 @@ fn good_assets_are_proved_the_same_way_on_any_number_of_threads() {
     assert_eq!(report.distances.proved, statistics.listed_cells);
     let cells = statistics.listed_cells + statistics.far_cells + statistics.outside_cells;
     assert_eq!((report.signs.proved, report.face_tree.proved), (cells + 1, 1));
-    assert!(report.pieces > 1000 && report.max_pieces > 10);
+    assert!(report.pieces > 1000 && report.most_pieces > 10);
     assert_eq!(Some(report.delta), asset.about().certificate().delta());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     assert_eq!(pool.install(|| proved(&asset)), report);

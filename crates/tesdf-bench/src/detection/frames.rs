@@ -11,7 +11,7 @@ use tesdf::glam::{DQuat, DVec3};
 use tesdf::input;
 use tesdf::mesh::SolidMesh;
 use tesdf::{Progress, TeSdf};
-use tesdf_sim::scene_file::{LoadedScene, MOST_BODIES};
+use tesdf_sim::scene_file::{LoadedScene, MAX_BODIES};
 
 use super::poses::{PoseFile, VERSION};
 use tesdf_terminal::progress::{interrupt_flag, watched};
@@ -19,7 +19,7 @@ use tesdf_terminal::report::Failure;
 use tesdf_terminal::{asset_file, mesh_file, run_file};
 
 /// Most instances in all worlds.
-const MOST_INSTANCES: usize = 1 << 20;
+const MAX_INSTANCES: usize = 1 << 20;
 /// What to do about a file of poses that is refused.
 const WRITES_POSES: &str = "`tesdf bench poses` writes files of poses";
 
@@ -80,10 +80,9 @@ impl Frames {
         if file.tesdf_poses != VERSION {
             return Err(named(&format!("version {}; this build reads {VERSION}", file.tesdf_poses)));
         }
-        if file.bodies.len() > MOST_BODIES || file.instances.len() > MOST_BODIES {
+        if file.bodies.len() > MAX_BODIES || file.instances.len() > MAX_BODIES {
             let [bodies, instances] = [file.bodies.len(), file.instances.len()];
-            let found =
-                format!("{bodies} bodies, {instances} instances; expected at most {MOST_BODIES} each");
+            let found = format!("{bodies} bodies, {instances} instances; expected at most {MAX_BODIES} each");
             return Err(named(&found));
         }
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -125,9 +124,9 @@ impl Frames {
             return Ok(self);
         }
         let instances = self.scene.instances().len().saturating_mul(worlds as usize);
-        if instances > MOST_INSTANCES {
+        if instances > MAX_INSTANCES {
             return Err(Failure::new(format!(
-                "--worlds {worlds} makes {instances} instances; expected at most {MOST_INSTANCES}: take fewer worlds"
+                "--worlds {worlds} makes {instances} instances; expected at most {MAX_INSTANCES}: take fewer worlds"
             )));
         }
         let Self { mut scene, poses, contact_distance } = self;

@@ -49,7 +49,7 @@ pub fn text(report: &ProveReport) -> String {
     text += &format!(
         "  pieces          {}, at most {} of one cell\n",
         count(report.pieces as usize, "piece"),
-        report.max_pieces
+        report.most_pieces
     );
     report.faults.iter().for_each(|fault| text += &fault_text(fault));
     let undecided = report.distances.undecided + report.signs.undecided;

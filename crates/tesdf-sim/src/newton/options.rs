@@ -29,8 +29,8 @@ pub struct NewtonOptions {
     pub max_iterations: u32,
 }
 
-const MOST_ITERATIONS: u32 = 10_000;
-const MOST_DENSE_BODIES: usize = 256;
+const MAX_ITERATIONS: u32 = 10_000;
+const MAX_DENSE_BODIES: usize = 256;
 
 impl Default for NewtonOptions {
     fn default() -> Self {
@@ -82,13 +82,13 @@ impl NewtonOptions {
             (
                 "max_iterations",
                 f64::from(self.max_iterations),
-                (1..=MOST_ITERATIONS).contains(&self.max_iterations),
+                (1..=MAX_ITERATIONS).contains(&self.max_iterations),
                 "1 to 10000",
             ),
             (
                 "dense_bodies",
                 self.dense_bodies as f64,
-                self.dense_bodies <= MOST_DENSE_BODIES,
+                self.dense_bodies <= MAX_DENSE_BODIES,
                 "at most 256: the matrix grows with the square of their number",
             ),
         ];

@@ -2,11 +2,11 @@
 use super::SceneFile;
 
 /// Most bodies.
-pub const MOST_BODIES: usize = 1 << 16;
+pub const MAX_BODIES: usize = 1 << 16;
 /// Most steps.
-pub const MOST_STEPS: u64 = 100_000_000;
+pub const MAX_STEPS: u64 = 100_000_000;
 /// Most bytes that the states of all bodies may take in the run file: 16 GiB.
-pub const MOST_STATE_BYTES: u64 = 1 << 34;
+pub const MAX_STATE_BYTES: u64 = 1 << 34;
 /// Bytes of a body's pose and velocities.
 const STATE: u64 = 13 * 8;
 
@@ -22,24 +22,24 @@ impl SceneFile {
                 return Err(LimitError::new(key, format!("{value}; expected a number of seconds above 0")));
             }
         }
-        if self.bodies.len() > MOST_BODIES {
-            let reason = format!("{}; expected at most {MOST_BODIES}: split the scene", self.bodies.len());
+        if self.bodies.len() > MAX_BODIES {
+            let reason = format!("{}; expected at most {MAX_BODIES}: split the scene", self.bodies.len());
             return Err(LimitError::new("bodies", reason));
         }
         let steps = (self.duration / self.time_step).round().max(1.0);
         // The quotient of two finite numbers may be infinite.
-        if steps > MOST_STEPS as f64 {
+        if steps > MAX_STEPS as f64 {
             let reason = format!(
-                "{:?} s in steps of {:?} s; expected at most {MOST_STEPS} steps: give a larger time_step or a shorter duration",
+                "{:?} s in steps of {:?} s; expected at most {MAX_STEPS} steps: give a larger time_step or a shorter duration",
                 self.duration, self.time_step
             );
             return Err(LimitError::new("duration", reason));
         }
         let steps = steps as u64;
         let bytes = (steps + 1) * self.bodies.len() as u64 * STATE;
-        if bytes > MOST_STATE_BYTES {
+        if bytes > MAX_STATE_BYTES {
             let reason = format!(
-                "{steps} steps of {} bodies make a run of {bytes} bytes; expected at most {MOST_STATE_BYTES}: give a larger time_step, a \
+                "{steps} steps of {} bodies make a run of {bytes} bytes; expected at most {MAX_STATE_BYTES}: give a larger time_step, a \
                  shorter duration, or fewer bodies",
                 self.bodies.len()
             );

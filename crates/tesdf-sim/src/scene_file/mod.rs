@@ -35,7 +35,7 @@ use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 pub use error::SceneError;
-pub use limits::{LimitError, MOST_BODIES, MOST_STATE_BYTES, MOST_STEPS};
+pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
 
 use crate::criterion::ScrewCriterion;
@@ -47,7 +47,7 @@ use crate::newton::NewtonOptions;
 pub struct SceneFile {
     /// s.
     pub time_step: f64,
-    /// s; rounded to whole steps, at most [`MOST_STEPS`].
+    /// s; rounded to whole steps, at most [`MAX_STEPS`].
     pub duration: f64,
     /// m/s².
     #[serde(default = "earth")]
@@ -64,7 +64,7 @@ pub struct SceneFile {
     /// What makes the run a success.
     #[serde(default)]
     pub criterion: CriterionSection,
-    /// The bodies, at most [`MOST_BODIES`].
+    /// The bodies, at most [`MAX_BODIES`].
     pub bodies: Vec<Spanned<BodySection>>,
 }
 

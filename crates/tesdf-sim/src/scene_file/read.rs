@@ -3,11 +3,11 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::DeTable;
 
-use super::{BodySection, MOST_BODIES, SceneError, SceneFile};
+use super::{BodySection, MAX_BODIES, SceneError, SceneFile};
 use crate::RunRecord;
 
 /// Most bytes of a scene: a thousand per body.
-const MOST_TEXT: usize = 1000 * MOST_BODIES;
+const MAX_TEXT: usize = 1000 * MAX_BODIES;
 
 /// A scene file with what its errors and paths refer to.
 #[derive(Clone, Debug)]
@@ -35,8 +35,8 @@ impl LoadedScene {
     /// # Errors
     /// [`SceneError::Parse`].
     pub fn parse(text: String, path: &Path) -> Result<Self, SceneError> {
-        if text.len() > MOST_TEXT {
-            let message = format!("{} bytes; expected a scene of at most {MOST_TEXT}", text.len());
+        if text.len() > MAX_TEXT {
+            let message = format!("{} bytes; expected a scene of at most {MAX_TEXT}", text.len());
             return Err(SceneError::Parse { path: path.to_path_buf(), message });
         }
         let scene = toml::from_str(&text).map_err(|e| SceneError::Parse {

@@ -189,7 +189,7 @@ pub fn prove(
         signs: found.signs,
         face_tree,
         pieces: found.pieces,
-        max_pieces: found.max_pieces,
+        most_pieces: found.most_pieces,
         faults: found.faults,
     })
 }

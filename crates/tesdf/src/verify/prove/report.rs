@@ -30,7 +30,7 @@ pub struct ProveReport {
     /// Total number of pieces into which the cells were cut.
     pub pieces: u64,
     /// Largest number of pieces of one cell.
-    pub max_pieces: u64,
+    pub most_pieces: u64,
     /// Claims that are not proved: the first [`FAULTS`](Self::FAULTS), in the order of the cells.
     pub faults: Vec<Fault>,
 }

@@ -17,7 +17,7 @@ pub struct Found {
     pub distances: Tally,
     pub signs: Tally,
     pub pieces: u64,
-    pub max_pieces: u64,
+    pub most_pieces: u64,
     pub faults: Vec<Fault>,
 }
 
@@ -29,7 +29,7 @@ impl Found {
             distances: self.distances.join(other.distances),
             signs: self.signs.join(other.signs),
             pieces: self.pieces + other.pieces,
-            max_pieces: self.max_pieces.max(other.max_pieces),
+            most_pieces: self.most_pieces.max(other.most_pieces),
             faults: self.faults,
         }
     }
@@ -117,7 +117,7 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
         if let Node::Listed(..) = node {
             let (fault, pieces) = self.distances(word, cell, &list, near);
             found.distance(fault);
-            (found.pieces, found.max_pieces) = (pieces, pieces);
+            (found.pieces, found.most_pieces) = (pieces, pieces);
         }
         found.sign(match self.asset.conforming {
             None => self.signs.fault(word, cell, node, &list, near),
