@@ -1,20 +1,21 @@
-//! Each module of the library uses only those before it, and no files use each other in a circle.
+//! A module of the library uses only the modules before it, and no files use each other in a cycle.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-/// The order of the modules, as `docs/architecture.md` and the documentation of the crate have it.
+/// The order of the modules, as in `docs/architecture.md` and in the documentation of the crate.
 const ORDER: [&str; 15] = [
     "base", "input", "save", "geometry", "sampling", "mesh", "domain", "asset", "query", "verify", "encode",
     "deform", "collide", "evaluate", "inspect",
 ];
-/// What unit tests share; all of them may use it.
+/// Shared parts of the unit tests. Every module may use it.
 const FOR_TESTS: &str = "testing";
 
-/// A module or an item: the names on the way to it from the root of the crate.
+/// Path of a module or an item from the root of the crate.
 type Names = Vec<String>;
 
-/// The files of the crate by module, without comments and unit tests, and what their modules export again.
+/// Files of the crate by module, without comments and unit tests, and the re-exports of the
+/// modules.
 struct Source {
     files: BTreeMap<Names, String>,
     exports: BTreeMap<Names, Names>,
@@ -65,14 +66,14 @@ impl Source {
         }
     }
 
-    /// The modules that a file uses, besides those that it is in and those in it.
+    /// The modules that a file uses, except its own parents and children.
     fn used(&self, module: &Names) -> BTreeSet<Names> {
         let homes = paths(&self.files[module], module).into_iter().map(|item| self.home(&item));
         homes.filter(|home| !home.starts_with(module) && !module.starts_with(home)).collect()
     }
 }
 
-/// Without comments and unit tests.
+/// The text without comments and unit tests.
 fn code(text: &str) -> String {
     let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
     text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
@@ -101,7 +102,7 @@ fn paths(code: &str, module: &Names) -> Vec<Names> {
     items
 }
 
-/// The items of a use tree below `from`, and what comes after it.
+/// The items of a use tree below `from`, and the text after the tree.
 fn tree_of<'a>(text: &'a str, from: &Names) -> (Vec<Names>, &'a str) {
     if let Some(mut rest) = text.strip_prefix('{') {
         let mut items = Vec::new();
@@ -112,7 +113,7 @@ fn tree_of<'a>(text: &'a str, from: &Names) -> (Vec<Names>, &'a str) {
             }
             let (inner, after) = tree_of(rest, from);
             items.extend(inner);
-            // A new name makes no difference.
+            // An `as` clause is skipped.
             rest = after.trim_start_matches(|c| c != ',' && c != '}');
         }
     }
@@ -149,7 +150,7 @@ fn no_files_use_each_other_in_a_circle() {
     loop {
         let files = open.len();
         let names: BTreeSet<Names> = open.keys().cloned().collect();
-        // A file that uses none of those that are left is in no circle.
+        // A file that uses none of the remaining files is in no cycle.
         open.retain(|_, used| used.iter().any(|used| names.contains(used)));
         if open.len() == files {
             break;
