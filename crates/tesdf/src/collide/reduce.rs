@@ -119,7 +119,7 @@ fn reduce(
         return (pair.iter().map(|p| p.2).collect(), report);
     }
     let mut kept = Kept::new(pair.len(), |i| wrench_of(contact(i), center, length));
-    let deepest = first_most(pair.len(), |i| -contact(i).distance);
+    let deepest = first_max(pair.len(), |i| -contact(i).distance);
     for i in [deepest].into_iter().chain(extremes(pair.len(), length, |i| contact(i).point_a - center)) {
         if kept.order.len() < n && !kept.order.contains(&i) {
             kept.keep(i);
@@ -141,7 +141,7 @@ fn reduce(
 }
 
 /// The first `i < n` with the greatest key.
-fn first_most(n: usize, key: impl Fn(usize) -> f64) -> usize {
+fn first_max(n: usize, key: impl Fn(usize) -> f64) -> usize {
     // `max_by` returns the last of equal elements.
     (0..n).rev().map(|i| (key(i), i)).max_by(|x, y| x.0.total_cmp(&y.0)).map_or(0, |(_, i)| i)
 }
@@ -153,12 +153,12 @@ fn extremes(n: usize, radius: f64, at: impl Fn(usize) -> DVec3) -> Vec<usize> {
     let mut axes = Vec::with_capacity(3);
     while axes.len() < 3 {
         let off = |p: DVec3| axes.iter().fold(p, |p, &axis| p - p.dot(axis) * axis);
-        let reach = off(at(first_most(n, |i| off(at(i)).length_squared())));
+        let reach = off(at(first_max(n, |i| off(at(i)).length_squared())));
         if reach.length() <= FLAT * radius {
             break;
         }
         let axis = reach.normalize();
-        extremes.extend([axis, -axis].map(|axis| first_most(n, |i| at(i).dot(axis))));
+        extremes.extend([axis, -axis].map(|axis| first_max(n, |i| at(i).dot(axis))));
         axes.push(axis);
     }
     extremes
@@ -234,9 +234,9 @@ impl Kept {
     fn farthest(&mut self, choices: &mut usize) -> Option<usize> {
         let now = self.hull.len() as u32;
         loop {
-            let block = first_most(self.greatest.len(), |b| self.greatest[b]);
+            let block = first_max(self.greatest.len(), |b| self.greatest[b]);
             let bounds = &self.bounds[self.block(block)];
-            let i = block * BLOCK + first_most(bounds.len(), |k| bounds[k]);
+            let i = block * BLOCK + first_max(bounds.len(), |k| bounds[k]);
             if self.bounds[i] <= ROUNDING * ROUNDING {
                 return None;
             }
