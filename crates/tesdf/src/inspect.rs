@@ -1,6 +1,6 @@
 //! Reports what an asset costs in memory and how much a query of it reads.
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::TeSdf;
@@ -206,16 +206,14 @@ fn near_surface(asset: &TeSdf, options: &InspectOptions) -> (f64, f64) {
     let weights = Weighted::new((0..asset.face_count()).map(|f| area(&triangle(f))));
     let bounds = (0..asset.face_count()).fold(Aabb::EMPTY, |b, f| b.union(Aabb::of(&triangle(f).corners)));
     let reach = NEAR * bounds.extent().length();
-    let (reads, fallback) = (0..options.samples as u64)
-        .into_par_iter()
-        .filter_map(|i| {
-            let mut random = Random::new(options.seed, i);
-            let face = triangle(weights.pick(&mut random)?);
-            let point = random.in_simplex(&face.corners) + random.between(-reach, reach) * face.normal;
-            let reads = asset.reads(asset.frame.to_world(point));
-            Some((reads.total(), usize::from(reads.list_entries == 0)))
-        })
-        .reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
+    let counts = (0..options.samples as u64).into_par_iter().filter_map(|i| {
+        let mut random = Random::new(options.seed, i);
+        let face = triangle(weights.pick(&mut random)?);
+        let point = random.in_simplex(&face.corners) + random.between(-reach, reach) * face.normal;
+        let reads = asset.reads(asset.frame.to_world(point));
+        Some((reads.total(), usize::from(reads.list_entries == 0)))
+    });
+    let (reads, fallback) = reduce(counts, || (0, 0), |a, b| (a.0 + b.0, a.1 + b.1));
     let samples = options.samples.max(1) as f64;
     (reads as f64 / samples, fallback as f64 / samples)
 }

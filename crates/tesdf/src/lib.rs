@@ -35,23 +35,45 @@
 //! # }
 //! ```
 #![warn(missing_docs)]
+#![cfg_attr(docsrs, feature(doc_cfg))]
+// What all features use together, some of them leave alone.
+#![cfg_attr(
+    not(all(
+        feature = "collide",
+        feature = "gltf",
+        feature = "gmsh",
+        feature = "parallel",
+        feature = "vtu"
+    )),
+    allow(dead_code, unused_imports)
+)]
 
 pub mod asset;
 pub mod base;
+#[cfg(feature = "collide")]
 pub mod collide;
+#[cfg(feature = "encode")]
 pub mod deform;
 pub mod domain;
+#[cfg(feature = "encode")]
 pub mod encode;
+#[cfg(feature = "encode")]
 pub mod evaluate;
 pub mod geometry;
 pub mod input;
+#[cfg(feature = "encode")]
 pub mod inspect;
+#[cfg(feature = "encode")]
 pub mod mesh;
+mod parallel;
 pub mod query;
+#[cfg(feature = "encode")]
 mod sampling;
+#[cfg(feature = "encode")]
 pub mod save;
 #[cfg(test)]
 pub(crate) mod testing;
+#[cfg(feature = "encode")]
 pub mod verify;
 
 pub use asset::TeSdf;

@@ -27,6 +27,7 @@ const PREFIX: u64 = 512;
 /// # Errors
 /// A section is given twice or does not have whole rows, a metadata key is reserved, or the header
 /// has more than 1 MiB.
+#[cfg(feature = "encode")]
 pub fn write_container(
     sections: &[Section<'_>],
     metadata: &BTreeMap<String, String>,
@@ -303,6 +304,7 @@ impl Container {
     ///
     /// # Errors
     /// [`AssetError::Checksum`] names the header or the first damaged section.
+    #[cfg(feature = "encode")]
     pub fn verify_checksums(&self) -> Result<(), AssetError> {
         let bytes = self.as_bytes();
         let compare = |part: String, found: String, expected: &[u8]| {

@@ -1,12 +1,14 @@
 use std::io;
 use std::path::PathBuf;
 
+#[cfg(feature = "encode")]
 use crate::save::SaveError;
 
 /// Why a `.tesdf` file cannot be written, opened or trusted.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
     /// The file cannot be written.
+    #[cfg(feature = "encode")]
     #[error(transparent)]
     Save(#[from] SaveError),
     /// The operating system refused an action.

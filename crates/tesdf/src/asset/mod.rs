@@ -33,11 +33,14 @@ mod roots;
 mod section;
 mod te_sdf;
 
+#[cfg(feature = "encode")]
 pub use crate::save::save_atomic;
 pub(crate) use cell_bounds::CellBounds;
 pub use cells::{CellKind, CellView};
 pub(crate) use conforming::Conforming;
-pub use container::{Container, SharedSection, write_container};
+#[cfg(feature = "encode")]
+pub use container::write_container;
+pub use container::{Container, SharedSection};
 pub use error::AssetError;
 pub use face_record::FaceRecord;
 pub(crate) use incidence::Incidence;

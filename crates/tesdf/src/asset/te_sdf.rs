@@ -12,7 +12,9 @@ use super::face_record::FaceRecord;
 use super::inner_ball::InnerBall;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
 use super::motion::Motion;
-use super::{AssetError, Container, Section, SharedSection, save_atomic, write_container};
+use super::{AssetError, Container, Section, SharedSection};
+#[cfg(feature = "encode")]
+use super::{save_atomic, write_container};
 use crate::base::Isa;
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
@@ -196,6 +198,7 @@ impl TeSdf {
     ///
     /// # Errors
     /// As [`save_atomic`]; no half file is left.
+    #[cfg(feature = "encode")]
     pub fn save(&self, path: &Path) -> Result<(), AssetError> {
         Ok(save_atomic(path, &self.to_bytes()?)?)
     }
@@ -204,6 +207,7 @@ impl TeSdf {
     ///
     /// # Errors
     /// The same as for [`write_container`].
+    #[cfg(feature = "encode")]
     pub fn to_bytes(&self) -> Result<Cow<'_, [u8]>, AssetError> {
         if self.motion.is_none() {
             return Ok(Cow::Borrowed(self.as_bytes()));
@@ -235,6 +239,7 @@ impl TeSdf {
     ///
     /// # Errors
     /// Names the header or the first damaged section.
+    #[cfg(feature = "encode")]
     pub fn verify_checksums(&self) -> Result<(), AssetError> {
         self.container.verify_checksums()
     }

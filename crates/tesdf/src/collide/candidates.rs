@@ -1,5 +1,5 @@
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::ordered_pair::OrderedPair;
 use super::{CollideError, CollideOptions, InstanceId, Scene};

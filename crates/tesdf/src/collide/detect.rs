@@ -1,4 +1,4 @@
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::hidden;
 use super::ordered_pair::OrderedPair;

@@ -10,8 +10,8 @@
 //! - In every mode, the centre of a ball inside each body is tested in the field of the other.
 use std::collections::BTreeMap;
 
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::field::FieldBody;
 use super::ordered_pair::OrderedPair;

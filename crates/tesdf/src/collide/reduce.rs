@@ -21,8 +21,8 @@
 //! wrenches are in the hull once one of them is kept. The bound is proved in `docs/math.md`, "What
 //! a reduction loses".
 
+use crate::parallel::{self, *};
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::hull::{ROUNDING, Wrench, dot, residual};
 use super::{Contact, InstanceId, PairReduction, Reduction};
@@ -80,7 +80,7 @@ pub fn wrench_error(contacts: &[Contact], kept: &[Contact], center: DVec3, lengt
         let residual = residual(&hull, &wrench_of(c, center, length));
         dot(&residual, &residual).sqrt()
     };
-    contacts.par_iter().map(distance).reduce(|| 0.0, f64::max)
+    parallel::reduce(contacts.par_iter().map(distance), || 0.0, f64::max)
 }
 
 /// The wrench of a unit force on the instance with the lower id.

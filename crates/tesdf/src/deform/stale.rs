@@ -1,5 +1,5 @@
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::TeSdf;
 use crate::asset::about::About;

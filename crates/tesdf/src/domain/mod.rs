@@ -10,19 +10,27 @@
 //! [`SolidMesh`]: crate::mesh::SolidMesh
 mod bisection;
 mod classes;
+#[cfg(feature = "encode")]
 mod conforming;
 mod cube;
+#[cfg(feature = "gmsh")]
 pub mod gmsh;
+#[cfg(feature = "encode")]
 mod read;
+#[cfg(feature = "encode")]
 mod sides;
+#[cfg(feature = "encode")]
 mod tet_mesh;
 
 pub use bisection::{Barycentric, Cell, MAX_DEPTH, ROOTS};
 pub use classes::Classes;
+#[cfg(feature = "encode")]
 pub use conforming::{ConformingError, ConformingMesh, MissingFace};
 pub use cube::DomainCube;
+#[cfg(feature = "encode")]
 pub use read::{
     LoadedTetrahedra, ReadTetrahedraError, Skipped, TetFormat, load_tetrahedra, read_tetrahedra,
     tetrahedra_files,
 };
+#[cfg(feature = "encode")]
 pub use tet_mesh::{TetMesh, TetMeshError};

@@ -16,6 +16,10 @@ mod cursor;
 mod error;
 mod gmsh;
 mod tetgen;
+#[cfg(not(feature = "vtu"))]
+#[path = "read/no_vtu.rs"]
+mod vtu;
+#[cfg(feature = "vtu")]
 mod vtu;
 
 use super::TetMesh;
@@ -153,7 +157,7 @@ fn beside(path: &Path, format: TetFormat) -> PathBuf {
     path.with_extension(if upper { extension.to_uppercase() } else { extension.to_owned() })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "vtu"))]
 mod tests {
     use proptest::prelude::*;
 

@@ -1,5 +1,5 @@
 //! Refines all roots within an effort, and refuses meshes for which the effort is not enough.
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::effort::Effort;
 use super::error::EncodeError;

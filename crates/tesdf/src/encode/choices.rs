@@ -9,6 +9,7 @@ use std::str::FromStr;
 
 use super::{Deformation, EncodeOptions, Encoder, Preset, Refinement, Sampling, Threshold};
 use crate::base::{Length, Progress};
+#[cfg(feature = "gmsh")]
 use crate::domain::gmsh::{GmshError, GmshOptions, tetrahedralise_and_report};
 use crate::domain::{ConformingError, ConformingMesh, ReadTetrahedraError, read_tetrahedra};
 use crate::mesh::SolidMesh;
@@ -99,7 +100,11 @@ pub enum ChoiceError {
 /// Why the tetrahedra of the chosen domain could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum DomainError {
+    /// The library was built without the feature that runs Gmsh.
+    #[error("tesdf was built without the feature `gmsh`; build it with it, or give a file of tetrahedra")]
+    NotBuilt,
     /// Gmsh gave no valid tetrahedra.
+    #[cfg(feature = "gmsh")]
     #[error(transparent)]
     Gmsh(#[from] GmshError),
     /// The file cannot be read.
@@ -184,6 +189,12 @@ impl EncodeChoices {
     ) -> Result<Option<ConformingMesh>, DomainError> {
         match &self.domain {
             DomainChoice::Bisection => Ok(None),
+            #[cfg(not(feature = "gmsh"))]
+            DomainChoice::Gmsh => {
+                let _ = progress;
+                Err(DomainError::NotBuilt)
+            }
+            #[cfg(feature = "gmsh")]
             DomainChoice::Gmsh => {
                 let options = GmshOptions {
                     band: self.band.map(Length::Absolute),

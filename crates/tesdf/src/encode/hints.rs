@@ -40,7 +40,7 @@ const FOLDED: f64 = -0.8;
 
 /// The hints of all faces. See "The sign rule" in `docs/math.md`.
 pub fn sign_hints(surface: &Surface, tree: &AabbTree, simplicity: Simplicity) -> Vec<SignHints> {
-    use rayon::prelude::*;
+    use crate::parallel::*;
     if simplicity == Simplicity::Involved {
         return vec![SignHints::default(); surface.faces.len()];
     }

@@ -1,6 +1,6 @@
 //! Makes the final lists of refined trees: tightened or sampled, completed for deformation,
 //! truncated. Labels the cells.
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use super::assemble::collect;
 use super::error::EncodeError;

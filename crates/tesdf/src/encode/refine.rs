@@ -185,7 +185,7 @@ impl Refiner<'_> {
         scratch.reuse(filtered);
         let (first, second) = (cell.child_corners(0), cell.child_corners(1));
         let (left, right) = if cell.depth < 14 {
-            rayon::join(
+            crate::parallel::join(
                 || {
                     self.refine(
                         cell.child(0),

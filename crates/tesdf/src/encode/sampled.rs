@@ -5,7 +5,6 @@
 //! A [`SampledCell`] is a cell with the candidates that Lemma 1 leaves. A [`Sampler`] looks at the
 //! samples: the [`Processor`] here, or a device of another crate.
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::error::EncodeError;
 use super::filter::Scratch;
@@ -14,6 +13,7 @@ use super::{Sampling, Threshold};
 use crate::base::Progress;
 use crate::domain::Cell;
 use crate::geometry::AabbTree;
+use crate::parallel::*;
 
 /// A cell with the candidates that Lemma 1 leaves. Everything is in the local frame.
 #[derive(Clone, Debug)]

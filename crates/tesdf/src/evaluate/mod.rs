@@ -14,8 +14,8 @@ mod report;
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::TeSdf;
 use crate::mesh::{MeshError, Topology};
@@ -97,18 +97,14 @@ pub fn evaluate(
     let fields: Vec<Field> = assets.iter().map(|&asset| Field::new(asset, options.exact)).collect();
     let slabs = grid.counts[2];
     let done = AtomicU64::new(0);
-    let tallies = (0..slabs)
-        .into_par_iter()
-        .map(|z| {
-            let tallies = slab(&grid, z, &reference, &fields);
-            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress(done as f64 / slabs as f64);
-            tallies
-        })
-        .reduce(
-            || vec![Tally::default(); fields.len()],
-            |a, b| a.into_iter().zip(b).map(|(a, b)| a.join(b)).collect(),
-        );
+    let tallies = (0..slabs).into_par_iter().map(|z| {
+        let tallies = slab(&grid, z, &reference, &fields);
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        progress(done as f64 / slabs as f64);
+        tallies
+    });
+    let none = || vec![Tally::default(); fields.len()];
+    let tallies = reduce(tallies, none, |a, b| a.into_iter().zip(b).map(|(a, b)| a.join(b)).collect());
     let report = |(tally, field): (Tally, &Field)| {
         let wrong = field.wrong.iter().filter(|w| w.load(Ordering::Relaxed)).count();
         BandReport::new(tally, &grid, wrong, field.exact)

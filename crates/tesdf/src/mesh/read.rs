@@ -13,6 +13,10 @@
 //! (`meshes[0].primitives[0].indices`).
 mod assemble;
 mod error;
+#[cfg(feature = "gltf")]
+mod gltf;
+#[cfg(not(feature = "gltf"))]
+#[path = "read/no_gltf.rs"]
 mod gltf;
 mod obj;
 mod off;

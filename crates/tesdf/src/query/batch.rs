@@ -1,5 +1,5 @@
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::locate::{FLIGHT, Faces, Place};
 use super::{Answer, Precision};

@@ -13,8 +13,8 @@ mod self_check;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::TeSdf;
@@ -123,21 +123,19 @@ pub fn verify(
     let truth = Truth { faces: BruteForce::new(&mesh, diagonal), place, winding: &winding, mesh: &mesh };
     let samples = options.samples as u64;
     let done = AtomicUsize::new(0);
-    let found = (0..samples.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let mut found = Found::new(&mesh, certificate);
-            let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(samples);
-            let count = (indices.end - indices.start) as usize;
-            indices.for_each(|index| found.add(asset, &truth, index, sampler.point(index)));
-            let before = done.fetch_add(count, Ordering::Relaxed);
-            match progress((before + count) as f64 / options.samples as f64) {
-                ControlFlow::Continue(()) => Some(found),
-                ControlFlow::Break(()) => None,
-            }
-        })
-        .try_reduce(|| Found::new(&mesh, certificate), |a, b| Some(a.join(b)))
-        .ok_or(VerifyError::Cancelled)?;
+    let parts = (0..samples.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
+        let mut found = Found::new(&mesh, certificate);
+        let indices = chunk * CHUNK..((chunk + 1) * CHUNK).min(samples);
+        let count = (indices.end - indices.start) as usize;
+        indices.for_each(|index| found.add(asset, &truth, index, sampler.point(index)));
+        let before = done.fetch_add(count, Ordering::Relaxed);
+        match progress((before + count) as f64 / options.samples as f64) {
+            ControlFlow::Continue(()) => Some(found),
+            ControlFlow::Break(()) => None,
+        }
+    });
+    let found =
+        try_reduce(parts, || Found::new(&mesh, certificate), Found::join).ok_or(VerifyError::Cancelled)?;
     let precisions = found.comparisons.map(Comparison::report);
     Ok(VerifyReport {
         passed: precisions.iter().all(|p| p.passed) && found.disagreements == 0,

@@ -1,6 +1,6 @@
 //! Compares a new encoding with brute force before it counts as proved.
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::brute_force::BruteForce;
 use super::compare::{Comparison, Worst};

@@ -24,6 +24,14 @@ pub enum ReadTetrahedraError {
         /// The path asked for.
         path: PathBuf,
     },
+    /// The library was built without the feature that reads the format.
+    #[error(
+        "{format}: tesdf was built without the feature `vtu`; build it with it, or convert the file to Gmsh's format"
+    )]
+    NotBuilt {
+        /// The format.
+        format: TetFormat,
+    },
     /// The bytes do not follow the rules of the format.
     #[error("{format}, {place}: {found}; {help}")]
     Malformed {

@@ -1,7 +1,7 @@
 use std::collections::HashSet;
 
+use crate::parallel::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::{
     edges::centroid,

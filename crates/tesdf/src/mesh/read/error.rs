@@ -46,6 +46,14 @@ pub enum ReadError {
         /// The requested path.
         path: PathBuf,
     },
+    /// The library was built without the feature that reads the format.
+    #[error(
+        "{format}: tesdf was built without the feature `gltf`; build it with it, or convert the mesh to PLY"
+    )]
+    NotBuilt {
+        /// The requested format.
+        format: MeshFormat,
+    },
     /// There are no bytes.
     #[error("the file is empty (0 bytes); expected {format} data: export or copy it again")]
     Empty {

@@ -39,7 +39,7 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize};
 
-use rayon::prelude::*;
+use crate::parallel::*;
 
 use crate::TeSdf;
 use crate::base::Certificate;
@@ -161,11 +161,8 @@ pub fn prove(
     let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
     let cells = || (0..roots.len()).into_par_iter().map(|root| walk.root(root, &all));
     // The search recurses for each cut, so it needs large stacks.
-    let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads()).stack_size(STACK);
-    let mut found = match threads.build() {
-        Ok(threads) => threads.install(|| cells().reduce(Found::default, Found::join)),
-        Err(_) => return Err(ProveError::Threads),
-    };
+    let mut found =
+        with_stack(STACK, || reduce(cells(), Found::default, Found::join)).ok_or(ProveError::Threads)?;
     if walk.is_cancelled() {
         return Err(ProveError::Cancelled);
     }

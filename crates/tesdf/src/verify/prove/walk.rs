@@ -92,7 +92,7 @@ impl<P: Fn(f64) -> ControlFlow<()> + Sync> Walk<'_, P> {
                     let child = cell.child(side);
                     self.below(children + side as u32, child, &self.near(&child, near))
                 };
-                let (left, right) = rayon::join(|| child(0), || child(1));
+                let (left, right) = crate::parallel::join(|| child(0), || child(1));
                 left.join(right)
             }
             _ => self.leaf(word, &cell, node, near),

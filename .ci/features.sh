@@ -1,0 +1,19 @@
+#!/usr/bin/env bash
+# Compiles the library with each set of features that makes sense, and the tool without the GPU; counts the crates of a library that only
+# queries.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. .ci/toolchain.sh
+
+for features in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf vtu gmsh gltf,collide encode,collide,parallel,gltf,vtu,gmsh; do
+    RUSTFLAGS="-D warnings" step cargo check --quiet --lib -p tesdf --no-default-features --features "$features" --target-dir target/features
+done
+step cargo test --quiet --lib -p tesdf-terminal device
+
+most=20
+found=$(cargo tree -p tesdf --no-default-features -e normal --prefix none --no-dedupe | sed 's/ (.*//' | sort -u | wc -l)
+echo "a library that only queries: $found crates"
+if [ "$found" -gt "$most" ]; then
+    echo "error: $found crates; expected at most $most" >&2
+    exit 1
+fi
