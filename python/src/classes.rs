@@ -1,10 +1,10 @@
 //! Classes of the package that are written in Python, and their objects made of what the library found.
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use serde::Serialize;
-
-use crate::errors::Error;
+use tesdf::mesh::CheckReport;
 
 /// `Answers` of `tesdf.results`.
 pub fn answers(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
@@ -39,6 +39,23 @@ pub fn repaired(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
 /// An object of class `name` of `tesdf.reports`, whose fields are those of `found`.
 pub fn report<'py>(py: Python<'py>, name: &str, found: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     static FROM_JSON: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    let text = serde_json::to_string(found).map_err(|e| Error::Report(e).raise(py))?;
+    let text = serde_json::to_string(found)
+        .map_err(|e| PyValueError::new_err(format!("the report cannot be handed to Python: {e}")))?;
     FROM_JSON.import(py, "tesdf.reports", "from_json")?.call1((name, text))
+}
+
+/// Fields of `tesdf.CheckReport`.
+#[derive(Serialize)]
+pub struct Checked<'a> {
+    #[serde(flatten)]
+    report: &'a CheckReport,
+    notes: &'a [String],
+    text: String,
+}
+
+impl<'a> Checked<'a> {
+    /// With what reading the file had to say.
+    pub fn of(report: &'a CheckReport, notes: &'a [String]) -> Self {
+        Self { report, notes, text: report.to_string() }
+    }
 }

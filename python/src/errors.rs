@@ -15,8 +15,7 @@ use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
 use tesdf::save::SaveError;
 use tesdf::verify::VerifyError;
 
-use crate::classes;
-use crate::mesh::Checked;
+use crate::classes::{self, Checked};
 
 /// What can go wrong while no Python object may be touched.
 #[derive(Debug)]
@@ -33,7 +32,6 @@ pub enum Error {
     /// The file, if the asset is of one.
     Asset(Option<PathBuf>, AssetError),
     Verify(VerifyError),
-    Report(serde_json::Error),
     Threads(rayon::ThreadPoolBuildError),
 }
 
@@ -65,7 +63,6 @@ impl Error {
             Self::Choice(_) | Self::Domain(_) | Self::Encode(..) => new(py, "EncodeError", self.text()),
             Self::Deform(_) => new(py, "DeformError", self.text()),
             Self::Asset(..) | Self::Verify(_) => new(py, "AssetError", self.text()),
-            Self::Report(_) => PyValueError::new_err(self.text()),
             Self::Threads(_) => PyOSError::new_err(self.text()),
         }
     }
@@ -89,7 +86,6 @@ impl Error {
             Self::Asset(_, e @ (AssetError::Io { .. } | AssetError::Save(_))) => e.to_string(),
             Self::Asset(path, e) => at(path, e),
             Self::Verify(e) => e.to_string(),
-            Self::Report(e) => format!("the report cannot be handed to Python: {e}"),
             Self::Threads(e) => format!("cannot start threads: {e}"),
         }
     }

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 use serde::Serialize;
 use tesdf::asset::about::Source;
-use tesdf::mesh::{CheckReport, RepairOptions, RepairReport, SolidMesh, TriangleMesh, read};
+use tesdf::mesh::{RepairOptions, RepairReport, SolidMesh, TriangleMesh, read};
 
 use crate::arrays::{self, Rows};
 use crate::errors::{Error, argument};
@@ -92,22 +92,6 @@ fn corner_ids(any: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
     ids.iter().enumerate().map(corners).collect()
 }
 
-/// Fields of `tesdf.CheckReport`.
-#[derive(Serialize)]
-pub struct Checked<'a> {
-    #[serde(flatten)]
-    report: &'a CheckReport,
-    notes: &'a [String],
-    text: String,
-}
-
-impl<'a> Checked<'a> {
-    /// With what reading the file had to say.
-    pub fn of(report: &'a CheckReport, notes: &'a [String]) -> Self {
-        Self { report, notes, text: report.to_string() }
-    }
-}
-
 /// Fields of `tesdf.RepairReport`.
 #[derive(Serialize)]
 struct Mended<'a> {
@@ -131,7 +115,7 @@ pub fn check<'py>(py: Python<'py>, mesh: &Bound<'py, PyAny>) -> PyResult<Bound<'
         Ok((report, loaded.notes))
     });
     let (report, notes) = found.map_err(|e: Error| e.raise(py))?;
-    classes::report(py, "CheckReport", &Checked::of(&report, &notes))
+    classes::report(py, "CheckReport", &classes::Checked::of(&report, &notes))
 }
 
 /// Makes a mesh encodable where that needs no guess, and says what it did.
