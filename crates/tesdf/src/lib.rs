@@ -5,9 +5,9 @@
 //!                                                     └──query──▶ signed distance, gradient, closest point, face
 //! ```
 //!
-//! Each module uses only those to its left:
-//! `base`, `input`, `save` ← `geometry` ← `mesh` ← `domain` ← `asset` ← `query` ← `verify` ← `encode` ← `deform`, with `collide` after `query`,
-//! `evaluate` after `verify`, and `inspect` after `asset`.
+//! Each module uses only modules to its left: `base`, `input`, `save` ← `geometry` ← `mesh` ←
+//! `domain` ← `asset` ← `query` ← `verify` ← `encode` ← `deform`. Besides, `collide` comes after
+//! `query`, `evaluate` after `verify`, and `inspect` after `asset`.
 //!
 //! ```
 //! use tesdf::Progress;
