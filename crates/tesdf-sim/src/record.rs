@@ -318,7 +318,7 @@ impl RunRecord {
     ///
     /// # Errors
     /// What the operating system refused.
-    pub fn save(&self, path: &Path) -> Result<(), RecordError> {
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), RecordError> {
         Ok(save_atomic(path, &self.to_bytes()?)?)
     }
 
@@ -326,8 +326,8 @@ impl RunRecord {
     ///
     /// # Errors
     /// As [`from_bytes`](Self::from_bytes), and what the operating system refused.
-    pub fn open(path: &Path) -> Result<Self, RecordError> {
-        Self::from_bytes(&read(path)?)
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+        Self::from_bytes(&read(path.as_ref())?)
     }
 
     /// A record from a file's bytes; of a journal, up to its last whole step.

@@ -12,7 +12,7 @@ pub const MAX_STREAMED: u64 = 1 << 32;
 /// The error of the operating system; [`io::ErrorKind::OutOfMemory`] when the file does not fit
 /// into memory; [`io::ErrorKind::FileTooLarge`] when a pipe or a device gives more than
 /// [`MAX_STREAMED`] bytes.
-pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+pub fn read(path: impl AsRef<Path>) -> io::Result<Vec<u8>> {
     let mut file = File::open(path)?;
     let mut bytes = Vec::new();
     read_rest(&mut file, &mut bytes)?;
@@ -23,7 +23,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`read`]; [`io::ErrorKind::InvalidData`], with the line, when the bytes are not UTF-8.
-pub fn read_to_string(path: &Path) -> io::Result<String> {
+pub fn read_to_string(path: impl AsRef<Path>) -> io::Result<String> {
     String::from_utf8(read(path)?).map_err(|e| {
         let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count();
         io::Error::new(io::ErrorKind::InvalidData, format!("line {line} is not UTF-8 text"))

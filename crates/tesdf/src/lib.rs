@@ -9,31 +9,52 @@
 //! `domain` ← `asset` ← `query` ← `verify` ← `encode` ← `deform`. Besides, `collide` comes after
 //! `query`, `evaluate` after `verify`, and `inspect` after `asset`.
 //!
+//! # Signed distances
+//!
 //! ```
-//! use tesdf::Progress;
-//! use tesdf::asset::about::Source;
-//! use tesdf::encode::{EncodeOptions, encode};
+//! use tesdf::TeSdf;
 //! use tesdf::glam::DVec3;
-//! use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
-//! use tesdf::query::Precision;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
-//! let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh; // or mesh::read(path)
-//! let solid = SolidMesh::new(mesh)?; // has an inside, or the error says what is wrong where
-//! let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &Progress::default())?;
-//!
-//! let answer = asset.query(DVec3::new(0.1, 0.3, 0.3), Precision::F64);
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("part.obj");
+//! # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+//! let asset = TeSdf::encode_file(&path)?; // or Encoder::new()…encode(&solid), with options
+//! let answer = asset.query(DVec3::new(0.1, 0.3, 0.3)); // or query_f32, query_batch, signed_distance
 //! assert!((answer.signed_distance + 0.1).abs() < 1e-12); // 0.1 inside of the side x = 0
 //! assert!(answer.gradient.distance(DVec3::NEG_X) < 1e-12);
 //! assert!(answer.closest_point.distance(DVec3::new(0.0, 0.3, 0.3)) < 1e-12);
 //! assert_eq!(answer.face, 3);
 //!
-//! let asset = tesdf::TeSdf::from_bytes(asset.as_bytes())?; // or asset.save(path) and TeSdf::open(path)
-//! assert!(asset.signed_distance(DVec3::new(5.0, 0.3, 0.3), Precision::F32) > 0.0);
+//! asset.save(path.with_extension("tesdf"))?;
+//! let asset = TeSdf::open(path.with_extension("tesdf"))?;
+//! assert!(asset.signed_distance(DVec3::new(5.0, 0.3, 0.3)) > 0.0);
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! # Contacts
+//!
+//! ```
+//! use tesdf::glam::DVec3;
+//! use tesdf::{CollideOptions, Instance, Pose, Scene, TeSdf, detect};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("part.obj");
+//! # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+//! let mut scene = Scene::new();
+//! let part = scene.add_shape(TeSdf::encode_file(&path)?)?;
+//! scene.add(Instance::new(part, Pose::IDENTITY))?;
+//! scene.add(Instance::new(part, Pose::at(DVec3::new(0.1, 0.1, 0.5))))?;
+//! for contact in detect(&scene, &CollideOptions::default())? {
+//!     println!("{} {} {}", contact.point_a, contact.normal, contact.distance);
+//! }
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! The main types are here at the root; the modules have the rest.
 #![warn(missing_docs)]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 // What all features use together, some of them leave alone.
@@ -77,5 +98,17 @@ pub(crate) mod testing;
 pub mod verify;
 
 pub use asset::TeSdf;
+pub use asset::about::Source;
 pub use base::{Certificate, Length, Progress, Side, Stage};
+#[cfg(feature = "collide")]
+pub use collide::{
+    Clearance, ClearanceOptions, CollideOptions, Contact, Contacts, Impact, Instance, InstanceId, Mode,
+    Motion, Pose, Reduction, Scene, Shape, ShapeId, TimeOfImpactOptions, Velocity, clearance, detect,
+    time_of_impact,
+};
+#[cfg(feature = "encode")]
+pub use encode::{Domain, EncodeOptions, Encoder, Preset};
 pub use glam;
+#[cfg(feature = "encode")]
+pub use mesh::{SolidMesh, TriangleMesh};
+pub use query::{Answer, Precision};

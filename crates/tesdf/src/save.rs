@@ -9,7 +9,7 @@
 //! # fn main() -> Result<(), tesdf::save::SaveError> {
 //! let inputs = [Path::new("part.tesdf")];
 //! let options = SaveOptions { inputs: &inputs, ..SaveOptions::default() };
-//! let output = Destination::new(Path::new("part.png"), &options)?;
+//! let output = Destination::new("part.png", &options)?;
 //! let picture = b"minutes of work";
 //! output.write(picture)?;
 //! # Ok(())
@@ -46,6 +46,6 @@ pub use part::{GrowingFile, Part};
 /// # Errors
 /// As [`Destination::new`] and [`Destination::write`]. On an error, a regular file at `path` is
 /// unchanged.
-pub fn save_atomic(path: &Path, bytes: &[u8]) -> Result<(), SaveError> {
+pub fn save_atomic(path: impl AsRef<Path>, bytes: &[u8]) -> Result<(), SaveError> {
     Destination::new(path, &SaveOptions::default())?.write(bytes)
 }

@@ -145,8 +145,8 @@ impl CutRun {
     ///
     /// # Errors
     /// As [`RunRecord::open`]; [`RecordError::Complete`] when nothing is missing.
-    pub fn open(path: &Path) -> Result<Self, RecordError> {
-        let bytes = super::read(path)?;
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+        let bytes = super::read(path.as_ref())?;
         if !is_journal(&bytes) {
             let record = RunRecord::from_bytes(&bytes)?;
             return Err(match record.planned_steps() {

@@ -24,7 +24,8 @@ impl LoadedScene {
     ///
     /// # Errors
     /// [`SceneError::Read`], [`SceneError::Parse`].
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
         let text = tesdf::input::read_to_string(path)
             .map_err(|source| SceneError::Read { path: path.to_path_buf(), source })?;
         Self::parse(text, path)
@@ -34,7 +35,11 @@ impl LoadedScene {
     ///
     /// # Errors
     /// [`SceneError::Parse`].
-    pub fn parse(text: String, path: &Path) -> Result<Self, SceneError> {
+    pub fn parse(text: String, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        Self::parse_at(text, path.as_ref())
+    }
+
+    fn parse_at(text: String, path: &Path) -> Result<Self, SceneError> {
         if text.len() > MAX_TEXT {
             let message = format!("{} bytes; expected a scene of at most {MAX_TEXT}", text.len());
             return Err(SceneError::Parse { path: path.to_path_buf(), message });
@@ -50,7 +55,11 @@ impl LoadedScene {
     ///
     /// # Errors
     /// [`SceneError::Parse`]: the run holds no scene.
-    pub fn of_run(record: &RunRecord, run: &Path) -> Result<Self, SceneError> {
+    pub fn of_run(record: &RunRecord, run: impl AsRef<Path>) -> Result<Self, SceneError> {
+        Self::of_record(record, run.as_ref())
+    }
+
+    fn of_record(record: &RunRecord, run: &Path) -> Result<Self, SceneError> {
         let no_scene =
             |e| SceneError::Parse { path: run.to_path_buf(), message: format!("the scene in it: {e}") };
         // `Spanned` reads from TOML only.
@@ -68,7 +77,8 @@ impl LoadedScene {
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`, a mesh otherwise. A relative path is
     /// relative to the scene's folder. `false`: there is no such body.
     #[must_use]
-    pub fn replace_geometry(&mut self, body: &str, file: PathBuf) -> bool {
+    pub fn replace_geometry(&mut self, body: &str, file: impl Into<PathBuf>) -> bool {
+        let file = file.into();
         let body = self.scene.bodies.iter_mut().map(|b| b.get_mut()).find(|b| b.name == body);
         let Some(body) = body else { return false };
         (body.asset, body.mesh, body.shape) = match file.extension().is_some_and(|e| e == "tesdf") {

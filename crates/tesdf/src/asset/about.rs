@@ -1,6 +1,7 @@
 //! What an asset says about itself, stored as JSON in the metadata of the container.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,15 @@ pub struct Source {
     pub name: String,
     /// BLAKE3 of the bytes of the file, in hex. Empty for a mesh made in memory.
     pub blake3: String,
+}
+
+impl Source {
+    /// The file at `path`. `blake3` is the hash of its bytes, in hex, as
+    /// [`LoadReport::source_blake3`](crate::mesh::LoadReport::source_blake3) has it.
+    pub fn of_file(path: impl AsRef<Path>, blake3: String) -> Self {
+        let name = path.as_ref().file_name().unwrap_or_default().to_string_lossy().into_owned();
+        Self { name, blake3 }
+    }
 }
 
 /// Counts of an encoding. Volumes are in the unit of the mesh, cubed.

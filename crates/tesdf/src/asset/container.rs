@@ -130,7 +130,11 @@ impl Container {
     ///
     /// # Errors
     /// [`AssetError`] names what was found, in which section, and what was expected.
-    pub fn open(path: &Path, table: &[SectionSpec]) -> Result<Self, AssetError> {
+    pub fn open(path: impl AsRef<Path>, table: &[SectionSpec]) -> Result<Self, AssetError> {
+        Self::open_path(path.as_ref(), table)
+    }
+
+    fn open_path(path: &Path, table: &[SectionSpec]) -> Result<Self, AssetError> {
         let io = |action| move |source| AssetError::Io { action, path: path.to_path_buf(), source };
         let mut file = File::open(path).map_err(io("open"))?;
         let kind = file.metadata().map_err(io("open"))?;

@@ -23,7 +23,7 @@ pub enum Preset {
 /// Which faces a list names.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Encoder {
+pub enum Method {
     /// Those that bounds cannot rule out: none is missing.
     #[default]
     Certified,
@@ -31,7 +31,7 @@ pub enum Encoder {
     Sampled(Sampling),
 }
 
-/// How [`Encoder::Sampled`] samples.
+/// How [`Method::Sampled`] samples.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sampling {
     /// Q: samples have barycentric coordinates that are multiples of 1 / Q.
@@ -96,8 +96,8 @@ pub struct EncodeOptions {
     /// Name of the mesh's unit, for people; nothing is scaled.
     pub unit: Option<String>,
     /// Which faces a list names.
-    #[serde(default)]
-    pub encoder: Encoder,
+    #[serde(default, rename = "encoder")]
+    pub method: Method,
     /// E_max: longer lists are cut to the faces that are needed nearest to the surface (Sec. V-C).
     #[serde(default)]
     pub max_entries: Option<u32>,
@@ -122,7 +122,7 @@ impl EncodeOptions {
             byte_worth: 0.067,
             tighten_levels: 0,
             unit: None,
-            encoder: Encoder::Sampled(sampling),
+            method: Method::Sampled(sampling),
             max_entries: None,
             refinement: Refinement::None,
             deformation: Deformation::None,
@@ -141,7 +141,7 @@ impl EncodeOptions {
         Self {
             byte_worth,
             tighten_levels,
-            encoder: Encoder::Certified,
+            method: Method::Certified,
             refinement: Refinement::ByCost,
             ..Self::PAPER
         }

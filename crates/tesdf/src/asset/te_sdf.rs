@@ -80,7 +80,7 @@ impl TeSdf {
     ///
     /// # Errors
     /// [`AssetError`] names the section at fault.
-    pub fn open(path: &Path) -> Result<Self, AssetError> {
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, AssetError> {
         Self::from_container(Container::open(path, &layout::SECTIONS)?)
     }
 
@@ -199,7 +199,7 @@ impl TeSdf {
     /// # Errors
     /// As [`save_atomic`]; no half file is left.
     #[cfg(feature = "encode")]
-    pub fn save(&self, path: &Path) -> Result<(), AssetError> {
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), AssetError> {
         Ok(save_atomic(path, &self.to_bytes()?)?)
     }
 

@@ -6,9 +6,8 @@ use super::field::FieldBody;
 use super::least::{Least, least};
 use super::narrow::Search;
 use super::surface::SurfaceBody;
-use super::{CollideError, CollideOptions, FaceMethod, InstanceId, Mode, Placement, Scene, Shape};
+use super::{CollideError, CollideOptions, InstanceId, Mode, Placement, Scene, Shape};
 use crate::base::Length;
-use crate::query::Precision;
 
 /// How exactly a clearance is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -187,7 +186,7 @@ impl<'a> Pair<'a> {
     fn shares_volume(&self, tolerance: f64) -> bool {
         let deep = |body: &Body, p: DVec3, depth: f64| {
             let scale = body.placement.scale;
-            body.shape.signed_distance(body.placement.to_shape(p), Precision::F64) * scale < -0.5 * depth
+            body.shape.signed_distance(body.placement.to_shape(p)) * scale < -0.5 * depth
         };
         let size = |body: &Body| body.shape.diagonal() * body.placement.scale;
         // Within a wall that is thicker than that, and clear of what the tolerance and rounding leave open.
@@ -249,8 +248,9 @@ impl<'a> Pair<'a> {
         let surface = SurfaceBody::new(of_surface.shape, of_surface.placement, &field);
         // Half for the search over a face, half for what is no longer searched.
         let half = 0.5 * tolerance;
-        let exact = FaceMethod::Exact { tolerance: Length::Absolute(half) };
-        let search = Search::new(&CollideOptions::with_mode(Mode::Face(exact)), 0.0, &field, 0.0);
+        let exact =
+            CollideOptions { tolerance: Length::Absolute(half), ..CollideOptions::with_mode(Mode::Exact) };
+        let search = Search::new(&exact, 0.0, &field, 0.0);
         let found = least(&surface, &field, &search, half / field.unit(), limit / field.unit())?;
         let Least { distance, face, part, minimum, converged } = found;
         let gradient = minimum.value.gradient;

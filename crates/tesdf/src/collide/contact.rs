@@ -1,3 +1,5 @@
+use std::{slice, vec};
+
 use glam::DVec3;
 use serde::Serialize;
 
@@ -99,11 +101,30 @@ pub struct PairReduction {
     pub length: f64,
 }
 
-/// The contacts of a scene, sorted by world, instances, face and cell.
+/// The contacts of a scene, sorted by world, instances, face and cell. It iterates over the contacts, by value or by reference.
+///
+/// # Example
+///
+/// ```
+/// use tesdf::glam::DVec3;
+/// use tesdf::{CollideOptions, Instance, Pose, Scene, Shape, detect};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut scene = Scene::new();
+/// let (ball, floor) = (scene.add_shape(Shape::Sphere { radius: 1.0 })?, scene.add_shape(Shape::Plane)?);
+/// scene.add(Instance::new(ball, Pose::at(DVec3::new(0.0, 0.0, 0.75))))?;
+/// scene.add(Instance::new(floor, Pose::IDENTITY))?;
+/// let contacts = detect(&scene, &CollideOptions::default())?;
+/// assert!(contacts.hidden.is_empty());
+/// for contact in contacts {
+///     assert_eq!(contact.distance, -0.25);
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contacts {
-    /// The contacts.
-    pub contacts: Vec<Contact>,
+    contacts: Vec<Contact>,
     /// What was done to find them.
     pub statistics: Statistics,
     /// What the reduction has lost, by pair of instances; empty without reduction.
@@ -111,4 +132,59 @@ pub struct Contacts {
     /// Pairs that overlap although no contact shows it, as the mode [`Node`](super::Mode::Node) has them; sorted by world and instances.
     /// Contacts will not keep these apart.
     pub hidden: Vec<HiddenOverlap>,
+}
+
+impl Contacts {
+    /// The contacts of a detector, which has sorted them.
+    pub fn new(
+        contacts: Vec<Contact>,
+        statistics: Statistics,
+        reductions: Vec<PairReduction>,
+        hidden: Vec<HiddenOverlap>,
+    ) -> Self {
+        Self { contacts, statistics, reductions, hidden }
+    }
+
+    /// Number of contacts.
+    pub fn len(&self) -> usize {
+        self.contacts.len()
+    }
+
+    /// Whether there is no contact. Bodies may overlap all the same: see [`hidden`](Self::hidden).
+    pub fn is_empty(&self) -> bool {
+        self.contacts.is_empty()
+    }
+
+    /// The contacts, in order.
+    pub fn iter(&self) -> slice::Iter<'_, Contact> {
+        self.contacts.iter()
+    }
+
+    /// The contacts as a slice.
+    pub fn as_slice(&self) -> &[Contact] {
+        &self.contacts
+    }
+
+    /// The contacts alone.
+    pub fn into_vec(self) -> Vec<Contact> {
+        self.contacts
+    }
+}
+
+impl IntoIterator for Contacts {
+    type Item = Contact;
+    type IntoIter = vec::IntoIter<Contact>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.contacts.into_iter()
+    }
+}
+
+impl<'a> IntoIterator for &'a Contacts {
+    type Item = &'a Contact;
+    type IntoIter = slice::Iter<'a, Contact>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
 }

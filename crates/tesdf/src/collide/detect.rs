@@ -50,7 +50,7 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
     let (contacts, reductions) = reduce_pairs(contacts, options.reduction);
     statistics.reduced = all - contacts.len();
     let hidden = hidden::among(&pairs, options.mode, &contacts);
-    Ok(Contacts { contacts, statistics, reductions, hidden })
+    Ok(Contacts::new(contacts, statistics, reductions, hidden))
 }
 
 /// Within one ordered pair of instances. A point in no cell may be one of several pieces outside of the cube.

@@ -5,41 +5,17 @@ use crate::base::Length;
 use crate::query::Precision;
 
 /// What is tested of body *a* against the field of body *b*.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
     /// Node-TES: the vertices.
     Node,
-    /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9).
-    Face(FaceMethod),
-}
-
-impl Mode {
-    /// Face-TES with the paper's 16 iterations.
-    pub const FACE: Self = Self::Face(FaceMethod::FrankWolfe { iterations: 16 });
-    /// The exact minimum, to 1e-7 of the diagonal.
-    pub const EXACT: Self = Self::Face(FaceMethod::Exact { tolerance: Length::OfDiagonal(1e-7) });
-}
-
-/// How the least signed distance over a polygon is found.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FaceMethod {
-    /// A fixed number of Frank–Wolfe iterations: an upper bound of the minimum.
-    FrankWolfe {
-        /// Iterations; each is one evaluation of the field.
-        iterations: u32,
-    },
-    /// Closed form outside, branch and bound inside.
-    Exact {
-        /// Bound on the error; a share of the diagonal of the field's body, or in the world's unit.
-        tolerance: Length,
-    },
-}
-
-impl FaceMethod {
-    /// Most iterations of [`FrankWolfe`](Self::FrankWolfe); the error falls with their number only, so more are of no use.
-    pub const MAX_ITERATIONS: u32 = 1 << 16;
+    /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9), by a fixed number of Frank–Wolfe
+    /// [`iterations`](CollideOptions::iterations): an upper bound of the minimum.
+    Face,
+    /// As [`Face`](Self::Face), but the minimum itself, within a [`tolerance`](CollideOptions::tolerance): by a closed form outside, by branch
+    /// and bound inside.
+    Exact,
 }
 
 /// How many contacts of a pair are kept.
@@ -57,6 +33,11 @@ pub enum Reduction {
 pub struct CollideOptions {
     /// Nodes, or faces and how.
     pub mode: Mode,
+    /// Frank–Wolfe iterations of the mode [`Face`](Mode::Face), each one evaluation of the field; at most
+    /// [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). The paper has 16.
+    pub iterations: u32,
+    /// Bound on the error of the mode [`Exact`](Mode::Exact): a share of the diagonal of the field's body, or in the world's unit.
+    pub tolerance: Length,
     /// Contacts are reported up to this signed distance, in the world's unit. Wider than the band of an asset is no
     /// error: what lies outside of its domain is answered from its face tree, exactly.
     pub contact_distance: f64,
@@ -76,12 +57,15 @@ fn exact() -> Precision {
 }
 
 impl CollideOptions {
+    /// Most [`iterations`](Self::iterations); the error falls with their number only, so more are of no use.
+    pub const MAX_ITERATIONS: u32 = 1 << 16;
+
     /// The defaults with another mode.
     pub fn with_mode(mode: Mode) -> Self {
         Self { mode, ..Self::default() }
     }
 
-    /// Checks that every value makes sense.
+    /// Checks that every value that the mode uses makes sense.
     ///
     /// # Errors
     /// Names the option.
@@ -99,18 +83,16 @@ impl CollideOptions {
         {
             return refuse("cos_theta", cos.to_string(), "-1 to 1");
         }
-        if let Mode::Face(FaceMethod::Exact { tolerance }) = self.mode {
-            let (Length::OfDiagonal(value) | Length::Absolute(value)) = tolerance;
+        if self.mode == Mode::Exact {
+            let (Length::OfDiagonal(value) | Length::Absolute(value)) = self.tolerance;
             if !(value > 0.0 && value.is_finite()) {
                 return refuse("tolerance", value.to_string(), "a finite number greater than 0");
             }
         }
-        if let Mode::Face(FaceMethod::FrankWolfe { iterations }) = self.mode
-            && iterations > FaceMethod::MAX_ITERATIONS
-        {
+        if self.mode == Mode::Face && self.iterations > Self::MAX_ITERATIONS {
             return refuse(
                 "iterations",
-                iterations.to_string(),
+                self.iterations.to_string(),
                 "at most 65536: from some hundred on nothing is gained",
             );
         }
@@ -122,10 +104,12 @@ impl CollideOptions {
 }
 
 impl Default for CollideOptions {
-    /// Exact, everything that touches, nothing filtered or reduced.
+    /// Exact to 1e-7 of the diagonal, everything that touches, nothing filtered or reduced.
     fn default() -> Self {
         Self {
-            mode: Mode::EXACT,
+            mode: Mode::Exact,
+            iterations: 16,
+            tolerance: Length::OfDiagonal(1e-7),
             contact_distance: 0.0,
             speculative_time: 0.0,
             cos_theta: None,

@@ -50,7 +50,7 @@ impl<'a> OrderedPair<'a> {
     pub fn candidates(&self) -> Candidates {
         match self.options.mode {
             Mode::Node => self.surface.nodes(&self.field, self.search.reach),
-            Mode::Face(_) => self.surface.faces(&self.field, self.search.reach),
+            Mode::Face | Mode::Exact => self.surface.faces(&self.field, self.search.reach),
         }
     }
 
@@ -58,7 +58,7 @@ impl<'a> OrderedPair<'a> {
     pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
         match self.options.mode {
             Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
-            Mode::Face(_) => {
+            Mode::Face | Mode::Exact => {
                 let face = self.surface.face_id(candidate);
                 (self.surface.face(candidate, &self.field, self.search.reach), face, face)
             }
@@ -68,7 +68,7 @@ impl<'a> OrderedPair<'a> {
     /// Eq. (10). What is rounded has every normal.
     pub fn is_filtered(&self, part: &Part, minimum: &Minimum) -> bool {
         match (self.options.mode, self.options.cos_theta) {
-            (Mode::Face(_), Some(cos)) if part.points().len() == 3 => {
+            (Mode::Face | Mode::Exact, Some(cos)) if part.points().len() == 3 => {
                 minimum.value.gradient.dot(part.normal) > -cos
             }
             _ => false,

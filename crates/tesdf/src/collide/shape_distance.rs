@@ -3,7 +3,6 @@ use glam::DVec3;
 use super::Shape;
 use super::simple::Simple;
 use crate::geometry::length_and_direction;
-use crate::query::Precision;
 
 /// A point with a coordinate above this is farther out than any shape is large.
 const FAR: f64 = 1e100;
@@ -11,11 +10,9 @@ const FAR: f64 = 1e100;
 impl Shape {
     /// Distance from `p` to the surface, negative inside; in the shape's frame and unit. NaN for a point that is not finite,
     /// [`f64::MAX`] for a distance above it.
-    ///
-    /// `precision` is that of an encoded mesh; the others are formulas.
-    pub fn signed_distance(&self, p: DVec3, precision: Precision) -> f64 {
+    pub fn signed_distance(&self, p: DVec3) -> f64 {
         match *self {
-            Self::Mesh(ref asset) => asset.signed_distance(p, precision),
+            Self::Mesh(ref asset) => asset.signed_distance(p),
             _ if !p.is_finite() => f64::NAN,
             // Squares would overflow, and from so far out every shape but a plane is a point.
             _ if p.abs().max_element() > FAR && !matches!(self, Self::Plane) => length_and_direction(p).0,
@@ -23,11 +20,20 @@ impl Shape {
         }
     }
 
+    /// As [`signed_distance`](Self::signed_distance), of an encoded mesh in `f32` ([`TeSdf::signed_distance_f32`](crate::TeSdf::signed_distance_f32)); the other shapes are
+    /// formulas.
+    pub fn signed_distance_f32(&self, p: DVec3) -> f64 {
+        match self {
+            Self::Mesh(asset) => asset.signed_distance_f32(p),
+            _ => self.signed_distance(p),
+        }
+    }
+
     /// Whether `p`, in the shape's frame and unit, lies inside. Points on the surface may go either way.
     pub fn contains(&self, p: DVec3) -> bool {
         match self {
             Self::Mesh(asset) => asset.is_inside(p),
-            _ => self.signed_distance(p, Precision::F64) < 0.0,
+            _ => self.signed_distance(p) < 0.0,
         }
     }
 }

@@ -111,7 +111,6 @@ fn common(a: [f64; 2], b: [f64; 2]) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::query::Precision;
     use crate::sampling::Random;
 
     #[test]
@@ -127,7 +126,7 @@ mod tests {
             for _ in 0..2000 {
                 let mut vector = || DVec3::from_array(std::array::from_fn(|_| random.between(-1.0, 1.0)));
                 let (origin, along) = (2.0 * vector(), vector());
-                let at = |t: f64| shape.signed_distance(origin + t * along, Precision::F64);
+                let at = |t: f64| shape.signed_distance(origin + t * along);
                 // The distance is a lower bound of the way to the surface, from inside too.
                 let mut t = 0.0;
                 while t < 50.0 && at(t).abs() > 1e-9 {
@@ -140,14 +139,14 @@ mod tests {
                 assert!(at(hit.t).abs() < 1e-9, "{shape:?}: {} off the surface", at(hit.t));
                 // Grazing rays end up to sqrt(tolerance) early.
                 assert!((hit.t - t).abs() * along.length() < 1e-4, "{shape:?}: {} for {t}", hit.t);
-                let out = shape.signed_distance(origin + hit.t * along + 1e-4 * hit.normal, Precision::F64);
+                let out = shape.signed_distance(origin + hit.t * along + 1e-4 * hit.normal);
                 assert!((out - 1e-4).abs() < 1e-8, "{shape:?}: {} {out}", hit.normal);
                 assert_eq!(shape.ray_cast(origin, along, hit.t * 0.999), None);
                 assert_eq!(shape.contains(origin), at(0.0) < 0.0);
             }
             assert_eq!(shape.ray_cast(DVec3::ONE, DVec3::ZERO, 1.0), None);
             assert_eq!(shape.ray_cast(DVec3::NAN, DVec3::Z, 1.0), None);
-            assert!(shape.signed_distance(DVec3::NAN, Precision::F64).is_nan());
+            assert!(shape.signed_distance(DVec3::NAN).is_nan());
         }
         assert!(hits > 1000, "{hits}");
     }

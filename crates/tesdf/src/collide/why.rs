@@ -186,7 +186,7 @@ impl Stages<'_> {
         let surface = &self.pair.surface;
         match self.options.mode {
             Mode::Node => surface.node_count() as usize,
-            Mode::Face(_) => surface.face_count() as usize,
+            Mode::Face | Mode::Exact => surface.face_count() as usize,
         }
     }
 
@@ -195,12 +195,14 @@ impl Stages<'_> {
         let total = self.total() as u32;
         let found: Vec<u32> = match self.options.mode {
             Mode::Node => (0..total).filter(|&node| node == id).collect(),
-            Mode::Face(_) => (0..total).filter(|&f| self.pair.surface.face_id(f) == id).collect(),
+            Mode::Face | Mode::Exact => (0..total).filter(|&f| self.pair.surface.face_id(f) == id).collect(),
         };
         if found.is_empty() {
             let (option, expected) = match self.options.mode {
                 Mode::Node => ("node", "a node of the body, counted from 0"),
-                Mode::Face(_) => ("face", "a face of the body, counted from 0 as in the encoded mesh"),
+                Mode::Face | Mode::Exact => {
+                    ("face", "a face of the body, counted from 0 as in the encoded mesh")
+                }
             };
             return Err(CollideError::Option { option, found: format!("{id} (of {total})"), expected });
         }

@@ -49,7 +49,8 @@ impl TetFormat {
     ///
     /// # Errors
     /// [`ReadTetrahedraError::UnknownExtension`] lists the known extensions.
-    pub fn of_path(path: &Path) -> Result<Self, ReadTetrahedraError> {
+    pub fn of_path(path: impl AsRef<Path>) -> Result<Self, ReadTetrahedraError> {
+        let path = path.as_ref();
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         Self::ALL
             .into_iter()
@@ -115,7 +116,7 @@ struct Parsed {
 ///
 /// # Errors
 /// [`ReadTetrahedraError`] names what is wrong, the line, byte or element, and what to do.
-pub fn read_tetrahedra(path: &Path) -> Result<TetMesh, ReadTetrahedraError> {
+pub fn read_tetrahedra(path: impl AsRef<Path>) -> Result<TetMesh, ReadTetrahedraError> {
     Ok(load_tetrahedra(path)?.mesh)
 }
 
@@ -123,7 +124,11 @@ pub fn read_tetrahedra(path: &Path) -> Result<TetMesh, ReadTetrahedraError> {
 ///
 /// # Errors
 /// The same as for [`read_tetrahedra`].
-pub fn load_tetrahedra(path: &Path) -> Result<LoadedTetrahedra, ReadTetrahedraError> {
+pub fn load_tetrahedra(path: impl AsRef<Path>) -> Result<LoadedTetrahedra, ReadTetrahedraError> {
+    load(path.as_ref())
+}
+
+fn load(path: &Path) -> Result<LoadedTetrahedra, ReadTetrahedraError> {
     let format = TetFormat::of_path(path)?;
     let bytes = |path: &Path| {
         crate::input::read(path).map_err(|source| ReadTetrahedraError::Open { path: path.to_owned(), source })
@@ -141,7 +146,8 @@ pub fn load_tetrahedra(path: &Path) -> Result<LoadedTetrahedra, ReadTetrahedraEr
 
 /// The files that [`read_tetrahedra`] opens for `path`: the file itself, and the other file of
 /// TetGen's pair.
-pub fn tetrahedra_files(path: &Path) -> Vec<PathBuf> {
+pub fn tetrahedra_files(path: impl AsRef<Path>) -> Vec<PathBuf> {
+    let path = path.as_ref();
     let other = match TetFormat::of_path(path) {
         Ok(TetFormat::Node) => Some(beside(path, TetFormat::Ele)),
         Ok(TetFormat::Ele) => Some(beside(path, TetFormat::Node)),

@@ -7,7 +7,7 @@ use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use super::{Deformation, EncodeOptions, Encoder, Preset, Refinement, Sampling, Threshold};
+use super::{Deformation, EncodeOptions, Method, Preset, Refinement, Sampling, Threshold};
 use crate::base::{Length, Progress};
 #[cfg(feature = "gmsh")]
 use crate::domain::gmsh::{GmshError, GmshOptions, tetrahedralise_and_report};
@@ -41,7 +41,7 @@ impl FromStr for DomainChoice {
 
 /// Ways to find the closest faces of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EncoderChoice {
+pub enum MethodChoice {
     /// By proof: no face that can be closest is left out.
     Certified,
     /// By samples: the faces that are closest at samples, as in the paper.
@@ -56,7 +56,7 @@ pub struct EncodeChoices {
     /// How space is cut into tetrahedra.
     pub domain: DomainChoice,
     /// How the closest faces of each tetrahedron are found.
-    pub encoder: Option<EncoderChoice>,
+    pub method: Option<MethodChoice>,
     /// Samples along an edge of a tetrahedron, less one. The default is 32, unless the preset has
     /// its own value.
     pub resolution: Option<u32>,
@@ -136,25 +136,25 @@ impl EncodeChoices {
     /// [`ChoiceError`]: choices that exclude each other.
     pub fn options(&self) -> Result<EncodeOptions, ChoiceError> {
         let of_preset = EncodeOptions::preset(self.preset);
-        let encoder = match (self.encoder, of_preset.encoder) {
-            (Some(EncoderChoice::Certified), Encoder::Sampled(_)) => {
+        let method = match (self.method, of_preset.method) {
+            (Some(MethodChoice::Certified), Method::Sampled(_)) => {
                 return Err(ChoiceError::CertifiedPreset);
             }
-            (Some(EncoderChoice::Sampled), Encoder::Certified) => {
-                Encoder::Sampled(Sampling { resolution: RESOLUTION, ..Sampling::PAPER })
+            (Some(MethodChoice::Sampled), Method::Certified) => {
+                Method::Sampled(Sampling { resolution: RESOLUTION, ..Sampling::PAPER })
             }
-            (_, encoder) => encoder,
+            (_, method) => method,
         };
-        let encoder = match encoder {
-            Encoder::Sampled(sampling) => Encoder::Sampled(Sampling {
+        let method = match method {
+            Method::Sampled(sampling) => Method::Sampled(Sampling {
                 resolution: self.resolution.unwrap_or(sampling.resolution),
                 threshold: self.threshold.unwrap_or(sampling.threshold),
                 ..sampling
             }),
-            Encoder::Certified if self.resolution.is_some() || self.threshold.is_some() => {
+            Method::Certified if self.resolution.is_some() || self.threshold.is_some() => {
                 return Err(ChoiceError::NotSampled);
             }
-            Encoder::Certified => Encoder::Certified,
+            Method::Certified => Method::Certified,
         };
         if matches!(self.domain, DomainChoice::File(_)) && (self.band.is_some() || !self.regions.is_empty()) {
             return Err(ChoiceError::BesidesFile);
@@ -165,7 +165,7 @@ impl EncodeChoices {
             (_, chosen) => chosen.unwrap_or(of_preset.refinement),
         };
         Ok(EncodeOptions {
-            encoder,
+            method,
             refinement,
             deformation: self.deformation,
             max_entries: self.max_entries.map(Into::into),

@@ -12,7 +12,7 @@ use super::roots::Roots;
 use super::sampled::{SampledCell, Sampler, sample};
 use super::surface::Surface;
 use super::tighten::{Levels, tighten};
-use super::{Deformation, EncodeOptions, Encoder, Sampling, Threshold};
+use super::{Deformation, EncodeOptions, Method, Sampling, Threshold};
 use crate::asset::layout::Label;
 use crate::base::{Chains, Progress, Side, Stage};
 use crate::domain::Cell;
@@ -83,10 +83,10 @@ impl Lists<'_> {
         let entries = leaves.iter().map(length).sum();
         let levels = Levels::new(self.options.tighten_levels, entries, self.surface.faces.len());
         progress.begin(Stage::Tighten, leaves.len() as u64);
-        let (sampled, step) = match &self.options.encoder {
-            Encoder::Certified => (leaves.iter().map(|_| None).collect(), 1),
+        let (sampled, step) = match &self.options.method {
+            Method::Certified => (leaves.iter().map(|_| None).collect(), 1),
             // The sampler has done nearly all of the work by then.
-            Encoder::Sampled(sampling) => (self.sampled(&leaves, &cells, sampling, sampler, progress)?, 0),
+            Method::Sampled(sampling) => (self.sampled(&leaves, &cells, sampling, sampler, progress)?, 0),
         };
         let finished: Option<Vec<(Label, f64, Option<Chains>)>> = leaves
             .into_par_iter()
@@ -184,15 +184,15 @@ impl Lists<'_> {
     /// The faces of a cell's list, before any are added or dropped. `chains` are those of the
     /// filters that left `faces`.
     fn found(&self, cell: &Cell, faces: &[u32], levels: u32, chains: Chains, scratch: &mut Scratch) -> Found {
-        match &self.options.encoder {
-            Encoder::Certified => {
+        match &self.options.method {
+            Method::Certified => {
                 let (tight, chains) = match levels {
                     0 => (faces.to_vec(), chains),
                     _ => tighten(self.surface, cell, faces, levels, chains, scratch),
                 };
                 self.proved(cell, &tight, chains, scratch)
             }
-            Encoder::Sampled(sampling) => {
+            Method::Sampled(sampling) => {
                 let sampled = SampledCell::new(self.surface, self.tree, *cell, sampling, self.scale);
                 let least = sample(self.surface, &sampled, sampling, scratch);
                 self.sampled_found(&sampled, &least, sampling, scratch)

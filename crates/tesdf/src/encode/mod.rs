@@ -1,6 +1,8 @@
 //! The encoder: finds the faces that can be closest in each cell. A solid mesh becomes an encoded
 //! asset.
 //!
+//! [`Encoder`] is the entry. Its stages:
+//!
 //! 1. `roots` gives the first tetrahedra, of the cube or of a conforming mesh.
 //! 2. `refine` bisects them, passes the surviving faces of each cell to its children (`filter`),
 //!    and merges cells on the way back where that costs less.
@@ -14,6 +16,7 @@ mod chains;
 mod choices;
 mod doubles;
 mod effort;
+mod encoder;
 mod error;
 pub(crate) mod filter;
 mod hints;
@@ -41,11 +44,11 @@ pub mod internal {
 
 pub use crate::asset::about::Source;
 pub use crate::asset::options::{
-    Deformation, EncodeOptions, Encoder, Preset, Refinement, Sampling, Threshold,
+    Deformation, EncodeOptions, Method, Preset, Refinement, Sampling, Threshold,
 };
-pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, EncoderChoice};
+pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, MethodChoice};
+pub use encoder::{EncodeFileError, Encoder};
 pub use error::EncodeError;
-pub use pipeline::{encode, encode_in, encode_with};
 pub use roots::Domain;
 pub use sampled::{Processor, SampledCell, Sampler};
 pub use surface::Surface;

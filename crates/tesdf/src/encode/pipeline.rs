@@ -6,10 +6,10 @@ use super::hints::{Simplicity, sign_hints};
 use super::lists::{Finished, Lists};
 use super::refine::{Refiner, Weights};
 use super::roots::{Domain, MAX_SIZE, Roots};
-use super::sampled::{Processor, Sampler, lipschitz_candidates};
+use super::sampled::{Sampler, lipschitz_candidates};
 use super::statistics::statistics;
 use super::surface::{Surface, Touching};
-use super::{Deformation, EncodeOptions, Encoder, Refinement, Source, Threshold};
+use super::{Deformation, EncodeOptions, Method, Refinement, Source, Threshold};
 use crate::asset::layout::{self, TREE_LEAF, TreeChild};
 use crate::asset::{Section, TeSdf, about, write_container};
 use crate::base::{Certificate, Progress, Proved, Stage};
@@ -18,46 +18,23 @@ use crate::geometry::{Aabb, AabbTree, Child, LocalFrame};
 use crate::mesh::{MeshError, SolidMesh, TriangleMesh, WindingNumber};
 use crate::verify::self_check;
 
-/// Encodes a solid in the bisection domain; the same mesh and options give the same bytes on any
-/// number of threads (it runs in the current rayon pool).
-///
-/// # Errors
-/// [`EncodeError`]; nothing is written anywhere.
-pub fn encode(
-    solid: &SolidMesh,
-    source: &Source,
-    options: &EncodeOptions,
-    progress: &Progress,
-) -> Result<TeSdf, EncodeError> {
-    encode_in(solid, Domain::Bisection, source, options, progress)
+/// All that an encoding depends on besides the solid.
+pub struct Request<'a> {
+    /// Where the cells come from.
+    pub domain: Domain<'a>,
+    /// What is recorded of the mesh's file.
+    pub source: &'a Source,
+    /// What is asked for.
+    pub options: &'a EncodeOptions,
+    /// What looks at the samples of [`Method::Sampled`].
+    pub sampler: &'a dyn Sampler,
+    /// How far the encoding is, and the wish to stop.
+    pub progress: &'a Progress,
 }
 
-/// As [`encode`], in a domain of choice.
-///
-/// # Errors
-/// [`EncodeError`]; nothing is written anywhere.
-pub fn encode_in(
-    solid: &SolidMesh,
-    domain: Domain,
-    source: &Source,
-    options: &EncodeOptions,
-    progress: &Progress,
-) -> Result<TeSdf, EncodeError> {
-    encode_with(solid, domain, source, options, &Processor, progress)
-}
-
-/// As [`encode_in`], the samples of [`Encoder::Sampled`] looked at by a `sampler` of choice.
-///
-/// # Errors
-/// [`EncodeError`]; nothing is written anywhere.
-pub fn encode_with(
-    solid: &SolidMesh,
-    domain: Domain,
-    source: &Source,
-    options: &EncodeOptions,
-    sampler: &dyn Sampler,
-    progress: &Progress,
-) -> Result<TeSdf, EncodeError> {
+/// From the solid to the finished asset; see [`Encoder::encode`](super::Encoder::encode).
+pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError> {
+    let Request { domain, source, options, sampler, progress } = *request;
     let mesh = solid.mesh();
     let diagonal = mesh.diagonal();
     let frame = LocalFrame::of(mesh.bounds());
@@ -169,9 +146,9 @@ pub fn encode_with(
     if faces.len() > 1 << 16 {
         sections.push(Section::new(layout::PALETTES_HIGH, &high));
     }
-    let encoder = match options.encoder {
-        Encoder::Certified => "certified".into(),
-        Encoder::Sampled(_) => sampler.name(),
+    let encoder = match options.method {
+        Method::Certified => "certified".into(),
+        Method::Sampled(_) => sampler.name(),
     };
     let proved = Proved { within: exact_within / frame.scale, chains: proof };
     let certificate = Certificate::new(encoder, domain.name().into(), diagonal, roots.cube.side(), proved);
@@ -228,7 +205,7 @@ fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<
     if options.max_entries == Some(0) {
         return wrong("max_entries", "0".into(), "1 or more faces");
     }
-    if let Encoder::Sampled(sampling) = options.encoder {
+    if let Method::Sampled(sampling) = options.method {
         if !(1..=MAX_RESOLUTION).contains(&sampling.resolution) {
             return wrong("resolution", format!("{}", sampling.resolution), "1 to 1024");
         }

@@ -18,7 +18,7 @@ pub use defect::{Defect, DefectKind, Severity};
 pub(crate) use read::text;
 pub use read::{LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, files, read, read_bytes};
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, repair};
-pub use solid::{NotSolid, SolidMesh};
+pub use solid::{NotSolid, ReadSolidError, SolidMesh};
 pub use topology::{Edge, EdgeUse, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};
 pub use winding::WindingNumber;

@@ -60,7 +60,8 @@ impl MeshFormat {
     ///
     /// # Errors
     /// [`ReadError::UnknownExtension`] lists the known extensions.
-    pub fn of_path(path: &Path) -> Result<Self, ReadError> {
+    pub fn of_path(path: impl AsRef<Path>) -> Result<Self, ReadError> {
+        let path = path.as_ref();
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         Self::ALL
             .into_iter()
@@ -142,7 +143,11 @@ pub struct LoadReport {
 ///
 /// # Errors
 /// [`ReadError`] names the cause, the line, byte or element, and what to do.
-pub fn read(path: &Path) -> Result<LoadedMesh, ReadError> {
+pub fn read(path: impl AsRef<Path>) -> Result<LoadedMesh, ReadError> {
+    read_path(path.as_ref())
+}
+
+fn read_path(path: &Path) -> Result<LoadedMesh, ReadError> {
     let format = MeshFormat::of_path(path)?;
     let bytes = input::read(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -151,7 +156,11 @@ pub fn read(path: &Path) -> Result<LoadedMesh, ReadError> {
 
 /// The files that [`read`] opens for `path`: the file itself and the external buffers of a glTF
 /// file. For a file that cannot be read, only `path`; [`read`] then gives the reason.
-pub fn files(path: &Path) -> Vec<PathBuf> {
+pub fn files(path: impl AsRef<Path>) -> Vec<PathBuf> {
+    files_of(path.as_ref())
+}
+
+fn files_of(path: &Path) -> Vec<PathBuf> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let buffers = match MeshFormat::of_path(path) {
         // A pipe is not opened here, because its bytes can be read only once.

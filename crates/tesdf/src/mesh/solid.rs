@@ -1,7 +1,11 @@
-use std::{collections::BTreeMap, fmt};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
 
 use super::count::count;
-use super::{CheckReport, Defect, DefectKind, Severity, TriangleMesh, check};
+use super::{
+    CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, ReadError, Severity, TriangleMesh, check, read,
+};
 
 /// A mesh with a well-defined inside. The encoder accepts only this type, and every value of it is
 /// valid.
@@ -22,6 +26,39 @@ pub struct SolidMesh {
 }
 
 impl SolidMesh {
+    /// Reads the mesh file at `path` and checks the mesh: [`read`](super::read()), then [`new`](Self::new). To see what
+    /// reading has changed, call these two.
+    ///
+    /// # Errors
+    /// [`ReadSolidError`] names the file and says why it cannot be read or why its mesh has no well-defined inside.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::SolidMesh;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("part.obj");
+    /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+    /// let solid = SolidMesh::read(&path)?; // STL, OBJ, PLY, OFF, glTF or GLB
+    /// assert!(solid.warnings().is_empty());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, ReadSolidError> {
+        Self::load(path.as_ref()).map(|(solid, _)| solid)
+    }
+
+    /// As [`read`](Self::read), with what reading found and changed.
+    pub(crate) fn load(path: &Path) -> Result<(Self, LoadReport), ReadSolidError> {
+        let LoadedMesh { mesh, report, .. } =
+            read(path).map_err(|source| ReadSolidError::Read { path: path.to_owned(), source })?;
+        let solid =
+            Self::new(mesh).map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
+        Ok((solid, report))
+    }
+
     /// Checks the mesh with [`check`](super::check()).
     ///
     /// # Errors
@@ -58,6 +95,27 @@ impl SolidMesh {
     pub fn into_mesh(self) -> TriangleMesh {
         self.mesh
     }
+}
+
+/// Why a mesh file does not give a [`SolidMesh`]. The message names the file.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadSolidError {
+    /// The file has no mesh that can be read.
+    #[error("{}", source.in_file(path))]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: ReadError,
+    },
+    /// The mesh has no well-defined inside.
+    #[error("{}: {source}", path.display())]
+    NotSolid {
+        /// The file.
+        path: PathBuf,
+        /// All defects.
+        source: NotSolid,
+    },
 }
 
 /// Why a mesh is not a [`SolidMesh`].

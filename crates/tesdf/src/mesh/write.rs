@@ -21,7 +21,8 @@ impl WriteFormat {
     ///
     /// # Errors
     /// [`WriteError::UnknownExtension`] lists the known extensions.
-    pub fn of_path(path: &Path) -> Result<Self, WriteError> {
+    pub fn of_path(path: impl AsRef<Path>) -> Result<Self, WriteError> {
+        let path = path.as_ref();
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         match extension.to_str() {
             Some("ply") => Ok(Self::Ply),
@@ -67,7 +68,8 @@ pub enum WriteError {
 ///
 /// # Errors
 /// [`WriteError`]. A regular file at `path` is then unchanged.
-pub fn write(path: &Path, mesh: &TriangleMesh) -> Result<WriteFormat, WriteError> {
+pub fn write(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<WriteFormat, WriteError> {
+    let path = path.as_ref();
     let format = WriteFormat::of_path(path)?;
     save_atomic(path, &write_bytes(mesh, format)?)?;
     Ok(format)

@@ -49,11 +49,38 @@ impl BatchError {
 }
 
 impl TeSdf {
-    /// Answers for many points, in order, on all threads of the current rayon pool.
+    /// Answers for many points, exactly, in the order of the points, on all threads of the current rayon pool.
     ///
-    /// The same answers as one query at a time, but quicker: a few points go through the stages together
+    /// The same answers as those of [`query`](Self::query), but quicker: a few points go through the stages together
     /// (cell, list, faces), and what the next stage needs is fetched ahead for all of them.
-    pub fn query_batch(&self, points: &[DVec3], precision: Precision) -> Vec<Answer> {
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tesdf::{Encoder, SolidMesh, mesh::MeshFormat, mesh::read_bytes};
+    /// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    /// # let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
+    /// # let asset = Encoder::new().encode(&solid)?;
+    /// let points = [DVec3::new(0.1, 0.3, 0.3), DVec3::new(-2.0, 0.3, 0.3)];
+    /// let answers = asset.query_batch(&points);
+    /// assert_eq!(answers[1], asset.query(points[1]));
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn query_batch(&self, points: &[DVec3]) -> Vec<Answer> {
+        self.query_batch_with(points, Precision::F64)
+    }
+
+    /// As [`query_batch`](Self::query_batch), in `f32`: the answers of [`query_f32`](Self::query_f32).
+    pub fn query_batch_f32(&self, points: &[DVec3]) -> Vec<Answer> {
+        self.query_batch_with(points, Precision::F32)
+    }
+
+    /// As [`query_batch`](Self::query_batch) or [`query_batch_f32`](Self::query_batch_f32), chosen at run time.
+    pub fn query_batch_with(&self, points: &[DVec3], precision: Precision) -> Vec<Answer> {
         let mut answers = vec![Answer::NONE; points.len()];
         self.each_flight(
             points,
@@ -67,10 +94,35 @@ impl TeSdf {
         answers
     }
 
-    /// As [`query_batch`](Self::query_batch), into arrays that are there.
+    /// As [`query_batch_with`](Self::query_batch_with), into arrays that the caller owns, one row for each point.
     ///
     /// # Errors
     /// [`BatchError`]: a column has not as many rows as there are points. No row was changed then.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    /// use tesdf::query::{AnswerColumns, Extent, Precision};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tesdf::{Encoder, SolidMesh, mesh::MeshFormat, mesh::read_bytes};
+    /// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    /// # let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
+    /// # let asset = Encoder::new().encode(&solid)?;
+    /// let points = [DVec3::new(0.1, 0.3, 0.3), DVec3::new(-2.0, 0.3, 0.3)];
+    /// let (mut distance, mut gradient, mut closest, mut face) = ([0.0; 2], [[0.0; 3]; 2], [[0.0; 3]; 2], [0; 2]);
+    /// let columns = AnswerColumns {
+    ///     signed_distance: &mut distance,
+    ///     gradient: &mut gradient,
+    ///     closest_point: &mut closest,
+    ///     face: &mut face,
+    /// };
+    /// asset.query_batch_into(&points, Precision::F64, Extent::Everywhere, columns)?;
+    /// assert_eq!(face[0], asset.query(points[0]).face);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn query_batch_into(
         &self,
         points: &[DVec3],
@@ -103,10 +155,10 @@ impl TeSdf {
         Ok(())
     }
 
-    /// As [`query_batch_into`](Self::query_batch_into), signed distances alone.
+    /// The signed distances alone, into an array that the caller owns, one for each point.
     ///
     /// # Errors
-    /// As [`query_batch_into`](Self::query_batch_into).
+    /// [`BatchError`]: there are not as many distances as points. None was changed then.
     pub fn signed_distances_into(
         &self,
         points: &[DVec3],

@@ -11,9 +11,19 @@ impl TeSdf {
     /// alone does, for comparison.
     ///
     /// The same exact distance; of equally near faces another may be named. The side is told by the closest feature where it
-    /// can tell ([`Precision::F32`]), else by [`is_inside`](Self::is_inside). On the surface itself the gradient is that
+    /// can tell (in `f32`), else by [`is_inside`](Self::is_inside). On the surface itself the gradient is that
     /// of [`query`](Self::query).
-    pub fn query_by_tree(&self, point: DVec3, precision: Precision) -> Answer {
+    pub fn query_by_tree(&self, point: DVec3) -> Answer {
+        self.query_by_tree_with(point, Precision::F64)
+    }
+
+    /// As [`query_by_tree`](Self::query_by_tree), in `f32`, as precise as [`query_f32`](Self::query_f32).
+    pub fn query_by_tree_f32(&self, point: DVec3) -> Answer {
+        self.query_by_tree_with(point, Precision::F32)
+    }
+
+    /// As [`query_by_tree`](Self::query_by_tree) or [`query_by_tree_f32`](Self::query_by_tree_f32), chosen at run time.
+    pub fn query_by_tree_with(&self, point: DVec3, precision: Precision) -> Answer {
         let local = self.frame.to_local(point);
         match precision {
             _ if !is_near(local) => self.answer_far(point),
@@ -51,14 +61,14 @@ impl TeSdf {
         let height = triangle.normal.dot(relative - triangle.corners[0]);
         let side =
             hinted_side(record.hints(), closest.feature, height).unwrap_or_else(|| self.side_of(point));
-        let on_surface = |d| (d < ON_SURFACE_F32).then(|| self.query(point, Precision::F32).gradient);
+        let on_surface = |d| (d < ON_SURFACE_F32).then(|| self.query_f32(point).gradient);
         self.to_answer(self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface))
     }
 
     fn by_tree_f64(&self, point: DVec3, local: DVec3) -> Answer {
         let (position, closest) = self.nearest_in_tree_f64(local);
         let side = if closest.distance > 0.0 { self.side_of(point) } else { Side::Outside };
-        let on_surface = |d| (d < ON_SURFACE_F64).then(|| self.query(point, Precision::F64).gradient);
+        let on_surface = |d| (d < ON_SURFACE_F64).then(|| self.query(point).gradient);
         self.to_answer(self.finish(local, closest, side, position, DVec3::ZERO, on_surface))
     }
 

@@ -3,6 +3,17 @@
 //! A point is taken to the local frame, its cell is found by descending the forest in fixed point, and the
 //! least distance to the faces of the cell's list is the answer. Points that no list serves (outside of the
 //! domain, or in a far cell) are answered from the tree over all faces, exactly too.
+//!
+//! | | exact | `f32` storage | chosen at run time |
+//! |---|---|---|---|
+//! | a point | [`query`](TeSdf::query) | [`query_f32`](TeSdf::query_f32) | [`query_with`](TeSdf::query_with) |
+//! | its signed distance | [`signed_distance`](TeSdf::signed_distance) | [`signed_distance_f32`](TeSdf::signed_distance_f32) | |
+//! | a point of the domain | [`query_in_domain`](TeSdf::query_in_domain) | [`query_in_domain_f32`](TeSdf::query_in_domain_f32) | [`query_in_domain_with`](TeSdf::query_in_domain_with) |
+//! | many points | [`query_batch`](TeSdf::query_batch) | [`query_batch_f32`](TeSdf::query_batch_f32) | [`query_batch_with`](TeSdf::query_batch_with) |
+//! | many points, into arrays | | | [`query_batch_into`](TeSdf::query_batch_into), [`signed_distances_into`](TeSdf::signed_distances_into) |
+//! | a point, without lists | [`query_by_tree`](TeSdf::query_by_tree) | [`query_by_tree_f32`](TeSdf::query_by_tree_f32) | [`query_by_tree_with`](TeSdf::query_by_tree_with) |
+//!
+//! [`is_inside`](TeSdf::is_inside) and [`ray_cast`](TeSdf::ray_cast) are exact.
 mod arrays;
 mod batch;
 mod by_tree;
@@ -34,7 +45,8 @@ use crate::geometry::{Closest, Feature};
 use far::is_near;
 use sign::hinted_side;
 
-/// What a query computes with.
+/// What a query computes with, for code that chooses at run time: [`TeSdf::query_with`] and the like take it. Code that
+/// knows calls [`TeSdf::query`] (`F64`) or [`TeSdf::query_f32`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
     /// Faces rounded to `f32` in a local frame, several at a time: within 1e-6 × diagonal, the right sign
@@ -101,15 +113,88 @@ const ON_SURFACE_F32: f64 = 1e-6;
 const TOUCHING: f64 = 1e-12;
 
 impl TeSdf {
-    /// Answers for any point; `point` is in the mesh's unit.
-    pub fn query(&self, point: DVec3, precision: Precision) -> Answer {
+    /// Answers for any point, exactly ([`Precision::F64`]). `point` and the answer are in the mesh's unit and frame.
+    ///
+    /// There is no error: a point that is not finite has an answer of NaN and [`Answer::NO_FACE`].
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tesdf::{Encoder, SolidMesh, mesh::MeshFormat, mesh::read_bytes};
+    /// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    /// # let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
+    /// # let asset = Encoder::new().encode(&solid)?;
+    /// let answer = asset.query(DVec3::new(0.1, 0.3, 0.3));
+    /// assert!((answer.signed_distance + 0.1).abs() < 1e-12); // 0.1 inside of the side x = 0
+    /// assert!(answer.closest_point.distance(DVec3::new(0.0, 0.3, 0.3)) < 1e-12);
+    /// assert!(answer.gradient.distance(DVec3::NEG_X) < 1e-12);
+    /// assert_eq!(answer.face, 3);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn query(&self, point: DVec3) -> Answer {
+        self.query_with(point, Precision::F64)
+    }
+
+    /// As [`query`](Self::query), in `f32`: several faces at a time, within 1e-6 of the mesh's diagonal ([`Precision::F32`]).
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tesdf::{Encoder, SolidMesh, mesh::MeshFormat, mesh::read_bytes};
+    /// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    /// # let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
+    /// # let asset = Encoder::new().encode(&solid)?;
+    /// let answer = asset.query_f32(DVec3::new(0.1, 0.3, 0.3));
+    /// assert!((answer.signed_distance + 0.1).abs() < 1e-6);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn query_f32(&self, point: DVec3) -> Answer {
+        self.query_with(point, Precision::F32)
+    }
+
+    /// As [`query`](Self::query) or [`query_f32`](Self::query_f32), chosen at run time.
+    pub fn query_with(&self, point: DVec3, precision: Precision) -> Answer {
         let local = self.frame.to_local(point);
         self.answer_alone(point, local, self.locate(local), precision)
     }
 
     /// As [`query`](Self::query), but `None` outside of the domain: more than the band from the solid, give or
     /// take a cell, and where no list was worth its bytes.
-    pub fn query_in_domain(&self, point: DVec3, precision: Precision) -> Option<Answer> {
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tesdf::{Encoder, SolidMesh, mesh::MeshFormat, mesh::read_bytes};
+    /// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    /// # let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
+    /// # let asset = Encoder::new().encode(&solid)?;
+    /// assert!(asset.query_in_domain(DVec3::new(0.1, 0.3, 0.3)).is_some());
+    /// assert!(asset.query_in_domain(DVec3::new(9.0, 0.3, 0.3)).is_none());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn query_in_domain(&self, point: DVec3) -> Option<Answer> {
+        self.query_in_domain_with(point, Precision::F64)
+    }
+
+    /// As [`query_in_domain`](Self::query_in_domain), in `f32`.
+    pub fn query_in_domain_f32(&self, point: DVec3) -> Option<Answer> {
+        self.query_in_domain_with(point, Precision::F32)
+    }
+
+    /// As [`query_in_domain`](Self::query_in_domain) or [`query_in_domain_f32`](Self::query_in_domain_f32), chosen at run time.
+    pub fn query_in_domain_with(&self, point: DVec3, precision: Precision) -> Option<Answer> {
         let local = self.frame.to_local(point);
         match self.locate(local) {
             Place::NotOfDomain => None,
@@ -117,9 +202,30 @@ impl TeSdf {
         }
     }
 
-    /// The signed distance alone; NaN for a point that is not finite.
-    pub fn signed_distance(&self, point: DVec3, precision: Precision) -> f64 {
-        self.query(point, precision).signed_distance
+    /// The signed distance alone, exactly: negative inside, in the mesh's unit; NaN for a point that is not finite.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # use tesdf::{Encoder, SolidMesh, mesh::MeshFormat, mesh::read_bytes};
+    /// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    /// # let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
+    /// # let asset = Encoder::new().encode(&solid)?;
+    /// assert!((asset.signed_distance(DVec3::new(-2.0, 0.3, 0.3)) - 2.0).abs() < 1e-12);
+    /// assert!((asset.signed_distance_f32(DVec3::new(-2.0, 0.3, 0.3)) - 2.0).abs() < 1e-6);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn signed_distance(&self, point: DVec3) -> f64 {
+        self.query(point).signed_distance
+    }
+
+    /// As [`signed_distance`](Self::signed_distance), in `f32`: within 1e-6 of the mesh's diagonal.
+    pub fn signed_distance_f32(&self, point: DVec3) -> f64 {
+        self.query_f32(point).signed_distance
     }
 
     /// Whether the winding number at `point` is 1 or more, by exact predicates. Points on the surface may

@@ -50,7 +50,11 @@ impl Destination {
     /// # Errors
     /// [`SaveError`] says which condition fails. Nothing is changed, except that abandoned part
     /// files are removed.
-    pub fn new(path: &Path, options: &SaveOptions<'_>) -> Result<Self, SaveError> {
+    pub fn new(path: impl AsRef<Path>, options: &SaveOptions<'_>) -> Result<Self, SaveError> {
+        Self::of(path.as_ref(), options)
+    }
+
+    fn of(path: &Path, options: &SaveOptions<'_>) -> Result<Self, SaveError> {
         if let Some(input) = options.inputs.iter().find(|input| is_same_file(path, input)) {
             return Err(SaveError::Input { output: path.to_path_buf(), input: input.to_path_buf() });
         }

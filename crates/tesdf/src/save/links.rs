@@ -49,7 +49,8 @@ pub(super) fn folder_of(path: &Path) -> &Path {
 
 /// Whether two paths refer to the same file on the disk. Names may differ, and hard and symbolic
 /// links are followed. `false` when a path refers to no file.
-pub fn is_same_file(a: &Path, b: &Path) -> bool {
+pub fn is_same_file(a: impl AsRef<Path>, b: impl AsRef<Path>) -> bool {
+    let (a, b) = (a.as_ref(), b.as_ref());
     #[cfg(unix)]
     {
         use std::os::unix::fs::MetadataExt;

@@ -192,7 +192,7 @@ impl Found {
         }
         let expected = if winding >= 1 { -distance } else { distance };
         for comparison in &mut self.comparisons {
-            let answer = asset.query(p, comparison.precision());
+            let answer = asset.query_with(p, comparison.precision());
             // Vector from the closest point of the face that the answer names.
             let place = truth.place.get(answer.face as usize).copied().flatten();
             let offset = place.map(|at| truth.faces.offset(at, p));

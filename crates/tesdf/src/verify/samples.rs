@@ -5,7 +5,6 @@ use crate::TeSdf;
 use crate::asset::CellKind;
 use crate::geometry::{Aabb, Triangle};
 use crate::mesh::{TriangleMesh, WindingNumber};
-use crate::query::Precision;
 use crate::sampling::{Random, Weighted};
 
 /// Classes of the points that are compared with brute force.
@@ -194,7 +193,7 @@ impl<'a> Sampler<'a> {
         for _ in 0..TRIES {
             let p = random.in_box(self.bounds);
             if self.winding.at_perturbed(p) >= 1 {
-                let depth = self.asset.signed_distance(p, Precision::F32).abs();
+                let depth = self.asset.signed_distance_f32(p).abs();
                 if depth > best.0 {
                     best = (depth, Some(p));
                 }

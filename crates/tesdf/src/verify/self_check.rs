@@ -41,7 +41,7 @@ pub(crate) fn self_check(asset: &TeSdf) -> Result<Option<(Precision, Worst)>, Me
     let mistake = |precision| {
         let mut comparison = Comparison::new(precision, &mesh, certificate);
         for &(point, expected) in &expected {
-            comparison.add(PointClass::Box, point, expected, &asset.query(point, precision), None);
+            comparison.add(PointClass::Box, point, expected, &asset.query_with(point, precision), None);
         }
         Some(precision).zip(comparison.worst_mistake())
     };
@@ -74,10 +74,9 @@ fn points(asset: &TeSdf) -> Vec<DVec3> {
 mod tests {
     use super::*;
     use crate::asset::SharedSection;
-    use crate::asset::about::Source;
     use crate::asset::layout::{Label, Node};
-    use crate::base::{Progress, Side};
-    use crate::encode::{EncodeOptions, encode};
+    use crate::base::Side;
+    use crate::encode::Encoder;
     use crate::mesh::{MeshFormat, SolidMesh, read_bytes};
 
     #[test]
@@ -87,8 +86,7 @@ mod tests {
                    f 4 3 6\nf 1 4 6\n";
         let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj).expect("a mesh").mesh;
         let solid = SolidMesh::new(mesh).expect("a solid");
-        let options = EncodeOptions::default();
-        let mut asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
+        let mut asset = Encoder::new().encode(&solid).expect("encodes");
         assert_eq!(self_check(&asset), Ok(None));
         // Mark all cells as outside.
         let mut nodes = asset.nodes.to_vec();

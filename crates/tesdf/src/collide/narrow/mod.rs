@@ -10,7 +10,7 @@ use super::field_value::FieldValue;
 use super::middle::{self, ClippedPolygon};
 use super::polygon::Polygon;
 use super::surface::Part;
-use super::{CollideOptions, FaceMethod, Mode};
+use super::{CollideOptions, Mode};
 use crate::query::{Faces, Place, Precision};
 
 /// The least signed distance of a part in one cell, in the field's frame.
@@ -36,6 +36,7 @@ struct Lowest {
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
     mode: Mode,
+    iterations: u32,
     /// Signed distances above this are not looked for.
     pub reach: f64,
     tolerance: f64,
@@ -50,10 +51,11 @@ impl Search {
     pub fn new(options: &CollideOptions, reach: f64, field: &FieldBody, diagonal: f64) -> Self {
         let unit = field.unit();
         let tolerance = match options.mode {
-            Mode::Face(FaceMethod::Exact { tolerance }) => tolerance.resolve(diagonal) / unit,
-            _ => 0.0,
+            Mode::Exact => options.tolerance.resolve(diagonal) / unit,
+            Mode::Node | Mode::Face => 0.0,
         };
-        Self { mode: options.mode, reach: reach / unit, tolerance, precision: options.precision }
+        let CollideOptions { mode, iterations, precision, .. } = *options;
+        Self { mode, iterations, reach: reach / unit, tolerance, precision }
     }
 
     /// The same search up to another signed distance (field's frame).
@@ -116,10 +118,8 @@ impl Search {
                 Some(Lowest { point: polygon.vertices()[0].point, converged: true })
             }
             Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true }),
-            Mode::Face(FaceMethod::FrankWolfe { iterations }) => {
-                frank_wolfe::lowest(cell, polygon, iterations, reach)
-            }
-            Mode::Face(FaceMethod::Exact { .. }) => {
+            Mode::Face => frank_wolfe::lowest(cell, polygon, self.iterations, reach),
+            Mode::Exact => {
                 let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
                 exact::lowest(cell, polygon, part.normal, self.tolerance, reach, precision)
             }

@@ -1,5 +1,5 @@
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::MeshFormat;
 use crate::mesh::MeshError;
@@ -136,4 +136,14 @@ pub enum ReadError {
     /// The mesh has more vertices or faces than ids can name.
     #[error(transparent)]
     Mesh(#[from] MeshError),
+}
+
+impl ReadError {
+    /// The message with the file's name before it, where the error does not name the file itself.
+    pub fn in_file(&self, path: &Path) -> String {
+        match self {
+            Self::Open { .. } | Self::UnknownExtension { .. } => self.to_string(),
+            _ => format!("{}: {self}", path.display()),
+        }
+    }
 }

@@ -1,0 +1,264 @@
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use super::pipeline::{self, Request};
+use super::sampled::Processor;
+use super::{Domain, EncodeError, EncodeOptions, Preset, Sampler, Source};
+use crate::asset::TeSdf;
+use crate::base::{Length, Progress};
+use crate::mesh::{NotSolid, ReadError, ReadSolidError, SolidMesh};
+
+/// Encodes solids: what is asked for, where the cells come from, who watches.
+///
+/// [`Encoder::new`] has the defaults; each method changes one thing and gives the encoder back. One encoder may encode many solids.
+///
+/// # Example
+///
+/// ```
+/// use tesdf::{Encoder, Length, Preset, SolidMesh};
+/// # use tesdf::mesh::{MeshFormat, read_bytes};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+/// # let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh;
+/// let solid = SolidMesh::new(mesh)?;
+/// let asset = Encoder::new().preset(Preset::Fast).band(Length::Absolute(0.2)).unit("mm").encode(&solid)?;
+/// assert_eq!(asset.unit(), Some("mm"));
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone)]
+pub struct Encoder<'a> {
+    options: EncodeOptions,
+    band: Option<Length>,
+    unit: Option<String>,
+    domain: Domain<'a>,
+    source: Source,
+    sampler: &'a dyn Sampler,
+    progress: Option<&'a Progress>,
+}
+
+impl fmt::Debug for Encoder<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Encoder")
+            .field("options", &self.resolved())
+            .field("domain", &self.domain)
+            .field("source", &self.source)
+            .field("sampler", &self.sampler.name())
+            .field("progress", &self.progress)
+            .finish()
+    }
+}
+
+impl Default for Encoder<'_> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<'a> Encoder<'a> {
+    /// An encoder with the defaults: [`Preset::Default`], the bisection domain, no source, samples on the processor.
+    pub fn new() -> Self {
+        Self {
+            options: EncodeOptions::default(),
+            band: None,
+            unit: None,
+            domain: Domain::Bisection,
+            source: Source::default(),
+            sampler: &Processor,
+            progress: None,
+        }
+    }
+
+    /// Takes the options of a preset, as [`options`](Self::options) with [`EncodeOptions::preset`].
+    ///
+    /// [`Preset::Paper`] and [`Preset::SampledSafe`] need a conforming [`domain`](Self::domain).
+    pub fn preset(self, preset: Preset) -> Self {
+        self.options(EncodeOptions::preset(preset))
+    }
+
+    /// Sets all options, in place of those of a preset. The last call of `preset` and `options` counts.
+    pub fn options(self, options: EncodeOptions) -> Self {
+        Self { options, ..self }
+    }
+
+    /// Sets the width of the layer outside of the solid that belongs to the domain; the default is 5 % of the diagonal. It counts in place of
+    /// [`EncodeOptions::band`], whether it is called before or after `preset` and `options`.
+    ///
+    /// Points farther out are answered as exactly, but not as quickly. A conforming domain is what its tetrahedra fill and has no band.
+    pub fn band(self, band: Length) -> Self {
+        Self { band: Some(band), ..self }
+    }
+
+    /// Records the name of the mesh's unit, for people; nothing is scaled. It counts in place of [`EncodeOptions::unit`], as `band` does.
+    pub fn unit(self, unit: impl Into<String>) -> Self {
+        Self { unit: Some(unit.into()), ..self }
+    }
+
+    /// Sets where the cells come from; the default is [`Domain::Bisection`].
+    pub fn domain(self, domain: Domain<'a>) -> Self {
+        Self { domain, ..self }
+    }
+
+    /// Records the file that the mesh came from. [`encode_file`](Self::encode_file) records its own file instead.
+    pub fn source(self, source: Source) -> Self {
+        Self { source, ..self }
+    }
+
+    /// Sets what looks at the samples of [`Method::Sampled`](super::Method::Sampled); the default is the [`Processor`], in `f64`.
+    pub fn sampler(self, sampler: &'a dyn Sampler) -> Self {
+        Self { sampler, ..self }
+    }
+
+    /// Shares the progress with another thread, which can watch and cancel.
+    pub fn progress(self, progress: &'a Progress) -> Self {
+        Self { progress: Some(progress), ..self }
+    }
+
+    /// Encodes a solid, on all threads of the current rayon pool. The same solid and options give the same bytes on any number of threads.
+    ///
+    /// # Errors
+    /// [`EncodeError`]: an option has no meaning for the solid or the domain, the mesh is too large for the file format or has no short lists,
+    /// or [`Progress::cancel`] was called. Nothing is written anywhere.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::{Encoder, SolidMesh};
+    /// # use tesdf::mesh::{MeshFormat, read_bytes};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    /// # let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh;
+    /// let solid = SolidMesh::new(mesh)?;
+    /// let asset = Encoder::new().encode(&solid)?;
+    /// assert_eq!(asset.face_count(), 4);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn encode(&self, solid: &SolidMesh) -> Result<TeSdf, EncodeError> {
+        self.encode_from(solid, &self.source)
+    }
+
+    /// Reads a mesh file, checks that the mesh is a solid, and encodes it. The name and the BLAKE3 of the file are recorded as the
+    /// [`Source`]. What is worth a look although the mesh can be encoded ([`SolidMesh::warnings`]) is not told.
+    ///
+    /// # Errors
+    /// [`EncodeFileError`]: the file cannot be read, its mesh has no well-defined inside, or it cannot be [encoded](Self::encode).
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::{Encoder, Preset};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("part.obj");
+    /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+    /// let asset = Encoder::new().preset(Preset::Compact).encode_file(&path)?; // STL, OBJ, PLY, OFF, glTF or GLB
+    /// assert_eq!(asset.about().source.name, "part.obj");
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn encode_file(&self, path: impl AsRef<Path>) -> Result<TeSdf, EncodeFileError> {
+        self.encode_path(path.as_ref())
+    }
+
+    fn encode_path(&self, path: &Path) -> Result<TeSdf, EncodeFileError> {
+        let (solid, report) = SolidMesh::load(path)?;
+        let source = Source::of_file(path, report.source_blake3);
+        let at = |source| EncodeFileError::Encode { path: path.to_owned(), source };
+        self.encode_from(&solid, &source).map_err(at)
+    }
+
+    fn encode_from(&self, solid: &SolidMesh, source: &Source) -> Result<TeSdf, EncodeError> {
+        let unwatched = Progress::default();
+        let request = Request {
+            domain: self.domain,
+            source,
+            options: &self.resolved(),
+            sampler: self.sampler,
+            progress: self.progress.unwrap_or(&unwatched),
+        };
+        pipeline::encode(solid, &request)
+    }
+
+    fn resolved(&self) -> EncodeOptions {
+        let mut options = self.options.clone();
+        options.band = self.band.unwrap_or(options.band);
+        options.unit = self.unit.clone().or(options.unit);
+        options
+    }
+}
+
+impl TeSdf {
+    /// Reads a mesh file, checks that the mesh is a solid, and encodes it with the defaults: [`Encoder::encode_file`] of [`Encoder::new`].
+    ///
+    /// # Errors
+    /// [`EncodeFileError`]: the file cannot be read, its mesh has no well-defined inside, or it cannot be encoded.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::TeSdf;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("part.obj");
+    /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+    /// let asset = TeSdf::encode_file(&path)?; // STL, OBJ, PLY, OFF, glTF or GLB
+    /// asset.save(path.with_extension("tesdf"))?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn encode_file(path: impl AsRef<Path>) -> Result<Self, EncodeFileError> {
+        Encoder::new().encode_file(path)
+    }
+}
+
+/// Why a mesh file is not encoded. The message names the file.
+#[derive(Debug, thiserror::Error)]
+pub enum EncodeFileError {
+    /// The file has no mesh that can be read.
+    #[error("{}", source.in_file(path))]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: ReadError,
+    },
+    /// The mesh has no well-defined inside.
+    #[error("{}: {source}", path.display())]
+    NotSolid {
+        /// The file.
+        path: PathBuf,
+        /// All defects.
+        source: NotSolid,
+    },
+    /// The solid cannot be encoded.
+    #[error("{}: {source}", path.display())]
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: EncodeError,
+    },
+}
+
+impl EncodeFileError {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Read { path, .. } | Self::NotSolid { path, .. } | Self::Encode { path, .. } => path,
+        }
+    }
+}
+
+impl From<ReadSolidError> for EncodeFileError {
+    fn from(error: ReadSolidError) -> Self {
+        match error {
+            ReadSolidError::Read { path, source } => Self::Read { path, source },
+            ReadSolidError::NotSolid { path, source } => Self::NotSolid { path, source },
+        }
+    }
+}
