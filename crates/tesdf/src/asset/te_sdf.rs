@@ -80,6 +80,24 @@ impl TeSdf {
     ///
     /// # Errors
     /// [`AssetError`] names the section at fault.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::TeSdf;
+    /// use tesdf::glam::DVec3;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("part.obj");
+    /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+    /// TeSdf::encode_file(&path)?.save(path.with_extension("tesdf"))?;
+    /// let asset = TeSdf::open(path.with_extension("tesdf"))?;
+    /// asset.verify_checksums()?; // for a file that may be damaged
+    /// assert!(asset.is_inside(DVec3::splat(0.1)));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn open(path: impl AsRef<Path>) -> Result<Self, AssetError> {
         Self::from_container(Container::open(path, &layout::SECTIONS)?)
     }

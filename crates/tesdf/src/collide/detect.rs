@@ -16,6 +16,27 @@ const TASK: usize = 64;
 ///
 /// # Errors
 /// An option that makes no sense, or an instance whose shape is gone.
+///
+/// # Example
+///
+/// ```
+/// use tesdf::glam::DVec3;
+/// use tesdf::{CollideOptions, Instance, Mode, Pose, Scene, Shape, detect};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut scene = Scene::new();
+/// let ball = scene.add_shape(Shape::Sphere { radius: 1.0 })?;
+/// scene.add(Instance::new(ball, Pose::IDENTITY))?;
+/// scene.add(Instance::new(ball, Pose::at(DVec3::new(0.0, 0.0, 1.5))))?;
+/// let contacts = detect(&scene, &CollideOptions::default())?;
+/// assert!(contacts.iter().all(|c| (c.distance + 0.5).abs() < 1e-6));
+///
+/// // Up to 0.1 apart, and what one node of each body finds.
+/// let options = CollideOptions { contact_distance: 0.1, ..CollideOptions::with_mode(Mode::Node) };
+/// assert!(detect(&scene, &options)?.len() >= 2);
+/// # Ok(())
+/// # }
+/// ```
 pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
     let pairs = OrderedPair::all(scene, options)?;
     let candidates: Vec<Candidates> = pairs.par_iter().map(OrderedPair::candidates).collect();

@@ -91,6 +91,23 @@ impl Scene {
     ///
     /// # Errors
     /// [`CollideError::Shape`] for sizes that are not positive.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::{Scene, Shape, TeSdf};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("part.obj");
+    /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+    /// let mut scene = Scene::new();
+    /// let part = scene.add_shape(TeSdf::encode_file(&path)?)?;
+    /// let floor = scene.add_shape(Shape::Plane)?;
+    /// assert_ne!(part, floor);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn add_shape(&mut self, shape: impl Into<Shape>) -> Result<ShapeId, CollideError> {
         let shape = shape.into();
         shape.validate()?;
@@ -127,6 +144,22 @@ impl Scene {
     ///
     /// # Errors
     /// As [`add_many`](Self::add_many).
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    /// use tesdf::{Instance, Pose, Scene, Shape};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let mut scene = Scene::new();
+    /// let ball = scene.add_shape(Shape::Sphere { radius: 1.0 })?;
+    /// let small = Instance { scale: 0.1, ..Instance::new(ball, Pose::at(DVec3::X)) };
+    /// let id = scene.add(small)?;
+    /// assert_eq!(scene.instance(id)?.scale, 0.1);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn add(&mut self, instance: Instance) -> Result<InstanceId, CollideError> {
         self.add_many(&[instance]).map(|ids| ids.start)
     }

@@ -143,6 +143,22 @@ pub struct LoadReport {
 ///
 /// # Errors
 /// [`ReadError`] names the cause, the line, byte or element, and what to do.
+///
+/// # Example
+///
+/// ```
+/// use tesdf::mesh::read;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("part.obj");
+/// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+/// let loaded = read(&path)?;
+/// assert_eq!(loaded.mesh.faces().len(), 4);
+/// assert_eq!(loaded.report.welded_vertices, 0);
+/// # Ok(())
+/// # }
+/// ```
 pub fn read(path: impl AsRef<Path>) -> Result<LoadedMesh, ReadError> {
     read_path(path.as_ref())
 }

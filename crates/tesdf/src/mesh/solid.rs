@@ -63,6 +63,25 @@ impl SolidMesh {
     ///
     /// # Errors
     /// [`NotSolid`] has all errors, and says whether repair with default options would help.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    /// use tesdf::{SolidMesh, TriangleMesh};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    /// let faces = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+    /// let solid = SolidMesh::new(TriangleMesh::new(vertices, faces)?)?;
+    /// assert!(solid.is_simple());
+    ///
+    /// let open = TriangleMesh::new(solid.mesh().vertices().to_vec(), vec![[0, 2, 1]])?;
+    /// let error = SolidMesh::new(open).unwrap_err();
+    /// assert_eq!(error.report().boundary_loops.len(), 1);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn new(mesh: TriangleMesh) -> Result<Self, NotSolid> {
         let report = check(&mesh);
         if !report.encodable {

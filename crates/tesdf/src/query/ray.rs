@@ -25,6 +25,23 @@ impl TeSdf {
     ///
     /// A ray that begins far out is taken from where it comes near the body. The place is rounded to 1e-16 of the
     /// distance, so from 1e16 diagonals on only rays along an axis are sure to hit their aim.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::TeSdf;
+    /// use tesdf::glam::DVec3;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let folder = tempfile::tempdir()?;
+    /// # let path = folder.path().join("part.obj");
+    /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+    /// let asset = TeSdf::encode_file(&path)?;
+    /// let hit = asset.ray_cast(DVec3::new(-2.0, 0.2, 0.2), DVec3::X, f64::INFINITY).ok_or("nothing")?;
+    /// assert!((hit.t - 2.0).abs() < 1e-12 && hit.normal.distance(DVec3::NEG_X) < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn ray_cast(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
         let valid = origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO && limit >= 0.0;
         if !valid {
