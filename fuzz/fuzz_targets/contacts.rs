@@ -8,12 +8,11 @@ use std::sync::{Arc, LazyLock};
 use glam::{DQuat, DVec3};
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use libfuzzer_sys::fuzz_target;
-use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Instance, InstanceId, Mode, Pose, Scene, detect};
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{Preset, Encoder};
 use tesdf::geometry::Triangle;
 use tesdf::mesh::{SolidMesh, TriangleMesh, WindingNumber};
-use tesdf::{Progress, TeSdf};
+use tesdf::TeSdf;
 
 struct Body {
     mesh: TriangleMesh,
@@ -29,8 +28,7 @@ static BODIES: LazyLock<Vec<Body>> = LazyLock::new(|| {
         .filter_map(|bytes| {
             let mesh = support::closed(&mut Unstructured::new(bytes)).ok()?;
             let solid = SolidMesh::new(mesh.clone()).ok()?;
-            let options = EncodeOptions::preset(Preset::Fast);
-            let asset = encode(&solid, &Source::default(), &options, &Progress::default()).ok()?;
+            let asset = Encoder::new().preset(Preset::Fast).encode(&solid).ok()?;
             let winding = WindingNumber::new(&mesh);
             Some(Body { mesh, winding, asset: Arc::new(asset) })
         })
@@ -68,13 +66,13 @@ fuzz_target!(|data: &[u8]| {
     for mode in [Mode::Node, CollideOptions::default().mode] {
         let found =
             detect(&scene, &CollideOptions { mode, ..CollideOptions::default() }).expect("valid options");
-        for contact in &found.contacts {
+        for contact in &found {
             let (body, at) = if contact.instance_b == InstanceId(0) { (a, at_a) } else { (b, at_b) };
             let exact = body.signed_distance(at.rotation.inverse() * (contact.point_a - at.translation));
             assert!((contact.distance - exact).abs() < TOLERANCE, "{mode:?} {exact} {contact:?}");
             assert!((contact.normal.length() - 1.0).abs() < 1e-3, "{contact:?}");
         }
-        let deepest = found.contacts.iter().map(|c| c.distance).fold(0.0, f64::min);
+        let deepest = found.iter().map(|c| c.distance).fold(0.0, f64::min);
         for (one, at_one, other, at_other) in [(a, at_a, b, at_b), (b, at_b, a, at_a)] {
             for &v in one.mesh.vertices() {
                 let p = at_one.rotation * v + at_one.translation;

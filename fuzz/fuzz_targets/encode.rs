@@ -7,9 +7,7 @@ use std::ops::ControlFlow;
 
 use libfuzzer_sys::arbitrary::Unstructured;
 use libfuzzer_sys::fuzz_target;
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeError, EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeError, EncodeOptions, Preset, Encoder};
 use tesdf::mesh::SolidMesh;
 use tesdf::verify::{VerifyOptions, verify};
 
@@ -17,7 +15,7 @@ fuzz_target!(|data: &[u8]| {
     let Ok(mesh) = support::closed(&mut Unstructured::new(data)) else { return };
     let Ok(solid) = SolidMesh::new(mesh) else { return };
     let options = EncodeOptions { byte_worth: 0.5, ..EncodeOptions::preset(Preset::Fast) };
-    let asset = match encode(&solid, &Source::default(), &options, &Progress::default()) {
+    let asset = match Encoder::new().options(options).encode(&solid) {
         Ok(asset) => asset,
         Err(e @ EncodeError::SelfCheck { .. }) => panic!("{e}: {:?}", solid.mesh()),
         Err(_) => return,

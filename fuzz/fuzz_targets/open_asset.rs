@@ -16,7 +16,7 @@ fuzz_target!(|data: &[u8]| {
     for share in [0.0, 0.25, 0.5, 1.0, 7.0] {
         let p = bounds.min + DVec3::new(share, 0.5, 1.0 - share) * bounds.extent();
         for precision in [Precision::F32, Precision::F64] {
-            asset.query(p, precision);
+            asset.query_with(p, precision);
         }
         asset.is_inside(p);
         asset.ray_cast(p, DVec3::new(1.0, share, -0.5), f64::INFINITY);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use tesdf::encode::{
-    Deformation, Domain, DomainChoice, EncodeChoices, EncoderChoice, Preset, Refinement, Threshold, encode_in,
+    Deformation, Domain, DomainChoice, EncodeChoices, Encoder, MethodChoice, Preset, Refinement, Threshold,
 };
 use tesdf::{Progress, Stage};
 
@@ -65,7 +65,7 @@ pub fn encode(
     let choices = EncodeChoices {
         preset: named_preset(preset)?,
         domain: domain.map(domain_choice).transpose()?.unwrap_or_default(),
-        encoder: encoder.map(named_encoder).transpose()?,
+        method: encoder.map(named_encoder).transpose()?,
         resolution,
         threshold: threshold.map(length_or_safe).transpose()?,
         max_entries: e_max,
@@ -85,7 +85,13 @@ pub fn encode(
             let (solid, path, source) = input.load()?.solid()?;
             let tetrahedra = choices.tetrahedra(&solid, &state).map_err(Error::Domain)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
-            encode_in(&solid, domain, &source, &options, &state).map_err(|e| Error::Encode(path, e))
+            Encoder::new()
+                .options(options)
+                .domain(domain)
+                .source(source)
+                .progress(&state)
+                .encode(&solid)
+                .map_err(|e| Error::Encode(path, e))
         })
     };
     let watch = || match progress {
@@ -119,10 +125,10 @@ fn named_preset(name: &str) -> PyResult<Preset> {
     })
 }
 
-fn named_encoder(name: &str) -> PyResult<EncoderChoice> {
+fn named_encoder(name: &str) -> PyResult<MethodChoice> {
     match name {
-        "certified" => Ok(EncoderChoice::Certified),
-        "sampled" => Ok(EncoderChoice::Sampled),
+        "certified" => Ok(MethodChoice::Certified),
+        "sampled" => Ok(MethodChoice::Sampled),
         _ => Err(argument("encoder", format!("'{name}'"), "'certified' or 'sampled'")),
     }
 }

@@ -74,8 +74,7 @@ impl Error {
             None => e.to_string(),
         };
         match self {
-            Self::Read(_, e @ (ReadError::Open { .. } | ReadError::UnknownExtension { .. })) => e.to_string(),
-            Self::Read(path, e) => format!("{}: {e}", path.display()),
+            Self::Read(path, e) => e.in_file(path),
             Self::Mesh(e) => e.to_string(),
             Self::NotSolid(path, e) => at(path, e),
             Self::Repair(path, e) => at(path, e),

@@ -57,8 +57,7 @@ impl MeshInput {
             Self::File(path) => match read(&path) {
                 Err(e) => Err(Error::Read(path, e)),
                 Ok(loaded) => {
-                    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                    let source = Source { name, blake3: loaded.report.source_blake3 };
+                    let source = Source::of_file(&path, loaded.report.source_blake3);
                     Ok(Loaded { mesh: loaded.mesh, path: Some(path), source, notes: loaded.report.notes })
                 }
             },

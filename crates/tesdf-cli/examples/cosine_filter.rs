@@ -4,10 +4,8 @@
 use std::error::Error;
 use std::sync::Arc;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
 use tesdf::collide::{CollideOptions, Contact, Instance, InstanceId, Pose, Scene, detect};
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{Encoder, Preset};
 use tesdf::geometry::Triangle;
 use tesdf::glam::{DVec2, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
@@ -39,16 +37,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     let solids = [prism(&PROBE, 0.5)?, prism(&RECTANGLE, 2.0)?];
     let mut scene = Scene::new();
     for solid in &solids {
-        let options = EncodeOptions::preset(Preset::Fast);
-        let asset = encode(solid, &Source::default(), &options, &Progress::default())?;
+        let asset = Encoder::new().preset(Preset::Fast).encode(solid)?;
         let shape = scene.add_shape(Arc::new(asset))?;
         scene.add(Instance::new(shape, Pose::IDENTITY))?;
     }
     let normal = |c: &Contact| Triangle::new(solids[0].mesh().triangle(c.face_a as usize)).normal;
     let cos = 0.5;
-    let found = detect(&scene, &CollideOptions::default())?.contacts;
-    let kept =
-        detect(&scene, &CollideOptions { cos_theta: Some(cos), ..CollideOptions::default() })?.contacts;
+    let found = detect(&scene, &CollideOptions::default())?;
+    let kept = detect(&scene, &CollideOptions { cos_theta: Some(cos), ..CollideOptions::default() })?;
 
     // Of each face and direction the deepest contact; only the two lower faces are drawn.
     let mut shown: Vec<Contact> = Vec::new();

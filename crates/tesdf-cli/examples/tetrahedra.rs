@@ -6,14 +6,13 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use tesdf::asset::about::Source;
 use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::domain::ConformingMesh;
 use tesdf::domain::gmsh::{GmshOptions, tetrahedralise};
-use tesdf::encode::{Domain, EncodeOptions, Preset, Refinement, encode, encode_in};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset, Refinement};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh, read};
-use tesdf::{Length, Progress, Side};
+use tesdf::{Length, Side};
 use tesdf_cli::render::{Cut, Drawn, Exposure, HalfSpace, Scenery, View, linear, render};
 
 type Failure = Box<dyn Error>;
@@ -52,8 +51,7 @@ fn plates(faces: &[[DVec3; 3]], thickness: f64) -> Result<Shape, Failure> {
 
 fn shape((vertices, faces): (Vec<DVec3>, Vec<[u32; 3]>)) -> Result<Shape, Failure> {
     let solid = SolidMesh::new(TriangleMesh::new(vertices, faces)?)?;
-    let options = EncodeOptions::preset(Preset::Fast);
-    Ok(Shape::Mesh(Arc::new(encode(&solid, &Source::default(), &options, &Progress::default())?)))
+    Ok(Shape::Mesh(Arc::new(Encoder::new().preset(Preset::Fast).encode(&solid)?)))
 }
 
 fn drawn(shape: &Shape, colour: [u8; 3], exposure: Exposure) -> Drawn<'_> {
@@ -106,8 +104,7 @@ fn encoded_faces(
     picture: impl Fn(&[Drawn], &Cut, &View, &str) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let options = EncodeOptions { refinement: Refinement::None, ..EncodeOptions::default() };
-    let progress = Progress::default();
-    let asset = encode_in(solid, Domain::Conforming(domain), &Source::default(), &options, &progress)?;
+    let asset = Encoder::new().options(options).domain(Domain::Conforming(domain)).encode(solid)?;
     let mut longest = None;
     asset.visit_cells(|cell| {
         let inside = domain.sides()[cell.id as usize] == Side::Inside;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use serde::Serialize;
 use tesdf::collide::{
-    CollideOptions, Contact, Contacts, FaceMethod, HiddenOverlap, Instance, InstanceId, Mode, PairReduction,
-    Pose, Reduction, Scene, Statistics, detect,
+    CollideOptions, Contact, Contacts, HiddenOverlap, Instance, InstanceId, Mode, PairReduction, Pose,
+    Reduction, Scene, Statistics, detect,
 };
 use tesdf::{Length, TeSdf};
 
@@ -141,11 +141,13 @@ impl Args {
         let tolerance = self.tolerance.map_or(Length::OfDiagonal(1e-7), Length::Absolute);
         let mode = match self.mode {
             ModeName::Node => Mode::Node,
-            ModeName::Face => Mode::Face(FaceMethod::FrankWolfe { iterations: self.iterations }),
-            ModeName::Exact => Mode::Face(FaceMethod::Exact { tolerance }),
+            ModeName::Face => Mode::Face,
+            ModeName::Exact => Mode::Exact,
         };
         CollideOptions {
             mode,
+            iterations: self.iterations,
+            tolerance,
             contact_distance: self.contact_distance,
             cos_theta: self.cos_theta.0,
             reduction: self.reduce,
@@ -172,10 +174,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let found = found.map_err(Failure::new)?;
     warn_of(&found.hidden, options.mode);
     if args.report {
-        let Contacts { contacts, statistics, reductions, hidden } = &found;
-        report::json(&Report { contacts, statistics, reductions, hidden })?;
+        let Contacts { statistics, reductions, hidden, .. } = &found;
+        report::json(&Report { contacts: found.as_slice(), statistics, reductions, hidden })?;
     } else if args.json {
-        report::json(&found.contacts)?;
+        report::json(&found.as_slice())?;
     } else {
         report::text(&text(&found))?;
     }
@@ -192,7 +194,7 @@ fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
     if !hidden.is_empty() {
         report::hint(match mode {
             Mode::Node => "the mode node tests vertices alone: use --mode face or --mode exact",
-            Mode::Face(_) => {
+            Mode::Face | Mode::Exact => {
                 "their surfaces are hardly inside of each other, as of bodies in one place: `tesdf clearance` tells how far, and a \
                  pose that parts them ends it"
             }
@@ -207,7 +209,7 @@ fn text(found: &Contacts) -> String {
     let s = &found.statistics;
     let mut text = format!(
         "{} of {} against {}\n",
-        count(found.contacts.len(), "contact"),
+        count(found.len(), "contact"),
         count(s.candidates, "candidate"),
         count(s.polygons, "cell")
     );
@@ -217,7 +219,7 @@ fn text(found: &Contacts) -> String {
     if s.unconverged > 0 {
         let _ = writeln!(text, "{} not within the tolerance", count(s.unconverged, "contact"));
     }
-    let mut deepest: Vec<&Contact> = found.contacts.iter().collect();
+    let mut deepest: Vec<&Contact> = found.iter().collect();
     deepest.sort_by(|x, y| x.distance.total_cmp(&y.distance));
     if !deepest.is_empty() {
         text += "deepest first: distance, face of a, face of b, point on a, normal from b to a\n";

@@ -8,7 +8,7 @@ use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::asset::about::{Source, Statistics};
 use tesdf::domain::tetrahedra_files;
-use tesdf::encode::{Domain, DomainChoice, EncodeOptions, Encoder, Threshold, encode_with};
+use tesdf::encode::{Domain, DomainChoice, EncodeOptions, Encoder, Method, Threshold};
 use tesdf::geometry::Aabb;
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 use tesdf::{Certificate, Progress, TeSdf};
@@ -124,13 +124,12 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     load.notes.iter().for_each(|note| report::warning(note));
     warn(solid.warnings());
 
-    let name = args.mesh.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let source = Source { name, blake3: load.source_blake3.clone() };
+    let source = Source::of_file(&args.mesh, load.source_blake3.clone());
     let interrupted = interrupt_flag()?;
     let progress = Progress::default();
     let choices = args.choices();
     let options = choices.options().map_err(Failure::new)?;
-    if options.encoder == Encoder::Certified && args.device != Choice::Processor {
+    if options.method == Method::Certified && args.device != Choice::Processor {
         return Err(Failure::new("--device is of the sampled encoder; add --encoder sampled"));
     }
     let sampler = args.device.sampler()?;
@@ -138,7 +137,14 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         pool.install(|| {
             let tetrahedra = choices.tetrahedra(&solid, &progress).map_err(Failure::new)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
-            encode_with(&solid, domain, &source, &options, &*sampler, &progress).map_err(|e| at(&e))
+            Encoder::new()
+                .options(options)
+                .domain(domain)
+                .source(source)
+                .sampler(&*sampler)
+                .progress(&progress)
+                .encode(&solid)
+                .map_err(|e| at(&e))
         })
     });
     if interrupted.load(Ordering::Relaxed) {

@@ -116,7 +116,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let device = args.device.open()?;
     let interrupted = interrupt_flag()?;
     let progress = Progress::default();
-    let system = watched(&progress, &interrupted, || loaded.system(&progress));
+    let system = watched(&progress, &interrupted, || loaded.system_watched(&progress));
     let mut system = system.map_err(|e| match e {
         SceneError::Cancelled => {
             Failure::new(format!("interrupted; {} is as it was", args.output().display()))

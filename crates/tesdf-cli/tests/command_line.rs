@@ -4,7 +4,7 @@ use std::process::{Command, Output, Stdio};
 
 use clap::{CommandFactory, Parser};
 use tesdf::encode::{
-    ChoiceError, Deformation, DomainChoice, EncodeOptions, Encoder, Refinement, Sampling, Threshold,
+    ChoiceError, Deformation, DomainChoice, EncodeOptions, Method, Refinement, Sampling, Threshold,
 };
 use tesdf_cli::{Cli, Command as Parsed, encode, slice};
 
@@ -145,7 +145,7 @@ fn options_of_the_encoders() {
     assert_eq!(domain, DomainChoice::File("x.msh".into()));
     let sampled = sampled.unwrap();
     let sampling = Sampling { resolution: 8, threshold: Threshold::CoveringRadius, ..Sampling::PAPER };
-    assert_eq!(sampled.encoder, Encoder::Sampled(sampling));
+    assert_eq!(sampled.method, Method::Sampled(sampling));
     assert_eq!((sampled.deformation, sampled.refinement), (Deformation::Expected, Refinement::ByCost));
     for (wrong, named) in [
         (&["--plain"][..], ChoiceError::PlainBisection),

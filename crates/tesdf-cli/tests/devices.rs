@@ -74,7 +74,7 @@ fn a_run_comes_out_as_on_the_processor() {
     folder.write("drop.toml", DROP.replace("CUBE", &data("cube.obj")));
     let run = |device: &str| {
         folder.good(&["simulate", "drop.toml", "-o", "run", "--device", device]);
-        RunRecord::open(&folder.path("run")).expect("a run")
+        RunRecord::open(folder.path("run")).expect("a run")
     };
     let (host, device) = (run("cpu"), run("gpu"));
     let last = host.times().len() - 1;

@@ -111,7 +111,7 @@ fn a_killed_run_goes_on_from_its_last_step_to_the_same_bytes() {
             assert_eq!(steps, None, "kill {kills} took the run away");
             continue;
         }
-        let left = RunRecord::open(&folder.path("run")).unwrap_or_else(|e| panic!("kill {kills}: {e}"));
+        let left = RunRecord::open(folder.path("run")).unwrap_or_else(|e| panic!("kill {kills}: {e}"));
         assert!(Some(left.steps()) >= steps, "kill {kills} took steps away");
         let last = left.steps() as usize;
         assert_eq!(left.times(), &record.times()[..=last]);

@@ -197,7 +197,7 @@ fn a_run_is_drawn_at_a_time_like_its_bodies_by_hand() {
         folder.good(&[&["render"][..], args, &common].concat());
         std::fs::read(folder.path("p.png")).unwrap()
     };
-    let record = RunRecord::open(&folder.path("run")).unwrap();
+    let record = RunRecord::open(folder.path("run")).unwrap();
     let by_hand = |step: usize| {
         let z = record.pose(step, 0).unwrap().translation.z;
         let pose = format!("0 0 {z:?} 0 0 0 1");

@@ -76,7 +76,7 @@ fn a_cut_run_goes_on_to_the_same_bytes() {
     assert!(read(&folder, "other") == whole);
     // A step that was half written.
     folder.write("torn", &cut[..cut.len() - 5]);
-    assert_eq!(RunRecord::open(&folder.path("torn")).unwrap().steps(), 6);
+    assert_eq!(RunRecord::open(folder.path("torn")).unwrap().steps(), 6);
     folder.good(&["simulate", "--resume", "torn"]);
     assert!(read(&folder, "torn") == whole);
     // The mesh has moved.
@@ -163,7 +163,7 @@ fn start(folder: &Folder, steps: u64) -> Child {
     let mut command = folder.command(&["simulate", "long.toml", "-o", "run"]);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     // The run of the test's beginning is shorter.
-    while !RunRecord::open(&folder.path("run"))
+    while !RunRecord::open(folder.path("run"))
         .is_ok_and(|run| run.planned_steps() == Some(steps) && run.steps() > 2)
     {
         std::thread::sleep(Duration::from_millis(2));
@@ -179,7 +179,7 @@ fn ctrl_c_keeps_the_steps_and_says_how_to_go_on() {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let (code, out, err) = texts(child.wait_with_output().unwrap());
     assert_eq!((code, out.as_str()), (Some(2), ""), "{err}");
-    let steps = RunRecord::open(&folder.path("run")).unwrap().steps();
+    let steps = RunRecord::open(folder.path("run")).unwrap().steps();
     assert!((3..2000).contains(&steps));
     let expected = format!(
         "error: interrupted after {steps} of 2000 steps; run has them\nhint: `tesdf simulate --resume run` goes on from there\n"

@@ -36,14 +36,14 @@ fn a_run_is_written_and_summed_up() {
     folder.write("drop.toml", DROP);
     let text = folder.good(&["simulate", "drop.toml", "-o", "run.safetensors"]);
     assert!(text.contains("10 steps") && text.contains("penetration"), "{text}");
-    let record = RunRecord::open(&folder.path("run.safetensors")).unwrap();
+    let record = RunRecord::open(folder.path("run.safetensors")).unwrap();
     assert_eq!((record.bodies.as_slice(), record.times().len()), (&["floor".into(), "ball".into()][..], 11));
 
     let more = ["--time-step", "1e-3", "--duration", "0.005", "--mode", "node", "--json"];
     let json = folder.good(&[&["simulate", "drop.toml", "-o", "run.safetensors"], &more[..]].concat());
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!((&json["steps"], &json["seconds"], &json["passed"]), (&5.into(), &0.005.into(), &().into()));
-    let record = RunRecord::open(&folder.path("run.safetensors")).unwrap();
+    let record = RunRecord::open(folder.path("run.safetensors")).unwrap();
     assert_eq!(
         (&record.scene["time_step"], &record.scene["detector"]["mode"]),
         (&1e-3.into(), &"node".into())
@@ -119,7 +119,7 @@ fn an_overlap_that_no_contact_shows_is_told_and_meets_no_criterion() {
     assert!(depth > 2e-3 && json["deepest_penetration"].as_f64().unwrap() >= depth, "{json}");
     assert!(err.contains("bodies below and above overlapped by") && err.contains("--mode face"), "{err}");
     // The record has it, too.
-    let record = RunRecord::open(&folder.path("run")).unwrap();
+    let record = RunRecord::open(folder.path("run")).unwrap();
     assert_eq!(serde_json::to_value(record.hidden_pairs()).unwrap(), json["hidden"]);
 
     folder.write("judged.toml", TWINS.to_string() + &SCREW.replace("ball", "above"));

@@ -236,7 +236,7 @@ impl Detector {
             bytes: products_bytes + size_of_val(contacts.as_slice()),
         };
         let hidden = HiddenOverlap::not_shown(self.overlaps(instances)?, &contacts);
-        Ok(Contacts { contacts, statistics, reductions, hidden })
+        Ok(Contacts::new(contacts, statistics, reductions, hidden))
     }
 
     /// The pairs that overlap, as far as contacts need not show it.

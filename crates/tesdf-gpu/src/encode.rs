@@ -5,13 +5,8 @@ mod face;
 
 use cubecl::prelude::*;
 use rayon::prelude::*;
-use tesdf::encode::Processor;
-use tesdf::encode::Surface;
-use tesdf::encode::{
-    Domain, EncodeError, EncodeOptions, SampledCell, Sampler, Sampling, Source, encode_with,
-};
-use tesdf::mesh::SolidMesh;
-use tesdf::{Progress, TeSdf};
+use tesdf::Progress;
+use tesdf::encode::{EncodeError, Processor, SampledCell, Sampler, Sampling, Surface};
 
 use cell::{CellRows, Grid};
 pub use count::{SampleCounter, SampleCounts};
@@ -21,29 +16,15 @@ use crate::GpuError;
 use crate::device::Device;
 use crate::kernels::sample::{FACE_ROWS, GROUP, sample};
 
-/// Encodes as [`encode_in`](tesdf::encode::encode_in), the samples of the sampled encoder on a device.
-///
-/// Distances are `f32` there. Lists name every face that the processor's name, and besides only faces whose gap at a sample is at most
-/// ε + 2 · [`ROUNDING`] · (R + d): R is the radius of the cell, d the distance. The certificate says on what class of device. The same device
-/// gives the same bytes.
-///
-/// # Errors
-/// [`EncodeError`]; [`EncodeError::Sampler`] has the [`GpuError`] of a device that refuses.
-pub fn encode(
-    device: &Device,
-    solid: &SolidMesh,
-    domain: Domain,
-    source: &Source,
-    options: &EncodeOptions,
-    progress: &Progress,
-) -> Result<TeSdf, EncodeError> {
-    encode_with(solid, domain, source, options, &DeviceSampler::new(device.clone()), progress)
-}
-
 /// What is allowed for rounding of a gap, as a share of the cell's radius and the distance: docs/math.md, 3.
 pub const ROUNDING: f64 = crate::kernels::sample::ROUNDING as f64;
 
-/// Looks at samples on a device.
+/// Looks at the samples of [`Method::Sampled`](tesdf::encode::Method::Sampled) on a device: give it to
+/// [`Encoder::sampler`](tesdf::Encoder::sampler).
+///
+/// Distances are `f32` there. Lists name every face that the processor's name, and besides only faces whose gap at a sample is at most
+/// ε + 2 · [`ROUNDING`] · (R + d): R is the radius of the cell, d the distance. The certificate says on what class of device. The same device
+/// gives the same bytes. [`EncodeError::Sampler`] has the [`GpuError`] of a device that refuses.
 #[derive(Clone, Debug)]
 pub struct DeviceSampler {
     device: Device,

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! TeSdf ──Images──▶ buffers ──SignedDistances──▶ answers of many points
-//! SolidMesh ──encode──▶ TeSdf, by samples
+//! SolidMesh ──tesdf::Encoder, DeviceSampler──▶ TeSdf
 //! Scene ──Detector──▶ contacts, in the form and order of `tesdf::collide::detect`
 //! ```
 //!
@@ -34,7 +34,7 @@ pub use detector::{
     Pruning,
 };
 pub use device::{Device, DeviceInfo, DeviceKind, devices};
-pub use encode::{DeviceSampler, ROUNDING, SampleCounter, SampleCounts, SamplerLimits, encode};
+pub use encode::{DeviceSampler, ROUNDING, SampleCounter, SampleCounts, SamplerLimits};
 pub use error::GpuError;
 pub use images::{ImageBytes, Images};
 pub use query::{WorldAnswer, query};

@@ -8,14 +8,12 @@ use compare::{Compared, device, each_mode, hold, hold_against};
 use support::random::Random;
 use support::shapes;
 use support::tetrahedra::{bare_beam, beam, bend, moves};
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::collide::{Instance, Placement, Pose, Scene, Shape};
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::{Domain, EncodeOptions, Preset, Refinement, encode, encode_in};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset, Refinement};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
-use tesdf::query::Precision;
-use tesdf::{Progress, TeSdf};
 use tesdf_gpu::{Detector, DetectorOptions, DeviceArray, GpuError, Images, query};
 
 fn plain() -> EncodeOptions {
@@ -23,7 +21,10 @@ fn plain() -> EncodeOptions {
 }
 
 fn encoded(solid: &SolidMesh, domain: &ConformingMesh, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, Domain::Conforming(domain), &Source::default(), options, &Progress::default())
+    Encoder::new()
+        .options(options.clone())
+        .domain(Domain::Conforming(domain))
+        .encode(solid)
         .expect("valid options")
 }
 
@@ -52,7 +53,7 @@ fn distances_are_those_of_the_host() {
             let answers = query(&device, &images, &[&shape], &[(0, at)], &points).expect("answers").remove(0);
             let mut others = 0;
             for (p, answer) in points.iter().zip(&answers) {
-                let expected = asset.signed_distance(*p, Precision::F64);
+                let expected = asset.signed_distance(*p);
                 let off = (answer.signed_distance - expected).abs() / diagonal;
                 assert!(truncated || off < 2e-6, "{p}: {} instead of {expected}", answer.signed_distance);
                 others += usize::from(off >= 2e-6);
@@ -82,7 +83,7 @@ fn contacts_are_those_of_the_host() {
     let mut random = Random(8);
     let bisected = |solid: &SolidMesh| {
         let options = EncodeOptions::preset(Preset::Fast);
-        encode(solid, &Source::default(), &options, &Progress::default()).expect("encodes")
+        Encoder::new().options(options).encode(solid).expect("encodes")
     };
     // Of small faces, and of faces larger than the beam.
     let ball = bisected(&shapes::Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid());
@@ -120,8 +121,7 @@ fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
     let device = device();
     let mut random = Random(4);
     let ball = shapes::Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid();
-    let ball = encode(&ball, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())
-        .expect("encodes");
+    let ball = Encoder::new().preset(Preset::Fast).encode(&ball).expect("encodes");
     let mut compared = Compared::default();
     for (solid, domain) in [beam(), bare_beam()] {
         for encoding in &encodings()[..2] {
@@ -139,7 +139,7 @@ fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
             let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
             let answers =
                 query(&device, &images, &[&Shape::Plane, &shape], &[(1, at)], &points).expect("answers");
-            let off = |(p, found): (&DVec3, f64)| (bent.signed_distance(*p, Precision::F64) - found).abs();
+            let off = |(p, found): (&DVec3, f64)| (bent.signed_distance(*p) - found).abs();
             let distances = answers[0].iter().map(|a| a.signed_distance);
             let others = points.iter().zip(distances).map(off).filter(|off| *off > 2e-6 * diagonal).count();
             // Lists of moved faces jump at borders of cells, where rounding may find another one.

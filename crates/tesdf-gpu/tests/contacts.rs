@@ -11,13 +11,12 @@ use compare::{Compared, device, each_mode, found, hold, least};
 use support::bodies::{Body, Placed, RELATIONS, Relation, body, rotation, scene};
 use support::meshes;
 use support::random::Random;
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::collide::{
     CollideOptions, Contact, Contacts, Groups, Instance, InstanceId, Mode, Pose, Scene, Shape, detect,
 };
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
-use tesdf::{Progress, TeSdf};
 use tesdf_gpu::{Capacities, Detector, DetectorOptions, Exchange, GpuError, Lanes, Memory, Pruning};
 
 #[test]
@@ -67,7 +66,7 @@ fn a_nut_on_its_bolt() {
     let bolt = Placed::around("iso_m16_bolt_6k", rotation(&mut random), 1.0, 3.0 * random.direction());
     let nut = Placed { body: body("iso_m16_nut_c25"), at: bolt.at };
     let size = bolt.diagonal();
-    for mode in [Mode::Node, Mode::FACE, Mode::EXACT] {
+    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
         let options = CollideOptions {
             contact_distance: 2e-5,
             cos_theta: Some(0.3),
@@ -118,7 +117,7 @@ fn truncated_lists() {
         .solid()
         .expect("solid");
     let options = EncodeOptions { max_entries: Some(8), ..EncodeOptions::preset(Preset::Fast) };
-    let asset: TeSdf = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
+    let asset: TeSdf = Encoder::new().options(options).encode(&solid).expect("encodes");
     let truncated = Arc::new(Body { solid, asset: Arc::new(asset) });
     let mut random = Random(31);
     for _ in 0..3 {
@@ -129,7 +128,7 @@ fn truncated_lists() {
         for options in each_mode(size) {
             let host = detect(&scene, &options).expect("a good scene");
             let (device, _) = found(&scene, &options, DetectorOptions::default());
-            let (on_host, on_device) = (least(&host.contacts), least(&device.contacts));
+            let (on_host, on_device) = (least(host.as_slice()), least(device.as_slice()));
             let same = on_host.keys().filter(|k| on_device.contains_key(k)).count();
             let all = on_host.len().max(on_device.len());
             assert!(all - same <= 2 + all / 50, "{same} of {all} parts");
@@ -156,14 +155,14 @@ fn worlds(count: u32, random: &mut Random) -> Scene {
 fn worlds_are_as_if_alone_and_cost_no_launches() {
     let mut random = Random(17);
     let scene = worlds(8, &mut random);
-    for mode in [Mode::Node, Mode::FACE] {
+    for mode in [Mode::Node, Mode::Face] {
         let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode) };
         let (all, mut detector) = found(&scene, &options, DetectorOptions::default());
         let launches = detector.report().launches;
         assert!(launches <= 24, "{launches} launches");
         let again = detector.detect(&scene, &options).expect("detects");
-        assert_eq!(all.contacts, again.contacts, "two runs differ");
-        let mut rest = all.contacts.as_slice();
+        assert_eq!(all.as_slice(), again.as_slice(), "two runs differ");
+        let mut rest = all.as_slice();
         for world in 0..8u32 {
             let mut alone = Scene::new();
             for id in [2 * world, 2 * world + 1] {
@@ -174,8 +173,8 @@ fn worlds_are_as_if_alone_and_cost_no_launches() {
             }
             let (own, one) = found(&alone, &options, DetectorOptions::default());
             assert_eq!(one.report().launches, launches);
-            let (these, others) = rest.split_at(own.contacts.len());
-            for (x, y) in these.iter().zip(&own.contacts) {
+            let (these, others) = rest.split_at(own.len());
+            for (x, y) in these.iter().zip(&own) {
                 let (a, b) = (y.instance_a.0 + 2 * world, y.instance_b.0 + 2 * world);
                 let names = (InstanceId(a), InstanceId(b), y.feature, y.face_a, y.face_b, y.tet_b);
                 assert_eq!((x.instance_a, x.instance_b, x.feature, x.face_a, x.face_b, x.tet_b), names);
@@ -193,7 +192,7 @@ fn groups_and_exclusions() {
     let mut random = Random(2);
     let mut scene = worlds(1, &mut random);
     let options = CollideOptions::with_mode(Mode::Node);
-    let count = |scene: &Scene| found(scene, &options, DetectorOptions::default()).0.contacts.len();
+    let count = |scene: &Scene| found(scene, &options, DetectorOptions::default()).0.len();
     let all = count(&scene);
     assert!(all > 0);
     scene.exclude(InstanceId(0), InstanceId(1)).expect("they are there");
@@ -214,19 +213,19 @@ fn groups_and_exclusions() {
 fn buffers_grow_or_say_what_they_need() {
     let mut random = Random(4);
     let scene = worlds(6, &mut random);
-    let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::FACE) };
+    let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::Face) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
     let capacities = Capacities { directions: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1, kept: 1 };
     let little = DetectorOptions { capacities, ..DetectorOptions::default() };
     let (grown, detector) = found(&scene, &options, little);
-    assert_eq!(grown.contacts, expected.contacts);
+    assert_eq!(grown.as_slice(), expected.as_slice());
     assert!(detector.report().passes > 1);
     let capacities = Capacities { contacts: 10, ..Capacities::default() };
     let fixed = DetectorOptions { capacities, memory: Memory::Fixed, ..DetectorOptions::default() };
     let mut detector = Detector::new(&device(), &scene, fixed).expect("fits");
     let error = detector.detect(&scene, &options).expect_err("too little");
     let GpuError::Full { buffer: "contacts", capacity: 10, needed, .. } = error else { panic!("{error}") };
-    assert_eq!(needed as usize, expected.contacts.len());
+    assert_eq!(needed as usize, expected.len());
 }
 
 /// A thread alone finds what 32 find, shared memory what planes find, pruning loses nothing, and the processor finds
@@ -235,7 +234,7 @@ fn buffers_grow_or_say_what_they_need() {
 fn the_same_however_a_polygon_is_worked_on() {
     let mut random = Random(6);
     let scene = worlds(3, &mut random);
-    let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::FACE) };
+    let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::Face) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
     let usual = DetectorOptions::default();
     for with in [
@@ -246,7 +245,7 @@ fn the_same_however_a_polygon_is_worked_on() {
     ] {
         let (other, _) = found(&scene, &options, with);
         let lost = |x: &Contacts, y: &Contacts| {
-            let missing = x.contacts.iter().filter(|c| !y.contacts.contains(c));
+            let missing = x.iter().filter(|c| !y.as_slice().contains(c));
             missing.copied().collect::<Vec<Contact>>()
         };
         assert_eq!(lost(&expected, &other), [], "{with:?} loses contacts");
@@ -260,7 +259,7 @@ fn nothing_is_no_error() {
     let scene = worlds(1, &mut random);
     let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("fits");
     let contacts = detector.detect(&Scene::new(), &CollideOptions::default()).expect("nothing to do");
-    assert!(contacts.contacts.is_empty());
+    assert!(contacts.is_empty());
     let options = CollideOptions { contact_distance: f64::NAN, ..CollideOptions::default() };
     let error = detector.detect(&scene, &options).expect_err("no distance");
     assert!(error.to_string().starts_with("contact_distance is NaN"), "{error}");

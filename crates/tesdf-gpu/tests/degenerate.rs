@@ -9,14 +9,13 @@ use support::random::Random;
 use support::reference::Reference;
 use support::shapes::{FAMILIES, Shape as Faces};
 use support::tetrahedra::{bare_beam, beam};
-use tesdf::asset::about::Source;
-use tesdf::collide::{FaceMethod, Instance, Mode, Placement, Pose, Reduction, Scene, Shape};
+use tesdf::TeSdf;
+use tesdf::collide::{Instance, Mode, Placement, Pose, Reduction, Scene, Shape};
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::{Domain, EncodeOptions, Preset, Refinement, encode, encode_in};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset, Refinement};
 use tesdf::geometry::Triangle;
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
-use tesdf::{Progress, TeSdf};
 use tesdf_gpu::{
     Detector, DetectorOptions, DeviceAnswers, DeviceArray, Images, WorldAnswer, query, query_arrays,
 };
@@ -29,8 +28,7 @@ fn solid(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> SolidMesh {
 }
 
 fn encoded(solid: &SolidMesh) -> TeSdf {
-    let options = EncodeOptions::preset(Preset::Fast);
-    encode(solid, &Source::default(), &options, &Progress::default()).expect("encodes")
+    Encoder::new().preset(Preset::Fast).encode(solid).expect("encodes")
 }
 
 /// The cube from −1 to 1 with more vertices and faces.
@@ -157,14 +155,14 @@ fn contacts_are_those_of_the_host() {
             let one = hold(&scene, options, diagonal);
             println!("{name}, {:?}: {one:?}", options.mode);
             match options.mode {
-                Mode::Face(FaceMethod::FrankWolfe { .. }) => frank_wolfe.add(one),
+                Mode::Face => frank_wolfe.add(one),
                 _ => sure.add(one),
             }
         }
         let reduced = tesdf::collide::CollideOptions { reduction: Reduction::PerPair(8), ..modes[0] };
         let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("fits");
         let found = detector.detect(&scene, &reduced).expect("detects");
-        assert!(found.contacts.iter().all(|c| (c.normal.length() - 1.0).abs() < 1e-5), "{name}");
+        assert!(found.iter().all(|c| (c.normal.length() - 1.0).abs() < 1e-5), "{name}");
         assert!(
             found.reductions.iter().all(|r| r.wrench_error.is_finite() && r.length.is_finite()),
             "{name}"
@@ -184,8 +182,7 @@ fn what_collapses_on_the_device() {
     for (solid, domain) in [beam(), bare_beam()] {
         let options = EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Fast) };
         let domain_of = Domain::Conforming(&domain);
-        let rest = encode_in(&solid, domain_of, &Source::default(), &options, &Progress::default())
-            .expect("valid options");
+        let rest = Encoder::new().options(options).domain(domain_of).encode(&solid).expect("valid options");
         let shape = Shape::from(rest);
         let (bounds, diagonal) = (shape.bounds(), shape.diagonal());
         let middle = bounds.center();

@@ -7,18 +7,16 @@ use std::ops::ControlFlow;
 use support::meshes;
 use support::tetrahedra::grid;
 use tesdf::domain::{Cell, ConformingMesh, DomainCube};
-use tesdf::encode::Processor;
-use tesdf::encode::Surface;
 use tesdf::encode::internal::Touching;
 use tesdf::encode::{
-    Domain, EncodeError, EncodeOptions, Encoder, Preset, Refinement, SampledCell, Sampler, Sampling, Source,
-    Threshold, encode_in, encode_with,
+    Domain, EncodeError, EncodeOptions, Encoder, Method, Preset, Processor, Refinement, SampledCell, Sampler,
+    Sampling, Surface, Threshold,
 };
 use tesdf::geometry::{Aabb, AabbTree, LocalFrame};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::verify::{VerifyOptions, verify};
 use tesdf::{Progress, TeSdf};
-use tesdf_gpu::{Device, DeviceSampler, ROUNDING, SamplerLimits, encode};
+use tesdf_gpu::{Device, DeviceSampler, ROUNDING, SamplerLimits};
 
 fn device() -> Device {
     Device::choose(None).expect("a device")
@@ -120,7 +118,7 @@ fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
 
 fn sampled(sampling: Sampling, refinement: Refinement) -> EncodeOptions {
     EncodeOptions {
-        encoder: Encoder::Sampled(sampling),
+        method: Method::Sampled(sampling),
         refinement,
         byte_worth: 1.0,
         ..EncodeOptions::preset(Preset::Fast)
@@ -143,14 +141,15 @@ fn lists(asset: &TeSdf) -> Vec<Vec<u32>> {
 
 #[test]
 fn a_whole_asset_in_both_domains() {
-    let (device, progress) = (device(), Progress::default());
+    let device = device();
     let (solid, conforming) = block();
     let sampling = Sampling { resolution: 7, ..Sampling::PAPER };
     for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
         let options = sampled(sampling, Refinement::ByCost);
-        let source = Source::default();
-        let asset = encode(&device, &solid, domain, &source, &options, &progress).expect("encodes");
-        let expected = encode_in(&solid, domain, &source, &options, &progress).expect("encodes");
+        let sampler = DeviceSampler::new(device.clone());
+        let encoder = Encoder::new().options(options.clone()).domain(domain);
+        let asset = encoder.clone().sampler(&sampler).encode(&solid).expect("encodes");
+        let expected = encoder.encode(&solid).expect("encodes");
         let (lists, expected_lists) = (lists(&asset), lists(&expected));
         assert_eq!(lists.len(), expected_lists.len());
         for (list, expected) in lists.iter().zip(&expected_lists) {
@@ -161,15 +160,16 @@ fn a_whole_asset_in_both_domains() {
         assert_eq!(said(&expected), "sampled");
         assert_eq!(asset.about().certificate().delta(), None);
 
-        let again = encode(&device, &solid, domain, &source, &options, &progress).expect("encodes");
+        let again = encoder.clone().sampler(&sampler).encode(&solid).expect("encodes");
         assert!(asset.as_bytes() == again.as_bytes(), "two runs differ");
         let limits = SamplerLimits { candidates: 30, distances: 100_000 };
         let bit_by_bit = DeviceSampler::with_limits(device.clone(), limits);
-        let again = encode_with(&solid, domain, &source, &options, &bit_by_bit, &progress).expect("encodes");
+        let again = encoder.sampler(&bit_by_bit).encode(&solid).expect("encodes");
         assert!(asset.as_bytes() == again.as_bytes(), "small batches differ");
 
         let cut = EncodeOptions { max_entries: Some(6), refinement: Refinement::ByCost, ..options };
-        let cut = encode(&device, &solid, domain, &source, &cut, &progress).expect("encodes");
+        let cut =
+            Encoder::new().options(cut).domain(domain).sampler(&sampler).encode(&solid).expect("encodes");
         let certificate = cut.about().certificate();
         assert!(certificate.truncated() && certificate.exactness_distance() > Some(0.0), "{certificate:?}");
         // Faces that pass through a cell of the bisection domain are never dropped.
@@ -183,9 +183,10 @@ fn a_whole_asset_in_both_domains() {
 fn a_threshold_as_wide_as_the_grid_misses_nothing() {
     let (solid, conforming) = block();
     let options = sampled(Sampling { resolution: 3, ..Sampling::SAFE }, Refinement::None);
-    let (source, progress) = (Source::default(), Progress::default());
     let domain = Domain::Conforming(&conforming);
-    let asset = encode(&device(), &solid, domain, &source, &options, &progress).expect("encodes");
+    let sampler = DeviceSampler::new(device());
+    let asset =
+        Encoder::new().options(options).domain(domain).sampler(&sampler).encode(&solid).expect("encodes");
     assert!(asset.about().certificate().delta().is_some());
     let go_on = |_| ControlFlow::Continue(());
     let report = verify(&asset, &VerifyOptions { samples: 3000, seed: 1 }, go_on).expect("a valid mesh");

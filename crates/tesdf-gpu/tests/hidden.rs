@@ -67,7 +67,7 @@ fn cubes_that_pass_through_each_other_a_world_for_each_shift() {
 #[test]
 fn bodies_in_one_place_overlap_in_every_mode() {
     let scene = scene(&[moved(&cube(), DVec3::ZERO), moved(&cube(), DVec3::ZERO)]);
-    for mode in [NODE, Mode::FACE, Mode::EXACT] {
+    for mode in [NODE, Mode::Face, Mode::Exact] {
         let [device, host] = both(&scene, mode);
         assert_eq!((device.len(), host.len()), (1, 1), "{mode:?}");
         assert!((device[0].depth - host[0].depth).abs() < 1e-5, "{device:?} instead of {host:?}");

@@ -6,7 +6,6 @@ use support::bodies::{body, rotation};
 use support::random::Random;
 use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::glam::DVec3;
-use tesdf::query::Precision;
 use tesdf_gpu::{Device, Images, query};
 
 /// What a distance may be off by, as a share of the diagonal: twice what `f32` queries of the host promise.
@@ -41,7 +40,7 @@ fn distances_are_those_of_the_host() {
         let answers = query(&device, &images, &shapes, &[(number, at)], &world).expect("answers").remove(0);
         let mut off: f64 = 0.0;
         for (p, answer) in points.iter().zip(&answers) {
-            let expected = at.scale * asset.signed_distance(*p, Precision::F64);
+            let expected = at.scale * asset.signed_distance(*p);
             // Far away `f32` is relative to the distance.
             let size = (at.scale * diagonal).max(expected.abs());
             let error = (answer.signed_distance - expected).abs() / size;
@@ -55,7 +54,7 @@ fn distances_are_those_of_the_host() {
             assert!((answer.gradient.length() - 1.0).abs() < 1e-5);
             // The way to the surface is along the gradient: of faces that are as near any may be named.
             for on in [answer.closest_point, at.to_world(*p) - answer.signed_distance * answer.gradient] {
-                let distance = at.scale * asset.signed_distance(at.to_shape(on), Precision::F64);
+                let distance = at.scale * asset.signed_distance(at.to_shape(on));
                 assert!(
                     distance.abs() < 3.0 * DISTANCE * size,
                     "{}: {p}: {distance} off the surface",
@@ -100,7 +99,7 @@ fn points_times_instances() {
             }
             let local = at.to_shape(*p);
             let expected = match shapes[*shape] {
-                Shape::Mesh(asset) => asset.signed_distance(local, Precision::F64),
+                Shape::Mesh(asset) => asset.signed_distance(local),
                 Shape::Plane => local.z,
                 Shape::Sphere { radius } => local.length() - radius,
                 Shape::Capsule { half_height, radius } => {

@@ -1,20 +1,13 @@
 //! Rapier's own world with an encoded mesh in it: a cube falls onto a plane, and a ball onto the cube.
 use std::error::Error;
-use std::path::Path;
 use std::sync::Arc;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::collide::{CollideOptions, Mode};
-use tesdf::encode::{EncodeOptions, encode};
-use tesdf::mesh::{SolidMesh, read};
+use tesdf::{CollideOptions, Mode, TeSdf};
 use tesdf_rapier::rapier3d_f64::prelude::*;
 use tesdf_rapier::{RapierOptions, TesdfShape, query_dispatcher};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/procedural/cube.obj");
-    let solid = SolidMesh::new(read(&path)?.mesh)?;
-    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &Progress::default())?;
+    let asset = TeSdf::encode_file(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj"))?;
     let bounds = asset.bounds();
     let (height, top) = (bounds.extent().z, bounds.max.z);
     let cube = TesdfShape::new(Arc::new(asset));

@@ -5,13 +5,8 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tesdf::asset::about::Source;
-use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Reduction, Shape};
-use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, read};
-use tesdf::query::Precision;
-use tesdf::{Progress, TeSdf};
+use tesdf::{CollideOptions, Encoder, Instance, Mode, Pose, Preset, Reduction, Shape, TeSdf};
 use tesdf_rapier::{RapierEngine, RapierOptions};
 use tesdf_sim::criterion::{ScrewCriterion, ScrewTracker};
 use tesdf_sim::{Dynamics, Mass, MassProperties, System};
@@ -27,8 +22,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let step = argument(2, "1").parse::<f64>()? * 1e-3;
     let mode = match argument(3, "node").as_str() {
         "node" => Mode::Node,
-        "face" => Mode::FACE,
-        "exact" => Mode::EXACT,
+        "face" => Mode::Face,
+        "exact" => Mode::Exact,
         other => return Err(format!("{other}: expected node, face or exact").into()),
     };
     let contact_distance = argument(5, "0.2").parse::<f64>()? * 1e-3;
@@ -107,15 +102,13 @@ fn asset(name: &str) -> Result<Arc<TeSdf>, Box<dyn Error>> {
     if path.extension().is_none() {
         path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../data/procedural/{name}.obj"));
     }
-    let solid = SolidMesh::new(read(&path)?.mesh)?;
-    let options = EncodeOptions::preset(Preset::Fast);
-    Ok(Arc::new(encode(&solid, &Source::default(), &options, &Progress::default())?))
+    Ok(Arc::new(Encoder::new().preset(Preset::Fast).encode_file(path)?))
 }
 
 /// How deep the vertices of one mesh are in another, m.
 fn penetration(a: &TeSdf, b: &TeSdf, to_b: impl Fn(DVec3) -> DVec3) -> f64 {
     (0..a.face_count())
         .flat_map(|face| a.face_corners(face))
-        .map(|p| -b.signed_distance(to_b(p), Precision::F64))
+        .map(|p| -b.signed_distance(to_b(p)))
         .fold(0.0, f64::max)
 }

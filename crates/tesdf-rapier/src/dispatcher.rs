@@ -80,7 +80,7 @@ impl PersistentQueryDispatcher<ContactManifoldData, ContactData> for TesdfDispat
         let begin = Instant::now();
         let pair = self.pair(g1, g2)?;
         let found = self.contacts(pos12, pair, prediction.max(0.0));
-        let contacts = found.as_ref().map_or(&[][..], |found| &found.contacts);
+        let contacts = found.as_ref().map_or(&[][..], Contacts::as_slice);
         manifolds::replace(contacts, pos12, manifolds, workspace);
         if let Some(record) = &self.record {
             let mut record = record.lock();
@@ -119,7 +119,7 @@ impl QueryDispatcher for TesdfDispatcher {
     ) -> Result<ShapeIntersection, Unsupported> {
         let pair = self.pair(g1, g2)?;
         let found = self.contacts(pos12, pair, 0.0).map_err(|_| Unsupported)?;
-        Ok(ShapeIntersection::new(!(found.contacts.is_empty() && found.hidden.is_empty())))
+        Ok(ShapeIntersection::new(!(found.is_empty() && found.hidden.is_empty())))
     }
 
     /// The deepest contact.
@@ -131,7 +131,7 @@ impl QueryDispatcher for TesdfDispatcher {
         prediction: f64,
     ) -> Result<Option<ParryContact>, Unsupported> {
         let pair = self.pair(g1, g2)?;
-        let contacts = self.contacts(pos12, pair, prediction.max(0.0)).map_err(|_| Unsupported)?.contacts;
+        let contacts = self.contacts(pos12, pair, prediction.max(0.0)).map_err(|_| Unsupported)?;
         let deepest = contacts.iter().min_by(|c, d| c.distance.total_cmp(&d.distance));
         Ok(deepest.map(|c| {
             let flipped = c.instance_a != FIRST;

@@ -17,17 +17,17 @@
 //! ```
 //! use std::sync::Arc;
 //! use rapier3d_f64::prelude::*;
-//! use tesdf::collide::{CollideOptions, Mode};
-//! use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
+//! use tesdf::mesh::{MeshFormat, read_bytes};
+//! use tesdf::{CollideOptions, Encoder, Mode, SolidMesh};
 //! use tesdf_rapier::{RapierOptions, TesdfShape, query_dispatcher};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 //! let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
-//! let asset = Arc::new(tesdf::encode::encode(&solid, &Default::default(), &Default::default(), &Default::default())?);
+//! let asset = Arc::new(Encoder::new().encode(&solid)?);
 //!
 //! let mut world = PhysicsWorld { gravity: Vector::new(0.0, 0.0, -9.81), ..PhysicsWorld::default() };
-//! world.narrow_phase.set_query_dispatcher(query_dispatcher(CollideOptions::with_mode(Mode::EXACT)));
+//! world.narrow_phase.set_query_dispatcher(query_dispatcher(CollideOptions::with_mode(Mode::Exact)));
 //! world.integration_parameters = RapierOptions::default().parameters(1e-3, 1e-3); // s, m
 //! world.insert_collider(ColliderBuilder::new(SharedShape::new(HalfSpace::new(Vector::Z))), None);
 //! let body = world.insert_body(RigidBodyBuilder::dynamic().translation(Vector::new(0.0, 0.0, 1e-3)));

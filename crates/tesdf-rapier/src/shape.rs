@@ -6,7 +6,7 @@ use rapier3d_f64::parry::bounding_volume::BoundingSphere;
 use rapier3d_f64::parry::mass_properties::MassProperties;
 use rapier3d_f64::parry::query::{PointProjection, PointQuery, RayCast};
 use tesdf::TeSdf;
-use tesdf::query::{Answer, Precision};
+use tesdf::query::Answer;
 use tesdf_sim::MassProperties as SolidMass;
 
 /// An encoded mesh as a shape of parry and Rapier, with a uniform scale.
@@ -41,7 +41,7 @@ impl TesdfShape {
     }
 
     fn answer(&self, p: DVec3) -> Answer {
-        self.asset.query(p / self.scale, Precision::F64)
+        self.asset.query(p / self.scale)
     }
 }
 

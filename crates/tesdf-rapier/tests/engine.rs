@@ -122,7 +122,7 @@ fn groups_worlds_and_exclusions_are_heeded() {
     let meets_own_group = system.add("own group", other_plane_only, mass).expect("a pose");
     let excluded = system.add("excluded", at(0.3), mass).expect("a pose");
     system.exclude(plane, excluded).expect("bodies");
-    let mut engine = engine(system, collide(Mode::EXACT));
+    let mut engine = engine(system, collide(Mode::Exact));
     for _ in 0..50 {
         engine.step(1e-3).expect("a step");
     }
@@ -141,7 +141,7 @@ fn free_motion_keeps_momentum() {
     let mass = steel(&shape);
     let mut system = System::new(DVec3::ZERO);
     let body = add(&mut system, "box", shape, Pose::at(DVec3::ZERO), Mass::Free(mass));
-    let mut engine = engine(system, collide(Mode::EXACT));
+    let mut engine = engine(system, collide(Mode::Exact));
     let state = State {
         linear: DVec3::X,
         angular: DVec3::new(1.0, 20.0, 2.0),

@@ -4,7 +4,6 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
-use tesdf::Progress;
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_sim::record::{CutRun, RecordError, RunJournal, RunOrigin, RunRecord};
 use tesdf_sim::scene_file::LoadedScene;
@@ -56,16 +55,16 @@ impl Bench {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("wedge.obj"), WEDGE).unwrap();
-        let loaded = LoadedScene::parse(SCENE.into(), &folder.path().join("scene.toml")).unwrap();
+        let loaded = LoadedScene::parse(SCENE.into(), folder.path().join("scene.toml")).unwrap();
         Self { folder, loaded }
     }
 
     fn destination(&self) -> Destination {
-        Destination::new(&self.folder.path().join("run"), &SaveOptions::default()).unwrap()
+        Destination::new(self.folder.path().join("run"), &SaveOptions::default()).unwrap()
     }
 
     fn system(&self) -> tesdf_sim::System {
-        self.loaded.system(&Progress::default()).unwrap()
+        self.loaded.system().unwrap()
     }
 
     fn origin(&self) -> RunOrigin {
@@ -104,7 +103,7 @@ impl Bench {
     }
 
     fn open(&self) -> CutRun {
-        CutRun::open(&self.folder.path().join("run")).unwrap()
+        CutRun::open(self.folder.path().join("run")).unwrap()
     }
 
     fn bytes(&self) -> Vec<u8> {
@@ -214,8 +213,8 @@ fn what_would_give_other_bits_is_refused() {
     // The same mesh under another name.
     fs::write(bench.folder.path().join("moved.obj"), WEDGE).unwrap();
     let mut loaded = bench.loaded.clone();
-    assert!(loaded.replace_geometry("wedge", "moved.obj".into()));
-    let system = loaded.system(&Progress::default()).unwrap();
+    assert!(loaded.replace_geometry("wedge", "moved.obj"));
+    let system = loaded.system().unwrap();
     cut.check(&loaded.scene, &RunOrigin::of(&system, "cpu").unwrap()).unwrap();
 }
 

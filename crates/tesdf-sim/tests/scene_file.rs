@@ -2,9 +2,7 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh, write};
 use tesdf_sim::record::{RecordError, RunRecord};
@@ -37,7 +35,7 @@ fn load(text: &str) -> Result<LoadedScene, SceneError> {
 /// What becomes of a text: the error of parsing it or of building its system and engine.
 fn refusal(text: &str) -> String {
     let error = load(text).and_then(|scene| {
-        let system = scene.system(&Progress::default())?;
+        let system = scene.system()?;
         scene.newton(system).map(|_| ())
     });
     error.expect_err("it was accepted").to_string()
@@ -48,7 +46,7 @@ fn a_scene_is_what_it_says() {
     let loaded = load(DROP).unwrap();
     assert_eq!(loaded.scene.detector.mode, DetectorMode::Exact);
     assert_eq!(loaded.scene.gravity, [0.0, 0.0, -9.81]);
-    let system = loaded.system(&Progress::default()).unwrap();
+    let system = loaded.system().unwrap();
     assert_eq!(system.bodies()[0].mass, Mass::Fixed);
     let Mass::Free(mass) = system.bodies()[1].mass else { panic!("the brick is fixed") };
     assert!((mass.mass - 0.5).abs() < 1e-15);
@@ -99,7 +97,7 @@ fn errors_say_where() {
 fn a_run_survives_its_file() {
     let run = || {
         let loaded = load(DROP).unwrap();
-        let system = loaded.system(&Progress::default()).unwrap();
+        let system = loaded.system().unwrap();
         let mut engine = loaded.newton(system).unwrap();
         simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap()
     };
@@ -142,7 +140,7 @@ fn what_is_no_run_is_refused() {
 #[test]
 fn a_run_can_be_broken_off() {
     let loaded = load(DROP).unwrap();
-    let mut engine = loaded.newton(loaded.system(&Progress::default()).unwrap()).unwrap();
+    let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
     let stop = |m: &tesdf_sim::Moment<'_>| match m.step {
         3 => ControlFlow::Break(()),
         _ => ControlFlow::Continue(()),
@@ -211,14 +209,14 @@ fn cubes(bodies: &str) -> (tempfile::TempDir, LoadedScene) {
     ];
     let mesh = TriangleMesh::new((0..8).map(corner).collect(), faces.to_vec()).unwrap();
     let solid = SolidMesh::new(mesh.clone()).unwrap();
-    write(&folder.path().join("cube.ply"), &mesh).unwrap();
+    write(folder.path().join("cube.ply"), &mesh).unwrap();
     for (name, unit) in [("mm", "mm"), ("inch", "inches"), ("furlong", "furlong")] {
         let options = EncodeOptions { unit: Some(unit.into()), ..EncodeOptions::preset(Preset::Fast) };
-        let asset = encode(&solid, &Source::default(), &options, &Progress::default()).unwrap();
-        asset.save(&folder.path().join(name).with_extension("tesdf")).unwrap();
+        let asset = Encoder::new().options(options).encode(&solid).unwrap();
+        asset.save(folder.path().join(name).with_extension("tesdf")).unwrap();
     }
     let text = format!("time_step = 1e-3\nduration = 1\n{bodies}");
-    let loaded = LoadedScene::parse(text, &folder.path().join("cubes.toml")).unwrap();
+    let loaded = LoadedScene::parse(text, folder.path().join("cubes.toml")).unwrap();
     (folder, loaded)
 }
 
@@ -237,7 +235,7 @@ fn a_mesh_of_a_thousand_bodies_is_loaded_once() {
         let mesh = body.get_mut().mesh.as_mut().unwrap();
         *mesh = mesh.to_str().unwrap().replace("FOLDER", &name).into();
     }
-    let system = loaded.system(&Progress::default()).unwrap();
+    let system = loaded.system().unwrap();
     let shape = |body: &tesdf_sim::Body| system.scene().instance(body.instance).unwrap().shape;
     assert_eq!(system.bodies().len(), 1000);
     assert!(system.bodies().iter().all(|body| shape(body) == shape(&system.bodies()[0])));
@@ -252,7 +250,7 @@ fn units_that_differ_need_scales_that_make_them_one() {
             )
         };
         let (_folder, loaded) = cubes(&assets.map(body).concat());
-        loaded.system(&Progress::default()).map(|_| ()).map_err(|e| e.to_string())
+        loaded.system().map(|_| ()).map_err(|e| e.to_string())
     };
     for good in
         [[("mm", 1e-3), ("inch", 0.0254)], [("mm", 1.0), ("inch", 25.4)], [("mm", 1.0), ("furlong", 3.0)]]

@@ -3,7 +3,6 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use tesdf::Progress;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Summary, System, simulate};
 
@@ -20,7 +19,7 @@ fn scene() -> (LoadedScene, System) {
             // In 60 ms an ideal screw makes 0.0083 turns.
             loaded.scene.criterion.screw.as_mut().unwrap().min_turns = 0.003;
             loaded.scene.criterion.screw.as_mut().unwrap().min_acceleration = 0.0;
-            let system = loaded.system(&Progress::default()).unwrap();
+            let system = loaded.system().unwrap();
             (loaded, system)
         })
         .clone()

@@ -1,7 +1,7 @@
 //! Reading a mesh the way every command does.
 use std::path::Path;
 
-use tesdf::mesh::{LoadReport, LoadedMesh, ReadError};
+use tesdf::mesh::{LoadReport, LoadedMesh};
 
 use crate::report::{Failure, count};
 
@@ -10,10 +10,7 @@ use crate::report::{Failure, count};
 /// # Errors
 /// As [`tesdf::mesh::read`].
 pub fn read(path: &Path) -> Result<LoadedMesh, Failure> {
-    tesdf::mesh::read(path).map_err(|e| match e {
-        ReadError::Open { .. } | ReadError::UnknownExtension { .. } => Failure::new(e),
-        e => Failure::new(format!("{}: {e}", path.display())),
-    })
+    tesdf::mesh::read(path).map_err(|e| Failure::new(e.in_file(path)))
 }
 
 /// What was read, as lines for a person.

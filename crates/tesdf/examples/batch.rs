@@ -2,26 +2,19 @@
 //!
 //! `cargo run --release --example batch -- [MESH]`; the default is a torus of 1.924 28e-5 m³.
 use std::error::Error;
-use std::path::PathBuf;
 use std::time::Instant;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, read};
-use tesdf::query::Precision;
+use tesdf::{Encoder, Preset, SolidMesh};
 
 /// Points a side.
 const GRID: usize = 64;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let torus = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/torus_5k.obj");
-    let path = std::env::args_os().nth(1).map_or(PathBuf::from(torus), PathBuf::from);
-    let solid = SolidMesh::new(read(&path)?.mesh)?;
+    let solid = SolidMesh::read(std::env::args_os().nth(1).unwrap_or(torus.into()))?;
     let bounds = solid.mesh().bounds();
-    let asset =
-        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())?;
+    let asset = Encoder::new().preset(Preset::Fast).encode(&solid)?;
 
     let middle = |i: usize| (i as f64 + 0.5) / GRID as f64;
     let points: Vec<DVec3> = (0..GRID.pow(3))
@@ -30,7 +23,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         .collect();
 
     let start = Instant::now();
-    let answers = asset.query_batch(&points, Precision::F32);
+    let answers = asset.query_batch_f32(&points);
     let seconds = start.elapsed().as_secs_f64();
     let inside = answers.iter().filter(|a| a.signed_distance < 0.0).count();
     let mean = answers.iter().map(|a| a.signed_distance.abs()).sum::<f64>() / points.len() as f64;
@@ -47,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Answers come in the order of the points, the same as one by one.
     for i in (0..points.len()).step_by(997) {
-        assert_eq!(answers[i], asset.query(points[i], Precision::F32));
+        assert_eq!(answers[i], asset.query_f32(points[i]));
     }
     Ok(())
 }

@@ -2,27 +2,20 @@
 //!
 //! `cargo run --release --example clearance -- [MESH]`; the default is a cube with an edge of 20 mm about the origin.
 use std::error::Error;
-use std::path::PathBuf;
-use std::sync::Arc;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::collide::{ClearanceOptions, Instance, Pose, Scene, clearance};
-use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, read};
+use tesdf::{ClearanceOptions, Encoder, Instance, Pose, Preset, Scene, clearance};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
     let given = std::env::args_os().nth(1);
-    let solid = SolidMesh::new(read(&given.as_ref().map_or(PathBuf::from(cube), PathBuf::from))?.mesh)?;
-    let height = solid.mesh().bounds().extent().z;
-    let asset =
-        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())?;
+    let path = given.clone().unwrap_or(cube.into());
+    let asset = Encoder::new().preset(Preset::Fast).encode_file(path)?;
+    let height = asset.bounds().extent().z;
 
     // Both instances share the encoded mesh. Lengths are in the mesh's unit.
     let mut scene = Scene::new();
-    let shape = scene.add_shape(Arc::new(asset))?;
+    let shape = scene.add_shape(asset)?;
     let below = scene.add(Instance::new(shape, Pose::IDENTITY))?;
     let above = scene.add(Instance::new(shape, Pose::IDENTITY))?;
     for gap in [0.5, 0.1, 0.0, -0.1, -0.25] {

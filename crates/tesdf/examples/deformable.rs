@@ -2,20 +2,18 @@
 //!
 //! `cargo run --release --example deformable`
 use std::error::Error;
-use std::path::Path;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::collide::{CollideOptions, Instance, Pose, Scene, Shape, detect};
 use tesdf::domain::{ConformingMesh, read_tetrahedra};
-use tesdf::encode::{Deformation, Domain, EncodeOptions, Refinement, encode_in};
+use tesdf::encode::{Deformation, Refinement};
 use tesdf::glam::DVec3;
-use tesdf::mesh::SolidMesh;
+use tesdf::{
+    CollideOptions, Domain, EncodeOptions, Encoder, Instance, Pose, Scene, Shape, SolidMesh, detect,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     // A mesh for finite elements: its own surface is what is encoded, so that the two conform.
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/procedural/beam.ele");
-    let tetrahedra = read_tetrahedra(&path)?;
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/beam.ele");
+    let tetrahedra = read_tetrahedra(path)?;
     let solid = SolidMesh::new(tetrahedra.surface()?)?;
     let domain = ConformingMesh::new(&solid, &tetrahedra)?;
     let options = EncodeOptions {
@@ -23,8 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         refinement: Refinement::None,
         ..EncodeOptions::default()
     };
-    let (source, progress) = (Source::default(), Progress::default());
-    let asset = encode_in(&solid, Domain::Conforming(&domain), &source, &options, &progress)?;
+    let asset = Encoder::new().options(options).domain(Domain::Conforming(&domain)).encode(&solid)?;
     let (bounds, diagonal) = (asset.bounds(), solid.mesh().diagonal());
 
     let mut scene = Scene::new();
@@ -35,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     scene.add(Instance::new(ball, Pose::at(below)))?;
 
     let touching = |scene: &Scene| -> Result<usize, Box<dyn Error>> {
-        let contacts = detect(scene, &CollideOptions::default())?.contacts;
+        let contacts = detect(scene, &CollideOptions::default())?;
         let deepest = contacts.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
         println!("{} contacts, deepest {deepest:e}", contacts.len());
         Ok(contacts.len())

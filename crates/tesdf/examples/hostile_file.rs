@@ -3,12 +3,8 @@
 //! `cargo run --release --example hostile_file -- [FILE.tesdf]`; without a file it makes one.
 use std::error::Error;
 
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::asset::{AssetError, layout};
-use tesdf::encode::{EncodeOptions, encode};
-use tesdf::mesh::{SolidMesh, read};
-use tesdf::query::Precision;
-use tesdf::{Progress, TeSdf};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let good = match std::env::args_os().nth(1) {
@@ -42,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut bent = good.clone();
     bent[at] ^= 1;
     let bent = TeSdf::from_bytes(&bent)?;
-    bent.query(opened.face_corners(0)[0], Precision::F32);
+    bent.query_f32(opened.face_corners(0)[0]);
     match bent.verify_checksums() {
         Err(error @ AssetError::Checksum { .. }) => println!("bent: {error}"),
         other => return Err(format!("expected a checksum error, got {other:?}").into()),
@@ -51,8 +47,6 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 fn made() -> Result<Vec<u8>, Box<dyn Error>> {
-    let mesh = read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/tetra.obj").as_ref())?.mesh;
-    let solid = SolidMesh::new(mesh)?;
-    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &Progress::default())?;
-    Ok(asset.as_bytes().to_vec())
+    let tetra = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/tetra.obj");
+    Ok(TeSdf::encode_file(tetra)?.as_bytes().to_vec())
 }

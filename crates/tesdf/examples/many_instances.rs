@@ -1,8 +1,8 @@
 //! Many instances of a few shapes: what they cost, and that only those that touch do.
 //!
 //! `cargo run --release -p tesdf --example many_instances -- 1000000`
-use tesdf::collide::{CollideOptions, Instance, Pose, Scene, Shape, detect};
 use tesdf::glam::DVec3;
+use tesdf::{CollideOptions, Instance, Pose, Scene, Shape, detect};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let count: u32 = std::env::args().nth(1).map_or(Ok(100_000), |n| n.parse())?;
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
     let found = detect(&scene, &CollideOptions::default())?;
     println!("{count} instances, {} bytes", scene.instance_bytes());
-    println!("{} contacts of {} ordered pairs", found.contacts.len(), found.statistics.instance_pairs);
+    println!("{} contacts of {} ordered pairs", found.len(), found.statistics.instance_pairs);
     println!("{} bytes of contacts and what led to them", found.statistics.bytes);
     Ok(())
 }

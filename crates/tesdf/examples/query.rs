@@ -2,26 +2,21 @@
 //!
 //! `cargo run --release --example query -- [MESH]`; the default is a cube with an edge of 20 mm about the origin.
 use std::error::Error;
-use std::path::PathBuf;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, encode};
+use tesdf::TeSdf;
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, read};
-use tesdf::query::Precision;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
     let given = std::env::args_os().nth(1);
-    let solid = SolidMesh::new(read(&given.as_ref().map_or(PathBuf::from(cube), PathBuf::from))?.mesh)?;
-    let (bounds, diagonal) = (solid.mesh().bounds(), solid.mesh().diagonal());
-    let asset = encode(&solid, &Source::default(), &EncodeOptions::default(), &Progress::default())?;
+    let asset = TeSdf::encode_file(given.clone().unwrap_or(cube.into()))?;
+    let bounds = asset.bounds();
+    let diagonal = bounds.extent().length();
 
-    // F32 is fast and within 1e-6 × diagonal; F64 is exact up to rounding. Lengths are in the mesh's unit.
+    // `query` is exact up to rounding; `query_f32` is faster and within 1e-6 × diagonal. Lengths are in the mesh's unit.
     let above = bounds.center() + DVec3::new(0.1, 0.2, 0.6) * bounds.extent();
-    let fast = asset.query(above, Precision::F32);
-    let exact = asset.query(above, Precision::F64);
+    let exact = asset.query(above);
+    let fast = asset.query_f32(above);
     println!("at {above}: {} from face {} at {}", exact.signed_distance, exact.face, exact.closest_point);
     println!("gradient {}, f32 off by {:e}", exact.gradient, fast.signed_distance - exact.signed_distance);
     assert!((fast.signed_distance - exact.signed_distance).abs() <= 1e-6 * diagonal);
@@ -30,8 +25,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Outside of the domain the answer is exact too, from all faces; a narrow-band user asks for `None` instead.
     let far = bounds.max + 10.0 * diagonal;
-    assert!(asset.query_in_domain(far, Precision::F64).is_none());
-    assert!(asset.signed_distance(far, Precision::F64) > 9.0 * diagonal);
+    assert!(asset.query_in_domain(far).is_none());
+    assert!(asset.signed_distance(far) > 9.0 * diagonal);
     assert!(!asset.is_inside(far));
 
     // A ray from there to the centre meets the surface on the way.
@@ -39,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let hit = asset.ray_cast(far, ray, 1.0);
     if let Some(hit) = hit {
         println!("the ray meets face {} at {}", hit.face, hit.point);
-        assert!(asset.signed_distance(hit.point, Precision::F64).abs() <= 1e-9 * diagonal);
+        assert!(asset.signed_distance(hit.point).abs() <= 1e-9 * diagonal);
     }
     if given.is_none() {
         assert_eq!(exact.gradient, DVec3::Z);

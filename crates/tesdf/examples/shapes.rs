@@ -2,21 +2,14 @@
 //!
 //! `cargo run --release --example shapes`
 use std::error::Error;
-use std::path::Path;
 use std::sync::Arc;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::collide::{CollideOptions, Instance, Pose, Scene, Shape, detect};
-use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, read};
+use tesdf::{CollideOptions, Encoder, Instance, Pose, Preset, Scene, Shape, detect};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
-    let solid = SolidMesh::new(read(Path::new(path))?.mesh)?;
-    let options = EncodeOptions::preset(Preset::Fast);
-    let cube = Arc::new(encode(&solid, &Source::default(), &options, &Progress::default())?);
+    let cube = Arc::new(Encoder::new().preset(Preset::Fast).encode_file(path)?);
 
     // A cube of 20 mm around the origin. Each shape overlaps its side x = 10 mm, or its bottom, by 1 mm.
     let half_extents = DVec3::new(0.005, 0.003, 0.003);
@@ -34,13 +27,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         scene.add(Instance::new(shape, Pose::at(at)))?;
         let found = detect(&scene, &CollideOptions::default())?;
         let deepest_of = |a| {
-            let of_a = found.contacts.iter().filter(|c| (c.instance_a == cube) == a);
+            let of_a = found.iter().filter(|c| (c.instance_a == cube) == a);
             of_a.map(|c| c.distance).fold(f64::INFINITY, f64::min)
         };
         let (as_field, as_surface) = (deepest_of(true), deepest_of(false));
         println!(
             "{name:<8} {:>4} contacts; deepest against its field {as_field:+.6}, of its surface {as_surface:+.6}",
-            found.contacts.len()
+            found.len()
         );
         assert!((as_surface + 0.001).abs() < 1e-8, "{name}: its surface is 1 mm inside the cube");
         assert!(as_field < 0.0, "{name}: the cube's surface is inside of it");

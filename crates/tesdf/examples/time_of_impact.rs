@@ -2,24 +2,18 @@
 //!
 //! `cargo run --release --example time_of_impact -- [MESH]`; the default is a cube with an edge of 20 mm about the origin.
 use std::error::Error;
-use std::path::PathBuf;
 
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::collide::{
-    Instance, Motion, Pose, Scene, Shape, TimeOfImpactOptions, Velocity, clearance, time_of_impact,
-};
-use tesdf::encode::{EncodeOptions, Preset, encode};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, read};
+use tesdf::{
+    ClearanceOptions, Encoder, Instance, Motion, Pose, Preset, Scene, Shape, TimeOfImpactOptions, Velocity,
+    clearance, time_of_impact,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cube = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
-    let given = std::env::args_os().nth(1);
-    let solid = SolidMesh::new(read(&given.as_ref().map_or(PathBuf::from(cube), PathBuf::from))?.mesh)?;
-    let diagonal = solid.mesh().diagonal();
-    let asset =
-        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())?;
+    let path = std::env::args_os().nth(1).unwrap_or(cube.into());
+    let asset = Encoder::new().preset(Preset::Fast).encode_file(path)?;
+    let diagonal = asset.bounds().extent().length();
 
     let mut scene = Scene::new();
     let (mesh, plane) = (scene.add_shape(asset)?, scene.add_shape(Shape::Plane)?);
@@ -45,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for k in 0..10 {
         let pose = thrown.pose_at(start, impact.time * f64::from(k) / 10.0);
         scene.set_poses(&[(body, pose)])?;
-        assert!(clearance(&scene, body, floor, &Default::default())?.distance > 0.0);
+        assert!(clearance(&scene, body, floor, &ClearanceOptions::default())?.distance > 0.0);
     }
     Ok(())
 }

@@ -2,20 +2,14 @@
 //!
 //! `cargo run --release --example two_meshes`
 use std::error::Error;
-use std::path::Path;
 
-use tesdf::asset::about::Source;
-use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Reduction, Scene, detect};
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::EncodeFileError;
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, read};
-use tesdf::{Progress, TeSdf};
+use tesdf::{CollideOptions, Encoder, Instance, Mode, Pose, Preset, Reduction, Scene, TeSdf, detect};
 
-fn load(name: &str) -> Result<TeSdf, Box<dyn Error>> {
+fn load(name: &str) -> Result<TeSdf, EncodeFileError> {
     let path = format!("{}/../../data/procedural/{name}.obj", env!("CARGO_MANIFEST_DIR"));
-    let solid = SolidMesh::new(read(Path::new(&path))?.mesh)?;
-    let options = EncodeOptions::preset(Preset::Fast);
-    Ok(encode(&solid, &Source::default(), &options, &Progress::default())?)
+    Encoder::new().preset(Preset::Fast).encode_file(path)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -27,10 +21,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let bolt = scene.add(Instance::new(bolt, Pose::IDENTITY))?;
 
     let mut deepest = Vec::new();
-    for (name, mode) in [("node", Mode::Node), ("face", Mode::FACE), ("exact", Mode::EXACT)] {
+    for (name, mode) in [("node", Mode::Node), ("face", Mode::Face), ("exact", Mode::Exact)] {
         let found = detect(&scene, &CollideOptions::with_mode(mode))?;
-        let least = found.contacts.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
-        println!("{name:<5} {} contacts, deepest {least:e} m, {:?}", found.contacts.len(), found.statistics);
+        let least = found.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
+        println!("{name:<5} {} contacts, deepest {least:e} m, {:?}", found.len(), found.statistics);
         deepest.push(least);
     }
     // Faces hold their nodes, and nothing is below the exact minimum.
@@ -39,8 +33,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let few = CollideOptions { reduction: Reduction::PerPair(16), ..CollideOptions::default() };
     let found = detect(&scene, &few)?;
-    println!("{} contacts are kept, the wrench is within {:?}", found.contacts.len(), found.reductions);
-    assert!(found.contacts.len() <= 16);
-    assert!(found.contacts.iter().all(|c| [nut, bolt].contains(&c.instance_a)));
+    println!("{} contacts are kept, the wrench is within {:?}", found.len(), found.reductions);
+    assert!(found.len() <= 16);
+    assert!(found.iter().all(|c| [nut, bolt].contains(&c.instance_a)));
     Ok(())
 }

@@ -61,6 +61,6 @@ mod tests {
         assert_eq!(read_to_string(&path).unwrap(), "a\nµ");
         std::fs::write(&path, b"a\n\xff").unwrap();
         assert_eq!(read_to_string(&path).unwrap_err().to_string(), "line 2 is not UTF-8 text");
-        assert_eq!(read(&folder.path().join("none")).unwrap_err().kind(), io::ErrorKind::NotFound);
+        assert_eq!(read(folder.path().join("none")).unwrap_err().kind(), io::ErrorKind::NotFound);
     }
 }

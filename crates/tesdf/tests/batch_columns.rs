@@ -4,11 +4,10 @@ mod support;
 
 use support::meshes::named;
 use support::random::Random;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::TeSdf;
+use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::query::{Answer, AnswerColumns, BatchError, Extent, Precision};
-use tesdf::{Progress, TeSdf};
 
 struct Columns {
     signed_distance: Vec<f64>,
@@ -48,8 +47,7 @@ impl Columns {
 
 fn asset() -> TeSdf {
     let solid = named("procedural/shaft_keyway.obj");
-    let options = EncodeOptions::preset(Preset::Fast);
-    encode(&solid, &Source::default(), &options, &Progress::default()).unwrap()
+    Encoder::new().preset(Preset::Fast).encode(&solid).unwrap()
 }
 
 #[test]
@@ -62,10 +60,10 @@ fn columns_are_the_answers() {
     let mut points: Vec<DVec3> =
         (0..8195).map(|_| bounds.center() + 0.7 * random.in_cube() * bounds.extent()).collect();
     points[5].y = f64::NAN;
-    let none = asset.query(points[5], Precision::F64);
+    let none = asset.query(points[5]);
     let mut asides = 0;
     for precision in [Precision::F32, Precision::F64] {
-        let batch = asset.query_batch(&points, precision);
+        let batch = asset.query_batch_with(&points, precision);
         let mut everywhere = Columns::new(points.len());
         asset.query_batch_into(&points, precision, Extent::Everywhere, everywhere.as_mut()).unwrap();
         let mut domain = Columns::new(points.len());
@@ -75,7 +73,7 @@ fn columns_are_the_answers() {
         for (i, answer) in batch.iter().enumerate() {
             assert!(everywhere.is(i, answer), "{precision:?} {i}: {answer:?}");
             assert_eq!(distances[i].to_bits(), answer.signed_distance.to_bits(), "{precision:?} {i}");
-            let expected = asset.query_in_domain(points[i], precision);
+            let expected = asset.query_in_domain_with(points[i], precision);
             asides += usize::from(expected.is_none());
             assert!(domain.is(i, &expected.unwrap_or(none)), "{precision:?} {i}: {expected:?}");
         }

@@ -7,11 +7,10 @@ use support::cells::Cells;
 use support::reference::{Reference, exceeds};
 use support::shapes::{FAMILIES, Family, Shape};
 use support::well_formed::WellFormed;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::Length;
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;
-use tesdf::{Length, Progress};
 
 fn options(preset: Preset, band: f64) -> EncodeOptions {
     EncodeOptions { band: Length::OfDiagonal(band), ..EncodeOptions::preset(preset) }
@@ -20,15 +19,14 @@ fn options(preset: Preset, band: f64) -> EncodeOptions {
 /// Encodes a member of a family, checks its cells, and checks distances.
 fn check_member(family: Family, seed: u64, options: &EncodeOptions) -> Result<(), String> {
     let solid = family.member(seed);
-    let asset =
-        encode(&solid, &Source::default(), options, &Progress::default()).map_err(|e| e.to_string())?;
+    let asset = Encoder::new().options(options.clone()).encode(&solid).map_err(|e| e.to_string())?;
     let (reference, cells) = (Reference::new(solid.mesh()), Cells::of(&asset));
     let band = options.band.resolve(reference.local_diagonal());
     WellFormed { reference: &reference, cells: &cells, band, lattice: 3, max_cells: 1500 }.check()?;
     for (kind, p) in support::points::sample(solid.mesh(), &cells, 450) {
         let exact = reference.signed_distance(p);
         for precision in [Precision::F32, Precision::F64] {
-            let found = asset.signed_distance(p, precision);
+            let found = asset.query_with(p, precision).signed_distance;
             let tolerance = match precision {
                 Precision::F32 => reference.tolerance_f32(p),
                 Precision::F64 => reference.tolerance_f64(p),
@@ -85,8 +83,7 @@ proptest! {
 #[test]
 fn missing_faces_are_noticed() {
     let solid = Shape::default().add_sphere(DVec3::ZERO, 1, || 1.0).solid();
-    let asset = encode(&solid, &Source::default(), &options(Preset::Fast, 0.05), &Progress::default())
-        .expect("valid options");
+    let asset = Encoder::new().options(options(Preset::Fast, 0.05)).encode(&solid).expect("valid options");
     let reference = Reference::new(solid.mesh());
     let mut cells = Cells::of(&asset);
     let band = 0.05 * reference.local_diagonal();

@@ -7,20 +7,17 @@ use std::sync::Arc;
 use support::meshes::named;
 use support::random::Random;
 use support::shapes::Shape as Surface;
-use tesdf::asset::about::Source;
 use tesdf::collide::{
     Clearance, ClearanceOptions, CollideError, Instance, InstanceId, Pose, Scene, Shape, clearance,
 };
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{Encoder, Preset};
 use tesdf::geometry::{Triangle, polygon_to_triangle};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
-use tesdf::query::Precision;
-use tesdf::{Length, Progress, TeSdf};
+use tesdf::{Length, TeSdf};
 
 fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
-    let options = EncodeOptions::preset(Preset::Fast);
-    Arc::new(encode(solid, &Source::default(), &options, &Progress::default()).expect("it encodes"))
+    Arc::new(Encoder::new().preset(Preset::Fast).encode(solid).expect("it encodes"))
 }
 
 fn bumpy(seed: u64) -> Arc<TeSdf> {
@@ -135,7 +132,7 @@ fn by_samples(surface: &[[DVec3; 3]], field: &TeSdf, pose: Pose, scale: f64) -> 
             for j in 0..=N - i {
                 let (u, v) = (i as f64 / N as f64, j as f64 / N as f64);
                 let p = *a + u * (*b - *a) + v * (*c - *a);
-                let value = scale * field.signed_distance(pose.to_body(p) / scale, Precision::F64);
+                let value = scale * field.signed_distance(pose.to_body(p) / scale);
                 least = least.min(value);
             }
         }
@@ -169,7 +166,7 @@ fn in_each_other_it_is_as_deep_as_dense_samples_find() {
             InstanceId(0) => (a, pose_a, scale_a, found.point_b),
             _ => (b, pose_b, scale_b, found.point_a),
         };
-        let value = scale * field.signed_distance(pose.to_body(point) / scale, Precision::F64);
+        let value = scale * field.signed_distance(pose.to_body(point) / scale);
         assert!((value - found.distance).abs() < 1e-12, "{found:?} {value}");
         assert!((found.point_a.distance(found.point_b) + found.distance).abs() < 1e-12);
     }

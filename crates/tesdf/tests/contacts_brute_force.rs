@@ -40,7 +40,7 @@ impl BruteForce {
             }
         });
         let faces: Vec<u32> = (0..a.body.solid.mesh().faces().len() as u32).step_by(stride).collect();
-        let value = |p: DVec3| b.body.asset.query_by_tree(p, tesdf::query::Precision::F64).signed_distance;
+        let value = |p: DVec3| b.body.asset.query_by_tree(p).signed_distance;
         let of_face = |&face: &u32| {
             let triangle = a.body.face(face, a.at).map(|p| b.at.to_shape(p));
             let bounds = Aabb::of(&triangle);
@@ -74,9 +74,9 @@ fn compare(a: usize, b: usize, bodies: &[Placed], stride: usize, contact_distanc
     let all = BruteForce::of(&bodies[a], &bodies[b], stride, contact_distance);
     let options = CollideOptions { contact_distance, ..CollideOptions::default() };
     let scene = scene(bodies);
-    let found = detect(&scene, &options).expect("a good scene").contacts;
+    let found = detect(&scene, &options).expect("a good scene");
     let of_stride = |face: u32| (face as usize).is_multiple_of(stride);
-    let reported: BTreeMap<Pair, f64> = of_direction(&found, a as u32, b as u32)
+    let reported: BTreeMap<Pair, f64> = of_direction(found.as_slice(), a as u32, b as u32)
         .filter(|c| of_stride(c.face_a))
         .filter_map(|c| c.tet_b.map(|cell| ((c.face_a, cell), c.distance)))
         .collect();
@@ -198,10 +198,10 @@ fn nodes_are_those_of_all_vertices() {
         let bodies = relation.place(["l_bracket", "torus_quads"], &mut random);
         let contact_distance = 0.03 * bodies[0].diagonal();
         let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(Mode::Node) };
-        let found = detect(&scene(&bodies), &options).expect("a good scene").contacts;
+        let found = detect(&scene(&bodies), &options).expect("a good scene");
         for (a, b) in [(0, 1), (1, 0)] {
             let nodes: BTreeSet<u32> =
-                of_direction(&found, a as u32, b as u32).map(|c| c.feature.a).collect();
+                of_direction(found.as_slice(), a as u32, b as u32).map(|c| c.feature.a).collect();
             let (from, to) = (&bodies[a], &bodies[b]);
             for (v, &p) in from.body.solid.mesh().vertices().iter().enumerate() {
                 let beyond = to.distance_by_tree(from.at.to_world(p)) - contact_distance;

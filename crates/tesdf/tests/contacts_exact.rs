@@ -10,12 +10,9 @@ use support::lowest::{certified, sampled};
 use support::random::Random;
 use support::shapes;
 use tesdf::Length;
-use tesdf::collide::{
-    CollideOptions, Contacts, FaceMethod, Instance, Mode, Placement, Pose, Scene, Shape, detect,
-};
+use tesdf::collide::{CollideOptions, Contacts, Instance, Placement, Pose, Scene, Shape, detect};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
-use tesdf::query::Precision;
 
 /// A sample of a face may be deeper than the reported contact by at most this fraction of the
 /// diagonal.
@@ -26,7 +23,7 @@ const TOLERANCE: f64 = 1.001e-7;
 /// The least distance of each face of an ordered pair.
 fn least_by_face(found: &Contacts, a: u32, b: u32) -> BTreeMap<u32, f64> {
     let mut least = BTreeMap::new();
-    for c in of_direction(&found.contacts, a, b) {
+    for c in of_direction(found.as_slice(), a, b) {
         let known: &mut f64 = least.entry(c.face_a).or_insert(f64::INFINITY);
         *known = known.min(c.distance);
     }
@@ -85,8 +82,8 @@ fn hold(bodies: &[Placed; 2], stride: [usize; 2], contact_distance: f64) -> usiz
         let value = |p| bodies[b].distance_by_tree(p);
         touching += compare(&least, &faces, contact_distance, bodies[b].diagonal(), value);
     }
-    let share = found.statistics.unconverged as f64 / found.contacts.len().max(1) as f64;
-    assert!(share < 1e-2, "{} of {} not converged", found.statistics.unconverged, found.contacts.len());
+    let share = found.statistics.unconverged as f64 / found.len().max(1) as f64;
+    assert!(share < 1e-2, "{} of {} not converged", found.statistics.unconverged, found.len());
     touching
 }
 
@@ -137,7 +134,7 @@ fn within_the_tolerance_of_certified_bounds() {
             for (a, b) in [(0, 1), (1, 0)] {
                 let (field, diagonal) = (&bodies[b], bodies[b].diagonal());
                 let nearest = |p: DVec3| {
-                    let answer = field.body.asset.query_by_tree(field.at.to_shape(p), Precision::F64);
+                    let answer = field.body.asset.query_by_tree(field.at.to_shape(p));
                     let triangle = Triangle::new(field.body.face(answer.face, field.at));
                     (field.at.scale * answer.signed_distance, triangle)
                 };
@@ -229,7 +226,7 @@ fn a_box_on_a_floor_of_other_triangles() {
     for face in on_floor {
         assert!(least.get(&face).is_some_and(|d| d.abs() < 1e-9), "face {face}: {:?}", least.get(&face));
     }
-    assert_eq!(found.statistics.unconverged, 0, "of {}", found.contacts.len());
+    assert_eq!(found.statistics.unconverged, 0, "of {}", found.len());
 }
 
 #[test]
@@ -240,8 +237,8 @@ fn tolerances_bound_the_error() {
     let fine = detect(&scene, &CollideOptions::default()).expect("a good scene");
     for share in [1e-3, 1e-5] {
         for tolerance in [Length::OfDiagonal(share), Length::Absolute(share * bodies[0].diagonal())] {
-            let mode = Mode::Face(FaceMethod::Exact { tolerance });
-            let coarse = detect(&scene, &CollideOptions::with_mode(mode)).expect("a good scene");
+            let coarse = CollideOptions { tolerance, ..CollideOptions::default() };
+            let coarse = detect(&scene, &coarse).expect("a good scene");
             for (a, b) in [(0, 1), (1, 0)] {
                 let allowed = match tolerance {
                     Length::OfDiagonal(share) => share * bodies[b].diagonal(),

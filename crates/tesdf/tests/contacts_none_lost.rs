@@ -12,18 +12,15 @@ use support::lowest::sampled;
 use support::meshes;
 use support::random::Random;
 use tesdf::Length;
-use tesdf::collide::{
-    CollideOptions, Contact, Contacts, FaceMethod, FeatureId, InstanceId, Mode, Pose, detect,
-};
+use tesdf::collide::{CollideOptions, Contact, Contacts, FeatureId, InstanceId, Mode, Pose, detect};
 use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
-use tesdf::query::Precision;
 
 /// Meshes with more faces are part of the long run only.
 const FACES: usize = 1_200;
 /// `contacts_exact` tests the default tolerance of 1e-7, which would take minutes here.
 const COARSE: f64 = 1e-4;
-const EXACT: Mode = Mode::Face(FaceMethod::Exact { tolerance: Length::OfDiagonal(COARSE) });
+const TOLERANCE: Length = Length::OfDiagonal(COARSE);
 /// Accepted shortfall of 16 Frank–Wolfe iterations. The worst cases are large faces in large cells,
 /// where the field is least convex.
 const FRANK_WOLFE: f64 = 5e-2;
@@ -104,7 +101,7 @@ fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
     assert!((c.normal.length() - 1.0).abs() < 1e-9, "{}", what());
     let between = c.point_a - c.point_b;
     assert!((between.length() - c.distance.abs()).abs() < rounding, "{}", what());
-    let answer = b.body.asset.query(b.at.to_shape(c.point_a), Precision::F64);
+    let answer = b.body.asset.query(b.at.to_shape(c.point_a));
     let asked = b.at.scale * answer.signed_distance;
     assert!((asked - c.distance).abs() < rounding, "{} query: {asked}", what());
     let on_b = Triangle::new(b.body.face(c.face_b, b.at));
@@ -151,7 +148,7 @@ fn least(contacts: &[Contact], a: u32, b: u32) -> BTreeMap<u32, f64> {
 
 /// All vertices of `a` within reach of the field of `b` have contacts.
 fn has_all_nodes(found: &Contacts, bodies: &[Placed], a: usize, b: usize, contact_distance: f64) {
-    let nodes = least(&found.contacts, a as u32, b as u32);
+    let nodes = least(found.as_slice(), a as u32, b as u32);
     let (from, to) = (&bodies[a], &bodies[b]);
     let band = ROUNDING * size(bodies) + 1e-12 * to.diagonal();
     let mut used = vec![false; from.body.solid.mesh().vertices().len()];
@@ -162,7 +159,7 @@ fn has_all_nodes(found: &Contacts, bodies: &[Placed], a: usize, b: usize, contac
             continue;
         }
         let p = from.at.to_world(p);
-        let distance = to.at.scale * to.body.asset.query(to.at.to_shape(p), Precision::F64).signed_distance;
+        let distance = to.at.scale * to.body.asset.query(to.at.to_shape(p)).signed_distance;
         match nodes.get(&(v as u32)) {
             Some(known) => assert!((known - distance).abs() < band, "vertex {v}: {known} {distance}"),
             None => assert!(distance > contact_distance - band, "vertex {v}, {distance}, is lost"),
@@ -180,7 +177,7 @@ fn has_the_deepest(
     contact_distance: f64,
     shallow: f64,
 ) {
-    let faces = least(&found.contacts, a as u32, b as u32);
+    let faces = least(found.as_slice(), a as u32, b as u32);
     let (from, to) = (&bodies[a], &bodies[b]);
     let band = ROUNDING * size(bodies) + shallow * to.diagonal();
     let count = from.body.solid.mesh().faces().len();
@@ -212,7 +209,7 @@ fn renamed(contacts: &[Contact]) -> Vec<Contact> {
 fn same_but_rounding(one: &Contacts, other: &Contacts, bodies: &[Placed], contact_distance: f64, error: f64) {
     for (a, b) in [(0, 1), (1, 0)] {
         let band = error * bodies[b as usize].diagonal() + 1e-12 * size(bodies);
-        let [one, other] = [one, other].map(|c| least(&c.contacts, a, b));
+        let [one, other] = [one, other].map(|c| least(c.as_slice(), a, b));
         for (x, y) in [(&one, &other), (&other, &one)] {
             for (part, distance) in x {
                 match y.get(part) {
@@ -241,27 +238,33 @@ fn no_contact_is_lost() {
             };
             let moved = [bodies[0].moved(motion), bodies[1].moved(motion)];
             // Accepted differences: twice the tolerance in the exact mode, rounding for nodes.
-            for (mode, error) in [(Mode::Node, 1e-12), (EXACT, 2.1 * COARSE), (Mode::FACE, f64::INFINITY)] {
+            for (mode, error) in
+                [(Mode::Node, 1e-12), (Mode::Exact, 2.1 * COARSE), (Mode::Face, f64::INFINITY)]
+            {
                 // When surfaces coincide, the exact mode reaches its limit of evaluations.
                 let is_flat = matches!(relation, Relation::Same | Relation::SharedFaces);
-                if mode == EXACT && is_flat && !is_small(bodies) {
+                if mode == Mode::Exact && is_flat && !is_small(bodies) {
                     continue;
                 }
-                let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
+                let options = CollideOptions {
+                    contact_distance,
+                    tolerance: TOLERANCE,
+                    ..CollideOptions::with_mode(mode)
+                };
                 let found = detect(&scene, &options).expect("a good scene");
                 let of_others = detect(&swapped, &options).expect("a good scene");
-                count += found.contacts.len();
-                is_sorted(&found.contacts);
-                found.contacts.iter().for_each(|c| is_sound(c, bodies, mode, contact_distance));
-                assert_eq!(renamed(&of_others.contacts), {
-                    let mut all = found.contacts.clone();
+                count += found.len();
+                is_sorted(found.as_slice());
+                found.iter().for_each(|c| is_sound(c, bodies, mode, contact_distance));
+                assert_eq!(renamed(of_others.as_slice()), {
+                    let mut all = found.as_slice().to_vec();
                     all.sort_by_key(|c| c.instance_a);
                     all
                 });
                 for (a, b) in [(0, 1), (1, 0)] {
                     match mode {
                         Mode::Node => has_all_nodes(&found, bodies, a, b, contact_distance),
-                        Mode::FACE => has_the_deepest(&found, bodies, a, b, contact_distance, FRANK_WOLFE),
+                        Mode::Face => has_the_deepest(&found, bodies, a, b, contact_distance, FRANK_WOLFE),
                         _ => has_the_deepest(&found, bodies, a, b, contact_distance, 1.01 * COARSE),
                     }
                 }
@@ -293,17 +296,21 @@ fn the_same_bytes_on_any_number_of_threads() {
         })
         .collect();
     let scene = scene(&bodies);
-    for mode in [Mode::Node, Mode::FACE, EXACT] {
-        let options = CollideOptions { contact_distance: 1e-4, ..CollideOptions::with_mode(mode) };
+    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
+        let options = CollideOptions {
+            contact_distance: 1e-4,
+            tolerance: TOLERANCE,
+            ..CollideOptions::with_mode(mode)
+        };
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
             pool.install(|| detect(&scene, &options).expect("a good scene"))
         };
         let [one, two, eight] = [1, 2, 8].map(on);
-        assert!(one.contacts.len() > 100, "{mode:?}: {} contacts", one.contacts.len());
-        is_sorted(&one.contacts);
+        assert!(one.len() > 100, "{mode:?}: {} contacts", one.len());
+        is_sorted(one.as_slice());
         for other in [two, eight] {
-            assert_eq!(bits(&one.contacts), bits(&other.contacts), "{mode:?}");
+            assert_eq!(bits(one.as_slice()), bits(other.as_slice()), "{mode:?}");
             assert_eq!(one.statistics, other.statistics);
         }
     }

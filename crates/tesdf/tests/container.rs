@@ -226,7 +226,7 @@ fn other_formats_are_recognised() {
         assert!(found.starts_with(&format!("this is {expected}, not a .tesdf file; ")), "{found}");
     }
     let folder = tempfile::tempdir().unwrap();
-    let e = Container::open(&folder.path().join("none.tesdf"), TABLE).unwrap_err();
+    let e = Container::open(folder.path().join("none.tesdf"), TABLE).unwrap_err();
     assert!(e.to_string().starts_with("cannot open "), "{e}");
     assert!(Container::open(folder.path(), TABLE).is_err());
     let empty = folder.path().join("empty");

@@ -7,23 +7,24 @@ use std::ops::ControlFlow;
 use support::random::Random;
 use support::shapes::Shape;
 use support::tetrahedra::{bare_beam, beam, bend, moves};
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Scene, detect};
 use tesdf::deform::DeformError;
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::{Deformation, Domain, EncodeOptions, Preset, Refinement, encode, encode_in};
+use tesdf::encode::{Deformation, Domain, EncodeOptions, Encoder, Preset, Refinement};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
-use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, VerifyReport, verify};
-use tesdf::{Progress, TeSdf};
 
 fn options() -> EncodeOptions {
     EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Fast) }
 }
 
 fn encoded(solid: &SolidMesh, domain: &ConformingMesh, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, Domain::Conforming(domain), &Source::default(), options, &Progress::default())
+    Encoder::new()
+        .options(options.clone())
+        .domain(Domain::Conforming(domain))
+        .encode(solid)
         .expect("valid options")
 }
 
@@ -75,7 +76,7 @@ fn lists_hold_again_after_re_encoding() {
         let mut random = Random(1);
         for _ in 0..2000 {
             let p = 4.0 + 4.0 * random.in_cube();
-            assert_eq!(opened.query(p, Precision::F64), asset.query(p, Precision::F64));
+            assert_eq!(opened.query(p), asset.query(p));
         }
     }
     assert!(errors[0] > 1e-3, "the bend is too mild to be a test: {errors:?}");
@@ -99,8 +100,8 @@ fn near_the_surface_faces_around_vertices_help() {
                 let [u, v, w, _] = random.weights();
                 let on = (u * a + v * b + w * c) / (u + v + w);
                 let p = on + random.between(-0.2, 0.2) * (b - a).cross(c - a).normalize();
-                let found = asset.query(p, Precision::F64).signed_distance.abs();
-                found > asset.query_by_tree(p, Precision::F64).signed_distance.abs() + 1e-9
+                let found = asset.query(p).signed_distance.abs();
+                found > asset.query_by_tree(p).signed_distance.abs() + 1e-9
             })
             .count()
     };
@@ -129,7 +130,7 @@ fn only_what_moved_is_looked_at() {
     let mut random = Random(2);
     for _ in 0..3000 {
         let p = 4.0 + 4.0 * random.in_cube();
-        let (found, expected) = (asset.query(p, Precision::F64), rest.query(p, Precision::F64));
+        let (found, expected) = (asset.query(p), rest.query(p));
         assert!((found.signed_distance - expected.signed_distance).abs() < 1e-14, "{p}");
     }
 }
@@ -169,17 +170,15 @@ fn bad_moves_change_nothing() {
     }
     let p = DVec3::splat(4.2);
     let rest = encoded(&solid, &domain, &options());
-    assert_eq!(asset.query(p, Precision::F64), rest.query(p, Precision::F64));
-    let mut bisected =
-        encode(&solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())
-            .expect("encodes");
+    assert_eq!(asset.query(p), rest.query(p));
+    let mut bisected = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
     assert_eq!(bisected.move_vertices(&[]), Err(DeformError::NotConforming));
 }
 
 /// The least distance of each face with contacts, by instance.
 fn lowest(scene: &Scene, options: &CollideOptions) -> BTreeMap<(u32, u32), f64> {
     let mut lowest = BTreeMap::new();
-    for c in detect(scene, options).expect("a good scene").contacts {
+    for c in detect(scene, options).expect("a good scene") {
         let least: &mut f64 = lowest.entry((c.instance_a.0, c.face_a)).or_insert(f64::INFINITY);
         *least = least.min(c.distance);
     }
@@ -206,10 +205,8 @@ fn assert_same(
 fn contacts_of_a_conforming_domain_are_those_of_the_bisection_domain() {
     for (solid, domain) in [beam(), bare_beam()] {
         let ball = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid();
-        let bisected = |solid: &SolidMesh| {
-            encode(solid, &Source::default(), &EncodeOptions::preset(Preset::Fast), &Progress::default())
-                .expect("encodes")
-        };
+        let bisected =
+            |solid: &SolidMesh| Encoder::new().preset(Preset::Fast).encode(solid).expect("encodes");
         let by_cost = EncodeOptions { refinement: Refinement::ByCost, byte_worth: 0.02, ..options() };
         let scene_of = |beam: TeSdf| {
             let mut scene = Scene::new();
@@ -220,7 +217,7 @@ fn contacts_of_a_conforming_domain_are_those_of_the_bisection_domain() {
             (scene, beam)
         };
         for contact_distance in [0.0, 0.3] {
-            for mode in [Mode::EXACT, Mode::Node] {
+            for mode in [Mode::Exact, Mode::Node] {
                 let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
                 for encoding in [self::options(), by_cost.clone()] {
                     let conforming = lowest(&scene_of(encoded(&solid, &domain, &encoding)).0, &options);
@@ -248,7 +245,7 @@ fn nothing_is_lost_where_lists_are_cut() {
     let ball = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid();
     let encoded = |solid: &SolidMesh, max_entries| {
         let options = EncodeOptions { max_entries, ..EncodeOptions::preset(Preset::Fast) };
-        encode(solid, &Source::default(), &options, &Progress::default()).expect("encodes")
+        Encoder::new().options(options).encode(solid).expect("encodes")
     };
     let scene_of = |most| {
         let mut scene = Scene::new();

@@ -9,17 +9,16 @@ use proptest::prelude::*;
 use support::random::Random;
 use support::reference::Reference;
 use support::shapes::{FAMILIES, Family, Shape};
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::collide::{
-    ClearanceOptions, CollideOptions, FaceMethod, Instance, InstanceId, Mode, Pose, Scene, Shape as Body,
-    clearance, detect,
+    ClearanceOptions, CollideOptions, Instance, InstanceId, Mode, Pose, Scene, Shape as Body, clearance,
+    detect,
 };
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, verify};
-use tesdf::{Progress, TeSdf};
 
 const CUBE: [[u32; 3]; 12] = [
     [0, 2, 1],
@@ -45,7 +44,7 @@ fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
 fn encoded(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> Arc<TeSdf> {
     let solid = SolidMesh::new(TriangleMesh::new(vertices, faces).expect("valid ids")).expect("a solid");
     let options = EncodeOptions::default();
-    Arc::new(encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes"))
+    Arc::new(Encoder::new().options(options).encode(&solid).expect("encodes"))
 }
 
 /// Checks distances, signs and gradients against their promises, in both precisions.
@@ -55,7 +54,7 @@ fn assert_right(asset: &TeSdf) {
     assert!(report.passed, "{report:#?}");
     asset.visit_cells(|cell| {
         for precision in [Precision::F32, Precision::F64] {
-            let answer = asset.query(cell.corners[0], precision);
+            let answer = asset.query_with(cell.corners[0], precision);
             assert!((answer.gradient.length() - 1.0).abs() < 1e-3, "{answer:?}");
         }
     });
@@ -68,13 +67,12 @@ fn depths(asset: &Arc<TeSdf>, top: f64) -> Vec<f64> {
     let probe = scene.add_shape(Body::Box { half_extents: DVec3::splat(0.25) }).expect("room");
     scene.add(Instance::new(body, Pose::IDENTITY)).expect("valid");
     scene.add(Instance::new(probe, Pose::at(DVec3::new(0.1, 0.2, top + 0.15)))).expect("valid");
-    let modes =
-        [Mode::Node, Mode::Face(FaceMethod::FrankWolfe { iterations: 16 }), CollideOptions::default().mode];
+    let modes = [Mode::Node, Mode::Face, Mode::Exact];
     modes
         .into_iter()
         .map(|mode| {
             let options = CollideOptions { mode, ..CollideOptions::default() };
-            let contacts = detect(&scene, &options).expect("valid").contacts;
+            let contacts = detect(&scene, &options).expect("valid");
             contacts.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min)
         })
         .collect()
@@ -86,7 +84,7 @@ fn a_face_of_one_vertex() {
     faces.push([1, 1, 1]);
     let asset = encoded(vertices, faces);
     for precision in [Precision::F32, Precision::F64] {
-        assert_eq!(asset.signed_distance(DVec3::ZERO, precision), -1.0);
+        assert_eq!(asset.query_with(DVec3::ZERO, precision).signed_distance, -1.0);
     }
     assert_right(&asset);
     for depth in depths(&asset, 1.0) {
@@ -104,7 +102,7 @@ fn a_facet_of_zeros() {
     let asset = encoded(vertices, faces);
     assert_right(&asset);
     let at = DVec3::splat(0.5);
-    assert!((asset.signed_distance(at, Precision::F64) - at.length()).abs() < 1e-12);
+    assert!((asset.signed_distance(at) - at.length()).abs() < 1e-12);
 }
 
 /// The cube with one corner cut off by a triangle of the given size.
@@ -198,7 +196,7 @@ fn a_segment_between_two_faces_tells_no_side() {
     let asset = encoded(vertices, faces);
     assert_right(&asset);
     for precision in [Precision::F32, Precision::F64] {
-        let answer = asset.query(DVec3::new(0.1882258779474606, 1.232421875, -0.232421875), precision);
+        let answer = asset.query_with(DVec3::new(0.1882258779474606, 1.232421875, -0.232421875), precision);
         assert!((answer.signed_distance - 0.2324_f64.hypot(0.2324)).abs() < 1e-3, "{answer:?}");
     }
 }
@@ -264,7 +262,7 @@ fn check_contacts(asset: &Arc<TeSdf>, solid: &SolidMesh, shift: DVec3) -> Result
     };
     for mode in [Mode::Node, CollideOptions::default().mode] {
         let options = CollideOptions { mode, ..CollideOptions::default() };
-        let found = detect(&scene, &options).expect("valid").contacts;
+        let found = detect(&scene, &options).expect("valid");
         for contact in &found {
             let exact = others(contact.point_a, contact.instance_b);
             prop_assert!((contact.distance - exact).abs() < tolerance, "{exact} {contact:?}");
@@ -284,8 +282,7 @@ proptest! {
     #[test]
     fn random_meshes_with_degenerate_faces(family in prop::sample::select(FAMILIES.to_vec()), seed in any::<u64>()) {
         let solid = degenerate(family, seed);
-        let options = EncodeOptions::preset(Preset::Fast);
-        let asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
+        let asset = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
         let report = verify(&asset, &VerifyOptions { samples: 600, seed }, |_| ControlFlow::Continue(())).expect("a valid mesh");
         prop_assert!(report.passed, "{report:#?}");
         let shift = 0.4 * solid.mesh().diagonal() * Random(seed).in_cube();

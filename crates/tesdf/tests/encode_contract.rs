@@ -7,16 +7,14 @@ use std::time::{Duration, Instant};
 use rayon::ThreadPoolBuilder;
 use support::meshes::named;
 use support::shapes::{FAMILIES, Shape};
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeError, EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeError, EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
-use tesdf::query::Precision;
 use tesdf::{Length, Progress, Stage, TeSdf};
 
 fn encode_on(threads: usize, solid: &SolidMesh, options: &EncodeOptions) -> TeSdf {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-    pool.install(|| encode(solid, &Source::default(), options, &Progress::default())).expect("valid options")
+    pool.install(|| Encoder::new().options(options.clone()).encode(solid)).expect("valid options")
 }
 
 fn ball() -> SolidMesh {
@@ -46,7 +44,7 @@ fn a_cancelled_encode_stops_soon() {
     let options = EncodeOptions { byte_worth: 1e-3, ..EncodeOptions::default() };
     let progress = Progress::default();
     let (result, late) = std::thread::scope(|scope| {
-        let encoder = scope.spawn(|| encode(&solid, &Source::default(), &options, &progress));
+        let encoder = scope.spawn(|| Encoder::new().options(options).progress(&progress).encode(&solid));
         std::thread::sleep(Duration::from_millis(1500));
         let (asked, cancelled) = (Instant::now(), !encoder.is_finished());
         progress.cancel();
@@ -59,7 +57,7 @@ fn a_cancelled_encode_stops_soon() {
 
     let before = Progress::default();
     before.cancel();
-    let result = encode(&ball(), &Source::default(), &EncodeOptions::default(), &before);
+    let result = Encoder::new().progress(&before).encode(&ball());
     assert!(matches!(result, Err(EncodeError::Cancelled)), "{result:?}");
 }
 
@@ -67,7 +65,7 @@ fn a_cancelled_encode_stops_soon() {
 fn progress_ends_at_the_end() {
     let progress = Progress::default();
     assert_eq!(progress.state(), (Stage::Refine, 0.0));
-    encode(&ball(), &Source::default(), &EncodeOptions::default(), &progress).expect("valid options");
+    Encoder::new().progress(&progress).encode(&ball()).expect("valid options");
     assert_eq!(progress.state().0, Stage::Assemble);
     assert!(!progress.is_cancelled());
 }
@@ -92,7 +90,7 @@ fn options_without_meaning_are_refused_by_name() {
         ("region", EncodeOptions { regions: vec![[0.0, 0.0, 0.0, inf, 1.0, 1.0]], ..d() }),
     ];
     for (name, options) in cases {
-        match encode(&ball(), &Source::default(), &options, &Progress::default()) {
+        match Encoder::new().options(options.clone()).encode(&ball()) {
             Err(EncodeError::Option { option, .. }) => assert_eq!(option, name, "{options:?}"),
             other => panic!("{options:?} gives {other:?}"),
         }
@@ -133,15 +131,13 @@ fn odd_regions() {
             EncodeOptions { regions: vec![[a.x, a.y, a.z, b.x, b.y, b.z]], ..EncodeOptions::default() };
         let asset = encode_on(2, &solid, &options);
         for p in [a, b, 0.5 * (a + b)] {
-            let answer = asset
-                .query_in_domain(p, Precision::F64)
-                .unwrap_or_else(|| panic!("{p} is not in the domain"));
-            let tree = encode_on(1, &solid, &EncodeOptions::default()).query(p, Precision::F64);
+            let answer = asset.query_in_domain(p).unwrap_or_else(|| panic!("{p} is not in the domain"));
+            let tree = encode_on(1, &solid, &EncodeOptions::default()).query(p);
             assert!((answer.signed_distance - tree.signed_distance).abs() < 1e-12 * p.length());
         }
     }
     let too_far =
         EncodeOptions { regions: vec![[-40.0, 3.0, 8.0, -39.0, 4.0, 9.0]], ..EncodeOptions::default() };
-    let refused = encode(&solid, &Source::default(), &too_far, &Progress::default());
+    let refused = Encoder::new().options(too_far).encode(&solid);
     assert!(matches!(refused, Err(EncodeError::Option { option: "band or region", .. })));
 }

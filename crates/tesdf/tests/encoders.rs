@@ -8,12 +8,10 @@ use support::random::Random;
 use support::shapes::Shape;
 use support::tetrahedra::grid;
 use tesdf::asset::CellKind;
-use tesdf::asset::about::Source;
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::Surface;
 use tesdf::encode::{
-    Deformation, Domain, EncodeError, EncodeOptions, Encoder, Preset, Refinement, SampledCell, Sampler,
-    Sampling, Threshold, encode_in, encode_with,
+    Deformation, Domain, EncodeError, EncodeOptions, Encoder, Method, Preset, Refinement, SampledCell,
+    Sampler, Sampling, Surface, Threshold,
 };
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
@@ -22,7 +20,7 @@ use tesdf::verify::{VerifyOptions, VerifyReport, verify};
 use tesdf::{Progress, TeSdf};
 
 fn encoded(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, domain, &Source::default(), options, &Progress::default()).expect("valid options")
+    Encoder::new().options(options.clone()).domain(domain).encode(solid).expect("valid options")
 }
 
 fn verified(asset: &TeSdf) -> VerifyReport {
@@ -58,15 +56,15 @@ fn a_conforming_domain_is_exact_plain_or_bisected() {
         assert_eq!(asset.classes(), Some(conforming.classes()));
         // The domain is exactly the grid.
         assert!((statistics.domain_volume - 216.0).abs() < 20.0);
-        assert!(asset.query_in_domain(DVec3::splat(-1.0), Precision::F64).is_none());
-        assert!(asset.query_in_domain(DVec3::splat(3.3), Precision::F64).is_some());
+        assert!(asset.query_in_domain(DVec3::splat(-1.0)).is_none());
+        assert!(asset.query_in_domain(DVec3::splat(3.3)).is_some());
 
         let again = TeSdf::from_bytes(asset.as_bytes()).expect("what was written opens");
         let mut random = Random(5);
         let points: Vec<DVec3> = (0..2000).map(|_| 3.0 + 4.0 * random.in_cube()).collect();
         for precision in [Precision::F32, Precision::F64] {
-            let batch = again.query_batch(&points, precision);
-            let alone: Vec<_> = points.iter().map(|&p| asset.query(p, precision)).collect();
+            let batch = again.query_batch_with(&points, precision);
+            let alone: Vec<_> = points.iter().map(|&p| asset.query_with(p, precision)).collect();
             assert_eq!(batch, alone);
         }
     }
@@ -75,9 +73,9 @@ fn a_conforming_domain_is_exact_plain_or_bisected() {
 #[test]
 fn the_same_bytes_on_any_number_of_threads() {
     let (solid, conforming) = block();
-    let sampled = Encoder::Sampled(Sampling { resolution: 4, ..Sampling::SAFE });
-    for encoder in [Encoder::Certified, sampled] {
-        let options = EncodeOptions { encoder, max_entries: Some(12), ..fast() };
+    let sampled = Method::Sampled(Sampling { resolution: 4, ..Sampling::SAFE });
+    for method in [Method::Certified, sampled] {
+        let options = EncodeOptions { method, max_entries: Some(12), ..fast() };
         for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
             let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
             let alone = one.install(|| encoded(&solid, domain, &options));
@@ -92,7 +90,7 @@ fn sampling_with_a_threshold_as_wide_as_the_grid_misses_nothing() {
     for resolution in [2, 5] {
         let sampling = Sampling { resolution, ..Sampling::SAFE };
         for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
-            let options = EncodeOptions { encoder: Encoder::Sampled(sampling), ..fast() };
+            let options = EncodeOptions { method: Method::Sampled(sampling), ..fast() };
             let asset = encoded(&solid, domain, &options);
             let report = verified(&asset);
             assert!(report.passed && report.precisions[1].largest_error_beyond.is_none(), "{report:#?}");
@@ -126,12 +124,16 @@ impl Sampler for OneFace {
 #[test]
 fn what_a_sampler_says_is_no_proof() {
     let (solid, conforming) = block();
-    let (source, progress) = (Source::default(), Progress::default());
     for most in [None, Some(3)] {
         for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
-            let encoder = Encoder::Sampled(Sampling { resolution: 3, ..Sampling::SAFE });
-            let options = EncodeOptions { encoder, max_entries: most, ..fast() };
-            let asset = encode_with(&solid, domain, &source, &options, &OneFace, &progress).expect("encodes");
+            let method = Method::Sampled(Sampling { resolution: 3, ..Sampling::SAFE });
+            let options = EncodeOptions { method, max_entries: most, ..fast() };
+            let asset = Encoder::new()
+                .options(options)
+                .domain(domain)
+                .sampler(&OneFace)
+                .encode(&solid)
+                .expect("encodes");
             let certificate = asset.about().certificate();
             assert_eq!((certificate.delta(), certificate.chains()), (None, None), "{certificate:?}");
         }
@@ -141,12 +143,12 @@ fn what_a_sampler_says_is_no_proof() {
 #[test]
 fn the_papers_sampling_misses_faces_where_the_grid_is_coarse() {
     let (solid, conforming) = block();
-    let plain = |encoder| EncodeOptions { encoder, refinement: Refinement::None, ..fast() };
-    let certified = encoded(&solid, Domain::Conforming(&conforming), &plain(Encoder::Certified));
+    let plain = |method| EncodeOptions { method, refinement: Refinement::None, ..fast() };
+    let certified = encoded(&solid, Domain::Conforming(&conforming), &plain(Method::Certified));
     let mut misses = Vec::new();
     for resolution in [1, 4, 16] {
         let sampling = Sampling { resolution, ..Sampling::PAPER };
-        let asset = encoded(&solid, Domain::Conforming(&conforming), &plain(Encoder::Sampled(sampling)));
+        let asset = encoded(&solid, Domain::Conforming(&conforming), &plain(Method::Sampled(sampling)));
         let report = verified(&asset);
         assert!(report.passed && asset.about().certificate().delta().is_none(), "nothing is promised");
         misses.push(report.precisions[1].largest_error_beyond.expect("nothing is promised"));
@@ -161,21 +163,21 @@ fn the_papers_sampling_misses_faces_where_the_grid_is_coarse() {
 fn a_truncated_asset_is_exact_up_to_its_exactness_distance() {
     let (solid, conforming) = block();
     let ball = Shape::default().add_sphere(DVec3::ZERO, 3, || 1.0).solid();
-    let safe = Encoder::Sampled(Sampling { resolution: 6, ..Sampling::SAFE });
+    let safe = Method::Sampled(Sampling { resolution: 6, ..Sampling::SAFE });
     for (solid, domain, most) in [
         (&solid, Domain::Conforming(&conforming), 16),
         (&solid, Domain::Bisection, 10),
         (&ball, Domain::Bisection, 24),
     ] {
-        for encoder in [Encoder::Certified, safe] {
-            let options = EncodeOptions { encoder, max_entries: Some(most), ..fast() };
+        for method in [Method::Certified, safe] {
+            let options = EncodeOptions { method, max_entries: Some(most), ..fast() };
             let asset = encoded(solid, domain, &options);
             let certificate = asset.about().certificate();
             assert!(certificate.truncated());
             let report = verified(&asset);
-            assert!(report.passed, "{encoder:?}: {report:#?}");
+            assert!(report.passed, "{method:?}: {report:#?}");
             let beyond = report.precisions[1].largest_error_beyond;
-            if encoder == Encoder::Certified {
+            if method == Method::Certified {
                 let within = certificate.exactness_distance().expect("it is truncated");
                 assert!(within > 0.0, "the nearest faces are kept");
                 let points: usize = report.precisions[1].classes.iter().map(|c| c.points).sum();
@@ -214,18 +216,16 @@ fn lists_for_deformation_name_all_faces_around_surface_vertices() {
 #[test]
 fn options_that_mean_nothing_are_errors() {
     let (solid, conforming) = block();
-    let refused = |domain, options: EncodeOptions| match encode_in(
-        &solid,
-        domain,
-        &Source::default(),
-        &options,
-        &Progress::default(),
-    ) {
+    let refused = |domain, options: EncodeOptions| match Encoder::new()
+        .options(options)
+        .domain(domain)
+        .encode(&solid)
+    {
         Err(EncodeError::Option { option, .. }) => option,
         other => panic!("{:?}", other.map(|_| ())),
     };
     let sampled = |resolution, shrink, threshold| EncodeOptions {
-        encoder: Encoder::Sampled(Sampling { resolution, shrink, threshold }),
+        method: Method::Sampled(Sampling { resolution, shrink, threshold }),
         ..fast()
     };
     let zero = Threshold::Absolute(0.0);

@@ -2,25 +2,23 @@
 mod support;
 
 use support::tetrahedra::grid;
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::domain::ConformingMesh;
-use tesdf::encode::{Domain, EncodeOptions, Encoder, Refinement, Sampling, Threshold, encode_in};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Method, Refinement, Sampling, Threshold};
 use tesdf::evaluate::{BandReport, EvaluateError, EvaluateOptions, Grid, evaluate};
 use tesdf::geometry::Triangle;
 use tesdf::mesh::{SolidMesh, WindingNumber, read};
-use tesdf::query::Precision;
-use tesdf::{Progress, TeSdf};
 
 fn data(name: &str) -> std::path::PathBuf {
     std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/procedural").join(name)
 }
 
 fn solid(name: &str) -> SolidMesh {
-    SolidMesh::new(read(&data(name)).unwrap().mesh).unwrap()
+    SolidMesh::new(read(data(name)).unwrap().mesh).unwrap()
 }
 
 fn encoded(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, domain, &Source::default(), options, &Progress::default()).unwrap()
+    Encoder::new().options(options.clone()).domain(domain).encode(solid).unwrap()
 }
 
 /// An L of cubes with six tetrahedra each, and a layer around it.
@@ -40,7 +38,7 @@ fn direct(solid: &SolidMesh, asset: &TeSdf, grid: &Grid) -> Vec<(f64, f64)> {
     for z in 0..grid.counts[2] {
         for (y, x) in (0..grid.counts[1]).flat_map(|y| (0..grid.counts[0]).map(move |x| (y, x))) {
             let p = grid.point([x, y, z]);
-            if let Some(answer) = asset.query_in_domain(p, Precision::F64) {
+            if let Some(answer) = asset.query_in_domain(p) {
                 let d = triangles.iter().map(|t| t.closest(p).distance).fold(f64::INFINITY, f64::min);
                 let inside = WindingNumber::brute_force(mesh, p) >= 1;
                 let exact = if inside { -d } else { d };
@@ -100,7 +98,7 @@ fn full_lists_have_no_error_and_truncated_ones_that_of_a_direct_loop() {
 fn a_sampled_encoder_in_a_conforming_domain_misses_what_a_direct_loop_finds() {
     let (solid, domain) = block();
     let coarse = Sampling { resolution: 1, shrink: 0.5, threshold: Threshold::Absolute(0.0) };
-    let sampled = EncodeOptions { encoder: Encoder::Sampled(coarse), ..EncodeOptions::PAPER };
+    let sampled = EncodeOptions { method: Method::Sampled(coarse), ..EncodeOptions::PAPER };
     let certified = EncodeOptions { refinement: Refinement::None, ..EncodeOptions::default() };
     let cut = EncodeOptions { max_entries: Some(8), ..certified.clone() };
     let assets = [sampled, certified, cut].map(|o| encoded(&solid, Domain::Conforming(&domain), &o));

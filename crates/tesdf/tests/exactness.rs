@@ -13,13 +13,12 @@ use support::meshes::{self, Row};
 use support::points::{self, KINDS, Kind};
 use support::reference::{Reference, exceeds};
 use support::well_formed::WellFormed;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::geometry::{Closest, Feature};
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::query::{Answer, Precision};
-use tesdf::{Length, Progress, TeSdf};
+use tesdf::{Length, TeSdf};
 
 /// Points per mesh, unless `TESDF_TEST_POINTS` is set.
 const POINTS: usize = 1800;
@@ -53,8 +52,7 @@ impl Sample {
         let named = |e: String| format!("{}: {e}", row.name);
         let solid = row.solid().map_err(named)?;
         let options = options(&row);
-        let asset = encode(&solid, &Source::default(), &options, &Progress::default())
-            .map_err(|e| named(e.to_string()))?;
+        let asset = Encoder::new().options(options).encode(&solid).map_err(|e| named(e.to_string()))?;
         let (reference, cells) = (Reference::new(solid.mesh()), Cells::of(&asset));
         Ok(Self { row, solid, asset, reference, cells })
     }
@@ -151,7 +149,7 @@ fn distances_equal_brute_force() {
                 }
             }
             for (which, precision) in PRECISIONS.into_iter().enumerate() {
-                let answer = s.asset.query(p, precision);
+                let answer = s.asset.query_with(p, precision);
                 let tolerance = tolerance(&s.reference, p, precision);
                 let error = (answer.signed_distance.abs() - exact.abs()).abs();
                 let at = KINDS.iter().position(|k| *k == kind).expect("one of them");
@@ -187,7 +185,7 @@ fn distances_equal_the_reference_files() {
         for &(p, exact) in &points {
             let p = DVec3::from_array(p);
             for precision in PRECISIONS {
-                let found = s.asset.signed_distance(p, precision);
+                let found = s.asset.query_with(p, precision).signed_distance;
                 if exceeds((found - exact).abs(), tolerance(&s.reference, p, precision)) {
                     mistakes.add(|| format!("{precision:?} {:?}: {found:e} is not {exact:e}", p.to_array()));
                 }
@@ -205,19 +203,19 @@ fn answers_are_consistent() {
         let points = s.points();
         let mut mistakes = Mistakes::default();
         let only: Vec<DVec3> = points.iter().map(|p| p.1).collect();
-        let batches = PRECISIONS.map(|precision| s.asset.query_batch(&only, precision));
+        let batches = PRECISIONS.map(|precision| s.asset.query_batch_with(&only, precision));
         let mut asides = 0;
         for (i, &p) in only.iter().enumerate() {
             let exact = s.reference.signed_distance(p);
             for (precision, batch) in PRECISIONS.into_iter().zip(&batches) {
-                let answer = s.asset.query(p, precision);
+                let answer = s.asset.query_with(p, precision);
                 if answer != batch[i] {
                     mistakes.add(|| format!("{p}: the batch says {:?}, the query {answer:?}", batch[i]));
                 }
                 if let Err(e) = check_answer(s, p, answer, precision) {
                     mistakes.add(|| format!("{precision:?} {:?}: {e}: {answer:?}", p.to_array()));
                 }
-                match s.asset.query_in_domain(p, precision) {
+                match s.asset.query_in_domain_with(p, precision) {
                     Some(inside) if inside != answer => {
                         mistakes.add(|| format!("{p}: {inside:?} in the domain"))
                     }
@@ -358,16 +356,15 @@ fn regions_belong_to_the_domain() {
         regions: vec![[a[0], a[1], a[2], b[0], b[1], b[2]]],
         ..EncodeOptions::default()
     };
-    let asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("valid options");
+    let asset = Encoder::new().options(options).encode(&solid).expect("valid options");
     let reference = Reference::new(solid.mesh());
     let mut random = support::random::Random(5);
     for i in 0..2000 {
         let t = (0.5 * random.in_cube() + 0.5).map(|x| if i % 3 == 0 { x.round() } else { x });
         let p = region[0] + t * (region[1] - region[0]);
-        let answer =
-            asset.query_in_domain(p, Precision::F64).unwrap_or_else(|| panic!("{p} is not in the domain"));
+        let answer = asset.query_in_domain(p).unwrap_or_else(|| panic!("{p} is not in the domain"));
         let exact = reference.signed_distance(p);
         assert!((answer.signed_distance - exact).abs() <= reference.tolerance_f64(p), "{p}");
     }
-    assert!(asset.query_in_domain(bounds.min - 0.5 * d, Precision::F64).is_none());
+    assert!(asset.query_in_domain(bounds.min - 0.5 * d).is_none());
 }

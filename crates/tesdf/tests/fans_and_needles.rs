@@ -6,12 +6,11 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
 use support::shapes::Shape;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::TeSdf;
+use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::verify::{VerifyOptions, verify};
-use tesdf::{Progress, TeSdf};
 
 fn on_circle(k: u32, n: u32, z: f64) -> DVec3 {
     let angle = TAU * f64::from(k) / f64::from(n);
@@ -21,8 +20,7 @@ fn on_circle(k: u32, n: u32, z: f64) -> DVec3 {
 /// Encodes and verifies.
 fn encoded(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> TeSdf {
     let solid = SolidMesh::new(TriangleMesh::new(vertices, faces).expect("valid ids")).expect("a solid");
-    let options = EncodeOptions::preset(Preset::Fast);
-    let asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
+    let asset = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
     let samples = VerifyOptions { samples: 1000, seed: 9 };
     let report = verify(&asset, &samples, |_| ControlFlow::Continue(())).expect("a valid mesh");
     assert!(report.passed, "{report:#?}");

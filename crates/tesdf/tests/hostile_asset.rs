@@ -12,11 +12,11 @@ use support::shapes::Shape;
 use support::well_formed::WellFormed;
 use tesdf::asset::about::Source;
 use tesdf::asset::{AssetError, layout, save_atomic};
-use tesdf::encode::{EncodeOptions, encode};
+use tesdf::encode::{EncodeOptions, Encoder};
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::query::Precision;
-use tesdf::{Length, Progress, TeSdf};
+use tesdf::{Length, TeSdf};
 
 fn ball() -> SolidMesh {
     Shape::default().add_sphere(DVec3::new(0.1, 0.2, 0.3), 1, || 1.0).solid()
@@ -27,7 +27,7 @@ fn small() -> TeSdf {
     let options =
         EncodeOptions { byte_worth: 0.5, band: Length::OfDiagonal(0.3), ..EncodeOptions::default() };
     let source = Source { name: "ball.obj".into(), blake3: "0".repeat(64) };
-    encode(&ball(), &source, &options, &Progress::default()).expect("valid options")
+    Encoder::new().options(options).source(source.clone()).encode(&ball()).expect("valid options")
 }
 
 /// A file of this format version, written once. It must continue to open and give the same answers.
@@ -51,9 +51,9 @@ fn the_golden_asset_answers() {
         .check()
         .expect("cells");
     for (kind, p) in support::points::sample(solid.mesh(), &cells, 900) {
-        let error = asset.signed_distance(p, Precision::F64) - reference.signed_distance(p);
+        let error = asset.signed_distance(p) - reference.signed_distance(p);
         assert!(error.abs() <= reference.tolerance_f64(p), "{kind:?} {p}: {error:e}");
-        let error = asset.signed_distance(p, Precision::F32) - reference.signed_distance(p);
+        let error = asset.signed_distance_f32(p) - reference.signed_distance(p);
         assert!(error.abs() <= 2.0 * reference.tolerance_f32(p), "{kind:?} {p}: {error:e}");
     }
 }
@@ -101,10 +101,10 @@ fn ask(asset: &TeSdf, random: &mut Random) {
             _ => {}
         }
         for precision in [Precision::F32, Precision::F64] {
-            asset.query(p, precision);
-            asset.query_in_domain(p, precision);
+            asset.query_with(p, precision);
+            asset.query_in_domain_with(p, precision);
         }
-        asset.query_batch(&[p, -p], Precision::F32);
+        asset.query_batch_f32(&[p, -p]);
         asset.is_inside(p);
         asset.reads(p);
         asset.ray_cast(p, random.in_cube(), f64::INFINITY);

@@ -13,7 +13,7 @@ fn bad(name: &str) -> PathBuf {
 }
 
 fn load(name: &str) -> TriangleMesh {
-    read(&bad(name)).unwrap_or_else(|e| panic!("{name}: {e}")).mesh
+    read(bad(name)).unwrap_or_else(|e| panic!("{name}: {e}")).mesh
 }
 
 /// Kinds and numbers of the defects of each readable file. Files without an entry have none.
@@ -61,7 +61,7 @@ const REFUSED: &[(&str, &str, bool)] = &[
 fn readable() -> Vec<String> {
     let table = std::fs::read_to_string(bad("expected.tsv")).unwrap();
     let names = table.lines().skip(1).map(|line| line.split('\t').next().unwrap().to_owned());
-    names.filter(|name| read(&bad(name)).is_ok()).collect()
+    names.filter(|name| read(bad(name)).is_ok()).collect()
 }
 
 fn counts(defects: &[Defect]) -> BTreeMap<DefectKind, usize> {
@@ -109,10 +109,10 @@ fn rows_to_accept_are_accepted_and_those_to_reject_are_not() {
     for line in table.lines().skip(1) {
         let fields: Vec<&str> = line.split('\t').collect();
         let (name, expect) = (fields[0], fields[1]);
-        let accepted = read(&bad(name)).is_ok_and(|loaded| SolidMesh::new(loaded.mesh).is_ok());
+        let accepted = read(bad(name)).is_ok_and(|loaded| SolidMesh::new(loaded.mesh).is_ok());
         assert_eq!(accepted, expect.starts_with("accept") || solid_as_is.contains(&name), "{name} {expect}");
         if expect == "accept+note" || solid_as_is.contains(&name) {
-            let loaded = read(&bad(name)).unwrap();
+            let loaded = read(bad(name)).unwrap();
             let solid = SolidMesh::new(loaded.mesh).unwrap();
             assert!(!solid.warnings().is_empty() || !loaded.report.notes.is_empty(), "{name}: no notice");
         }

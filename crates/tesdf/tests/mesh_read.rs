@@ -86,7 +86,7 @@ fn each_bad_file_reads_or_is_refused_as_listed() {
     let rows: Vec<_> = table.lines().skip(1).filter_map(|row| row.split('\t').next()).collect();
     assert_eq!(rows.len(), listed.len());
     for name in rows {
-        match (listed[name], read(&bad(name))) {
+        match (listed[name], read(bad(name))) {
             (Mesh(vertices, faces), Ok(loaded)) => {
                 let found = (loaded.mesh.vertices().len(), loaded.mesh.faces().len());
                 assert_eq!(found, (*vertices, *faces), "{name}");
@@ -118,23 +118,23 @@ fn volume6(loaded: &LoadedMesh) -> f64 {
 
 #[test]
 fn reports_name_what_was_changed() {
-    let soup = read(&bad("soup_unwelded.obj")).unwrap();
+    let soup = read(bad("soup_unwelded.obj")).unwrap();
     assert_eq!((soup.report.welded_vertices, soup.report.unused_vertices), (798, 0));
-    let jitter = read(&bad("soup_jitter.obj")).unwrap();
+    let jitter = read(bad("soup_jitter.obj")).unwrap();
     assert_eq!(jitter.report.welded_vertices, 0);
 
-    let nan = read(&bad("nan_unused_vertex.obj")).unwrap();
+    let nan = read(bad("nan_unused_vertex.obj")).unwrap();
     assert_eq!(nan.report.unused_vertices, 1);
     assert!(nan.report.notes.iter().any(|n| n.contains("line 9: vertex 9 (1-based) is not finite")));
     assert!(nan.mesh.diagonal() < 0.035);
 
-    let concave = read(&bad("polygon_concave.obj")).unwrap();
+    let concave = read(bad("polygon_concave.obj")).unwrap();
     assert_eq!((concave.report.triangulated_polygons, concave.report.concave_polygons), (8, 2));
     assert!(concave.report.notes.iter().any(|n| n.contains("2 of 8 polygons are concave")));
     assert!((volume6(&concave) / 6.0 - 5e-6).abs() < 1e-18, "{}", volume6(&concave) / 6.0);
     assert_eq!(concave.origin.faces[..8], [0, 0, 0, 0, 1, 1, 1, 1]);
 
-    let quads = read(&bad("quads.obj")).unwrap();
+    let quads = read(bad("quads.obj")).unwrap();
     assert_eq!((quads.report.triangulated_polygons, quads.report.concave_polygons), (6, 0));
     assert!(quads.report.notes.is_empty());
     let hash = blake3::hash(&std::fs::read(bad("quads.obj")).unwrap());
@@ -143,16 +143,16 @@ fn reports_name_what_was_changed() {
 
 #[test]
 fn all_encodings_of_one_cube_agree() {
-    let cube = read(&bad("continuation_line.obj")).unwrap();
+    let cube = read(bad("continuation_line.obj")).unwrap();
     for name in ["negative_indices.obj", "ply_little_double.ply", "stl_ascii.stl", "stl_ascii_upper.stl"] {
-        let other = read(&bad(name)).unwrap();
+        let other = read(bad(name)).unwrap();
         assert_eq!(other.mesh.faces().len(), 12, "{name}");
         for face in 0..12 {
             assert_eq!(other.mesh.triangle(face), cube.mesh.triangle(face), "{name}");
         }
     }
     for name in ["ply_big_endian.ply", "stl_solid_but_binary.stl"] {
-        let other = read(&bad(name)).unwrap();
+        let other = read(bad(name)).unwrap();
         for face in 0..12 {
             let f32_of = |p: DVec3| p.as_vec3().as_dvec3();
             assert_eq!(other.mesh.triangle(face), cube.mesh.triangle(face).map(f32_of), "{name}");

@@ -15,7 +15,7 @@ fn data(name: &str) -> PathBuf {
 }
 
 fn load(name: &str) -> TriangleMesh {
-    read(&data(name)).unwrap_or_else(|e| panic!("{name}: {e}")).mesh
+    read(data(name)).unwrap_or_else(|e| panic!("{name}: {e}")).mesh
 }
 
 fn repaired(mesh: &TriangleMesh) -> Repaired {

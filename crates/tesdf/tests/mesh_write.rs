@@ -53,7 +53,7 @@ fn files_are_replaced_whole_or_not_at_all() {
     assert_eq!(read(&path).unwrap().mesh, mesh());
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file is left");
 
-    let unknown = write(&folder.path().join("a.off"), &mesh()).unwrap_err().to_string();
+    let unknown = write(folder.path().join("a.off"), &mesh()).unwrap_err().to_string();
     assert!(unknown.contains(".ply, .obj, .stl"), "{unknown}");
     let missing = write(Path::new("no/such/folder/a.ply"), &mesh()).unwrap_err().to_string();
     assert!(missing.contains("no/such/folder/a.ply"), "{missing}");

@@ -4,13 +4,12 @@ mod support;
 
 use proptest::prelude::*;
 use support::random::Random;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::TeSdf;
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{CheckReport, DefectKind, Severity, SolidMesh, TriangleMesh, WindingNumber, check};
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, verify};
-use tesdf::{Progress, TeSdf};
 
 /// Faces of a tetrahedron with positive volume, oriented outward.
 const OUTWARD: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
@@ -101,7 +100,7 @@ fn assert_exact(mesh: &TriangleMesh, asset: &TeSdf) {
             .fold(f64::INFINITY, f64::min);
         let expected = if w >= 1 { -distance } else { distance };
         for (precision, tolerance) in [(Precision::F32, 1e-6), (Precision::F64, 1e-12)] {
-            let found = asset.signed_distance(p, precision);
+            let found = asset.query_with(p, precision).signed_distance;
             let beside = distance <= tolerance * mesh.diagonal();
             let error = if beside { found.abs() - distance } else { found - expected };
             assert!(
@@ -131,7 +130,7 @@ fn what_is_inside_out_is_outside() {
         let warned = solid.warnings().iter().any(|d| d.kind == DefectKind::NegativeWinding);
         assert!(warned, "{:?}", solid.warnings());
         for options in [EncodeOptions::preset(Preset::Fast), EncodeOptions::preset(Preset::Compact)] {
-            let asset = encode(&solid, &Source::default(), &options, &Progress::default()).unwrap();
+            let asset = Encoder::new().options(options).encode(&solid).unwrap();
             assert_exact(&mesh, &asset);
         }
     }

@@ -7,22 +7,21 @@ use support::cells::lattice;
 use support::random::Random;
 use support::shapes::{FAMILIES, Shape};
 use support::tetrahedra::beam;
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::asset::layout::{self, Label, List, Node};
 use tesdf::asset::{CellKind, SectionSpec};
-use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset, Refinement, Sampling, Threshold, encode_in};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Method, Preset, Refinement, Sampling, Threshold};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 use tesdf::mesh::SolidMesh;
 use tesdf::verify::{Claim, ProveError, ProveOptions, ProveReport, Verdict, prove};
-use tesdf::{Progress, TeSdf};
 
 fn fast() -> EncodeOptions {
     EncodeOptions::preset(Preset::Fast)
 }
 
 fn encoded_with(solid: &SolidMesh, domain: Domain, options: &EncodeOptions) -> TeSdf {
-    encode_in(solid, domain, &Source::default(), options, &Progress::default()).expect("valid options")
+    Encoder::new().options(options.clone()).domain(domain).encode(solid).expect("valid options")
 }
 
 fn encoded(solid: &SolidMesh) -> TeSdf {
@@ -283,7 +282,7 @@ fn lists_of_samples_are_held_to_the_same_delta() {
     let solid = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid();
     let sampling = Sampling { resolution: 1, shrink: 1.0, threshold: Threshold::Absolute(0.0) };
     let options =
-        EncodeOptions { encoder: Encoder::Sampled(sampling), refinement: Refinement::ByCost, ..fast() };
+        EncodeOptions { method: Method::Sampled(sampling), refinement: Refinement::ByCost, ..fast() };
     let report = proved_with(&encoded_with(&solid, Domain::Bisection, &options), 1 << 12);
     assert!(!report.certified && !report.proved && report.distances.refuted > 0, "{:?}", report.distances);
     assert!(report.distances.proved > 0 && report.delta > 0.0);

@@ -3,9 +3,7 @@ mod support;
 
 use support::meshes::named;
 use support::random::Random;
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{Encoder, Preset};
 use tesdf::query::Precision;
 
 #[test]
@@ -13,19 +11,18 @@ fn tree_and_lists_agree() {
     for file in ["procedural/cube.obj", "procedural/shaft_keyway.obj", "procedural/lobed_peg.obj"] {
         let solid = named(file);
         let (bounds, diagonal) = (solid.mesh().bounds(), solid.mesh().diagonal());
-        let options = EncodeOptions::preset(Preset::Fast);
-        let asset = encode(&solid, &Source::default(), &options, &Progress::default()).unwrap();
+        let asset = Encoder::new().preset(Preset::Fast).encode(&solid).unwrap();
         let mut random = Random(1);
         for i in 0..4000 {
             let share = random.in_cube() * if i % 4 == 0 { 4.0 } else { 0.6 };
             let mut p = bounds.center() + share * bounds.extent();
             if i % 3 == 0 {
                 // Close to the surface.
-                let at = asset.query(p, Precision::F64);
+                let at = asset.query(p);
                 p = at.closest_point + random.power(-9.0, -2.0) * diagonal * at.gradient;
             }
             for (precision, of_diagonal) in [(Precision::F32, 1e-6), (Precision::F64, 1e-12)] {
-                let (tree, list) = (asset.query_by_tree(p, precision), asset.query(p, precision));
+                let (tree, list) = (asset.query_by_tree_with(p, precision), asset.query_with(p, precision));
                 let error = 2.0 * of_diagonal * diagonal;
                 let (a, b) = (tree.signed_distance, list.signed_distance);
                 assert!((a.abs() - b.abs()).abs() <= error, "{file} {p} {precision:?}: {a}, {b}");
@@ -35,6 +32,6 @@ fn tree_and_lists_agree() {
         }
         let p = bounds.center();
         assert!(asset.reads_by_tree(p).tree_faces >= 1 && asset.reads_by_tree(p).list_entries == 0);
-        assert!(asset.query_by_tree(p * f64::NAN, Precision::F32).signed_distance.is_nan());
+        assert!(asset.query_by_tree_f32(p * f64::NAN).signed_distance.is_nan());
     }
 }

@@ -80,7 +80,7 @@ fn abandoned_part_files_are_removed_and_those_of_the_living_are_not() {
     let held = File::create(at(".tesdf-held.part")).unwrap();
     held.lock().unwrap();
     fs::create_dir(at(".tesdf-folder.part")).unwrap();
-    save_atomic(&at("a"), b"a").unwrap();
+    save_atomic(at("a"), b"a").unwrap();
     let kept =
         [".other.part", ".tesdf-abc.parts", ".tesdf-folder.part", ".tesdf-held.part", "a", "tesdf-abc.part"];
     assert_eq!(names(folder.path()), kept);
@@ -102,7 +102,7 @@ fn a_part_grows_beside_its_target_and_keeps_others_away() {
     assert_eq!(fs::read(&path).unwrap(), b"old");
     // Another write into the folder acts like another process, because locks belong to the open
     // file.
-    save_atomic(&folder.path().join("other"), b"").unwrap();
+    save_atomic(folder.path().join("other"), b"").unwrap();
     let mut file = part.finish().unwrap();
     file.write_all(b"er").unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"newer");
@@ -188,7 +188,7 @@ mod unix {
             symlink(to, at(link)).unwrap();
         }
         for bytes in [b"first", b"again"] {
-            save_atomic(&at("link"), bytes).unwrap();
+            save_atomic(at("link"), bytes).unwrap();
             assert!(at("link").is_symlink());
             assert_eq!(fs::read(at("sub/a")).unwrap(), bytes);
         }

@@ -4,8 +4,8 @@ mod support;
 use support::bodies::body;
 use tesdf::Length;
 use tesdf::collide::{
-    CollideError, CollideOptions, FaceMethod, Groups, Instance, InstanceId, Mode, Placement, Pose, Reduction,
-    Scene, Shape, ShapeId, Velocity, detect,
+    CollideError, CollideOptions, Groups, Instance, InstanceId, Mode, Placement, Pose, Reduction, Scene,
+    Shape, ShapeId, Velocity, detect,
 };
 use tesdf::glam::{DQuat, DVec3};
 
@@ -28,7 +28,7 @@ fn row(places: &[f64]) -> (Scene, Vec<InstanceId>) {
 /// Ordered pairs (a, b) that have a contact.
 fn touching(scene: &Scene) -> Vec<(u32, u32)> {
     let found = detect(scene, &CollideOptions::default()).expect("a good scene");
-    let mut pairs: Vec<_> = found.contacts.iter().map(|c| (c.instance_a.0, c.instance_b.0)).collect();
+    let mut pairs: Vec<_> = found.iter().map(|c| (c.instance_a.0, c.instance_b.0)).collect();
     pairs.dedup();
     pairs
 }
@@ -87,15 +87,18 @@ fn shapes_that_are_none() {
 fn options_that_make_no_sense() {
     let (scene, _) = row(&[0.0, 1.0]);
     let good = CollideOptions::default();
-    let exact = |value| Mode::Face(FaceMethod::Exact { tolerance: Length::OfDiagonal(value) });
     for (name, options) in [
         ("contact_distance", CollideOptions { contact_distance: -1e-9, ..good }),
         ("contact_distance", CollideOptions { contact_distance: f64::NAN, ..good }),
         ("speculative_time", CollideOptions { speculative_time: f64::INFINITY, ..good }),
         ("cos_theta", CollideOptions { cos_theta: Some(1.5), ..good }),
         ("cos_theta", CollideOptions { cos_theta: Some(f64::NAN), ..good }),
-        ("tolerance", CollideOptions { mode: exact(0.0), ..good }),
-        ("tolerance", CollideOptions { mode: exact(f64::NAN), ..good }),
+        ("tolerance", CollideOptions { tolerance: Length::OfDiagonal(0.0), ..good }),
+        ("tolerance", CollideOptions { tolerance: Length::Absolute(f64::NAN), ..good }),
+        (
+            "iterations",
+            CollideOptions { mode: Mode::Face, iterations: CollideOptions::MAX_ITERATIONS + 1, ..good },
+        ),
         ("reduction", CollideOptions { reduction: Reduction::PerPair(0), ..good }),
     ] {
         let error = detect(&scene, &options).expect_err("is refused");
@@ -106,7 +109,7 @@ fn options_that_make_no_sense() {
 #[test]
 fn scenes_of_little() {
     let none = detect(&Scene::new(), &CollideOptions::default()).expect("nothing is no error");
-    assert_eq!((none.contacts.len(), none.statistics.instance_pairs), (0, 0));
+    assert_eq!((none.len(), none.statistics.instance_pairs), (0, 0));
     assert_eq!(touching(&row(&[0.0]).0), []);
     // Two planes have no contacts: they are half-spaces, and would touch along a whole line.
     let mut scene = Scene::new();
@@ -127,10 +130,10 @@ fn contact_distance_of_zero() {
     let mut scene = Scene::new();
     let shape = scene.add_shape(cube.asset.clone()).expect("a mesh");
     scene.add_many(&[Instance::new(shape, at(0.0)), Instance::new(shape, at(edge))]).expect("poses");
-    for mode in [Mode::Node, Mode::FACE, Mode::EXACT] {
+    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
         let found = detect(&scene, &CollideOptions::with_mode(mode)).expect("a good scene");
-        let least = found.contacts.iter().map(|c| c.distance).fold(0.0, f64::min);
-        assert!(found.contacts.len() >= 4 && least > -1e-9 * edge, "{mode:?}: {least}");
+        let least = found.iter().map(|c| c.distance).fold(0.0, f64::min);
+        assert!(found.len() >= 4 && least > -1e-9 * edge, "{mode:?}: {least}");
     }
 }
 
@@ -150,7 +153,7 @@ fn bounds_that_touch_only_after_rounding() {
         }
         let options = CollideOptions { contact_distance: 1e-15, ..CollideOptions::with_mode(Mode::Node) };
         let found = detect(&scene, &options).expect("a good scene");
-        assert!(!found.contacts.is_empty(), "seed {k}");
+        assert!(!found.is_empty(), "seed {k}");
     }
 }
 
@@ -226,10 +229,10 @@ fn many_worlds_are_many_times_one() {
     let options = CollideOptions::default();
     let (of_one, of_all) =
         (detect(&one, &options).expect("a good scene"), detect(&scene, &options).expect("a good scene"));
-    assert_eq!(of_all.contacts.len(), 50 * of_one.contacts.len());
+    assert_eq!(of_all.len(), 50 * of_one.len());
     assert_eq!(of_all.statistics.instance_pairs, 50 * of_one.statistics.instance_pairs);
     let worlds: Vec<u32> =
-        of_all.contacts.iter().map(|c| scene.instance(c.instance_a).expect("it is there").world).collect();
+        of_all.iter().map(|c| scene.instance(c.instance_a).expect("it is there").world).collect();
     assert!(worlds.is_sorted());
 }
 
@@ -255,15 +258,14 @@ fn a_hundred_thousand_instances() {
     scene.add_many(&instances).expect("poses");
     assert!(scene.instance_bytes() < 200 * count, "{} bytes", scene.instance_bytes());
     let found = detect(&scene, &CollideOptions::default()).expect("a good scene");
-    let mut pairs: Vec<(u32, u32)> =
-        found.contacts.iter().map(|c| (c.instance_a.0, c.instance_b.0)).collect();
+    let mut pairs: Vec<(u32, u32)> = found.iter().map(|c| (c.instance_a.0, c.instance_b.0)).collect();
     pairs.dedup();
     let expected: Vec<(u32, u32)> =
         (0..count as u32).step_by(1000).flat_map(|k| [(k, k + 1), (k + 1, k)]).collect();
     assert_eq!(pairs, expected);
     // The cost depends on contacts, not on instances.
     assert_eq!(found.statistics.instance_pairs, expected.len());
-    assert!(found.statistics.bytes < 100_000 + 1000 * found.contacts.len(), "{:?}", found.statistics);
+    assert!(found.statistics.bytes < 100_000 + 1000 * found.len(), "{:?}", found.statistics);
 }
 
 #[test]
@@ -277,7 +279,7 @@ fn a_scaled_instance_is_a_scaled_shape() {
     for (world, pair) in pairs.iter().enumerate() {
         scene.add_many(&pair.map(|i| Instance { world: world as u32, ..i })).expect("poses");
     }
-    let found = detect(&scene, &CollideOptions::default()).expect("a good scene").contacts;
+    let found = detect(&scene, &CollideOptions::default()).expect("a good scene").into_vec();
     assert_eq!(found.len(), 4);
     for (x, y) in found[..2].iter().zip(&found[2..]) {
         assert!((x.distance - y.distance).abs() < 1e-15 && x.point_a.distance(y.point_a) < 1e-15);

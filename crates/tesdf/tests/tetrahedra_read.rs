@@ -30,9 +30,9 @@ fn positions(mesh: &TetMesh) -> Vec<[[f64; 3]; 4]> {
 
 #[test]
 fn gmsh_files_hold_the_same_tetrahedra() {
-    let text = positions(&read_tetrahedra(&golden("v22.msh")).unwrap());
+    let text = positions(&read_tetrahedra(golden("v22.msh")).unwrap());
     assert_eq!(text.len(), 60);
-    let binary = positions(&read_tetrahedra(&golden("v22_binary.msh")).unwrap());
+    let binary = positions(&read_tetrahedra(golden("v22_binary.msh")).unwrap());
     for (a, b) in text.iter().flatten().flatten().zip(binary.iter().flatten().flatten()) {
         assert!((a - b).abs() <= 1e-15, "{a} {b}");
     }
@@ -44,7 +44,7 @@ fn gmsh_files_hold_the_same_tetrahedra() {
         ("v41_binary.msh", &binary),
         ("v41_binary_parametric.msh", &binary),
     ] {
-        let loaded = load_tetrahedra(&golden(name)).unwrap();
+        let loaded = load_tetrahedra(golden(name)).unwrap();
         assert!(positions(&loaded.mesh) == *expected, "{name}");
         assert_eq!((loaded.format, loaded.mesh.vertices().len()), (TetFormat::Msh, 32), "{name}");
         assert_eq!(loaded.skipped, SKIPPED, "{name}");
@@ -53,7 +53,7 @@ fn gmsh_files_hold_the_same_tetrahedra() {
 
 #[test]
 fn vtu_files_hold_the_same_tetrahedra() {
-    let expected = positions(&read_tetrahedra(&golden("v22.msh")).unwrap());
+    let expected = positions(&read_tetrahedra(golden("v22.msh")).unwrap());
     for name in [
         "ascii.vtu",
         "base64.vtu",
@@ -65,7 +65,7 @@ fn vtu_files_hold_the_same_tetrahedra() {
         "appended_raw_zlib.vtu",
         "meshio.vtu",
     ] {
-        let loaded = load_tetrahedra(&golden(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let loaded = load_tetrahedra(golden(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
         let found = positions(&loaded.mesh);
         let differ = |(a, b): (&f64, &f64)| (a - b).abs() > 1e-15;
         let close = !found.iter().flatten().flatten().zip(expected.iter().flatten().flatten()).any(differ);
@@ -80,10 +80,10 @@ fn vtu_files_hold_the_same_tetrahedra() {
 /// fill.
 #[test]
 fn the_beam_conforms() {
-    let beam = read_tetrahedra(&data("beam.node")).unwrap();
-    assert_eq!(read_tetrahedra(&data("beam.ele")).unwrap(), beam);
+    let beam = read_tetrahedra(data("beam.node")).unwrap();
+    assert_eq!(read_tetrahedra(data("beam.ele")).unwrap(), beam);
     // The surface file cuts half of the squares along the other diagonal.
-    let other = SolidMesh::new(read(&data("beam.obj")).unwrap().mesh).unwrap();
+    let other = SolidMesh::new(read(data("beam.obj")).unwrap().mesh).unwrap();
     let error = ConformingMesh::new(&other, &beam).unwrap_err();
     let expected =
         ConformingError::FaceMissing { missing: 352, of: 704, face: 0, reason: MissingFace::Recut };
@@ -134,11 +134,11 @@ fn error_of(name: &str, bytes: &[u8]) -> String {
 
 #[test]
 fn second_order_is_an_error() {
-    let error = read_tetrahedra(&golden("second_order.msh")).unwrap_err();
+    let error = read_tetrahedra(golden("second_order.msh")).unwrap_err();
     let ReadTetrahedraError::Element { element: 77, ref kind, .. } = error else { panic!("{error}") };
     assert_eq!(kind, "a second-order tetrahedron");
     assert!(error.to_string().starts_with("Gmsh MSH, line "), "{error}");
-    let error = read_tetrahedra(&golden("second_order_v22_binary.msh")).unwrap_err().to_string();
+    let error = read_tetrahedra(golden("second_order_v22_binary.msh")).unwrap_err().to_string();
     assert!(error.starts_with("Gmsh MSH, byte ") && error.contains("second-order"), "{error}");
     let text = std::fs::read_to_string(golden("ascii.vtu")).unwrap().replace(" 10 10 ", " 10 24 ");
     let error = error_of("a.vtu", text.as_bytes());
@@ -198,7 +198,7 @@ fn tetgen_errors_name_the_line() {
     let read = |node: &str, ele: &str| {
         std::fs::write(folder.path().join("a.node"), node).unwrap();
         std::fs::write(folder.path().join("a.ele"), ele).unwrap();
-        read_tetrahedra(&folder.path().join("a.ele")).map_err(|e| e.to_string())
+        read_tetrahedra(folder.path().join("a.ele")).map_err(|e| e.to_string())
     };
     assert!(read(node, ele).is_ok());
     for (node, ele, expected) in [

@@ -6,19 +6,17 @@ use std::sync::Arc;
 use support::meshes::named;
 use support::random::Random;
 use support::shapes::Shape as Surface;
-use tesdf::asset::about::Source;
 use tesdf::collide::{
     ClearanceOptions, CollideError, Impact, Instance, InstanceId, Motion, Pose, Scene, Shape,
     TimeOfImpactOptions, Velocity, clearance, time_of_impact,
 };
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
-use tesdf::{Length, Progress, TeSdf};
+use tesdf::{Length, TeSdf};
 
 fn asset(solid: &SolidMesh) -> Arc<TeSdf> {
-    let options = EncodeOptions::preset(Preset::Fast);
-    Arc::new(encode(solid, &Source::default(), &options, &Progress::default()).expect("it encodes"))
+    Arc::new(Encoder::new().preset(Preset::Fast).encode(solid).expect("it encodes"))
 }
 
 fn boxed(half: DVec3) -> Arc<TeSdf> {

@@ -4,19 +4,18 @@ mod support;
 use std::ops::ControlFlow;
 
 use support::shapes::Shape;
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::asset::layout::{self, Label, Node};
 use tesdf::asset::{CellKind, SectionSpec};
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::inspect::{InspectOptions, inspect};
 use tesdf::mesh::SolidMesh;
 use tesdf::verify::{PointClass, VerifyError, VerifyOptions, VerifyReport, verify};
-use tesdf::{Progress, TeSdf};
 
 fn encoded(solid: &SolidMesh) -> TeSdf {
     let options = EncodeOptions::preset(Preset::Fast);
-    encode(solid, &Source::default(), &options, &Progress::default()).expect("valid options")
+    Encoder::new().options(options).encode(solid).expect("valid options")
 }
 
 /// A ball with a box-shaped cavity, which has cells of every label.
@@ -189,7 +188,7 @@ fn reads_by_volume_are_those_of_random_points() {
     let (low, high) = (DVec3::new(1.5, -3.5, -1.0), DVec3::new(4.5, -0.5, 2.0));
     for _ in 0..20_000 {
         let p = low + DVec3::new(random.unit(), random.unit(), random.unit()) * (high - low);
-        if asset.query_in_domain(p, tesdf::query::Precision::F32).is_some() {
+        if asset.query_in_domain_f32(p).is_some() {
             reads += asset.reads(p).total();
             count += 1;
         }

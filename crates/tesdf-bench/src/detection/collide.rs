@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use serde::Serialize;
-use tesdf::collide::{CollideOptions, FaceMethod, Mode, Reduction, detect};
+use tesdf::collide::{CollideOptions, Mode, Reduction, detect};
 
 use super::frames::Frames;
 use super::report::{Counts, PHASES, Report, Spread, ms, text};
@@ -94,11 +94,12 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let contact_distance = args.contact_distance.or(frames.contact_distance).unwrap_or(0.0);
     let mode = match args.mode {
         ModeName::Node => Mode::Node,
-        ModeName::Face => Mode::Face(FaceMethod::FrankWolfe { iterations: args.iterations }),
-        ModeName::Exact => Mode::EXACT,
+        ModeName::Face => Mode::Face,
+        ModeName::Exact => Mode::Exact,
     };
     let options = CollideOptions {
         contact_distance,
+        iterations: args.iterations,
         cos_theta: Some(args.cos_theta),
         reduction: args.reduce.map_or(Reduction::None, Reduction::PerPair),
         ..CollideOptions::with_mode(mode)

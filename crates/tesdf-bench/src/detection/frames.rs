@@ -4,9 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use tesdf::asset::about::Source;
 use tesdf::collide::{Instance, InstanceId, Pose, Scene};
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::input;
 use tesdf::mesh::SolidMesh;
@@ -51,7 +50,8 @@ impl Frames {
     fn of_scene(loaded: &LoadedScene) -> Result<Self, Failure> {
         let interrupted = interrupt_flag()?;
         let progress = Progress::default();
-        let system = watched(&progress, &interrupted, || loaded.system(&progress)).map_err(Failure::new)?;
+        let system =
+            watched(&progress, &interrupted, || loaded.system_watched(&progress)).map_err(Failure::new)?;
         let scene = system.scene().clone();
         let poses = vec![scene.instances().map(|(_, instance)| instance.pose).collect()];
         Ok(Self { scene, poses, contact_distance: loaded.scene.detector.contact_distance })
@@ -162,7 +162,7 @@ fn geometry(path: &Path, max_entries: Option<u32>, interrupted: &AtomicBool) -> 
     let solid = SolidMesh::new(mesh_file::read(path)?.mesh).map_err(|e| named(&e))?;
     let options = EncodeOptions { max_entries, ..EncodeOptions::preset(Preset::Default) };
     let progress = Progress::default();
-    watched(&progress, interrupted, || encode(&solid, &Source::default(), &options, &progress))
+    watched(&progress, interrupted, || Encoder::new().options(options).progress(&progress).encode(&solid))
         .map(Arc::new)
         .map_err(|e| named(&e))
 }

@@ -3,9 +3,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use serde::Serialize;
-use tesdf::encode::{
-    Deformation, EncodeOptions, Encoder, Refinement, Sampler, Sampling, Threshold, encode_with,
-};
+use tesdf::encode::{Deformation, EncodeOptions, Encoder, Method, Refinement, Sampler, Sampling, Threshold};
 use tesdf::evaluate::{BandReport, EvaluateOptions, evaluate};
 use tesdf::inspect::{InspectOptions, inspect};
 use tesdf::{Progress, TeSdf};
@@ -54,7 +52,7 @@ impl Way {
         let sampling = Sampling { resolution, threshold: Threshold::Absolute(threshold), ..Sampling::PAPER };
         Self {
             encoder: format!("{resolution} / {}", output::threshold(threshold)),
-            options: EncodeOptions { encoder: Encoder::Sampled(sampling), ..certified.options.clone() },
+            options: EncodeOptions { method: Method::Sampled(sampling), ..certified.options.clone() },
             ..certified
         }
     }
@@ -74,7 +72,13 @@ impl Way {
         let progress = Progress::default();
         let never = AtomicBool::new(false);
         let asset = watched(&progress, &never, || {
-            encode_with(&place.solid, place.domain(), &place.source, &self.options, sampler, &progress)
+            Encoder::new()
+                .options(self.options.clone())
+                .domain(place.domain())
+                .source(place.source.clone())
+                .sampler(sampler)
+                .progress(&progress)
+                .encode(&place.solid)
         });
         let asset = asset.map_err(|e| Failure::new(format!("{}: {e}", place.source.name)))?;
         Ok((asset, start.elapsed().as_secs_f64()))

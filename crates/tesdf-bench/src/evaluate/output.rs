@@ -53,7 +53,7 @@ impl Sink {
         std::fs::create_dir_all(folder)
             .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", folder.display())))?;
         let meshes: Vec<_> =
-            MESHES.iter().flat_map(|mesh| tetrahedra_files(&args.data.join(mesh.path))).collect();
+            MESHES.iter().flat_map(|mesh| tetrahedra_files(args.data.join(mesh.path))).collect();
         let open =
             |extension| output::open(&folder.join(format!("{name}.{extension}")), &meshes, args.consent);
         Ok(Self::Files([open("json")?, open("csv")?, open("md")?]))

@@ -30,7 +30,7 @@ pub enum Preset {
     SampledSafe,
 }
 
-impl From<EncoderChoice> for tesdf::encode::EncoderChoice {
+impl From<EncoderChoice> for tesdf::encode::MethodChoice {
     fn from(choice: EncoderChoice) -> Self {
         match choice {
             EncoderChoice::Certified => Self::Certified,
@@ -58,7 +58,7 @@ impl Args {
         EncodeChoices {
             preset: self.preset.into(),
             domain: self.domain.clone(),
-            encoder: self.encoder.map(Into::into),
+            method: self.encoder.map(Into::into),
             resolution: self.resolution,
             threshold: self.threshold,
             max_entries: self.e_max,

@@ -5,7 +5,6 @@ use std::io::{self, IsTerminal};
 use std::path::PathBuf;
 
 use tesdf::input;
-use tesdf::query::Precision;
 
 pub use points::{HEADER, PointsError, read, write};
 
@@ -43,7 +42,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut rows = Vec::new();
     for (i, chunk) in points.chunks(CHUNK).enumerate() {
         rows.clear();
-        write(&mut rows, chunk, &asset.query_batch(chunk, Precision::F64))
+        write(&mut rows, chunk, &asset.query_batch(chunk))
             .map_err(|e| Failure::new(format!("cannot write the rows: {e}")))?;
         report::result(&rows)?;
         if let Some(bar) = &bar {

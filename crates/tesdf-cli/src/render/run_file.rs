@@ -27,11 +27,12 @@ pub fn posed(args: &Args, run: &Path) -> Result<(Posed, Destination), Failure> {
     inputs.push(run.to_path_buf());
     let output = output::open(&args.output, &inputs, args.consent)?;
     let (progress, interrupted) = (Progress::default(), interrupt_flag()?);
-    let system = watched(&progress, &interrupted, || loaded.system(&progress)).map_err(|e| match e {
-        SceneError::Body { name, reason, .. } => at(&format!("body {name}: {reason}"))
-            .hint("the run holds paths, not meshes; --geometry BODY=FILE says where they are now"),
-        e => Failure::new(e),
-    })?;
+    let system =
+        watched(&progress, &interrupted, || loaded.system_watched(&progress)).map_err(|e| match e {
+            SceneError::Body { name, reason, .. } => at(&format!("body {name}: {reason}"))
+                .hint("the run holds paths, not meshes; --geometry BODY=FILE says where they are now"),
+            e => Failure::new(e),
+        })?;
 
     let end = record.times().last().copied();
     let time = args.time.or(end).ok_or_else(|| at(&"it has no steps"))?;

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use tesdf::collide::{Placement, Shape};
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
-use tesdf::query::Precision;
 
 use super::colour::Linear;
 use super::cut::{Cut, HalfSpace};
@@ -73,7 +72,7 @@ impl Body<'_> {
     /// Signed distance of the whole body, world unit.
     pub fn signed_distance(&self, p: DVec3) -> f64 {
         let Placement { scale, .. } = self.drawn.placement;
-        self.drawn.shape.signed_distance(self.drawn.placement.to_shape(p), Precision::F32) * scale
+        self.drawn.shape.signed_distance_f32(self.drawn.placement.to_shape(p)) * scale
     }
 }
 

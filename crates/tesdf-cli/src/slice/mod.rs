@@ -17,7 +17,6 @@ use tesdf::asset::CellKind;
 use tesdf::evaluate::EvaluateOptions;
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
-use tesdf::query::Precision;
 
 pub use cut::{Axis, View, cut_tetrahedron, cut_triangle};
 pub use error::{Deviation, draw_error};
@@ -94,14 +93,14 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         // Cells would hide the borders of the bands.
         overlay.cells.clear();
         let deviation = |p: DVec3| {
-            let found = asset.query_in_domain(p, Precision::F64)?.signed_distance;
-            let exact = asset.query_by_tree(p, Precision::F64).signed_distance;
+            let found = asset.query_in_domain(p)?.signed_distance;
+            let exact = asset.query_by_tree(p).signed_distance;
             Some(Deviation { exact, error: (found - exact).abs() })
         };
         let tolerance = EvaluateOptions::default().exact * asset.bounds().extent().length();
         draw_error(&view, &overlay, args.size, tolerance, deviation)
     } else {
-        draw(&view, &overlay, args.size, |p| asset.signed_distance(p, Precision::F32))
+        draw(&view, &overlay, args.size, |p| asset.signed_distance_f32(p))
     }
     .map_err(Failure::new)?;
     output::write(&output, &png)?;

@@ -5,7 +5,6 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use tesdf::Progress;
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{PartialRun, RunJournal, RunOrigin, simulate_from};
@@ -92,8 +91,8 @@ pub fn block(n: u32) -> String {
 
 /// The file of a run that was killed after `steps` steps.
 pub fn cut_run(folder: &Folder, scene: &str, steps: u64) -> Vec<u8> {
-    let loaded = LoadedScene::read(&folder.path(scene)).unwrap();
-    let system = loaded.system(&Progress::default()).unwrap();
+    let loaded = LoadedScene::read(folder.path(scene)).unwrap();
+    let system = loaded.system().unwrap();
     let origin = RunOrigin::of(&system, "cpu").unwrap();
     let run = PartialRun::new(&loaded.scene, &system, folder.0.path().display().to_string());
     let mut engine = loaded.newton(system).unwrap();

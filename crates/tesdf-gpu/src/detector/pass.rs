@@ -1,6 +1,6 @@
 //! One pass: the launches of all stages.
 use cubecl::prelude::*;
-use tesdf::collide::{CollideOptions, FaceMethod, Mode, Reduction};
+use tesdf::collide::{CollideOptions, Mode, Reduction};
 
 use super::buffers::{Products, ROW, WORD};
 use super::stages::{Stages, Timing};
@@ -24,7 +24,7 @@ impl Detector {
         let device = self.device.clone();
         let weights = match options.mode {
             Mode::Node => None,
-            Mode::Face(method) => Some((method, self.products.weights(&device)?)),
+            Mode::Face | Mode::Exact => Some(self.products.weights(&device)?),
         };
         let counters = device.upload("counters", &[0u32; products::COUNTERS])?;
         let mut pass = Pass {
@@ -39,7 +39,7 @@ impl Detector {
         pass.hidden(per_meshlet.clone())?;
         match weights {
             None => pass.nodes(per_meshlet)?,
-            Some((method, weights)) => pass.faces(per_meshlet, instances, method, &weights)?,
+            Some(weights) => pass.faces(per_meshlet, instances, &weights)?,
         }
         pass.reduction()?;
         let Pass { sent, stages: Stages { launches, times, .. }, .. } = pass;
@@ -250,7 +250,6 @@ impl Pass<'_> {
         &mut self,
         per_meshlet: CubeCount,
         instances: &Instances,
-        method: FaceMethod,
         weights: &Buffer,
     ) -> Result<(), GpuError> {
         let Detector { device, images, products, options: with, .. } = self.detector;
@@ -293,16 +292,17 @@ impl Pass<'_> {
                 );
             })?;
         }
-        let (per, lanes) = match (with.lanes, method) {
-            (Lanes::Single, FaceMethod::FrankWolfe { .. }) => (narrow::LANES, 1),
+        let by_iterations = self.options.mode == Mode::Face;
+        let (per, lanes) = match with.lanes {
+            Lanes::Single if by_iterations => (narrow::LANES, 1),
             _ => (1, narrow::LANES),
         };
         let per_polygon = self.groups_for(room.polygons, per, products::POLYGONS)?;
         let counters = &self.counters;
         // Above any cosine: nothing is filtered.
         let cos_theta = self.options.cos_theta.map_or(-2.0, |cos| cos as f32);
-        match method {
-            FaceMethod::FrankWolfe { iterations } => {
+        match self.options.mode {
+            Mode::Node | Mode::Face => {
                 let planes = with.exchange == Exchange::Device && device.has_planes_of_32();
                 self.stages.run("face narrow phase", || {
                     narrow::narrow_faces::launch(
@@ -317,7 +317,7 @@ impl Pass<'_> {
                         counters.words(),
                         contact_words.words(),
                         contact_rows.rows(),
-                        iterations,
+                        self.options.iterations,
                         cos_theta,
                         room.polygons,
                         room.contacts,
@@ -327,9 +327,9 @@ impl Pass<'_> {
                     );
                 })
             }
-            FaceMethod::Exact { tolerance } => {
-                let tolerances =
-                    device.upload("tolerances", &self.detector.tolerances(instances, tolerance))?;
+            Mode::Exact => {
+                let tolerances = self.detector.tolerances(instances, self.options.tolerance);
+                let tolerances = device.upload("tolerances", &tolerances)?;
                 self.sent += tolerances.bytes();
                 self.stages.run("exact narrow phase", || {
                     exact::narrow_exact::launch(

@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use tesdf::collide::{CollideOptions, Contact, Contacts, InstanceId, Mode, Scene, Shape, detect};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
-use tesdf::query::Precision;
 use tesdf_gpu::{Detector, DetectorOptions, Device};
 
 /// What `f32` may be off by, as a share of the larger body: rounding of poses, faces and distances.
@@ -33,7 +32,7 @@ pub fn found(scene: &Scene, options: &CollideOptions, with: DetectorOptions) -> 
 /// Signed distance and gradient of a shape, in its frame.
 pub fn exact(shape: &Shape, p: DVec3) -> f64 {
     match shape {
-        Shape::Mesh(asset) => asset.query_by_tree(p, Precision::F64).signed_distance,
+        Shape::Mesh(asset) => asset.query_by_tree(p).signed_distance,
         Shape::Plane => p.z,
         Shape::Sphere { radius } => p.length() - radius,
         Shape::Capsule { half_height, radius } => {
@@ -120,15 +119,15 @@ impl Compared {
 /// Compares all of a scene.
 pub fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
     let (device, _) = found(scene, options, DetectorOptions::default());
-    let most = 1 + device.contacts.len() / 1000;
-    device.contacts.iter().step_by(most).for_each(|c| is_true(scene, c, size));
+    let most = 1 + device.len() / 1000;
+    device.iter().step_by(most).for_each(|c| is_true(scene, c, size));
     hold_against(scene, options, size, &device)
 }
 
 /// Compares contacts of a device with all of a scene.
 pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: &Contacts) -> Compared {
     let host = detect(scene, options).expect("a good scene");
-    let (on_host, on_device) = (least(&host.contacts), least(&device.contacts));
+    let (on_host, on_device) = (least(host.as_slice()), least(device.as_slice()));
     let keys: BTreeSet<_> = on_host.keys().chain(on_device.keys()).collect();
     let mut others = 0;
     for key in &keys {
@@ -152,7 +151,7 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
     }
     // Cells: those of one part may differ by slivers at their borders.
     let cells = |c: &Contacts| {
-        c.contacts.iter().map(|c| (c.instance_a, c.instance_b, c.feature.a, c.tet_b)).collect::<BTreeSet<_>>()
+        c.iter().map(|c| (c.instance_a, c.instance_b, c.feature.a, c.tet_b)).collect::<BTreeSet<_>>()
     };
     let (h, d) = (cells(&host), cells(device));
     let differing = h.symmetric_difference(&d).count();
@@ -161,11 +160,11 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
 
 /// All modes of detection, for bodies of a size.
 pub fn each_mode(size: f64) -> [CollideOptions; 4] {
-    let face = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(Mode::FACE) };
+    let face = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(Mode::Face) };
     [
         CollideOptions { mode: Mode::Node, ..face },
         CollideOptions { cos_theta: Some(0.3), ..face },
         face,
-        CollideOptions { mode: Mode::EXACT, ..face },
+        CollideOptions { mode: Mode::Exact, ..face },
     ]
 }

@@ -3,11 +3,10 @@
 #![allow(dead_code)]
 use std::path::Path;
 
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::collide::Shape;
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{Encoder, Preset};
 use tesdf::mesh::{LoadedMesh, MeshFormat, SolidMesh, read, read_bytes};
-use tesdf::{Progress, TeSdf};
 use tesdf_sim::MassProperties;
 
 /// A cube of `half` its edges, centred on the origin.
@@ -31,8 +30,7 @@ pub fn data(name: &str) -> TeSdf {
 
 fn encoded(loaded: LoadedMesh) -> TeSdf {
     let solid = SolidMesh::new(loaded.mesh).expect("closed");
-    let options = EncodeOptions::preset(Preset::Fast);
-    encode(&solid, &Source::default(), &options, &Progress::default()).expect("encoded")
+    Encoder::new().preset(Preset::Fast).encode(&solid).expect("encoded")
 }
 
 /// Of steel.

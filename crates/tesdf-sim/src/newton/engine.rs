@@ -39,8 +39,8 @@ pub struct Newton {
     options: NewtonOptions,
     /// Diagonal of each body's bounds.
     sizes: Vec<f64>,
-    contacts: Vec<Contact>,
-    hidden: Vec<HiddenOverlap>,
+    /// What the last step found at its beginning.
+    found: Contacts,
 }
 
 /// What stays the same within a step.
@@ -87,8 +87,8 @@ impl Newton {
             Ok(system.scene().shape(instance.shape)?.diagonal() * instance.scale)
         };
         let sizes = system.bodies().iter().map(size).collect::<Result<_, CollideError>>()?;
-        let (detector, contacts, hidden) = (Box::new(detector), Vec::new(), Vec::new());
-        Ok(Self { system, detector, collide, options, sizes, contacts, hidden })
+        let (detector, found) = (Box::new(detector), Contacts::default());
+        Ok(Self { system, detector, collide, options, sizes, found })
     }
 
     fn begin(&self, h: f64) -> Step {
@@ -250,9 +250,9 @@ impl Newton {
             let depths = Depths::of_contacts(contacts);
             for _ in 0..self.options.redetections {
                 let predicted = self.moved(step, &velocities);
-                let contacts = self.detect(step, &predicted)?.contacts;
+                let contacts = self.detect(step, &predicted)?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
-                rows = self.predicted_rows(step, &contacts, &poses, &velocities, &depths);
+                rows = self.predicted_rows(step, contacts.as_slice(), &poses, &velocities, &depths);
                 rows.retain(|row| !stays(row));
                 rows.extend(first.iter().filter(|row| stays(row)).cloned());
                 velocities = self.solve(step, &rows, Gap::Position, &velocities);
@@ -287,27 +287,27 @@ impl Dynamics for Newton {
         for (free, target) in step.free.iter().zip(&step.target) {
             (ahead[free.body].linear, ahead[free.body].angular) = unpack(target);
         }
-        let Contacts { contacts, hidden, .. } = self.detect(&mut step, &ahead)?;
-        let [velocities, carried] = self.velocities(&mut step, &contacts)?;
+        let found = self.detect(&mut step, &ahead)?;
+        let [velocities, carried] = self.velocities(&mut step, found.as_slice())?;
         let mut states = self.moved(&step, &velocities);
         for (free, v) in step.free.iter().zip(&carried) {
             (states[free.body].linear, states[free.body].angular) = unpack(v);
         }
         self.system.set_states(states)?;
         let mut report = step.report;
-        report.contacts = contacts.len();
-        report.deepest = contacts.iter().map(|c| c.distance).reduce(f64::min);
+        report.contacts = found.len();
+        report.deepest = found.iter().map(|c| c.distance).reduce(f64::min);
         report.solution = begin.elapsed().saturating_sub(report.detection);
-        (self.contacts, self.hidden) = (contacts, hidden);
+        self.found = found;
         Ok(report)
     }
 
     fn contacts(&self) -> &[Contact] {
-        &self.contacts
+        self.found.as_slice()
     }
 
     fn hidden(&self) -> &[HiddenOverlap] {
-        &self.hidden
+        &self.found.hidden
     }
 }
 

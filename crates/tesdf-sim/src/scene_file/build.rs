@@ -2,14 +2,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tesdf::asset::about::Source;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, FaceMethod, Instance, Mode, Pose, Scene, Shape, ShapeId,
-    Velocity, detect,
+    CollideError, CollideOptions, Contacts, Instance, Mode, Pose, Scene, Shape, ShapeId, Velocity, detect,
 };
-use tesdf::encode::{EncodeError, EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeError, EncodeFileError, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
-use tesdf::mesh::{self, LoadedMesh, SolidMesh};
 use tesdf::{Length, Progress, TeSdf};
 
 use super::read::LoadedScene;
@@ -22,11 +19,19 @@ use crate::{DynamicsError, Mass, MassProperties, System};
 const CONTACT_DISTANCE: f64 = 5e-3;
 
 impl LoadedScene {
-    /// Opens and encodes what the bodies are, and makes the system. `progress` is told of every encoding.
+    /// Opens and encodes what the bodies are, and makes the system.
     ///
     /// # Errors
-    /// The body at fault, with its line; or [`SceneError::Cancelled`].
-    pub fn system(&self, progress: &Progress) -> Result<System, SceneError> {
+    /// The body at fault, with its line.
+    pub fn system(&self) -> Result<System, SceneError> {
+        self.system_watched(&Progress::default())
+    }
+
+    /// As [`system`](Self::system), with `progress` for another thread, which can watch every encoding and cancel.
+    ///
+    /// # Errors
+    /// As [`system`](Self::system); or [`SceneError::Cancelled`].
+    pub fn system_watched(&self, progress: &Progress) -> Result<System, SceneError> {
         let scene = &self.scene;
         scene.steps().map_err(|e| self.value(e.key, e.reason))?;
         let gravity = DVec3::from_array(scene.gravity);
@@ -110,14 +115,19 @@ fn nothing(_: &Scene, _: &CollideOptions) -> Result<Contacts, CollideError> {
 fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions {
     let mode = match section.mode {
         DetectorMode::Node | DetectorMode::Off => Mode::Node,
-        DetectorMode::Face => Mode::Face(FaceMethod::FrankWolfe { iterations: section.iterations }),
-        DetectorMode::Exact => {
-            Mode::Face(FaceMethod::Exact { tolerance: Length::OfDiagonal(section.tolerance) })
-        }
+        DetectorMode::Face => Mode::Face,
+        DetectorMode::Exact => Mode::Exact,
     };
     let contact_distance =
         section.contact_distance.unwrap_or_else(|| CONTACT_DISTANCE * smallest_free_body(system));
-    CollideOptions { contact_distance, cos_theta: section.cos_theta, ..CollideOptions::with_mode(mode) }
+    CollideOptions {
+        mode,
+        iterations: section.iterations,
+        tolerance: Length::OfDiagonal(section.tolerance),
+        contact_distance,
+        cos_theta: section.cos_theta,
+        ..CollideOptions::default()
+    }
 }
 
 /// Diagonal of the smallest free body; 0 when there is none.
@@ -185,14 +195,10 @@ fn add_shape(system: &mut System, shape: Shape) -> Result<ShapeId, ShapeFailure>
 }
 
 fn encode_mesh(file: &Path, progress: &Progress) -> Result<TeSdf, ShapeFailure> {
-    let at = |e: &dyn std::fmt::Display| ShapeFailure::Reason(format!("{}: {e}", file.display()));
-    let LoadedMesh { mesh, report, .. } = mesh::read(file).map_err(|e| at(&e))?;
-    let solid = SolidMesh::new(mesh).map_err(|e| at(&e))?;
-    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let source = Source { name, blake3: report.source_blake3 };
-    encode(&solid, &source, &EncodeOptions::preset(Preset::Fast), progress).map_err(|e| match e {
-        EncodeError::Cancelled => ShapeFailure::Cancelled,
-        e => at(&e),
+    let encoder = Encoder::new().preset(Preset::Fast).progress(progress);
+    encoder.encode_file(file).map_err(|e| match e {
+        EncodeFileError::Encode { source: EncodeError::Cancelled, .. } => ShapeFailure::Cancelled,
+        e => ShapeFailure::Reason(e.to_string()),
     })
 }
 

@@ -94,7 +94,7 @@ impl LoadedScene {
             let BodySection { asset, mesh, .. } = body.get_ref();
             let asset = asset.iter().map(|path| self.resolve(path));
             asset
-                .chain(mesh.iter().flat_map(|path| tesdf::mesh::files(&self.resolve(path))))
+                .chain(mesh.iter().flat_map(|path| tesdf::mesh::files(self.resolve(path))))
                 .collect::<Vec<_>>()
         };
         self.scene.bodies.iter().flat_map(of_body).collect()

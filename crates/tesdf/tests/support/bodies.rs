@@ -2,12 +2,11 @@
 use std::collections::HashMap;
 use std::sync::{Arc, LazyLock, Mutex};
 
-use tesdf::asset::about::Source;
+use tesdf::TeSdf;
 use tesdf::collide::{Contact, Instance, InstanceId, Placement, Pose, Scene, Shape};
-use tesdf::encode::{EncodeOptions, Preset, encode};
+use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
-use tesdf::{Progress, TeSdf};
 
 use super::meshes;
 use super::random::Random;
@@ -37,7 +36,7 @@ impl Body {
     pub fn new(solid: SolidMesh) -> Self {
         let byte_worth = if solid.mesh().faces().len() > 1000 { 2.0 } else { 0.5 };
         let options = EncodeOptions { byte_worth, ..EncodeOptions::preset(Preset::Fast) };
-        let asset = encode(&solid, &Source::default(), &options, &Progress::default()).expect("encodes");
+        let asset = Encoder::new().options(options).encode(&solid).expect("encodes");
         Self { solid, asset: Arc::new(asset) }
     }
 
@@ -77,7 +76,7 @@ impl Placed {
     /// Signed distance at a point of the world, from the tree over all faces.
     pub fn distance_by_tree(&self, p: DVec3) -> f64 {
         let precision = tesdf::query::Precision::F64;
-        self.at.scale * self.body.asset.query_by_tree(self.at.to_shape(p), precision).signed_distance
+        self.at.scale * self.body.asset.query_by_tree_with(self.at.to_shape(p), precision).signed_distance
     }
 
     pub fn diagonal(&self) -> f64 {

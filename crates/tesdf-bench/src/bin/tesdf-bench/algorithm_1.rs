@@ -2,10 +2,9 @@
 use std::path::PathBuf;
 
 use clap::ValueEnum;
-use tesdf::asset::about::Source;
+use tesdf::Length;
 use tesdf::domain::gmsh::{GmshOptions, tetrahedralise};
-use tesdf::encode::{Domain, EncodeOptions, Encoder, Refinement, Sampling, encode_with};
-use tesdf::{Length, Progress};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Method, Refinement, Sampling};
 use tesdf_gpu::SampleCounter;
 
 use crate::input::{Input, Preset};
@@ -90,9 +89,9 @@ fn row(args: &Args, input: &Input, name: DomainName) -> Result<(), Failure> {
     let refinement = if conforming.is_some() { Refinement::None } else { Refinement::ByCost };
     let sampling = Sampling { resolution: args.resolution, ..Sampling::PAPER };
     let options =
-        EncodeOptions { encoder: Encoder::Sampled(sampling), refinement, ..Preset::Default.options() };
+        EncodeOptions { method: Method::Sampled(sampling), refinement, ..Preset::Default.options() };
     let counter = SampleCounter::new(args.every, args.blocks);
-    encode_with(&input.solid, domain, &Source::default(), &options, &counter, &Progress::default())?;
+    Encoder::new().options(options).domain(domain).sampler(&counter).encode(&input.solid)?;
     let counts = counter.counts();
     let seconds = |distances: f64| format!("{:.1}", distances * OPERATIONS / args.speed);
     output::row(&[

@@ -43,7 +43,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let seconds = |precision| {
         pool.install(|| {
             best_pass(|| {
-                black_box(asset.query_batch(black_box(&points), precision));
+                black_box(asset.query_batch_with(black_box(&points), precision));
             })
         })
     };

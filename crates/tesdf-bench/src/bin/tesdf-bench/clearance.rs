@@ -167,7 +167,7 @@ mod tests {
 
     fn cube() -> TriangleMesh {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
-        tesdf::mesh::read(path.as_ref()).expect("readable").mesh
+        tesdf::mesh::read(path).expect("readable").mesh
     }
 
     /// Edges of 20 mm: closed forms for faces, edges and faces, and crossed edges, apart and overlapping.

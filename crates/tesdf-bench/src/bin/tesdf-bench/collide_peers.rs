@@ -157,7 +157,7 @@ fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
     let contacts = |mode| {
         measure(set, |poses, contact_distance| {
             let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
-            let found = detect(&scene(poses)?.0, &options)?.contacts;
+            let found = detect(&scene(poses)?.0, &options)?;
             let least = found.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
             Ok(Found {
                 contacts: Some(found.len()),
@@ -174,8 +174,8 @@ fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
     })?;
     Ok(vec![
         row("detect, nodes", "no: at vertices only", contacts(Mode::Node)?),
-        row("detect, Frank-Wolfe, 16", "no: minima from above", contacts(Mode::FACE)?),
-        row("detect, exact", "f64; signed, of the solids, to 1e-7", contacts(Mode::EXACT)?),
+        row("detect, Frank-Wolfe, 16", "no: minima from above", contacts(Mode::Face)?),
+        row("detect, exact", "f64; signed, of the solids, to 1e-7", contacts(Mode::Exact)?),
         row("clearance", "f64; signed, of the solids, to 1e-7", apart),
     ])
 }
@@ -217,7 +217,7 @@ fn vertex_contacts(
     let bounds = b.input.solid.mesh().bounds().grown(distance);
     let vertices = a.input.solid.mesh().vertices().iter().map(|&v| pose.to_world(v));
     let near: Vec<DVec3> = vertices.filter(|&v| bounds.contains(v)).collect();
-    let answers = b.asset.query_batch(&near, precision);
+    let answers = b.asset.query_batch_with(&near, precision);
     let contacts = answers.iter().filter(|a| a.signed_distance <= distance).count();
     (contacts, answers.iter().map(|a| a.signed_distance).fold(f64::INFINITY, f64::min))
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use rayon::ThreadPoolBuilder;
 use tesdf::encode::EncodeOptions;
 use tesdf::inspect::{InspectOptions, inspect};
-use tesdf::query::Precision;
 
 use crate::input::{Input, Preset};
 use crate::output::mb;
@@ -74,12 +73,12 @@ pub fn run(args: &Args) -> Result<(), Failure> {
             let reads: usize = near.iter().map(|&p| asset.reads(p).total()).sum();
             let single = best_pass(|| {
                 for &p in &near {
-                    black_box(asset.query(black_box(p), Precision::F32));
+                    black_box(asset.query_f32(black_box(p)));
                 }
             });
             let batch = one.install(|| {
                 best_pass(|| {
-                    black_box(asset.query_batch(black_box(&near), Precision::F32));
+                    black_box(asset.query_batch_f32(black_box(&near)));
                 })
             });
             output::row(&[

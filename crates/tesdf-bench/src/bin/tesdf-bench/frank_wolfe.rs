@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use fastrand::Rng;
-use tesdf::collide::{CollideOptions, Contact, FaceMethod, Instance, Mode, Pose, Scene, detect};
+use tesdf::collide::{CollideOptions, Contact, Instance, Mode, Pose, Scene, detect};
 use tesdf::glam::{DQuat, DVec3};
 
 use crate::input::{Input, Preset};
@@ -78,13 +78,16 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         let turn = 0.01 * DVec3::new(signed(), signed(), signed()) / 3f64.sqrt();
         let pose = Pose::new(translation, DQuat::from_scaled_axis(turn))?;
         scene.set_poses(&[(ids[1], pose)])?;
-        let find = |mode| {
+        let find = |mode, iterations| {
             let contact_distance = args.contact_distance;
-            detect(&scene, &CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) })
+            detect(
+                &scene,
+                &CollideOptions { contact_distance, iterations, ..CollideOptions::with_mode(mode) },
+            )
         };
-        let exact = by_key(&find(Mode::EXACT)?.contacts);
+        let exact = by_key(find(Mode::Exact, 0)?.as_slice());
         for (k, &iterations) in ITERATIONS.iter().enumerate() {
-            let found = by_key(&find(Mode::Face(FaceMethod::FrankWolfe { iterations }))?.contacts);
+            let found = by_key(find(Mode::Face, iterations)?.as_slice());
             for (key, least) in &exact {
                 let (of, beyond) = &mut errors[usize::from(*least < 0.0)][k];
                 match found.get(key) {

@@ -3,10 +3,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::ValueEnum;
+use tesdf::TeSdf;
 use tesdf::asset::about::Source;
-use tesdf::encode::{EncodeOptions, encode};
-use tesdf::mesh::{ReadError, RepairOptions, SolidMesh, repair};
-use tesdf::{Progress, TeSdf};
+use tesdf::encode::{EncodeOptions, Encoder};
+use tesdf::mesh::{RepairOptions, SolidMesh, repair};
 
 use crate::Failure;
 
@@ -72,14 +72,9 @@ impl Input {
     /// what was changed.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let at = |e: &dyn std::fmt::Display| Failure::from(format!("{}: {e}", path.display()));
-        let loaded = tesdf::mesh::read(path).map_err(|e| match e {
-            // These name the file themselves.
-            ReadError::Open { .. } | ReadError::UnknownExtension { .. } => e.into(),
-            e => at(&e),
-        })?;
-        let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let loaded = tesdf::mesh::read(path).map_err(|e| e.in_file(path))?;
         let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let source = Source { name: file, blake3: loaded.report.source_blake3 };
+        let source = Source::of_file(path, loaded.report.source_blake3);
         let solid = match SolidMesh::new(loaded.mesh.clone()) {
             Ok(solid) => solid,
             Err(e) if e.is_repairable() => {
@@ -106,7 +101,10 @@ impl Input {
     /// Encodes the mesh; the asset and the seconds it took, on all threads of the current rayon pool.
     pub fn encode(&self, options: &EncodeOptions) -> Result<(TeSdf, f64), Failure> {
         let start = Instant::now();
-        let asset = encode(&self.solid, &self.source, options, &Progress::default())
+        let asset = Encoder::new()
+            .options(options.clone())
+            .source(self.source.clone())
+            .encode(&self.solid)
             .map_err(|e| format!("{}: {e}", self.source.name))?;
         Ok((asset, start.elapsed().as_secs_f64()))
     }

@@ -6,7 +6,6 @@ use tesdf::TeSdf;
 use tesdf::asset::CellKind;
 use tesdf::glam::DVec3;
 use tesdf::inspect::{InspectOptions, inspect};
-use tesdf::query::Precision;
 
 use crate::input::{Input, Preset};
 use crate::output::{mb, percent};
@@ -113,7 +112,7 @@ impl Fallback {
             .map(|&p| {
                 let reads = asset.reads(p);
                 let fallback = reads.list_entries == 0;
-                let close = fallback && asset.signed_distance(p, Precision::F64).abs() <= reach;
+                let close = fallback && asset.signed_distance(p).abs() <= reach;
                 (reads.total(), usize::from(fallback), usize::from(close))
             })
             .reduce(|| (0, 0, 0), |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2));
@@ -134,5 +133,5 @@ fn nearest_fallback(asset: &TeSdf) -> Option<f64> {
             }
         }
     });
-    probes.par_iter().map(|&p| asset.signed_distance(p, Precision::F32).abs()).reduce_with(f64::min)
+    probes.par_iter().map(|&p| asset.signed_distance_f32(p).abs()).reduce_with(f64::min)
 }

@@ -4,7 +4,6 @@ use tesdf::TeSdf;
 use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
-use tesdf::query::Precision;
 
 /// Half width of the layer near the surface, as a share of the diagonal.
 pub const NEAR: f64 = 0.02;
@@ -45,7 +44,7 @@ pub fn in_domain(asset: &TeSdf, count: usize, seed: u64) -> Vec<DVec3> {
     let mut cube = Aabb::EMPTY;
     asset.visit_cells(|cell| cube = cube.union(Aabb::of(&cell.corners)));
     std::iter::repeat_with(|| one_in_box(cube, &mut random))
-        .filter(|&p| asset.query_in_domain(p, Precision::F32).is_some())
+        .filter(|&p| asset.query_in_domain_f32(p).is_some())
         .take(count)
         .collect()
 }

@@ -100,11 +100,11 @@ fn contest(asset: &TeSdf, peer: &Peer, one: &ThreadPool, points: &[DVec3]) -> [R
         name,
         seconds: best_pass(|| {
             for &p in points {
-                black_box(asset.query(black_box(p), precision));
+                black_box(asset.query_with(black_box(p), precision));
             }
         }),
         reads,
-        found: points.iter().map(|&p| asset.signed_distance(p, precision)).collect(),
+        found: points.iter().map(|&p| asset.query_with(p, precision).signed_distance).collect(),
         sign_from,
     };
     [
@@ -124,11 +124,11 @@ fn contest(asset: &TeSdf, peer: &Peer, one: &ThreadPool, points: &[DVec3]) -> [R
             name: "tesdf, face tree alone, f32",
             seconds: best_pass(|| {
                 for &p in points {
-                    black_box(asset.query_by_tree(black_box(p), Precision::F32));
+                    black_box(asset.query_by_tree_f32(black_box(p)));
                 }
             }),
             reads: tree_reads,
-            found: points.iter().map(|&p| asset.query_by_tree(p, Precision::F32).signed_distance).collect(),
+            found: points.iter().map(|&p| asset.query_by_tree_f32(p).signed_distance).collect(),
             sign_from: 1e-6,
         },
         single("tesdf, one by one, f32", Precision::F32, list_reads, 1e-6),
@@ -136,11 +136,11 @@ fn contest(asset: &TeSdf, peer: &Peer, one: &ThreadPool, points: &[DVec3]) -> [R
             name: "tesdf, batch, f32",
             seconds: one.install(|| {
                 best_pass(|| {
-                    black_box(asset.query_batch(black_box(points), Precision::F32));
+                    black_box(asset.query_batch_f32(black_box(points)));
                 })
             }),
             reads: list_reads,
-            found: asset.query_batch(points, Precision::F32).iter().map(|a| a.signed_distance).collect(),
+            found: asset.query_batch_f32(points).iter().map(|a| a.signed_distance).collect(),
             sign_from: 1e-6,
         },
         single("tesdf, one by one, f64", Precision::F64, None, 1e-12),

@@ -3,13 +3,12 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use tesdf::asset::about::Source;
 use tesdf::domain::ConformingMesh;
 use tesdf::domain::gmsh::{GmshOptions, tetrahedralise};
-use tesdf::encode::{Domain, EncodeOptions, Refinement, encode_in};
+use tesdf::encode::{Domain, EncodeOptions, Encoder, Refinement};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::verify::{VerifyOptions, verify};
-use tesdf::{Length, Progress, TeSdf};
+use tesdf::{Length, TeSdf};
 
 use crate::input::{Input, Preset};
 use crate::{Failure, heading, output};
@@ -49,8 +48,10 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let options = EncodeOptions { refinement: Refinement::None, ..Preset::Default.options() };
     let encode = || -> Result<(TeSdf, f64), Failure> {
         let start = Instant::now();
-        let (source, progress) = (Source::default(), Progress::default());
-        let asset = encode_in(&input.solid, Domain::Conforming(&domain), &source, &options, &progress)?;
+        let asset = Encoder::new()
+            .options(options.clone())
+            .domain(Domain::Conforming(&domain))
+            .encode(&input.solid)?;
         Ok((asset, 1e3 * start.elapsed().as_secs_f64()))
     };
     let (rest, anew) = encode()?;

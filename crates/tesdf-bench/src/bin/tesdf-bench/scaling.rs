@@ -55,7 +55,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
          its bolt in each world. Nodes and exact minima; the quickest of the repeats.\n",
     )?;
     output::head(&COLUMNS, 1)?;
-    let modes = [("node", Mode::Node), ("exact", Mode::EXACT)];
+    let modes = [("node", Mode::Node), ("exact", Mode::Exact)];
     for (name, mode) in modes {
         let options = CollideOptions::with_mode(mode);
         let scenes = ROWS.map(|n| (n, row(&link, n)));
@@ -80,12 +80,12 @@ fn print(
     for (instances, scene) in scenes {
         let scene = scene?;
         let (contacts, seconds) = quickest(&scene, options, repeats)?;
-        let each = seconds / contacts.contacts.len().max(1) as f64;
+        let each = seconds / contacts.len().max(1) as f64;
         let first = *smallest.get_or_insert(each);
         output::row(&[
             name.into(),
             instances.to_string(),
-            contacts.contacts.len().to_string(),
+            contacts.len().to_string(),
             format!("{:.2}", 1e3 * seconds),
             format!("{:.2}", 1e6 * each),
             format!("{:.2}", each / first),

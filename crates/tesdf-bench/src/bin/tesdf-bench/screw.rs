@@ -3,8 +3,8 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::ValueEnum;
+use tesdf::Length;
 use tesdf::collide::{ClearanceOptions, CollideError, clearance};
-use tesdf::{Length, Progress};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Moment, Summary, System, simulate};
 
@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         if let (Some(screw), Some(play)) = (&mut loaded.scene.criterion.screw, args.backlash.get(k)) {
             screw.backlash = play * 1e-6;
         }
-        let system = loaded.system(&Progress::default())?;
+        let system = loaded.system()?;
         for &mode in &args.modes {
             loaded.scene.detector.mode = match mode {
                 Mode::Node => DetectorMode::Node,

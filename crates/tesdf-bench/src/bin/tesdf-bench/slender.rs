@@ -5,9 +5,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use rayon::ThreadPoolBuilder;
-use tesdf::Progress;
-use tesdf::asset::about::Source;
-use tesdf::encode::encode;
+use tesdf::encode::Encoder;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 
@@ -90,7 +88,7 @@ fn one(name: &str, mesh: TriangleMesh, preset: Preset, unit: Option<f64>) -> Res
     let solid = SolidMesh::new(mesh)?;
     let checked = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let asset = encode(&solid, &Source::default(), &preset.options(), &Progress::default())?;
+    let asset = Encoder::new().options(preset.options()).encode(&solid)?;
     let seconds = start.elapsed().as_secs_f64();
     let ratio = seconds / faces as f64 / unit.unwrap_or(seconds / faces as f64);
     output::row(&[

@@ -57,7 +57,7 @@ pub(super) fn load<'a>(
                         "expected a file next to the glTF file, or below its folder",
                     )
                 })?;
-                let bytes = crate::input::read(&folder.join(&path)).map_err(|e| {
+                let bytes = crate::input::read(folder.join(&path)).map_err(|e| {
                     let name = shown(path.as_os_str().as_encoded_bytes());
                     error(format!("the file {name}: {e}"), "put the file there, or export GLB")
                 })?;
