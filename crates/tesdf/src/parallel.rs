@@ -1,12 +1,12 @@
-//! Work on all threads of the current rayon pool, with the feature `parallel`; without it, the same calls
-//! on the calling thread. Results are the same.
+//! Runs work on all threads of the current rayon pool, with the feature `parallel`. Without the
+//! feature, the same calls run on the calling thread. The results are the same.
 #[cfg(feature = "parallel")]
 mod threads {
     #[cfg(feature = "encode")]
     pub use rayon::join;
     pub use rayon::prelude::*;
 
-    /// Joins all items by an associative function, from `identity` on.
+    /// Joins all items by an associative function, beginning with `identity`.
     pub fn reduce<I: ParallelIterator>(
         items: I,
         identity: impl Fn() -> I::Item + Send + Sync,
@@ -15,7 +15,7 @@ mod threads {
         items.reduce(identity, join)
     }
 
-    /// As [`reduce`]; `None` as soon as an item is.
+    /// The same as [`reduce`]. Returns `None` as soon as an item is `None`.
     #[cfg(feature = "encode")]
     pub fn try_reduce<T: Send>(
         items: impl ParallelIterator<Item = Option<T>>,
@@ -25,7 +25,8 @@ mod threads {
         items.try_reduce(identity, |a, b| Some(join(a, b)))
     }
 
-    /// Runs `work` on threads whose stacks have this many bytes; `None` when they cannot be started.
+    /// Runs `work` on threads whose stacks have this many bytes. Returns `None` when the threads
+    /// cannot be started.
     #[cfg(feature = "encode")]
     pub fn with_stack<R: Send>(bytes: usize, work: impl FnOnce() -> R + Send) -> Option<R> {
         let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
@@ -36,12 +37,12 @@ mod threads {
 
 #[cfg(not(feature = "parallel"))]
 mod threads {
-    /// Runs both, one after the other.
+    /// Runs both functions, one after the other.
     pub fn join<A, B>(a: impl FnOnce() -> A, b: impl FnOnce() -> B) -> (A, B) {
         (a(), b())
     }
 
-    /// Joins all items, from `identity` on.
+    /// Joins all items, beginning with `identity`.
     pub fn reduce<I: Iterator>(
         items: I,
         identity: impl FnOnce() -> I::Item,
@@ -50,7 +51,7 @@ mod threads {
         items.fold(identity(), join)
     }
 
-    /// As [`reduce`]; `None` as soon as an item is.
+    /// The same as [`reduce`]. Returns `None` as soon as an item is `None`.
     pub fn try_reduce<T>(
         mut items: impl Iterator<Item = Option<T>>,
         identity: impl FnOnce() -> T,
@@ -59,7 +60,8 @@ mod threads {
         items.try_fold(identity(), |all, item| item.map(|item| join(all, item)))
     }
 
-    /// Runs `work` on a thread whose stack has this many bytes; `None` when it cannot be started.
+    /// Runs `work` on a thread whose stack has this many bytes. Returns `None` when the thread
+    /// cannot be started.
     pub fn with_stack<R: Send>(bytes: usize, work: impl FnOnce() -> R + Send) -> Option<R> {
         std::thread::scope(|scope| {
             let thread = std::thread::Builder::new().stack_size(bytes).spawn_scoped(scope, work).ok()?;
@@ -79,7 +81,7 @@ mod threads {
 
     impl<I: IntoIterator> IntoSerialIterator for I {}
 
-    /// Rayon's methods of slices.
+    /// Rayon's methods for slices.
     pub trait SerialSlice<T> {
         fn par_iter(&self) -> std::slice::Iter<'_, T>;
         fn par_chunks(&self, size: usize) -> std::slice::Chunks<'_, T>;
@@ -110,12 +112,12 @@ mod threads {
         }
     }
 
-    /// Rayon's name of an iterator whose length is known.
+    /// Rayon's name for an iterator whose length is known.
     pub trait IndexedParallelIterator: Iterator {}
 
     impl<I: Iterator> IndexedParallelIterator for I {}
 
-    /// Rayon's methods of iterators that the standard library names otherwise.
+    /// Rayon's methods for iterators that have another name in the standard library.
     pub trait SerialIterator: Iterator + Sized {
         fn map_init<S, R>(
             self,

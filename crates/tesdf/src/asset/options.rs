@@ -3,31 +3,31 @@ use serde::{Deserialize, Serialize};
 use crate::base::Length;
 use crate::geometry::Aabb;
 
-/// Options by one name: a point on the curve of memory against speed, or what the paper has.
+/// A set of options by name: a balance of memory and speed, or the options of the paper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
-    /// Few faces per query.
+    /// Few faces for each query.
     #[default]
     Default,
-    /// Quickest to encode; lists as they come.
+    /// Quick to encode. Lists are not shortened much.
     Fast,
-    /// Smallest; more faces per query.
+    /// Small files, with more faces for each query.
     Compact,
-    /// [`EncodeOptions::PAPER`]: the only one that is not exact.
+    /// [`EncodeOptions::PAPER`]: the only preset that is not exact.
     Paper,
     /// [`EncodeOptions::SAMPLED_SAFE`].
     SampledSafe,
 }
 
-/// Which faces a list names.
+/// How the faces of a list are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Those that bounds cannot rule out: none is missing.
+    /// By bounds: a list has all faces that the bounds cannot rule out, so no face is missing.
     #[default]
     Certified,
-    /// Those closest at samples, Algorithm 1 of the paper.
+    /// By samples, with Algorithm 1 of the paper: a list has the faces that are closest at samples.
     Sampled(Sampling),
 }
 
@@ -36,37 +36,38 @@ pub enum Method {
 pub struct Sampling {
     /// Q: samples have barycentric coordinates that are multiples of 1 / Q.
     pub resolution: u32,
-    /// α: the cell is shrunk by this towards its centroid first.
+    /// α: before, the cell is shrunk towards its centroid by this factor.
     pub shrink: f64,
-    /// ε: how much farther than the closest face a listed one may be at a sample.
+    /// ε: how much farther than the closest face a listed face may be at a sample.
     pub threshold: Threshold,
 }
 
 impl Sampling {
-    /// That of the paper, Sec. VII-A.
+    /// The sampling of the paper, Sec. VII-A.
     pub const PAPER: Self = Self { resolution: 128, shrink: 0.999, threshold: Threshold::Absolute(0.0) };
-    /// So wide a threshold that nothing is missing: a face that is closest anywhere is within it at the nearest sample.
+    /// A threshold so wide that no face is missing: a face that is closest at any point is within
+    /// the threshold at the nearest sample.
     pub const SAFE: Self = Self { resolution: 16, shrink: 1.0, threshold: Threshold::CoveringRadius };
 }
 
-/// How much farther than the closest face a listed one may be at a sample.
+/// How much farther than the closest face a listed face may be at a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Threshold {
-    /// In the mesh's unit.
+    /// A length in the unit of the mesh.
     Absolute(f64),
-    /// Twice the distance from which on every point of the cell has a sample.
+    /// Twice the covering radius, the distance within which every point of the cell has a sample.
     CoveringRadius,
 }
 
-/// What becomes of the tetrahedra of a conforming domain.
+/// How the tetrahedra of a conforming domain are refined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refinement {
     /// They are bisected where shorter lists are worth the bytes.
     #[default]
     ByCost,
-    /// Nothing: the plain form of the paper.
+    /// They are left whole, as in the plain form of the paper.
     None,
 }
 
@@ -74,45 +75,49 @@ pub enum Refinement {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Deformation {
-    /// They will not.
+    /// The vertices will not move.
     #[default]
     None,
-    /// They will: lists of tetrahedra at the surface name all faces around their surface vertices (Sec. V-D).
+    /// The vertices will move. So the lists of tetrahedra at the surface have all faces around
+    /// their surface vertices (Sec. V-D).
     Expected,
 }
 
-/// What to encode, and for how much memory. Every field is used.
+/// The options of an encoding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EncodeOptions {
-    /// Width of the layer outside of the surface that belongs to the bisection domain; a conforming domain is what its tetrahedra fill.
+    /// Width of the layer outside of the surface that belongs to the bisection domain. A conforming
+    /// domain consists of its tetrahedra and has no band.
     pub band: Length,
-    /// Further boxes that belong to the bisection domain, in the mesh's unit: `[min x y z, max x y z]`.
+    /// Further boxes that belong to the bisection domain, in the unit of the mesh: `[min x y z, max
+    /// x y z]`.
     pub regions: Vec<[f64; 6]>,
-    /// How many faces less per query near the surface one more byte per face of the mesh is worth.
-    /// Smaller makes more cells with shorter lists.
+    /// The worth of a byte: one more byte for each face of the mesh is worth this many fewer faces
+    /// in a query near the surface. A smaller number makes more cells with shorter lists.
     pub byte_worth: f64,
-    /// Bisections below each cell that tell apart which faces it needs; 0 keeps the lists as they come.
+    /// How many bisections below each cell may tell apart the faces that the cell needs. With 0,
+    /// lists are not shortened.
     pub tighten_levels: u32,
-    /// Name of the mesh's unit, for people; nothing is scaled.
+    /// Name of the unit of the mesh. Nothing is scaled.
     pub unit: Option<String>,
-    /// Which faces a list names.
+    /// How the faces of a list are found.
     #[serde(default, rename = "encoder")]
     pub method: Method,
-    /// E_max: longer lists are cut to the faces that are needed nearest to the surface (Sec. V-C).
+    /// E_max: a longer list is cut to the faces that are needed nearest to the surface (Sec. V-C).
     #[serde(default)]
     pub max_entries: Option<u32>,
-    /// What becomes of the tetrahedra of a conforming domain.
+    /// How the tetrahedra of a conforming domain are refined.
     #[serde(default)]
     pub refinement: Refinement,
-    /// Whether the vertices will move; only in a conforming domain.
+    /// Whether the vertices will move. Only in a conforming domain.
     #[serde(default)]
     pub deformation: Deformation,
 }
 
 impl EncodeOptions {
-    /// The encoder of the paper, on a conforming domain that is left as it is.
+    /// The encoder of the paper, in a conforming domain that is left as it is.
     pub const PAPER: Self = Self::sampled(Sampling::PAPER);
-    /// The same with a threshold that lets nothing be missed.
+    /// The same, with a threshold so wide that no face is missing.
     pub const SAMPLED_SAFE: Self = Self::sampled(Sampling::SAFE);
 
     const fn sampled(sampling: Sampling) -> Self {

@@ -102,18 +102,18 @@ impl TeSdf {
         Self::from_container(Container::open(path, &layout::SECTIONS)?)
     }
 
-    /// As [`open`](Self::open), from bytes, which are copied.
+    /// The same as [`open`](Self::open), with a copy of `bytes`.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// The same as for [`open`](Self::open).
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, AssetError> {
         Self::from_container(Container::from_bytes(bytes, &layout::SECTIONS)?)
     }
 
-    /// As [`open`](Self::open), from a container that was opened with [`layout::SECTIONS`].
+    /// The same as [`open`](Self::open), for a container that was opened with [`layout::SECTIONS`].
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// The same as for [`open`](Self::open).
     pub fn from_container(container: Container) -> Result<Self, AssetError> {
         let about = About::from_metadata(container.metadata())?;
         let placed: SharedSection<f64> = container.shared_section(layout::FRAME.name)?;
@@ -169,7 +169,7 @@ impl TeSdf {
         Ok(asset)
     }
 
-    /// Where the asset came from, what was asked for, what was proved.
+    /// What the asset says about itself: its source, the options, the certificate, the counts.
     pub fn about(&self) -> &About {
         &self.about
     }
@@ -211,11 +211,11 @@ impl TeSdf {
         &self.container
     }
 
-    /// Writes the file, replacing one at `path` atomically; with vertices and lists as they are
-    /// now.
+    /// Writes the file, with the current vertices and lists. A file at `path` is replaced
+    /// atomically.
     ///
     /// # Errors
-    /// As [`save_atomic`]; no half file is left.
+    /// The same as for [`save_atomic`]. No half file is left.
     #[cfg(feature = "encode")]
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), AssetError> {
         Ok(save_atomic(path, &self.to_bytes()?)?)

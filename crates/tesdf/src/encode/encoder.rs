@@ -8,9 +8,10 @@ use crate::asset::TeSdf;
 use crate::base::{Length, Progress};
 use crate::mesh::{NotSolid, ReadError, ReadSolidError, SolidMesh};
 
-/// Encodes solids: what is asked for, where the cells come from, who watches.
+/// Encodes solids.
 ///
-/// [`Encoder::new`] has the defaults; each method changes one thing and gives the encoder back. One encoder may encode many solids.
+/// [`Encoder::new`] has the default options. Each method changes one setting and returns the
+/// encoder. One encoder may encode many solids.
 ///
 /// # Example
 ///
@@ -22,7 +23,8 @@ use crate::mesh::{NotSolid, ReadError, ReadSolidError, SolidMesh};
 /// # let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 /// # let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh;
 /// let solid = SolidMesh::new(mesh)?;
-/// let asset = Encoder::new().preset(Preset::Fast).band(Length::Absolute(0.2)).unit("mm").encode(&solid)?;
+/// let asset =
+///     Encoder::new().preset(Preset::Fast).band(Length::Absolute(0.2)).unit("mm").encode(&solid)?;
 /// assert_eq!(asset.unit(), Some("mm"));
 /// # Ok(())
 /// # }
@@ -57,7 +59,8 @@ impl Default for Encoder<'_> {
 }
 
 impl<'a> Encoder<'a> {
-    /// An encoder with the defaults: [`Preset::Default`], the bisection domain, no source, samples on the processor.
+    /// An encoder with the defaults: [`Preset::Default`], the bisection domain, no source, and
+    /// samples on the processor.
     pub fn new() -> Self {
         Self {
             options: EncodeOptions::default(),
@@ -70,56 +73,64 @@ impl<'a> Encoder<'a> {
         }
     }
 
-    /// Takes the options of a preset, as [`options`](Self::options) with [`EncodeOptions::preset`].
+    /// Sets the options of a preset: [`EncodeOptions::preset`].
     ///
     /// [`Preset::Paper`] and [`Preset::SampledSafe`] need a conforming [`domain`](Self::domain).
     pub fn preset(self, preset: Preset) -> Self {
         self.options(EncodeOptions::preset(preset))
     }
 
-    /// Sets all options, in place of those of a preset. The last call of `preset` and `options` counts.
+    /// Sets all options, in place of those of a preset. The last call of `preset` or `options`
+    /// counts.
     pub fn options(self, options: EncodeOptions) -> Self {
         Self { options, ..self }
     }
 
-    /// Sets the width of the layer outside of the solid that belongs to the domain; the default is 5 % of the diagonal. It counts in place of
-    /// [`EncodeOptions::band`], whether it is called before or after `preset` and `options`.
+    /// Sets the width of the layer outside of the solid that belongs to the domain. The default is
+    /// 5 % of the diagonal. It replaces [`EncodeOptions::band`], whether it is called before or
+    /// after `preset` and `options`.
     ///
-    /// Points farther out are answered as exactly, but not as quickly. A conforming domain is what its tetrahedra fill and has no band.
+    /// Points farther out are answered just as exactly, but more slowly. A conforming domain
+    /// consists of its tetrahedra and has no band.
     pub fn band(self, band: Length) -> Self {
         Self { band: Some(band), ..self }
     }
 
-    /// Records the name of the mesh's unit, for people; nothing is scaled. It counts in place of [`EncodeOptions::unit`], as `band` does.
+    /// Records the name of the unit of the mesh. Nothing is scaled. It replaces
+    /// [`EncodeOptions::unit`], in the same way as `band`.
     pub fn unit(self, unit: impl Into<String>) -> Self {
         Self { unit: Some(unit.into()), ..self }
     }
 
-    /// Sets where the cells come from; the default is [`Domain::Bisection`].
+    /// Sets the domain, from which the cells come. The default is [`Domain::Bisection`].
     pub fn domain(self, domain: Domain<'a>) -> Self {
         Self { domain, ..self }
     }
 
-    /// Records the file that the mesh came from. [`encode_file`](Self::encode_file) records its own file instead.
+    /// Records the file that the mesh came from. [`encode_file`](Self::encode_file) records its own
+    /// file instead.
     pub fn source(self, source: Source) -> Self {
         Self { source, ..self }
     }
 
-    /// Sets what looks at the samples of [`Method::Sampled`](super::Method::Sampled); the default is the [`Processor`], in `f64`.
+    /// Sets the sampler for [`Method::Sampled`](super::Method::Sampled). The default is the
+    /// [`Processor`], in `f64`.
     pub fn sampler(self, sampler: &'a dyn Sampler) -> Self {
         Self { sampler, ..self }
     }
 
-    /// Shares the progress with another thread, which can watch and cancel.
+    /// Shares the progress with another thread, which can watch and cancel the encoding.
     pub fn progress(self, progress: &'a Progress) -> Self {
         Self { progress: Some(progress), ..self }
     }
 
-    /// Encodes a solid, on all threads of the current rayon pool. The same solid and options give the same bytes on any number of threads.
+    /// Encodes a solid, on all threads of the current rayon pool. The same solid and options give
+    /// the same bytes on any number of threads.
     ///
     /// # Errors
-    /// [`EncodeError`]: an option has no meaning for the solid or the domain, the mesh is too large for the file format or has no short lists,
-    /// or [`Progress::cancel`] was called. Nothing is written anywhere.
+    /// [`EncodeError`]: an option is not valid for the solid or the domain, the mesh is too large
+    /// for the file format or has no short lists, or [`Progress::cancel`] was called. Nothing is
+    /// written anywhere.
     ///
     /// # Example
     ///
@@ -140,11 +151,14 @@ impl<'a> Encoder<'a> {
         self.encode_from(solid, &self.source)
     }
 
-    /// Reads a mesh file, checks that the mesh is a solid, and encodes it. The name and the BLAKE3 of the file are recorded as the
-    /// [`Source`]. What is worth a look although the mesh can be encoded ([`SolidMesh::warnings`]) is not told.
+    /// Reads a mesh file, checks that the mesh is a solid, and encodes it.
+    ///
+    /// The asset records the name and the BLAKE3 of the file as its [`Source`]. Warnings about a
+    /// mesh that can be encoded ([`SolidMesh::warnings`]) are not reported.
     ///
     /// # Errors
-    /// [`EncodeFileError`]: the file cannot be read, its mesh has no well-defined inside, or it cannot be [encoded](Self::encode).
+    /// [`EncodeFileError`]: the file cannot be read, its mesh has no well-defined inside, or it
+    /// cannot be [encoded](Self::encode).
     ///
     /// # Example
     ///
@@ -155,7 +169,8 @@ impl<'a> Encoder<'a> {
     /// # let folder = tempfile::tempdir()?;
     /// # let path = folder.path().join("part.obj");
     /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
-    /// let asset = Encoder::new().preset(Preset::Compact).encode_file(&path)?; // STL, OBJ, PLY, OFF, glTF or GLB
+    /// // STL, OBJ, PLY, OFF, glTF or GLB
+    /// let asset = Encoder::new().preset(Preset::Compact).encode_file(&path)?;
     /// assert_eq!(asset.about().source.name, "part.obj");
     /// # Ok(())
     /// # }
@@ -192,10 +207,12 @@ impl<'a> Encoder<'a> {
 }
 
 impl TeSdf {
-    /// Reads a mesh file, checks that the mesh is a solid, and encodes it with the defaults: [`Encoder::encode_file`] of [`Encoder::new`].
+    /// Reads a mesh file, checks that the mesh is a solid, and encodes it with the defaults:
+    /// [`Encoder::encode_file`] of [`Encoder::new`].
     ///
     /// # Errors
-    /// [`EncodeFileError`]: the file cannot be read, its mesh has no well-defined inside, or it cannot be encoded.
+    /// [`EncodeFileError`]: the file cannot be read, its mesh has no well-defined inside, or it
+    /// cannot be encoded.
     ///
     /// # Example
     ///
@@ -216,15 +233,15 @@ impl TeSdf {
     }
 }
 
-/// Why a mesh file is not encoded. The message names the file.
+/// Why a mesh file cannot be encoded. The message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeFileError {
-    /// The file has no mesh that can be read.
+    /// No mesh can be read from the file.
     #[error("{}", source.in_file(path))]
     Read {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error of the reader.
         source: ReadError,
     },
     /// The mesh has no well-defined inside.
@@ -232,7 +249,7 @@ pub enum EncodeFileError {
     NotSolid {
         /// The file.
         path: PathBuf,
-        /// All defects.
+        /// All defects of the mesh.
         source: NotSolid,
     },
     /// The solid cannot be encoded.
@@ -240,7 +257,7 @@ pub enum EncodeFileError {
     Encode {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The error of the encoder.
         source: EncodeError,
     },
 }

@@ -18,21 +18,21 @@ use crate::geometry::{Aabb, AabbTree, Child, LocalFrame};
 use crate::mesh::{MeshError, SolidMesh, TriangleMesh, WindingNumber};
 use crate::verify::self_check;
 
-/// All that an encoding depends on besides the solid.
+/// The input of an encoding, in addition to the solid.
 pub struct Request<'a> {
     /// Where the cells come from.
     pub domain: Domain<'a>,
-    /// What is recorded of the mesh's file.
+    /// The file of the mesh, which the asset records.
     pub source: &'a Source,
-    /// What is asked for.
+    /// The options.
     pub options: &'a EncodeOptions,
-    /// What looks at the samples of [`Method::Sampled`].
+    /// Looks at the samples of [`Method::Sampled`].
     pub sampler: &'a dyn Sampler,
-    /// How far the encoding is, and the wish to stop.
+    /// Shows how far the encoding is, and carries the request to stop.
     pub progress: &'a Progress,
 }
 
-/// From the solid to the finished asset; see [`Encoder::encode`](super::Encoder::encode).
+/// Encodes a solid; see [`Encoder::encode`](super::Encoder::encode).
 pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError> {
     let Request { domain, source, options, sampler, progress } = *request;
     let mesh = solid.mesh();

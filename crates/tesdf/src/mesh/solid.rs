@@ -26,11 +26,12 @@ pub struct SolidMesh {
 }
 
 impl SolidMesh {
-    /// Reads the mesh file at `path` and checks the mesh: [`read`](super::read()), then [`new`](Self::new). To see what
-    /// reading has changed, call these two.
+    /// Reads the mesh file at `path` and checks the mesh: [`read`](super::read()), then
+    /// [`new`](Self::new). To see what reading has changed, call these two.
     ///
     /// # Errors
-    /// [`ReadSolidError`] names the file and says why it cannot be read or why its mesh has no well-defined inside.
+    /// [`ReadSolidError`] names the file and says why it cannot be read or why its mesh has no
+    /// well-defined inside.
     ///
     /// # Example
     ///
