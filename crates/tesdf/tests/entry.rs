@@ -1,4 +1,5 @@
-//! The ways into the library: files and solids to assets, by the builder and with the defaults.
+//! The entry points of the library: from files and solids to assets, by the builder and with the
+//! defaults.
 mod support;
 
 use std::error::Error as _;
@@ -24,7 +25,7 @@ fn a_file_is_encoded_as_its_solid_and_recorded() {
     assert_eq!((source.name.as_str(), source.blake3.len()), ("cube.obj", 64));
     let by_hand = Encoder::new().source(source).encode(&solid).unwrap();
     assert!(asset.as_bytes() == by_hand.as_bytes());
-    // The file is recorded in place of another source.
+    // The file replaces another source.
     let other = Source { name: "another.stl".into(), blake3: String::new() };
     assert!(Encoder::new().source(other).encode_file(cube()).unwrap().as_bytes() == asset.as_bytes());
 }
@@ -38,7 +39,7 @@ fn band_and_unit_count_in_any_order() {
     let before = Encoder::new().band(band).unit(unit).preset(Preset::Compact).encode(&solid).unwrap();
     let after = Encoder::new().preset(Preset::Compact).unit(unit).band(band).encode(&solid).unwrap();
     assert!(before.as_bytes() == expected.as_bytes() && after.as_bytes() == expected.as_bytes());
-    // One encoder encodes many solids.
+    // One encoder can encode many solids.
     let encoder = Encoder::new().preset(Preset::Fast);
     let [first, second] = [(); 2].map(|()| encoder.encode(&solid).unwrap());
     assert!(first.as_bytes() == second.as_bytes() && first.unit().is_none());

@@ -9,11 +9,11 @@ use super::surface::SurfaceBody;
 use super::{CollideError, CollideOptions, InstanceId, Mode, Placement, Scene, Shape};
 use crate::base::Length;
 
-/// How exactly a clearance is wanted.
+/// Required accuracy of a clearance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClearanceOptions {
-    /// Bound on the error; a share of the smaller body's diagonal, or in the world's unit. Rounding comes on top: some 1e-15 of the
-    /// largest coordinate.
+    /// Bound of the error: a fraction of the smaller body's diagonal, or a length in the world's
+    /// unit. Rounding comes in addition: about 1e-15 of the largest coordinate.
     pub tolerance: Length,
 }
 
@@ -24,41 +24,49 @@ impl Default for ClearanceOptions {
     }
 }
 
-/// How far two bodies are apart, or how deep they are in each other; in the world's unit and frame.
+/// Distance or penetration depth of two bodies, in the world's unit and frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Clearance {
-    /// Positive: the least distance between the surfaces. Negative: the lesser of the least signed distance to *b* over the surface of *a*
-    /// and the least to *a* over that of *b*; so a body wholly inside of the other penetrates. Never below the truth
-    /// by more than rounding, never above it by more than the tolerance when `converged`.
+    /// Positive: the least distance between the surfaces. Negative: the lesser of two values, the
+    /// least signed distance to *b* over the surface of *a*, and the least signed distance to *a*
+    /// over the surface of *b*. So a body completely inside the other penetrates it.
+    ///
+    /// It is never below the true value by more than rounding. When `converged`, it is never above
+    /// the true value by more than the tolerance.
     pub distance: f64,
-    /// The witness on *a*.
+    /// The witness point on *a*.
     pub point_a: DVec3,
-    /// The witness on *b*, `distance` away.
+    /// The witness point on *b*. Its distance from `point_a` is `|distance|`.
     pub point_b: DVec3,
-    /// Unit, from *b* to *a*: ahead of it the clearance of the witnesses grows as *a* moves.
+    /// Unit vector from *b* to *a*. When *a* moves along it, the clearance of the witnesses grows.
     pub normal: DVec3,
-    /// The face of *a* that has `point_a`.
+    /// The face of *a* that contains `point_a`.
     pub face_a: u32,
-    /// The face of *b* that has `point_b`.
+    /// The face of *b* that contains `point_b`.
     pub face_b: u32,
-    /// Whose field it is: the other one's witness is the deepest point of a face, and this one's the nearest point to it.
+    /// The body whose field was used. The witness on the other body is the lowest point of a face
+    /// in this field, and this body's witness is the surface point nearest to it.
     pub field: InstanceId,
-    /// Whether the error is within the tolerance; false when the search in a hard spot deep inside was cut short.
+    /// Whether the error is within the tolerance. False when a difficult search deep inside was cut
+    /// short.
     pub converged: bool,
-    /// Whether the two solids share volume. Where `distance` is negative they do, up to the tolerance. Where it is 0, up to the
-    /// tolerance, they do when their surfaces lie on each other with both solids on one side, as of a body and itself in one place:
-    /// then no point of a surface is inside of the other body, and yet they overlap.
+    /// Whether the two solids share volume. They do where `distance` is negative (up to the
+    /// tolerance). Where `distance` is 0 (up to the tolerance), they do when their surfaces
+    /// coincide with both solids on the same side. An example is a body and its copy in the same
+    /// pose: no point of a surface is inside the other body, and yet they overlap.
     pub overlap: bool,
 }
 
 /// The clearance of two instances, whatever their worlds, groups and exclusions.
 ///
-/// A best-first search over the face tree of the body with fewer faces in the field of the other, then the other way around for
-/// what lies deeper. When the bodies are apart, both ways would give the same, so the second looks for parts inside only.
+/// A best-first search over the face tree of the body with fewer faces, in the field of the other
+/// body. Then the same in the other order, for deeper points. When the bodies are apart, both
+/// orders would give the same result, so the second search only looks for parts inside.
 ///
-/// Of a sphere or a capsule the surface's signed distance is that of its centre or segment less its radius. That is exact while those
-/// are outside of the other body; with them inside, it is at most the value at the surface. A plane's half space is endless:
-/// only its field is used, as no point of a plane is deeper in a body than the body reaches below the plane.
+/// The signed distance of the surface of a sphere or capsule is that of its centre or segment minus
+/// its radius. This is exact while these are outside the other body. With them inside, it is at
+/// most the value at the surface. A plane's half-space is infinite, so only its field is used: no
+/// point of a plane is deeper in a body than the body reaches below the plane.
 ///
 /// ```
 /// use tesdf::collide::{ClearanceOptions, Instance, Pose, Scene, Shape, clearance};
@@ -74,8 +82,8 @@ pub struct Clearance {
 /// ```
 ///
 /// # Errors
-/// An instance that is not there, one and the same instance twice, two planes, a tolerance that makes no sense, positions too far
-/// out for double precision.
+/// [`CollideError`] for an unknown instance, the same instance twice, two planes, an invalid
+/// tolerance, or positions too far out for double precision.
 pub fn clearance(
     scene: &Scene,
     a: InstanceId,
@@ -90,24 +98,24 @@ pub fn clearance(
 /// A body of a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Body<'a> {
-    /// Its name.
+    /// Its id.
     pub id: InstanceId,
     /// Its shape.
     pub shape: &'a Shape,
-    /// Where it is.
+    /// Its pose and scale.
     pub placement: Placement,
 }
 
-/// Two bodies between which distances are measured.
+/// Two bodies whose distance is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair<'a> {
-    /// The first, *a*.
+    /// The first body, *a*.
     pub a: Body<'a>,
-    /// The second, *b*.
+    /// The second body, *b*.
     pub b: Body<'a>,
 }
 
-/// Which body's surface goes first.
+/// The body whose surface is searched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Surface {
     A,
@@ -118,7 +126,7 @@ impl<'a> Pair<'a> {
     /// Two instances of a scene.
     ///
     /// # Errors
-    /// As [`clearance`], but for the tolerance.
+    /// As [`clearance`], except for the tolerance.
     pub fn new(scene: &'a Scene, a: InstanceId, b: InstanceId) -> Result<Self, CollideError> {
         let body = |id| {
             let instance = scene.instance(id)?;
@@ -135,10 +143,10 @@ impl<'a> Pair<'a> {
         Ok(pair)
     }
 
-    /// A share of the smaller diagonal, in the world's unit.
+    /// Converts a tolerance to the world's unit; fractions refer to the smaller diagonal.
     ///
     /// # Errors
-    /// When it is not a finite number above 0.
+    /// The tolerance is not a finite number above 0.
     pub fn tolerance(&self, tolerance: Length) -> Result<f64, CollideError> {
         let (Length::OfDiagonal(value) | Length::Absolute(value)) = tolerance;
         if !(value > 0.0 && value.is_finite()) {
@@ -152,17 +160,19 @@ impl<'a> Pair<'a> {
         Ok(tolerance.resolve(diagonal(&self.a).min(diagonal(&self.b))))
     }
 
-    /// Both ways, to a tolerance in the world's unit.
+    /// The clearance from both orders, to a tolerance in the world's unit.
     ///
     /// # Errors
-    /// Positions too far out.
+    /// Positions are too far out.
     pub fn clearance(&self, tolerance: f64) -> Result<Clearance, CollideError> {
         let first = self.first();
         let found = self.apart(tolerance)?;
         if matches!(self.a.shape, Shape::Plane) || matches!(self.b.shape, Shape::Plane) {
             return Ok(Clearance { overlap: found.distance < -tolerance, ..found });
         }
-        // Apart, no surface is nearer than this to the other: what is lower the other way around is at most its negative.
+        // When the bodies are apart by a distance, no surface comes nearer to the other than that.
+        // So the second order can only find a lower value at or below the negative of that
+        // distance.
         let limit = if found.distance > 0.0 { tolerance - found.distance } else { found.distance };
         let second = match first {
             Surface::A => Surface::B,
@@ -178,18 +188,20 @@ impl<'a> Pair<'a> {
         Ok(Clearance { overlap, ..found })
     }
 
-    /// Whether bodies whose surfaces touch up to the tolerance share volume: whether a point behind a face of one, by more than
-    /// the tolerance, is inside of both.
+    /// Whether bodies whose surfaces touch up to the tolerance share volume. It tests whether a
+    /// point behind a face, by more than the tolerance, is inside both bodies.
     ///
-    /// No face of one is inside of the other then, so a part of one that overlaps the other has its surface in common with it, and a point
-    /// behind any face of that part tells.
+    /// In this situation no face of one body is inside the other. So a part of one body that
+    /// overlaps the other has a common surface with it, and a point behind any face of that part
+    /// decides.
     fn shares_volume(&self, tolerance: f64) -> bool {
         let deep = |body: &Body, p: DVec3, depth: f64| {
             let scale = body.placement.scale;
             body.shape.signed_distance(body.placement.to_shape(p)) * scale < -0.5 * depth
         };
         let size = |body: &Body| body.shape.diagonal() * body.placement.scale;
-        // Within a wall that is thicker than that, and clear of what the tolerance and rounding leave open.
+        // The depth must be less than the thickness of a wall, and more than the tolerance and
+        // rounding.
         let depths = [1e-2, 1e-3, 1e-4].map(|share| share * size(&self.a).min(size(&self.b)));
         let behind = self.behind_faces();
         depths.into_iter().filter(|&depth| depth > 8.0 * tolerance).any(|depth| {
@@ -198,7 +210,8 @@ impl<'a> Pair<'a> {
         })
     }
 
-    /// For each face of *a* a point of it and the direction inward; the world's frame. Of a simple shape one place is enough, as it is convex.
+    /// For each face of *a*, a point of it and the inward direction, in the world's frame. A simple
+    /// shape is convex, so one point is enough.
     fn behind_faces(&self) -> Vec<(DVec3, DVec3)> {
         let Body { shape, placement, .. } = &self.a;
         let rotate = |n: DVec3| placement.pose.rotation * n;
@@ -211,15 +224,15 @@ impl<'a> Pair<'a> {
                 (0..asset.face_count()).filter_map(|f| of_face(asset.face_corners(f))).collect()
             }
             Shape::Plane => Vec::new(),
-            // From the middle of its upper side down.
+            // The centre of its upper side, downwards.
             simple => vec![(placement.to_world(DVec3::Z * simple.bounds().max.z), rotate(DVec3::NEG_Z))],
         }
     }
 
-    /// One way, which is the clearance when neither body is inside of the other.
+    /// The clearance from one order. It is right when neither body is inside the other.
     ///
     /// # Errors
-    /// Positions too far out.
+    /// Positions are too far out.
     pub fn apart(&self, tolerance: f64) -> Result<Clearance, CollideError> {
         self.one_way(self.first(), tolerance, f64::INFINITY).ok_or(CollideError::NoClearance {
             a: self.a.id,
@@ -228,7 +241,7 @@ impl<'a> Pair<'a> {
         })
     }
 
-    /// That of fewer faces; of a plane there is no surface to go over.
+    /// The body with fewer faces. A plane never comes first, because it has no finite surface.
     fn first(&self) -> Surface {
         let faces = |body: &Body| match body.shape {
             Shape::Mesh(asset) => asset.face_count(),
@@ -238,7 +251,7 @@ impl<'a> Pair<'a> {
         if faces(&self.b) < faces(&self.a) { Surface::B } else { Surface::A }
     }
 
-    /// The least signed distance over one surface that is at most `limit`.
+    /// The least signed distance over one surface; `None` when it is above `limit`.
     fn one_way(&self, of: Surface, tolerance: f64, limit: f64) -> Option<Clearance> {
         let (of_surface, of_field) = match of {
             Surface::A => (&self.a, &self.b),
@@ -246,7 +259,7 @@ impl<'a> Pair<'a> {
         };
         let field = FieldBody::new(of_field.shape, of_field.placement);
         let surface = SurfaceBody::new(of_surface.shape, of_surface.placement, &field);
-        // Half for the search over a face, half for what is no longer searched.
+        // Half of the tolerance for the search within a face, half for faces that are skipped.
         let half = 0.5 * tolerance;
         let exact =
             CollideOptions { tolerance: Length::Absolute(half), ..CollideOptions::with_mode(Mode::Exact) };

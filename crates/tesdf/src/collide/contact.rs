@@ -7,37 +7,40 @@ use super::{HiddenOverlap, InstanceId};
 
 /// A place where body *a* touches body *b*, in the world's unit and frame.
 ///
-/// *a* is the body whose face or node it is, *b* the one whose signed distance field `φ_b` it is.
+/// *a* is the body that has the face or node. *b* is the body whose signed distance field `φ_b` is
+/// used.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Contact {
-    /// The witness on `face_a`.
+    /// The witness point on `face_a`.
     pub point_a: DVec3,
     /// The point of b's surface that is closest to `point_a`.
     pub point_b: DVec3,
-    /// ∇φ_b at `point_a`: unit, from b to a.
+    /// ∇φ_b at `point_a`: a unit vector from b to a.
     pub normal: DVec3,
-    /// φ_b at `point_a`: negative where the bodies penetrate.
+    /// φ_b at `point_a`; negative where the bodies penetrate.
     pub distance: f64,
-    /// The face of a, 0-based in the encoded mesh; for a node the lowest face that has it.
+    /// The face of a, 0-based in the encoded mesh. For a node, the lowest face that has it.
     pub face_a: u32,
     /// The face of b that is closest to `point_a`.
     pub face_b: u32,
-    /// The cell of b's domain, as the number of its word in `domain.nodes`; `None` where the face tree or a formula answered.
+    /// The cell of b's domain, as the index of its word in `domain.nodes`; `None` where the face
+    /// tree or a formula answered.
     pub tet_b: Option<u32>,
-    /// The body whose face it is.
+    /// The body that has the face or node.
     pub instance_a: InstanceId,
-    /// The body whose field it is.
+    /// The body whose field is used.
     pub instance_b: InstanceId,
-    /// The same from step to step while the same parts touch.
+    /// The touching features. It stays the same from step to step while the same features touch.
     pub feature: FeatureId,
-    /// Whether the minimum over the face is within the tolerance; false when its search was cut short.
+    /// Whether the minimum over the face is within the tolerance. False when its search was cut
+    /// short.
     pub converged: bool,
 }
 
-/// Names the parts of two bodies that touch, whatever cells they touch in.
+/// Identifies the features of two bodies that touch, independently of the cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub struct FeatureId {
-    /// Face of a; a node in node mode.
+    /// Face of a, or node of a in node mode.
     pub a: u32,
     /// The closest feature of b.
     pub b: FeatureB,
@@ -55,12 +58,12 @@ pub enum FeatureB {
     Face(u32),
 }
 
-/// What a detection did. Bytes are of the products between stages, at their greatest.
+/// Statistics of a detection. `bytes` is the largest size of the intermediate products.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Statistics {
-    /// Ordered pairs of instances whose bounds meet.
+    /// Ordered pairs of instances whose bounds overlap.
     pub instance_pairs: usize,
-    /// Faces or nodes of a that the broad phase left, over all pairs.
+    /// Faces or nodes of a that remain after the broad phase, over all pairs.
     pub candidates: usize,
     /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell.
     pub polygons: usize,
@@ -76,32 +79,35 @@ pub struct Statistics {
     pub bytes: usize,
 }
 
-/// What reducing the contacts of a pair of instances has lost.
+/// The loss from reducing the contacts of a pair of instances.
 ///
-/// Any normal forces on all contacts of the pair, of total size `F`, can be replaced by normal forces on the kept ones, of the
-/// same total, that differ in their sum by at most `wrench_error · F`, and in their torque around `center` by at most
-/// `wrench_error · length · F`. Up to rounding, of some 1e-12; a GPU adds what it rounds to `wrench_error`.
+/// Take any normal forces on all contacts of the pair, with total size `F`. Normal forces on the
+/// kept contacts with the same total size can replace them. The sums of forces differ by at most
+/// `wrench_error · F`, the torques around `center` by at most `wrench_error · length · F`. This
+/// holds up to rounding of about 1e-12; a GPU adds its rounding to `wrench_error`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PairReduction {
-    /// The instance of the lower id.
+    /// The instance with the lower id.
     pub instance_a: InstanceId,
-    /// The instance of the higher id.
+    /// The instance with the higher id.
     pub instance_b: InstanceId,
-    /// Contacts of the pair before, in both directions.
+    /// Number of contacts of the pair before the reduction, in both orders.
     pub contacts: usize,
-    /// How many of them are kept.
+    /// Number of kept contacts.
     pub kept: usize,
-    /// The greatest distance of the wrench of a contact from the convex hull of those of the kept contacts, without
-    /// unit; 0 when all are kept.
+    /// The greatest distance of a contact's wrench from the convex hull of the wrenches of the kept
+    /// contacts, without unit; 0 when all are kept.
     pub wrench_error: f64,
-    /// The middle of a box around the contact points `point_a`, in the world: of one along its axes, or along those of `instance_b`
-    /// when a GPU detects.
+    /// The centre of a box around the contact points `point_a`, in the world. The box is parallel
+    /// to the world's axes, or to those of `instance_b` when a GPU detects.
     pub center: DVec3,
-    /// The greatest distance of a contact point from `center`, in the world's unit. On a GPU not less than what its rounding can tell.
+    /// The greatest distance of a contact point from `center`, in the world's unit. On a GPU it is
+    /// at least the limit of its rounding.
     pub length: f64,
 }
 
-/// The contacts of a scene, sorted by world, instances, face and cell. It iterates over the contacts, by value or by reference.
+/// The contacts of a scene, sorted by world, instances, face and cell. Iterates over the contacts
+/// by value or by reference.
 ///
 /// # Example
 ///
@@ -111,7 +117,8 @@ pub struct PairReduction {
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut scene = Scene::new();
-/// let (ball, floor) = (scene.add_shape(Shape::Sphere { radius: 1.0 })?, scene.add_shape(Shape::Plane)?);
+/// let ball = scene.add_shape(Shape::Sphere { radius: 1.0 })?;
+/// let floor = scene.add_shape(Shape::Plane)?;
 /// scene.add(Instance::new(ball, Pose::at(DVec3::new(0.0, 0.0, 0.75))))?;
 /// scene.add(Instance::new(floor, Pose::IDENTITY))?;
 /// let contacts = detect(&scene, &CollideOptions::default())?;
@@ -125,17 +132,18 @@ pub struct PairReduction {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Contacts {
     contacts: Vec<Contact>,
-    /// What was done to find them.
+    /// Statistics of the detection.
     pub statistics: Statistics,
-    /// What the reduction has lost, by pair of instances; empty without reduction.
+    /// The loss from the reduction, for each pair of instances; empty without reduction.
     pub reductions: Vec<PairReduction>,
-    /// Pairs that overlap although no contact shows it, as the mode [`Node`](super::Mode::Node) has them; sorted by world and instances.
-    /// Contacts will not keep these apart.
+    /// Pairs that overlap without a contact that shows it, which happens in the mode
+    /// [`Node`](super::Mode::Node). Sorted by world and instances. Contacts will not keep these
+    /// pairs apart.
     pub hidden: Vec<HiddenOverlap>,
 }
 
 impl Contacts {
-    /// The contacts of a detector, which has sorted them.
+    /// `contacts` must be sorted.
     pub fn new(
         contacts: Vec<Contact>,
         statistics: Statistics,
@@ -150,7 +158,7 @@ impl Contacts {
         self.contacts.len()
     }
 
-    /// Whether there is no contact. Bodies may overlap all the same: see [`hidden`](Self::hidden).
+    /// Whether there is no contact. Bodies may still overlap; see [`hidden`](Self::hidden).
     pub fn is_empty(&self) -> bool {
         self.contacts.is_empty()
     }
@@ -165,7 +173,7 @@ impl Contacts {
         &self.contacts
     }
 
-    /// The contacts alone.
+    /// The contacts without the rest of the result.
     pub fn into_vec(self) -> Vec<Contact> {
         self.contacts
     }

@@ -5,17 +5,17 @@ use super::ordered_pair::OrderedPair;
 use super::surface::Candidates;
 use super::{CollideError, CollideOptions, Contact, Contacts, Scene, Statistics, reduce_pairs};
 
-/// Faces or nodes that one task takes.
+/// Number of faces or nodes per task.
 const TASK: usize = 64;
 
 /// All contacts of a scene up to the contact distance.
 ///
-/// Both orders of each pair are evaluated: faces (or nodes) of the one against the field of the other, and the other way around.
-/// Pairs that overlap although no contact shows it are in [`Contacts::hidden`].
-/// Runs on the current rayon pool; the result is the same on any number of threads.
+/// Both orders of each pair are evaluated: faces (or nodes) of the first body against the field of
+/// the second body, and vice versa. [`Contacts::hidden`] lists pairs that overlap without a contact
+/// that shows it. Runs on the current rayon pool. The result is the same for any number of threads.
 ///
 /// # Errors
-/// An option that makes no sense, or an instance whose shape is gone.
+/// An option is invalid, or the shape of an instance is missing.
 ///
 /// # Example
 ///
@@ -31,7 +31,7 @@ const TASK: usize = 64;
 /// let contacts = detect(&scene, &CollideOptions::default())?;
 /// assert!(contacts.iter().all(|c| (c.distance + 0.5).abs() < 1e-6));
 ///
-/// // Up to 0.1 apart, and what one node of each body finds.
+/// // Contacts up to 0.1 apart, at the nodes of the bodies.
 /// let options = CollideOptions { contact_distance: 0.1, ..CollideOptions::with_mode(Mode::Node) };
 /// assert!(detect(&scene, &options)?.len() >= 2);
 /// # Ok(())
@@ -63,7 +63,7 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
         + statistics.candidates * size_of::<u32>()
         + size_of_val(tasks.as_slice())
         + size_of_val(contacts.as_slice());
-    // Tasks follow the pairs, which are sorted; within a pair a face has one place.
+    // Tasks follow the sorted order of the pairs. Within a pair, contacts are sorted by face.
     contacts
         .chunk_by_mut(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b))
         .for_each(|run| run.sort_unstable_by_key(order));
@@ -74,7 +74,8 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
     Ok(Contacts::new(contacts, statistics, reductions, hidden))
 }
 
-/// Within one ordered pair of instances. A point in no cell may be one of several pieces outside of the cube.
+/// Sort key within one ordered pair of instances. Without a cell, several pieces outside the cube
+/// may have the same face, so the point decides.
 fn order(c: &Contact) -> (u32, u32, Option<u32>, [u64; 3]) {
     (c.face_a, c.feature.a, c.tet_b, c.point_a.to_array().map(f64::to_bits))
 }
@@ -86,7 +87,7 @@ struct Found {
     filtered: usize,
 }
 
-/// Middle and narrow phase, and the cosine filter.
+/// Middle phase, narrow phase and cosine filter.
 fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let mut found = Found::default();
     let Found { contacts, polygons, filtered } = &mut found;

@@ -1,21 +1,26 @@
 //! Contacts between instances of encoded meshes and simple shapes.
 //!
 //! ```text
-//! Scene ──instance_pairs──▶ pairs ──broad──▶ Candidates ──middle──▶ ClippedPolygons ──narrow──▶ contacts ──filter, reduce──▶ Contacts
+//! Scene ──instance_pairs──▶ pairs ──broad──▶ Candidates ──middle──▶ ClippedPolygons
+//!       ──narrow──▶ contacts ──filter, reduce──▶ Contacts
 //! ```
 //!
-//! - [`Scene`]: shapes (an encoded mesh, a plane, a box, a sphere, a capsule), and instances of them: a pose, a
-//!   velocity, a scale, a world. An instance costs its state only.
-//! - [`detect`](detect()): all contacts of a scene, sorted by ids; the same input gives the same bytes on any number of threads.
-//! - [`candidates`](candidates()): what the broad and the middle phase leave, for debug views.
-//! - [`reduce_pairs`]: fewer contacts per pair, with a bound on what is lost; [`wrench_error`] tells what is.
-//! - [`hidden_overlaps`]: pairs that overlap although no contact shows it, which detections tell beside their contacts.
-//! - [`clearance`](clearance()): the signed distance between two instances, with witnesses.
-//! - [`time_of_impact`](time_of_impact()): when two moving instances first touch, never too late.
-//! - [`why`](why()): why a contact is, or is not, there.
+//! - [`Scene`]: shapes (an encoded mesh, a plane, a box, a sphere, a capsule) and their instances.
+//!   An instance has a pose, a velocity, a scale and a world, and needs memory only for this state.
+//! - [`detect`](detect()): all contacts of a scene, sorted by ids. The same input gives the same
+//!   bytes for any number of threads.
+//! - [`candidates`](candidates()): the result of the broad and the middle phase, for debug views.
+//! - [`reduce_pairs`]: fewer contacts per pair, with a bound of the loss; [`wrench_error`] computes
+//!   the loss.
+//! - [`hidden_overlaps`]: pairs that overlap without a contact that shows it. Detections report
+//!   them beside the contacts.
+//! - [`clearance`](clearance()): the signed distance between two instances, with witness points.
+//! - [`time_of_impact`](time_of_impact()): the time at which two moving instances first touch;
+//!   never too late.
+//! - [`why`](why()): why a contact is present or missing.
 //!
-//! In each contact *a* is the body whose face (or node) it is and *b* the body whose signed distance field it is; both
-//! directions of a pair are evaluated.
+//! In each contact, *a* is the body that has the face (or node), and *b* is the body whose signed
+//! distance field is used. Both orders of a pair are evaluated.
 mod candidates;
 mod clearance;
 mod contact;

@@ -4,50 +4,55 @@ use super::CollideError;
 use crate::base::Length;
 use crate::query::Precision;
 
-/// What is tested of body *a* against the field of body *b*.
+/// The part of body *a* that is tested against the field of body *b*.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
     /// Node-TES: the vertices.
     Node,
-    /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9), by a fixed number of Frank–Wolfe
-    /// [`iterations`](CollideOptions::iterations): an upper bound of the minimum.
+    /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9). A fixed number of
+    /// Frank–Wolfe [`iterations`](CollideOptions::iterations) gives an upper bound of the minimum.
     Face,
-    /// As [`Face`](Self::Face), but the minimum itself, within a [`tolerance`](CollideOptions::tolerance): by a closed form outside, by branch
-    /// and bound inside.
+    /// As [`Face`](Self::Face), but with the minimum itself, within a
+    /// [`tolerance`](CollideOptions::tolerance). It comes from a closed form outside, and from
+    /// branch and bound inside.
     Exact,
 }
 
-/// How many contacts of a pair are kept.
+/// Number of contacts kept per pair of instances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduction {
-    /// All.
+    /// All contacts.
     None,
-    /// At most so many per pair of instances: the deepest, the extremes, then those that matter most to the wrench.
+    /// At most this many per pair of instances: the deepest, the extremes, then those that matter
+    /// most for the wrench.
     PerPair(u32),
 }
 
-/// What to detect. Every field is used.
+/// Options of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CollideOptions {
-    /// Nodes, or faces and how.
+    /// Nodes or faces, and the method.
     pub mode: Mode,
-    /// Frank–Wolfe iterations of the mode [`Face`](Mode::Face), each one evaluation of the field; at most
-    /// [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). The paper has 16.
+    /// Number of Frank–Wolfe iterations of the mode [`Face`](Mode::Face), at most
+    /// [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). Each evaluates the field once. The paper uses 16.
     pub iterations: u32,
-    /// Bound on the error of the mode [`Exact`](Mode::Exact): a share of the diagonal of the field's body, or in the world's unit.
+    /// Bound of the error of the mode [`Exact`](Mode::Exact): a fraction of the diagonal of the
+    /// field's body, or a length in the world's unit.
     pub tolerance: Length,
-    /// Contacts are reported up to this signed distance, in the world's unit. Wider than the band of an asset is no
-    /// error: what lies outside of its domain is answered from its face tree, exactly.
+    /// Contacts are reported up to this signed distance, in the world's unit. It may be wider than
+    /// the band of an asset: outside the domain, the face tree answers, also exactly.
     pub contact_distance: f64,
-    /// Adds to the contact distance of a pair what its velocities can close in this time; 0 adds nothing.
+    /// Adds to a pair's contact distance what its velocities can close within this time; 0 adds
+    /// nothing.
     pub speculative_time: f64,
-    /// Eq. (10): a contact of a face is dropped when ∇φ · n > −cos θ; `None` keeps all. Not for nodes.
+    /// Eq. (10): a contact of a face is dropped when ∇φ · n > −cos θ. `None` keeps all. Not used
+    /// for nodes.
     pub cos_theta: Option<f64>,
-    /// How many contacts of a pair are kept.
+    /// Number of contacts kept per pair of instances.
     pub reduction: Reduction,
-    /// What the reported distances, normals and witness points are computed with.
+    /// Precision of the reported distances, normals and witness points.
     #[serde(skip, default = "exact")]
     pub precision: Precision,
 }
@@ -57,7 +62,8 @@ fn exact() -> Precision {
 }
 
 impl CollideOptions {
-    /// Most [`iterations`](Self::iterations); the error falls with their number only, so more are of no use.
+    /// Largest accepted number of [`iterations`](Self::iterations). The error only falls in
+    /// proportion to the number, so more iterations are of no use.
     pub const MAX_ITERATIONS: u32 = 1 << 16;
 
     /// The defaults with another mode.
@@ -65,10 +71,10 @@ impl CollideOptions {
         Self { mode, ..Self::default() }
     }
 
-    /// Checks that every value that the mode uses makes sense.
+    /// Checks all values that the mode uses.
     ///
     /// # Errors
-    /// Names the option.
+    /// [`CollideError::Option`] names the option.
     pub fn validate(&self) -> Result<(), CollideError> {
         let refuse = |option, found: String, expected| Err(CollideError::Option { option, found, expected });
         for (name, value) in
@@ -104,7 +110,8 @@ impl CollideOptions {
 }
 
 impl Default for CollideOptions {
-    /// Exact to 1e-7 of the diagonal, everything that touches, nothing filtered or reduced.
+    /// Exact mode with a tolerance of 1e-7 of the diagonal, contact distance 0, no filter and no
+    /// reduction.
     fn default() -> Self {
         Self {
             mode: Mode::Exact,

@@ -1,17 +1,18 @@
-//! Two instances in an order: the surface of the first against the signed distance field of the second.
+//! Two instances in an order: the surface of the first against the signed distance field of the
+//! second.
 use super::field::FieldBody;
 use super::instance_pairs::instance_pairs;
 use super::narrow::{Minimum, Search};
 use super::surface::{Candidates, Part, SurfaceBody};
 use super::{CollideError, CollideOptions, Contact, FeatureId, InstanceId, Mode, Scene};
 
-/// One body's surface against another's field.
+/// The surface of one body and the field of another.
 pub struct OrderedPair<'a> {
-    /// Whose faces or nodes.
+    /// The body that has the faces or nodes.
     pub surface: SurfaceBody<'a>,
-    /// Whose signed distances.
+    /// The body whose signed distances are used.
     pub field: FieldBody<'a>,
-    /// How minima are found, and up to which value.
+    /// The search for minima, with its limit.
     pub search: Search,
     options: &'a CollideOptions,
     pub a: InstanceId,
@@ -54,7 +55,7 @@ impl<'a> OrderedPair<'a> {
         }
     }
 
-    /// A candidate, the user's number of its face, and its own: of the node or the face.
+    /// A candidate, the id of its face, and its feature: the id of the node or of the face.
     pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
         match self.options.mode {
             Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
@@ -65,7 +66,7 @@ impl<'a> OrderedPair<'a> {
         }
     }
 
-    /// Eq. (10). What is rounded has every normal.
+    /// Eq. (10). It does not apply to rounded shapes, which have normals in all directions.
     pub fn is_filtered(&self, part: &Part, minimum: &Minimum) -> bool {
         match (self.options.mode, self.options.cos_theta) {
             (Mode::Face | Mode::Exact, Some(cos)) if part.points().len() == 3 => {

@@ -8,17 +8,18 @@ use super::{CollideError, InstanceId, Placement, Pose, Shape, ShapeId};
 use crate::TeSdf;
 use crate::geometry::Aabb;
 
-/// Which instances meet which: two do when each one's `memberships` share a bit with the other's `filter`.
+/// Groups decide which instances meet. Two instances meet when the `memberships` of each share a
+/// bit with the `filter` of the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Groups {
-    /// The groups that the instance is in.
+    /// The groups to which the instance belongs.
     pub memberships: u32,
-    /// The groups that it meets.
+    /// The groups that the instance meets.
     pub filter: u32,
 }
 
 impl Groups {
-    /// In all groups, meeting all.
+    /// Member of all groups, meeting all groups.
     pub const ALL: Self = Self { memberships: u32::MAX, filter: u32::MAX };
 
     /// Whether instances of these groups meet.
@@ -27,38 +28,39 @@ impl Groups {
     }
 }
 
-/// Velocity of a body in the world, per unit of time; the angular part about the body's origin, in radians.
+/// Velocity of a body in the world, per unit of time. The angular part is about the body's origin,
+/// in radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Velocity {
-    /// Of the body's origin.
+    /// Velocity of the body's origin.
     pub linear: DVec3,
-    /// About the body's origin.
+    /// Angular velocity about the body's origin.
     pub angular: DVec3,
 }
 
-/// How far from the origin an instance may be, in diagonals of its shape: there the rounding of coordinates is some 1e-4 of
-/// the diagonal.
+/// Largest distance of an instance from the origin, in diagonals of its shape. There, the rounding
+/// of coordinates is about 1e-4 of the diagonal.
 const FARTHEST: f64 = 1e12;
 
-/// A shape, placed in a world. Its state is all that it costs.
+/// A shape placed in a world. It needs memory only for this state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instance {
     /// The shape.
     pub shape: ShapeId,
-    /// Where it is.
+    /// Its pose.
     pub pose: Pose,
-    /// How it moves; only for contacts ahead of time.
+    /// Its velocity; used only for speculative contacts.
     pub velocity: Velocity,
     /// World units per unit of the shape; positive.
     pub scale: f64,
     /// Instances of different worlds never meet.
     pub world: u32,
-    /// Which instances it meets.
+    /// The groups that decide which instances it meets.
     pub groups: Groups,
 }
 
 impl Instance {
-    /// A resting instance of scale 1 in world 0 that meets all others.
+    /// A resting instance with scale 1 in world 0 that meets all others.
     pub fn new(shape: ShapeId, pose: Pose) -> Self {
         Self { shape, pose, velocity: Velocity::default(), scale: 1.0, world: 0, groups: Groups::ALL }
     }
@@ -73,7 +75,7 @@ impl Instance {
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     shapes: BTreeMap<ShapeId, Shape>,
-    /// Sorted by id, as ids only grow.
+    /// Sorted by id, because ids only grow.
     ids: Vec<InstanceId>,
     instances: Vec<Instance>,
     excluded: BTreeSet<(InstanceId, InstanceId)>,
@@ -82,12 +84,12 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A scene of nothing.
+    /// An empty scene.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Adds a shape: an encoded mesh (shared, by `Arc`) or a simple one.
+    /// Adds a shape: an encoded mesh (shared by `Arc`) or a simple shape.
     ///
     /// # Errors
     /// [`CollideError::Shape`] for sizes that are not positive.
@@ -117,11 +119,11 @@ impl Scene {
         Ok(id)
     }
 
-    /// An encoded mesh, to move its vertices ([`TeSdf::move_vertices`]): all of its instances deform alike. One that is shared with
-    /// others than this scene is copied first.
+    /// Mutable access to an encoded mesh, to move its vertices ([`TeSdf::move_vertices`]). All its
+    /// instances deform alike. An asset that is shared outside this scene is copied first.
     ///
     /// # Errors
-    /// [`CollideError::NoShape`] when there is no such shape, or it is no mesh.
+    /// [`CollideError::NoShape`] when there is no such shape, or it is not a mesh.
     pub fn mesh_mut(&mut self, shape: ShapeId) -> Result<&mut TeSdf, CollideError> {
         match self.shapes.get_mut(&shape) {
             Some(Shape::Mesh(asset)) => Ok(Arc::make_mut(asset)),
@@ -132,7 +134,8 @@ impl Scene {
     /// Removes a shape that no instance uses.
     ///
     /// # Errors
-    /// [`CollideError::ShapeInUse`] names an instance.
+    /// [`CollideError::ShapeInUse`] names an instance; [`CollideError::NoShape`] when there is no
+    /// such shape.
     pub fn remove_shape(&mut self, shape: ShapeId) -> Result<Shape, CollideError> {
         if let Some(at) = self.instances.iter().position(|i| i.shape == shape) {
             return Err(CollideError::ShapeInUse { shape, instance: self.ids[at] });
@@ -164,10 +167,10 @@ impl Scene {
         self.add_many(&[instance]).map(|ids| ids.start)
     }
 
-    /// Adds instances; their ids follow each other. All are added, or none.
+    /// Adds instances with consecutive ids. Either all are added or none.
     ///
     /// # Errors
-    /// Names the instance by its place in `instances`.
+    /// [`CollideError::Instance`] names the instance by its index in `instances`.
     pub fn add_many(&mut self, instances: &[Instance]) -> Result<std::ops::Range<InstanceId>, CollideError> {
         let first = self.next_instance;
         let end =
@@ -187,10 +190,10 @@ impl Scene {
         Ok(InstanceId(first)..InstanceId(end))
     }
 
-    /// Removes instances. All are removed, or none.
+    /// Removes instances. Either all are removed or none.
     ///
     /// # Errors
-    /// [`CollideError::NoInstance`] names one that is not there.
+    /// [`CollideError::NoInstance`] names an instance that does not exist.
     pub fn remove(&mut self, ids: &[InstanceId]) -> Result<(), CollideError> {
         ids.iter().try_for_each(|&id| self.at(id).map(|_| ()))?;
         let gone: BTreeSet<InstanceId> = ids.iter().copied().collect();
@@ -201,10 +204,10 @@ impl Scene {
         Ok(())
     }
 
-    /// Replaces the states of instances. All are replaced, or none.
+    /// Replaces the states of instances. Either all are replaced or none.
     ///
     /// # Errors
-    /// Names the first instance that is not there or whose state cannot be.
+    /// Names the first instance that does not exist or has an invalid state.
     pub fn update(&mut self, updates: &[(InstanceId, Instance)]) -> Result<(), CollideError> {
         let checked = |&(id, instance): &(InstanceId, Instance)| {
             let instance = self
@@ -218,7 +221,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Moves instances. All are moved, or none.
+    /// Sets the poses of instances. Either all are set or none.
     ///
     /// # Errors
     /// As [`update`](Self::update).
@@ -230,7 +233,7 @@ impl Scene {
         self.update(&updates)
     }
 
-    /// Two instances never meet from now on.
+    /// Excludes a pair of instances, so that they never meet.
     ///
     /// # Errors
     /// [`CollideError::NoInstance`].
@@ -241,12 +244,12 @@ impl Scene {
         Ok(())
     }
 
-    /// Two excluded instances meet again.
+    /// Revokes the exclusion of a pair of instances.
     pub fn include(&mut self, a: InstanceId, b: InstanceId) {
         self.excluded.remove(&(a.min(b), a.max(b)));
     }
 
-    /// An instance's state.
+    /// The state of an instance.
     ///
     /// # Errors
     /// [`CollideError::NoInstance`].
@@ -262,27 +265,28 @@ impl Scene {
         self.shapes.get(&id).ok_or(CollideError::NoShape(id))
     }
 
-    /// All instances, by id.
+    /// All instances, in the order of their ids.
     pub fn instances(&self) -> impl ExactSizeIterator<Item = (InstanceId, &Instance)> {
         self.ids.iter().copied().zip(&self.instances)
     }
 
-    /// Whether two instances may meet: of one world, of groups that meet, not excluded, not the same.
+    /// Whether two different instances may meet: they are in the same world, their groups meet, and
+    /// the pair is not excluded.
     pub fn may_meet(&self, a: (InstanceId, &Instance), b: (InstanceId, &Instance)) -> bool {
         a.0 != b.0 && a.1.world == b.1.world && a.1.groups.meet(b.1.groups) && !self.is_excluded(a.0, b.0)
     }
 
-    /// Whether two instances were told never to meet.
+    /// Whether a pair of instances is excluded.
     pub fn is_excluded(&self, a: InstanceId, b: InstanceId) -> bool {
         !self.excluded.is_empty() && self.excluded.contains(&(a.min(b), a.max(b)))
     }
 
-    /// The pairs of instances that were told never to meet, the lower id first, sorted.
+    /// The excluded pairs of instances, lower id first, sorted.
     pub fn excluded(&self) -> impl ExactSizeIterator<Item = (InstanceId, InstanceId)> {
         self.excluded.iter().copied()
     }
 
-    /// Bounds of an instance in the world.
+    /// Bounds of an instance in the world; infinite for a plane.
     ///
     /// # Errors
     /// [`CollideError::NoInstance`].
@@ -290,13 +294,13 @@ impl Scene {
         let instance = self.instance(id)?;
         let shape = self.shape(instance.shape)?;
         Ok(match shape {
-            // A rotated half space has no useful box.
+            // A rotated half-space has no useful box.
             Shape::Plane => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
             _ => instance.placement().bounds(shape.bounds()),
         })
     }
 
-    /// Bytes that the instances take, shapes not counted.
+    /// Memory of the instances and exclusions in bytes, without shapes.
     pub fn instance_bytes(&self) -> usize {
         self.instances.len() * (size_of::<Instance>() + size_of::<InstanceId>())
             + self.excluded.len() * size_of::<(InstanceId, InstanceId)>()
@@ -306,7 +310,7 @@ impl Scene {
         self.ids.binary_search(&id).map_err(|_| CollideError::NoInstance(id))
     }
 
-    /// The instance with its rotation normalised.
+    /// Checks an instance. Returns it with its rotation normalised.
     fn checked(&self, instance: &Instance) -> Result<Instance, String> {
         let shape = self.shape(instance.shape).map_err(|e| e.to_string())?;
         let Instance { pose, velocity, scale, .. } = instance;

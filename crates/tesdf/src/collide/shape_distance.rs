@@ -4,23 +4,24 @@ use super::Shape;
 use super::simple::Simple;
 use crate::geometry::length_and_direction;
 
-/// A point with a coordinate above this is farther out than any shape is large.
+/// A point with a larger coordinate is farther out than any shape is large.
 const FAR: f64 = 1e100;
 
 impl Shape {
-    /// Distance from `p` to the surface, negative inside; in the shape's frame and unit. NaN for a point that is not finite,
-    /// [`f64::MAX`] for a distance above it.
+    /// Signed distance from `p` to the surface, negative inside; in the shape's frame and unit. NaN
+    /// for a point that is not finite, [`f64::MAX`] for a larger distance.
     pub fn signed_distance(&self, p: DVec3) -> f64 {
         match *self {
             Self::Mesh(ref asset) => asset.signed_distance(p),
             _ if !p.is_finite() => f64::NAN,
-            // Squares would overflow, and from so far out every shape but a plane is a point.
+            // Squares would overflow. From so far out, every shape except a plane is a point.
             _ if p.abs().max_element() > FAR && !matches!(self, Self::Plane) => length_and_direction(p).0,
             ref simple => Simple::from(simple).value(p).distance,
         }
     }
 
-    /// As [`signed_distance`](Self::signed_distance), of an encoded mesh in `f32` ([`TeSdf::signed_distance_f32`](crate::TeSdf::signed_distance_f32)); the other shapes are
+    /// As [`signed_distance`](Self::signed_distance), but an encoded mesh answers in `f32`
+    /// ([`TeSdf::signed_distance_f32`](crate::TeSdf::signed_distance_f32)). The other shapes use
     /// formulas.
     pub fn signed_distance_f32(&self, p: DVec3) -> f64 {
         match self {
@@ -29,7 +30,8 @@ impl Shape {
         }
     }
 
-    /// Whether `p`, in the shape's frame and unit, lies inside. Points on the surface may go either way.
+    /// Whether `p`, in the shape's frame and unit, lies inside. Points on the surface may count as
+    /// either.
     pub fn contains(&self, p: DVec3) -> bool {
         match self {
             Self::Mesh(asset) => asset.is_inside(p),

@@ -3,23 +3,24 @@ use glam::{DVec2, DVec3};
 use super::Shape;
 use crate::geometry::NearRay;
 
-/// Where a ray meets the surface of a shape first, in the shape's frame and unit.
+/// The first point at which a ray meets the surface of a shape, in the shape's frame and unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapeHit {
     /// Distance along the ray, in lengths of its direction.
     pub t: f64,
     /// Outward unit normal of the surface.
     pub normal: DVec3,
-    /// The face of an encoded mesh, by its id in the source mesh.
+    /// The face of an encoded mesh, by its id in the source mesh; `None` for other shapes.
     pub face: Option<u32>,
 }
 
 impl Shape {
-    /// The first point of the surface that `origin + t · direction` meets for `t` in `[0, limit]`, from either side; in
-    /// the shape's frame and unit.
+    /// The first point of the surface that `origin + t · direction` meets for `t` in `[0, limit]`,
+    /// from either side. In the shape's frame and unit.
     ///
-    /// `None` when nothing is met, or when the ray is not finite or has no direction, or `t` would be above [`f64::MAX`]. As in
-    /// [`TeSdf::ray_cast`](crate::TeSdf::ray_cast), a ray that begins far out is taken from where it comes near the shape.
+    /// `None` when the ray meets nothing, is not finite or has no direction, or when `t` would be
+    /// above [`f64::MAX`]. As in [`TeSdf::ray_cast`](crate::TeSdf::ray_cast), a ray that begins far
+    /// out is first moved to where it comes near the shape.
     pub fn ray_cast(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<ShapeHit> {
         if let Self::Mesh(asset) = self {
             let hit = asset.ray_cast(origin, direction, limit)?;
@@ -36,9 +37,9 @@ impl Shape {
                 face: None,
             });
         }
-        // From near by squares of coordinates do not overflow.
+        // From a near origin, squares of coordinates do not overflow.
         let ray = NearRay::new(origin, direction, DVec3::ZERO, self.diagonal())?;
-        // The simple shapes are convex: the ray's line is inside over one interval.
+        // The simple shapes are convex, so the ray's line is inside over one interval.
         let [enter, leave] = self.inside_of_line(ray.origin, ray.direction)?;
         let rest = ray.rest_of(limit);
         let t = [enter, leave].into_iter().find(|t| (0.0..=rest).contains(t))?;
@@ -46,7 +47,7 @@ impl Shape {
         Some(ShapeHit { t: ray.total(t)?, normal, face: None })
     }
 
-    /// Where the line enters and leaves a box, sphere or capsule.
+    /// The parameters at which the line enters and leaves a box, sphere or capsule.
     fn inside_of_line(&self, from: DVec3, along: DVec3) -> Option<[f64; 2]> {
         match *self {
             Self::Mesh(_) | Self::Plane => None,
@@ -85,7 +86,7 @@ impl Shape {
     }
 }
 
-/// Where `from + t · along` lies between `low` and `high`.
+/// The interval of `t` where `from + t · along` lies between `low` and `high`.
 fn slab(from: f64, along: f64, low: f64, high: f64) -> Option<[f64; 2]> {
     if along == 0.0 {
         return (low..=high).contains(&from).then_some([f64::NEG_INFINITY, f64::INFINITY]);
@@ -94,7 +95,7 @@ fn slab(from: f64, along: f64, low: f64, high: f64) -> Option<[f64; 2]> {
     Some([s.min(t), s.max(t)])
 }
 
-/// Where `a t² + 2 b t + c` is at most 0, for `a` not negative.
+/// The interval of `t` where `a t² + 2 b t + c` is at most 0. `a` must not be negative.
 fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     if a == 0.0 {
         return (c <= 0.0).then_some([f64::NEG_INFINITY, f64::INFINITY]);
@@ -127,7 +128,8 @@ mod tests {
                 let mut vector = || DVec3::from_array(std::array::from_fn(|_| random.between(-1.0, 1.0)));
                 let (origin, along) = (2.0 * vector(), vector());
                 let at = |t: f64| shape.signed_distance(origin + t * along);
-                // The distance is a lower bound of the way to the surface, from inside too.
+                // The absolute distance is a lower bound of the path length to the surface, also
+                // from inside.
                 let mut t = 0.0;
                 while t < 50.0 && at(t).abs() > 1e-9 {
                     t += at(t).abs() / along.length();

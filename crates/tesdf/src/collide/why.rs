@@ -1,4 +1,5 @@
-//! Why a contact is, or is not, there: what each stage of a detection saw of one ordered pair.
+//! Explains why a contact is present or missing: the result of each stage of a detection for one
+//! ordered pair.
 use glam::DVec3;
 use serde::Serialize;
 
@@ -6,19 +7,19 @@ use super::middle::ClippedPolygon;
 use super::ordered_pair::OrderedPair;
 use super::{CollideError, CollideOptions, InstanceId, Mode, Scene, Shape};
 
-/// What became of a pair of instances.
+/// The result for a pair of instances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PairVerdict {
-    /// It goes on to the broad phase.
+    /// The pair goes on to the broad phase.
     Tested,
-    /// They are one and the same.
+    /// They are the same instance.
     SameInstance,
     /// They are in different worlds.
     OtherWorlds,
     /// Their groups do not meet.
     GroupsDoNotMeet,
-    /// They were told never to meet.
+    /// The pair is excluded.
     Excluded,
     /// Both are planes.
     BothPlanes,
@@ -26,35 +27,39 @@ pub enum PairVerdict {
     BoundsApart,
 }
 
-/// What the broad phase made of a face or node; bounds are in the world's unit.
+/// The result of the broad phase for a face or node. Bounds are in the world's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BroadVerdict {
     /// It goes on to the middle phase.
     Candidate,
-    /// A node of the face tree over it has no signed distance below `bound`, which is above the contact distance.
+    /// A node of the face tree above it has no signed distance below `bound`, which is above the
+    /// contact distance.
     PrunedByTree {
-        /// That of the first such node on the way down.
+        /// The bound of the first such node on the way down.
         bound: f64,
     },
-    /// The ball around it has no signed distance below `bound`, which is above the contact distance.
+    /// The ball around it has no signed distance below `bound`, which is above the contact
+    /// distance.
     PrunedByBall {
-        /// Signed distance at the middle of the ball, less its radius.
+        /// Signed distance at the centre of the ball, minus its radius.
         bound: f64,
     },
 }
 
-/// What the middle and the narrow phase made of a part of a face.
+/// The result of the middle and the narrow phase for a part of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PolygonVerdict {
     /// It is a contact.
     Contact,
-    /// Its cell has no signed distance up to the contact distance: dropped unseen.
+    /// Its cell has no signed distance up to the contact distance, so it was dropped without a
+    /// search.
     CellBeyond,
     /// Its least signed distance is above the contact distance.
     Beyond,
-    /// Dropped by the cosine filter, Eq. (10): the gradient meets the face's normal at this cosine, above −cos θ.
+    /// Dropped by the cosine filter, Eq. (10): the cosine between the gradient and the face's
+    /// normal is above −cos θ.
     Filtered {
         /// ∇φ · n.
         cosine: f64,
@@ -64,28 +69,29 @@ pub enum PolygonVerdict {
 /// A face clipped by one cell, or a node; in the world's unit and frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PolygonReport {
-    /// The cell's word in `domain.nodes`; `None` outside of the domain's cube, and in the field of a simple shape.
+    /// The cell's word in `domain.nodes`; `None` outside the domain's cube, and in the field of a
+    /// simple shape.
     pub cell: Option<u32>,
-    /// Corners of the clipped polygon, of a rounded shape those of its core.
+    /// Corners of the clipped polygon; for a rounded shape, those of its core.
     pub vertices: Vec<DVec3>,
-    /// The least signed distance, as the mode finds it without a limit.
+    /// The least signed distance that the mode finds without a limit.
     pub distance: f64,
-    /// Where that is.
+    /// The point with this distance.
     pub point: DVec3,
-    /// The nearest face of *b* from there.
+    /// The face of *b* nearest to this point.
     pub face_b: u32,
-    /// What became of it.
+    /// The result.
     pub verdict: PolygonVerdict,
 }
 
-/// A face of *a*, or in node mode a node.
+/// A face of *a*, or a node in node mode.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartReport {
-    /// The user's number of the face, or of the node.
+    /// The id of the face or node in the user's numbering.
     pub id: u32,
-    /// What the broad phase made of it.
+    /// The result of the broad phase.
     pub broad: BroadVerdict,
-    /// Its polygons, all of them, in the order of the forest.
+    /// All its polygons, in the order of the forest.
     pub polygons: Vec<PolygonReport>,
 }
 
@@ -95,38 +101,42 @@ impl PartReport {
         self.polygons.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min)
     }
 
-    /// How many of its polygons are contacts.
+    /// Number of its polygons that are contacts.
     pub fn contacts(&self) -> usize {
         self.polygons.iter().filter(|p| p.verdict == PolygonVerdict::Contact).count()
     }
 }
 
-/// One ordered pair, before reduction: faces (or nodes) of *a* in the field of *b*.
+/// The report for one ordered pair, before reduction: faces (or nodes) of *a* in the field of *b*.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WhyReport {
-    /// Whose faces.
+    /// The instance that has the faces.
     pub instance_a: InstanceId,
-    /// Whose field.
+    /// The instance whose field is used.
     pub instance_b: InstanceId,
-    /// What became of the pair. The rest is reported as if it was tested.
+    /// The result for the pair. The rest is reported as if the pair was tested.
     pub pair: PairVerdict,
-    /// Contacts count up to this, in the world's unit: the options' contact distance and what velocities add.
+    /// The pair's contact distance, in the world's unit: that of the options plus what velocities
+    /// add.
     pub contact_distance: f64,
-    /// Distance between the bounds of the two along the axis on which they are farthest apart; 0 when they meet.
+    /// Distance between the bounds along the axis on which they are farthest apart; 0 when they
+    /// overlap.
     pub bounds_gap: f64,
-    /// Faces or nodes of *a*.
+    /// Number of faces or nodes of *a*.
     pub total: usize,
-    /// Those that the broad phase left.
+    /// Number of faces or nodes that the broad phase keeps.
     pub candidates: usize,
-    /// The one that was asked for, or else all candidates.
+    /// The requested face or node; without a request, all candidates.
     pub parts: Vec<PartReport>,
 }
 
-/// Says what each stage of [`detect`](super::detect()) makes of the faces (in node mode: nodes) of `a` in the field of `b`: of `part`, or of
-/// all candidates. The stages are those of the detection itself; what they drop is computed on for the report.
+/// Reports the result of each stage of [`detect`](super::detect()) for the faces (in node mode:
+/// nodes) of `a` in the field of `b`: for `part`, or for all candidates. The stages are those of
+/// the detection itself. What they drop is still computed for the report.
 ///
 /// # Errors
-/// As [`detect`](super::detect()); an instance that is not there, a face or node that `a` does not have.
+/// As [`detect`](super::detect()); also for an unknown instance, or a face or node that `a` does
+/// not have.
 pub fn why(
     scene: &Scene,
     options: &CollideOptions,
@@ -190,7 +200,7 @@ impl Stages<'_> {
         }
     }
 
-    /// The candidates that go by the user's number: of a plane its two halves.
+    /// The candidates with this id in the user's numbering; a plane has two.
     fn named(&self, id: u32) -> Result<Vec<u32>, CollideError> {
         let total = self.total() as u32;
         let found: Vec<u32> = match self.options.mode {
@@ -226,7 +236,7 @@ impl Stages<'_> {
                 }
             }
         };
-        // What the detection sees, then everything.
+        // First the limits of the detection, then no limit.
         let mut seen = Vec::new();
         let mut kept = Vec::new();
         search.minima(field, &part, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
@@ -256,7 +266,7 @@ impl Stages<'_> {
     }
 }
 
-/// Tells the polygons of one face apart.
+/// Identifies a polygon among those of one face.
 type Key = (Option<u32>, [u64; 3]);
 
 fn key(polygon: &ClippedPolygon) -> Key {

@@ -27,11 +27,11 @@ pub struct SolidMesh {
 
 impl SolidMesh {
     /// Reads the mesh file at `path` and checks the mesh: [`read`](super::read()), then
-    /// [`new`](Self::new). To see what reading has changed, call these two.
+    /// [`new`](Self::new). Call these two directly to see the changes made while reading.
     ///
     /// # Errors
-    /// [`ReadSolidError`] names the file and says why it cannot be read or why its mesh has no
-    /// well-defined inside.
+    /// [`ReadSolidError`] names the file. It says why the file cannot be read, or why its mesh has
+    /// no well-defined inside.
     ///
     /// # Example
     ///
@@ -51,7 +51,7 @@ impl SolidMesh {
         Self::load(path.as_ref()).map(|(solid, _)| solid)
     }
 
-    /// As [`read`](Self::read), with what reading found and changed.
+    /// As [`read`](Self::read), and returns the report of reading.
     pub(crate) fn load(path: &Path) -> Result<(Self, LoadReport), ReadSolidError> {
         let LoadedMesh { mesh, report, .. } =
             read(path).map_err(|source| ReadSolidError::Read { path: path.to_owned(), source })?;
@@ -120,7 +120,7 @@ impl SolidMesh {
 /// Why a mesh file does not give a [`SolidMesh`]. The message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadSolidError {
-    /// The file has no mesh that can be read.
+    /// The file cannot be read as a mesh.
     #[error("{}", source.in_file(path))]
     Read {
         /// The file.

@@ -5,26 +5,28 @@ use super::locate::{FLIGHT, Faces, Place};
 use super::{Answer, Precision};
 use crate::TeSdf;
 
-/// Points that one task takes.
+/// Number of points per task.
 const TASK: usize = 1 << 12;
 
-/// Which points a batch answers.
+/// The points that a batch answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// All finite points.
     Everywhere,
-    /// Points of the domain, as [`TeSdf::query_in_domain`] has it; others get NaN and [`Answer::NO_FACE`].
+    /// Points of the domain, as [`TeSdf::query_in_domain`] defines it. Other points get NaN and
+    /// [`Answer::NO_FACE`].
     Domain,
 }
 
-/// Where a batch puts its answers, one array per field of [`Answer`], as numpy and GPUs want them.
+/// Output arrays of a batch, one for each field of [`Answer`], as numpy and GPUs expect them. Each
+/// needs one row per point.
 #[derive(Debug)]
 pub struct AnswerColumns<'a> {
-    /// Distances to the nearest face, negative inside.
+    /// Distances to the nearest face, negative inside; in the mesh's unit.
     pub signed_distance: &'a mut [f64],
     /// Unit gradients.
     pub gradient: &'a mut [[f64; 3]],
-    /// Nearest points of the surface.
+    /// Nearest points of the surface, in the mesh's unit.
     pub closest_point: &'a mut [[f64; 3]],
     /// Nearest faces, by their ids in the source mesh.
     pub face: &'a mut [u32],
@@ -34,9 +36,9 @@ pub struct AnswerColumns<'a> {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{column} has {found} rows for {expected} points; expected one for each point")]
 pub struct BatchError {
-    /// The array.
+    /// Name of the array.
     pub column: &'static str,
-    /// Its rows.
+    /// Its number of rows.
     pub found: usize,
     /// Number of points.
     pub expected: usize,
@@ -49,10 +51,11 @@ impl BatchError {
 }
 
 impl TeSdf {
-    /// Answers for many points, exactly, in the order of the points, on all threads of the current rayon pool.
+    /// Answers many points exactly, in order, on all threads of the current rayon pool.
     ///
-    /// The same answers as those of [`query`](Self::query), but quicker: a few points go through the stages together
-    /// (cell, list, faces), and what the next stage needs is fetched ahead for all of them.
+    /// The answers equal those of [`query`](Self::query), but take less time: a few points pass the
+    /// stages (cell, list, faces) together, and the data of the next stage are prefetched for all
+    /// of them.
     ///
     /// # Example
     ///
@@ -74,12 +77,14 @@ impl TeSdf {
         self.query_batch_with(points, Precision::F64)
     }
 
-    /// As [`query_batch`](Self::query_batch), in `f32`: the answers of [`query_f32`](Self::query_f32).
+    /// As [`query_batch`](Self::query_batch), in `f32`: the answers of
+    /// [`query_f32`](Self::query_f32).
     pub fn query_batch_f32(&self, points: &[DVec3]) -> Vec<Answer> {
         self.query_batch_with(points, Precision::F32)
     }
 
-    /// As [`query_batch`](Self::query_batch) or [`query_batch_f32`](Self::query_batch_f32), chosen at run time.
+    /// As [`query_batch`](Self::query_batch) or [`query_batch_f32`](Self::query_batch_f32), chosen
+    /// at run time.
     pub fn query_batch_with(&self, points: &[DVec3], precision: Precision) -> Vec<Answer> {
         let mut answers = vec![Answer::NONE; points.len()];
         self.each_flight(
@@ -94,10 +99,12 @@ impl TeSdf {
         answers
     }
 
-    /// As [`query_batch_with`](Self::query_batch_with), into arrays that the caller owns, one row for each point.
+    /// As [`query_batch_with`](Self::query_batch_with), but writes into arrays of the caller, one
+    /// row for each point.
     ///
     /// # Errors
-    /// [`BatchError`]: a column has not as many rows as there are points. No row was changed then.
+    /// [`BatchError`]: the number of rows of an array differs from the number of points. Then no
+    /// row is changed.
     ///
     /// # Example
     ///
@@ -111,7 +118,8 @@ impl TeSdf {
     /// # let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
     /// # let asset = Encoder::new().encode(&solid)?;
     /// let points = [DVec3::new(0.1, 0.3, 0.3), DVec3::new(-2.0, 0.3, 0.3)];
-    /// let (mut distance, mut gradient, mut closest, mut face) = ([0.0; 2], [[0.0; 3]; 2], [[0.0; 3]; 2], [0; 2]);
+    /// let (mut distance, mut face) = ([0.0; 2], [0; 2]);
+    /// let (mut gradient, mut closest) = ([[0.0; 3]; 2], [[0.0; 3]; 2]);
     /// let columns = AnswerColumns {
     ///     signed_distance: &mut distance,
     ///     gradient: &mut gradient,
@@ -155,10 +163,11 @@ impl TeSdf {
         Ok(())
     }
 
-    /// The signed distances alone, into an array that the caller owns, one for each point.
+    /// Writes only the signed distances, into an array of the caller, one for each point.
     ///
     /// # Errors
-    /// [`BatchError`]: there are not as many distances as points. None was changed then.
+    /// [`BatchError`]: the number of distances differs from the number of points. Then none is
+    /// changed.
     pub fn signed_distances_into(
         &self,
         points: &[DVec3],
@@ -174,8 +183,8 @@ impl TeSdf {
         Ok(())
     }
 
-    /// Answers flight by flight; `tasks` are the places of [`TASK`] answers each, and `put` has the place, the number of
-    /// answers of the task before the flight, and the flight.
+    /// Answers flight by flight. Each item of `tasks` holds the output of [`TASK`] points. `put`
+    /// receives the item, the index of the flight's first point in the task, and the answers.
     fn each_flight<T: Send>(
         &self,
         points: &[DVec3],
@@ -227,11 +236,11 @@ impl TeSdf {
     }
 }
 
-/// Asks for the cache line of the first element; says nothing about whether it comes.
+/// Prefetches the cache line of the first element. It is only a hint.
 #[inline(always)]
 fn fetch<T>(slice: &[T]) {
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: a prefetch reads nothing that the program sees, and the instruction is part of x86-64.
+    // SAFETY: a prefetch has no visible effect, and the instruction is part of x86-64.
     unsafe {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         _mm_prefetch::<_MM_HINT_T0>(slice.as_ptr().cast());

@@ -7,22 +7,24 @@ use crate::TeSdf;
 use crate::base::Side;
 
 impl TeSdf {
-    /// As [`query`](Self::query), from the tree over all faces instead of the lists: what a good bounding volume hierarchy
-    /// alone does, for comparison.
+    /// As [`query`](Self::query), but from the tree over all faces instead of the lists. For
+    /// comparison with a good bounding volume hierarchy.
     ///
-    /// The same exact distance; of equally near faces another may be named. The side is told by the closest feature where it
-    /// can tell (in `f32`), else by [`is_inside`](Self::is_inside). On the surface itself the gradient is that
-    /// of [`query`](Self::query).
+    /// The distance is equally exact. Among equally near faces another may be named. The closest
+    /// feature decides the side where it can (in `f32`); otherwise [`is_inside`](Self::is_inside)
+    /// does. On the surface itself the gradient is that of [`query`](Self::query).
     pub fn query_by_tree(&self, point: DVec3) -> Answer {
         self.query_by_tree_with(point, Precision::F64)
     }
 
-    /// As [`query_by_tree`](Self::query_by_tree), in `f32`, as precise as [`query_f32`](Self::query_f32).
+    /// As [`query_by_tree`](Self::query_by_tree), in `f32`, with the precision of
+    /// [`query_f32`](Self::query_f32).
     pub fn query_by_tree_f32(&self, point: DVec3) -> Answer {
         self.query_by_tree_with(point, Precision::F32)
     }
 
-    /// As [`query_by_tree`](Self::query_by_tree) or [`query_by_tree_f32`](Self::query_by_tree_f32), chosen at run time.
+    /// As [`query_by_tree`](Self::query_by_tree) or [`query_by_tree_f32`](Self::query_by_tree_f32),
+    /// chosen at run time.
     pub fn query_by_tree_with(&self, point: DVec3, precision: Precision) -> Answer {
         let local = self.frame.to_local(point);
         match precision {
@@ -32,7 +34,8 @@ impl TeSdf {
         }
     }
 
-    /// How many faces and nodes [`query_by_tree`](Self::query_by_tree) reads at `point`, in `f32`.
+    /// Number of faces and nodes that [`query_by_tree`](Self::query_by_tree) reads at `point`, in
+    /// `f32`.
     pub fn reads_by_tree(&self, point: DVec3) -> Reads {
         let mut reads = Reads::default();
         let relative = self.frame.to_local(point) - self.cube.middle();
@@ -42,7 +45,7 @@ impl TeSdf {
 
     fn by_tree_f32(&self, point: DVec3, local: DVec3) -> Answer {
         let relative = local - self.cube.middle();
-        // Far from the cube, f32 is too coarse against the body.
+        // Far from the cube, f32 is too coarse relative to the body.
         if relative.abs().max_element() > 2.0 * self.cube.side() {
             return self.by_tree_f64(point, local);
         }

@@ -1,8 +1,8 @@
 //! Signed distance, closest point, gradient, closest face; occupancy and rays.
 //!
-//! A point is taken to the local frame, its cell is found by descending the forest in fixed point, and the
-//! least distance to the faces of the cell's list is the answer. Points that no list serves (outside of the
-//! domain, or in a far cell) are answered from the tree over all faces, exactly too.
+//! A query maps the point to the local frame and finds its cell by descending the forest in fixed
+//! point. The answer is the least distance to the faces of the cell's list. Points without a list
+//! (outside the domain or in a far cell) are answered by the tree over all faces, also exactly.
 //!
 //! | | exact | `f32` storage | chosen at run time |
 //! |---|---|---|---|
@@ -45,39 +45,41 @@ use crate::geometry::{Closest, Feature};
 use far::is_near;
 use sign::hinted_side;
 
-/// What a query computes with, for code that chooses at run time: [`TeSdf::query_with`] and the like take it. Code that
-/// knows calls [`TeSdf::query`] (`F64`) or [`TeSdf::query_f32`].
+/// The arithmetic of a query, for code that chooses it at run time with [`TeSdf::query_with`] and
+/// similar methods. Other code calls [`TeSdf::query`] (`F64`) or [`TeSdf::query_f32`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
-    /// Faces rounded to `f32` in a local frame, several at a time: within 1e-6 × diagonal, the right sign
-    /// beyond that, gradients within 1e-3 rad from 1e-4 × diagonal on. Where faces are lower than 1e-6 × diagonal, gradients are off by
-    /// that length over the distance as well.
+    /// Faces rounded to `f32` in a local frame, several at a time. Distances are within 1e-6 ×
+    /// diagonal, and the sign is right beyond that distance. Gradients are within 1e-3 rad from
+    /// 1e-4 × diagonal on. Where faces have a height below 1e-6 × diagonal, gradients have an
+    /// additional error of that length divided by the distance.
     F32,
-    /// Faces as they are in the mesh: within 1e-12 × diagonal plus 4 ulp of the largest coordinate, signs by
-    /// exact predicates, gradients within 1e-3 rad from 1e-9 × diagonal on.
+    /// Faces as they are in the mesh. Distances are within 1e-12 × diagonal plus 4 ulp of the
+    /// largest coordinate, and signs come from exact predicates. Gradients are within 1e-3 rad from
+    /// 1e-9 × diagonal on.
     F64,
 }
 
 /// The answer to a query, in the mesh's unit and frame.
 ///
-/// A point with a NaN or infinite coordinate has no answer: the numbers are NaN and the face is
-/// [`NO_FACE`](Self::NO_FACE). Every other point has one, however far out it is; a distance above [`f64::MAX`] is given
-/// as [`f64::MAX`].
+/// A point with a NaN or infinite coordinate has no answer: the numbers are NaN, and the face is
+/// [`NO_FACE`](Self::NO_FACE). Every other point has an answer, however far out it is. A distance
+/// above [`f64::MAX`] is reported as [`f64::MAX`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Distance to the nearest face, negative inside.
     pub signed_distance: f64,
-    /// Unit gradient of the signed distance; it points outward.
+    /// Unit gradient of the signed distance. It points outward.
     pub gradient: DVec3,
     /// The nearest point of the surface.
     pub closest_point: DVec3,
-    /// The nearest face, by its id in the source mesh, 0-based. Of faces of the cell's list at equal
-    /// distance, the lowest.
+    /// The nearest face, by its id in the source mesh, 0-based. Among faces of the cell's list at
+    /// equal distance, the lowest.
     pub face: u32,
 }
 
 impl Answer {
-    /// The face of a point that has no answer.
+    /// The face of a point without an answer.
     pub const NO_FACE: u32 = u32::MAX;
 
     const NONE: Self = Self {
@@ -97,25 +99,27 @@ pub(crate) struct Found {
     pub gradient: DVec3,
     /// The nearest point of the surface.
     pub closest_point: DVec3,
-    /// The nearest face, by its position among the asset's faces.
+    /// The nearest face, by its index among the asset's faces.
     pub position: u32,
-    /// Which feature of it the nearest point is on.
+    /// The feature of this face on which the nearest point lies.
     pub feature: Feature,
 }
 
-/// Below this distance (local frame) the gradient is the normal of the closest feature.
+/// Below this distance (local frame), the gradient is the normal of the closest feature.
 ///
-/// At most 1e-9 × diagonal, as the diagonal is 0.5 to 1 here: from there on the gradient is that of the point.
+/// The diagonal is 0.5 to 1 in this frame, so this is at most 1e-9 × diagonal. From there on the
+/// gradient belongs to the point.
 const ON_SURFACE_F64: f64 = 5e-10;
-/// The same for `f32` storage, some ten times its rounding.
+/// The same for `f32` storage: about ten times its rounding.
 const ON_SURFACE_F32: f64 = 1e-6;
-/// Faces that share an edge are this near to a point of it.
+/// Faces that share an edge are at most this far from a point of the edge.
 const TOUCHING: f64 = 1e-12;
 
 impl TeSdf {
-    /// Answers for any point, exactly ([`Precision::F64`]). `point` and the answer are in the mesh's unit and frame.
+    /// Answers any point exactly ([`Precision::F64`]). `point` and the answer are in the mesh's
+    /// unit and frame.
     ///
-    /// There is no error: a point that is not finite has an answer of NaN and [`Answer::NO_FACE`].
+    /// This cannot fail: the answer at a point that is not finite is NaN with [`Answer::NO_FACE`].
     ///
     /// # Example
     ///
@@ -139,7 +143,8 @@ impl TeSdf {
         self.query_with(point, Precision::F64)
     }
 
-    /// As [`query`](Self::query), in `f32`: several faces at a time, within 1e-6 of the mesh's diagonal ([`Precision::F32`]).
+    /// As [`query`](Self::query), in `f32`: several faces at a time, within 1e-6 of the mesh's
+    /// diagonal ([`Precision::F32`]).
     ///
     /// # Example
     ///
@@ -166,8 +171,8 @@ impl TeSdf {
         self.answer_alone(point, local, self.locate(local), precision)
     }
 
-    /// As [`query`](Self::query), but `None` outside of the domain: more than the band from the solid, give or
-    /// take a cell, and where no list was worth its bytes.
+    /// As [`query`](Self::query), but `None` outside the domain. The domain covers the band around
+    /// the solid up to about one cell, except where no list was worth its bytes.
     ///
     /// # Example
     ///
@@ -193,7 +198,8 @@ impl TeSdf {
         self.query_in_domain_with(point, Precision::F32)
     }
 
-    /// As [`query_in_domain`](Self::query_in_domain) or [`query_in_domain_f32`](Self::query_in_domain_f32), chosen at run time.
+    /// As [`query_in_domain`](Self::query_in_domain) or
+    /// [`query_in_domain_f32`](Self::query_in_domain_f32), chosen at run time.
     pub fn query_in_domain_with(&self, point: DVec3, precision: Precision) -> Option<Answer> {
         let local = self.frame.to_local(point);
         match self.locate(local) {
@@ -202,7 +208,8 @@ impl TeSdf {
         }
     }
 
-    /// The signed distance alone, exactly: negative inside, in the mesh's unit; NaN for a point that is not finite.
+    /// Only the signed distance, exact: negative inside, in the mesh's unit; NaN for a point that
+    /// is not finite.
     ///
     /// # Example
     ///
@@ -228,8 +235,8 @@ impl TeSdf {
         self.query_f32(point).signed_distance
     }
 
-    /// Whether the winding number at `point` is 1 or more, by exact predicates. Points on the surface may
-    /// go either way; points that are not finite are outside.
+    /// Whether the winding number at `point` is 1 or more, by exact predicates. Points on the
+    /// surface may count as either; points that are not finite are outside.
     pub fn is_inside(&self, point: DVec3) -> bool {
         let local = self.frame.to_local(point);
         match self.locate(local) {
@@ -239,7 +246,7 @@ impl TeSdf {
         }
     }
 
-    /// How many faces and nodes a query at `point` reads, in `f32`.
+    /// Number of faces and nodes that a query at `point` reads, in `f32`.
     pub fn reads(&self, point: DVec3) -> Reads {
         let local = self.frame.to_local(point);
         let mut reads = Reads::default();
@@ -266,12 +273,12 @@ impl TeSdf {
         })
     }
 
-    /// The faces of the list at `offset`, read once for many points.
+    /// Passes the faces of the list at `offset` to `f`. The list is read once for many points.
     pub(crate) fn with_list<R>(&self, offset: u32, f: impl FnOnce(&Faces) -> R) -> R {
         thread_local! {
             static FACES: RefCell<Vec<Faces>> = const { RefCell::new(Vec::new()) };
         }
-        // Taken out, as `f` may read another list.
+        // The buffer is taken out of the pool, because `f` may read another list.
         let mut faces = FACES.with_borrow_mut(Vec::pop).unwrap_or_default();
         self.read_list(offset, &mut faces);
         let result = f(&faces);
@@ -279,7 +286,7 @@ impl TeSdf {
         result
     }
 
-    /// The answer at a point of the local frame whose place is known; the point is finite.
+    /// The answer at a finite point of the local frame whose place is known.
     pub(crate) fn found_at(&self, local: DVec3, place: Place, precision: Precision) -> Found {
         match place {
             Place::Listed { offset, .. } => {
@@ -289,7 +296,8 @@ impl TeSdf {
         }
     }
 
-    /// As [`found_at`](Self::found_at) in `f32`, with the exact distance also where lists are not known to be exact.
+    /// As [`found_at`](Self::found_at) in `f32`, but with the exact distance also where lists are
+    /// not proved exact.
     pub(crate) fn found_exactly(&self, local: DVec3) -> Found {
         let place = self.locate(local);
         match place {
@@ -306,7 +314,8 @@ impl TeSdf {
         }
     }
 
-    /// `faces` are those of the place's list, if it has one. `local` is `point` in the local frame.
+    /// The answer at `point`; `local` is `point` in the local frame. `faces` are those of the
+    /// place's list, if it has one.
     #[inline]
     fn answer(
         &self,
@@ -323,7 +332,7 @@ impl TeSdf {
         }
     }
 
-    /// As [`answer`](Self::answer), in the local frame; `local` is finite and not far.
+    /// As [`answer`](Self::answer), in the local frame. `local` must be finite and not far.
     #[inline]
     pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
         match precision {
@@ -332,7 +341,7 @@ impl TeSdf {
         }
     }
 
-    /// From the local frame to the mesh's.
+    /// Converts from the local frame to the mesh's frame.
     #[inline]
     fn to_answer(&self, found: Found) -> Answer {
         Answer {
@@ -348,22 +357,24 @@ impl TeSdf {
         let relative = local - self.cube.middle();
         let found = match place {
             Place::Listed { .. } => self.nearest_in_list_f32(faces, relative.as_vec3()),
-            // Far from the cube, f32 is too coarse against the body.
+            // Far from the cube, f32 is too coarse relative to the body.
             _ if relative.abs().max_element() > 2.0 * self.cube.side() => {
                 return self.answer_f64(local, place, faces);
             }
             _ => self.nearest_in_tree_f32(relative.as_vec3(), &mut Reads::default()),
         };
-        // Nothing is near in f32 when a file's coordinates overflow it.
+        // No face is found in f32 when coordinates of the file overflow.
         let Some(record) = self.records.get(found.face as usize) else {
             return self.answer_f64(local, place, faces);
         };
         let triangle = record.triangle();
         if triangle.normal == DVec3::ZERO {
-            // A segment in `f32` may be a narrow face in `f64`: the gradient would be off by its width over the distance.
+            // A segment in `f32` may be a narrow face in `f64`. Its gradient would have an error of
+            // the face's width divided by the distance.
             return self.answer_f64(local, place, faces);
         }
-        // The kernel has found the part; in f64 the point on it is as good as the f32 corners allow.
+        // The kernel has found the part of the face. In f64 the point on this part is as good as
+        // the f32 corners allow.
         let closest = match found.part() {
             0 => triangle.closest_in_plane(relative),
             edge => triangle.closest_on_edge(edge as usize - 1, relative),
@@ -398,13 +409,13 @@ impl TeSdf {
         let on_surface = |d: f64| match place {
             _ if d >= ON_SURFACE_F64 => None,
             Place::Listed { .. } => Some(self.pseudonormal(faces, position, &closest)),
-            // A cell that no list was worth its bytes for may touch the surface.
+            // A cell without a list, because no list was worth its bytes, may touch the surface.
             _ => Some(self.face_normal(position)),
         };
         self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
     }
 
-    /// Signed, and with the gradient; `origin` is that of the frame that `p` and `closest` are given in.
+    /// Adds the sign and the gradient. `origin` is the origin of the frame of `p` and `closest`.
     #[inline]
     fn finish(
         &self,
@@ -427,7 +438,7 @@ impl TeSdf {
         }
     }
 
-    /// The unit normal of a face; of a face that is a segment or a point some direction at right angles to it.
+    /// The unit normal of a face. For a segment or a point, some direction perpendicular to it.
     fn face_normal(&self, position: u32) -> DVec3 {
         let triangle = self.local_triangle(position as usize);
         if triangle.normal != DVec3::ZERO {
@@ -440,9 +451,10 @@ impl TeSdf {
         longest.try_normalize().map_or(DVec3::Z, DVec3::any_orthonormal_vector)
     }
 
-    /// The normal of a feature: of the face, the sum over an edge's faces, or the angle-weighted sum around a
-    /// vertex (Bærentzen and Aanæs 2005). The list names all of them when the feature is within the padding of the cell; the lists of
-    /// a conforming domain need not, and there the face tree is asked.
+    /// The normal of a feature: the face normal, the sum over the faces of an edge, or the
+    /// angle-weighted sum around a vertex (Bærentzen and Aanæs 2005). In a bisection domain, the
+    /// list names all faces at a feature within the padding of the cell. In a conforming domain it
+    /// need not, so the face tree is used.
     fn pseudonormal(&self, faces: &Faces, position: u32, closest: &Closest) -> DVec3 {
         let corners = self.faces[position as usize];
         let own = self.face_normal(position);

@@ -4,27 +4,31 @@ use crate::TeSdf;
 use crate::asset::layout::TreeChild;
 use crate::geometry::{NearRay, orientation};
 
-/// Where a ray meets the surface first.
+/// The first point at which a ray meets the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Distance along the ray, in lengths of its direction.
     pub t: f64,
-    /// The point met, in the mesh's unit.
+    /// The point, in the mesh's unit.
     pub point: DVec3,
-    /// The face met, by its id in the source mesh; of several at the same `t`, the lowest.
+    /// The face, by its id in the source mesh, 0-based. Among several faces at the same `t`, the
+    /// lowest.
     pub face: u32,
     /// Outward unit normal of the face.
     pub normal: DVec3,
 }
 
 impl TeSdf {
-    /// The first face that `origin + t · direction` meets for `t` in `[0, limit]`, from either side; in the mesh's
-    /// unit. Rays through edges and corners hit: which side of an edge a ray passes is decided exactly.
+    /// The first face that `origin + t · direction` meets for `t` in `[0, limit]`, from either
+    /// side. In the mesh's unit. Rays through edges and corners hit: the side on which a ray passes
+    /// an edge is decided exactly.
     ///
-    /// `None` when nothing is met, or when the ray is not finite or has no direction, or `t` would be above [`f64::MAX`].
+    /// `None` when the ray meets nothing, is not finite or has no direction, or when `t` would be
+    /// above [`f64::MAX`].
     ///
-    /// A ray that begins far out is taken from where it comes near the body. The place is rounded to 1e-16 of the
-    /// distance, so from 1e16 diagonals on only rays along an axis are sure to hit their aim.
+    /// A ray that begins far out is first moved to where it comes near the body. That position is
+    /// rounded to 1e-16 of the distance. So from about 1e16 diagonals on, only rays along an axis
+    /// reliably hit what they aim at.
     ///
     /// # Example
     ///
@@ -37,7 +41,8 @@ impl TeSdf {
     /// # let path = folder.path().join("part.obj");
     /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
     /// let asset = TeSdf::encode_file(&path)?;
-    /// let hit = asset.ray_cast(DVec3::new(-2.0, 0.2, 0.2), DVec3::X, f64::INFINITY).ok_or("nothing")?;
+    /// let origin = DVec3::new(-2.0, 0.2, 0.2);
+    /// let hit = asset.ray_cast(origin, DVec3::X, f64::INFINITY).ok_or("nothing")?;
     /// assert!((hit.t - 2.0).abs() < 1e-12 && hit.normal.distance(DVec3::NEG_X) < 1e-12);
     /// # Ok(())
     /// # }
@@ -53,10 +58,11 @@ impl TeSdf {
         Some(RayHit { t: ray.total(hit.t)?, ..hit })
     }
 
-    /// As [`ray_cast`](Self::ray_cast), for an origin near the body and a direction of length 1 to 4.
+    /// As [`ray_cast`](Self::ray_cast), for an origin near the body and a direction of length 1 to
+    /// 4.
     fn near_ray_cast(&self, origin: DVec3, direction: DVec3, limit: f64) -> Option<RayHit> {
         let from = self.frame.to_local(origin);
-        // In the local frame distances are those of the mesh's unit times the scale, and the direction stays.
+        // The local frame scales distances and keeps the direction.
         let (along, limit) = (direction, limit * self.frame.scale);
         let relative = from - self.cube.middle();
         let mut best: Option<(f64, u32, u32)> = None;
@@ -73,7 +79,8 @@ impl TeSdf {
                         let enter = enters_box(relative, along, reach, &boxes[6 * side..6 * side + 6])?;
                         Some((enter, TreeChild::decode(words[side])))
                     });
-                    // The nearer child is taken first: what it holds often ends the search of the other.
+                    // The nearer child is visited first: a hit in it often ends the search of the
+                    // other child.
                     match met {
                         [Some(a), Some(b)] if a.0 <= b.0 => stack.extend([b, a]),
                         _ => stack.extend(met.into_iter().flatten()),
@@ -101,7 +108,8 @@ impl TeSdf {
     }
 }
 
-/// Where the ray enters the box, at most: a slab test, widened by more than its rounding.
+/// Lower bound of the parameter where the ray enters the box; `None` when it misses. A slab test,
+/// widened by more than its rounding.
 fn enters_box(from: DVec3, along: DVec3, limit: f64, b: &[f32]) -> Option<f64> {
     let (mut enter, mut leave) = (0.0f64, limit);
     for a in 0..3 {
@@ -127,7 +135,8 @@ fn meets_face(from: DVec3, along: DVec3, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     if slope == 0.0 || t.is_nan() || t < 0.0 {
         return None;
     }
-    // Signs of the volumes that the ray's line spans with the edges, exact for the rounded second point.
+    // Signs of the volumes that the ray's line spans with the edges. They are exact for the rounded
+    // second point.
     let to = from + along;
     let sides = [orientation(from, to, a, b), orientation(from, to, b, c), orientation(from, to, c, a)];
     let one_side = sides.iter().all(|&s| s >= 0) || sides.iter().all(|&s| s <= 0);

@@ -1,4 +1,4 @@
-//! Narrow phase: the least signed distance over a node or a clipped polygon, and where.
+//! Narrow phase: the least signed distance over a node or a clipped polygon, and its point.
 mod branch_and_bound;
 mod exact;
 mod frank_wolfe;
@@ -16,38 +16,41 @@ use crate::query::{Faces, Place, Precision};
 /// The least signed distance of a part in one cell, in the field's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Minimum {
-    /// Where it is: a point of the part.
+    /// The point of the part.
     pub point: DVec3,
-    /// The field there.
+    /// The field's value there.
     pub value: FieldValue,
     /// The cell's word; `None` where the face tree or a formula answered.
     pub cell: Option<u32>,
-    /// Whether it is within the tolerance.
+    /// Whether the error is within the tolerance.
     pub converged: bool,
 }
 
-/// What a search over one polygon gives: a point of it, and whether no other is lower by more than the tolerance.
+/// Result of a search over one polygon: a point of it, and whether no other point is lower by more
+/// than the tolerance.
 struct Lowest {
     point: DVec3,
     converged: bool,
 }
 
-/// How a detection looks for minima of one field; lengths in its frame.
+/// Parameters of the search for minima in one field. Lengths are in its frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
     mode: Mode,
     iterations: u32,
-    /// Signed distances above this are not looked for.
+    /// Signed distances above this are ignored.
     pub reach: f64,
     tolerance: f64,
     precision: Precision,
 }
 
-/// Tolerances from this on are searched in `f32`, whose rounding is then small against them.
+/// From this tolerance on, searches use `f32`, whose rounding is then small relative to the
+/// tolerance.
 const COARSE: f64 = 20.0 * ROUNDING;
 
 impl Search {
-    /// `reach` is the contact distance, in the world's unit.
+    /// `reach` is the contact distance and `diagonal` that of the field's body, both in the world's
+    /// unit.
     pub fn new(options: &CollideOptions, reach: f64, field: &FieldBody, diagonal: f64) -> Self {
         let unit = field.unit();
         let tolerance = match options.mode {
@@ -63,10 +66,11 @@ impl Search {
         Self { reach, ..self }
     }
 
-    /// The parts of a part that the narrow phase is asked about, cell by cell.
+    /// Clips a part by the cells of the field and visits each polygon.
     pub fn polygons(&self, field: &FieldBody, part: &Part, visit: &mut impl FnMut(&ClippedPolygon)) {
         let polygon = Polygon::new(part.points());
-        // Cells know the least distance outside only: 0 for those that hold a part of the solid.
+        // Bounds of cells are only known outside: a cell that contains a part of the solid has the
+        // bound 0.
         let reach = (self.reach + part.radius).max(0.0);
         match (field.field, part.points()) {
             (Field::Mesh(asset), &[point]) => middle::locate(asset, point, reach, visit),
@@ -77,7 +81,8 @@ impl Search {
         }
     }
 
-    /// The minima of a part, cell by cell, that are within reach; also tells every polygon.
+    /// Finds the minima of a part, cell by cell, that are within reach. `polygon` receives every
+    /// polygon, `found` every minimum.
     pub fn minima(
         &self,
         field: &FieldBody,

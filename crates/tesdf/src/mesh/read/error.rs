@@ -139,7 +139,7 @@ pub enum ReadError {
 }
 
 impl ReadError {
-    /// The message with the file's name before it, where the error does not name the file itself.
+    /// The message, with the name of the file in front unless the error already names it.
     pub fn in_file(&self, path: &Path) -> String {
         match self {
             Self::Open { .. } | Self::UnknownExtension { .. } => self.to_string(),

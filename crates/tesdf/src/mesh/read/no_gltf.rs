@@ -1,4 +1,4 @@
-//! glTF in a library without the feature `gltf`: an error that says so.
+//! Reading glTF in a library without the feature `gltf`: an error that names the feature.
 use std::path::{Path, PathBuf};
 
 use super::{MeshFormat, RawMesh, ReadError};
