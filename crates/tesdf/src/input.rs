@@ -42,7 +42,7 @@ pub(crate) fn read_rest(file: &mut File, bytes: &mut Vec<u8>) -> io::Result<()> 
     }
     file.take(MAX_STREAMED + 1).read_to_end(bytes)?;
     if bytes.len() as u64 > MAX_STREAMED {
-        let found = format!("it is no regular file, and more than {MAX_STREAMED} bytes came from it");
+        let found = format!("it is not a regular file, and more than {MAX_STREAMED} bytes came from it");
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, found));
     }
     Ok(())

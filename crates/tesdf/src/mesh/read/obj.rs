@@ -141,7 +141,7 @@ struct Skipped {
 impl Skipped {
     fn add(&mut self, keyword: &[u8], line: u64) -> Result<(), ReadError> {
         if !keyword.iter().all(u8::is_ascii_graphic) {
-            let found = format!("{} is no statement", shown(keyword));
+            let found = format!("{} is not a statement", shown(keyword));
             return Err(malformed(OBJ, line, found, "expected OBJ text: is the file of another kind?"));
         }
         if let Some((_, _, count)) = self.known.iter_mut().find(|(known, ..)| known == keyword) {
@@ -163,7 +163,7 @@ impl Skipped {
                     b"l" => "line elements",
                     b"p" => "point elements",
                     b"<<<<<<<" => "mark of an unfinished Git merge: two versions may be mixed",
-                    _ => "statements that are no vertex or face",
+                    _ => "statements other than vertices and faces",
                 };
                 format!("line {line}: {} ({what}) skipped; {count} in the file", shown(keyword))
             })

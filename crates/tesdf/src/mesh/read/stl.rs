@@ -37,9 +37,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
         }
     };
     let help = if has_solid {
-        "it begins with 'solid' but has zero bytes, so it is no ASCII STL either; is the file cut short?"
+        "it begins with 'solid' but has zero bytes, so it is not ASCII STL either; is the file cut short?"
     } else {
-        "it does not begin with 'solid', so it is no ASCII STL either; is the file cut short or of another kind?"
+        "it does not begin with 'solid', so it is not ASCII STL either; is the file cut short or of another kind?"
     };
     Err(ReadError::Malformed { format: MeshFormat::Stl, place: Place::Byte(80), found, help: help.into() })
 }
