@@ -1,4 +1,5 @@
-//! Rapier's own world with an encoded mesh in it: a cube falls onto a plane, and a ball onto the cube.
+//! An encoded mesh in Rapier's own world: a cube falls onto a plane, and a ball falls onto the
+//! cube.
 use std::error::Error;
 use std::sync::Arc;
 
@@ -13,9 +14,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let cube = TesdfShape::new(Arc::new(asset));
 
     let mut world = PhysicsWorld { gravity: Vector::new(0.0, 0.0, -9.81), ..PhysicsWorld::default() };
-    // The cube's corners and the ball's centre are all that can touch first here.
+    // Node mode suffices here: the corners of the cube and the centre of the ball touch first.
     world.narrow_phase.set_query_dispatcher(query_dispatcher(CollideOptions::with_mode(Mode::Node)));
-    // Steps of 2 ms, contacts up to 1 % of the cube.
+    // Steps of 2 ms, and contacts up to 1 % of the cube's height.
     world.integration_parameters =
         RapierOptions { length_unit: height, ..RapierOptions::default() }.parameters(2e-3, 0.01 * height);
 

@@ -1,6 +1,9 @@
-//! A frictionless M16 nut turns down its bolt in Rapier, with all contacts from the encoded meshes.
+//! A frictionless M16 nut turns down its bolt in Rapier, with contacts from the encoded meshes.
 //!
-//! `cargo run --release -p tesdf-rapier --example nut_on_bolt [NUT [SECONDS [STEP_MS [MODE [CONTACTS [DISTANCE_MM [BOLT]]]]]]]`
+//! ```text
+//! cargo run --release -p tesdf-rapier --example nut_on_bolt \
+//!     [NUT [SECONDS [STEP_MS [MODE [CONTACTS [DISTANCE_MM [BOLT]]]]]]]
+//! ```
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -38,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     system.add("bolt", Instance::new(bolt, Pose::at(DVec3::ZERO)), Mass::Fixed)?;
     let mass = MassProperties::of_shape(&Shape::Mesh(nut_asset.clone()), 1.0, STEEL)?;
     let shape = system.add_shape(nut_asset.clone())?;
-    // Four pitches up, so that the threads mesh without a turn.
+    // The nut starts four pitches up, where the threads mesh without a rotation.
     system.add("nut", Instance::new(shape, Pose::at(DVec3::new(0.0, 0.0, 8e-3))), Mass::Free(mass))?;
 
     let collide = CollideOptions { contact_distance, reduction, ..CollideOptions::with_mode(mode) };
@@ -96,7 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// A mesh of `data/procedural`, or a file.
+/// The encoded mesh `name` of `data/procedural`, or of a file.
 fn asset(name: &str) -> Result<Arc<TeSdf>, Box<dyn Error>> {
     let mut path = PathBuf::from(name);
     if path.extension().is_none() {
@@ -105,7 +108,7 @@ fn asset(name: &str) -> Result<Arc<TeSdf>, Box<dyn Error>> {
     Ok(Arc::new(Encoder::new().preset(Preset::Fast).encode_file(path)?))
 }
 
-/// How deep the vertices of one mesh are in another, m.
+/// The largest depth of a vertex of `a` in `b`, m.
 fn penetration(a: &TeSdf, b: &TeSdf, to_b: impl Fn(DVec3) -> DVec3) -> f64 {
     (0..a.face_count())
         .flat_map(|face| a.face_corners(face))

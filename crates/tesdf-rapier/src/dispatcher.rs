@@ -13,21 +13,25 @@ use crate::known::{self, Known};
 use crate::manifolds::{self, FIRST};
 use crate::record::Record;
 
-/// Finds the contacts of pairs of shapes with [`tesdf::collide::detect`], faces of each against the field of the other.
+/// Finds the contacts of pairs of shapes with [`tesdf::collide::detect`], in both directions: the
+/// faces of each shape against the distance field of the other.
 ///
-/// A pair has a [`TesdfShape`](crate::TesdfShape) and another one, or a half space, cuboid, ball or capsule. All else is
-/// `Unsupported`, which [`query_dispatcher`] leaves to parry: so are distances and sweeps, hence Rapier's continuous collision
-/// detection does nothing for these shapes. Contacts ahead of time take its place.
+/// It answers pairs of a [`TesdfShape`](crate::TesdfShape) with another `TesdfShape`, a half space,
+/// a cuboid, a ball or a capsule. All other pairs are `Unsupported`; [`query_dispatcher`] passes
+/// them to parry. Distances and sweeps are also `Unsupported`, and parry cannot compute them for
+/// these shapes either. Rapier's continuous collision detection therefore has no effect on them;
+/// speculative contacts take its place.
 #[derive(Clone, Debug)]
 pub struct TesdfDispatcher {
     options: CollideOptions,
     record: Option<Record>,
 }
 
-/// [`TesdfDispatcher`], and parry's own for pairs that it does not answer.
+/// A [`TesdfDispatcher`] that passes the pairs that it does not answer to parry's default
+/// dispatcher.
 ///
-/// Of `options` the contact distance and the speculative time are not used: how far ahead contacts are taken is Rapier's
-/// prediction distance. An option that makes no sense means that no contact is found.
+/// Rapier's prediction distance decides how far contacts reach, so the contact distance and the
+/// speculative time of `options` have no effect. If an option is out of range, no contact is found.
 pub fn query_dispatcher(
     options: CollideOptions,
 ) -> impl PersistentQueryDispatcher<ContactManifoldData, ContactData> + 'static {
@@ -35,24 +39,25 @@ pub fn query_dispatcher(
 }
 
 impl TesdfDispatcher {
-    /// See [`query_dispatcher`] for what is used of `options`.
+    /// A dispatcher with these options; [`query_dispatcher`] says which options have an effect.
     pub fn new(options: CollideOptions) -> Self {
         Self { options, record: None }
     }
 
-    /// A dispatcher that records what it finds. It answers pairs of simple shapes, too, so that the record is complete.
+    /// A dispatcher that records what it finds. It also answers pairs of simple shapes, so the
+    /// record has all contacts.
     pub(crate) fn recording(options: CollideOptions, record: Record) -> Self {
         Self { options, record: Some(record) }
     }
 
-    /// The shapes of a pair that this dispatcher answers.
+    /// The two shapes, if this dispatcher answers the pair.
     fn pair(&self, g1: &dyn Shape, g2: &dyn Shape) -> Result<[Known; 2], Unsupported> {
         let pair = [Known::new(g1).ok_or(Unsupported)?, Known::new(g2).ok_or(Unsupported)?];
         let answered = self.record.is_some() || pair.iter().any(Known::is_mesh);
         answered.then_some(pair).ok_or(Unsupported)
     }
 
-    /// Contacts up to a distance in the frame of the first shape, which is instance 0.
+    /// Contacts up to `distance`, in the frame of the first shape, which is instance 0.
     fn contacts(&self, pos12: &Pose, pair: [Known; 2], distance: f64) -> Result<Contacts, CollideError> {
         let mut scene = Scene::new();
         let placed = |known: &Known, pose| Placement { pose, scale: known.scale };
@@ -122,7 +127,7 @@ impl QueryDispatcher for TesdfDispatcher {
         Ok(ShapeIntersection::new(!(found.is_empty() && found.hidden.is_empty())))
     }
 
-    /// The deepest contact.
+    /// The contact of the smallest signed distance.
     fn contact(
         &self,
         pos12: &Pose,

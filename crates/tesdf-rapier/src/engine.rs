@@ -9,31 +9,37 @@ use crate::manifolds::FIRST;
 use crate::record::{Found, Record};
 use crate::world::{MayMeet, World};
 
-/// Contacts reach at least this much farther than a body at rest falls in a step.
+/// Contacts reach at least this factor times the distance that a body at rest falls in a step.
 const MARGIN: f64 = 1.2;
 
-/// Rapier as the engine of a system, with contacts of [`tesdf::collide`].
+/// Rapier as the physics engine of a system, with contacts of [`tesdf::collide`].
 ///
-/// Sleeping and continuous collision detection are off. In a report, a step converged whenever it was done, as Rapier has a number of
-/// iterations instead of a tolerance; all bodies are one island, and contacts are detected once.
+/// Sleeping and continuous collision detection are off. Rapier has a number of iterations instead
+/// of a tolerance, so a step always reports that it converged. It also reports one island and one
+/// detection.
 pub struct RapierEngine {
     system: System,
     collide: CollideOptions,
     options: RapierOptions,
     record: Record,
-    /// Made by the first step, and anew when the prediction distance changes: Rapier keeps boxes that were made with it.
+    /// Built by the first step, and again when the prediction distance changes, because Rapier
+    /// keeps bounding boxes that depend on it.
     world: Option<World>,
     contacts: Vec<Contact>,
     hidden: Vec<HiddenOverlap>,
 }
 
 impl RapierEngine {
-    /// An engine for `system`. Of `collide` everything is used but the speculative time. Contacts reach as far as the contact distance, what
-    /// a body at rest falls in a step, and what [`RapierOptions::speculative_distance`] says. Each contact is
-    /// a manifold, which costs Rapier some 5 µs in each step; see `docs/dynamics.md` for what a reduction to 64 per pair gives and takes.
+    /// An engine for `system`.
+    ///
+    /// All values of `collide` are used except the speculative time. Contacts reach as far as the
+    /// largest of the contact distance, the distance that a body at rest falls in a step, and
+    /// [`RapierOptions::speculative_distance`]. Each contact becomes a manifold, which costs Rapier
+    /// some 5 µs per step. `docs/dynamics.md` shows the effect of a reduction to 64 contacts per
+    /// pair.
     ///
     /// # Errors
-    /// An option that makes no sense.
+    /// An option of `options` or `collide` is out of range.
     pub fn new(
         system: System,
         collide: CollideOptions,
@@ -45,12 +51,13 @@ impl RapierEngine {
         Ok(Self { system, collide, options, record, world: None, contacts, hidden })
     }
 
-    /// Bodies and colliders as Rapier has them, in the order of the system's bodies; `None` before the first step.
+    /// Rapier's world with its bodies and colliders, in the order of the system's bodies. `None`
+    /// before the first step.
     pub fn rapier(&self) -> Option<&rapier3d_f64::pipeline::PhysicsWorld> {
         self.world.as_ref().map(|world| &world.rapier)
     }
 
-    /// The world as it is now, for steps of `h`.
+    /// The world in the current state, with parameters for steps of `h` seconds.
     fn world(&mut self, h: f64) -> Result<World, DynamicsError> {
         let fall = MARGIN * self.system.gravity.length() * h * h;
         let prediction = self.collide.contact_distance.max(fall);
@@ -60,13 +67,14 @@ impl RapierEngine {
         };
         world.rapier.gravity = self.system.gravity;
         let mut parameters = self.options.parameters(h, prediction);
-        // The dispatcher answers no sweeps.
+        // The dispatcher does not answer sweeps.
         parameters.max_ccd_substeps = 0;
         world.rapier.integration_parameters = parameters;
         Ok(world)
     }
 
-    /// The contacts of the last detection, in the world's frame at `self.system`'s states.
+    /// The contacts of the last detection, in the world frame, at the current states of
+    /// `self.system`.
     fn contacts_of(&self, world: &World, found: &Found) -> Vec<Contact> {
         let mut contacts = Vec::with_capacity(found.contacts.len());
         for pair in world.rapier.narrow_phase.contact_pairs() {
@@ -87,12 +95,12 @@ impl RapierEngine {
             let world = self.system.scene().instance(c.instance_a).map_or(0, |instance| instance.world);
             (world, c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b), c.instance_a)
         };
-        // Stable: a pair's contacts are in the detector's order.
+        // The sort is stable, so the contacts of a pair stay in the detector's order.
         contacts.sort_by_key(order);
         contacts
     }
 
-    /// Replaces all states, or none.
+    /// Replaces all states, or none on an error.
     fn set_states(&mut self, states: &[State]) -> Result<(), DynamicsError> {
         let before = self.system.states().to_vec();
         for (body, state) in states.iter().enumerate() {
@@ -136,7 +144,7 @@ impl Dynamics for RapierEngine {
             let expected = "a finite number of seconds, greater than 0";
             return Err(DynamicsError::Option { option: "time step", found: time_step, expected });
         }
-        // After an error there is no world, and the next step makes one of the system's states.
+        // After an error there is no world, and the next step builds one from the system's states.
         let mut world = self.world(time_step)?;
         *self.record.lock() = Found::default();
         world.rapier.step_with_events(&MayMeet(&self.system), &());
@@ -144,7 +152,7 @@ impl Dynamics for RapierEngine {
         if let Some(error) = found.error {
             return Err(error.into());
         }
-        // Rapier puts bodies aside whose state stops being finite.
+        // Rapier puts a body into quarantine when its state stops being finite.
         if let Some(&body) = world.rapier.quarantine().bodies().first() {
             let body =
                 world.rapier.bodies.get(body).and_then(|b| usize::try_from(b.user_data).ok()).unwrap_or(0);
@@ -156,7 +164,8 @@ impl Dynamics for RapierEngine {
             });
         }
         let contacts = self.contacts_of(&world, &found);
-        // Rapier asks pair by pair, and knows of contacts alone.
+        // Rapier detects pair by pair and only knows contacts, so hidden overlaps are searched
+        // here.
         let before = self.system.states().to_vec();
         let hidden = hidden_overlaps(self.system.scene_at(&before)?, &self.collide, &contacts)?;
         let states = world.states(self.system.states());

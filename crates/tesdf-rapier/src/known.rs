@@ -1,4 +1,4 @@
-//! From shapes of parry to those of the detector.
+//! Converts shapes of parry to shapes of the detector.
 use glam::{DQuat, DVec3};
 use rapier3d_f64::geometry::{Shape as ParryShape, TypedShape};
 use rapier3d_f64::math::Pose as ParryPose;
@@ -6,16 +6,18 @@ use tesdf::collide::{Pose, Shape};
 
 use crate::TesdfShape;
 
-/// A shape that the detector knows, in the frame of parry's.
+/// A shape of the detector, and its pose in the frame of parry's shape.
 pub struct Known {
     pub shape: Shape,
     pub scale: f64,
-    /// The detector's frame in parry's: its plane faces z, its capsule lies along z.
+    /// Pose of the detector's frame in parry's frame. A plane of the detector faces z, and a
+    /// capsule lies along z.
     pub pose: Pose,
 }
 
 impl Known {
-    /// Of an encoded mesh, half space, cuboid, ball or capsule.
+    /// Converts an encoded mesh, half space, cuboid, ball or capsule. Returns `None` for other
+    /// shapes.
     pub fn new(shape: &dyn ParryShape) -> Option<Self> {
         if let Some(mesh) = shape.as_shape::<TesdfShape>() {
             return Some(Self {
@@ -24,9 +26,9 @@ impl Known {
                 pose: Pose::at(DVec3::ZERO),
             });
         }
-        let turn = |axis: DVec3| DQuat::from_rotation_arc(DVec3::Z, axis);
+        let rotation_to = |axis: DVec3| DQuat::from_rotation_arc(DVec3::Z, axis);
         let (shape, translation, rotation) = match shape.as_typed_shape() {
-            TypedShape::HalfSpace(half_space) => (Shape::Plane, DVec3::ZERO, turn(half_space.normal)),
+            TypedShape::HalfSpace(half_space) => (Shape::Plane, DVec3::ZERO, rotation_to(half_space.normal)),
             TypedShape::Cuboid(cuboid) => {
                 (Shape::Box { half_extents: cuboid.half_extents }, DVec3::ZERO, DQuat::IDENTITY)
             }
@@ -38,7 +40,7 @@ impl Known {
                     0.0 => Shape::Sphere { radius },
                     half_height => Shape::Capsule { half_height, radius },
                 };
-                (shape, 0.5 * (segment.a + segment.b), turn(axis.normalize_or(DVec3::Z)))
+                (shape, 0.5 * (segment.a + segment.b), rotation_to(axis.normalize_or(DVec3::Z)))
             }
             _ => return None,
         };
@@ -50,12 +52,12 @@ impl Known {
     }
 }
 
-/// The same pose. Its rotation has drifted from unit length by rounding at most, which the scene normalises.
+/// Converts a pose. Rounding may have changed the length of its rotation; the scene normalises it.
 pub fn pose(pose: &ParryPose) -> Pose {
     Pose { translation: pose.translation, rotation: pose.rotation }
 }
 
-/// The same pose.
+/// Converts a pose to parry's type.
 pub fn parry_pose(pose: Pose) -> ParryPose {
     ParryPose::from_parts(pose.translation, pose.rotation)
 }

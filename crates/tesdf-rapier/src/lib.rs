@@ -3,16 +3,19 @@
 //!
 //! ```text
 //! TesdfShape ─┐
-//! Ball, …     ├─TesdfDispatcher: tesdf::collide::detect─▶ contacts ──one manifold each──▶ Rapier's solver
-//! HalfSpace ──┘                                              └── impulses of the last step, by feature id
+//! Ball, …     ├─TesdfDispatcher (tesdf::collide::detect)─▶ manifold per contact ─▶ Rapier's solver
+//! HalfSpace ──┘                          (with the impulses of the previous step)
 //! ```
 //!
-//! - [`TesdfShape`]: an encoded mesh as a shape; put it into a collider as `SharedShape::new(TesdfShape::new(asset))`.
-//! - [`TesdfDispatcher`]: finds the contacts of pairs with such a shape. [`query_dispatcher`] leaves all other pairs to Rapier.
-//! - [`RapierEngine`]: moves the bodies of a [`tesdf_sim::System`] with both.
+//! - [`TesdfShape`]: an encoded mesh as a shape. Use it in a collider as
+//!   `SharedShape::new(TesdfShape::new(asset))`.
+//! - [`TesdfDispatcher`]: finds the contacts of pairs with such a shape. [`query_dispatcher`]
+//!   passes all other pairs to parry.
+//! - [`RapierEngine`]: moves the bodies of a [`tesdf_sim::System`] with Rapier.
 //!
-//! Everything is in `f64` (`rapier3d-f64`), so that nothing is rounded on the way: in `f32` a position 1 m from the origin is off by up to
-//! 0.06 µm after every substep, and clearances are 25 µm. Lengths are in metres as long as the options' defaults are kept.
+//! Everything is in `f64` (`rapier3d-f64`), so no conversion rounds. In `f32` a position 1 m from
+//! the origin would be off by up to 0.06 µm after every substep, while clearances are 25 µm.
+//! Lengths are in metres with the default options.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -36,7 +39,7 @@
 //! for _ in 0..100 {
 //!     world.step();
 //! }
-//! assert!(world.bodies[body].translation().z.abs() < 1e-4); // it fell by a millimetre and lies on the plane
+//! assert!(world.bodies[body].translation().z.abs() < 1e-4); // it fell 1 mm and lies on the plane
 //! # Ok(())
 //! # }
 //! ```

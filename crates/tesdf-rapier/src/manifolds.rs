@@ -1,7 +1,7 @@
-//! From contacts to Rapier's manifolds, with the impulses of the step before.
+//! Converts contacts to Rapier's manifolds, with the impulses of the previous step.
 //!
-//! Rapier solves at most four points of a manifold and gives all of them one normal. Contacts of curved bodies have as many normals
-//! as points, so each gets a manifold of its own.
+//! Rapier solves at most four points per manifold and gives all of them one normal. Contacts of
+//! curved bodies have one normal per point, so each contact becomes a manifold of its own.
 use glam::DVec3;
 use rapier3d_f64::geometry::{ContactData, ContactManifold, TrackedContact};
 use rapier3d_f64::math::Pose;
@@ -9,16 +9,17 @@ use rapier3d_f64::parry::query::details::{ContactManifoldsWorkspace, TypedWorksp
 use rapier3d_f64::parry::shape::PackedFeatureId;
 use tesdf::collide::{Contact, FeatureB, FeatureId, InstanceId};
 
-/// The instance that stands for the first shape of a pair.
+/// The instance that represents the first shape of a pair.
 pub const FIRST: InstanceId = InstanceId(0);
 
-/// What a contact is recognised by: whose face it is, and the features.
+/// Identifies a contact between steps: the instance of the face, and the two features.
 type Key = (InstanceId, FeatureId);
 
-/// Keys of a pair's manifolds, in their order.
+/// The keys of a pair's manifolds, in the order of the manifolds.
 ///
-/// That it is there has a second use: Rapier trusts the numbers of a pair's manifolds from step to step unless the pair has a
-/// workspace. Without it, a manifold that goes panics the solver ("stale ContactRef manifold ordinal").
+/// Storing them as the pair's workspace has a second effect. Without a workspace, Rapier expects
+/// the manifolds of a pair to keep their numbers from step to step, and its solver panics when a
+/// manifold disappears ("stale ContactRef manifold ordinal").
 #[derive(Clone, Debug, Default)]
 struct Keys(Vec<Key>);
 
@@ -32,15 +33,18 @@ impl WorkspaceData for Keys {
     }
 }
 
-/// What a contact left behind.
+/// The solver data of a contact in the previous step.
 struct Previous {
     key: Key,
     point: DVec3,
     data: ContactData,
 }
 
-/// Replaces the manifolds of a pair by one per contact. A contact of the same features takes over the impulses; of several of the
-/// same features (a face that touches in several cells) the nearest one does. `contacts` are in the first shape's frame.
+/// Replaces the manifolds of a pair by one manifold per contact.
+///
+/// A contact takes over the impulses of a previous contact of the same features. When a face
+/// touches in several cells, there are several such contacts, and the nearest one is taken.
+/// `contacts` are in the frame of the first shape.
 pub fn replace(
     contacts: &[Contact],
     pos12: &Pose,
@@ -67,7 +71,7 @@ fn key(contact: &Contact) -> Key {
     (contact.instance_a, contact.feature)
 }
 
-/// Sorted by key; those without impulses are left out.
+/// The previous contacts with impulses, sorted by key.
 fn previous(manifolds: &[ContactManifold], workspace: Option<&ContactManifoldsWorkspace>) -> Vec<Previous> {
     let Some(Keys(keys)) = workspace.and_then(|w| w.0.downcast_ref()) else { return Vec::new() };
     let mut previous: Vec<Previous> = keys
@@ -79,12 +83,12 @@ fn previous(manifolds: &[ContactManifold], workspace: Option<&ContactManifoldsWo
             (!at_rest).then_some(Previous { key, point: point.local_p1, data: point.data })
         })
         .collect();
-    // Stable: those of one key stay in the detector's order.
+    // The sort is stable, so contacts of one key stay in the detector's order.
     previous.sort_by_key(|p| p.key);
     previous
 }
 
-/// The impulses of the nearest contact of the key, which no other contact gets.
+/// Removes the nearest previous contact of the key, and returns its data.
 fn take(previous: &mut Vec<Previous>, key: Key, point: DVec3) -> Option<ContactData> {
     let start = previous.partition_point(|p| p.key < key);
     let same = previous[start..].iter().take_while(|p| p.key == key).enumerate();
@@ -94,7 +98,8 @@ fn take(previous: &mut Vec<Previous>, key: Key, point: DVec3) -> Option<ContactD
 }
 
 fn tracked(contact: &Contact, pos12: &Pose) -> TrackedContact<ContactData> {
-    // For people only, as the keys recognise a contact; parry has 30 bits for a number, and one number for an edge.
+    // These ids are for users only, because the keys identify contacts. Parry has 30 bits for an
+    // id, and a single id for an edge.
     let number = |id: u32| id & (u32::MAX >> 2);
     let a = PackedFeatureId::face(number(contact.face_a));
     let b = match contact.feature.b {

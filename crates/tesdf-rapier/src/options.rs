@@ -1,21 +1,24 @@
 use rapier3d_f64::dynamics::{FrictionModel, IntegrationParameters, SpringCoefficients};
 use tesdf_sim::DynamicsError;
 
-/// How Rapier solves a step. Every field is used.
+/// Parameters of Rapier's solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RapierOptions {
-    /// Substeps of the solver in a step; 4 to 8 for close fits.
+    /// Number of solver substeps per step; 4 to 8 for close fits.
     pub substeps: usize,
-    /// Natural frequency of a contact, Hz. Rapier's own 30 and 60 Hz let a nut sink into its thread.
+    /// Natural frequency of a contact, Hz. With Rapier's defaults of 30 and 60 Hz a nut sinks into
+    /// its thread.
     pub contact_frequency: f64,
     /// Damping ratio of a contact.
     pub contact_damping: f64,
-    /// What Rapier calls the length unit: its tolerances are for parts of a size of 1 of it. The default is 1 cm.
+    /// Rapier's length unit, m: Rapier's tolerances are made for parts of about this size. The
+    /// default is 1 cm.
     pub length_unit: f64,
-    /// Rapier takes contacts ahead of time as far as the velocities of two bodies' centres close in a step, at most so far; 0 takes
-    /// none but those within the contact distance.
+    /// Maximum reach of speculative contacts, m. Up to this distance Rapier considers contacts that
+    /// the velocities of the two bodies' centres can close in a step. With 0 it considers only
+    /// contacts within the contact distance.
     pub speculative_distance: f64,
-    /// Coulomb's friction coefficient of all bodies.
+    /// Coulomb friction coefficient of all bodies.
     pub friction: f64,
 }
 
@@ -33,13 +36,17 @@ impl Default for RapierOptions {
 }
 
 impl RapierOptions {
-    /// Rapier's parameters for close fits, for a time step in s and contacts up to `contact_distance` in m.
+    /// Rapier's parameters for close fits. `time_step` is in s, and contacts reach up to
+    /// `contact_distance`, m.
     ///
-    /// What differs from Rapier's defaults, besides the fields of this type:
-    /// - Contacts are not clustered and not recycled: clusters give many contacts one normal, and what is recycled is not exact.
-    /// - The prediction distance is the contact distance; with the default of 20 mm all of a nut's thread is in contact.
-    /// - There is no greatest velocity. The default follows from the length unit, and would be 4 m/s.
-    /// - Friction is Coulomb's in each contact; the simplified one needs manifolds of several points.
+    /// These values differ from Rapier's defaults, in addition to the fields of this type:
+    /// - Contacts are not clustered, because a cluster gives many contacts one normal. They are not
+    ///   recycled, because recycled contacts are not exact.
+    /// - The prediction distance is the contact distance. With the default of 20 mm the whole
+    ///   thread of a nut would be in contact.
+    /// - The velocity has no maximum. The default follows from the length unit and would be 4 m/s.
+    /// - Friction follows Coulomb's law in each contact, because Rapier's simplified model needs
+    ///   manifolds of several points.
     pub fn parameters(&self, time_step: f64, contact_distance: f64) -> IntegrationParameters {
         let softness = SpringCoefficients::new(self.contact_frequency, self.contact_damping);
         IntegrationParameters {
@@ -57,10 +64,10 @@ impl RapierOptions {
         }
     }
 
-    /// Checks that every value makes sense.
+    /// Checks that every value is in its range.
     ///
     /// # Errors
-    /// Names the option.
+    /// [`DynamicsError::Option`] names the first option that is out of range.
     pub fn validate(&self) -> Result<(), DynamicsError> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let not_negative = |x: f64| x >= 0.0 && x.is_finite();

@@ -11,8 +11,9 @@ use tesdf_sim::MassProperties as SolidMass;
 
 /// An encoded mesh as a shape of parry and Rapier, with a uniform scale.
 ///
-/// A solid: points inside of it are found to be inside. A copy shares the asset. Its contacts come from
-/// [`TesdfDispatcher`](crate::TesdfDispatcher); parry's own dispatcher does not know it.
+/// The shape is a solid: its interior belongs to it. A clone shares the asset.
+/// [`TesdfDispatcher`](crate::TesdfDispatcher) finds its contacts; parry's own dispatcher does not
+/// know the shape.
 #[derive(Clone, Debug)]
 pub struct TesdfShape {
     asset: Arc<TeSdf>,
@@ -20,12 +21,13 @@ pub struct TesdfShape {
 }
 
 impl TesdfShape {
-    /// The mesh in its own unit.
+    /// The mesh, where one unit of the mesh is one world unit.
     pub fn new(asset: Arc<TeSdf>) -> Self {
         Self { asset, scale: 1.0 }
     }
 
-    /// The mesh with `scale` world units per unit of the mesh; `None` unless that is finite and positive.
+    /// The mesh, where one unit of the mesh is `scale` world units. Returns `None` unless `scale`
+    /// is finite and positive.
     pub fn scaled(asset: Arc<TeSdf>, scale: f64) -> Option<Self> {
         (scale > 0.0 && scale.is_finite()).then_some(Self { asset, scale })
     }
@@ -66,9 +68,9 @@ impl RayCast for TesdfShape {
         if solid && self.contains_local_point(ray.origin) {
             return Some(RayIntersection::new(0.0, DVec3::ZERO, FeatureId::Unknown));
         }
-        // The direction is scaled, too, so that t means the same.
+        // The direction is divided as well, so the parameter t stays the same.
         let hit = self.asset.ray_cast(ray.origin / self.scale, ray.dir / self.scale, limit)?;
-        // From inside the normal of parry's shapes points against the ray.
+        // As for parry's shapes, a ray from inside gets a normal that points against the ray.
         let normal = if hit.normal.dot(ray.dir) > 0.0 { -hit.normal } else { hit.normal };
         Some(RayIntersection::new(hit.t, normal, FeatureId::Face(hit.face)))
     }
@@ -89,14 +91,15 @@ impl Shape for TesdfShape {
         Box::new(self.clone())
     }
 
-    /// `None` for a scale that is not uniform and positive: distances are exact under no other.
+    /// Returns `None` unless the scale is uniform and positive: only then do distances stay exact.
     fn scale_dyn(&self, scale: DVec3, _: u32) -> Option<Box<dyn Shape>> {
         let uniform = scale == DVec3::splat(scale.x);
         let shape = Self::scaled(self.asset.clone(), self.scale * scale.x).filter(|_| uniform)?;
         Some(Box::new(shape))
     }
 
-    /// Of the solid; zero for a mesh that has no volume or a density that is not positive.
+    /// Mass properties of the solid; zero for a mesh without volume or a density that is not
+    /// positive.
     fn mass_properties(&self, density: f64) -> MassProperties {
         match SolidMass::of_shape(&self.asset.clone().into(), self.scale, density) {
             Ok(SolidMass { mass, center, inertia }) => {
@@ -114,7 +117,7 @@ impl Shape for TesdfShape {
         TypedShape::Custom(self)
     }
 
-    /// Zero, as for parry's meshes: how thin the thinnest wall is, is not known.
+    /// Zero, as for parry's meshes: the smallest wall thickness is not known.
     fn ccd_thickness(&self) -> f64 {
         0.0
     }

@@ -1,4 +1,4 @@
-//! A system's bodies in Rapier.
+//! The bodies of a system in Rapier.
 use glam::DVec3;
 use rapier3d_f64::dynamics::{RigidBody, RigidBodyBuilder, RigidBodyHandle};
 use rapier3d_f64::geometry::{
@@ -14,17 +14,17 @@ use crate::known::{parry_pose, pose};
 use crate::record::Record;
 use crate::{RapierOptions, TesdfDispatcher, TesdfShape};
 
-/// Bodies of a system, and the world that moves them.
+/// Rapier's world, and the handles of a system's bodies in it.
 pub struct World {
     pub rapier: PhysicsWorld,
-    /// Of each body.
+    /// The handle of each body, in the order of the system.
     handles: Vec<RigidBodyHandle>,
-    /// What the time step makes of the contact distance.
+    /// Prediction distance, m: the contact distance, or more when a body falls farther in a step.
     prediction: f64,
 }
 
 impl World {
-    /// All bodies where the system says, without impulses of a step before.
+    /// A world with all bodies in their current states, without impulses of a previous step.
     pub fn new(
         system: &System,
         collide: CollideOptions,
@@ -59,7 +59,7 @@ impl World {
         }
     }
 
-    /// Of each body, in order; a fixed body keeps its state of `before`.
+    /// The states of all bodies, in order. A fixed body keeps its state of `before`.
     pub fn states(&self, before: &[State]) -> Vec<State> {
         let state = |(handle, before): (&RigidBodyHandle, &State)| match self.rapier.bodies.get(*handle) {
             Some(body) if body.is_dynamic() => {
@@ -70,7 +70,7 @@ impl World {
         self.handles.iter().zip(before).map(state).collect()
     }
 
-    /// The body of a collider.
+    /// The number of the body that a collider belongs to.
     pub fn body_of(&self, collider: ColliderHandle) -> Option<usize> {
         let parent = self.rapier.colliders.get(collider)?.parent()?;
         number(self.rapier.bodies.get(parent)?)
@@ -99,7 +99,7 @@ fn rigid_body(number: usize, body: &Body, state: &State, options: &RapierOptions
 }
 
 fn collider(shape: SharedShape, options: &RapierOptions) -> Collider {
-    // The mass is the body's.
+    // The body has the mass, so the collider has none.
     ColliderBuilder::new(shape)
         .density(0.0)
         .friction(options.friction)
@@ -113,7 +113,7 @@ fn shape(shape: &Shape, instance: &Instance) -> SharedShape {
     match *shape {
         Shape::Mesh(ref asset) => match TesdfShape::scaled(asset.clone(), scale) {
             Some(shape) => SharedShape::new(shape),
-            // The scene has checked the scale.
+            // The scene has already checked the scale.
             None => SharedShape::new(TesdfShape::new(asset.clone())),
         },
         Shape::Plane => SharedShape::new(HalfSpace::new(DVec3::Z)),
@@ -126,7 +126,7 @@ fn shape(shape: &Shape, instance: &Instance) -> SharedShape {
     }
 }
 
-/// Worlds, groups and excluded pairs of the system's scene.
+/// Applies the worlds, groups and excluded pairs of the system's scene.
 pub struct MayMeet<'a>(pub &'a System);
 
 impl PhysicsHooks for MayMeet<'_> {

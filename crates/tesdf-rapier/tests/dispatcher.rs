@@ -1,4 +1,4 @@
-//! The dispatcher and the shape, as Rapier calls them.
+//! Tests of the dispatcher and the shape through Rapier's traits.
 mod support;
 
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use tesdf_rapier::rapier3d_f64::parry::query::{
 use tesdf_rapier::rapier3d_f64::prelude::*;
 use tesdf_rapier::{TesdfDispatcher, TesdfShape, query_dispatcher};
 
-/// Half of the cube's edges.
+/// Half of the cube's edge length, m.
 const HALF: f64 = 0.01;
 
 fn shape() -> TesdfShape {
@@ -24,7 +24,7 @@ fn dispatcher() -> TesdfDispatcher {
     TesdfDispatcher::new(CollideOptions::with_mode(Mode::Node))
 }
 
-/// Impulses by corner of the cube, which is the second shape.
+/// Impulse of each contact, by corner of the cube. The cube is the second shape.
 fn impulses(manifolds: &[ContactManifold]) -> BTreeMap<[bool; 3], f64> {
     let of = |m: &ContactManifold| {
         assert_eq!(m.points.len(), 1);
@@ -43,7 +43,7 @@ fn impulses_stay_with_their_features() {
         assert!(done.is_ok());
     };
     let flat = Pose::from_parts(Vector::new(0.0, 0.0, HALF), Rotation::IDENTITY);
-    // About the y axis: the corners of +x are low, those of -x 2 mm higher.
+    // A rotation about the y axis: the corners of +x are low, and those of -x are 2 mm higher.
     let turn = Rotation::from_rotation_y(0.1);
     let low = (turn * DVec3::new(HALF, 0.0, -HALF)).z;
     let tilted = Pose::from_parts(Vector::new(0.0, 0.0, -low), turn);
@@ -93,7 +93,7 @@ fn contacts_of_a_pair_do_not_depend_on_its_order() {
     assert_eq!(forward.len(), backward.len());
     for manifold in &forward {
         let point = &manifold.points[0];
-        // Rapier's convention: the second point lies `dist` along the normal of the first shape.
+        // Rapier's convention: the second point lies at `dist` along the normal of the first shape.
         let across = pose * point.local_p2 - point.local_p1;
         assert!((across.dot(manifold.local_n1) - point.dist).abs() < 1e-9, "{point:?}");
         assert!((pose.rotation * manifold.local_n2 + manifold.local_n1).length() < 1e-12);
@@ -119,7 +119,7 @@ fn contacts_of_a_pair_do_not_depend_on_its_order() {
 #[test]
 fn simple_shapes_touch_meshes_where_they_are() {
     let (dispatcher, cube) = (dispatcher(), shape());
-    // Each lies 50 µm above the cube's top.
+    // Each shape lies 50 µm above the top of the cube.
     let gap = 5e-5;
     let capsule = Capsule::new(Vector::new(0.0, 0.002, 0.0), Vector::new(0.004, 0.002, 0.0), 0.003);
     let half_space = HalfSpace::new(Vector::X);
@@ -127,7 +127,7 @@ fn simple_shapes_touch_meshes_where_they_are() {
         (&Ball::new(0.004), Pose::from_translation(Vector::Z * (HALF + 0.004 + gap))),
         (&Cuboid::new(Vector::splat(0.002)), Pose::from_translation(Vector::Z * (HALF + 0.002 + gap))),
         (&capsule, Pose::from_translation(Vector::Z * (HALF + 0.003 + gap))),
-        // Its outward normal turned down onto the cube.
+        // The outward normal points down to the cube.
         (
             &half_space,
             Pose::from_parts(

@@ -1,4 +1,4 @@
-//! Bodies in Rapier with contacts of encoded meshes.
+//! Tests of bodies in Rapier with contacts of encoded meshes.
 mod support;
 
 use std::sync::Arc;
@@ -25,7 +25,7 @@ fn add(system: &mut System, name: &str, shape: Shape, pose: Pose, mass: Mass) ->
     system.add(name, Instance::new(shape, pose), mass).expect("a pose")
 }
 
-/// A cube of 2 cm, as a mesh or as a box, above a plane that is tilted with all of the scene.
+/// A cube of 2 cm, as a mesh or as a box, above a plane. `turn` rotates the whole scene.
 fn over_plane(shape: Shape, turn: DQuat) -> System {
     let mut system = System::new(turn * GRAVITY);
     add(&mut system, "plane", Shape::Plane, Pose { translation: DVec3::X, rotation: turn }, Mass::Fixed);
@@ -50,14 +50,14 @@ fn a_cube_comes_to_rest_on_a_plane() {
         assert!(state.linear.length() < 1e-3 && state.angular.length() < 1e-1, "{state:?}");
         assert!(!engine.contacts().is_empty());
         assert!(engine.contacts().iter().all(|c| (c.normal.dot(turn * DVec3::Z).abs() - 1.0).abs() < 1e-6));
-        // What the manifolds hold carries it.
+        // The impulses of the manifolds carry the weight.
         let impulse = impulses(&engine).iter().sum::<f64>();
         let share = impulse / (weight * 1e-3);
         assert!((share - 1.0).abs() < 0.05, "{share} of the weight");
     }
 }
 
-/// Of each contact in the last step, N s.
+/// Impulse of each contact in the last step, N s.
 fn impulses(engine: &RapierEngine) -> Vec<f64> {
     let world = engine.rapier().expect("it made a step");
     world
@@ -113,7 +113,7 @@ fn groups_worlds_and_exclusions_are_heeded() {
     let mut system = System::new(GRAVITY);
     let plane = add(&mut system, "plane", Shape::Plane, Pose::at(DVec3::ZERO), Mass::Fixed);
     let shape = system.add_shape(ball).expect("a shape");
-    // Beside each other, as they meet each other, too.
+    // The balls lie side by side, because they also meet each other.
     let at = |x: f64| Instance::new(shape, Pose::at(DVec3::new(x, 0.0, 0.01)));
     let lies = system.add("lies", at(0.0), mass).expect("a pose");
     let other_world = system.add("other world", Instance { world: 1, ..at(0.1) }, mass).expect("a pose");
@@ -128,7 +128,7 @@ fn groups_worlds_and_exclusions_are_heeded() {
     }
     let height = |body: usize| engine.system().states()[body].pose.translation.z;
     assert!((height(lies) - 0.01).abs() < 1e-5, "{}", height(lies));
-    // The plane is in all groups and meets all, hence the own group, too.
+    // The plane is in all groups and meets all groups, so it also meets this one.
     assert!((height(meets_own_group) - 0.01).abs() < 1e-5, "{}", height(meets_own_group));
     for body in [other_world, excluded] {
         assert!(height(body) < 0.0, "{} is at {}", engine.system().bodies()[body].name, height(body));
@@ -168,7 +168,7 @@ fn a_state_set_between_steps_is_the_next_steps_beginning() {
         engine.step(1e-3).expect("a step");
     }
     assert!(!engine.contacts().is_empty());
-    // Up, and back again: contacts go and come, down to none.
+    // The body goes up and comes back, so contacts disappear and appear again.
     for height in [0.05, 0.0101, 0.5, 0.01] {
         let pose = Pose::at(DVec3::new(1.0, 0.0, height));
         engine.set_state(1, State::at_rest(pose)).expect("a state");
@@ -178,7 +178,7 @@ fn a_state_set_between_steps_is_the_next_steps_beginning() {
         let least = engine.contacts().iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
         assert!(!near || (least - (height - 0.01)).abs() < 1e-9, "{least} at {height}");
     }
-    // Another time step: another prediction distance.
+    // Another time step changes the prediction distance.
     engine.step(5e-3).expect("a step");
     assert!(!engine.contacts().is_empty());
 }
@@ -202,7 +202,7 @@ fn the_same_steps_give_the_same_bits() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn values_out_of_range_are_refused() {
     let system = || over_plane(Shape::Box { half_extents: DVec3::splat(0.01) }, DQuat::IDENTITY);
     let options = RapierOptions { substeps: 0, ..RapierOptions::default() };
     let refused = RapierEngine::new(system(), collide(Mode::Node), options).err();
@@ -219,7 +219,8 @@ fn what_makes_no_sense_is_refused() {
     state.linear.x = f64::NAN;
     assert!(matches!(engine.set_state(1, state), Err(DynamicsError::NotFinite { body: 1, .. })));
     assert!(matches!(engine.set_state(2, before[1]), Err(DynamicsError::NoBody { .. })));
-    // So fast that a step overflows; then the states stay, and the engine goes on.
+    // The body is so fast that the step overflows. The states must not change, and the next step
+    // must work.
     state.linear = DVec3::splat(f64::MAX);
     engine.set_state(1, state).expect("finite");
     let fast = engine.system().states().to_vec();

@@ -1,5 +1,5 @@
 //! Meshes for the tests.
-// Each test file uses its part.
+// Each test file uses only some of these functions.
 #![allow(dead_code)]
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use tesdf::encode::{Encoder, Preset};
 use tesdf::mesh::{LoadedMesh, MeshFormat, SolidMesh, read, read_bytes};
 use tesdf_sim::MassProperties;
 
-/// A cube of `half` its edges, centred on the origin.
+/// A cube whose edges have the length 2 · `half`, centred on the origin.
 pub fn cube(half: f64) -> TeSdf {
     let mut obj = String::new();
     for corner in 0..8 {
@@ -22,7 +22,7 @@ pub fn cube(half: f64) -> TeSdf {
     encoded(read_bytes(obj.as_bytes(), MeshFormat::Obj).expect("an OBJ"))
 }
 
-/// A mesh of `data/procedural`.
+/// The encoded mesh `name` of `data/procedural`.
 pub fn data(name: &str) -> TeSdf {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../data/procedural/{name}.obj"));
     encoded(read(&path).expect("a mesh"))
@@ -33,7 +33,7 @@ fn encoded(loaded: LoadedMesh) -> TeSdf {
     Encoder::new().preset(Preset::Fast).encode(&solid).expect("encoded")
 }
 
-/// Of steel.
+/// Mass properties of a shape of steel.
 pub fn steel(shape: &Shape) -> MassProperties {
     MassProperties::of_shape(shape, 1.0, 7850.0).expect("a volume")
 }
