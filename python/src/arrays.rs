@@ -1,4 +1,4 @@
-//! Between numpy's arrays and the library's slices, without copies where that can be.
+//! Converts between numpy arrays and the library's slices, without a copy where possible.
 use bytemuck::Pod;
 use numpy::ndarray::ArrayView;
 use numpy::{
@@ -11,14 +11,14 @@ use tesdf::glam::DVec3;
 
 use crate::errors::argument;
 
-/// Rows of three `f64`: an array as it is, if it is contiguous and aligned, otherwise a copy.
+/// Rows of three `f64`. A contiguous and aligned array is used in place, other arrays are copied.
 pub struct Rows<'py>(PyReadonlyArray2<'py, f64>);
 
 impl<'py> Rows<'py> {
-    /// Of shape `[N, 3]`; anything that numpy makes an array of `float64` of.
+    /// Converts any object that numpy can convert to a `float64` array of shape `[N, 3]`.
     ///
     /// # Errors
-    /// `ValueError` names the argument and the shape found.
+    /// `ValueError` names the argument and the shape that was found.
     pub fn new(name: &str, any: &Bound<'py, PyAny>) -> PyResult<Self> {
         let py = any.py();
         static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
@@ -33,16 +33,16 @@ impl<'py> Rows<'py> {
         }
     }
 
-    /// The rows.
+    /// The rows as a slice.
     pub fn as_slice(&self) -> PyResult<&[DVec3]> {
         Ok(bytemuck::cast_slice(self.0.as_slice()?))
     }
 }
 
-/// Whole numbers of any type, in an array whose shape `fits`.
+/// Converts an array of integers of any type, whose shape must satisfy `fits`.
 ///
 /// # Errors
-/// `ValueError` names the argument and what was found.
+/// `ValueError` names the argument, and what was found and expected.
 pub fn integers<'py>(
     name: &str,
     any: &Bound<'py, PyAny>,
@@ -61,7 +61,7 @@ pub fn integers<'py>(
     array.call_method1("astype", (numpy::dtype::<i64>(py), "C"))?.extract()
 }
 
-/// Ids of vertices or the like, of shape `[N]`.
+/// Converts an array of ids of shape `[N]`.
 ///
 /// # Errors
 /// `ValueError` names the argument and what was found.
@@ -74,27 +74,29 @@ pub fn ids(name: &str, any: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
     numbers.as_slice()?.iter().map(id).collect()
 }
 
-/// A row for each of `vectors`, as an array of shape `[N, 3]`.
+/// An array of shape `[N, 3]` with one row per vector.
 pub fn of_rows<'py>(py: Python<'py>, vectors: &[DVec3]) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_slice(py, bytemuck::cast_slice(vectors)).reshape([vectors.len(), 3])
 }
 
-/// A row for each of `faces`, as an array of shape `[F, 3]`.
+/// An array of shape `[F, 3]` with one row per face.
 pub fn of_faces<'py>(py: Python<'py>, faces: &[[u32; 3]]) -> PyResult<Bound<'py, PyArray2<u32>>> {
     faces.as_flattened().to_vec().into_pyarray(py).reshape([faces.len(), 3])
 }
 
-/// A read-only array of shape `[N]`, or `[N, columns]` for more than one, over memory that `owner` holds; it keeps `owner` alive.
+/// A read-only array of shape `[N]`, or `[N, columns]` if `columns` is not 1, over memory of
+/// `owner`. The array keeps `owner` alive.
 ///
 /// # Safety
-/// `numbers` must stay where it is, unchanged, as long as `owner` lives.
+/// `numbers` must neither move nor change while `owner` lives.
 pub unsafe fn view<'py, T: Element + Pod>(
     owner: &Bound<'py, PyAny>,
     numbers: &[T],
     columns: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
     let flat = ArrayView::from(numbers);
-    // SAFETY: by the caller's word the memory lives as long as the owner, which becomes the array's base.
+    // SAFETY: the caller guarantees that the memory lives as long as the owner, which becomes the
+    // array's base.
     let array = unsafe { PyArray1::borrow_from_array(&flat, owner.clone()) };
     let array = array.try_readwrite()?.make_nonwriteable();
     match columns {

@@ -20,14 +20,15 @@ use crate::errors::{Error, argument};
 use crate::interrupt::cancellable;
 use crate::{classes, pool};
 
-/// Points between two looks at Python's signals: under a second of work.
+/// Number of points between two checks for Python's signals: less than a second of work.
 const CHUNK: usize = 1 << 19;
 
-/// An encoded mesh: exact signed distances, closest points and gradients. Made by encode, or opened from a file; immutable: what
-/// moves its vertices gives another asset.
+/// An encoded mesh with exact signed distances, closest points and gradients. encode makes it, open
+/// reads it from a file. It is immutable: methods that move its vertices return another asset.
 ///
-/// All lengths are in the mesh's unit. Points are arrays [N, 3]; float64, contiguous ones are read in place. Queries run
-/// on all cores (RAYON_NUM_THREADS says on how many) with the interpreter's lock free.
+/// All lengths are in the mesh's unit. Points are arrays [N, 3]; contiguous float64 arrays are read
+/// in place. Queries run on all cores (RAYON_NUM_THREADS sets the number of threads) and release
+/// the interpreter's lock.
 #[pyclass(frozen, module = "tesdf")]
 pub struct Asset {
     inner: TeSdf,
@@ -38,7 +39,8 @@ impl Asset {
         Self { inner }
     }
 
-    /// Calls `fill` for runs of rows, with the lock free, and lets Python handle signals between them.
+    /// Calls `fill` for chunks of rows without the interpreter's lock. Python handles signals
+    /// between the chunks.
     fn in_chunks(
         py: Python<'_>,
         rows: usize,
@@ -102,44 +104,47 @@ fn named(precision: &str) -> PyResult<Precision> {
 
 #[pymethods]
 impl Asset {
-    /// Maps the file and checks all that a query relies on; verify also reads every byte.
+    /// Maps the file and checks the structure that queries rely on. verify also reads every byte.
     ///
-    /// The file must not be changed in place while the asset lives; replacing it, as save does, is safe.
-    /// Raises OSError when it cannot be read, AssetError when it is not an asset.
+    /// The file must not be changed in place while the asset exists; replacing it, as save does, is
+    /// safe. Raises OSError if the file cannot be read, and AssetError if it is not an asset.
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let opened = py.detach(|| TeSdf::open(&path));
         opened.map(Self::new).map_err(|e| Error::Asset(Some(path), e).raise(py))
     }
 
-    /// As open, from the bytes of a file.
+    /// As open, but from the bytes of a file.
     #[staticmethod]
     fn from_bytes(py: Python<'_>, data: &[u8]) -> PyResult<Self> {
         TeSdf::from_bytes(data).map(Self::new).map_err(|e| Error::Asset(None, e).raise(py))
     }
 
-    /// The whole file. One of a moved mesh does not say which lists are stale; make them anew before.
+    /// The bytes of the whole file. After move_vertices, call reencode_stale first: the file does
+    /// not record which lists are stale.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = self.inner.to_bytes().map_err(|e| Error::Asset(None, e).raise(py))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Writes the file, that of to_bytes; a file that is there is replaced in one step, and keeps its permissions. A read-only
-    /// file raises PermissionError.
+    /// Writes the file with the bytes of to_bytes. An existing file is replaced in one step and
+    /// keeps its permissions. A read-only file raises PermissionError.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| self.inner.save(&path)).map_err(|e| Error::Asset(Some(path), e).raise(py))
     }
 
-    /// Signed distance, gradient, closest point and face for each of points [N, 3].
+    /// Signed distance, gradient, closest point and face for each of the points [N, 3].
     ///
-    /// precision: "f64" reads the mesh as given and decides signs by exact predicates; "f32" is several times quicker and
-    /// right to 1e-6 of the diagonal. A point that is not finite gets NaN and NO_FACE.
+    /// With precision "f64" the mesh is used as given, and exact predicates decide the signs. "f32"
+    /// is several times faster and exact to 1e-6 of the diagonal. A point that is not finite gets
+    /// NaN and NO_FACE.
     #[pyo3(signature = (points, precision = "f64"))]
     fn query<'py>(&self, points: &Bound<'py, PyAny>, precision: &str) -> PyResult<Bound<'py, PyAny>> {
         self.answers(points, precision, Extent::Everywhere)
     }
 
-    /// As query, but NaN and NO_FACE outside of the encoded domain: more than the band from the solid, give or take a cell.
+    /// As query, but with NaN and NO_FACE for points outside of the encoded domain. The domain ends at
+    /// the width of the band from the solid, up to about the size of a cell.
     #[pyo3(signature = (points, precision = "f64"))]
     fn query_in_domain<'py>(
         &self,
@@ -149,7 +154,7 @@ impl Asset {
         self.answers(points, precision, Extent::Domain)
     }
 
-    /// Signed distances [N] alone, negative inside.
+    /// Only the signed distances [N], negative inside.
     #[pyo3(signature = (points, precision = "f64"))]
     fn signed_distance<'py>(
         &self,
@@ -171,7 +176,8 @@ impl Asset {
         Ok(found)
     }
 
-    /// Whether each of points [N, 3] is inside, by exact predicates; points on the surface may go either way.
+    /// Whether each of the points [N, 3] is inside, by exact predicates. Points on the surface may
+    /// count as inside or outside.
     fn is_inside<'py>(
         &self,
         py: Python<'py>,
@@ -194,8 +200,9 @@ impl Asset {
 
     /// The first face that each ray meets, from either side: RayHits(t, point, face, normal).
     ///
-    /// origins, directions: [N, 3], or [3] for one that all rays share. t counts lengths of the direction, up to limit.
-    /// A ray that meets nothing has t = inf, NaN and NO_FACE.
+    /// origins and directions have the shape [N, 3], or [3] for a value that all rays share. t is
+    /// in lengths of the direction and at most limit. A ray that meets no face has t = inf, NaN and
+    /// NO_FACE.
     #[pyo3(signature = (origins, directions, limit = f64::INFINITY))]
     fn ray_cast<'py>(
         &self,
@@ -229,13 +236,15 @@ impl Asset {
         ))
     }
 
-    /// The asset with vertices [N] at positions [N, 3], in a conforming domain: Moved(asset, faces, tetrahedra, inverted).
+    /// The asset with the vertices [N] moved to the positions [N, 3]: Moved(asset, faces,
+    /// tetrahedra, inverted). Needs a conforming domain.
     ///
-    /// Ids from 0 are of the mesh's vertices, in their order; those of the domain's own (sections["domain.vertices"]) follow. Tetrahedra
-    /// and lists stay: distances are those to the listed faces where they are now, and nothing of them is proved until
-    /// reencode_stale. This asset stays as it is.
+    /// The first ids are the mesh's vertices in their order; those of the domain's own vertices
+    /// (sections["domain.vertices"]) follow. Tetrahedra and lists stay the same. Distances are then
+    /// distances to the listed faces in their new positions, and nothing is proved about them until
+    /// reencode_stale. This asset does not change.
     ///
-    /// Raises DeformError in the bisection domain, and for ids and positions that cannot be.
+    /// Raises DeformError in the bisection domain, and for ids and positions that are not valid.
     fn move_vertices<'py>(
         &self,
         vertices: &Bound<'py, PyAny>,
@@ -259,15 +268,16 @@ impl Asset {
         classes::moved(py)?.call1((Self::new(asset), moved.faces, moved.tetrahedra, inverted))
     }
 
-    /// The cells whose lists may not hold where the vertices are now: their words in sections["domain.nodes"], ascending.
+    /// The stale cells: cells whose lists may be wrong for the current positions of the vertices.
+    /// Returns their words in sections["domain.nodes"], ascending.
     fn stale_cells<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u32>>> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         let found = py.detach(|| pool.install(|| self.inner.stale_cells()));
         Ok(PyArray1::from_vec(py, found.map_err(|e| Error::Encode(None, e).raise(py))?))
     }
 
-    /// The asset with the lists of stale cells made anew, as it was encoded: Reencoded(asset, cells, checked, stale). What is proved
-    /// holds then for the mesh as it is.
+    /// The asset with new lists in its stale cells, by the encoder and options of the asset:
+    /// Reencoded(asset, cells, checked, stale). The certificate then holds for the current mesh.
     fn reencode_stale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         let reencoded = py.detach(|| {
@@ -279,18 +289,18 @@ impl Asset {
         classes::reencoded(py)?.call1((Self::new(asset), found.cells, found.checked, stale))
     }
 
-    /// What the asset costs and what a query reads: counts, list lengths, reads, bytes by section; of a conforming domain the classes
-    /// of its vertices and tetrahedra, too.
+    /// Size and query cost of the asset: counts, list lengths, reads per query, bytes by section,
+    /// and for a conforming domain the classes of its vertices and tetrahedra.
     fn inspect<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         let found = py.detach(|| pool.install(|| inspect(&self.inner, &InspectOptions::default())));
         classes::report(py, "Inspection", &found)
     }
 
-    /// Reads every byte and compares it with the checksums, then answers at samples points with brute force over all faces;
-    /// Ctrl-C ends it with KeyboardInterrupt.
+    /// Compares every byte with the checksums, then the answers at `samples` points with brute
+    /// force over all faces. Ctrl-C ends it with KeyboardInterrupt.
     ///
-    /// Raises AssetError when the file was damaged. Wrong answers are in the report.
+    /// Raises AssetError if the file is damaged. Wrong answers are in the report.
     #[pyo3(signature = (samples = 10_000))]
     fn verify<'py>(&self, py: Python<'py>, samples: u32) -> PyResult<Bound<'py, PyAny>> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
@@ -315,7 +325,7 @@ impl Asset {
         classes::report(py, "Certificate", &self.inner.about().certificate())
     }
 
-    /// Counts taken while encoding.
+    /// Counts from the encoding.
     #[getter]
     fn statistics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         classes::report(py, "Statistics", &self.inner.about().statistics)
@@ -327,45 +337,49 @@ impl Asset {
         classes::report(py, "Source", &self.inner.about().source)
     }
 
-    /// Name of the mesh's unit, if one was given.
+    /// Name of the mesh's unit, or None.
     #[getter]
     fn unit(&self) -> Option<&str> {
         self.inner.about().options.unit.as_deref()
     }
 
-    /// Bounds of the mesh [2, 3]: least and greatest corner.
+    /// Bounding box of the mesh [2, 3]: the lowest and the highest corner.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let bounds = self.inner.bounds();
         arrays::of_rows(py, &[bounds.min, bounds.max])
     }
 
-    /// Positions [V, 3] in the source's order: a read-only view.
+    /// Positions [V, 3] of the vertices in the source's order: a read-only view.
     #[getter]
     fn vertices<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::section(slf, layout::VERTICES.name)
     }
 
-    /// Corners [F, 3] of the faces, uint32, in the order of the file: a read-only view. Row i is face face_ids[i].
+    /// Vertices [F, 3] of the faces, uint32, in the order of the file: a read-only view. Row i is
+    /// the face face_ids[i].
     #[getter]
     fn faces<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::section(slf, layout::FACES.name)
     }
 
-    /// Id [F] in the source mesh of each row of faces, uint32: a read-only view. Answers name faces by these.
+    /// Id [F] of each row of faces in the source mesh, uint32: a read-only view. Answers use these
+    /// ids.
     #[getter]
     fn face_ids<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         Self::section(slf, layout::FACE_IDS.name)
     }
 
-    /// All arrays of the file by name, as read-only views without a copy; each keeps the asset alive.
+    /// All arrays of the file by name, as read-only views without a copy. Each view keeps the asset
+    /// alive.
     #[getter]
     fn sections<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
         let found = PyDict::new(slf.py());
         for section in slf.get().inner.sections() {
             let (owner, columns) = (slf.as_any(), section.spec.columns);
             let bytes = section.bytes;
-            // SAFETY: an asset never changes, its bytes (a mapping or a heap block) do not move, and it is the owner.
+            // SAFETY: an asset never changes, its bytes (a mapping or a heap block) do not move,
+            // and the asset is the owner.
             let array = unsafe {
                 match section.spec.element {
                     Element::U8 => arrays::view::<u8>(owner, bytes, columns),
@@ -390,7 +404,7 @@ impl Asset {
         )
     }
 
-    /// Assets can be pickled: as the bytes of the file.
+    /// Supports pickling through the bytes of the file.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
         Ok((slf.getattr("from_bytes")?, (slf.get().to_bytes(slf.py())?,)))
     }

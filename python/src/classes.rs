@@ -1,4 +1,4 @@
-//! Classes of the package that are written in Python, and their objects made of what the library found.
+//! Makes objects of the package's Python classes from results of the library.
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -36,7 +36,7 @@ pub fn repaired(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
     CLASS.import(py, "tesdf.results", "Repaired")
 }
 
-/// An object of class `name` of `tesdf.reports`, whose fields are those of `found`.
+/// An object of class `name` of `tesdf.reports` with the fields of `found`.
 pub fn report<'py>(py: Python<'py>, name: &str, found: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     static FROM_JSON: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let text = serde_json::to_string(found)
@@ -54,7 +54,7 @@ pub struct Checked<'a> {
 }
 
 impl<'a> Checked<'a> {
-    /// With what reading the file had to say.
+    /// The fields, with the notes from reading the file.
     pub fn of(report: &'a CheckReport, notes: &'a [String]) -> Self {
         Self { report, notes, text: report.to_string() }
     }

@@ -15,30 +15,39 @@ use crate::interrupt::cancellable;
 use crate::mesh::MeshInput;
 use crate::pool;
 
-/// Encodes a closed mesh; Ctrl-C ends it with KeyboardInterrupt.
+/// Encodes a closed mesh. Ctrl-C ends it with KeyboardInterrupt.
 ///
-/// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an object that has both.
-/// preset: "default" (few faces per query), "fast" (quickest to encode) or "compact" (smallest), all exact; "paper" (the paper's
-/// encoder: sampled, 129 samples along an edge, plain) or "sampled-safe" (sampled so that nothing is missing).
-/// domain: how space is cut into tetrahedra. None or "bisection" needs nothing else; "gmsh" runs Gmsh (the program of that name, or what
-/// the environment variable TESDF_GMSH names); a path (.msh, .node, .ele, .vtu) has tetrahedra whose sides are the mesh's faces.
-/// encoder: how the closest faces of each are found, "certified" (proven) or "sampled" (as in the paper: faces that are closest
-/// only between samples may be missing); None is that of the preset.
-/// resolution: samples along an edge of a tetrahedron, less one; None is 32, or that of the preset.
-/// threshold: how much farther than the closest face a listed one may be at a sample, in the mesh's unit; "safe" is so much that
-/// nothing is missing.
-/// e_max: lists are cut to this many faces, those that are needed nearest to the surface.
-/// deformable: makes lists ready for moving vertices; needs a conforming domain ("gmsh" or a path).
-/// plain: leaves the tetrahedra of a conforming domain as they are, instead of bisecting them where that pays.
-/// band: width of the layer around the solid that is encoded too, in the mesh's unit; None is 5 % of the diagonal, with "gmsh" none.
-/// regions: boxes [R, 6] that are encoded too, each min x y z, max x y z.
-/// unit: name of the mesh's unit, recorded in the asset; nothing is scaled.
-/// threads: None is one per core; the asset is the same, byte by byte, for every number.
-/// progress: called with the stage ("refine", "tighten", "assemble") and the share of it that is done, 0 to 1, some
-/// twenty times a second; what it raises ends the encoding and is raised.
+/// - mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an
+///   object with attributes of these names.
+/// - preset: "default" (fast queries), "fast" (fast encoding) or "compact" (small), all exact;
+///   "paper" (the paper's encoder: sampled, 129 samples along an edge, plain) or "sampled-safe"
+///   (sampled with a threshold that is large enough that no needed face is missing).
+/// - domain: the division of space into tetrahedra. None or "bisection" needs no other program.
+///   "gmsh" runs Gmsh (the program of that name, or the one in the environment variable
+///   TESDF_GMSH). A path (.msh, .node, .ele, .vtu) has tetrahedra that conform to the mesh's faces.
+/// - encoder: the method that finds the closest faces of each tetrahedron: "certified" (proven) or
+///   "sampled" (as in the paper; faces that are closest only between samples may be missing). None
+///   is the encoder of the preset.
+/// - resolution: an edge of a tetrahedron has resolution + 1 samples. None is 32, or the value of
+///   the preset.
+/// - threshold: a face is listed if it is at most this length farther than the closest face at a
+///   sample, in the mesh's unit. "safe" is large enough that no needed face is missing.
+/// - e_max: maximum length of a list; the faces that are needed nearest to the surface stay.
+/// - deformable: prepares the lists for moving vertices; needs a conforming domain ("gmsh" or a
+///   path).
+/// - plain: keeps the tetrahedra of a conforming domain as they are, without bisecting them.
+/// - band: width of the encoded layer around the solid, in the mesh's unit. None is 5 % of the
+///   diagonal, and no layer with "gmsh".
+/// - regions: boxes [R, 6] that are encoded as well, each min x y z, max x y z.
+/// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing.
+/// - threads: number of threads; None is one per core. The bytes of the asset do not depend on it.
+/// - progress: called with the stage ("refine", "tighten", "assemble") and the completed fraction
+///   of it, 0 to 1, about twenty times a second. An exception from it ends the encoding and is
+///   raised.
 ///
-/// Raises OSError or MeshError when there is no mesh or no tetrahedra, NotSolidError when the mesh has no well-defined inside, and
-/// EncodeError when an option has no meaning for it, options exclude each other, Gmsh fails, or tetrahedra do not conform to the mesh.
+/// Raises OSError or MeshError if the mesh or the tetrahedra cannot be read. Raises NotSolidError
+/// if the mesh has no well-defined inside. Raises EncodeError if an option does not apply to the
+/// mesh, options exclude each other, Gmsh fails, or the tetrahedra do not conform to the mesh.
 #[pyfunction]
 #[pyo3(signature = (
     mesh, preset = "default", *, domain = None, encoder = None, resolution = None, threshold = None, e_max = None,
@@ -133,7 +142,7 @@ fn named_encoder(name: &str) -> PyResult<MethodChoice> {
     }
 }
 
-/// A name or a path as text; other paths are paths.
+/// Converts the name of a domain, or a path. Text that is not a name is a path.
 fn domain_choice(any: &Bound<'_, PyAny>) -> PyResult<DomainChoice> {
     if let Ok(text) = any.cast::<PyString>()
         && let Ok(choice) = text.to_cow()?.parse()

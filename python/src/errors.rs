@@ -1,4 +1,4 @@
-//! Errors of the library as Python's: its own text, in classes of `tesdf.errors`.
+//! Converts errors of the library to exceptions of `tesdf.errors` with the same text.
 use std::io;
 use std::path::PathBuf;
 
@@ -17,26 +17,26 @@ use tesdf::verify::VerifyError;
 
 use crate::classes::{self, Checked};
 
-/// What can go wrong while no Python object may be touched.
+/// Errors that occur while the interpreter's lock is released.
 #[derive(Debug)]
 pub enum Error {
     Read(PathBuf, ReadError),
     Mesh(MeshError),
-    /// The file, if the mesh is of one.
+    /// The path, if the mesh comes from a file.
     NotSolid(Option<PathBuf>, NotSolid),
     Repair(Option<PathBuf>, RepairError),
     Choice(ChoiceError),
     Domain(DomainError),
     Encode(Option<PathBuf>, EncodeError),
     Deform(DeformError),
-    /// The file, if the asset is of one.
+    /// The path, if the asset comes from a file.
     Asset(Option<PathBuf>, AssetError),
     Verify(VerifyError),
     Threads(rayon::ThreadPoolBuildError),
 }
 
 impl Error {
-    /// The exception to be raised.
+    /// The exception for this error.
     pub fn raise(self, py: Python<'_>) -> PyErr {
         match self {
             Self::Read(_, ReadError::Open { ref source, .. }) => system(source, self.text()),
@@ -67,7 +67,7 @@ impl Error {
         }
     }
 
-    /// What the library says, after the file's name where it does not say it itself.
+    /// The library's message, with the path of the file in front if the message does not have it.
     fn text(&self) -> String {
         let at = |path: &Option<PathBuf>, e: &dyn std::fmt::Display| match path {
             Some(path) => format!("{}: {e}", path.display()),
@@ -90,7 +90,8 @@ impl Error {
     }
 }
 
-/// An `OSError`: Python makes it `FileNotFoundError` and the like by the system's number, PyO3 by the kind.
+/// An `OSError`. Python chooses a subclass, such as `FileNotFoundError`, by the system's error
+/// number; without a number PyO3 chooses by the error's kind.
 fn system(source: &io::Error, text: String) -> PyErr {
     match source.raw_os_error() {
         Some(number) => PyOSError::new_err((number, text)),
@@ -106,7 +107,7 @@ fn new(py: Python<'_>, class: &str, arguments: impl pyo3::PyErrArguments + 'stat
     }
 }
 
-/// An argument that has no meaning: what it is, what was expected.
+/// The exception for an invalid argument, with what was found and what was expected.
 pub fn argument(name: &str, found: impl std::fmt::Display, expected: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: {found}; expected {expected}"))
 }

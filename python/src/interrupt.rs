@@ -1,4 +1,4 @@
-//! Long work that Ctrl-C ends.
+//! Runs long work that Ctrl-C can end.
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -6,14 +6,15 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 
-/// Time between two looks at Python's signals.
+/// Time between two checks for Python's signals.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Runs `work` on a thread of its own with the interpreter's lock free. In between `watch` is called, and Python handles its
-/// signals; when either raises, `cancel` is called and the error is given once `work` has ended.
+/// Runs `work` on a separate thread without the interpreter's lock. Meanwhile this thread lets
+/// Python handle signals and calls `watch`. When either raises, it calls `cancel`, waits for
+/// `work`, and returns the exception.
 ///
 /// # Errors
-/// `KeyboardInterrupt` after Ctrl-C, or what `watch` raised.
+/// `KeyboardInterrupt` after Ctrl-C, or the exception of `watch`.
 pub fn cancellable<T: Send>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send,
@@ -35,7 +36,8 @@ pub fn cancellable<T: Send>(
         loop {
             py.detach(|| wait(locked()));
             if let Some(result) = locked().take() {
-                // Ctrl-C ends programs that `work` has run, too, and then it is not their error that counts.
+                // Ctrl-C also ends programs that `work` runs. The interrupt then takes precedence
+                // over their errors.
                 return (result, raised.or_else(|| py.check_signals().err()));
             }
             if raised.is_none()

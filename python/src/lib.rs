@@ -1,8 +1,9 @@
-//! The extension module `tesdf._native` of the Python package `tesdf`: meshes and points come in as numpy arrays, answers
-//! go out as numpy arrays, the sections of an asset as views.
+//! The extension module `tesdf._native` of the Python package `tesdf`. Meshes and points are passed
+//! in as numpy arrays, answers are returned as numpy arrays, and the sections of an asset as views.
 //!
-//! What is data alone (reports, errors, named results) is Python, in `tesdf/*.py`, and made from here. The interpreter's lock is
-//! free while the library computes.
+//! Classes that only hold data (reports, errors, named results) are written in Python, in
+//! `tesdf/*.py`, and created from here. The interpreter's lock is released while the library
+//! computes.
 mod arrays;
 mod asset;
 mod classes;
@@ -22,7 +23,7 @@ mod _native {
     #[pymodule_export]
     use super::mesh::{check, repair};
 
-    /// The face of a point that has no answer and of a ray that meets nothing.
+    /// The face in the answer of a point that is not finite, and of a ray that meets no face.
     #[pymodule_export]
     const NO_FACE: u32 = tesdf::query::Answer::NO_FACE;
 

@@ -1,4 +1,4 @@
-//! Meshes: from files, arrays or objects with `vertices` and `faces`; `check` and `repair`.
+//! Meshes from files, arrays or objects with `vertices` and `faces`; `check` and `repair`.
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
@@ -11,14 +11,14 @@ use crate::arrays::{self, Rows};
 use crate::errors::{Error, argument};
 use crate::{classes, pool};
 
-/// A mesh as a caller gives it.
+/// A mesh argument.
 pub enum MeshInput {
-    /// A file that is read when the mesh is needed.
+    /// A file, which is read when the mesh is needed.
     File(PathBuf),
     Arrays(TriangleMesh),
 }
 
-/// A mesh and what is known of its file.
+/// A mesh, and its file if it has one.
 pub struct Loaded {
     pub mesh: TriangleMesh,
     pub path: Option<PathBuf>,
@@ -27,10 +27,11 @@ pub struct Loaded {
 }
 
 impl MeshInput {
-    /// A path, an object with `vertices` and `faces`, or a pair of these.
+    /// Converts a path, an object with `vertices` and `faces`, or a pair of these arrays.
     ///
     /// # Errors
-    /// `TypeError` or `ValueError` says what was found; `MeshError` which face or vertex is at fault.
+    /// `TypeError` or `ValueError` with what was found; `MeshError` with the face or vertex at
+    /// fault.
     pub fn new(any: &Bound<'_, PyAny>) -> PyResult<Self> {
         if any.is_instance_of::<PyString>() || any.hasattr("__fspath__")? {
             return Ok(Self::File(any.extract()?));
@@ -48,7 +49,7 @@ impl MeshInput {
         TriangleMesh::new(vertices, faces).map(Self::Arrays).map_err(|e| Error::Mesh(e).raise(any.py()))
     }
 
-    /// Reads the file, if it is one.
+    /// Reads the file, if the mesh is in a file.
     pub fn load(self) -> Result<Loaded, Error> {
         match self {
             Self::Arrays(mesh) => {
@@ -66,7 +67,7 @@ impl MeshInput {
 }
 
 impl Loaded {
-    /// The mesh as a solid, and the rest.
+    /// Checks that the mesh is a solid. Returns it with the path and the source.
     pub fn solid(self) -> Result<(SolidMesh, Option<PathBuf>, Source), Error> {
         match SolidMesh::new(self.mesh) {
             Ok(solid) => Ok((solid, self.path, self.source)),
@@ -75,7 +76,7 @@ impl Loaded {
     }
 }
 
-/// Corner ids of faces, of shape `[F, 3]` and any type of integers.
+/// Converts the vertex ids of faces from an array of shape `[F, 3]` of any integer type.
 fn corner_ids(any: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
     let ids = arrays::integers("faces", any, "shape (F, 3)", |shape| matches!(shape, [_, 3]))?;
     let ids = ids.as_slice()?.as_chunks::<3>().0;
@@ -100,11 +101,14 @@ struct Mended<'a> {
     text: String,
 }
 
-/// Looks for everything that keeps a mesh from having a well-defined inside, or is worth a look.
+/// Checks a mesh for defects: those that prevent a well-defined inside, and those that may be
+/// unintended.
 ///
-/// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an object that has both.
+/// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an
+/// object with attributes of these names.
 ///
-/// Raises OSError or MeshError when there is no mesh to look at. Defects are no error: they are in the report.
+/// Raises OSError or MeshError if the mesh cannot be read. Defects are in the report and raise
+/// nothing.
 #[pyfunction]
 pub fn check<'py>(py: Python<'py>, mesh: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let input = MeshInput::new(mesh)?;
@@ -117,12 +121,14 @@ pub fn check<'py>(py: Python<'py>, mesh: &Bound<'py, PyAny>) -> PyResult<Bound<'
     classes::report(py, "CheckReport", &classes::Checked::of(&report, &notes))
 }
 
-/// Makes a mesh encodable where that needs no guess, and says what it did.
+/// Makes a mesh encodable where the repair is unique, and reports every change.
 ///
-/// mesh: as for check. weld_tolerance: vertices up to this far apart are merged, in the mesh's unit; None merges none.
+/// mesh: as for check. weld_tolerance: maximum distance of vertices that are merged, in the mesh's
+/// unit; None merges none.
 ///
-/// Returns Repaired(vertices, faces, report). A mesh that is still not encodable is no error: the report says why.
-/// Raises OSError or MeshError when there is no mesh to repair or nothing is left of it.
+/// Returns Repaired(vertices, faces, report). A mesh that cannot be encoded after the repair is not
+/// an error: the report gives the reason. Raises OSError or MeshError if the mesh cannot be read or
+/// no face remains.
 #[pyfunction]
 #[pyo3(signature = (mesh, *, weld_tolerance = None))]
 pub fn repair<'py>(

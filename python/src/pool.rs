@@ -1,4 +1,4 @@
-//! The threads that the library computes on.
+//! The thread pools of the library.
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -6,10 +6,10 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::errors::Error;
 
-/// The pool of this process, one thread per core, or as many as `RAYON_NUM_THREADS` says.
+/// The pool of this process, with one thread per core or the number in `RAYON_NUM_THREADS`.
 ///
-/// Not rayon's global one: that has no threads in a process made by `fork`, as Python's `multiprocessing` does it on Linux, and
-/// would be waited for without end.
+/// This is not rayon's global pool. After a `fork`, which Python's `multiprocessing` uses on Linux,
+/// the global pool has no threads in the child process, and the child would wait for them forever.
 pub fn shared() -> Result<Arc<ThreadPool>, Error> {
     static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
     let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
@@ -19,7 +19,8 @@ pub fn shared() -> Result<Arc<ThreadPool>, Error> {
         _ => {
             let threads = Arc::new(ThreadPoolBuilder::new().build().map_err(Error::Threads)?);
             if let Some((_, of_parent)) = pool.replace((process, Arc::clone(&threads))) {
-                // Its threads are not in this process, so nothing of it may be waited for.
+                // The threads of the parent's pool do not exist in this process, so dropping the
+                // pool would wait forever.
                 std::mem::forget(of_parent);
             }
             Ok(threads)
@@ -27,7 +28,7 @@ pub fn shared() -> Result<Arc<ThreadPool>, Error> {
     }
 }
 
-/// A pool of its own with so many threads, or the shared one.
+/// A new pool with this number of threads, or the shared pool.
 pub fn of(threads: Option<NonZeroUsize>) -> Result<Arc<ThreadPool>, Error> {
     match threads {
         Some(threads) => {

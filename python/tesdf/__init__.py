@@ -1,20 +1,22 @@
 """Exact signed distances of triangle meshes, in numpy.
 
-    asset = tesdf.encode("part.stl")                   # a path, (vertices, faces), or an object that has both
-    answers = asset.query(points)                      # points [N, 3]
+    asset = tesdf.encode("part.stl")                    # a path, (vertices, faces), or a mesh object
+    answers = asset.query(points)                       # points [N, 3]
     answers.signed_distance, answers.gradient, answers.closest_point, answers.face
     asset.save("part.tesdf")
-    asset = tesdf.Asset.open("part.tesdf")             # maps the file; asset.vertices, .faces are views of it
+    asset = tesdf.Asset.open("part.tesdf")              # maps the file; asset.faces is a view of it
 
-    report = tesdf.check("part.stl")                   # defects by element; report.encodable
-    vertices, faces, report = tesdf.repair("part.stl") # says every change
+    report = tesdf.check("part.stl")                    # defects and their positions; report.encodable
+    vertices, faces, report = tesdf.repair("part.stl")  # reports every change
     tesdf.encode((vertices, faces))
 
-    asset = tesdf.encode("beam.stl", domain="gmsh", deformable=True)       # tetrahedra that follow the surface
+    # Tetrahedra that conform to the surface can follow its vertices.
+    asset = tesdf.encode("beam.stl", domain="gmsh", deformable=True)
     asset = asset.move_vertices(ids, positions).asset.reencode_stale().asset
 
-All lengths are in the mesh's unit; ids are 0-based. Errors are `MeshError` (`NotSolidError` when the mesh has no
-well-defined inside), `EncodeError`, `DeformError`, `AssetError`, all of them `ValueError`, and `OSError` for files.
+All lengths are in the mesh's unit, and all ids start from 0. Errors are `MeshError`
+(`NotSolidError` if the mesh has no well-defined inside), `EncodeError`, `DeformError` and
+`AssetError`, which are all `ValueError`s, and `OSError` for files.
 """
 
 from ._native import NO_FACE, Asset, __version__, check, encode, repair

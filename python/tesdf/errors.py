@@ -1,4 +1,4 @@
-"""Why something could not be done, in the library's own words. What the system refuses is an `OSError`."""
+"""Exceptions with the library's messages. Errors of the operating system are `OSError`s."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from .reports import CheckReport
 
 
 class MeshError(ValueError):
-    """A file or arrays do not give a mesh."""
+    """A file or arrays do not contain a valid mesh."""
 
 
 class NotSolidError(MeshError):
-    """A mesh has no well-defined inside; `report` has all defects, as `check` gives them."""
+    """A mesh has no well-defined inside. `report` has all defects, as `check` reports them."""
 
     report: CheckReport
 
@@ -23,12 +23,12 @@ class NotSolidError(MeshError):
 
 
 class EncodeError(ValueError):
-    """A solid cannot be encoded as asked."""
+    """A solid cannot be encoded with these options."""
 
 
 class DeformError(ValueError):
-    """Vertices cannot be moved; nothing was."""
+    """Vertices cannot be moved. The asset is unchanged."""
 
 
 class AssetError(ValueError):
-    """A file or bytes are not an asset of this version, or were damaged."""
+    """A file or bytes are not an asset of this version, or are damaged."""

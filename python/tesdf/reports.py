@@ -1,6 +1,6 @@
-"""What `check`, `repair`, `Asset.inspect` and `Asset.verify` find, and what an asset says of itself.
+"""Results of `check`, `repair`, `Asset.inspect` and `Asset.verify`, and the metadata of an asset.
 
-Lengths are in the mesh's unit, ids are 0-based. A float that left the range of floats is NaN.
+Lengths are in the mesh's unit, and ids start from 0. A float that is not finite is NaN.
 """
 
 from __future__ import annotations
@@ -16,17 +16,18 @@ Point = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Defect:
-    """Something about a mesh that a person may want to know, with its place."""
+    """A defect or unusual property of a mesh, and where it is."""
 
     kind: str
     """such as "open-edge" or "self-intersection" """
     severity: str
-    """"error": the mesh cannot be encoded; "warning": worth a look; "note": without consequence"""
+    """"error": the mesh cannot be encoded; "warning": may be unintended; "note": has no
+    consequence"""
     faces: tuple[int, ...]
     vertices: tuple[int, ...]
     place: Point
     message: str
-    """one line for people"""
+    """one line for users"""
 
     def __str__(self) -> str:
         return self.message
@@ -43,7 +44,7 @@ class BoundaryLoop:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What `check` found; as text, the lines of `tesdf check`."""
+    """Result of `check`. Its text has the lines of `tesdf check`."""
 
     vertices: int
     """number of vertices"""
@@ -53,16 +54,16 @@ class CheckReport:
     max: Point
     diagonal: float
     shells: int
-    """number of pieces that are connected over edges"""
+    """number of pieces that are connected through edges"""
     boundary_loops: tuple[BoundaryLoop, ...]
     winding: Optional[tuple[int, int]]
-    """least and greatest winding number; None when it is not an integer everywhere"""
+    """smallest and largest winding number; None if it is not an integer everywhere"""
     encodable: bool
-    """whether the inside is well defined: there is no error"""
+    """whether the inside is well defined, that is, there is no error"""
     defects: tuple[Defect, ...]
-    """by kind, then by place in the mesh"""
+    """sorted by kind, then by position in the mesh"""
     notes: tuple[str, ...]
-    """what reading the file changed"""
+    """changes made while the file was read"""
     text: str = dataclasses.field(repr=False)
 
     def __str__(self) -> str:
@@ -82,32 +83,33 @@ class SplitEdge:
 
 @dataclass(frozen=True)
 class RepairReport:
-    """Every change of `repair`, in its order; ids are those of the mesh given, in `remaining` and `warnings` of the result.
+    """All changes of `repair`, in their order. Ids refer to the given mesh; in `remaining` and
+    `warnings` to the result.
 
-    As text, the lines of `tesdf repair`.
+    Its text has the lines of `tesdf repair`.
     """
 
     welded_vertices: tuple[tuple[int, int], ...]
-    """vertices merged, each with the one that took its place"""
+    """merged vertices, each with the vertex that replaces it"""
     collapsed_faces: tuple[int, ...]
-    """faces dropped as two of their corners are equal"""
+    """faces that were removed because two of their corners are equal"""
     duplicate_faces: tuple[tuple[int, int], ...]
-    """faces dropped as they repeat another, with that one"""
+    """faces that were removed because they repeat another face, with that face"""
     split_edges: tuple[SplitEdge, ...]
     vanished_faces: tuple[int, ...]
-    """collinear faces that vanished as their neighbours were split"""
+    """collinear faces that were removed because their neighbours were split"""
     reversed_faces: tuple[int, ...]
     crossing_shells: tuple[tuple[int, int], ...]
-    """shells that meet others and keep their orientation: one face of each of two"""
+    """shells that intersect others and keep their orientation: one face of each of two shells"""
     unused_vertices: int
-    """number of vertices dropped as no face uses them"""
+    """number of vertices that were removed because no face uses them"""
     encodable: bool
-    """whether the mesh is encodable now"""
+    """whether the mesh can be encoded after the repair"""
     remaining: tuple[Defect, ...]
-    """errors left"""
+    """remaining errors"""
     warnings: tuple[Defect, ...]
     notes: tuple[str, ...]
-    """what reading the file changed"""
+    """changes made while the file was read"""
     text: str = dataclasses.field(repr=False)
 
     def __str__(self) -> str:
@@ -121,19 +123,21 @@ class Certificate:
     encoder: str
     domain: str
     delta: Optional[float]
-    """None: nothing is proved"""
+    """None if nothing is proved"""
     delta_of_diagonal: Optional[float]
     truncated: bool
-    """whether lists were cut to a largest length"""
+    """whether lists were truncated to a maximum length"""
     exactness_distance: Optional[float]
-    """distance from the surface within which every cell is exact; None: everywhere"""
+    """distance from the surface up to which every cell is exact; None if every cell is exact
+    everywhere"""
     chains: Optional[int]
-    """how much of the budget for rounding the lists have used, of 400; None: nothing is proved"""
+    """largest weight of a chain of shared features (rule C) in the proof of a list, at most 400; None
+    if nothing is proved"""
 
 
 @dataclass(frozen=True)
 class Source:
-    """The file that a mesh came from; empty for a mesh made in memory."""
+    """The file that a mesh was read from; empty for a mesh from memory."""
 
     name: str
     blake3: str
@@ -141,7 +145,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Counts taken while encoding; volumes are in the mesh's unit, cubed."""
+    """Counts from the encoding. Volumes are in the mesh's unit, cubed."""
 
     faces: int
     vertices: int
@@ -159,7 +163,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Counts:
-    """How many there are of what."""
+    """Numbers of faces, vertices, cells and list entries."""
 
     faces: int
     vertices: int
@@ -173,7 +177,7 @@ class Counts:
 
 @dataclass(frozen=True)
 class ListLengths:
-    """Lengths of the lists, each cell counted once."""
+    """Lengths of the lists, where each cell counts once."""
 
     mean: float
     p50: int
@@ -184,7 +188,8 @@ class ListLengths:
 
 @dataclass(frozen=True)
 class MeanReads:
-    """Faces and nodes that a query reads on average; shares are of points or of the domain's volume."""
+    """Mean number of faces and nodes that a query reads, and fractions of points or of the
+    domain's volume."""
 
     near_surface: float
     near_surface_fallback: float
@@ -196,22 +201,23 @@ class MeanReads:
 
 @dataclass(frozen=True)
 class Memory:
-    """What is resident while an asset is open, in bytes."""
+    """Resident memory of an open asset, in bytes."""
 
     parts: tuple[tuple[str, int], ...]
-    """each part of the file, and what opening makes besides"""
+    """each section of the file, and the tables that are built when it is opened"""
     file: int
     whole: int
     whole_per_face: float
     lists_and_tree: int
     paper: int
-    """4 bytes for each list entry and 16 for each cell with a list"""
+    """4 bytes per list entry and 16 per cell with a list"""
     paper_mib: float
 
 
 @dataclass(frozen=True)
 class Classes:
-    """Vertices and tetrahedra of a conforming domain by class; "boundary" tetrahedra have a vertex on the surface."""
+    """Numbers of vertices and tetrahedra of a conforming domain by class. "boundary" tetrahedra
+    have a vertex on the surface."""
 
     surface_vertices: int
     inner_vertices: int
@@ -224,11 +230,11 @@ class Classes:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What `Asset.inspect` found."""
+    """Result of `Asset.inspect`."""
 
     counts: Counts
     classes: Optional[Classes]
-    """of a conforming domain"""
+    """None in the bisection domain"""
     lists: ListLengths
     reads: MeanReads
     memory: Memory
@@ -236,26 +242,29 @@ class Inspection:
 
 @dataclass(frozen=True)
 class Promise:
-    """What a precision promises: errors of distances as a share of the diagonal, of gradients in radians."""
+    """Promised accuracy of a precision: errors of distances relative to the diagonal, of
+    gradients in radians."""
 
     of_diagonal: float
     ulps: float
     gradient: float
     gradient_width: float
-    """added to `gradient`: this length over the distance; 0 unless the precision takes narrow faces for segments"""
+    """added to `gradient`: this length divided by the distance; 0 unless the precision treats
+    narrow faces as segments"""
     gradient_from: float
     within: Optional[float]
-    """distances and gradients are promised nearer to the surface than this; None: everywhere"""
+    """distances and gradients are promised up to this distance from the surface; None if
+    everywhere"""
     diagonal: float
     largest_coordinate: float
 
 
 @dataclass(frozen=True)
 class Worst:
-    """A point where an answer was off."""
+    """The point with the largest error of an answer."""
 
     point: Point
-    # Keywords cannot be fields: `class` of the library is `kind` here.
+    # `class` is a keyword in Python, so the library's field `class` is `kind` here.
     kind: str
     expected: float
     found: float
@@ -264,7 +273,7 @@ class Worst:
 
 @dataclass(frozen=True)
 class ClassErrors:
-    """Points of one kind, such as "near_surface" or "on_edge"."""
+    """Errors at the points of one kind, such as "near_surface" or "on_edge"."""
 
     kind: str
     points: int
@@ -273,7 +282,7 @@ class ClassErrors:
 
 @dataclass(frozen=True)
 class PrecisionReport:
-    """How one precision compares with brute force."""
+    """Comparison of one precision with brute force."""
 
     precision: str
     passed: bool
@@ -288,13 +297,13 @@ class PrecisionReport:
     largest_gradient_error: float
     worst_gradient: Optional[Worst]
     largest_error_beyond: Optional[float]
-    """where none is promised; None when every point has a promise"""
+    """largest error where none is promised; None if every point has a promise"""
     classes: tuple[ClassErrors, ...]
 
 
 @dataclass(frozen=True)
 class VerifyReport:
-    """What `Asset.verify` found."""
+    """Result of `Asset.verify`."""
 
     passed: bool
     """whether every promise was kept"""
@@ -314,7 +323,8 @@ def from_json(name: str, text: str) -> Any:
 
 
 def _build(kind: Any, value: Any) -> Any:
-    """`value` as an object of type `kind`; a field more or less than the class has is a TypeError."""
+    """`value` as an object of type `kind`. Raises TypeError if the fields differ from those of
+    the class."""
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
         hints = typing.get_type_hints(kind)
         names = {("kind" if key == "class" else key): item for key, item in value.items()}

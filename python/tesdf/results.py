@@ -1,4 +1,4 @@
-"""What queries, `repair` and moved vertices give: tuples with names."""
+"""Results of queries, `repair` and moved vertices, as named tuples."""
 
 from __future__ import annotations
 
@@ -14,63 +14,65 @@ if TYPE_CHECKING:
 
 
 class Answers(NamedTuple):
-    """One row for each point, in the mesh's unit. A point that has no answer has NaN and `NO_FACE`."""
+    """One row per point, in the mesh's unit. A point that is not finite has NaN and `NO_FACE`."""
 
     signed_distance: npt.NDArray[np.float64]
     """[N] distance to the nearest face, negative inside"""
     gradient: npt.NDArray[np.float64]
-    """[N, 3] unit gradient of the signed distance; it points outward"""
+    """[N, 3] unit gradient of the signed distance; points outward"""
     closest_point: npt.NDArray[np.float64]
-    """[N, 3] the nearest point of the surface"""
+    """[N, 3] nearest point on the surface"""
     face: npt.NDArray[np.uint32]
-    """[N] the nearest face, by its id in the source mesh"""
+    """[N] id of the nearest face in the source mesh"""
 
 
 class RayHits(NamedTuple):
-    """One row for each ray, in the mesh's unit. A ray that meets nothing has t = inf, NaN and `NO_FACE`."""
+    """One row per ray, in the mesh's unit. A ray that meets no face has t = inf, NaN and
+    `NO_FACE`."""
 
     t: npt.NDArray[np.float64]
     """[N] distance along the ray, in lengths of its direction"""
     point: npt.NDArray[np.float64]
-    """[N, 3] the point met"""
+    """[N, 3] point where the ray meets the face"""
     face: npt.NDArray[np.uint32]
-    """[N] the face met, by its id in the source mesh"""
+    """[N] id of the face in the source mesh"""
     normal: npt.NDArray[np.float64]
-    """[N, 3] outward unit normal of that face"""
+    """[N, 3] outward unit normal of the face"""
 
 
 class Repaired(NamedTuple):
-    """A mesh after `repair`; `encode` takes it as it is."""
+    """A repaired mesh; `encode` accepts it directly."""
 
     vertices: npt.NDArray[np.float64]
     """[V, 3]"""
     faces: npt.NDArray[np.uint32]
     """[F, 3]"""
     report: RepairReport
-    """every change, and what is left to be done"""
+    """all changes, and the remaining defects"""
 
 
 class Moved(NamedTuple):
-    """An asset after `Asset.move_vertices`, and what has changed."""
+    """An asset after `Asset.move_vertices`, and what changed."""
 
     asset: Asset
-    """the asset as it is now"""
+    """the asset with moved vertices"""
     faces: int
     """number of faces with a vertex that moved"""
     tetrahedra: int
     """number of tetrahedra with a vertex that moved"""
     inverted: npt.NDArray[np.uint32]
-    """those of them that are now inside out or flat, ascending: points of them may be found in several cells or in none"""
+    """tetrahedra that are now inverted or flat, ascending; their points may lie in several cells
+    or in none"""
 
 
 class Reencoded(NamedTuple):
-    """An asset after `Asset.reencode_stale`, and what was done."""
+    """An asset after `Asset.reencode_stale`, and the cells that were re-encoded."""
 
     asset: Asset
     """the asset with the new lists"""
     cells: int
     """number of cells with a list"""
     checked: int
-    """number of those that something that moved may matter to"""
+    """number of cells that a moved face or vertex may affect"""
     stale: npt.NDArray[np.uint32]
-    """those whose list was made anew, ascending"""
+    """cells with new lists, ascending"""

@@ -17,7 +17,7 @@ TETRAHEDRON = (
 
 @pytest.fixture(scope="session")
 def torus():
-    """major radius 1, minor radius 0.4, 600 faces; in memory"""
+    """a torus with major radius 1, minor radius 0.4 and 600 faces, as arrays"""
     m, n = 25, 12
     u, v = (2 * np.pi * np.arange(k) / k for k in (m, n))
     u, v = np.meshgrid(u, v, indexing="ij")
@@ -36,7 +36,7 @@ def asset(torus):
 
 @pytest.fixture(scope="session")
 def points(torus):
-    """in and around the torus, near its surface, and far away"""
+    """points in and around the torus, near its surface, and far away"""
     random = np.random.default_rng(1)
     vertices, faces = torus
     corners = vertices[faces[random.integers(len(faces), size=600)]]
@@ -47,10 +47,11 @@ def points(torus):
 
 @pytest.fixture(scope="session")
 def beam(tmp_path_factory):
-    """a beam of 4 x 2 x 2 cubes in a grid of 6 x 4 x 4, each cut into six tetrahedra: the beam's mesh, and a file of the tetrahedra"""
+    """a beam of 4 x 2 x 2 in a grid of 6 x 4 x 4 cubes, each split into six tetrahedra: the
+    beam's mesh, and the tetrahedra's file"""
     shape = np.array([6, 4, 4])
     cubes = np.stack(np.meshgrid(*map(range, shape), indexing="ij"), -1).reshape(-1, 3)
-    # From corner to opposite corner along the axes, in each order; the order tells the orientation.
+    # Paths from a corner to the opposite corner along the axes, in each order; the order decides the orientation.
     walks = np.array([np.cumsum(np.vstack([np.zeros(3, int), np.eye(3, dtype=int)[list(axes)]]), 0) for axes in permutations(range(3))])
     walks[[1, 2, 5], 2:] = walks[[1, 2, 5], :1:-1]
     tetrahedra = ((cubes[:, None, None] + walks) @ [25, 5, 1]).reshape(-1, 4)

@@ -1,4 +1,4 @@
-"""Files, views, and what an asset says of itself."""
+"""Files, views and metadata of assets."""
 
 import gc
 import json

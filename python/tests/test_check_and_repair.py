@@ -1,4 +1,4 @@
-"""Reports, and that their classes have every field of the library's."""
+"""Reports, and whether their classes have all fields of the library's reports."""
 
 import numpy as np
 import pytest
@@ -59,7 +59,7 @@ def test_weld_tolerance():
 
 
 def test_t_junctions_are_reported():
-    # The edge 0-1 of one face is split by vertex 4 on the other side.
+    # Vertex 4 on the other side splits the edge 0-1 of one face.
     vertices = np.concatenate([VERTICES, [[0.5, 0, 0]]])
     faces = np.concatenate([FACES[1:], [[0, 2, 4], [4, 2, 1]]])
     (split,) = tesdf.repair((vertices, faces)).report.split_edges

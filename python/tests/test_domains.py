@@ -1,4 +1,4 @@
-"""Encoders and domains: what they prove, what they refuse, vertices that move."""
+"""Encoders and domains: what they prove and refuse, and moving vertices."""
 
 import pickle
 
@@ -111,7 +111,7 @@ def test_tetrahedra_of_another_mesh(beam, tmp_path):
 def test_vertices_that_move(beam, deformable, tmp_path):
     (vertices, faces), _ = beam
     before = deformable.to_bytes()
-    # The end of the beam, with the vertices of the domain around it.
+    # The end of the beam, and the vertices of the domain around it.
     places = np.concatenate([deformable.vertices, deformable.sections["domain.vertices"]])
     ids = np.flatnonzero(places[:, 0] > 3.5)
     turn = 0.1 * (places[ids, 0] - 3)

@@ -1,4 +1,4 @@
-"""Ways to give a mesh, options, progress, Ctrl-C."""
+"""Mesh arguments, options, progress and Ctrl-C."""
 
 import os
 import signal
@@ -33,7 +33,7 @@ def test_arrays_of_any_kind():
         tesdf.repair(TETRAHEDRON),
     ):
         assert tesdf.encode(mesh).to_bytes() == expected
-    # A quarter inside of the side x = 0; brute force is in test_query.
+    # The point is 0.25 inside the side x = 0. test_query compares with brute force.
     assert tesdf.encode(TETRAHEDRON).signed_distance([[0.1, 0.3, 0.3]])[0] == pytest.approx(-0.1, abs=1e-12)
 
 
@@ -116,8 +116,9 @@ SAYING = [
 
 
 def ended_by_ctrl_c(body, *arguments, environment=None):
-    """Runs `body` in another process, which says "started", sends it SIGINT, and it alone, and looks how it ends."""
-    # A process whose parents ignore the signal, as background jobs do, would ignore it too.
+    """Runs `body` in another process, which prints "started". Sends SIGINT to this process only,
+    and checks how it ends."""
+    # If the parent process ignores SIGINT, as for background jobs, the child would ignore it as well.
     heeding = "signal.signal(signal.SIGINT, signal.default_int_handler)"
     lines = ["import signal, sys, time, tesdf", heeding, "try:", *("    " + line for line in body), "except KeyboardInterrupt:"]
     program = "\n".join([*lines, "    print('interrupted', flush=True)", "    sys.exit(3)"])
@@ -125,7 +126,7 @@ def ended_by_ctrl_c(body, *arguments, environment=None):
     child = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, **(environment or {})})
     try:
         assert child.stdout.readline() == "started\n"
-        # Where the call follows the word, it has begun by then; if not, it is ended before it does.
+        # If the call follows "started", this gives it time to begin.
         time.sleep(0.3)
         child.send_signal(signal.SIGINT)
         out, _ = child.communicate(timeout=120)
@@ -140,7 +141,7 @@ def test_ctrl_c_ends_encode():
 
 
 def test_ctrl_c_ends_verify():
-    # 2^32 - 1 points would take days.
+    # Checking 2^32 - 1 points would take days.
     body = ["asset = tesdf.encode(sys.argv[1])", "print('started', flush=True)", "asset.verify(2**32 - 1)"]
     ended_by_ctrl_c(body, CUBE)
 

@@ -1,4 +1,4 @@
-"""Answers against brute force over all faces, and how points may be given."""
+"""Answers against brute force over all faces, and the accepted forms of points."""
 
 import multiprocessing
 import threading
@@ -6,9 +6,9 @@ import threading
 import numpy as np
 import pytest
 import tesdf
-from make_reference import sdf  # numpy's brute force over all faces, of data/reference
+from make_reference import sdf  # numpy's brute force over all faces, in data/reference
 
-# Of the torus's diagonal, 4.04: what the precisions promise, and rounding of the brute force.
+# The promised errors for the torus's diagonal of 4.04, and the rounding of the brute force.
 TOLERANCE = {"f64": 1e-11, "f32": 4.04e-6}
 
 
@@ -27,7 +27,7 @@ def test_answers_are_those_of_brute_force(asset, torus, points, truth, precision
     far = np.abs(distances) > tolerance
     assert np.abs(np.abs(answers.signed_distance) - np.abs(distances)).max() <= tolerance
     assert (np.sign(answers.signed_distance) == np.sign(distances))[far].all()
-    # The closest point is that far away, on the face that is named, and the gradient leads away from it.
+    # The closest point has that distance and lies on the named face, and the gradient points away from it.
     offset = points - answers.closest_point
     assert np.abs(np.linalg.norm(offset, axis=1) - np.abs(distances)).max() <= tolerance
     vertices, faces = torus
@@ -134,7 +134,7 @@ def test_threads_share_an_asset(asset, points):
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_other_processes(asset, points, method):
-    # A forked child has none of the threads that answered here.
+    # A forked child has none of the threads that answered in the parent.
     expected = asset.query(points).signed_distance
     with multiprocessing.get_context(method).Pool(1) as pool:
         found = pool.apply_async(asset.signed_distance, (points,)).get(timeout=60)
