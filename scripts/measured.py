@@ -1,4 +1,5 @@
-"""What the scripts beside this share: meshes of `data`, and Markdown tables that say where, when and by which command they were made."""
+"""Shared by the scripts in this folder: meshes of `data`, and Markdown tables whose heading names
+the machine, date and command."""
 import os
 import sys
 from datetime import datetime, timezone
@@ -7,7 +8,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path[:0] = [str(ROOT / "data"), str(ROOT / "data" / "reference")]
 
-# Peers with absolute tolerances mean them in millimetres; meshes of `data` are in metres.
+# The meshes of `data` are in metres, but some peers have absolute tolerances that are meant for
+# millimetres.
 SCALE = 1000.0
 
 
@@ -16,7 +18,7 @@ def processor():
 
 
 def heading(*lines):
-    """the command, the date, the processor, and further lines"""
+    """prints the command, the date, the processor, and further lines"""
     program = Path(sys.argv[0]).resolve().relative_to(ROOT)
     print(f"`{' '.join([str(program), *sys.argv[1:]])}`\n")
     print(f"- {datetime.now(timezone.utc):%Y-%m-%d %H:%M} UTC, Python {sys.version.split()[0]}")
@@ -27,7 +29,7 @@ def heading(*lines):
 
 
 def head(columns, text):
-    """begins a table; columns named in `text` are aligned left, the others right"""
+    """begins a table; the columns in `text` are aligned left, the others right"""
     print("| " + " | ".join(columns) + " |")
     print("|" + "|".join("---" if c in text else "---:" for c in columns) + "|", flush=True)
 
@@ -37,6 +39,6 @@ def row(cells):
 
 
 def why(error):
-    """of something that cannot be done, as a cell"""
+    """the cell of an operation that failed"""
     text = error if isinstance(error, str) else f"{type(error).__name__}: {error}"
     return f"cannot: {text}".replace("\n", " ").replace("|", "/")

@@ -1,13 +1,16 @@
 #!/usr/bin/env python3
-"""Contacts of posed meshes: the peers that Python has, and those of `tesdf-bench collide-peers`, on the same poses in one run.
+"""Contacts of posed meshes: the peers with a Python package, and those of `tesdf-bench
+collide-peers`, on the same poses in one run.
 
     python -m venv VENV && VENV/bin/pip install -r scripts/peers-requirements.txt
     cargo build --release -p tesdf-bench
     VENV/bin/python scripts/peers.py --ours target/release/tesdf-bench [--json raw.json] [data/poses/SET.json ...] > table.md
 
-One thread each, one after the other; processor time for Python's peers, time by the clock for `tesdf-bench`. `--ours` also gives the true clearances, which errors are against: without it that column stays
-empty. A peer that is missing or fails gets a row `cannot: why`; nothing is installed. Peers get lengths in thousandths of the
-meshes' unit (millimetres), as some have absolute tolerances; results are in the meshes' unit again.
+Each peer runs alone on one thread. The times are processor time for the Python peers and wall time
+for `tesdf-bench`. `--ours` also gives the true clearances, from which errors are computed; without
+it the error columns stay empty. A peer that is missing or fails gets a row `cannot: why`; the
+script installs nothing. The peers get lengths in thousandths of the meshes' unit (millimetres),
+because some have absolute tolerances. Results are in the meshes' unit.
 """
 import argparse
 import json
@@ -27,12 +30,12 @@ import numpy as np  # noqa: E402
 from measured import ROOT, SCALE, head, heading, row, why  # noqa: E402
 from meshtools import read_obj  # noqa: E402
 
-MANY = 10**6  # more contacts than any pose gives
+MANY = 10**6  # more contacts than any pose has
 
 
 # ------------------------------------------------------------------ input
 class Pose:
-    """mesh to world, in thousandths of the mesh's unit"""
+    """a pose, mesh to world, in thousandths of the mesh's unit"""
 
     def __init__(self, text):
         numbers = np.array([float(word) for word in text.split()])
@@ -60,10 +63,11 @@ class PoseSet:
         self.diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0))) / SCALE
 
 
-# ------------------------------------------------------------------ what a peer gives
+# ------------------------------------------------------------------ results of a peer
 @dataclass
 class Found:
-    """overlap: whether the solids do; clearance: distance or negative depth; None where the operation does not say"""
+    """whether the solids overlap, the number of contacts, and the distance or negative depth; None
+    where the operation does not report it"""
 
     overlap: bool | None = None
     contacts: int | None = None
@@ -72,7 +76,7 @@ class Found:
 
 @dataclass
 class Operation:
-    """run(pose_a, pose_b) is timed, read(its result) -> Found is not"""
+    """an operation of a peer: run(pose_a, pose_b) is timed, read(its result) -> Found is not"""
 
     name: str
     exact: str
@@ -91,8 +95,10 @@ class Row:
 
 
 def measure(operation, poses, budget):
-    """the best of up to four runs a pose, until the budget in seconds is spent: then later poses are left out; a first pose that
-    takes ten times the budget by the clock is a TimeoutError"""
+    """measures each pose up to four times and keeps the best time
+
+    Stops when the budget, in seconds of processor time, is spent; the remaining poses are left out.
+    Raises TimeoutError if the first pose takes ten times the budget of wall time."""
     outcomes, begin = [], time.process_time()
 
     def late(*_):
@@ -122,13 +128,13 @@ def measure(operation, poses, budget):
 
 
 def least(distances):
-    """contacts with signed distances"""
+    """a result from the signed distances of contacts"""
     nearest = min(distances, default=None)
     return Found(nearest is not None and nearest < 0, len(distances), nearest)
 
 
 def separation(distance):
-    """a distance that is not positive where surfaces cross"""
+    """a result from a distance that is not positive where the surfaces intersect"""
     return Found(distance <= 0, None, distance if distance > 0 else None)
 
 
@@ -229,7 +235,10 @@ def coal_operations(s):
 
 
 def at_vertices(s, query):
-    """query(i, points in the frame of mesh i) -> their signed distances there, or whether they are inside: both ways"""
+    """runs query in both directions, at the vertices of each mesh that are near the other
+
+    query(i, points in the frame of mesh i) returns their signed distances, or whether they are
+    inside."""
     bounds = [(v.min(0) - s.distance, v.max(0) + s.distance) for v, _ in s.meshes]
 
     def run(*poses):
@@ -258,7 +267,7 @@ def trimesh_operations(s):
 
     meshes = [trimesh.Trimesh(v, f, process=False) for v, f in s.meshes]
     for mesh in meshes:
-        mesh.contains(mesh.bounds[:1])  # builds its tree
+        mesh.contains(mesh.bounds[:1])  # builds the tree
     only = "no: at vertices only"
     return [
         Operation(
@@ -291,7 +300,7 @@ def open3d_operations(s):
 
 
 def mujoco_operations(s, depth):
-    """depth of the octrees of type sdf; None: type mesh"""
+    """geoms of type sdf with octrees of this depth, or of type mesh for None"""
     import mujoco
 
     spec = mujoco.MjSpec()
@@ -310,7 +319,8 @@ def mujoco_operations(s, depth):
     placed = []
 
     def run(*poses):
-        if placed != list(poses):  # kinematics are not part of the time of later runs, of which the best counts
+        # The best run counts, and only the first run of a pose includes the kinematics.
+        if placed != list(poses):
             data.qpos[:] = np.concatenate([x for pose in poses for x in (pose.t, pose.wxyz)])
             mujoco.mj_kinematics(model, data)
             mujoco.mj_comPos(model, data)
@@ -325,7 +335,7 @@ def mujoco_operations(s, depth):
 
 
 def peers(depths):
-    """name, module, distribution, operations"""
+    """yields name, module, distribution and operations of each peer"""
     yield "FCL", "fcl", "python-fcl", fcl_operations
     yield "Coal", "coal", "coal", coal_operations
     yield "trimesh", "trimesh", "trimesh", trimesh_operations
@@ -343,7 +353,7 @@ def rows(s, args):
             all_operations = operations(s)
             build = time.process_time() - start
             contender = f"{name} {version(distribution)}"
-        except Exception as e:  # whatever a peer raises is its row
+        except Exception as e:  # an exception of a peer becomes its row
             yield Row(name, "", cannot=f"{type(e).__name__}: {e}")
             continue
         for operation in all_operations:
@@ -397,11 +407,11 @@ def table(s, all_rows, truth):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sets", nargs="*", type=Path, help="default: all of data/poses")
-    parser.add_argument("--ours", metavar="BIN", help="tesdf-bench: adds its rows, and errors against its true clearances")
-    parser.add_argument("--json", type=Path, help="also write all measurements, pose by pose")
-    parser.add_argument("--budget", type=float, default=20, help="seconds of processor time for an operation on a set; default 20")
+    parser.add_argument("--ours", metavar="BIN", help="the tesdf-bench binary: adds its rows and the true clearances")
+    parser.add_argument("--json", type=Path, help="also write all measurements, one entry per pose")
+    parser.add_argument("--budget", type=float, default=20, help="processor time of an operation on a set, s; default 20")
     parser.add_argument("--mujoco-depths", type=lambda t: [int(n) for n in t.split(",")], default=[6, 8],
-                        help="of its octrees; default 6,8")
+                        help="depths of MuJoCo's octrees; default 6,8")
     args = parser.parse_args()
     paths = args.sets or sorted((ROOT / "data/poses").glob("*.json"))
     heading()

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
-"""Signed distances against peers: the same meshes and points, in one run.
+"""Signed distances of tesdf and of peers, for the same meshes and points, in one run.
 
     python -m venv VENV && VENV/bin/pip install -r scripts/peers-requirements.txt ./python
     VENV/bin/python scripts/peers_distance.py [--points N] [--checked N] [MESH.obj ...] > table.md
 
-Every contender runs in a process of its own, on one core, in processor time; with `--all-cores` on all, too, by the clock. Errors are against numpy's brute force over all
-faces and the sum of their solid angles (`data/reference/make_reference.py`), which share nothing with any contender, at the
-first points of each kind. A contender that is missing, fails or takes too long gets a row `cannot: why`. Peers get millimetres.
+Each contender runs in its own process on one core, measured in processor time; with `--all-cores`
+also on all cores, in wall time. Errors are relative to numpy's brute force over all faces and the
+sum of their solid angles (`data/reference/make_reference.py`), which shares no code with a
+contender, at the first points of each kind. A contender that is missing, fails or takes too long
+gets a row `cannot: why`. The peers get lengths in millimetres.
 """
 import argparse
 import atexit
@@ -27,8 +29,8 @@ from make_reference import sdf  # of data, which `measured` adds to the path
 from meshtools import read_obj
 
 MESHES = ["iso_m16_bolt_24k", "iso_m16_nut_c100", "spur_gear_m2_z20", "lobed_hole_c100", "shaft_keyway", "spoon", "cup_thin"]
-NEAR = 0.02  # half width of the layer near the surface, of the diagonal
-SIGN_FROM = 1e-6  # signs count from this distance on, of the diagonal
+NEAR = 0.02  # half width of the layer near the surface, as a fraction of the diagonal
+SIGN_FROM = 1e-6  # signs are compared from this distance on, as a fraction of the diagonal
 PASSES = 3
 
 
@@ -71,7 +73,7 @@ def trimesh(vertices, faces, _):
     return lambda points: -trimesh.proximity.signed_distance(mesh, points)
 
 
-# Name, distribution, module, what it gives, and whether every call builds its trees anew.
+# Name, distribution, module, results, and whether every call builds the trees again.
 CONTENDERS = [
     ("tesdf f64", "tesdf", "tesdf", "distance, gradient, point, face; f64", ours("f64"), False),
     ("tesdf f32", "tesdf", "tesdf", "distance, gradient, point, face; f32", ours("f32"), False),
@@ -91,7 +93,8 @@ def seconds(clock, query, points):
 
 
 def work(name, cores, mesh, kinds, checked, budget, answer):
-    """in a process of its own: seconds to build, and for each kind of points seconds per query and the first distances"""
+    """runs in its own process: the time to build, and for each kind of points the time per query
+    and the first distances"""
     _, _, module, _, build, rebuilds = next(contender for contender in CONTENDERS if contender[0] == name)
     try:
         os.sched_setaffinity(0, cores)
@@ -99,7 +102,7 @@ def work(name, cores, mesh, kinds, checked, budget, answer):
         clock = time.process_time if len(cores) == 1 else time.perf_counter
         start = clock()
         query = build(*mesh)
-        query(kinds[0][:1])  # some build on first use
+        query(kinds[0][:1])  # some peers build their trees on first use
         found = [clock() - start]
         for points in kinds:
             again = min(seconds(clock, query, points[:1]) for _ in range(PASSES)) if rebuilds else 0.0
@@ -114,7 +117,7 @@ def work(name, cores, mesh, kinds, checked, budget, answer):
                 each = min((seconds(clock, query, points[:count]) - again) / count for _ in range(PASSES))
             found.append((each, distances))
         answer.send(found)
-    except Exception as e:  # whatever a peer raises is its row
+    except Exception as e:  # an exception of a peer becomes its row
         answer.send(why(e))
 
 
@@ -135,7 +138,7 @@ def measure(*arguments, limit):
 
 
 def kinds_of_points(vertices, faces, count):
-    """near the surface, and uniform in the box"""
+    """points near the surface, and uniform points in the bounding box"""
     random = np.random.default_rng(1)
     corners = vertices[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -148,7 +151,8 @@ def kinds_of_points(vertices, faces, count):
 
 
 def errors(distances, truth, diagonal):
-    """largest error of an unsigned distance over the diagonal, and wrong signs"""
+    """the largest error of an unsigned distance relative to the diagonal, and the number of wrong
+    signs"""
     worst = np.abs(np.abs(distances) - np.abs(truth)).max() / diagonal
     wrong = (np.signbit(distances) != np.signbit(truth)) & (np.abs(truth) > SIGN_FROM * diagonal)
     return "NaN" if np.isnan(worst) else f"{worst:.1e}", str(wrong.sum())
@@ -157,11 +161,11 @@ def errors(distances, truth, diagonal):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("meshes", nargs="*", type=Path, help="default: those of docs/benchmarks.md")
-    parser.add_argument("--points", type=int, default=100_000, help="of each kind, at most; default 100000")
-    parser.add_argument("--checked", type=int, default=1000, help="of them compared with brute force; default 1000")
-    parser.add_argument("--budget", type=float, default=3, help="seconds for the passes of a contender over one kind; default 3")
-    parser.add_argument("--limit", type=float, default=120, help="seconds after which a contender is given up; default 120")
-    parser.add_argument("--all-cores", action="store_true", help="also on all cores, by the clock: for a machine that does nothing else")
+    parser.add_argument("--points", type=int, default=100_000, help="maximum number of points of each kind; default 100000")
+    parser.add_argument("--checked", type=int, default=1000, help="number of points compared with brute force; default 1000")
+    parser.add_argument("--budget", type=float, default=3, help="time for the passes of a contender over one kind, s; default 3")
+    parser.add_argument("--limit", type=float, default=120, help="time after which a contender is stopped, s; default 120")
+    parser.add_argument("--all-cores", action="store_true", help="also on all cores, in wall time; needs an idle machine")
     args = parser.parse_args()
     spot = ROOT / "data/public/spot.obj"
     paths = args.meshes or [*(ROOT / f"data/procedural/{name}.obj" for name in MESHES), spot]

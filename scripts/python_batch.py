@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""A batch from Python against the same batch in Rust: one asset, the same points, in turns on one machine.
+"""Compares a batch of queries from Python with the same batch in Rust: the same asset and points,
+in turns on one machine.
 
     cargo build --release -p tesdf-bench
     python -m venv VENV && VENV/bin/pip install ./python
     VENV/bin/python scripts/python_batch.py --rust target/release/tesdf-bench [--points N] [MESH.obj or .tesdf ...] > table.md
 
-Rust: `query_batch` over points in memory, by `tesdf-bench batch`. Python: `Asset.query` of an array [N, 3] into four new ones.
+Rust: `query_batch` over points in memory, by `tesdf-bench batch`. Python: `Asset.query` of an array
+[N, 3], which returns four new arrays.
 """
 import argparse
 import json
@@ -21,7 +23,7 @@ from measured import ROOT, head, heading, row
 
 PASSES = 5
 
-# In a process of its own, as the number of threads is fixed with the first query.
+# Runs in its own process, because the first query fixes the number of threads.
 PYTHON = f"""
 import json, sys, time
 import numpy as np, tesdf
@@ -45,9 +47,9 @@ def output(*command, threads):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("meshes", nargs="*", type=Path, default=[ROOT / "data/procedural/iso_m16_bolt_24k.obj"])
-    parser.add_argument("--rust", required=True, help="tesdf-bench")
-    parser.add_argument("--points", type=int, default=1_000_000, help="default 10^6")
-    parser.add_argument("--rounds", type=int, default=3, help="Rust and Python in turns so often, the best counts; default 3")
+    parser.add_argument("--rust", required=True, help="the tesdf-bench binary")
+    parser.add_argument("--points", type=int, default=1_000_000, help="number of points; default 10^6")
+    parser.add_argument("--rounds", type=int, default=3, help="number of rounds of Rust and Python; the best counts; default 3")
     args = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
     heading(f"tesdf {tesdf.__version__}, numpy {np.__version__}")

@@ -1,5 +1,6 @@
-//! Meshes of any faces through `check` and `repair`: what is repaired has no worse defects than before, but of what was thinner than
-//! the tolerance for T-junctions nothing may be left.
+//! Runs `check` and `repair` on arbitrary meshes. A repair must not add errors to a mesh without
+//! errors. The only exception is a mesh that is thinner than the tolerance for T-junctions: nothing
+//! of it may remain.
 #![no_main]
 
 mod support;

@@ -1,4 +1,5 @@
-//! Two small bodies in any poses: each contact is at its distance, and no vertex is deeper than the deepest contact.
+//! Detects contacts of two small bodies in arbitrary poses. The distance of each contact must be
+//! right, and no vertex may be deeper than the deepest contact.
 #![no_main]
 
 mod support;
@@ -20,7 +21,7 @@ struct Body {
     asset: Arc<TeSdf>,
 }
 
-/// A box, an octahedron, and a box with a vertex pushed in, from fixed bytes.
+/// A box, an octahedron, and a box with a vertex that is pushed in, from fixed bytes.
 static BODIES: LazyLock<Vec<Body>> = LazyLock::new(|| {
     let bytes: [&[u8]; 3] = [&[1, 0, 0], &[0, 0, 0], &[1, 1, 7, 2, 4, 200, 4, 200, 4, 200, 0]];
     bytes
@@ -50,7 +51,7 @@ fn pose(bytes: &mut Unstructured) -> Result<Pose> {
     Ok(Pose::new(0.7 * support::point(bytes)?, rotation).expect("a unit quaternion"))
 }
 
-/// Twice what `f32` queries promise of bodies of these sizes.
+/// Twice the promised error of `f32` queries for bodies of these sizes.
 const TOLERANCE: f64 = 8e-6;
 
 fuzz_target!(|data: &[u8]| {

@@ -1,4 +1,5 @@
-//! Small meshes through the encoder: what is called a solid encodes, and answers as all faces do.
+//! Encodes small meshes. A mesh that passes `SolidMesh::new` must give the same answers as brute
+//! force over all faces, unless the encoder returns an error.
 #![no_main]
 
 mod support;

@@ -1,4 +1,4 @@
-//! Triangles and points of any shape: distances against rational arithmetic.
+//! Compares distances of arbitrary triangles and points with rational arithmetic.
 #![no_main]
 
 #[path = "../../crates/tesdf/src/testing/exact.rs"]
@@ -21,7 +21,7 @@ fn points(bytes: &mut Unstructured) -> Result<[DVec3; 6]> {
     ])
 }
 
-/// What a distance may lose, for coordinates up to 2.
+/// Bound on the rounding error of a distance, for coordinates up to 2.
 const ROUNDING: f64 = 1e-14;
 
 fuzz_target!(|data: &[u8]| {
@@ -40,7 +40,7 @@ fuzz_target!(|data: &[u8]| {
     for corner in [p, q, r] {
         assert!(distance <= triangle.closest(corner).distance + 1e-12, "{distance} {corner}");
     }
-    // A crossing is one way or the other, seen from either end.
+    // A crossing has the opposite sign for the reversed triangle.
     let crossing = signed_crossing(p, q, [a, b, c]);
     assert!((-1..=1).contains(&crossing));
     assert_eq!(signed_crossing(p, q, [a, c, b]), -crossing);

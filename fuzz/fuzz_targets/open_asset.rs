@@ -1,4 +1,5 @@
-//! `.tesdf` files of any bytes. What opens answers every query, and its cells can be visited.
+//! Opens arbitrary bytes as a `.tesdf` file. A file that opens must answer every query, and its
+//! cells can be visited.
 #![no_main]
 
 use glam::DVec3;

@@ -1,4 +1,4 @@
-//! `.tesrun` files of any bytes. What opens can be read to its last step.
+//! Opens arbitrary bytes as a run file. A run that opens can be read to its last step.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

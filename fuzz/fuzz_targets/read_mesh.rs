@@ -1,4 +1,4 @@
-//! Mesh files of any bytes: the first byte chooses the format, the others are the file.
+//! Reads arbitrary bytes as a mesh file: the first byte selects the format, the rest is the file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,5 @@
-//! Scene files of any text. What is accepted is made into a system, if it names no files.
+//! Reads arbitrary text as a scene file. An accepted scene that names no files is built into a
+//! system.
 #![no_main]
 
 use std::path::Path;

@@ -1,5 +1,5 @@
-//! Tetrahedra files of any bytes: the first byte chooses the format, the others are the file; of TetGen's two files the part after the first
-//! byte 0 is the second.
+//! Reads arbitrary bytes as a tetrahedra file: the first byte selects the format, the rest is the
+//! file. For TetGen's pair of files, the first zero byte separates the two files.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

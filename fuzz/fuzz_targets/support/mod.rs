@@ -1,11 +1,11 @@
-//! Small meshes from bytes: shapes that go wrong are as likely as sound ones.
+//! Builds small meshes from bytes. Degenerate shapes are as likely as regular ones.
 #![allow(dead_code, reason = "each target uses its own part")]
 
 use glam::DVec3;
 use libfuzzer_sys::arbitrary::{Result, Unstructured};
 use tesdf::mesh::TriangleMesh;
 
-/// A coordinate: of a coarse grid, nearly so, or any number from −2 to 2.
+/// A coordinate from −2 to 2: on a coarse grid, close to it, or any number.
 pub fn coordinate(bytes: &mut Unstructured) -> Result<f64> {
     let on_grid = f64::from(bytes.int_in_range(-4i8..=4)?) / 4.0;
     Ok(match bytes.int_in_range(0u8..=9)? {
@@ -16,12 +16,12 @@ pub fn coordinate(bytes: &mut Unstructured) -> Result<f64> {
     })
 }
 
-/// A point of such coordinates.
+/// A point with such coordinates.
 pub fn point(bytes: &mut Unstructured) -> Result<DVec3> {
     Ok(DVec3::new(coordinate(bytes)?, coordinate(bytes)?, coordinate(bytes)?))
 }
 
-/// Up to 12 vertices and 24 faces, in any order.
+/// A mesh of up to 12 vertices and 24 faces in any order.
 pub fn soup(bytes: &mut Unstructured) -> Result<TriangleMesh> {
     let vertices = (0..bytes.int_in_range(3usize..=12)?).map(|_| point(bytes)).collect::<Result<Vec<_>>>()?;
     let last = vertices.len() as u32 - 1;
@@ -33,7 +33,8 @@ pub fn soup(bytes: &mut Unstructured) -> Result<TriangleMesh> {
     Ok(TriangleMesh::new(vertices, faces).expect("ids are in range and numbers finite"))
 }
 
-/// A box or octahedron with moved vertices, then perhaps with faces of one vertex: closed, as every face stays.
+/// A box or octahedron with moved vertices, and sometimes additional faces that have one vertex
+/// only. The mesh stays closed, because no face is removed.
 pub fn closed(bytes: &mut Unstructured) -> Result<TriangleMesh> {
     let corner = |k: u32| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
     let (mut vertices, mut faces): (Vec<DVec3>, Vec<[u32; 3]>) = if bytes.arbitrary()? {
