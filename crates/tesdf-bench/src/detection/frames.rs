@@ -1,4 +1,4 @@
-//! Where the frames of a benchmark come from: a scene, a run, a file of poses.
+//! The frames of a benchmark, from a scene, a run or a file of poses.
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -17,32 +17,38 @@ use tesdf_terminal::progress::{interrupt_flag, watched};
 use tesdf_terminal::report::Failure;
 use tesdf_terminal::{asset_file, mesh_file, run_file};
 
-/// Most instances in all worlds.
+/// Maximum number of instances in all worlds.
 const MAX_INSTANCES: usize = 1 << 20;
-/// What to do about a file of poses that is refused.
+/// Hint for a file of poses that is refused.
 const WRITES_POSES: &str = "`tesdf bench poses` writes files of poses";
 
-/// Bodies, and where they are in each frame.
+/// Bodies and their poses in each frame.
 pub struct Frames {
     /// The bodies in their first poses.
     pub scene: Scene,
-    /// For each frame, for each instance of the scene.
+    /// For each frame, the pose of each instance of the scene.
     pub poses: Vec<Vec<Pose>>,
-    /// What the file says about contacts, if anything.
+    /// Contact distance in the file, if it has one.
     pub contact_distance: Option<f64>,
 }
 
 impl Frames {
-    /// Reads a scene (`.toml`), a run (`.tesrun`, at most `most` frames of it, evenly spaced) or poses (`.json`), and puts the same into
-    /// `worlds` worlds. Meshes of a file of poses get lists of at most `max_entries` faces.
+    /// Reads a scene (`.toml`), a run (`.tesrun`) or a file of poses (`.json`), and copies it into
+    /// `worlds` worlds. At most `max_frames` frames are read; those of a run are evenly spaced.
+    /// Meshes of a file of poses are encoded with lists of at most `max_entries` faces.
     ///
     /// # Errors
-    /// A file that cannot be read, or does not hold what its name says.
-    pub fn read(path: &Path, most: usize, worlds: u32, max_entries: Option<u32>) -> Result<Self, Failure> {
+    /// A file cannot be read, or its content does not match its extension.
+    pub fn read(
+        path: &Path,
+        max_frames: usize,
+        worlds: u32,
+        max_entries: Option<u32>,
+    ) -> Result<Self, Failure> {
         let frames = match path.extension().and_then(|e| e.to_str()) {
             Some("toml") => Self::of_scene(&LoadedScene::read(path).map_err(Failure::new)?)?,
-            Some("json") => Self::of_poses(path, most, max_entries)?,
-            _ => Self::of_run(path, most)?,
+            Some("json") => Self::of_poses(path, max_frames, max_entries)?,
+            _ => Self::of_run(path, max_frames)?,
         };
         frames.in_worlds(worlds)
     }
@@ -57,13 +63,13 @@ impl Frames {
         Ok(Self { scene, poses, contact_distance: loaded.scene.detector.contact_distance })
     }
 
-    fn of_run(path: &Path, most: usize) -> Result<Self, Failure> {
+    fn of_run(path: &Path, max_frames: usize) -> Result<Self, Failure> {
         let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
         let record = run_file::open(path)?;
         let loaded = LoadedScene::of_run(&record, path).map_err(Failure::new)?;
         let start = Self::of_scene(&loaded)?;
         let steps = record.times().len();
-        let every = steps.div_ceil(most.max(1)).max(1);
+        let every = steps.div_ceil(max_frames.max(1)).max(1);
         let bodies = start.poses[0].len();
         let frame = |step| (0..bodies).map(|body| record.pose(step, body)).collect::<Option<Vec<Pose>>>();
         let poses = (0..steps).step_by(every).map(frame).collect::<Option<Vec<_>>>();
@@ -71,7 +77,7 @@ impl Frames {
         Ok(Self { poses, ..start })
     }
 
-    fn of_poses(path: &Path, most: usize, max_entries: Option<u32>) -> Result<Self, Failure> {
+    fn of_poses(path: &Path, max_frames: usize, max_entries: Option<u32>) -> Result<Self, Failure> {
         let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
         let named = |e: &dyn std::fmt::Display| named(e).hint(WRITES_POSES);
         let text = input::read(path).map_err(|e| named(&e))?;
@@ -102,7 +108,7 @@ impl Frames {
         let pose = |[x, y, z, i, j, k, w]: [f64; 7]| {
             Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| named(&e))
         };
-        let frames = file.frames.into_iter().take(most).map(|f| f.into_iter().map(pose).collect());
+        let frames = file.frames.into_iter().take(max_frames).map(|f| f.into_iter().map(pose).collect());
         let poses: Vec<Vec<Pose>> = frames.collect::<Result<_, _>>()?;
         let count = file.instances.len();
         if let Some((k, f)) = poses.iter().enumerate().find(|(_, f)| f.len() != count) {
@@ -118,7 +124,8 @@ impl Frames {
         Ok(Self { scene, poses, contact_distance: Some(file.contact_distance) })
     }
 
-    /// The same in several worlds: frame `f` of world `w` is frame `f + w`, so that worlds differ.
+    /// Copies the frames into several worlds. Frame `f` of world `w` is frame `f + w`, so the
+    /// worlds differ.
     fn in_worlds(self, worlds: u32) -> Result<Self, Failure> {
         if worlds <= 1 {
             return Ok(self);
@@ -142,10 +149,10 @@ impl Frames {
         Ok(Self { scene, poses, contact_distance })
     }
 
-    /// Moves the scene's instances to where they are in a frame.
+    /// Moves the instances of the scene to their poses in a frame.
     ///
     /// # Errors
-    /// None for frames of the same scene.
+    /// Never for frames of the same scene.
     pub fn show(&mut self, frame: usize) -> Result<(), Failure> {
         let ids: Vec<InstanceId> = self.scene.instances().map(|(id, _)| id).collect();
         let poses: Vec<(InstanceId, Pose)> = ids.into_iter().zip(self.poses[frame].iter().copied()).collect();
@@ -153,7 +160,7 @@ impl Frames {
     }
 }
 
-/// A `.tesdf` file, or a mesh that is encoded.
+/// Opens a `.tesdf` file, or encodes a mesh.
 fn geometry(path: &Path, max_entries: Option<u32>, interrupted: &AtomicBool) -> Result<Arc<TeSdf>, Failure> {
     if path.extension().is_some_and(|e| e == "tesdf") {
         return asset_file::open(path).map(Arc::new);

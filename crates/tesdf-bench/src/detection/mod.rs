@@ -1,4 +1,4 @@
-//! `tesdf bench`: what detection costs on a device, stage by stage.
+//! `tesdf bench`: measures the cost of a detection on a device, stage by stage.
 mod collide;
 mod frames;
 #[cfg(feature = "gpu")]
@@ -12,24 +12,24 @@ use tesdf_terminal::report::{Failure, Outcome};
 #[derive(clap::Args, Debug)]
 pub struct Args {
     #[command(subcommand)]
-    what: What,
+    benchmark: Benchmark,
 }
 
 #[derive(clap::Subcommand, Debug)]
-enum What {
-    /// Detect the contacts of recorded or generated poses, and print time, launches, bytes and queries
+enum Benchmark {
+    /// Detect the contacts of recorded or generated poses; print time, launches, bytes and queries
     Collide(collide::Args),
-    /// Write a file of poses: bodies in overlap, from a seed
+    /// Write a file of poses with overlapping bodies, from a seed
     Poses(poses::Args),
 }
 
 /// Runs a benchmark.
 ///
 /// # Errors
-/// A file that cannot be read or written, or a device that fails.
+/// A file cannot be read or written, or a device fails.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    match &args.what {
-        What::Collide(args) => collide::run(args),
-        What::Poses(args) => poses::run(args),
+    match &args.benchmark {
+        Benchmark::Collide(args) => collide::run(args),
+        Benchmark::Poses(args) => poses::run(args),
     }
 }

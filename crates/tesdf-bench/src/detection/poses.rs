@@ -1,4 +1,4 @@
-//! Files of poses: bodies, and where their instances are, frame by frame.
+//! Files of poses: bodies, and the poses of their instances in each frame.
 use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
@@ -9,7 +9,7 @@ use tesdf_terminal::output::{self, Consent};
 use tesdf_terminal::parse;
 use tesdf_terminal::report::{self, Failure, Outcome, count};
 
-/// The version that is written and read.
+/// The version that this build writes and reads.
 pub const VERSION: u32 = 1;
 
 /// A file of poses, in JSON. Lengths are in the unit of the meshes.
@@ -17,49 +17,49 @@ pub const VERSION: u32 = 1;
 pub struct PoseFile {
     /// [`VERSION`].
     pub tesdf_poses: u32,
-    /// Contacts are taken up to this signed distance.
+    /// Contacts are detected up to this signed distance.
     pub contact_distance: f64,
-    /// The bodies: meshes, or `.tesdf` files; relative to the folder of this file.
+    /// The bodies: mesh files or `.tesdf` files, relative to the folder of this file.
     pub bodies: Vec<PathBuf>,
-    /// Which body each instance is, and its world.
+    /// For each instance, its body and its world.
     pub instances: Vec<(usize, u32)>,
-    /// For each frame, for each instance: translation, unit quaternion x y z w.
+    /// For each frame and instance: the translation and the unit quaternion x y z w.
     pub frames: Vec<Vec<[f64; 7]>>,
 }
 
-/// Scenes that the generator knows.
+/// Scenes of the generator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Scene {
     /// A nut on its bolt, within the clearance of 50 µm
     BoltNut,
-    /// A lobed peg in its hole, 100 µm of clearance, on the way in
+    /// A lobed peg that enters its hole, with 100 µm of clearance
     PegHole,
-    /// 128 shafts in deep overlap, in any pose
+    /// 128 shafts in random poses, with deep overlaps
     Shafts,
 }
 
 /// Arguments of `tesdf bench poses`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// What is posed
+    /// The scene
     #[arg(value_enum)]
     pub scene: Scene,
-    /// The file to write: JSON; an existing one is replaced, a pipe or device is written to
+    /// Output file, JSON; an existing file is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]
     pub consent: Consent,
-    /// Frames
+    /// Number of frames
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
-    /// The same input gives the same poses
+    /// Seed of the random poses
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub seed: u64,
-    /// Contacts are taken up to this signed distance [default: 0.2 mm, for shafts 0]
+    /// Contacts are detected up to this signed distance [default: 0.2 mm, for shafts 0]
     #[arg(long, value_name = "D", value_parser = parse::length)]
     pub contact_distance: Option<f64>,
-    /// The folder of the meshes
+    /// Folder of the meshes
     #[arg(long, value_name = "FOLDER", default_value = "data/procedural")]
     pub data: PathBuf,
 }
@@ -98,7 +98,7 @@ impl Scene {
         let still = pose(DVec3::ZERO, DQuat::IDENTITY);
         match self {
             Self::BoltNut => {
-                // A shift along the axis turns the nut by the pitch of 2 mm.
+                // A shift along the axis rotates the nut according to the pitch of 2 mm.
                 let frame = |_| {
                     let z = random.f64() * 0.01;
                     let angle = z / 0.002 * std::f64::consts::TAU;
@@ -110,7 +110,7 @@ impl Scene {
                 file(&bodies, vec![(0, 0), (1, 0)], 2e-4, frames)
             }
             Self::PegHole => {
-                // On its floor the peg stands 5 mm up.
+                // On the floor of the hole the peg stands 5 mm up.
                 let frame = |_| {
                     let aside = 4e-5 * (in_cube(random) * DVec3::new(1.0, 1.0, 0.0));
                     vec![still, pose(aside + DVec3::Z * (0.006 + 0.02 * random.f64()), DQuat::IDENTITY)]
@@ -131,7 +131,7 @@ impl Scene {
     }
 }
 
-/// Half the side of the cube that the middles of 128 shafts lie in.
+/// Half of the side of the cube that contains the centres of the 128 shafts, m.
 const SHAFTS: f64 = 0.24;
 
 fn pose(p: DVec3, q: DQuat) -> [f64; 7] {
@@ -143,7 +143,7 @@ fn in_cube(random: &mut fastrand::Rng) -> DVec3 {
     DVec3::new(between(), between(), between())
 }
 
-/// Uniform over all rotations.
+/// A rotation that is uniform over all rotations.
 fn rotation(random: &mut fastrand::Rng) -> DQuat {
     loop {
         let v = in_cube(random);

@@ -1,4 +1,4 @@
-//! A smooth field that bends and twists a body.
+//! A smooth deformation that bends and twists a body.
 use tesdf::TeSdf;
 use tesdf::deform::Moved;
 use tesdf::domain::ConformingMesh;
@@ -7,22 +7,23 @@ use tesdf::glam::{DQuat, DVec3};
 
 use tesdf_terminal::report::Failure;
 
-/// A bend of the far end against the near one, with a twist around the long axis.
+/// A bend of the far end relative to the near end, with a twist around the longest axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bend {
-    /// rad.
+    /// Bending angle, rad.
     pub bend: f64,
-    /// rad.
+    /// Twisting angle, rad.
     pub twist: f64,
 }
 
-/// What is tried first.
+/// The first deformation that is tried.
 const STRONG: Bend = Bend { bend: 0.5, twist: 0.3 };
-/// By how much it is weakened while it turns a tetrahedron over.
+/// Factor by which a deformation is weakened while it inverts a tetrahedron.
 const WEAKER: f64 = 0.8;
 
 impl Bend {
-    /// The strongest of a series that turns no tetrahedron over: meshers leave flat ones at surfaces, which do not bear much.
+    /// The strongest deformation of a series that inverts no tetrahedron. Meshers leave flat
+    /// tetrahedra at surfaces, which invert early.
     pub fn of(domain: &ConformingMesh) -> Self {
         let bounds = Aabb::of(domain.vertices());
         let mut bend = STRONG;
@@ -39,7 +40,8 @@ impl Bend {
         bend
     }
 
-    /// Where a point of a body with these bounds goes: the longest axis becomes an arc.
+    /// The deformed position of a point of a body with these bounds: the longest axis becomes an
+    /// arc.
     fn apply(self, bounds: Aabb, p: DVec3) -> DVec3 {
         let extent = bounds.extent();
         let by_length = |a: &usize, b: &usize| extent[*a].total_cmp(&extent[*b]);
@@ -62,7 +64,7 @@ impl Bend {
     /// Moves all vertices of an asset of this domain.
     ///
     /// # Errors
-    /// A vertex cannot be moved so far.
+    /// A vertex cannot be moved that far.
     pub fn move_vertices(self, asset: &mut TeSdf, domain: &ConformingMesh) -> Result<Moved, Failure> {
         let bounds = Aabb::of(domain.vertices());
         let moves: Vec<(u32, DVec3)> =

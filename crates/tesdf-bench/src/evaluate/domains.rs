@@ -1,4 +1,4 @@
-//! Meshes and the tetrahedra around them.
+//! Opens meshes and makes the tetrahedra around them.
 use std::path::Path;
 
 use tesdf::Progress;
@@ -14,26 +14,26 @@ use tesdf_terminal::mesh_file;
 use tesdf_terminal::report::{Failure, note};
 
 /// A solid in a domain.
-pub struct Place {
+pub struct Subject {
     pub solid: SolidMesh,
     pub source: Source,
-    /// As rows name it.
+    /// Name of the domain in the rows of a table.
     pub name: String,
-    /// `None`: the bisection domain.
+    /// The tetrahedra; `None` for the bisection domain.
     pub conforming: Option<ConformingMesh>,
 }
 
-impl Place {
+impl Subject {
     pub fn domain(&self) -> Domain<'_> {
         self.conforming.as_ref().map_or(Domain::Bisection, Domain::Conforming)
     }
 }
 
-/// The mesh in the domain; one that comes with tetrahedra keeps them.
+/// Opens a mesh in a domain. A mesh that comes with tetrahedra keeps them.
 ///
 /// # Errors
-/// A file cannot be read, the mesh is no solid, or there are no tetrahedra of it.
-pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Place, Failure> {
+/// A file cannot be read, the mesh is not a solid, or tetrahedra are missing.
+pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Subject, Failure> {
     let path = data.join(mesh.path);
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
     if !path.exists() {
@@ -47,13 +47,13 @@ pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Place, Failu
         let solid = SolidMesh::new(surface).map_err(|e| at(&e))?;
         let conforming = ConformingMesh::new(&solid, &tetrahedra).map_err(|e| at(&e))?;
         let source = Source { name, ..Source::default() };
-        return Ok(Place { solid, source, name: "file".into(), conforming: Some(conforming) });
+        return Ok(Subject { solid, source, name: "file".into(), conforming: Some(conforming) });
     }
     let loaded = mesh_file::read(&path)?;
     let source = Source { name, blake3: loaded.report.source_blake3.clone() };
     let solid = SolidMesh::new(loaded.mesh).map_err(|e| at(&e))?;
     if domain == DomainName::Bisection {
-        return Ok(Place { solid, source, name: "bisection".into(), conforming: None });
+        return Ok(Subject { solid, source, name: "bisection".into(), conforming: None });
     }
     let options = GmshOptions { band: mesh.outside, ..GmshOptions::default() };
     let made = tetrahedralise_and_report(&solid, &options, &Progress::default()).map_err(|e| match e {
@@ -61,7 +61,7 @@ pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Place, Failu
         e => Failure::new(e),
     })?;
     made.refused.iter().for_each(|refused| note(&format!("{}: {refused:?}", mesh.name)));
-    Ok(Place { solid, source, name: "Gmsh".into(), conforming: Some(made.mesh) })
+    Ok(Subject { solid, source, name: "Gmsh".into(), conforming: Some(made.mesh) })
 }
 
 #[cfg(test)]

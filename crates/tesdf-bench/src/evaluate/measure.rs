@@ -1,4 +1,4 @@
-//! One way to encode a mesh: made, counted and compared with exact distances.
+//! Encodes a mesh with one set of options, and compares the asset with exact distances.
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -8,47 +8,47 @@ use tesdf::evaluate::{BandReport, EvaluateOptions, evaluate};
 use tesdf::inspect::{InspectOptions, inspect};
 use tesdf::{Progress, TeSdf};
 
-use super::domains::Place;
+use super::domains::Subject;
 use super::output;
 use tesdf_terminal::progress::{Bar, watched};
 use tesdf_terminal::report::Failure;
 
-/// How lists are made.
+/// The encoder, domain and options of a row.
 #[derive(Clone, Debug)]
-pub struct Way {
-    /// As rows name the encoder: `certified`, or Q / ε.
+pub struct Setup {
+    /// Name of the encoder in the rows: `certified`, or Q / ε.
     pub encoder: String,
-    /// As rows name the domain.
+    /// Name of the domain in the rows.
     pub domain: String,
-    /// What the library is asked for.
+    /// Options of the library.
     pub options: EncodeOptions,
 }
 
-/// What is done with the tetrahedra of a conforming domain.
+/// Treatment of the tetrahedra of a conforming domain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cells {
-    /// Nothing.
+    /// The tetrahedra stay as they are.
     Plain,
-    /// They are bisected where that pays.
+    /// The tetrahedra are bisected where that reduces the cost.
     Bisected,
 }
 
-impl Way {
-    /// With the certified encoder.
-    pub fn certified(place: &Place, cells: Cells, deformation: Deformation) -> Self {
-        let plain = place.conforming.is_some() && cells == Cells::Plain;
+impl Setup {
+    /// The certified encoder.
+    pub fn certified(subject: &Subject, cells: Cells, deformation: Deformation) -> Self {
+        let plain = subject.conforming.is_some() && cells == Cells::Plain;
         let refinement = if plain { Refinement::None } else { Refinement::ByCost };
-        let domain = match place.conforming {
-            Some(_) if !plain => format!("{}, bisected", place.name),
-            _ => place.name.clone(),
+        let domain = match subject.conforming {
+            Some(_) if !plain => format!("{}, bisected", subject.name),
+            _ => subject.name.clone(),
         };
         let options = EncodeOptions { refinement, deformation, ..EncodeOptions::default() };
         Self { encoder: "certified".into(), domain, options }
     }
 
-    /// With Algorithm 1 and the paper's α, in plain tetrahedra.
-    pub fn sampled(place: &Place, resolution: u32, threshold: f64, deformation: Deformation) -> Self {
-        let certified = Self::certified(place, Cells::Plain, deformation);
+    /// Algorithm 1 with the paper's α, in tetrahedra that are not bisected.
+    pub fn sampled(subject: &Subject, resolution: u32, threshold: f64, deformation: Deformation) -> Self {
+        let certified = Self::certified(subject, Cells::Plain, deformation);
         let sampling = Sampling { resolution, threshold: Threshold::Absolute(threshold), ..Sampling::PAPER };
         Self {
             encoder: format!("{resolution} / {}", output::threshold(threshold)),
@@ -57,17 +57,18 @@ impl Way {
         }
     }
 
-    /// The same with lists of at most so many faces.
+    /// The same options, with lists of at most `max_entries` faces.
     pub fn truncated(&self, max_entries: u32) -> Self {
         let options = EncodeOptions { max_entries: Some(max_entries), ..self.options.clone() };
         Self { options, ..self.clone() }
     }
 
-    /// Encodes, the samples of Algorithm 1 looked at by `sampler`; also the seconds that it took.
+    /// Encodes, where `sampler` evaluates the samples of Algorithm 1. Returns the asset and the
+    /// time, s.
     ///
     /// # Errors
-    /// What the library refused.
-    pub fn encode(&self, place: &Place, sampler: &dyn Sampler) -> Result<(TeSdf, f64), Failure> {
+    /// The errors of the encoder.
+    pub fn encode(&self, subject: &Subject, sampler: &dyn Sampler) -> Result<(TeSdf, f64), Failure> {
         let start = Instant::now();
         let progress = Progress::default();
         let never = AtomicBool::new(false);
@@ -80,34 +81,34 @@ impl Way {
                 .progress(&progress)
                 .encode(&place.solid)
         });
-        let asset = asset.map_err(|e| Failure::new(format!("{}: {e}", place.source.name)))?;
+        let asset = asset.map_err(|e| Failure::new(format!("{}: {e}", subject.source.name)))?;
         Ok((asset, start.elapsed().as_secs_f64()))
     }
 }
 
-/// What an asset costs.
+/// Size and query cost of an asset.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Cost {
-    /// Tetrahedra with a list or without.
+    /// Number of tetrahedra, with and without a list.
     pub tetrahedra: usize,
     /// Mean length of the lists.
     pub list_mean: f64,
-    /// Length of the longest.
+    /// Length of the longest list.
     pub longest_list: usize,
-    /// Mean length of the lists by volume.
+    /// Mean length of the lists, weighted by volume.
     pub list_by_volume: f64,
-    /// Faces and nodes that a query reads, by volume.
+    /// Mean number of faces and nodes that a query reads, weighted by volume.
     pub read_by_volume: f64,
-    /// The paper account, MiB.
+    /// Memory in the paper's account, MiB.
     pub memory_mib: f64,
-    /// Every byte that is resident.
+    /// All resident bytes.
     pub whole_bytes: usize,
 }
 
 impl Cost {
     pub fn of(asset: &TeSdf) -> Self {
         let found = inspect(asset, &InspectOptions::default());
-        // Reads of far cells are part of the other mean; this one is of lists alone.
+        // `volume_weighted` includes the reads of far cells; this mean is over the lists alone.
         let reads = &found.reads;
         let listed = 1.0 - reads.fallback_volume;
         Self {
@@ -125,7 +126,7 @@ impl Cost {
 /// Compares assets of the same mesh with exact distances.
 ///
 /// # Errors
-/// As [`evaluate`].
+/// The same errors as [`evaluate`].
 pub fn compare(assets: &[&TeSdf], options: &EvaluateOptions) -> Result<Vec<BandReport>, Failure> {
     let bar = Bar::new("comparing with exact distances");
     evaluate(assets, options, |share| bar.set(share)).map_err(Failure::new)

@@ -1,4 +1,4 @@
-//! The meshes of Table I: nearest to the paper's, whose own are not public.
+//! The meshes of Table I. The paper's own meshes are not public; these are the most similar ones.
 use tesdf::Length;
 
 use super::paper;
@@ -6,30 +6,31 @@ use super::paper;
 /// A mesh, and how it is measured.
 #[derive(Debug)]
 pub struct Mesh {
-    /// As its rows are called.
+    /// Name in the rows.
     pub name: &'static str,
-    /// Under the folder of meshes.
+    /// Path in the folder of meshes.
     pub path: &'static str,
-    /// The rows of the paper's Table I that it stands beside.
+    /// The rows of the paper's Table I that are printed above the rows of this mesh.
     pub paper: &'static [&'static str],
-    /// ε of the sampled encoder, mesh unit: that of the paper's row.
+    /// ε of the sampled encoder, in the mesh's unit, as in the paper's row.
     pub threshold: f64,
-    /// In a conforming domain also the space outside, up to here: where the paper's tetrahedra per face say so.
+    /// Width of the band outside the body in a conforming domain. It is given where the paper's
+    /// number of tetrahedra per face indicates such a band.
     pub outside: Option<Length>,
-    /// Whether a deformed form is measured, too, in a conforming domain.
+    /// Whether a deformed shape is measured as well, in a conforming domain.
     pub deforms: Deforms,
     /// Whether it is measured with `--quick`.
     pub quick: Quick,
 }
 
-/// Whether a mesh is measured deformed.
+/// Whether a mesh is also measured after a deformation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deforms {
     Yes,
     No,
 }
 
-/// Whether a mesh is among the quick ones.
+/// Whether a mesh is measured with `--quick`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quick {
     Yes,
@@ -49,18 +50,18 @@ const fn rigid(
     Mesh { name, path, paper, threshold, outside, deforms: Deforms::No, quick }
 }
 
-/// Q of the paper for meshes that have no row of their own.
+/// The paper's Q for meshes without a row of their own.
 const USUAL_RESOLUTION: u32 = 128;
 
 impl Mesh {
-    /// Q of the paper's row.
+    /// Q in the paper's row.
     pub fn paper_resolution(&self) -> u32 {
         let row = self.paper.iter().find_map(|name| paper::table_1(name)?.sampling);
         row.map_or(USUAL_RESOLUTION, |(resolution, _)| resolution)
     }
 }
 
-/// All of them, in the order of the table.
+/// All meshes, in the order of the table.
 pub const MESHES: [Mesh; 8] = [
     rigid("bolt", "procedural/iso_m16_bolt_24k.obj", &["M16 bolt"], 0.0, AROUND, Quick::No),
     rigid("nut", "procedural/iso_m16_nut_c100.obj", &["M16 Nut"], 0.0, None, Quick::No),
@@ -85,7 +86,7 @@ pub const MESHES: [Mesh; 8] = [
         deforms: Deforms::Yes,
         quick: Quick::No,
     },
-    // Tetrahedra from a file: conforming without any program.
+    // A mesh with tetrahedra from a file, so it conforms without another program.
     Mesh {
         name: "beam",
         path: "procedural/beam.ele",
@@ -97,5 +98,5 @@ pub const MESHES: [Mesh; 8] = [
     },
 ];
 
-/// That of Table IV.
+/// The mesh of Table IV.
 pub const SHAFT: &str = "procedural/shaft_keyway.obj";

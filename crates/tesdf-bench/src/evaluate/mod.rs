@@ -1,8 +1,9 @@
-//! `tesdf evaluate table1|table4`: Tables I and IV of the paper, measured, beside the paper's figures.
+//! `tesdf evaluate table1|table4`: measures Tables I and IV of the paper, next to the paper's
+//! figures.
 //!
-//! In go the meshes of the repository (`meshes`); each is encoded in a domain with both encoders, with full lists and with
-//! truncated ones (`measure`), and compared with exact distances on a grid. Out come rows (`table1`, `table4`)
-//! as Markdown, CSV or JSON.
+//! The meshes of the repository (`meshes`) are encoded in a domain with both encoders, with full
+//! and with truncated lists (`measure`). The assets are compared with exact distances on a grid.
+//! The rows (`table1`, `table4`) are printed as Markdown, CSV or JSON.
 mod deformed;
 mod domains;
 mod measure;
@@ -25,7 +26,7 @@ use tesdf_terminal::report::{Failure, Outcome};
 /// Arguments of `tesdf evaluate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Which table
+    /// The table
     #[command(subcommand)]
     pub table: Table,
 }
@@ -33,40 +34,43 @@ pub struct Args {
 /// Tables of the paper.
 #[derive(clap::Subcommand, Clone, Debug)]
 pub enum Table {
-    /// Table I: memory, largest error and bands of several meshes, full lists and at most 32 faces
+    /// Table I: memory, largest error and bands of several meshes, with full lists and with at most
+    /// 32 faces per list
     Table1(TableArgs),
-    /// Table IV: the same of the shaft, for lists of at most 32, 64, ... 288 faces
+    /// Table IV: the same figures for the shaft, with at most 32, 64, ... 288 faces per list
     Table4(TableArgs),
 }
 
 /// Arguments of a table.
 #[derive(clap::Args, Clone, Debug)]
 pub struct TableArgs {
-    /// How space is cut into tetrahedra; several are separated by commas and give rows each
+    /// Division of space into tetrahedra; several values, separated by commas, give separate rows
     #[arg(long, value_enum, value_delimiter = ',', default_value = "bisection")]
     pub domain: Vec<DomainName>,
-    /// Points of the grid along the diagonal of a mesh [default: 1024; with --quick 64]
+    /// Number of grid points along the diagonal of a mesh [default: 1024; with --quick 64]
     #[arg(long, value_name = "N")]
     pub grid: Option<u32>,
-    /// Q of the sampled encoder: samples per edge of a tetrahedron [default: 32; with --quick 4; on a device the paper's of each mesh]
+    /// Resolution Q of the sampled encoder: an edge of a tetrahedron has Q + 1 samples [default:
+    /// 32; with --quick 4; on a device the paper's value for each mesh]
     #[arg(long, value_name = "Q")]
     pub resolution: Option<u32>,
-    /// Where samples are looked at
+    /// Where samples are evaluated
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("samples are looked at"))]
     pub device: Choice,
-    /// A coarse grid, few samples, and in Table I the smaller meshes alone
+    /// Use a coarse grid and few samples, and in Table I only the smaller meshes
     #[arg(long)]
     pub quick: bool,
-    /// Meshes by the names of their rows, separated by commas [default: all of the table]
+    /// Names of the meshes, separated by commas [default: all meshes of the table]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub meshes: Option<Vec<String>>,
-    /// The folder with the meshes: `data` of the repository
+    /// Folder of the meshes: `data` of the repository
     #[arg(long, value_name = "FOLDER", default_value = "data")]
     pub data: PathBuf,
-    /// Form of the result
+    /// Format of the result
     #[arg(long, value_enum, default_value_t = Format::Md)]
     pub format: Format,
-    /// Write the result in every form to this folder, which is made where it is not there, instead of printing it
+    /// Write the result in all formats to this folder, which is created if necessary, instead of
+    /// printing it
     #[arg(short, long, value_name = "FOLDER", conflicts_with = "format")]
     pub output: Option<PathBuf>,
     /// Whether a read-only output is replaced.
@@ -74,23 +78,23 @@ pub struct TableArgs {
     pub consent: Consent,
 }
 
-/// Ways to cut space into tetrahedra.
+/// Methods that divide space into tetrahedra.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum DomainName {
-    /// Cubes and their halves; no other program is needed
+    /// Bisected tetrahedra of a cube; needs no other program
     Bisection,
-    /// Tetrahedra that conform to the surface, by Gmsh, which must be installed: as in the paper
+    /// Tetrahedra that conform to the surface, as in the paper; needs Gmsh
     Gmsh,
 }
 
-/// Forms of a result.
+/// Formats of a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Format {
-    /// Markdown, with command, date and processor above
+    /// Markdown with command, date and processor
     Md,
-    /// One row per line
+    /// CSV, one row per line
     Csv,
-    /// Figures with full precision
+    /// JSON, with full precision
     Json,
 }
 
@@ -112,9 +116,9 @@ impl TableArgs {
 /// Measures and prints the table.
 ///
 /// # Errors
-/// A mesh cannot be read or encoded, Gmsh is not there or fails, or the result cannot be written.
+/// A mesh cannot be read or encoded, Gmsh is missing or fails, or the result cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    // Files are opened before the work of minutes to hours, whose result they take.
+    // The output files are opened before the work, which takes minutes to hours.
     match &args.table {
         Table::Table1(args) => table1::run(args, &Sink::open(args, "table1")?)?,
         Table::Table4(args) => table4::run(args, &Sink::open(args, "table4")?)?,

@@ -1,4 +1,4 @@
-//! Tables as text.
+//! Formats tables as text.
 use serde::Serialize;
 use tesdf::domain::tetrahedra_files;
 use tesdf::evaluate::BandReport;
@@ -16,7 +16,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// Markdown; the first `left` columns are aligned left.
+    /// Formats the table as Markdown. The first `left` columns are aligned left.
     pub fn markdown(&self, left: usize) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let rules: Vec<&str> =
@@ -36,15 +36,15 @@ impl Text {
     }
 }
 
-/// Where a table goes.
+/// The destination of a table.
 pub enum Sink {
     Stdout(Format),
-    /// JSON, CSV and Markdown.
+    /// JSON, CSV and Markdown files.
     Files([Destination; 3]),
 }
 
 impl Sink {
-    /// What the arguments ask for; the folder is made where it is not there.
+    /// The destination in the arguments. Its folder is created if necessary.
     ///
     /// # Errors
     /// A file cannot be written, or is one of the meshes.
@@ -59,11 +59,11 @@ impl Sink {
         Ok(Self::Files([open("json")?, open("csv")?, open("md")?]))
     }
 
-    /// Prints a table in the form that was asked for, or writes it in all of them. Markdown is as given, CSV and JSON have all
-    /// figures.
+    /// Prints a table in the chosen format, or writes it in all formats. Markdown is printed as
+    /// given; CSV and JSON have all figures.
     ///
     /// # Errors
-    /// stdout or a file cannot be written.
+    /// Stdout or a file cannot be written.
     pub fn print<T: Serialize>(&self, json: &T, csv: &Text, markdown: &str) -> Result<(), Failure> {
         let files = match self {
             Self::Stdout(Format::Json) => return report::json(json),
@@ -81,7 +81,7 @@ impl Sink {
     }
 }
 
-/// At most three significant digits.
+/// Formats a number with at most three significant digits.
 pub fn short(value: f64) -> String {
     let magnitude = value.abs().log10().floor();
     match magnitude {
@@ -98,12 +98,12 @@ pub fn short(value: f64) -> String {
     }
 }
 
-/// A band, rounded down: only one that is the whole of the solid is 1.
+/// Formats a band, rounded down, so that only a band over the whole solid is 1.
 pub fn band(value: f64) -> String {
     short((value * 1e3).floor() / 1e3)
 }
 
-/// The largest error in percent; `0` when it counts as none.
+/// The largest error in percent, or `0` if it is within the tolerance for exactness.
 pub fn error(report: &BandReport) -> Option<String> {
     match report.max_error <= report.exact {
         true => Some("0".into()),
@@ -111,12 +111,12 @@ pub fn error(report: &BandReport) -> Option<String> {
     }
 }
 
-/// ε of the sampled encoder.
+/// Formats ε of the sampled encoder.
 pub fn threshold(epsilon: f64) -> String {
     if epsilon == 0.0 { "0".into() } else { format!("{epsilon:e}") }
 }
 
-/// A figure that may be missing.
+/// Replaces a missing figure by a dash.
 pub fn or_dash(value: Option<String>) -> String {
     value.unwrap_or_else(|| "–".into())
 }

@@ -1,13 +1,14 @@
-//! The paper's figures: H. Ji, Y. Lee, D. Lee, *TE-SDF: Tetra-Encoded Signed Distance Field for Memory-Efficient and Accurate
-//! Collision Detection*, Tables I and IV. Memory is in MiB (`docs/paper-map.md` says why).
+//! The figures of the paper: H. Ji, Y. Lee, D. Lee, *TE-SDF: Tetra-Encoded Signed Distance Field
+//! for Memory-Efficient and Accurate Collision Detection*, Tables I and IV. Memory is in MiB;
+//! `docs/paper-map.md` gives the reason.
 
-/// A row of Table I; pairs are of full lists and of E_max = 32.
+/// A row of Table I. Pairs are for full lists and for E_max = 32.
 pub struct Table1 {
     pub name: &'static str,
     pub vertices: usize,
     pub faces: usize,
     pub tetrahedra: usize,
-    /// Q, and ε as printed.
+    /// Q and ε, as printed.
     pub sampling: Option<(u32, f64)>,
     pub list_mean: f64,
     pub longest_list: usize,

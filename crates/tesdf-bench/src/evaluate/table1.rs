@@ -1,4 +1,4 @@
-//! Table I: each mesh with full lists and with at most 32 faces, by both encoders.
+//! Table I: each mesh with full lists and with at most 32 faces per list, by both encoders.
 use std::time::Instant;
 
 use serde::Serialize;
@@ -7,8 +7,8 @@ use tesdf::encode::{Deformation, Sampler};
 use tesdf::evaluate::{BandReport, EvaluateOptions};
 
 use super::deformed::Bend;
-use super::domains::{Place, open};
-use super::measure::{Cells, Cost, Way, compare};
+use super::domains::{Subject, open};
+use super::measure::{Cells, Cost, Setup, compare};
 use super::meshes::{Deforms, MESHES, Mesh, Quick};
 use super::output::{Sink, Text, band, error, or_dash, short, threshold};
 use super::{TableArgs, paper};
@@ -17,17 +17,17 @@ use tesdf_terminal::report::{Failure, note};
 /// E_max of the truncated lists.
 const MAX_ENTRIES: u32 = 32;
 
-/// What `--format json` prints.
+/// The output of `--format json`.
 #[derive(Serialize)]
 struct Table {
     table: u32,
-    /// Voxels along the diagonal.
+    /// Number of voxels along the diagonal.
     grid: u32,
     max_entries: u32,
     rows: Vec<Row>,
 }
 
-/// A mesh in a domain by an encoder, or a row of the paper.
+/// A mesh in a domain, encoded by an encoder, or a row of the paper.
 #[derive(Serialize)]
 struct Row {
     name: String,
@@ -37,20 +37,20 @@ struct Row {
     domain: String,
     /// `certified`, or Q / ε.
     encoder: String,
-    /// Vertices of the surface and of the tetrahedra.
+    /// Number of vertices of the surface and of the tetrahedra.
     vertices: usize,
     faces: usize,
     full: Figures,
     truncated: Figures,
-    /// Of full lists; for a re-encoded asset, of the stale cells alone.
+    /// Encoding time of full lists, s; for a re-encoded asset the time of the stale cells.
     encode_seconds: Option<f64>,
     reencoded: Option<Reencoded>,
-    /// Of a deformed body.
+    /// Bending angle of a deformed body.
     bend_degrees: Option<f64>,
     twist_degrees: Option<f64>,
 }
 
-/// What re-encoding looked at.
+/// Numbers of cells in a re-encoding.
 #[derive(Clone, Copy, Serialize)]
 struct Reencoded {
     cells: usize,
@@ -58,7 +58,7 @@ struct Reencoded {
     stale: usize,
 }
 
-/// An asset.
+/// Figures of an asset.
 #[derive(Clone, Serialize)]
 struct Figures {
     tetrahedra: usize,
@@ -71,7 +71,7 @@ struct Figures {
     max_error_percent: Option<f64>,
     exactness_band: Option<f64>,
     one_percent_band: Option<f64>,
-    /// All that was found on the grid.
+    /// The report of the comparison on the grid.
     on_grid: Option<BandReport>,
 }
 
@@ -124,22 +124,22 @@ fn paper_row(row: &paper::Table1) -> Row {
     }
 }
 
-/// A mesh encoded in one way.
+/// A mesh that was encoded with one set of options.
 struct Made {
-    way: Way,
+    setup: Setup,
     full: TeSdf,
-    /// `None`: no list of the full asset is too long.
+    /// `None` when no list of the full asset exceeds the limit.
     truncated: Option<TeSdf>,
     seconds: f64,
 }
 
 impl Made {
-    fn new(way: Way, place: &Place, sampler: &dyn Sampler) -> Result<Self, Failure> {
-        let (full, seconds) = way.encode(place, sampler)?;
+    fn new(setup: Setup, subject: &Subject, sampler: &dyn Sampler) -> Result<Self, Failure> {
+        let (full, seconds) = setup.encode(subject, sampler)?;
         let cut = full.about().statistics.longest_list > MAX_ENTRIES as usize;
         let truncated =
-            cut.then(|| way.truncated(MAX_ENTRIES).encode(place, sampler)).transpose()?.map(|(a, _)| a);
-        Ok(Self { way, full, truncated, seconds })
+            cut.then(|| setup.truncated(MAX_ENTRIES).encode(subject, sampler)).transpose()?.map(|(a, _)| a);
+        Ok(Self { setup, full, truncated, seconds })
     }
 
     fn assets(&self) -> impl Iterator<Item = &TeSdf> {
@@ -151,8 +151,13 @@ impl Made {
     }
 }
 
-/// Rows of what was made, compared with exact distances all at once.
-fn rows(mesh: &Mesh, place: &Place, made: &[Made], options: &EvaluateOptions) -> Result<Vec<Row>, Failure> {
+/// The rows of these assets. One pass over the grid compares all of them with exact distances.
+fn rows(
+    mesh: &Mesh,
+    subject: &Subject,
+    made: &[Made],
+    options: &EvaluateOptions,
+) -> Result<Vec<Row>, Failure> {
     let assets: Vec<&TeSdf> = made.iter().flat_map(Made::assets).collect();
     let mut reports = compare(&assets, options)?.into_iter();
     let mut figures = |asset: &TeSdf| reports.next().map(|report| Figures::of(Cost::of(asset), report));
@@ -160,14 +165,14 @@ fn rows(mesh: &Mesh, place: &Place, made: &[Made], options: &EvaluateOptions) ->
     for made in made {
         let Some(full) = figures(&made.full) else { break };
         let truncated = made.truncated.as_ref().and_then(&mut figures).unwrap_or_else(|| full.clone());
-        let solid = place.solid.mesh();
+        let solid = subject.solid.mesh();
         rows.push(Row {
             name: mesh.name.into(),
             from: "tesdf",
             mesh: Some(mesh.path.into()),
-            domain: made.way.domain.clone(),
-            encoder: made.way.encoder.clone(),
-            vertices: place.conforming.as_ref().map_or(solid.vertices().len(), |d| d.vertices().len()),
+            domain: made.setup.domain.clone(),
+            encoder: made.setup.encoder.clone(),
+            vertices: subject.conforming.as_ref().map_or(solid.vertices().len(), |d| d.vertices().len()),
             faces: solid.faces().len(),
             full,
             truncated,
@@ -183,7 +188,7 @@ fn rows(mesh: &Mesh, place: &Place, made: &[Made], options: &EvaluateOptions) ->
 /// Measures and prints the table.
 ///
 /// # Errors
-/// As [`run`](super::run).
+/// The same errors as [`run`](super::run).
 pub fn run(args: &TableArgs, sink: &Sink) -> Result<(), Failure> {
     let options = args.evaluate_options();
     let sampler = args.device.sampler()?;
@@ -196,8 +201,8 @@ pub fn run(args: &TableArgs, sink: &Sink) -> Result<(), Failure> {
         table.rows.extend(mesh.paper.iter().filter_map(|name| paper::table_1(name)).map(paper_row));
         for domain in domains {
             note(&format!("{}, {domain:?}", mesh.name));
-            let place = open(mesh, &args.data, domain)?;
-            measure(mesh, &place, args, &*sampler, &options, &mut table.rows)?;
+            let subject = open(mesh, &args.data, domain)?;
+            measure(mesh, &subject, args, &*sampler, &options, &mut table.rows)?;
         }
     }
     sink.print(&table, &csv(&table.rows), &markdown(&table))
@@ -217,25 +222,25 @@ fn chosen(args: &TableArgs) -> Result<Vec<&'static Mesh>, Failure> {
 
 fn measure(
     mesh: &Mesh,
-    place: &Place,
+    subject: &Subject,
     args: &TableArgs,
     sampler: &dyn Sampler,
     options: &EvaluateOptions,
     table: &mut Vec<Row>,
 ) -> Result<(), Failure> {
-    let deforms = place.conforming.is_some() && mesh.deforms == Deforms::Yes;
+    let deforms = subject.conforming.is_some() && mesh.deforms == Deforms::Yes;
     let deformation = if deforms { Deformation::Expected } else { Deformation::None };
-    let ways = [
-        Way::certified(place, Cells::Plain, deformation),
-        Way::sampled(place, args.resolution(mesh), mesh.threshold, deformation),
+    let setups = [
+        Setup::certified(subject, Cells::Plain, deformation),
+        Setup::sampled(subject, args.resolution(mesh), mesh.threshold, deformation),
     ];
     let mut made =
-        ways.into_iter().map(|way| Made::new(way, place, sampler)).collect::<Result<Vec<_>, _>>()?;
-    if place.conforming.is_some() {
-        made.push(Made::new(Way::certified(place, Cells::Bisected, deformation), place, sampler)?);
+        setups.into_iter().map(|setup| Made::new(setup, subject, sampler)).collect::<Result<Vec<_>, _>>()?;
+    if subject.conforming.is_some() {
+        made.push(Made::new(Setup::certified(subject, Cells::Bisected, deformation), subject, sampler)?);
     }
-    table.extend(rows(mesh, place, &made, options)?);
-    let Some(domain) = place.conforming.as_ref().filter(|_| deforms) else { return Ok(()) };
+    table.extend(rows(mesh, subject, &made, options)?);
+    let Some(domain) = subject.conforming.as_ref().filter(|_| deforms) else { return Ok(()) };
 
     let bend = Bend::of(domain);
     for asset in made.iter_mut().flat_map(Made::assets_mut) {
@@ -246,7 +251,7 @@ fn measure(
         row.twist_degrees = Some(bend.twist.to_degrees());
         row.name = format!("{name}, bent {:.0}°", bend.bend.to_degrees());
     };
-    let mut bent = rows(mesh, place, &made, options)?;
+    let mut bent = rows(mesh, subject, &made, options)?;
     for row in &mut bent {
         row.encode_seconds = None;
         moved(row, &format!("deformed {}", mesh.name));
@@ -263,7 +268,7 @@ fn measure(
             truncated.reencode_stale().map_err(Failure::new)?;
         }
     }
-    let mut again = rows(mesh, place, &made, options)?;
+    let mut again = rows(mesh, subject, &made, options)?;
     for (row, reencoded) in again.iter_mut().zip(reencoded) {
         row.reencoded = Some(reencoded);
         moved(row, &format!("deformed {}, re-encoded", mesh.name));
@@ -343,7 +348,7 @@ fn csv(rows: &[Row]) -> Text {
     Text { columns, rows: rows.iter().flat_map(lines).collect() }
 }
 
-/// Both figures, or the one that both are.
+/// Both figures, or a single one if they are equal.
 fn pair(a: String, b: String) -> String {
     if a == b { a } else { format!("{a} / {b}") }
 }

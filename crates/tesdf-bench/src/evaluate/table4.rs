@@ -1,26 +1,26 @@
-//! Table IV: the shaft, its lists cut to more and more faces.
+//! Table IV: the shaft with increasing maximum list lengths.
 use serde::Serialize;
 use tesdf::TeSdf;
 use tesdf::encode::Deformation;
 use tesdf::evaluate::BandReport;
 
 use super::domains::open;
-use super::measure::{Cells, Cost, Way, compare};
+use super::measure::{Cells, Cost, Setup, compare};
 use super::meshes::{MESHES, SHAFT};
 use super::output::{Sink, Text, band, error, or_dash, short};
 use super::{TableArgs, paper};
 use tesdf_terminal::report::{Failure, note};
 
-/// What `--format json` prints.
+/// The output of `--format json`.
 #[derive(Serialize)]
 struct Table {
     table: u32,
-    /// Voxels along the diagonal.
+    /// Number of voxels along the diagonal.
     grid: u32,
     rows: Vec<Row>,
 }
 
-/// The shaft in a domain by an encoder, or the paper's.
+/// The shaft in a domain, encoded by an encoder, or the paper's figures.
 #[derive(Serialize)]
 struct Row {
     /// `paper` or `tesdf`.
@@ -30,7 +30,7 @@ struct Row {
     columns: Vec<Column>,
 }
 
-/// One E_max.
+/// The figures for one E_max.
 #[derive(Serialize)]
 struct Column {
     max_entries: u32,
@@ -80,28 +80,28 @@ fn paper_row() -> Row {
 /// Measures and prints the table.
 ///
 /// # Errors
-/// As [`run`](super::run).
+/// The same errors as [`run`](super::run).
 pub fn run(args: &TableArgs, sink: &Sink) -> Result<(), Failure> {
     let options = args.evaluate_options();
     let sampler = args.device.sampler()?;
     let mut table = Table { table: 4, grid: options.fineness, rows: vec![paper_row()] };
     let Some(mesh) = MESHES.iter().find(|m| m.path == SHAFT) else { return Ok(()) };
     for &domain in &args.domain {
-        let place = open(mesh, &args.data, domain)?;
-        let mut ways = vec![
-            Way::certified(&place, Cells::Plain, Deformation::None),
-            Way::sampled(&place, args.resolution(mesh), mesh.threshold, Deformation::None),
+        let subject = open(mesh, &args.data, domain)?;
+        let mut setups = vec![
+            Setup::certified(&subject, Cells::Plain, Deformation::None),
+            Setup::sampled(&subject, args.resolution(mesh), mesh.threshold, Deformation::None),
         ];
-        if place.conforming.is_some() {
-            ways.push(Way::certified(&place, Cells::Bisected, Deformation::None));
+        if subject.conforming.is_some() {
+            setups.push(Setup::certified(&subject, Cells::Bisected, Deformation::None));
         }
-        // All are compared in one pass over the grid.
+        // One pass over the grid compares all assets.
         let mut assets: Vec<TeSdf> = Vec::new();
-        // Which asset a column is, for each way.
+        // For each set of options, the asset of each column.
         let mut columns: Vec<Vec<usize>> = Vec::new();
-        for way in &ways {
-            note(&format!("{}, {}, {}", mesh.name, way.domain, way.encoder));
-            let (full, _) = way.encode(&place, &*sampler)?;
+        for setup in &setups {
+            note(&format!("{}, {}, {}", mesh.name, setup.domain, setup.encoder));
+            let (full, _) = setup.encode(&subject, &*sampler)?;
             let longest = full.about().statistics.longest_list;
             let whole = assets.len();
             assets.push(full);
@@ -111,18 +111,18 @@ pub fn run(args: &TableArgs, sink: &Sink) -> Result<(), Failure> {
                     at.push(whole);
                 } else {
                     at.push(assets.len());
-                    assets.push(way.truncated(column.max_entries).encode(&place, &*sampler)?.0);
+                    assets.push(setup.truncated(column.max_entries).encode(&subject, &*sampler)?.0);
                 }
             }
             columns.push(at);
         }
         let reports = compare(&assets.iter().collect::<Vec<_>>(), &options)?;
         let costs: Vec<Cost> = assets.iter().map(Cost::of).collect();
-        for (way, at) in ways.into_iter().zip(columns) {
+        for (setup, at) in setups.into_iter().zip(columns) {
             let column =
                 |(c, at): (&paper::Table4, usize)| Column::of(c.max_entries, &costs[at], reports[at].clone());
             let columns = paper::TABLE_4.iter().zip(at).map(column).collect();
-            table.rows.push(Row { from: "tesdf", domain: way.domain, encoder: way.encoder, columns });
+            table.rows.push(Row { from: "tesdf", domain: setup.domain, encoder: setup.encoder, columns });
         }
     }
     sink.print(&table, &csv(&table.rows), &markdown(&table))

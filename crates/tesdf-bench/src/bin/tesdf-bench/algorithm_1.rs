@@ -1,4 +1,4 @@
-//! `tesdf-bench algorithm-1`
+//! `tesdf-bench algorithm-1`: counts the distances that Algorithm 1 of the paper computes.
 use std::path::PathBuf;
 
 use clap::ValueEnum;
@@ -13,35 +13,38 @@ use crate::{Failure, heading, output};
 /// Arguments of `tesdf-bench algorithm-1`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The meshes that would be encoded
+    /// Mesh files; they are encoded with Algorithm 1
     #[arg(required = true)]
     meshes: Vec<PathBuf>,
-    /// Domains: of Gmsh with a band of 5 % of the diagonal, its tetrahedra as they are, or the bisection domain
+    /// Domains: `gmsh` has the tetrahedra of Gmsh, not bisected, with a band of 5 % of the
+    /// diagonal; `bisection` is the bisection domain
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [DomainName::Gmsh, DomainName::Bisection])]
     domain: Vec<DomainName>,
-    /// Q: samples along an edge of a tetrahedron, less one
+    /// Resolution Q: a tetrahedron's edge has Q + 1 samples
     #[arg(long, default_value_t = 128)]
     resolution: u32,
-    /// In every so manieth cell some blocks of samples are looked into, for what they are left with
+    /// Counts the candidates of blocks of samples in every N-th cell
     #[arg(long, default_value_t = 50)]
     every: usize,
-    /// How many blocks of such a cell
+    /// Number of blocks in each of these cells
     #[arg(long, default_value_t = 20)]
     blocks: usize,
-    /// Floating-point operations per second of a device, for the estimate [default: a quarter of an H200's 66.9e12 in 32 bits]
+    /// Floating-point operations per second of a device, for the estimated time [default: a quarter
+    /// of the 66.9e12 of an H200 in 32 bits]
     #[arg(long, default_value_t = 0.25 * 66.9e12)]
     speed: f64,
 }
 
-/// Ways to cut space into tetrahedra.
+/// Methods that divide space into tetrahedra.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum DomainName {
     Gmsh,
     Bisection,
 }
 
-/// Operations of a distance in `tesdf-gpu`'s `kernels/sample.rs`, sums and products counted alike: four heights over planes at 6, three
-/// feet on edges at 8, three distances to edges at 13, nine comparisons and choices.
+/// Number of operations of one distance in `kernels/sample.rs` of `tesdf-gpu`. Each sum and each
+/// product counts as one: 6 for each of four heights over planes, 8 for each of three foot points
+/// on edges, 13 for each of three distances to edges, and 9 comparisons and selections.
 const OPERATIONS: f64 = 96.0;
 
 const COLUMNS: [&str; 11] = [
@@ -61,10 +64,11 @@ const COLUMNS: [&str; 11] = [
 pub fn run(args: &Args) -> Result<(), Failure> {
     heading::print()?;
     output::line(&format!(
-        "Counted, not timed. Q = {}. *Candidates*: what Lemma 1 leaves of the faces. *Sample × candidate*: the distances of Algorithm 1, \
-         which lines 12 and 14 both take: seconds are for twice as many. *Left to a block*: what Lemma 1, asked again for 8 × 8 × 4 samples, \
-         leaves of them, the mean of {} blocks of every {}th cell; *distances*: what the device then measures, those for asking included. \
-         Seconds: {OPERATIONS} operations per distance at {:.1e} per second.\n",
+        "Counted, not timed. Q = {}. *Candidates*: the faces that Lemma 1 keeps. *Sample × candidate*: the number of \
+         distances in Algorithm 1. Its lines 12 and 14 both compute them, so the seconds are for twice this number. \
+         *Left to a block*: the candidates that remain when Lemma 1 is applied again to a block of 8 × 8 × 4 samples, on \
+         average over {} blocks of every {}th cell. *Distances*: the number that the device then computes, including those \
+         for Lemma 1. Seconds: {OPERATIONS} operations per distance at {:.1e} per second.\n",
         args.resolution, args.blocks, args.every, args.speed
     ))?;
     output::head(&COLUMNS, 2)?;

@@ -1,4 +1,4 @@
-//! `tesdf-bench batch`
+//! `tesdf-bench batch`: times batch queries at the points of a file.
 use std::hint::black_box;
 use std::path::PathBuf;
 
@@ -16,14 +16,15 @@ use crate::{Failure, output};
 pub struct Args {
     /// A .tesdf file
     asset: PathBuf,
-    /// Points: x y z of each as little-endian f64, nothing else
+    /// A file of points: x y z of each point as little-endian f64
     points: PathBuf,
     /// Number of threads
     #[arg(long, default_value_t = 1)]
     threads: usize,
 }
 
-/// Prints the seconds of `query_batch` over all points, the best of some passes, for each precision.
+/// Prints the time of `query_batch` over all points for each precision, in seconds: the best of
+/// several passes.
 pub fn run(args: &Args) -> Result<(), Failure> {
     let asset = TeSdf::open(&args.asset)?;
     let at = |e: &dyn std::fmt::Display| Failure::from(format!("{}: {e}", args.points.display()));

@@ -1,4 +1,5 @@
-//! What contacts are judged by: the signed clearance of two posed solids, in `f64`, by branch and bound over all faces.
+//! The reference for contacts: the signed clearance of two posed solids in `f64`, by branch and
+//! bound over all faces.
 use std::array::from_fn;
 use std::collections::VecDeque;
 
@@ -10,31 +11,36 @@ use tesdf::mesh::TriangleMesh;
 use crate::poses::in_frame_of;
 use crate::reference::Reference;
 
-/// Depths are found up to this share of the other solid's diagonal; distances up to rounding.
+/// Tolerance of depths, as a fraction of the other solid's diagonal. Distances are exact up to
+/// rounding.
 pub const TOLERANCE: f64 = 1e-7;
 
-/// A solid with all that its signed distances need.
+/// A solid, with the trees for its signed distances.
 pub struct Body<'a> {
     mesh: &'a TriangleMesh,
     reference: Reference,
 }
 
 impl<'a> Body<'a> {
-    /// Builds the trees.
+    /// Builds the trees of `mesh`.
     pub fn new(mesh: &'a TriangleMesh) -> Self {
         Self { mesh, reference: Reference::new(mesh) }
     }
 
-    /// The distance between two solids that do not overlap; of others, the negative depth of the deepest point of either surface in
-    /// the other solid. Depth is the distance to the nearest point of the surface, as a signed distance field gives it; it is
-    /// not the length of the shortest translation that separates the solids.
+    /// The distance between two solids, or the negative depth when they overlap, in the unit of the
+    /// meshes.
+    ///
+    /// The depth is the largest depth of a point of either surface in the other solid. The depth of
+    /// a point is its distance to the nearest point of the surface, as a signed distance field
+    /// defines it. It is not the length of the shortest translation that separates the solids.
     pub fn clearance(&self, other: &Self, [own, others]: [Pose; 2]) -> f64 {
         let depth =
             self.deepest(other, in_frame_of(others, own)).max(other.deepest(self, in_frame_of(own, others)));
         if depth > 0.0 { -depth } else { self.separation(other, in_frame_of(others, own)) }
     }
 
-    /// How deep the surface reaches into `other`, in whose frame `pose` places it; 0 if it does not.
+    /// The largest depth of a point of this surface in `other`; 0 when no point is inside. `pose`
+    /// is the pose of `self` in the frame of `other`.
     fn deepest(&self, other: &Self, pose: Pose) -> f64 {
         let bounds = other.mesh.bounds();
         let vertices: Vec<DVec3> = self.mesh.vertices().iter().map(|&v| pose.to_world(v)).collect();
@@ -44,7 +50,8 @@ impl<'a> Body<'a> {
         }
         let least_gain = TOLERANCE * other.mesh.diagonal();
         let corners = self.mesh.faces().iter().map(|face| face.map(|v| vertices[v as usize]));
-        // Widest first: what is deep is found before what is near the surface is cut small.
+        // The queue handles wide pieces first, so deep points are found before pieces near the
+        // surface become small.
         let mut pieces: VecDeque<[DVec3; 3]> = corners.filter(|t| Aabb::of(t).overlaps(bounds)).collect();
         while let Some(piece) = pieces.pop_front() {
             let (center, radius) = sphere(&piece);
@@ -57,7 +64,8 @@ impl<'a> Body<'a> {
                 continue;
             }
             depth = other.deeper(center, depth);
-            // Depth is greatest on ridges, where two faces are equally near: without these points it is only ever approached.
+            // The depth is greatest on ridges, where two faces are equally near. Without these
+            // points the search would only approach the maximum.
             for (i, j) in [(0, 1), (1, 2), (2, 0)] {
                 let (at_i, at_j) = (heights[i][i] - heights[j][i], heights[i][j] - heights[j][j]);
                 let share = at_i / (at_i - at_j);
@@ -65,7 +73,8 @@ impl<'a> Body<'a> {
                     depth = other.deeper(piece[i].lerp(piece[j], share), depth);
                 }
             }
-            // All of a piece that does not cross the surface is on the side of its centre.
+            // All points of a piece that does not cross the surface lie on the same side as its
+            // centre.
             if !other.is_crossed_by(&piece) && !other.reference.is_inside(center) {
                 continue;
             }
@@ -74,7 +83,7 @@ impl<'a> Body<'a> {
         depth
     }
 
-    /// The depth of the point if it is inside and deeper than `depth`, else `depth`.
+    /// The depth of `p` if it is inside and deeper than `depth`, otherwise `depth`.
     fn deeper(&self, p: DVec3, depth: f64) -> f64 {
         let distance = self.reference.distance(p).0;
         if distance > depth && self.reference.is_inside(p) { distance } else { depth }
@@ -85,17 +94,21 @@ impl<'a> Body<'a> {
         near.into_iter().any(|face| triangles_meet(*piece, self.reference.face(face).corners))
     }
 
-    /// Distances of the corners of the piece to four faces, those nearest to its corners and to its centre.
+    /// Distances of the corners of the piece to four faces: the nearest faces of its three corners
+    /// and of its centre.
     ///
-    /// No point of the piece is further from the surface than from any of them. The distance to one face is convex, so it lies below
-    /// the plane through its values at the corners; of any two faces the lower plane counts, which is tight on ridges of the distance.
+    /// They bound the depth: no point of the piece is farther from the surface than from any of
+    /// these faces. The distance to one face is convex, so it lies below the plane through its
+    /// values at the corners. The lower plane of any two faces is also a bound, which is tight on
+    /// ridges of the distance.
     fn heights(&self, piece: &[DVec3; 3], center: DVec3) -> [[f64; 3]; 4] {
         let nearest = |p: DVec3| self.reference.face(self.reference.distance(p).1);
         let to_corners = |face: &Triangle| piece.map(|c| face.closest(c).distance);
         [piece[0], piece[1], piece[2], center].map(|p| to_corners(nearest(p)))
     }
 
-    /// The distance between the surfaces, which must not cross; `pose` places `self` in the frame of `other`.
+    /// The distance between two surfaces that do not cross. `pose` is the pose of `self` in the
+    /// frame of `other`.
     fn separation(&self, other: &Self, pose: Pose) -> f64 {
         let placed = |face: &[u32; 3]| face.map(|v| pose.to_world(self.mesh.vertices()[v as usize]));
         let mut least = placed(&self.mesh.faces()[0])
@@ -113,8 +126,9 @@ impl<'a> Body<'a> {
     }
 }
 
-/// The greatest value over a triangle of the lower of two linear functions, by their values at the corners: the least, over all
-/// mixtures of the two, of the mixture's greatest value.
+/// The maximum over a triangle of the smaller of two linear functions, given by their values at the
+/// corners. It equals the minimum over all convex combinations of the two functions of the
+/// combination's maximum.
 fn highest_of_lower(a: [f64; 3], b: [f64; 3]) -> f64 {
     let greatest =
         |share: f64| (0..3).map(|k| share * a[k] + (1.0 - share) * b[k]).fold(f64::NEG_INFINITY, f64::max);
@@ -123,7 +137,8 @@ fn highest_of_lower(a: [f64; 3], b: [f64; 3]) -> f64 {
     shares.into_iter().filter(|s| (0.0..=1.0).contains(s)).map(greatest).fold(f64::INFINITY, f64::min)
 }
 
-/// Two triangles that do not cross are nearest at a corner of one or at an edge of each.
+/// The distance of two triangles that do not cross. It is attained at a corner of one of them, or
+/// between an edge of each.
 fn triangle_distance(t: &Triangle, u: &Triangle) -> f64 {
     let corners = t.corners.iter().map(|&c| u.closest(c).distance);
     let corners = corners.chain(u.corners.iter().map(|&c| t.closest(c).distance));
@@ -132,8 +147,9 @@ fn triangle_distance(t: &Triangle, u: &Triangle) -> f64 {
     corners.chain(edges).fold(f64::INFINITY, f64::min)
 }
 
-/// An upper bound of the distance of two segments: that of the nearest points of their lines if both are inside, and infinity otherwise,
-/// as an end is nearest then, which the corners of the triangles stand for.
+/// An upper bound of the distance of two segments: the distance of their lines, when its closest
+/// points lie on both segments. Otherwise infinity, because an end point is then closest, and the
+/// corners of the triangles cover that case.
 fn segment_distance([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> f64 {
     let (u, v, w) = (b - a, d - c, a - c);
     let (uu, uv, vv, uw, vw) = (u.dot(u), u.dot(v), v.dot(v), u.dot(w), v.dot(w));
@@ -148,7 +164,7 @@ fn sphere(t: &[DVec3; 3]) -> (DVec3, f64) {
     (center, t.iter().map(|c| c.distance(center)).fold(0.0, f64::max))
 }
 
-/// Cut at the middle of the longest edge.
+/// Splits a triangle at the middle of its longest edge.
 fn halves(t: [DVec3; 3]) -> [[DVec3; 3]; 2] {
     let length: [f64; 3] = from_fn(|k| t[k].distance_squared(t[(k + 1) % 3]));
     let k = (0..3).max_by(|&i, &j| length[i].total_cmp(&length[j])).unwrap_or(0);
@@ -170,7 +186,8 @@ mod tests {
         tesdf::mesh::read(path).expect("readable").mesh
     }
 
-    /// Edges of 20 mm: closed forms for faces, edges and faces, and crossed edges, apart and overlapping.
+    /// Cubes with edges of 20 mm, where closed formulas give the clearance: face to face, edge to
+    /// face, and crossed edges, both apart and overlapping.
     #[test]
     fn clearance_of_cubes() {
         let mesh = cube();
@@ -180,14 +197,14 @@ mod tests {
         let half_diagonal = 0.01 * SQRT_2;
         let world = Pose { rotation: DQuat::from_rotation_x(0.3), translation: DVec3::new(0.1, 0.2, 0.3) };
         let gap = 0.001;
-        // Moved aside, too: no face lies in the plane of another.
+        // The offsets 0.003 and 0.002 keep the faces from lying in common planes.
         for (name, other, moved, reach, expected) in [
             ("faces, apart", DQuat::IDENTITY, DQuat::IDENTITY, 0.02 + gap, gap),
             ("faces, overlapping", DQuat::IDENTITY, DQuat::IDENTITY, 0.02 - gap, -gap),
             ("edge and face, apart", DQuat::IDENTITY, edge_forward, 0.01 + half_diagonal + gap, gap),
             ("edge and face, overlapping", DQuat::IDENTITY, edge_forward, 0.01 + half_diagonal - gap, -gap),
             ("edges, apart", edge_forward, edge_sideways, 2.0 * half_diagonal + gap, gap),
-            // No vertex is inside.
+            // No vertex is inside the other cube.
             ("edges, overlapping", edge_forward, edge_sideways, 2.0 * half_diagonal - gap, -gap / SQRT_2),
         ] {
             let poses = [

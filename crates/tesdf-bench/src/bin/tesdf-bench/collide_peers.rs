@@ -1,6 +1,8 @@
-//! `tesdf-bench collide-peers`: one JSON document for `scripts/peers.py`, which runs the other peers and makes the table.
+//! `tesdf-bench collide-peers`: prints one JSON document for `scripts/peers.py`, which runs the
+//! other peers and makes the table.
 //!
-//! Per pose set: the true clearance of each pose, and rows of raw measurements, one entry a pose. All lengths are in the meshes' unit.
+//! Each pose set has the true clearance of each pose, and rows of raw measurements with one entry
+//! per pose. All lengths are in the unit of the meshes.
 use std::collections::HashMap;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
@@ -30,49 +32,50 @@ pub struct Args {
     /// Pose sets, as in `data/poses`
     #[arg(required = true)]
     sets: Vec<PathBuf>,
-    /// What is encoded
+    /// Preset of the encoder
     #[arg(long, value_enum, default_value_t = Preset::Default)]
     preset: Preset,
-    /// parry3d computes in f32 with absolute tolerances: its unit, in units of the mesh
+    /// Scale of parry3d's unit to the mesh's unit, because parry3d computes in f32 with absolute
+    /// tolerances
     #[arg(long, default_value_t = 1000.0)]
     parry_scale: f64,
 }
 
-/// One pose set.
+/// The measurements of one pose set.
 #[derive(Serialize)]
 struct Measured {
     set: String,
-    /// One per pose: see [`Body::clearance`].
+    /// The true clearance of each pose; see [`Body::clearance`].
     clearance: Vec<f64>,
     rows: Vec<Row>,
 }
 
-/// One way to ask one contender.
+/// One operation of one contender.
 #[derive(Serialize)]
 struct Row {
     contender: String,
     operation: &'static str,
-    /// Whether what it yields is exact for the meshes as given, or why not.
+    /// Whether the result is exact for the given meshes, or why it is not.
     exact: &'static str,
-    /// Seconds to prepare both meshes.
+    /// Time to prepare both meshes, s.
     build: f64,
     poses: Vec<Outcome>,
 }
 
-/// What one pose gave.
+/// The result of one operation at one pose.
 #[derive(Serialize)]
 struct Outcome {
-    /// The best of a few runs.
+    /// Best time of several runs, s.
     seconds: f64,
-    /// Whether the solids overlap, where the operation says it.
+    /// Whether the solids overlap, if the operation reports it.
     overlap: Option<bool>,
-    /// Number of contacts, where it yields contacts.
+    /// Number of contacts, if the operation reports contacts.
     contacts: Option<usize>,
-    /// Distance, or negative depth, where it yields either.
+    /// Distance or negative depth, in the unit of the meshes, if the operation reports it.
     clearance: Option<f64>,
 }
 
-/// What a contender found at a pose.
+/// The result of a contender at a pose.
 #[derive(Default)]
 struct Found {
     overlap: Option<bool>,
@@ -81,7 +84,7 @@ struct Found {
 }
 
 pub fn run(args: &Args) -> Result<(), Failure> {
-    // Encoding may use all threads, nothing that is measured does.
+    // The encoder may use all threads, but the measured operations use one.
     let one = ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut bodies = HashMap::new();
     let mut all = Vec::new();
@@ -107,7 +110,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     output::line(&serde_json::to_string_pretty(&all)?)
 }
 
-/// A mesh made ready for all contenders.
+/// A mesh, prepared for all contenders.
 struct Encoded {
     input: Input,
     asset: Arc<TeSdf>,
@@ -129,14 +132,14 @@ impl Encoded {
     }
 }
 
-/// Our rows.
+/// The rows of tesdf.
 fn ours(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
     let mut rows = detector(set, a, b)?;
     rows.extend(vertices(set, a, b)?);
     Ok(rows)
 }
 
-/// The detector, by mode, and the clearance.
+/// The rows of the detector in each mode, and of the clearance.
 fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
     let scene = |poses: [Pose; 2]| -> Result<(Scene, [InstanceId; 2]), Failure> {
         let mut scene = Scene::new();
@@ -180,7 +183,7 @@ fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
     ])
 }
 
-/// Queries without the detector.
+/// The rows of signed distances at the vertices, without the detector.
 fn vertices(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
     let build = a.encode_seconds + b.encode_seconds;
     [(Precision::F32, "f32"), (Precision::F64, "f64")]
@@ -206,7 +209,8 @@ fn vertices(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
         .collect()
 }
 
-/// How many vertices of `a` are within the distance of `b`, and the least signed distance of those that are near its bounds.
+/// The number of vertices of `a` within `distance` of `b`, and the smallest signed distance of the
+/// vertices near the bounds of `b`.
 fn vertex_contacts(
     a: &Encoded,
     b: &Encoded,
@@ -222,7 +226,7 @@ fn vertex_contacts(
     (contacts, answers.iter().map(|a| a.signed_distance).fold(f64::INFINITY, f64::min))
 }
 
-/// Rows of parry3d.
+/// The rows of parry3d.
 fn peers(set: &PoseSet, a: &Encoded, b: &Encoded, scale: f64) -> Result<Vec<Row>, Failure> {
     type Find<'a> = &'a dyn Fn(&[ParryPose; 2], f32) -> Result<Found, Failure>;
     let row = |operation, exact, find: Find<'_>| -> Result<Row, Failure> {
@@ -269,7 +273,8 @@ fn peers(set: &PoseSet, a: &Encoded, b: &Encoded, scale: f64) -> Result<Vec<Row>
     ])
 }
 
-/// Asks at each pose, after one run to warm up, three times or until half a second is over; `find` takes the poses and the contact distance.
+/// Measures each pose three times after a warm-up run, or until half a second has passed. `find`
+/// takes the poses and the contact distance.
 fn measure(
     set: &PoseSet,
     find: impl Fn([Pose; 2], f64) -> Result<Found, Failure>,

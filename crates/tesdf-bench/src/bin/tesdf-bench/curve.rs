@@ -1,4 +1,4 @@
-//! `tesdf-bench curve`
+//! `tesdf-bench curve`: memory against speed.
 use std::hint::black_box;
 use std::path::PathBuf;
 
@@ -14,18 +14,18 @@ use crate::{Failure, heading, output, points};
 /// Arguments of `tesdf-bench curve`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A mesh of any format; one without an inside is repaired
+    /// A mesh file; it is repaired first if necessary
     mesh: PathBuf,
-    /// Values of the option that trades memory for speed
+    /// Values of `byte_worth`, which trades memory for speed
     #[arg(long, value_delimiter = ',', default_value = "0.03,0.05,0.075,0.1,0.15,0.25,0.5", value_parser = positive, allow_negative_numbers = true)]
     byte_worth: Vec<f64>,
-    /// Levels of bisection below each cell that shorten lists
+    /// Values of `tighten_levels`: levels of bisection below each cell that shorten its list
     #[arg(long, value_delimiter = ',', default_value = "0,3,6,12")]
     tighten_levels: Vec<u32>,
-    /// Points near the surface
+    /// Number of points near the surface
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     points: u32,
-    /// The same seed gives the same points
+    /// Seed of the random points
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }

@@ -1,4 +1,4 @@
-//! `tesdf-bench encode`
+//! `tesdf-bench encode`: time, memory and hash of one encode.
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -13,9 +13,9 @@ use crate::{Failure, heading, output};
 /// Arguments of `tesdf-bench encode`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A mesh of any format; one without an inside is repaired
+    /// A mesh file; it is repaired first if necessary
     mesh: PathBuf,
-    /// What is encoded
+    /// Preset of the encoder
     #[arg(long, value_enum, default_value_t = Preset::Default)]
     preset: Preset,
     /// Number of threads [default: one per core]
@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let pool = pool.build()?;
     let start = Instant::now();
-    // A `Failure` does not go from thread to thread; a text does.
+    // A `Failure` cannot cross threads here, but its text can.
     let input = pool.install(|| Input::read(&args.mesh).map_err(|e| e.to_string()))?;
     let read = start.elapsed().as_secs_f64();
     heading::print()?;
@@ -67,7 +67,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     ])
 }
 
-/// Largest resident size of this process so far.
+/// Largest resident size of this process since its start, or since the last reset, KiB.
 pub fn peak_resident_kib() -> Result<u64, Failure> {
     let path = "/proc/self/status";
     let text = fs::read_to_string(path).map_err(|e| format!("cannot read {path}, which Linux has: {e}"))?;

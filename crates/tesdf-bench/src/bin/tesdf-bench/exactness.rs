@@ -1,4 +1,4 @@
-//! `tesdf-bench exactness`
+//! `tesdf-bench exactness`: largest errors and sign mistakes against brute force.
 
 use std::ops::ControlFlow;
 

@@ -1,4 +1,4 @@
-//! `tesdf-bench frank-wolfe`
+//! `tesdf-bench frank-wolfe`: the error of Frank–Wolfe iterations.
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,22 +13,22 @@ use crate::{Failure, heading, output};
 /// Arguments of `tesdf-bench frank-wolfe`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Two meshes of one frame, such as a bolt and its nut
+    /// Two mesh files in one frame, such as a bolt and its nut
     #[arg(num_args = 2, required = true)]
     meshes: Vec<PathBuf>,
-    /// What is encoded
+    /// Preset of the encoder
     #[arg(long, value_enum, default_value_t = Preset::Default)]
     preset: Preset,
-    /// Poses of the second body: off its place, in each direction, and turned
+    /// Number of random poses of the second body
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..))]
     poses: u32,
-    /// How far it is off its place at most, in the meshes' unit
+    /// Maximum offset of a pose in each direction, in the meshes' unit
     #[arg(long, default_value_t = 3e-4)]
     aside: f64,
     /// Contacts up to this signed distance, in the meshes' unit
     #[arg(long, default_value_t = 1e-4)]
     contact_distance: f64,
-    /// The same seed gives the same poses
+    /// Seed of the random poses
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -37,7 +37,7 @@ const ITERATIONS: [u32; 5] = [4, 8, 16, 32, 64];
 const COLUMNS: [&str; 8] =
     ["where", "K", "polygons", "p50", "p90", "p99", "largest", "beyond the contact distance"];
 
-/// Face, direction and cell.
+/// The instance of the face, the face and the cell.
 type Key = (u32, u32, Option<u32>);
 
 fn by_key(contacts: &[Contact]) -> BTreeMap<Key, f64> {
@@ -55,11 +55,11 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         ids.push(scene.add(Instance::new(shape, Pose::IDENTITY))?);
     }
     output::line(&format!(
-        "{} on {}, preset `{}`: {} poses, up to {} aside in each coordinate and turned by up to 0.01 rad, contact distance {}, seed \
-         {}. For every polygon (the part of a face in a cell) that the exact mode reports: by how much the least signed distance \
-         of K iterations is above the exact one, as a share of the diagonal of the field's body. *Inside*: the exact distance is \
-         negative. *Beyond*: polygons whose distance is then above the contact distance and not reported; not part of the \
-         other columns.\n",
+        "{} on {}, preset `{}`: {} poses, offset by up to {} in each coordinate and rotated by up to 0.01 rad, contact distance {}, seed \
+         {}. A polygon is the part of a face in a cell. For every polygon that the exact mode reports, the table has the excess \
+         of the smallest signed distance after K iterations over the exact one, as a fraction of the diagonal of the body with \
+         the field. *Inside*: the exact distance is negative. *Beyond*: polygons that are not reported, because their distance \
+         after K iterations is above the contact distance; the other columns leave them out.\n",
         inputs[1].name,
         inputs[0].name,
         args.preset.name(),
@@ -71,7 +71,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     let diagonals = [0, 1].map(|i| inputs[i].solid.mesh().diagonal());
     let mut random = Rng::with_seed(args.seed);
     let mut signed = || 2.0 * random.f64() - 1.0;
-    // Errors outside and inside by K, and how many are beyond.
+    // For exact distances outside and inside, and for each K: the errors, and the number of
+    // polygons beyond the contact distance.
     let mut errors: [[(Vec<f64>, usize); 5]; 2] = Default::default();
     for _ in 0..args.poses {
         let translation = args.aside * DVec3::new(signed(), signed(), signed());

@@ -1,4 +1,4 @@
-//! Meshes and presets as the benchmarks take them.
+//! Meshes and presets of the benchmarks.
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -15,14 +15,14 @@ use crate::Failure;
 pub enum Preset {
     /// Few faces per query
     Default,
-    /// Quickest to encode
+    /// Fast to encode
     Fast,
-    /// Smallest
+    /// Small files
     Compact,
 }
 
 impl Preset {
-    /// As on the command line.
+    /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Default => "default",
@@ -31,7 +31,7 @@ impl Preset {
         }
     }
 
-    /// What the encoder is asked for.
+    /// The options of the encoder.
     pub fn options(self) -> EncodeOptions {
         EncodeOptions::preset(match self {
             Self::Default => tesdf::encode::Preset::Default,
@@ -41,35 +41,35 @@ impl Preset {
     }
 }
 
-/// Meshes, and the points at which they are asked.
+/// Arguments of the benchmarks that query meshes at random points.
 #[derive(clap::Args)]
 pub struct MeshesAndPoints {
-    /// Meshes of any format; those without an inside are repaired
+    /// Mesh files; they are repaired first if necessary
     #[arg(required = true)]
     pub meshes: Vec<PathBuf>,
-    /// What is encoded
+    /// Preset of the encoder
     #[arg(long, value_enum, default_value_t = Preset::Default)]
     pub preset: Preset,
-    /// Points for each mesh: `query` so many of each kind, `exactness` so many whose kinds take turns
+    /// Number of points per mesh; for `query` the number of points of each kind
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub points: u32,
-    /// The same seed gives the same points
+    /// Seed of the random points
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 }
 
-/// A mesh that can be encoded.
+/// A mesh that the encoder accepts.
 pub struct Input {
-    /// File name without extension; repaired meshes are marked.
+    /// File name without extension; ` (repaired)` follows the name of a repaired mesh.
     pub name: String,
-    /// The mesh, repaired if need be.
+    /// The mesh, repaired if necessary.
     pub solid: SolidMesh,
     source: Source,
 }
 
 impl Input {
-    /// Reads a mesh of any format. One that has no inside is repaired with default options; its name then says so, and stderr
-    /// what was changed.
+    /// Reads a mesh file. A mesh that cannot be encoded is repaired with default options, and
+    /// stderr reports the changes.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let at = |e: &dyn std::fmt::Display| Failure::from(format!("{}: {e}", path.display()));
         let loaded = tesdf::mesh::read(path).map_err(|e| e.in_file(path))?;
@@ -98,7 +98,8 @@ impl Input {
         Ok(Self { name, solid, source })
     }
 
-    /// Encodes the mesh; the asset and the seconds it took, on all threads of the current rayon pool.
+    /// Encodes the mesh on all threads of the current rayon pool. Returns the asset and the time,
+    /// s.
     pub fn encode(&self, options: &EncodeOptions) -> Result<(TeSdf, f64), Failure> {
         let start = Instant::now();
         let asset = Encoder::new()

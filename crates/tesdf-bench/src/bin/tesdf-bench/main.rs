@@ -1,6 +1,7 @@
-//! `tesdf-bench`: the tables of `docs/benchmarks.md`, each one command, as Markdown on stdout (`batch`, `collide-peers`: JSON).
+//! `tesdf-bench`: the benchmarks of `docs/benchmarks.md`. Each command prints one table as
+//! Markdown; `batch` and `collide-peers` print JSON.
 //!
-//! Every table says on which processor, when and by which command it was made. Speeds are meant as ratios within one run.
+//! Each table names its processor, date and command. Compare speeds within one run only.
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -47,28 +48,31 @@ enum Command {
     Query(MeshesAndPoints),
     /// Time of one batch over points of a file, as JSON for `scripts/python_batch.py`
     Batch(batch::Args),
-    /// Bytes, and faces read per query, by preset
+    /// Bytes of the asset and faces read per query, by preset
     Memory(memory::Args),
     /// Time, peak memory and hash of one encode
     Encode(encode::Args),
-    /// Distances of Algorithm 1 at a resolution, as the paper has it and as a device measures them
+    /// Number of distances of Algorithm 1 at a resolution: in the paper's formulation, and as a
+    /// device computes them
     #[command(name = "algorithm-1")]
     Algorithm1(algorithm_1::Args),
-    /// Memory against speed over the encoder's options
+    /// Memory against speed, over the options of the encoder
     Curve(curve::Args),
     /// Largest errors and sign mistakes against brute force
     Exactness(MeshesAndPoints),
-    /// Time and size of fans, needles and stray vertices, against another mesh
+    /// Time and size of meshes with fans, needles and stray vertices, relative to another mesh
     Slender(slender::Args),
-    /// A nut on a bolt: travel, energy, penetration and time by clearance, time step and detector
+    /// A nut on a bolt: travel, energy, penetration and time, by clearance, time step and detector
+    /// mode
     Screw(screw::Args),
-    /// Time of a detection as a scene grows: instances in a row, worlds side by side
+    /// Time of a detection as a scene grows: more instances in a row, or more worlds
     Scaling(scaling::Args),
-    /// What a deformed mesh costs, by the share that has moved: cells looked at, stale, and time against encoding anew
+    /// Cost of re-encoding a deformed mesh, by the fraction of vertices that moved
     Reencode(reencode::Args),
-    /// How far Frank-Wolfe iterations are off the exact minimum, on two bodies in contact
+    /// Error of Frank-Wolfe iterations relative to the exact minimum, on two bodies in contact
     FrankWolfe(frank_wolfe::Args),
-    /// Contacts of two posed meshes, ours and parry3d's, with the true clearances, as JSON for `scripts/peers.py`
+    /// Contacts of two posed meshes, from tesdf and parry3d, with the true clearances, as JSON for
+    /// `scripts/peers.py`
     CollidePeers(collide_peers::Args),
 }
 

@@ -1,4 +1,4 @@
-//! `tesdf-bench memory`
+//! `tesdf-bench memory`: bytes and faces read per query, by preset.
 use std::path::PathBuf;
 
 use rayon::prelude::*;
@@ -14,16 +14,16 @@ use crate::{Failure, heading, output, points};
 /// Arguments of `tesdf-bench memory`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Meshes of any format; those without an inside are repaired
+    /// Mesh files; they are repaired first if necessary
     #[arg(required = true)]
     meshes: Vec<PathBuf>,
-    /// What is encoded
+    /// Presets of the encoder
     #[arg(long, value_enum, value_delimiter = ',', default_value = "default,fast,compact")]
     presets: Vec<Preset>,
-    /// Points near the surface, and points in the domain
+    /// Number of points near the surface, and of points in the domain
     #[arg(long, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
     points: u32,
-    /// The same seed gives the same points
+    /// Seed of the random points
     #[arg(long, default_value_t = 1)]
     seed: u64,
 }
@@ -95,13 +95,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What queries at some points read, and where no list answers them.
+/// What queries at some points read, and how many of them the face tree answers.
 struct Fallback {
-    /// Mean of list entries, faces and nodes.
+    /// Mean number of list entries, faces and nodes that a query reads.
     reads: f64,
-    /// Share of the points that the face tree answers.
+    /// Fraction of the points that the face tree answers.
     share: f64,
-    /// Of those, the points within reach of the surface.
+    /// Number of these points within reach of the surface.
     close: usize,
 }
 
@@ -121,7 +121,8 @@ impl Fallback {
     }
 }
 
-/// Least distance from the surface of the cells without a list, as far as their corners, edge middles and centroids tell.
+/// Smallest distance from the surface to a cell without a list, measured at the corners, edge
+/// midpoints and centroids of these cells.
 fn nearest_fallback(asset: &TeSdf) -> Option<f64> {
     let mut probes = Vec::new();
     asset.visit_cells(|cell| {

@@ -1,21 +1,22 @@
-//! Seeded points that queries are asked at.
+//! Random query points. The same seed gives the same points.
 use fastrand::Rng;
 use tesdf::TeSdf;
 use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::mesh::TriangleMesh;
 
-/// Half width of the layer near the surface, as a share of the diagonal.
+/// Half width of the layer near the surface, as a fraction of the diagonal.
 pub const NEAR: f64 = 0.02;
 
-/// Points of the surface, uniform by area, moved along the normal of their face by up to [`NEAR`], uniformly.
+/// Points that are uniform on the surface by area, then moved along the normal of their face by a
+/// uniform distance up to [`NEAR`].
 pub fn near_surface(mesh: &TriangleMesh, count: usize, seed: u64) -> Vec<DVec3> {
     let mut random = Rng::with_seed(seed);
     let diagonal = mesh.diagonal();
     let mut area = 0.0;
     let sums: Vec<f64> = (0..mesh.faces().len())
         .map(|f| {
-            // Relative to the diagonal, so that no area underflows.
+            // The areas are relative to the diagonal, so none underflows.
             let [a, b, c] = mesh.triangle(f).map(|p| p / diagonal);
             area += (b - a).cross(c - a).length();
             area
@@ -32,13 +33,14 @@ pub fn near_surface(mesh: &TriangleMesh, count: usize, seed: u64) -> Vec<DVec3> 
     (0..count).map(point).collect()
 }
 
-/// Uniform in a box.
+/// Uniform points in a box.
 pub fn in_box(bounds: Aabb, count: usize, seed: u64) -> Vec<DVec3> {
     let mut random = Rng::with_seed(seed);
     (0..count).map(|_| one_in_box(bounds, &mut random)).collect()
 }
 
-/// Uniform in the domain of an asset: those of its cube that are in the domain.
+/// Uniform points in the domain of an asset: points of the box around its cells, without those
+/// outside the domain.
 pub fn in_domain(asset: &TeSdf, count: usize, seed: u64) -> Vec<DVec3> {
     let mut random = Rng::with_seed(seed);
     let mut cube = Aabb::EMPTY;

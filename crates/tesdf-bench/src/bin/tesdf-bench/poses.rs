@@ -1,4 +1,5 @@
-//! Pose sets: two meshes and the poses at which their contacts are measured. `data/poses/generate.py` says what is in a file.
+//! Pose sets: two meshes, and the poses at which their contacts are measured.
+//! `data/poses/generate.py` describes the files.
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -7,7 +8,7 @@ use tesdf::glam::{DQuat, DVec3};
 
 use crate::Failure;
 
-/// The pose as seen from the body that `frame` places.
+/// Expresses `pose` in the frame of the body with pose `frame`.
 pub fn in_frame_of(frame: Pose, pose: Pose) -> Pose {
     let back = frame.rotation.conjugate();
     Pose {
@@ -20,11 +21,11 @@ pub fn in_frame_of(frame: Pose, pose: Pose) -> Pose {
 pub struct PoseSet {
     /// File name without extension.
     pub name: String,
-    /// The meshes `a` and `b`.
+    /// Paths of the meshes `a` and `b`.
     pub meshes: [PathBuf; 2],
-    /// Contacts up to this distance are asked for, in the meshes' unit.
+    /// Contacts are detected up to this distance, in the meshes' unit.
     pub contact_distance: f64,
-    /// Of `a` and of `b`.
+    /// The poses of `a` and of `b`.
     pub poses: Vec<[Pose; 2]>,
 }
 
@@ -45,7 +46,7 @@ struct Pair {
 }
 
 impl PoseSet {
-    /// Reads a file; its meshes are named relative to it.
+    /// Reads a file. Its mesh paths are relative to its folder.
     pub fn read(path: &Path) -> Result<Self, Failure> {
         let at = |e: &dyn std::fmt::Display| Failure::from(format!("{}: {e}", path.display()));
         let text = std::fs::read_to_string(path).map_err(|e| at(&e))?;

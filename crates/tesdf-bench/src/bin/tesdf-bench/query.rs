@@ -1,4 +1,4 @@
-//! `tesdf-bench query`
+//! `tesdf-bench query`: time of a query, against parry3d and a face tree.
 use std::hint::black_box;
 
 use parry3d::math::Vector;
@@ -28,13 +28,13 @@ const COLUMNS: [&str; 9] = [
 pub fn run(args: &MeshesAndPoints) -> Result<(), Failure> {
     heading::print()?;
     output::line(&format!(
-        "One thread, preset `{}`, {} points of each kind, seed {}; the best of {PASSES} passes after one to warm up. All give \
-         signed distance, closest point and gradient; ours the face, too, and the place of the point is part of its time. \
-         *Near*: uniform on the surface, moved by up to ±{} % of the diagonal along the normal. *Box*: uniform in the mesh's \
-         bounds. *Face tree*: the tree over all faces of our own asset in f32, eight faces a leaf, SIMD over faces, sides \
-         from the closest feature, without the lists. *Read*: list entries, or faces and nodes of the tree. Errors are \
-         against an f64 tree over the mesh as read, signs against winding numbers, counted from 1e-6 (f64: 1e-12) of \
-         the diagonal on.\n",
+        "One thread, preset `{}`, {} points of each kind, seed {}; the best of {PASSES} passes after a warm-up pass. All contenders \
+         return the signed distance, closest point and gradient. tesdf also returns the face, and its time includes locating \
+         the cell of the point. *Near*: uniform on the surface, then moved by up to ±{} % of the diagonal along the normal. \
+         *Box*: uniform in the mesh's bounds. *Face tree*: the tree over all faces of the same asset in f32, without the \
+         lists, with eight faces per leaf, SIMD over faces, and signs from the closest feature. *Read*: list entries, or faces \
+         and nodes of the tree. Errors are relative to an f64 tree over the mesh as read, and signs to winding numbers, where \
+         the distance is at least 1e-6 (f64: 1e-12) of the diagonal.\n",
         args.preset.name(),
         args.points,
         args.seed,
@@ -75,21 +75,21 @@ pub fn run(args: &MeshesAndPoints) -> Result<(), Failure> {
     Ok(())
 }
 
-/// One contender at one kind of points.
+/// The results of one contender at points of one kind.
 struct Row {
     name: &'static str,
     seconds: f64,
-    /// Mean of faces and nodes.
+    /// Mean number of list entries, or of faces and nodes, that a query reads.
     reads: Option<f64>,
-    /// Signed distances found.
+    /// The signed distances that the contender found.
     found: Vec<f64>,
-    /// Nearer to the surface than this share of the diagonal the sign is free.
+    /// Signs are not compared at points nearer to the surface than this fraction of the diagonal.
     sign_from: f64,
 }
 
-/// The peer first, the tree second.
+/// Measures all contenders: parry3d first, then the face tree.
 fn contest(asset: &TeSdf, peer: &Peer, one: &ThreadPool, points: &[DVec3]) -> [Row; 5] {
-    // Rounded outside of what is timed.
+    // The points are rounded before the time is measured.
     let rounded: Vec<Vector> = points.iter().map(|&p| parry::point(p)).collect();
     let mean = |reads: &dyn Fn(DVec3) -> usize| {
         Some(points.iter().map(|&p| reads(p)).sum::<usize>() as f64 / points.len() as f64)
@@ -148,12 +148,13 @@ fn contest(asset: &TeSdf, peer: &Peer, one: &ThreadPool, points: &[DVec3]) -> [R
 }
 
 impl Row {
-    /// Largest error of an absolute distance as a share of the diagonal, and the number of wrong signs.
+    /// The largest error of an absolute distance as a fraction of the diagonal, and the number of
+    /// wrong signs.
     fn compare(&self, truth: &[f64], diagonal: f64) -> (f64, usize) {
         let (mut largest, mut mistakes) = (0.0f64, 0);
         for (&found, &expected) in self.found.iter().zip(truth) {
             let error = (found.abs() - expected.abs()).abs() / diagonal;
-            // NaN is worse than any number.
+            // NaN counts as an infinite error.
             largest = largest.max(if error.is_nan() { f64::INFINITY } else { error });
             let wrong = found.is_sign_negative() != expected.is_sign_negative();
             mistakes += usize::from(wrong && expected.abs() > self.sign_from * diagonal);

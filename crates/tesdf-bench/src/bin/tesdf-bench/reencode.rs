@@ -1,4 +1,4 @@
-//! `tesdf-bench reencode`
+//! `tesdf-bench reencode`: the cost of re-encoding a deformed mesh.
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -16,15 +16,15 @@ use crate::{Failure, heading, output};
 /// Arguments of `tesdf-bench reencode`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The mesh that is deformed, in a domain of Gmsh with a band of 5 % of the diagonal
+    /// A mesh file; it is deformed in a Gmsh domain with a band of 5 % of the diagonal
     mesh: PathBuf,
-    /// Shares of the length, from one end on, that are bent
+    /// Fractions of the length, from one end, that are bent
     #[arg(long, value_delimiter = ',', default_values_t = [0.02, 0.05, 0.1, 0.2, 0.5, 1.0])]
     shares: Vec<f64>,
-    /// How far the end is bent, degrees per length of the mesh
+    /// Bending angle at the end, degrees per length of the mesh
     #[arg(long, default_value_t = 5.0)]
     bend: f64,
-    /// Points at which the re-encoded asset is compared with brute force
+    /// Number of points at which the re-encoded asset is compared with brute force
     #[arg(long, default_value_t = 5000)]
     samples: usize,
 }
@@ -98,7 +98,8 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Vertices beyond the last `share` of the longest axis, turned about an axis across it, the more the farther they are out.
+/// The vertices in the last `share` of the longest axis, rotated about a transverse axis. The angle
+/// grows with the distance from the start of the bend.
 fn bent(domain: &ConformingMesh, rest: &TeSdf, share: f64, angle: f64) -> Vec<(u32, DVec3)> {
     let bounds = rest.bounds();
     let extent = bounds.extent();

@@ -3,8 +3,8 @@ use tesdf::geometry::{Aabb, AabbTree, Triangle};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{TriangleMesh, WindingNumber};
 
-/// Signed distances in `f64` that share nothing with an asset but the closest point of one triangle: a tree over the faces as
-/// read, and winding numbers.
+/// Reference signed distances in `f64`, from a tree over the faces of the mesh and from winding
+/// numbers. Of the code that an asset uses, it shares only the closest point of a triangle.
 pub struct Reference {
     triangles: Vec<Triangle>,
     tree: AabbTree,
@@ -12,7 +12,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Builds the trees.
+    /// Builds the trees of `mesh`.
     pub fn new(mesh: &TriangleMesh) -> Self {
         let triangles: Vec<Triangle> =
             (0..mesh.faces().len()).map(|f| Triangle::new(mesh.triangle(f))).collect();
@@ -30,23 +30,23 @@ impl Reference {
         if self.is_inside(p) { -distance } else { distance }
     }
 
-    /// Distance of the nearest face, and the face.
+    /// The distance to the nearest face, and this face.
     pub fn distance(&self, p: DVec3) -> (f64, u32) {
         let squared = |face: u32| self.face(face).closest(p).distance.powi(2);
         self.tree.nearest(p, squared).map_or((f64::INFINITY, 0), |(d, face)| (d.sqrt(), face))
     }
 
-    /// By the winding number.
+    /// Whether the point is inside, by the winding number.
     pub fn is_inside(&self, p: DVec3) -> bool {
         self.winding.at_perturbed(p) >= 1
     }
 
-    /// A face of the mesh.
+    /// A face of the mesh, by its index.
     pub fn face(&self, face: u32) -> &Triangle {
         &self.triangles[face as usize]
     }
 
-    /// All faces whose boxes meet the bounds, and a few others.
+    /// All faces whose bounding boxes overlap `bounds`, and possibly a few others.
     pub fn faces_meeting(&self, bounds: Aabb) -> Vec<u32> {
         let mut found = Vec::new();
         self.tree.visit(|node| node.overlaps(bounds), |faces| found.extend_from_slice(faces));

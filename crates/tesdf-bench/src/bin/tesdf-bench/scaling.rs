@@ -1,4 +1,4 @@
-//! `tesdf-bench scaling`
+//! `tesdf-bench scaling`: time of a detection as a scene grows.
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,16 +12,16 @@ use crate::{Failure, heading, output};
 /// Arguments of `tesdf-bench scaling`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The mesh whose instances lie in a row, each touching the next
+    /// The mesh of the row; each instance touches the next one
     #[arg(long, default_value = "data/procedural/chain_link.obj")]
     link: PathBuf,
-    /// The nut of the worlds
+    /// The nut of each world
     #[arg(long, default_value = "data/procedural/iso_m16_nut_c50.obj")]
     nut: PathBuf,
-    /// The bolt of the worlds
+    /// The bolt of each world
     #[arg(long, default_value = "data/procedural/iso_m16_bolt_24k.obj")]
     bolt: PathBuf,
-    /// Times that each is repeated; the quickest counts
+    /// Number of repetitions; the fastest one counts
     #[arg(long, default_value_t = 5)]
     repeats: usize,
 }
@@ -36,11 +36,12 @@ const COLUMNS: [&str; 7] = [
     "instances, products and contacts, MB",
 ];
 
-/// Instances in a row of the first table.
+/// Numbers of instances in a row.
 const ROWS: [usize; 4] = [2, 16, 128, 1024];
-/// Worlds of the second, of nodes and of exact minima: those of 64 worlds are 3 million contacts.
+/// Numbers of worlds in node mode and in exact mode. In exact mode 64 worlds have 3 million
+/// contacts.
 const WORLDS: [[u32; 4]; 2] = [[1, 16, 128, 1024], [1, 4, 16, 64]];
-/// Where the nut is mated with the bolt, and how near contacts count, in metres.
+/// Position of the nut on the bolt, and the contact distance, m.
 const NUT_AT: DVec3 = DVec3::new(0.0, 0.0, 0.01);
 const CONTACT_DISTANCE: f64 = 5e-5;
 
@@ -96,7 +97,7 @@ fn print(
 }
 
 fn quickest(scene: &Scene, options: &CollideOptions, repeats: usize) -> Result<(Contacts, f64), Failure> {
-    // The first makes what assets make on first use.
+    // The first detection also builds data that an asset builds on first use.
     let mut found = detect(scene, options)?;
     let mut seconds = f64::INFINITY;
     for _ in 0..repeats.max(1) {

@@ -1,4 +1,4 @@
-//! `tesdf-bench screw`
+//! `tesdf-bench screw`: a nut on a bolt.
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -13,12 +13,13 @@ use crate::{Failure, heading, output};
 /// Arguments of `tesdf-bench screw`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// A scene with the criterion `screw`
+    /// A scene file with the criterion `screw`
     scene: PathBuf,
-    /// Geometries of the turning body, one after the other: meshes or .tesdf files [default: that of the scene]
+    /// Geometries of the turning body, one run for each: mesh or .tesdf files [default: the
+    /// geometry of the scene]
     #[arg(long, value_name = "FILE", num_args = 1..)]
     geometries: Vec<PathBuf>,
-    /// Play of each geometry along the axis, µm, instead of the criterion's
+    /// Backlash of each geometry along the axis, µm, in place of the criterion's
     #[arg(long, value_name = "UM", value_delimiter = ',', requires = "geometries")]
     backlash: Vec<f64>,
     /// Time steps, ms
@@ -27,18 +28,18 @@ pub struct Args {
     /// Detector modes
     #[arg(long, value_enum, value_delimiter = ',', default_value = "node,face,exact")]
     modes: Vec<Mode>,
-    /// How often contacts are detected again
+    /// Numbers of re-detections
     #[arg(long, value_name = "N", value_delimiter = ',', default_value = "0,1,2")]
     redetections: Vec<u32>,
-    /// Instead of the scene's duration, s
+    /// Duration, s, in place of the scene's
     #[arg(long, value_name = "SECONDS")]
     duration: Option<f64>,
-    /// How often in a run the penetration is measured
+    /// Number of measurements of the penetration during a run
     #[arg(long, value_name = "N", default_value_t = 10)]
     measurements: u64,
 }
 
-/// As in a scene.
+/// Detector modes, as in a scene file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Mode {
     Node,
@@ -128,14 +129,14 @@ fn with_geometry(loaded: &LoadedScene, body: &str, file: PathBuf) -> Result<(Str
     Ok((name, loaded))
 }
 
-/// A run, and the greatest penetration at its measurements, m.
+/// Runs the scene. Returns its summary and the greatest penetration at the measurements, m.
 fn one(loaded: &LoadedScene, system: System, measurements: u64) -> Result<(Summary, f64), Failure> {
     let mut engine = loaded.newton(system)?;
     let (mut depth, mut failure) = (0.0_f64, None);
     let (_, summary) = simulate(&loaded.scene, &mut engine, |moment: &Moment<'_>| {
         let part = |step: u64| step * measurements / moment.steps;
         if part(moment.step) != part(moment.step - 1) {
-            // An error is told after the run.
+            // The error is returned after the run.
             match penetration(moment.system) {
                 Ok(deeper) => depth = depth.max(deeper),
                 Err(e) => failure = Some(e),
@@ -164,10 +165,10 @@ fn print(start: impl Iterator<Item = String>, summary: &Summary, depth: f64) -> 
     output::row(&start.chain(rest).collect::<Vec<_>>())
 }
 
-/// Bound on the error of a penetration, m: 10 nm.
+/// Tolerance of a penetration: 10 nm.
 const TOLERANCE: Length = Length::Absolute(1e-8);
 
-/// How deep any two bodies are in each other by their exact clearance, m; 0 when none is.
+/// The greatest overlap of any two bodies by their exact clearance, m; 0 when none overlap.
 fn penetration(system: &System) -> Result<f64, CollideError> {
     let scene = system.scene();
     let bodies = system.bodies();

@@ -1,4 +1,4 @@
-//! `tesdf-bench slender`
+//! `tesdf-bench slender`: time and size of meshes with slender faces.
 use std::f64::consts::TAU;
 use std::fs;
 use std::path::PathBuf;
@@ -17,9 +17,9 @@ use crate::{Failure, heading, output};
 /// Arguments of `tesdf-bench slender`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The mesh whose time per face is 1
+    /// The mesh file that times per face are compared with
     reference: PathBuf,
-    /// What is encoded
+    /// Preset of the encoder
     #[arg(long, value_enum, default_value_t = Preset::Fast)]
     preset: Preset,
 }
@@ -38,9 +38,10 @@ const COLUMNS: [&str; 8] = [
 pub fn run(args: &Args) -> Result<(), Failure> {
     heading::print()?;
     output::line(&format!(
-        "Preset `{}`, one thread. *Cone*: n sides to a tip, and a bottom that is a fan around one corner. *Disc*: both ends are fans around \
-         their centres. *Prism*: both ends are fans around a corner. *Rod*: a cube, drawn out. *Spike*: a cube, one corner far \
-         away. *Stray*: the first mesh, one vertex far away. *Hair*: n long tetrahedra, anyhow.\n",
+        "Preset `{}`, one thread. *Cone*: n sides and a tip; its bottom is a fan around one corner. *Disc*: both \
+         ends are fans around their centres. *Prism*: both ends are fans around a corner. *Rod*: a stretched cube. *Spike*: a \
+         cube with one corner far away. *Stray*: the first mesh with one vertex far away. *Hair*: n long tetrahedra in \
+         random positions.\n",
         args.preset.name()
     ))?;
     output::head(&COLUMNS, 1)?;
@@ -71,17 +72,17 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         row(format!("prism {n}"), prism(n)?)?;
     }
     for length in [1e6, 1e12] {
-        row(format!("rod 1 : {length:.0e}"), drawn_out(|v| v * DVec3::new(length, 1.0, 1.0))?)?;
-        row(format!("spike 1 : {length:.0e}"), drawn_out(|v| if v == DVec3::ONE { v * length } else { v })?)?;
+        row(format!("rod 1 : {length:.0e}"), stretched(|v| v * DVec3::new(length, 1.0, 1.0))?)?;
+        row(format!("spike 1 : {length:.0e}"), stretched(|v| if v == DVec3::ONE { v * length } else { v })?)?;
         row(format!("stray 1 : {length:.0e}"), stray(length)?)?;
     }
     row("hair 1000".into(), hair(1000)?)
 }
 
-/// Checks and encodes; prints a row and returns the seconds of encoding.
+/// Checks and encodes a mesh and prints a row. Returns the time of the encode, s.
 fn one(name: &str, mesh: TriangleMesh, preset: Preset, unit: Option<f64>) -> Result<f64, Failure> {
     let faces = mesh.faces().len();
-    // Forgets the largest size so far.
+    // Resets the peak resident size.
     fs::write("/proc/self/clear_refs", "5")
         .map_err(|e| format!("cannot write /proc/self/clear_refs, which Linux has: {e}"))?;
     let start = Instant::now();
@@ -113,7 +114,7 @@ fn rim(n: u32, z: f64) -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// The squares between two rims of `n` corners.
+/// The quads between two rims of `n` corners, as triangles.
 fn sides(n: u32) -> impl Iterator<Item = [u32; 3]> {
     (0..n).flat_map(move |k| {
         let next = (k + 1) % n;
@@ -143,7 +144,7 @@ fn prism(n: u32) -> Made {
 }
 
 /// A cube with moved vertices.
-fn drawn_out(move_vertex: impl Fn(DVec3) -> DVec3) -> Made {
+fn stretched(move_vertex: impl Fn(DVec3) -> DVec3) -> Made {
     let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
     let squares = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
     let faces = squares.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [a, c, d]]);

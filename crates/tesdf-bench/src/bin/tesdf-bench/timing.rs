@@ -1,9 +1,9 @@
 use std::time::Instant;
 
-/// Passes that are timed.
+/// Number of timed passes.
 pub const PASSES: usize = 5;
 
-/// Seconds of the quickest of [`PASSES`] passes, one after the other, after one that is not counted.
+/// The time of the fastest of [`PASSES`] passes, s. A pass before them warms up and is not counted.
 pub fn best_pass(mut pass: impl FnMut()) -> f64 {
     pass();
     let timed = |_| {
