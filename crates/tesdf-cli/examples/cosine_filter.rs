@@ -1,4 +1,5 @@
-//! Draws Fig. 5 of the paper: two faces of a body in the field of a rectangle, and which gradients the cosine filter keeps.
+//! Draws Fig. 5 of the paper: two faces of a body in the distance field of a rectangle, and the
+//! gradients that the cosine filter keeps.
 //!
 //! `cargo run -p tesdf-cli --example cosine_filter -- docs/images/cosine-filter.png`
 use std::error::Error;
@@ -13,10 +14,11 @@ use tiny_skia::{Color, FillRule, LineCap, Paint, PathBuilder, Pixmap, Stroke, St
 
 /// Corners in x and z, counter-clockwise.
 const RECTANGLE: [[f64; 2]; 4] = [[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [0.0, 1.0]];
-/// The lower side is deeper than the middle of the rectangle (normal n¹); the next one climbs out of it (n²).
+/// The lower side (normal n¹) is deeper than the middle of the rectangle. The next side (normal n²)
+/// leaves the rectangle.
 const PROBE: [[f64; 2]; 5] = [[1.0, 0.35], [2.0, 0.35], [3.2, 1.15], [3.2, 1.6], [1.0, 1.6]];
 
-/// A prism over a convex polygon, `half_depth` to either side along y.
+/// A prism over a convex polygon, from -`half_depth` to `half_depth` along y.
 fn prism(polygon: &[[f64; 2]], half_depth: f64) -> Result<SolidMesh, Box<dyn Error>> {
     let n = polygon.len() as u32;
     let at = |y: f64| polygon.iter().map(move |&[x, z]| DVec3::new(x, y, z));
@@ -46,7 +48,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let found = detect(&scene, &CollideOptions::default())?;
     let kept = detect(&scene, &CollideOptions { cos_theta: Some(cos), ..CollideOptions::default() })?;
 
-    // Of each face and direction the deepest contact; only the two lower faces are drawn.
+    // The deepest contact of each face and direction. Only the two lower faces are drawn.
     let mut shown: Vec<Contact> = Vec::new();
     let mut all: Vec<Contact> = found.into_iter().filter(|c| c.instance_a == InstanceId(0)).collect();
     all.sort_by(|x, y| x.distance.total_cmp(&y.distance));
@@ -85,7 +87,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 struct Picture(Pixmap);
 
-/// Pixels to one unit.
+/// Pixels per unit.
 const SCALE: f64 = 200.0;
 
 impl Picture {
@@ -122,7 +124,7 @@ impl Picture {
         self.0.stroke_path(&path, &Self::paint([60, 66, 76], 255), &stroke, Transform::identity(), None);
     }
 
-    /// Dashed when it is dropped, so that colours are not needed to tell.
+    /// A dropped contact has a dashed arrow, so the picture is readable without colours.
     fn arrow(&mut self, at: DVec2, along: DVec2, length: f64, rgb: [u8; 3], is_dashed: bool) {
         let tip = at + length * along;
         let (back, aside) = (tip - 0.1 * along, 0.045 * along.perp());
@@ -140,7 +142,7 @@ impl Picture {
     }
 }
 
-/// A dot of 0.03.
+/// A dot of radius 0.03.
 fn circle(center: DVec2) -> Vec<DVec2> {
     (0..24).map(|k| center + 0.03 * DVec2::from_angle(std::f64::consts::TAU * f64::from(k) / 24.0)).collect()
 }

@@ -1,7 +1,11 @@
-//! Draws what Figs. 2 and 3 of the paper show: the tetrahedra in and around a torus, cut open and a little apart, by their class; and
-//! one of them with its encoded faces. Needs Gmsh.
+//! Draws what Figs. 2 and 3 of the paper show. The first picture has the tetrahedra inside and
+//! around a torus, cut open, shrunk and coloured by class. The second picture has one tetrahedron
+//! with its encoded faces. Needs Gmsh.
 //!
-//! `cargo run --release -p tesdf-cli --example tetrahedra -- data/public/torus_quads.obj docs/images`
+//! ```text
+//! cargo run --release -p tesdf-cli --example tetrahedra -- \
+//!     data/public/torus_quads.obj docs/images
+//! ```
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -17,12 +21,12 @@ use tesdf_cli::render::{Cut, Drawn, Exposure, HalfSpace, Scenery, View, linear, 
 
 type Failure = Box<dyn Error>;
 
-/// Sides of a positively oriented tetrahedron, outward.
+/// Sides of a positively oriented tetrahedron, facing outward.
 const SIDES: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-/// T_BI, T_I, T_BO, T_O.
+/// Colours of the classes T_BI, T_I, T_BO and T_O.
 const COLOURS: [[u8; 3]; 4] = [[236, 160, 92], [176, 58, 40], [150, 190, 220], [40, 96, 158]];
 
-/// Tetrahedra, each shrunk towards its centroid so that they can be told apart.
+/// Tetrahedra that are shrunk towards their centroids, so that gaps separate them.
 fn apart(tetrahedra: &[[DVec3; 4]]) -> Result<Shape, Failure> {
     let mut mesh = (Vec::new(), Vec::new());
     for corners in tetrahedra {
@@ -34,7 +38,7 @@ fn apart(tetrahedra: &[[DVec3; 4]]) -> Result<Shape, Failure> {
     shape(mesh)
 }
 
-/// Faces as thin plates on the outer side.
+/// Faces as thin plates on their outer side.
 fn plates(faces: &[[DVec3; 3]], thickness: f64) -> Result<Shape, Failure> {
     let mut mesh = (Vec::new(), Vec::new());
     for &[a, b, c] in faces {
@@ -70,14 +74,14 @@ fn main() -> Result<(), Failure> {
     let middle = solid.mesh().bounds().center();
     let view = View { azimuth: -65.0, elevation: 32.0, field_of_view: None, zoom: 1.0, target: None };
 
-    // Those behind a plane through the middle and in a quarter before it.
+    // The tetrahedra behind a plane through the middle, without the outer ones of the upper half.
     let mut classes: [Vec<[DVec3; 4]>; 4] = Default::default();
     for (t, corners) in domain.tetrahedra().iter().enumerate() {
         let positions = domain.corners(t);
         let from = 0.25 * positions.iter().sum::<DVec3>() - middle;
         let has_surface = corners.iter().any(|&v| (v as usize) < solid.mesh().vertices().len());
         let outside = domain.sides()[t] == Side::Outside;
-        // The outside is cut at the middle, too: the inside stands out of it.
+        // The outside is cut at the middle as well, so the inside stands out of it.
         if from.y > 0.0 && !(outside && from.z > 0.0) {
             classes[2 * usize::from(outside) + usize::from(!has_surface)].push(positions);
         }
@@ -96,7 +100,7 @@ fn main() -> Result<(), Failure> {
     encoded_faces(&solid, &domain, &view, picture)
 }
 
-/// The inner tetrahedron with the longest list, its list, and half of the body.
+/// Draws the inner tetrahedron with the longest list, the faces of its list, and half of the body.
 fn encoded_faces(
     solid: &SolidMesh,
     domain: &ConformingMesh,
@@ -123,7 +127,8 @@ fn encoded_faces(
         plates(&faces, 0.006 * diagonal)?,
     );
     let tetrahedron = apart(&[corners])?;
-    // Across the tube, just behind the tetrahedron: it stands before the section, within its faces.
+    // The plane of the cut crosses the tube just behind the tetrahedron, so the tetrahedron stands
+    // in front of the section.
     let from = centre - solid.mesh().bounds().center();
     let along = DVec3::new(-from.y, from.x, 0.0);
     let least = corners.iter().map(|p| along.dot(*p)).fold(f64::INFINITY, f64::min);

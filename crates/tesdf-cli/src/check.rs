@@ -1,4 +1,4 @@
-//! `tesdf check MESH`
+//! `tesdf check MESH`: reports the defects of a mesh.
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -10,14 +10,14 @@ use tesdf_terminal::report::{self, Failure, Outcome};
 /// Arguments of `tesdf check`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Mesh: STL, OBJ, PLY, OFF, glTF or GLB
+    /// Mesh file: STL, OBJ, PLY, OFF, glTF or GLB
     pub mesh: PathBuf,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
 }
 
-/// What `--json` prints; all ids are 0-based.
+/// The output of `--json`. All ids start from 0.
 #[derive(Serialize)]
 struct Report<'a> {
     file: String,
@@ -25,7 +25,7 @@ struct Report<'a> {
     check: &'a CheckReport,
 }
 
-/// Reads and checks a mesh and prints what was found.
+/// Reads and checks a mesh, and prints the result.
 ///
 /// # Errors
 /// The mesh cannot be read, or stdout cannot be written.
@@ -46,17 +46,17 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::NotGood)
 }
 
-/// What to do about a mesh that is not encodable: `tesdf repair`, where that changes something.
+/// The hint for a mesh that cannot be encoded: `tesdf repair`, if it changes something.
 fn next(args: &Args, mesh: &TriangleMesh) -> String {
     let command = format!("tesdf repair {} -o FILE.ply", args.mesh.display());
     match repair(mesh, &RepairOptions::default()) {
         Ok(repaired) if repaired.report.encodable => format!("{command} makes it encodable"),
         Ok(repaired) if repaired.report.changes_something() => {
-            format!("{command} mends a part of it; mend the rest where the mesh was made")
+            format!("{command} repairs a part of it; repair the rest in the program that made the mesh")
         }
         _ => format!(
-            "nothing of it can be mended without guessing: mend the mesh where it was made; where cracks are open, {command} \
-             --weld-tolerance T closes those up to T wide"
+            "the mesh cannot be repaired without guessing: repair it in the program that made it, or close cracks up to a width \
+             T with {command} --weld-tolerance T"
         ),
     }
 }

@@ -1,4 +1,4 @@
-//! `tesdf clearance A.tesdf B.tesdf`
+//! `tesdf clearance A.tesdf B.tesdf`: the distance or overlap of two bodies.
 use tesdf::Length;
 use tesdf::collide::{Clearance, ClearanceOptions, InstanceId, clearance};
 
@@ -9,10 +9,10 @@ use tesdf_terminal::report::{self, Failure, Outcome};
 /// Arguments of `tesdf clearance`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The bodies.
+    /// The two bodies.
     #[command(flatten)]
     pub bodies: Bodies,
-    /// Bound on the error, in the meshes' unit [default: 1e-8 of the smaller body's diagonal]
+    /// Maximum error, in the meshes' unit [default: 1e-8 of the smaller body's diagonal]
     #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
     /// Print the result as a JSON object
@@ -23,7 +23,7 @@ pub struct Args {
 /// Prints the clearance of two bodies.
 ///
 /// # Errors
-/// A file that cannot be opened, an option out of range, or stdout cannot be written.
+/// A file cannot be opened, an option is out of range, or stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut options = ClearanceOptions::default();
     if let Some(tolerance) = args.tolerance {
@@ -39,11 +39,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Good)
 }
 
-/// What people see of a clearance.
+/// The table that users see of a clearance.
 pub fn rows(found: &Clearance, [a, b]: [InstanceId; 2]) -> Vec<(&'static str, String)> {
     let what = match (found.distance < 0.0, found.overlap) {
-        (true, _) => "deep in each other",
-        (false, true) => "they overlap: their surfaces lie on each other, with both bodies on the same side",
+        (true, _) => "they overlap",
+        (false, true) => "they overlap: their surfaces coincide, with both bodies on the same side",
         (false, false) if found.distance == 0.0 => "they touch",
         (false, false) => "apart",
     };
@@ -53,10 +53,10 @@ pub fn rows(found: &Clearance, [a, b]: [InstanceId; 2]) -> Vec<(&'static str, St
         ("point on a", format!("({}) of face {a}:{}", report::point(found.point_a), found.face_a)),
         ("point on b", format!("({}) of face {b}:{}", report::point(found.point_b), found.face_b)),
         ("normal from b to a", format!("({:.6} {:.6} {:.6})", normal.x, normal.y, normal.z)),
-        ("field", format!("of instance {}", found.field)),
+        ("field", format!("instance {}", found.field)),
     ];
     if !found.converged {
-        rows.push(("accuracy", "not within the tolerance: the search was cut short".into()));
+        rows.push(("accuracy", "not within the tolerance: the search stopped early".into()));
     }
     rows
 }

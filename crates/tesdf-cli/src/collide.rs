@@ -1,4 +1,4 @@
-//! `tesdf collide A.tesdf B.tesdf`
+//! `tesdf collide A.tesdf B.tesdf`: the contacts between two bodies.
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,26 +19,26 @@ use tesdf_terminal::device::{self, Choice};
 use tesdf_terminal::parse;
 use tesdf_terminal::report::{self, Failure, Outcome, count};
 
-/// Two placed bodies: arguments that several commands share.
+/// Two posed bodies. Several commands share these arguments.
 #[derive(clap::Args, Debug)]
 pub struct Bodies {
     /// The .tesdf file of instance 0
     pub a: PathBuf,
     /// The .tesdf file of instance 1
     pub b: PathBuf,
-    /// Where A is, body to world: translation, then the unit quaternion x y z w
+    /// Pose of A, body to world: translation, then the unit quaternion x y z w
     #[arg(long, value_name = "\"tx ty tz qx qy qz qw\"", value_parser = parse::pose, allow_hyphen_values = true, default_value = "0 0 0 0 0 0 1", hide_default_value = true)]
     pub pose_a: Pose,
-    /// Where B is
+    /// Pose of B
     #[arg(long, value_name = "\"tx ty tz qx qy qz qw\"", value_parser = parse::pose, allow_hyphen_values = true, default_value = "0 0 0 0 0 0 1", hide_default_value = true)]
     pub pose_b: Pose,
 }
 
 impl Bodies {
-    /// A scene of the two, and their ids.
+    /// A scene of the two bodies, and their ids.
     ///
     /// # Errors
-    /// A file that cannot be opened, units that differ, or a pose that is too far out.
+    /// A file cannot be opened, the units differ, or a pose is out of range.
     pub fn scene(&self) -> Result<(Scene, [InstanceId; 2]), Failure> {
         let mut assets = Assets::default();
         let [a, b] = [assets.open(&self.a)?, assets.open(&self.b)?];
@@ -53,58 +53,61 @@ impl Bodies {
     }
 }
 
-/// What is tested against the other body's field.
+/// The features of one body that are tested against the distance field of the other.
 #[derive(ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModeName {
     /// The vertices
     Node,
     /// The faces, by Frank-Wolfe iterations
     Face,
-    /// The faces, the exact minimum
+    /// The faces, with the exact minimum
     Exact,
 }
 
 /// Arguments of `tesdf collide`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The bodies.
+    /// The two bodies.
     #[command(flatten)]
     pub bodies: Bodies,
-    /// What is tested against the other body's field
+    /// Features that are tested against the distance field of the other body
     #[arg(long, value_enum, default_value_t = ModeName::Exact)]
     pub mode: ModeName,
-    /// Contacts are reported up to this signed distance, in the meshes' unit
+    /// Report contacts up to this signed distance, in the meshes' unit
     #[arg(long, value_name = "D", value_parser = parse::length, default_value_t = 0.0, allow_hyphen_values = true)]
     pub contact_distance: f64,
-    /// Drop contacts of faces whose normal meets the field's gradient at less than this, or `off`
+    /// Drop a contact when the cosine between the face's normal and the field's gradient is below
+    /// this, or `off`
     #[arg(long, value_name = "C|off", value_parser = cosine, default_value = "off", allow_hyphen_values = true)]
     pub cos_theta: Cosine,
-    /// Frank-Wolfe iterations of the mode `face`
+    /// Number of Frank-Wolfe iterations in the mode `face`
     #[arg(long, value_name = "K", default_value_t = 16)]
     pub iterations: u32,
-    /// Bound on the error of the mode `exact`, in the meshes' unit [default: 1e-7 of the diagonal of the field's body]
+    /// Maximum error in the mode `exact`, in the meshes' unit [default: 1e-7 of the diagonal of the
+    /// body with the field]
     #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
-    /// Most contacts to keep of the pair, or `none` to keep all
+    /// Maximum number of contacts of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
     /// Where contacts are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = device::help("contacts are found"))]
     pub device: Choice,
-    /// Say instead why contacts are or are not there: what each stage made of all candidates, or of one face (in the mode `node`, node) of
-    /// instance 0, or as INSTANCE:FACE of one of either
+    /// Print why contacts exist or not instead: what each stage did with all candidates, or with
+    /// one face (in the mode `node`, one vertex) of instance 0, or of either instance as
+    /// INSTANCE:FACE
     #[arg(long, value_name = "FACE", value_parser = parse::part, num_args = 0..=1)]
     pub why: Option<Option<(u32, u32)>>,
-    /// Print the contacts as a JSON array; with --why the reports
+    /// Print the contacts as a JSON array; with --why, print the reports
     #[arg(long)]
     pub json: bool,
-    /// With --json: print an object instead, with the contacts, the statistics, what the reduction has lost, and the pairs that overlap although
-    /// no contact shows it (`hidden`)
+    /// With --json: print an object instead, with the contacts, the statistics, the effect of the
+    /// reduction, and the pairs that overlap without a contact (`hidden`)
     #[arg(long, requires = "json", conflicts_with = "why")]
     pub report: bool,
 }
 
-/// What `--json --report` prints.
+/// The output of `--json --report`.
 #[derive(Serialize)]
 struct Report<'a> {
     contacts: &'a [Contact],
@@ -113,7 +116,7 @@ struct Report<'a> {
     hidden: &'a [HiddenOverlap],
 }
 
-/// The cosine filter's threshold, if it is on.
+/// The threshold of the cosine filter; `None` when the filter is off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cosine(pub Option<f64>);
 
@@ -159,7 +162,7 @@ impl Args {
 /// Prints the contacts of two bodies.
 ///
 /// # Errors
-/// A file that cannot be opened, an option out of range, or stdout cannot be written.
+/// A file cannot be opened, an option is out of range, or stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let options = args.options();
     options.validate().map_err(Failure::new)?;
@@ -184,7 +187,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Good)
 }
 
-/// Says which pairs overlap although no contact shows it, and what to do next.
+/// Warns of pairs that overlap without a contact, and prints a hint.
 fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
     for HiddenOverlap { instance_a, instance_b, depth } in hidden {
         report::warning(&format!(
@@ -202,7 +205,7 @@ fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
     }
 }
 
-/// Contacts that are shown to people.
+/// Number of contacts in the text output.
 const SHOWN: usize = 10;
 
 fn text(found: &Contacts) -> String {

@@ -1,4 +1,4 @@
-//! `tesdf completions SHELL`
+//! `tesdf completions SHELL`: prints a completion script.
 use clap::CommandFactory;
 use clap_complete::Shell;
 
@@ -15,7 +15,7 @@ pub struct Args {
 /// Prints the script.
 ///
 /// # Errors
-/// When stdout cannot be written.
+/// Stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut crate::Cli::command(), "tesdf", &mut script);

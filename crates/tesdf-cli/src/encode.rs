@@ -1,4 +1,4 @@
-//! `tesdf encode MESH -o FILE`
+//! `tesdf encode MESH -o FILE`: encodes a mesh.
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
@@ -26,52 +26,58 @@ pub use choices::{EncoderChoice, Preset};
 /// Arguments of `tesdf encode`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Mesh: STL, OBJ, PLY, OFF, glTF or GLB
+    /// Mesh file: STL, OBJ, PLY, OFF, glTF or GLB
     pub mesh: PathBuf,
-    /// The file to write; an existing one is replaced, a pipe or device is written to
+    /// Output file; an existing file is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]
     pub consent: Consent,
-    /// How the space in and around the solid is cut into tetrahedra: `bisection` needs nothing else, `gmsh` runs Gmsh, a FILE (.msh, .node,
-    /// .ele, .vtu) has tetrahedra whose sides are the mesh's faces
+    /// Division of the space in and around the solid into tetrahedra: `bisection` needs no other
+    /// program, `gmsh` runs Gmsh, and a FILE (.msh, .node, .ele, .vtu) has tetrahedra that conform
+    /// to the mesh's faces
     #[arg(long, value_name = "bisection|gmsh|FILE", default_value = "bisection")]
     pub domain: DomainChoice,
-    /// How the closest faces of each tetrahedron are found [default: certified, or that of the preset]
+    /// Method that finds the closest faces of each tetrahedron [default: certified, or the
+    /// preset's]
     #[arg(long, value_enum)]
     pub encoder: Option<EncoderChoice>,
-    /// A point on the curve of memory and speed
+    /// Trade-off between memory, query speed and encoding time
     #[arg(long, value_enum, default_value_t = Preset::Default)]
     pub preset: Preset,
-    /// Samples along an edge of a tetrahedron, less one [default: 32]
+    /// Resolution Q of the sampled encoder: an edge of a tetrahedron has Q + 1 samples [default:
+    /// 32]
     #[arg(long, value_name = "Q")]
     pub resolution: Option<u32>,
-    /// How much farther than the closest face a listed one may be at a sample: a length, or `safe` for so much that nothing is missing
+    /// Threshold of the sampled encoder: a face is listed if it is at most this length farther than
+    /// the closest face at a sample; `safe` is large enough that no needed face is missing
     #[arg(long, value_name = "LENGTH|safe", value_parser = choices::threshold)]
     pub threshold: Option<Threshold>,
-    /// Where samples are looked at
+    /// Where samples are evaluated
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("samples are looked at"))]
     pub device: Choice,
-    /// Cut lists to this many faces, those that are needed nearest to the surface
+    /// Truncate each list to this number of faces; the faces that are needed nearest to the surface
+    /// stay
     #[arg(long, value_name = "N")]
     pub e_max: Option<NonZeroU32>,
-    /// Make lists ready for moving vertices; needs a conforming domain
+    /// Prepare the lists for moving vertices; needs a conforming domain
     #[arg(long)]
     pub deformable: bool,
-    /// Leave the tetrahedra of a conforming domain as they are, instead of bisecting them where that pays
+    /// Keep the tetrahedra of a conforming domain as they are, without bisecting them
     #[arg(long)]
     pub plain: bool,
-    /// Width of the band around the mesh's box that is encoded too, mesh unit [default: 5 % of its diagonal]
+    /// Width of the encoded band around the mesh's bounding box, in the mesh's unit [default: 5 %
+    /// of its diagonal]
     #[arg(long, value_name = "LENGTH", value_parser = parse::length, allow_hyphen_values = true)]
     pub band: Option<f64>,
-    /// A box that is encoded too, mesh unit; may be given several times
+    /// A box that is encoded as well, in the mesh's unit; may be given several times
     #[arg(long = "region", value_name = "x0 y0 z0 x1 y1 z1", value_parser = parse::region, allow_hyphen_values = true)]
     pub regions: Vec<Aabb>,
-    /// Name of the mesh's unit, recorded in the file; nothing is scaled
+    /// Name of the mesh's unit; it is recorded in the file and scales nothing
     #[arg(long, value_name = "NAME")]
     pub unit: Option<String>,
-    /// Number of threads; the file is the same for every number [default: one per core]
+    /// Number of threads; the file does not depend on it [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print the result as JSON
@@ -89,7 +95,7 @@ fn exactness(certificate: &Certificate) -> String {
     }
 }
 
-/// What `--json` prints; all ids are 0-based.
+/// The output of `--json`. All ids start from 0.
 #[derive(Serialize)]
 struct Report<'a> {
     file: String,
@@ -108,8 +114,8 @@ struct Report<'a> {
 /// Reads, checks and encodes a mesh, and saves the result in one step at the end.
 ///
 /// # Errors
-/// The mesh cannot be read or has no well-defined inside, an option has no meaning for it, the file cannot be written, or
-/// Ctrl-C was pressed. The output file is then as it was.
+/// The mesh cannot be read or has no well-defined inside, an option does not apply to it, the file
+/// cannot be written, or Ctrl-C was pressed. The output file is then unchanged.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut pool = ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
@@ -148,7 +154,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         })
     });
     if interrupted.load(Ordering::Relaxed) {
-        return Err(Failure::new(format!("interrupted; {} is as it was", args.output.display())));
+        return Err(Failure::new(format!("interrupted; {} is unchanged", args.output.display())));
     }
     let asset: TeSdf = encoded?;
     output::write(&output, &asset.to_bytes().map_err(Failure::new)?)?;
@@ -168,7 +174,7 @@ impl Args {
     }
 }
 
-/// Defects of each kind that are printed; `tesdf check` prints more.
+/// Number of defects of each kind that are printed; `tesdf check` prints more.
 const SHOWN: usize = 3;
 
 fn warn(defects: &[Defect]) {

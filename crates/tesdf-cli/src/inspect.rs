@@ -1,4 +1,4 @@
-//! `tesdf inspect FILE`
+//! `tesdf inspect FILE`: prints the contents of a `.tesdf` file.
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -21,7 +21,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 struct Report<'a> {
     file: String,
@@ -35,7 +35,7 @@ struct Report<'a> {
     statistics: &'a Statistics,
 }
 
-/// Opens an asset, which checks its structure, and prints what is in it.
+/// Opens an asset, which checks its structure, and prints its contents.
 ///
 /// # Errors
 /// The asset cannot be opened, or stdout cannot be written.
@@ -151,7 +151,7 @@ fn rows(report: &Report) -> Vec<(String, String)> {
                 _ => "not proven".into(),
             },
         ),
-        ("lists cut", yes_no(certificate.truncated()).into()),
+        ("truncated lists", yes_no(certificate.truncated()).into()),
         ("band", band),
         ("regions", options.regions.len().to_string()),
         ("byte worth", options.byte_worth.to_string()),

@@ -1,8 +1,10 @@
-//! The parts of the command-line tool `tesdf`: one module per command, and what they share.
+//! The command-line tool `tesdf` as a library: one module per command, and shared modules.
 //!
-//! stdout carries only a command's result; notes, warnings, errors and progress go to stderr. With `-o /dev/stdout` it carries only the bytes
-//! of the output. The exit code is 0 when the command did its work, 1 when a mesh or file is not good (`check`, `repair`, `verify`) or a run does
-//! not meet its criterion (`simulate`), 2 for bad usage or input, an output that cannot be written, and Ctrl-C.
+//! Stdout carries only a command's result; notes, warnings, errors and progress go to stderr. With
+//! `-o /dev/stdout`, stdout carries only the bytes of the output. The exit code is 0 when the
+//! command did its work. It is 1 when a mesh or file has defects (`check`, `repair`, `verify`) or a
+//! run does not meet its criterion (`simulate`). It is 2 for bad usage or input, an output that
+//! cannot be written, and Ctrl-C.
 #![warn(missing_docs)]
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -34,7 +36,7 @@ use tesdf_terminal::report::{self, Failure, Outcome};
 #[derive(Parser, Debug)]
 #[command(name = "tesdf", version, about, arg_required_else_help = true)]
 pub struct Cli {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -43,45 +45,46 @@ pub struct Cli {
 #[derive(Subcommand, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one of it")]
 pub enum Command {
-    /// Say what is wrong with a mesh
+    /// Report the defects of a mesh
     Check(check::Args),
-    /// Mend what can be mended without guessing, and say what was changed
+    /// Repair defects of a mesh that have a unique repair, and report the changes
     Repair(repair::Args),
     /// Encode a mesh into a .tesdf file
     Encode(encode::Args),
-    /// Signed distance, gradient and closest point at the points of a CSV file
+    /// Print signed distance, gradient and closest point at the points of a CSV file
     Query(query::Args),
-    /// Say what is in a .tesdf file
+    /// Print the contents of a .tesdf file
     Inspect(inspect::Args),
-    /// Check a .tesdf file: its checksums, then its distances against brute force
+    /// Check the checksums of a .tesdf file, and its distances against brute force
     Verify(verify::Args),
-    /// Contacts between two bodies
+    /// Find the contacts between two bodies
     Collide(collide::Args),
-    /// How far two bodies are apart, or how deep they are in each other
+    /// Measure the distance between two bodies, or the depth of their overlap
     ///
-    /// A positive clearance is the least distance between the two surfaces. A negative one says that the bodies overlap: its size is how
-    /// deep the deepest point of either surface is inside of the other body. Bodies whose surfaces lie on each other have clearance 0;
-    /// `overlap` in the JSON result, and the text, say whether they share volume.
+    /// A positive clearance is the smallest distance between the two surfaces. A negative clearance
+    /// means that the bodies overlap: its absolute value is the largest depth of a point of either
+    /// surface inside the other body. Bodies whose surfaces only lie on each other have clearance
+    /// 0; `overlap` in the JSON result, and the text, tell whether they share volume.
     Clearance(clearance::Args),
-    /// When two moving bodies first touch
+    /// Find the time at which two moving bodies first touch
     Toi(toi::Args),
-    /// List the devices that can compute, by the numbers and names that --device takes
+    /// List the compute devices, with the numbers and names for --device
     Devices(devices::Args),
-    /// Measure what detection costs on a device, stage by stage
+    /// Measure the cost of a detection on a device, stage by stage
     Bench(detection::Args),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
-    /// Move the bodies of a scene and write the run
+    /// Simulate the bodies of a scene and write the run
     Simulate(simulate::Args),
     /// Draw a scene of one or more bodies as a PNG picture
     Render(render::Args),
-    /// Measure Table I or IV of the paper, beside the paper's figures
+    /// Measure Table I or IV of the paper, next to the paper's figures
     Evaluate(evaluate::Args),
     /// Print a completion script for a shell
     Completions(completions::Args),
 }
 
-/// Runs the command that the arguments of this process ask for.
+/// Runs the command in the arguments of this process.
 pub fn main() -> ExitCode {
     abort::give_exit_code();
     let cli = match Cli::try_parse() {
@@ -91,7 +94,7 @@ pub fn main() -> ExitCode {
             return ExitCode::from(u8::try_from(e.exit_code()).unwrap_or(2));
         }
     };
-    // A panic is a bug of ours; the shell still gets a documented exit code.
+    // A panic is a bug in tesdf; the shell still gets a documented exit code.
     let outcome = catch_unwind(AssertUnwindSafe(|| run(&cli.command))).unwrap_or_else(|_| {
         Err(Failure::new("tesdf has a bug: the message above says where")
             .hint("please report it with the command and, if you may share it, the file"))

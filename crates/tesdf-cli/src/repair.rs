@@ -1,4 +1,4 @@
-//! `tesdf repair MESH -o FILE`
+//! `tesdf repair MESH -o FILE`: repairs a mesh.
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -14,16 +14,17 @@ use tesdf_terminal::{mesh_file, parse};
 /// Arguments of `tesdf repair`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Mesh: STL, OBJ, PLY, OFF, glTF or GLB
+    /// Mesh file: STL, OBJ, PLY, OFF, glTF or GLB
     pub mesh: PathBuf,
-    /// The file to write, .ply (keeps every digit), .obj or .stl; an existing one is replaced, a pipe or device is written to, as PLY
-    /// unless its name says otherwise
+    /// Output file: .ply (keeps every digit), .obj or .stl; an existing file is replaced. A pipe or
+    /// device is written to, as PLY unless its name has another extension
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]
     pub consent: Consent,
-    /// Merge vertices closer than this and close cracks up to it, mesh unit [default: bitwise equal positions only]
+    /// Merge vertices that are closer than this, and close cracks up to this width, in the mesh's
+    /// unit [default: merge bitwise equal positions only]
     #[arg(long, value_name = "T", value_parser = parse::length, allow_hyphen_values = true)]
     pub weld_tolerance: Option<f64>,
     /// Print the result as JSON
@@ -31,7 +32,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// What `--json` prints; all ids are 0-based.
+/// The output of `--json`. All ids start from 0.
 #[derive(Serialize)]
 struct Report<'a> {
     file: String,
@@ -40,13 +41,13 @@ struct Report<'a> {
     repair: &'a RepairReport,
 }
 
-/// Repairs a mesh, writes it, and prints what was changed and what is left.
+/// Repairs a mesh, writes it, and prints the changes and the remaining defects.
 ///
 /// # Errors
-/// The mesh cannot be read or has nothing to keep, or the result cannot be written.
+/// The mesh cannot be read or has no valid face, or the result cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let output = output::open(&args.output, &files(&args.mesh), args.consent)?;
-    // A wrong extension is found before the work.
+    // A wrong extension is reported before the work.
     let format = match args.output.extension() {
         None if output.file_path().is_none() => WriteFormat::Ply,
         _ => WriteFormat::of_path(&args.output).map_err(Failure::new)?,
@@ -68,16 +69,18 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if !found.encodable {
         report::hint(match args.weld_tolerance {
             None => "--weld-tolerance T merges vertices up to T apart and closes cracks up to T",
-            Some(_) => "mend the rest where the mesh was made, or try another --weld-tolerance",
+            Some(_) => "repair the rest in the program that made the mesh, or try another --weld-tolerance",
         });
         return Ok(Outcome::NotGood);
     }
     if !format.is_exact() {
-        // Rounding may have closed or opened what the repaired mesh did not.
+        // Rounding may close or open the mesh after the repair.
         let rounded =
             read_bytes(&bytes, MeshFormat::Stl).map_err(|e| Failure::new(format!("{output}: {e}")))?;
         if !check(&rounded.mesh).encodable {
-            report::warning(&format!("{output}: not encodable, as the format rounds coordinates to 32 bits"));
+            report::warning(&format!(
+                "{output}: not encodable, because the format rounds coordinates to 32 bits"
+            ));
             report::hint("write .ply, which keeps every digit");
             return Ok(Outcome::NotGood);
         }

@@ -1,4 +1,4 @@
-//! `tesdf simulate SCENE -o RUN`, `tesdf simulate --resume RUN`
+//! `tesdf simulate SCENE -o RUN` and `tesdf simulate --resume RUN`: simulates a scene.
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,7 +11,7 @@ use tesdf::Progress;
 use tesdf_sim::criterion::ScrewReport;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
-use tesdf_sim::{CutRun, HiddenPair, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
+use tesdf_sim::{HiddenPair, InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
 use tesdf_terminal::device::{self, Choice, Device};
 use tesdf_terminal::output::{self, Consent};
@@ -26,29 +26,32 @@ use recorder::Recorder;
 /// Arguments of `tesdf simulate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// A scene: TOML. With --resume it may be left out, and must be the scene of the run otherwise
+    /// Scene file, TOML. With --resume it is optional, but must be the scene of the run
     #[arg(required_unless_present = "resume")]
     pub scene: Option<PathBuf>,
-    /// The file to write, safetensors; an existing one is replaced when the first step is made. Until the run is complete, it holds the steps
-    /// so far. A pipe or device is written to at the end [default: with --resume, the run itself]
+    /// Output file, safetensors; an existing file is replaced after the first step. Until the run
+    /// is complete, the file holds the steps so far. A pipe or device is written to at the end
+    /// [default: with --resume, the run itself]
     #[arg(short, long, value_name = "RUN", required_unless_present = "resume")]
     pub output: Option<PathBuf>,
     /// Whether a read-only output is replaced.
     #[command(flatten)]
     pub consent: Consent,
-    /// Go on with a run that was interrupted or killed, from its last whole step, to the same bytes as without the interruption
+    /// Resume a run that was interrupted or killed, from its last complete step. The file ends with
+    /// the same bytes as without the interruption
     #[arg(long, value_name = "RUN")]
     pub resume: Option<PathBuf>,
-    /// Instead of the scene's time step, s
+    /// Time step in place of the scene's, s
     #[arg(long, value_name = "SECONDS", value_parser = parse::length)]
     pub time_step: Option<f64>,
-    /// Instead of the scene's duration, s
+    /// Duration in place of the scene's, s
     #[arg(long, value_name = "SECONDS", value_parser = parse::length)]
     pub duration: Option<f64>,
-    /// Instead of the scene's detector mode
+    /// Detector mode in place of the scene's
     #[arg(long, value_enum)]
     pub mode: Option<Mode>,
-    /// Instead of the geometry of a body: a .tesdf file, or a mesh that is encoded; may be given several times
+    /// Replace the geometry of a body by a .tesdf file, or by a mesh, which is encoded; may be
+    /// given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = geometry)]
     pub geometries: Vec<(String, PathBuf)>,
     /// Where contacts are found
@@ -59,29 +62,29 @@ pub struct Args {
     pub json: bool,
 }
 
-/// What is tested against the other body's field.
+/// The features of one body that are tested against the distance field of the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Mode {
     /// The vertices
     Node,
     /// The faces, by Frank-Wolfe iterations
     Face,
-    /// The faces, the exact minimum
+    /// The faces, with the exact minimum
     Exact,
     /// Nothing: bodies pass through each other, and a criterion should fail
     Off,
 }
 
-/// A body and its geometry from `BODY=FILE`.
+/// Parses a body and its geometry as `BODY=FILE`.
 ///
 /// # Errors
-/// There is no `=`.
+/// The text has no `=`.
 pub fn geometry(text: &str) -> Result<(String, PathBuf), String> {
     let (body, file) = text.split_once('=').ok_or("expected BODY=FILE")?;
     Ok((body.into(), file.into()))
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 struct Report<'a> {
     scene: String,
@@ -91,7 +94,7 @@ struct Report<'a> {
 }
 
 impl Args {
-    /// The file that says what the run is of; for messages.
+    /// The file that the scene comes from, for messages.
     fn source(&self) -> &Path {
         self.scene.as_deref().or(self.resume.as_deref()).unwrap_or(Path::new(""))
     }
@@ -101,15 +104,17 @@ impl Args {
     }
 }
 
-/// Runs a scene, or goes on with a run that was cut. The run is recorded step by step, and written as a complete run at the end.
+/// Simulates a scene, or resumes an interrupted run. Each step is recorded at once, and the
+/// complete run is written at the end.
 ///
 /// # Errors
-/// The scene cannot be loaded, the run was made with something else, a step failed, the file cannot be written, or Ctrl-C was pressed.
-/// Before the first step the output file is as it was; after it, it holds the steps that were made. A run that does not meet the
-/// scene's criterion is written, and is not good.
+/// The scene cannot be loaded, the run was made with another scene or program version, a step
+/// failed, the file cannot be written, or Ctrl-C was pressed. Before the first step the output file
+/// is unchanged; afterwards it holds the steps so far. A run that does not meet the scene's
+/// criterion is written and has exit code 1.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let cut = args.resume.as_deref().map(open_cut).transpose()?;
-    let loaded = load(args, cut.as_ref())?;
+    let earlier = args.resume.as_deref().map(open_interrupted).transpose()?;
+    let loaded = load(args, earlier.as_ref())?;
     let mut inputs = loaded.geometry_files();
     inputs.extend(args.scene.clone());
     let output = output::open(args.output(), &inputs, args.consent)?;
@@ -119,20 +124,20 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let system = watched(&progress, &interrupted, || loaded.system_watched(&progress));
     let mut system = system.map_err(|e| match e {
         SceneError::Cancelled => {
-            Failure::new(format!("interrupted; {} is as it was", args.output().display()))
+            Failure::new(format!("interrupted; {} is unchanged", args.output().display()))
         }
         e => Failure::new(e),
     })?;
     let device_name = device.as_ref().map_or("cpu", Device::name);
     let origin = RunOrigin::of(&system, device_name).map_err(Failure::new)?;
-    let begun = begin(args, &loaded, cut.as_ref(), &mut system, &origin)?;
+    let begun = begin(args, &loaded, earlier.as_ref(), &mut system, &origin)?;
     let engine = match device {
         Some(device) => loaded.newton_with(system, device.into_detector()),
         None => loaded.newton(system),
     };
     let mut engine = engine.map_err(Failure::new)?;
     let bar = LiveProgress::new(&interrupted);
-    let mut recorder = Recorder::new(&output, &origin, cut.as_ref());
+    let mut recorder = Recorder::new(&output, &origin, earlier.as_ref());
     let ended = simulate_from(&loaded.scene, &mut engine, begun, |moment| {
         recorder.push(moment)?;
         bar.show(moment)
@@ -145,40 +150,41 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(if summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
 }
 
-fn open_cut(run: &Path) -> Result<CutRun, Failure> {
-    CutRun::open(run).map_err(|e| match e {
+fn open_interrupted(run: &Path) -> Result<InterruptedRun, Failure> {
+    InterruptedRun::open(run).map_err(|e| match e {
         e @ RecordError::Complete { .. } => run_file::failure(run, e)
             .hint("there is nothing to resume; for a longer run, simulate the scene with --duration"),
         e => run_file::failure(run, e),
     })
 }
 
-/// The beginning of the run, where `system` then is: that of the scene, or the last step of the run that was cut.
+/// The start of the run: the beginning of the scene, or the last step of an interrupted run.
+/// `system` gets the states of this start.
 fn begin(
     args: &Args,
     loaded: &LoadedScene,
-    cut: Option<&CutRun>,
+    earlier: Option<&InterruptedRun>,
     system: &mut System,
     origin: &RunOrigin,
 ) -> Result<PartialRun, Failure> {
-    let (Some(cut), Some(resumed)) = (cut, &args.resume) else {
-        // So that the run finds its meshes, wherever it is read.
+    let (Some(earlier), Some(resumed)) = (earlier, &args.resume) else {
+        // The run stores the scene's folder, so its meshes are found from any folder.
         let scene = absolute(args.source())?;
         let folder = scene.parent().unwrap_or(&scene).to_string_lossy().into_owned();
         return Ok(PartialRun::new(&loaded.scene, system, folder));
     };
-    cut.check(&loaded.scene, origin).map_err(|e| {
+    earlier.check(&loaded.scene, origin).map_err(|e| {
         Failure::new(format!("cannot resume {}: {e}", resumed.display()))
             .hint("resume with the scene, options and geometries of the run, or simulate the scene from its beginning")
     })?;
-    cut.run.restore(system).map_err(|e| Failure::new(format!("{}: {e}", resumed.display())))?;
-    Ok(cut.run.clone())
+    earlier.run.restore(system).map_err(|e| Failure::new(format!("{}: {e}", resumed.display())))?;
+    Ok(earlier.run.clone())
 }
 
-/// The scene with what the command line replaces.
-fn load(args: &Args, cut: Option<&CutRun>) -> Result<LoadedScene, Failure> {
-    let loaded = match (&args.scene, cut) {
-        (None, Some(cut)) => LoadedScene::of_run(&cut.run.record, args.source()),
+/// The scene, with the values that the command line replaces.
+fn load(args: &Args, earlier: Option<&InterruptedRun>) -> Result<LoadedScene, Failure> {
+    let loaded = match (&args.scene, earlier) {
+        (None, Some(earlier)) => LoadedScene::of_run(&earlier.run.record, args.source()),
         _ => LoadedScene::read(args.source()),
     };
     let mut loaded = loaded.map_err(Failure::new)?;
@@ -189,7 +195,7 @@ fn load(args: &Args, cut: Option<&CutRun>) -> Result<LoadedScene, Failure> {
     let given = given.iter().filter_map(|(option, value)| Some(format!("{option} {:?}", (*value)?)));
     let given: Vec<String> = given.collect();
     if !given.is_empty() {
-        // The scene's error would name a line of the file.
+        // The scene's own error would name a line of the file.
         scene.steps().map_err(|e| Failure::new(format!("{}: {e}", given.join(" "))))?;
     }
     if let Some(mode) = args.mode {
@@ -204,17 +210,19 @@ fn load(args: &Args, cut: Option<&CutRun>) -> Result<LoadedScene, Failure> {
     Ok(loaded)
 }
 
-/// Puts other geometry in the place of that of the scene's bodies; `file` is what the scene was read from.
+/// Replaces the geometries of bodies. `file` is the file that the scene was read from, for
+/// messages.
 ///
 /// # Errors
-/// There is no such body, or no current folder.
+/// A body does not exist, or there is no current folder.
 pub fn replace_geometries(
     loaded: &mut LoadedScene,
     geometries: &[(String, PathBuf)],
     file: &Path,
 ) -> Result<(), Failure> {
     for (body, geometry) in geometries {
-        // Paths of a scene are relative to its folder, those of a command to where it runs.
+        // Paths in a scene are relative to its folder, but paths on the command line to the current
+        // folder.
         if !loaded.replace_geometry(body, absolute(geometry)?) {
             return Err(Failure::new(format!("{}: there is no body {body}", file.display())));
         }
@@ -226,7 +234,7 @@ fn absolute(path: &Path) -> Result<PathBuf, Failure> {
     std::path::absolute(path).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
 }
 
-/// A bar on stderr with what the run does now.
+/// A progress bar on stderr with the current state of the run.
 struct LiveProgress<'a> {
     bar: ProgressBar,
     interrupted: &'a AtomicBool,
@@ -267,12 +275,12 @@ impl Drop for LiveProgress<'_> {
     }
 }
 
-/// Says which bodies overlapped although no contact showed it, and what to do next.
+/// Warns of bodies that overlapped without a contact, and prints a hint.
 fn warn_of(hidden: &[HiddenPair], mode: DetectorMode) {
     hidden.iter().for_each(|pair| report::warning(&pair.message()));
     if !hidden.is_empty() && mode == DetectorMode::Node {
         report::hint(
-            "the mode node tests vertices alone: use --mode face or --mode exact, or mesh the bodies more finely",
+            "the mode `node` only tests vertices: use --mode face or --mode exact, or mesh the bodies more finely",
         );
     }
 }
@@ -289,11 +297,11 @@ fn print(args: &Args, summary: &Summary) -> Result<(), Failure> {
             "contacts",
             format!("{:.0} per step on average, at most {}", summary.mean_contacts, summary.most_contacts),
         ),
-        ("penetration", format!("at most {:.1e} m, as the detection saw it", summary.deepest_penetration)),
+        ("penetration", format!("at most {:.1e} m, as detected", summary.deepest_penetration)),
         (
             "energy",
             format!(
-                "{:.3e} J of motion, from {:.3e} J released",
+                "{:.3e} J kinetic, from {:.3e} J released",
                 summary.kinetic_energy, summary.released_energy
             ),
         ),
@@ -324,7 +332,7 @@ fn screw_rows(screw: &ScrewReport) -> Vec<(&'static str, String)> {
         (
             "screw",
             format!(
-                "{:.4} mm and {:.4} turns, {:.1} µm apart at most",
+                "{:.4} mm and {:.4} turns, at most {:.1} µm from the pitch",
                 screw.travel * 1e3,
                 screw.turns,
                 screw.largest_pitch_error * 1e6
@@ -333,7 +341,7 @@ fn screw_rows(screw: &ScrewReport) -> Vec<(&'static str, String)> {
         (
             "acceleration",
             format!(
-                "{:.3e} m/s², of an ideal screw {:.3e}; {:.1} % of its travel",
+                "{:.3e} m/s², ideal screw {:.3e} m/s²; {:.1} % of the ideal travel",
                 screw.acceleration,
                 screw.analytic_acceleration,
                 100.0 * screw.travel_of_analytic

@@ -1,4 +1,4 @@
-//! `tesdf toi A.tesdf B.tesdf`
+//! `tesdf toi A.tesdf B.tesdf`: the time of impact of two moving bodies.
 use serde::Serialize;
 use tesdf::Length;
 use tesdf::collide::{Impact, Motion, TimeOfImpactOptions, time_of_impact};
@@ -11,36 +11,38 @@ use tesdf_terminal::report::{self, Failure, Outcome};
 /// Arguments of `tesdf toi`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The bodies.
+    /// The two bodies.
     #[command(flatten)]
     pub bodies: Bodies,
-    /// Velocity of A's origin, and angular velocity about it in radians; A rests without one
+    /// Velocity of A's origin, and angular velocity about it in radians; without it A rests
     #[arg(long, value_name = "\"vx vy vz wx wy wz\"", value_parser = parse::velocity, allow_hyphen_values = true)]
     pub velocity_a: Option<Motion>,
-    /// That of B
+    /// Velocity and angular velocity of B
     #[arg(long, value_name = "\"vx vy vz wx wy wz\"", value_parser = parse::velocity, allow_hyphen_values = true)]
     pub velocity_b: Option<Motion>,
-    /// A turns about a line instead: a point and the direction of the line, angular speed in radians, way along the line per turn
+    /// Screw motion of A: a point and the direction of the axis, the angular speed in radians, and
+    /// the travel along the axis per turn
     #[arg(long, value_name = "\"px py pz ax ay az omega pitch\"", value_parser = parse::screw, allow_hyphen_values = true, conflicts_with = "velocity_a")]
     pub screw_a: Option<Motion>,
-    /// B does
+    /// Screw motion of B
     #[arg(long, value_name = "\"px py pz ax ay az omega pitch\"", value_parser = parse::screw, allow_hyphen_values = true, conflicts_with = "velocity_b")]
     pub screw_b: Option<Motion>,
-    /// Follow the motion from time 0 to this
+    /// Follow the motion from time 0 to this time
     #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true, default_value_t = TimeOfImpactOptions::default().end)]
     pub end: f64,
-    /// Bodies this near touch, in the meshes' unit [default: 1e-6 of the smaller body's diagonal]
+    /// Bodies touch when they are at most this far apart, in the meshes' unit [default: 1e-6 of the
+    /// smaller body's diagonal]
     #[arg(long, value_name = "L", value_parser = parse::number, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
-    /// Most steps
+    /// Maximum number of steps
     #[arg(long, value_name = "N", default_value_t = TimeOfImpactOptions::default().iterations)]
     pub iterations: u32,
-    /// Print the result as a JSON object; its `time` is null when the bodies stay apart
+    /// Print the result as a JSON object; its `time` is null when the bodies do not touch
     #[arg(long)]
     pub json: bool,
 }
 
-/// The result as JSON.
+/// The output of `--json`.
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Json {
@@ -48,10 +50,10 @@ enum Json {
     None { time: Option<f64>, end: f64 },
 }
 
-/// Prints when two bodies first touch.
+/// Prints the time at which two bodies first touch.
 ///
 /// # Errors
-/// A file that cannot be opened, an option out of range, or stdout cannot be written.
+/// A file cannot be opened, an option is out of range, or stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let mut options =
         TimeOfImpactOptions { end: args.end, iterations: args.iterations, ..Default::default() };
@@ -71,7 +73,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         return Ok(Outcome::Good);
     };
     let what = match impact {
-        Impact { touches: false, .. } => "free up to here; --iterations goes on",
+        Impact { touches: false, .. } => "free up to this time; a larger --iterations continues",
         Impact { time: 0.0, .. } => "at the start",
         _ => "they touch",
     };

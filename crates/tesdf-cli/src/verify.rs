@@ -1,4 +1,4 @@
-//! `tesdf verify FILE`
+//! `tesdf verify FILE`: checks a file against its checksums and its distances against brute force.
 mod proof;
 
 use std::num::NonZeroU64;
@@ -20,19 +20,23 @@ use tesdf_terminal::report::{self, Failure, Outcome, count};
 pub struct Args {
     /// A .tesdf file
     pub file: PathBuf,
-    /// Number of points that are compared with brute force
+    /// Number of points at which the file is compared with brute force
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     pub samples: u32,
-    /// Also prove, cell by cell and with code of its own, that the lists, the signs and the face tree are right
+    /// Also prove, cell by cell and by independent code, that the lists, the signs and the face
+    /// tree are right
     ///
-    /// For every cell: no face outside of the cell's list is closer than the list by more than the δ of the certificate, at any point of the
-    /// cell; and the sign is right in all of the cell. The proof shares the layout of the file, the corners of the cells and exact predicates with the
-    /// encoder, and neither rules nor trees. It does not cover single precision, the search for a point's cell, and the
-    /// sign hints of faces: the comparison with brute force is for these. A cell is proved, refuted (with a point where the list is
-    /// wrong) or undecided; the exit code is 0 only if all are proved.
+    /// It proves two claims for every cell. First, at no point of the cell is a face outside of the
+    /// cell's list closer than the list by more than the δ of the certificate. Second, the sign is
+    /// right in the whole cell. The proof shares the layout of the file, the corners of the cells
+    /// and exact predicates with the encoder, but neither its rules nor its trees. It does not
+    /// cover single precision, the search for a point's cell, and the sign hints of faces; the
+    /// comparison with brute force tests these. A cell is proved, refuted (with a point where the
+    /// list is wrong) or undecided. The exit code is 0 only if all cells are proved.
     #[arg(long)]
     pub prove: bool,
-    /// Most pieces that --prove cuts one cell into before the cell is undecided [default: 1048576]
+    /// Maximum number of pieces into which --prove divides a cell before the cell is undecided
+    /// [default: 1048576]
     #[arg(long, value_name = "N", requires = "prove")]
     pub pieces: Option<NonZeroU64>,
     /// Print the result as JSON
@@ -40,25 +44,26 @@ pub struct Args {
     pub json: bool,
 }
 
-/// What `--json` prints.
+/// The output of `--json`.
 #[derive(Serialize)]
 struct Report {
     file: String,
     passed: bool,
-    /// Whether the structure and every checksum are right; the comparison is made only then.
+    /// Whether the structure and every checksum are right. Only then is the file compared with
+    /// brute force.
     intact: bool,
     /// Why the file failed before the comparison.
     error: Option<String>,
     comparison: Option<VerifyReport>,
-    /// What `--prove` found.
+    /// The result of `--prove`.
     prove: Option<ProveReport>,
 }
 
-/// Compares a file with its checksums, then its answers with brute force, and prints what was found.
+/// Checks the checksums of a file, compares its answers with brute force, and prints the result.
 ///
 /// # Errors
-/// The file cannot be read or is not a `.tesdf` file of this version, or stdout cannot be written. A file that is one but is
-/// damaged is a result: it is not good.
+/// The file cannot be read or is not a `.tesdf` file of this version, or stdout cannot be written.
+/// A damaged `.tesdf` file is not an error but a result, with exit code 1.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let file = args.file.display().to_string();
     let asset = match open_intact(&args.file) {
@@ -107,7 +112,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     finish(args, Report { file, passed, intact: true, error, comparison, prove })
 }
 
-/// The comparison with brute force.
+/// Compares answers with brute force.
 fn compare(
     args: &Args,
     asset: &TeSdf,
@@ -115,27 +120,28 @@ fn compare(
 ) -> Result<Result<VerifyReport, VerifyError>, Failure> {
     let bar = Bar::new("comparing with brute force");
     let options = VerifyOptions { samples: args.samples as usize, ..VerifyOptions::default() };
-    let found = verify(asset, &options, |share| go_on(&bar, share, interrupted));
+    let found = verify(asset, &options, |share| show_progress(&bar, share, interrupted));
     uninterrupted(interrupted)?;
     Ok(found)
 }
 
-/// Shows the share done, and says whether Ctrl-C was pressed.
-fn go_on(bar: &Bar, share: f64, interrupted: &AtomicBool) -> ControlFlow<()> {
+/// Shows the completed fraction, and stops the work after Ctrl-C.
+fn show_progress(bar: &Bar, share: f64, interrupted: &AtomicBool) -> ControlFlow<()> {
     bar.set(share);
     if interrupted.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 fn uninterrupted(interrupted: &AtomicBool) -> Result<(), Failure> {
     match interrupted.load(Ordering::Relaxed) {
-        true => Err(Failure::new("interrupted; nothing was found out")),
+        true => Err(Failure::new("interrupted; there is no result")),
         false => Ok(()),
     }
 }
 
-/// Opens a file after every byte was compared with the checksums: what opening looks at more closely is then as written.
+/// Opens a file after its checksums: all other checks then read the bytes that were written.
 fn open_intact(path: &Path) -> Result<TeSdf, AssetError> {
-    // Opened once: a pipe gives its bytes once, and a file could be replaced in between.
+    // The file is opened once, because a pipe gives its bytes once, and a file could be replaced
+    // between two reads.
     let container = Container::open(path, &layout::SECTIONS)?;
     container.verify_checksums()?;
     TeSdf::from_container(container)

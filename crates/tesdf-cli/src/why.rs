@@ -1,4 +1,4 @@
-//! `tesdf collide A.tesdf B.tesdf --why`
+//! `tesdf collide A.tesdf B.tesdf --why`: explains contacts.
 use std::fmt::Write as _;
 
 use tesdf::collide::{
@@ -8,10 +8,11 @@ use tesdf::collide::{
 
 use tesdf_terminal::report::{self, Failure, Outcome, count};
 
-/// Prints why contacts are or are not there: both ways, or for one part (instance, number) the way that it is a surface.
+/// Prints why contacts exist or not, for both ordered pairs of the bodies. For one `part`, an
+/// (instance, number) pair, it reports the ordered pair whose first body has this part.
 ///
 /// # Errors
-/// A part that is not there, or stdout cannot be written.
+/// The part does not exist, or stdout cannot be written.
 pub fn run(
     scene: &Scene,
     [a, b]: [InstanceId; 2],
@@ -19,13 +20,13 @@ pub fn run(
     part: Option<(u32, u32)>,
     json: bool,
 ) -> Result<Outcome, Failure> {
-    let ways = match part {
+    let pairs = match part {
         None => vec![(a, b, None)],
         Some((instance, part)) if instance == a.0 => vec![(a, b, Some(part))],
         Some((_, part)) => vec![(b, a, Some(part))],
     };
-    let ways = if part.is_none() { [ways, vec![(b, a, None)]].concat() } else { ways };
-    let reports = ways
+    let pairs = if part.is_none() { [pairs, vec![(b, a, None)]].concat() } else { pairs };
+    let reports = pairs
         .into_iter()
         .map(|(a, b, part)| why(scene, options, a, b, part))
         .collect::<Result<Vec<_>, _>>()
@@ -39,7 +40,7 @@ pub fn run(
     Ok(Outcome::Good)
 }
 
-/// Faces, and polygons of a face, that are shown to people.
+/// Number of faces, and of polygons per face, in the text output.
 const SHOWN: usize = 10;
 
 fn text(r: &WhyReport, options: &CollideOptions) -> String {
@@ -72,15 +73,15 @@ fn part_text(part: &PartReport, noun: &str, text: &mut String) {
     let broad = match part.broad {
         BroadVerdict::Candidate => "candidate".to_string(),
         BroadVerdict::PrunedByTree { bound } => {
-            format!("pruned: a node of the face tree over it is at least {bound:e} away")
+            format!("pruned: a face-tree node that contains it is at least {bound:e} away")
         }
         BroadVerdict::PrunedByBall { bound } => {
-            format!("pruned: the ball around it is at least {bound:e} away")
+            format!("pruned: its bounding ball is at least {bound:e} away")
         }
     };
     let _ = writeln!(
         text,
-        "  {noun} {}: {broad}; least signed distance {:e}; {} of {}",
+        "  {noun} {}: {broad}; smallest signed distance {:e}; {} of {}",
         part.id,
         part.distance(),
         count(part.contacts(), "contact"),

@@ -1,11 +1,12 @@
-//! Every file of `bad/` gets what `bad/expected.tsv` says, from the binary.
+//! The binary treats every file of `bad/` as `bad/expected.tsv` says.
 mod folder;
 
 use std::collections::BTreeMap;
 
 use folder::{Folder, data};
 
-/// What the message of `encode` must name for each file that is refused, or to be repaired first.
+/// Texts that the message of `encode` must contain, for each file that is refused or must be
+/// repaired first.
 const NAMED: [(&str, &[&str]); 34] = [
     ("open_holes.obj", &["edge ", "is open: only face "]),
     ("open_half.obj", &["edge ", "is open: only face "]),
@@ -39,11 +40,12 @@ const NAMED: [(&str, &[&str]); 34] = [
     ("duplicate_faces.obj", &["320", "tesdf repair"]),
     ("soup_jitter.obj", &["--weld-tolerance", "tesdf repair"]),
     ("t_junction.obj", &["vertex 8", "4-6", "tesdf repair"]),
-    // The winding number of these is an integer from 0 up as they are.
+    // These files are accepted as they are: their winding number is an integer of at least 0
+    // everywhere.
     ("zero_area_repeated_index.obj", &["face 12", "face 13"]),
     ("nan_unused_vertex.obj", &["vertex 9", "line 9"]),
 ];
-/// Marked `repair`, and encoded as they are, with a warning.
+/// Files that are marked `repair` but are encoded as they are, with a warning.
 const WELL_DEFINED: [&str; 3] =
     ["zero_area_repeated_index.obj", "cavity_inverted.obj", "nan_unused_vertex.obj"];
 
@@ -64,7 +66,7 @@ fn named(file: &str, text: &str) {
 }
 
 #[test]
-fn the_table_is_what_this_test_knows() {
+fn the_test_knows_every_row_of_the_table() {
     let rows = expected();
     assert_eq!(rows.len(), std::fs::read_dir(data("bad")).unwrap().count() - 1, "a file without a row");
     for (file, _) in NAMED {

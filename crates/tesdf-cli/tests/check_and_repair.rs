@@ -1,4 +1,4 @@
-//! What a person and a script see of `tesdf check` and `tesdf repair`.
+//! The output and exit codes of `tesdf check` and `tesdf repair`.
 mod folder;
 
 use std::path::Path;
@@ -33,7 +33,7 @@ fn a_hole_is_1_and_names_its_edges() {
     assert_eq!(code, Some(1), "{err}");
     assert!(out.contains("error: edge 0-1 is open: only face "), "{out}");
     assert!(out.contains("boundary loop 0: 4 edges, length 8"), "{out}");
-    assert!(err.starts_with("hint: nothing of it can be mended without guessing"), "{err}");
+    assert!(err.starts_with("hint: the mesh cannot be repaired without guessing"), "{err}");
     assert!(err.contains("tesdf repair open.obj -o FILE.ply --weld-tolerance T"), "{err}");
     let (code, out, err) = folder.tesdf(&["repair", "open.obj", "-o", "r.ply"]);
     assert_eq!(code, Some(1));
@@ -42,9 +42,9 @@ fn a_hole_is_1_and_names_its_edges() {
 }
 
 #[test]
-fn what_is_repaired_is_named_and_checks_in_every_format() {
+fn repairs_are_reported_and_pass_the_check_in_every_format() {
     let folder = Folder::new();
-    // The last face is there twice, the first one is reversed.
+    // The last face occurs twice, and the first face is reversed.
     let faces = FACES.replace("f 1 4 3 2", "f 1 2 3 4");
     folder.write("bad.obj", format!("{VERTICES}{faces}f 4 1 5 8\n"));
     assert_eq!(folder.tesdf(&["check", "bad.obj"]).0, Some(1));
@@ -63,9 +63,9 @@ fn what_is_repaired_is_named_and_checks_in_every_format() {
 }
 
 #[test]
-fn a_weld_tolerance_joins_what_is_near() {
+fn a_weld_tolerance_merges_near_vertices() {
     let folder = Folder::new();
-    // The roof has corners of its own, a millionth off.
+    // The top has corners of its own, which are a millionth away from those of the sides.
     let near = "v 0 0 2.000001\nv 2 0 2.000001\nv 2 2 2.000001\nv 0 2 2.000001\n";
     let faces = FACES.replace("f 5 6 7 8", "f 9 10 11 12");
     folder.write("crack.obj", format!("{VERTICES}{near}{faces}"));
@@ -79,7 +79,7 @@ fn a_weld_tolerance_joins_what_is_near() {
 }
 
 #[test]
-fn what_cannot_be_read_or_written_is_2_and_named() {
+fn files_that_cannot_be_read_or_written_are_named() {
     let folder = Folder::new();
     folder.write("cube.obj", format!("{VERTICES}{FACES}"));
     folder.write("bad.obj", "v 0 0 zero\n");

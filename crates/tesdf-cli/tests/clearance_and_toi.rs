@@ -1,10 +1,10 @@
-//! `tesdf clearance`, `tesdf toi` and `tesdf collide --why`, as a script sees them.
+//! The output of `tesdf clearance`, `tesdf toi` and `tesdf collide --why`.
 mod folder;
 
 use folder::Folder;
 use serde_json::Value;
 
-/// A cube of edge 2, one corner at the origin.
+/// A cube with edges of length 2 and a corner at the origin.
 const CUBE: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n\
                     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
@@ -54,7 +54,7 @@ fn time_of_impact_of_two_cubes() {
     assert!(time <= 1.0 && time > 1.0 - 1e-6, "{hit}");
     assert!(hit["distance"].as_f64().unwrap() >= 0.0 && hit["touches"] == true, "{hit}");
     assert_eq!(hit["normal"][2], 1.0);
-    // Down by 4 per turn, once around in 2π.
+    // The screw motion moves the body down by 4 per turn, and one turn takes a time of 2π.
     let screwed = toi(&["--screw-a", "1 1 0 0 0 -1 1 4", "--end", "9"]);
     let time = screwed["time"].as_f64().unwrap();
     assert!((time - 0.75 * std::f64::consts::TAU).abs() < 1e-5, "{screwed}");
@@ -67,9 +67,9 @@ fn time_of_impact_of_two_cubes() {
 }
 
 #[test]
-fn an_overlap_that_no_contact_shows_is_told() {
+fn a_hidden_overlap_is_reported() {
     let folder = cube();
-    // The cube has edges of 2: moved by 0.4, no node of either is inside of the other.
+    // The cube has edges of length 2. Moved by 0.4, no vertex of either cube is inside the other.
     let shifted = ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0 0 0.4 0 0 0 1"];
     let run = |more: &[&str]| {
         let (code, out, err) = folder.tesdf(&[&shifted[..], more].concat());
@@ -79,7 +79,7 @@ fn an_overlap_that_no_contact_shows_is_told() {
     let warning = "instances 0 and 1 overlap by";
     let (_, err) = run(&["--mode", "node"]);
     assert!(err.contains(warning) && err.contains("use --mode face or --mode exact"), "{err}");
-    // The array stays as it was; an object has more.
+    // Without --report the output stays an array; the object has more.
     let (out, err) = run(&["--mode", "node", "--json"]);
     assert!(serde_json::from_str::<serde_json::Value>(&out).unwrap().is_array() && err.contains(warning));
     let (out, _) = run(&["--mode", "node", "--json", "--report"]);
@@ -114,7 +114,7 @@ fn why_contacts_are_or_are_not_there() {
         .count();
     assert_eq!(reported, contacts.as_array().unwrap().len());
     assert_eq!((&reports[0]["pair"], &reports[1]["instance_a"]), (&"tested".into(), &1.into()));
-    // Face 0 is in the bottom of the cube: of A it is far from B, of B it is in A.
+    // Face 0 is in the bottom of the cube. The one of A is far from B, the one of B is inside A.
     let far = why(&["--why", "0"]);
     assert_eq!(far.as_array().unwrap().len(), 1);
     let part = &far[0]["parts"][0];
@@ -123,7 +123,7 @@ fn why_contacts_are_or_are_not_there() {
     assert!(part["polygons"].as_array().unwrap().iter().all(|p| p["verdict"] != "contact"), "{part}");
     let deep = why(&["--why", "1:0"]);
     assert_eq!((&deep[0]["instance_a"], &deep[0]["parts"][0]["broad"]), (&1.into(), &"candidate".into()));
-    // What the cosine filter drops.
+    // The contacts that the cosine filter drops.
     let filtered = why(&["--why", "--cos-theta", "1"]);
     let text = filtered.to_string();
     assert!(text.contains("filtered") && text.contains("cosine"), "{text}");

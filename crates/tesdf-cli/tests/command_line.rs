@@ -1,4 +1,4 @@
-//! What a person or a script sees of the binary: exit codes, streams, messages.
+//! The binary's exit codes, streams and messages.
 use std::path::PathBuf;
 use std::process::{Command, Output, Stdio};
 

@@ -1,4 +1,4 @@
-//! Encoding in domains of Gmsh and of files. Gmsh must be there: `./test` gets it.
+//! Encoding in domains from Gmsh and from files. These tests need Gmsh; `./test` installs it.
 mod folder;
 
 use std::path::Path;
@@ -51,10 +51,10 @@ fn a_gmsh_domain_is_encoded_inspected_and_verified() {
 }
 
 #[test]
-fn what_does_not_conform_or_is_not_there_is_said() {
+fn domains_that_do_not_conform_or_exist_are_reported() {
     let folder = Folder::new();
     let (beam, tetrahedra) = (data("beam.obj"), data("beam.ele"));
-    // Half of the mesh's squares have the other diagonal.
+    // In the file, half of the mesh's squares are split along the other diagonal.
     let (code, out, err) = folder.tesdf(&["encode", &beam, "-o", "b.tesdf", "--domain", &tetrahedra]);
     assert_eq!((code, out.as_str()), (Some(2), ""));
     assert!(err.contains("beam.ele") && err.contains("face"), "{err}");

@@ -1,4 +1,5 @@
-//! `tesdf devices`, `--device` and `tesdf bench`; on the software driver, and failing without a device.
+//! `tesdf devices`, `--device` and `tesdf bench`. These tests run on the software driver and fail
+//! without a device.
 mod folder;
 
 use std::path::Path;
@@ -80,7 +81,8 @@ fn a_run_comes_out_as_on_the_processor() {
     let last = host.times().len() - 1;
     for body in [1, 2] {
         let [h, d] = [&host, &device].map(|r| r.pose(last, body).expect("a pose").translation);
-        // Nothing holds them sideways: rounding makes them drift, micrometres of twenty millimetres.
+        // No contact holds the bodies sideways, so rounding makes them drift by micrometres, at a
+        // size of 20 mm.
         assert!(h.distance(d) < 1e-5, "body {body}: {d} instead of {h}");
     }
 }

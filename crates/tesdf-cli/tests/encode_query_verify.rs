@@ -1,13 +1,13 @@
-//! From a mesh file to answers, as a person and a script see it.
+//! From a mesh file to answers, on the command line.
 mod folder;
 
 use folder::{Folder, data};
 
-/// A cube of edge 2, one corner at the origin.
+/// A cube with edges of length 2 and a corner at the origin.
 const CUBE: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n\
                     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// `n` by `m` quadrilaterals on a torus of radii 3 and 1.
+/// A torus of radii 3 and 1 with `n` by `m` quadrilaterals.
 fn torus(n: u32, m: u32) -> String {
     use std::f64::consts::TAU;
     let mut obj = String::new();
@@ -72,7 +72,7 @@ fn the_summary_and_inspect_say_the_same() {
     assert_eq!(encoded["source"]["blake3"].as_str().unwrap().len(), 64);
     assert_eq!(encoded["options"]["band"]["absolute"], 0.5);
     assert_eq!(encoded["options"]["regions"][0][5], 5.0);
-    // Two ways to count the same.
+    // Both commands count the same cells and entries in different ways.
     for key in ["listed_cells", "far_cells", "crossing_cells", "outside_cells", "entries"] {
         assert_eq!(inspected["counts"][key], inspected["statistics"][key], "{key}");
     }
@@ -85,7 +85,7 @@ fn the_summary_and_inspect_say_the_same() {
     assert_eq!(of("file"), encoded["bytes"].as_u64().unwrap());
     let count = |key: &str| inspected["counts"][key].as_u64().unwrap();
     assert_eq!(of("paper"), 4 * count("entries") + 16 * count("listed_cells"));
-    // The volume is cells with lists and cells without.
+    // The volume consists of cells with lists and cells without.
     let volume = |key: &str| inspected["statistics"][key].as_f64().unwrap();
     let share = inspected["reads"]["fallback_volume"].as_f64().unwrap();
     assert!((share - volume("far_volume") / volume("domain_volume")).abs() < 1e-9);
@@ -99,7 +99,7 @@ fn an_output_is_replaced_in_one_step_or_left_alone() {
     folder.write("cube.obj", CUBE);
     folder.write("open.obj", CUBE.replace("f 4 1 5 8\n", ""));
     folder.write("f.tesdf", "what was here before");
-    // The other name keeps the old file: nothing was written into it.
+    // A hard link keeps the old file, which shows that nothing was written into it.
     std::fs::hard_link(folder.path("f.tesdf"), folder.path("old")).unwrap();
     let before = folder.names();
     assert_eq!(folder.tesdf(&["encode", "open.obj", "-o", "f.tesdf"]).0, Some(2));
@@ -130,7 +130,7 @@ fn ctrl_c_leaves_no_half_file() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    // Before the handler is there the signal ends the process, which tests nothing.
+    // Without the handler the signal would end the process, which would test nothing.
     let catches = || {
         let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap();
         let caught = status.lines().find_map(|l| l.strip_prefix("SigCgt:")).unwrap().trim();
@@ -142,7 +142,7 @@ fn ctrl_c_leaves_no_half_file() {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let (code, out, err) = folder::texts(child.wait_with_output().unwrap());
     assert_eq!((code, out.as_str()), (Some(2), ""));
-    assert_eq!(err, "error: interrupted; f.tesdf is as it was\n");
+    assert_eq!(err, "error: interrupted; f.tesdf is unchanged\n");
     assert_eq!(folder.names(), ["f.tesdf", "torus.obj"]);
     assert_eq!(std::fs::read(folder.path("f.tesdf")).unwrap(), b"what was here before");
 }
@@ -168,7 +168,7 @@ fn answers_come_in_order_with_every_digit() {
     let expected = [-0.1 - 0.2, (2.0_f64 + 1e-9) - 2.0, 998.0, 29_f64.sqrt()];
     for (row, d) in rows.iter().zip(expected) {
         assert!((row[3] - d).abs() <= 1e-15 * d.abs(), "{} {d}", row[3]);
-        // x = c + phi g, and the gradient is a unit vector.
+        // x = c + φ g, and the gradient g is a unit vector.
         for k in 0..3 {
             assert!(
                 (row[k] - row[7 + k] - row[3] * row[4 + k]).abs() <= 1e-13 * row[k].abs().max(1.0),
@@ -178,14 +178,14 @@ fn answers_come_in_order_with_every_digit() {
         assert!((row[4].hypot(row[5]).hypot(row[6]) - 1.0).abs() < 1e-12);
     }
     assert_eq!([rows[0][4..7].to_vec(), rows[1][4..7].to_vec()], [[-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]);
-    // Faces 2 and 3 are the two triangles of the top, the second polygon.
+    // Faces 2 and 3 are the two triangles of the top, which is the second polygon.
     assert!([2.0, 3.0].contains(&rows[1][10]));
     assert!(rows[4][3..].iter().chain(&rows[5][3..]).all(|v| v.is_nan()), "{out}");
     assert_eq!(out.lines().nth(5).unwrap(), "1.0,1.0,NaN,NaN,NaN,NaN,NaN,NaN,NaN,NaN,");
 }
 
 #[test]
-fn what_is_not_a_question_is_2_and_named() {
+fn bad_points_are_named() {
     let folder = cube();
     folder.write("p.csv", "x,y,z\n1,2,three\n");
     folder.write("q.csv", "x,y\n1,2\n");
@@ -204,7 +204,7 @@ fn what_is_not_a_question_is_2_and_named() {
 }
 
 #[test]
-fn what_is_no_asset_is_2_and_named() {
+fn files_that_are_no_assets_are_named() {
     let folder = cube();
     let bytes = std::fs::read(folder.path("cube.tesdf")).unwrap();
     folder.write("p.csv", "x,y,z\n1,2,3\n");
@@ -236,7 +236,7 @@ fn what_is_no_asset_is_2_and_named() {
     for file in ["empty.tesdf", "stl.tesdf", "none.tesdf"] {
         assert_eq!(folder.tesdf(&["verify", file]).0, Some(2), "{file}");
     }
-    // A file that is an asset and has lost something fails the verification.
+    // A damaged asset fails the verification.
     for file in ["half.tesdf", "short.tesdf", "long.tesdf"] {
         let (code, out, _) = folder.tesdf(&["verify", file]);
         assert_eq!(code, Some(1), "{file}");
@@ -250,7 +250,7 @@ fn a_flipped_byte_fails_the_verification() {
     let folder = cube();
     let bytes = std::fs::read(folder.path("cube.tesdf")).unwrap();
     let header = 8 + u64::from_le_bytes(*bytes.first_chunk().unwrap()) as usize;
-    // The first 32 bytes say what kind of file it is; they may make it another kind.
+    // The first 32 bytes identify the kind of file, so a change there may make it another kind.
     for at in (32..bytes.len()).step_by(61).chain([header, bytes.len() - 1]) {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0x10;
@@ -264,7 +264,7 @@ fn a_flipped_byte_fails_the_verification() {
         if at >= header {
             assert!(out.contains("section ") && out.contains("checksum"), "byte {at}: {out}");
         }
-        // The other commands do not read every byte, but none of them panics.
+        // The other commands do not read every byte, but none of them may panic.
         let (code, _, err) = folder.tesdf(&["inspect", "d.tesdf"]);
         assert!(matches!(code, Some(0 | 2)) && !err.contains("bug"), "byte {at}: {err}");
     }
@@ -312,7 +312,7 @@ fn samples_on_a_device_are_in_32_bits_and_the_file_says_so() {
     let (code, _, err) = folder.tesdf(&["encode", "cube.obj", "-o", "cube.tesdf", "--device", "gpu"]);
     assert_eq!(
         (code, err.trim()),
-        (Some(2), "error: --device is of the sampled encoder; add --encoder sampled")
+        (Some(2), "error: --device only applies to the sampled encoder; add --encoder sampled")
     );
 }
 

@@ -1,4 +1,4 @@
-//! `tesdf evaluate`: the figures of a quick Table I, and the forms of the result.
+//! The figures of a quick Table I from `tesdf evaluate`, and the formats of its output.
 mod folder;
 
 use folder::Folder;
@@ -106,7 +106,7 @@ fn what_is_not_there_is_an_error() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_is_told_before_the_work() {
+fn a_folder_that_cannot_be_made_is_reported_before_the_work() {
     let folder = Folder::new();
     folder.write("file", "in the way");
     let data = meshes();

@@ -1,4 +1,5 @@
-//! `kill -9` at random moments: nothing is ever half a file, and a run loses one step at most.
+//! Processes that are killed at random times (`kill -9`): no file is ever incomplete, and a run
+//! loses at most one step.
 #![cfg(unix)]
 mod folder;
 
@@ -34,11 +35,12 @@ velocity = [1, 0, 0]
 angular_velocity = [5, 3, 1]
 "#;
 
-/// A command that is killed at random moments.
+/// A command that is killed at random times.
 struct Victim<'a> {
     args: &'a [&'a str],
     random: fastrand::Rng,
-    /// How long the command takes; the shortest time seen, as other work slows it down.
+    /// Duration of the command: the shortest time that was measured, because other work slows it
+    /// down.
     whole: Duration,
 }
 
@@ -49,12 +51,13 @@ impl<'a> Victim<'a> {
         Self { args, random: fastrand::Rng::with_seed(seed), whole: start.elapsed() }
     }
 
-    /// A share of the time that the whole command takes.
+    /// A random fraction of the command's duration, between `from` and `to`.
     fn share(&mut self, from: f64, to: f64) -> Duration {
         self.whole.mul_f64(from + (to - from) * self.random.f64())
     }
 
-    /// Starts the command and kills it after a while. Whether it was killed, not over before.
+    /// Starts the command and kills it after `delay`. Returns whether it was killed before it
+    /// ended.
     fn kill(&mut self, folder: &Folder, args: &[&str], delay: Duration) -> bool {
         let mut command = folder.command(args);
         let start = Instant::now();
@@ -81,7 +84,7 @@ fn a_killed_encode_leaves_the_old_file_or_the_new_file() {
     let mut kills = 0;
     while kills < KILLS {
         folder.write("f.tesdf", "old");
-        // Every second time near the end, when the file is written.
+        // Every second kill is near the end, when the file is written.
         let delay = if kills % 2 == 0 { victim.share(0.0, 1.0) } else { victim.share(0.8, 1.0) };
         kills += usize::from(victim.kill(&folder, &encode, delay));
         let left = fs::read(folder.path("f.tesdf")).unwrap();
@@ -92,7 +95,7 @@ fn a_killed_encode_leaves_the_old_file_or_the_new_file() {
 }
 
 #[test]
-fn a_killed_run_goes_on_from_its_last_step_to_the_same_bytes() {
+fn a_killed_run_resumes_from_its_last_step_to_the_same_bytes() {
     let folder = Folder::new();
     folder.write("scene.toml", SCENE);
     let simulate = ["simulate", "scene.toml", "-o", "run"];
@@ -128,7 +131,7 @@ fn a_killed_run_goes_on_from_its_last_step_to_the_same_bytes() {
             }
         }
     }
-    assert!(cuts > 0, "no run was cut");
+    assert!(cuts > 0, "no run was interrupted");
     folder.good(if steps.is_some() { &resume[..] } else { &simulate });
     assert!(fs::read(folder.path("run")).unwrap() == expected);
     assert_eq!(folder.names(), ["run", "scene.toml"]);

@@ -1,4 +1,5 @@
-//! Files and options that ask for too much: an error that names what, never an abort.
+//! Files and options that need too much memory or time cause an error that names the value, never
+//! an abort.
 #![cfg(target_os = "linux")]
 mod folder;
 
@@ -22,7 +23,7 @@ density = 1000
 translation = [0, 0, 0.011]
 "#;
 
-/// The binary in so many kB of memory.
+/// Runs the binary with a memory limit in kB.
 fn within(kilobytes: u32, folder: &Folder, args: &[&str]) -> (Option<i32>, String, String) {
     let script = format!("ulimit -v {kilobytes}; exec \"$0\" \"$@\"");
     let mut shell = Command::new("sh");
@@ -31,7 +32,7 @@ fn within(kilobytes: u32, folder: &Folder, args: &[&str]) -> (Option<i32>, Strin
 }
 
 #[test]
-fn what_a_scene_asks_for_is_refused_with_key_and_line() {
+fn scenes_over_a_limit_are_refused_with_key_and_line() {
     let folder = Folder::new();
     for (from, to, expected) in [
         ("duration = 0.01", "duration = 1e318", "line 3"),
@@ -84,14 +85,14 @@ fn a_picture_that_does_not_fit_the_memory_is_refused() {
     assert_eq!(folder.names(), Vec::<String>::new());
 }
 
-/// What is read here grows with what the file holds, and no single request for memory is too large.
+/// The memory grows with the content of the file, and no single allocation is too large.
 #[test]
 fn where_the_memory_ends_the_exit_code_is_2() {
     let folder = Folder::new();
     folder.write("s.toml", format!("{DROP}\nx = [{}]\n", "[],".repeat(15_000_000)));
     let (code, out, err) = within(1 << 20, &folder, &["simulate", "s.toml", "-o", "run"]);
     assert_eq!((code, out.as_str()), (Some(2), ""), "{err}");
-    assert!(err.contains("memory allocation of ") && err.contains("hint: where memory is short"), "{err}");
+    assert!(err.contains("memory allocation of ") && err.contains("hint: if memory is short"), "{err}");
 }
 
 #[test]

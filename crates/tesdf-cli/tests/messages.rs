@@ -1,15 +1,15 @@
-//! What a person is told: what it says is true, can be read, and says what to do next.
+//! Messages for users: they are true, can be read, and say what to do next.
 mod folder;
 
 use std::process::Command;
 
 use folder::{Folder, data, texts};
 
-/// A cube of edge 2, one corner at the origin.
+/// A cube with edges of length 2 and a corner at the origin.
 const CUBE: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 2 2 2\nv 0 2 2\n\
                     f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// Assets of the cube in units, by their names; `none.tesdf` records none.
+/// Assets of the cube with these units as their names. `none.tesdf` records no unit.
 fn cubes(units: &[&str]) -> Folder {
     let folder = Folder::new();
     folder.write("c.obj", CUBE);
@@ -22,7 +22,7 @@ fn cubes(units: &[&str]) -> Folder {
 }
 
 #[test]
-fn what_controls_a_terminal_is_not_printed() {
+fn control_characters_are_not_printed() {
     let folder = Folder::new();
     let hostile = "\u{1b}[31mred\u{7}\nfaces  12";
     folder.write("c.obj", CUBE);
@@ -76,7 +76,7 @@ fn an_asset_comes_through_a_pipe() {
     assert!(code == Some(0) && out.contains("passed"), "{out}{err}");
     let (code, _, err) = piped("cat none.tesdf", "clearance /dev/stdin none.tesdf");
     assert_eq!(code, Some(0), "{err}");
-    // Bytes without an end, which are not read on.
+    // An endless stream must not be read to its end.
     let (code, _, err) = piped("cat /dev/zero", "verify /dev/stdin");
     assert!(code == Some(2) && err.contains("not a .tesdf file"), "{err}");
     let (code, out, _) = piped("head -c 3000 none.tesdf", "verify /dev/stdin");
@@ -103,7 +103,7 @@ fn a_body_and_itself_in_one_place_overlap() {
     };
     for (pose, expected, overlap) in [
         ("0 0 0 0 0 0 1", "(they overlap: ", true),
-        ("0.5 0.5 0.5 0 0 0 1", "(deep in each other)", true),
+        ("0.5 0.5 0.5 0 0 0 1", "(they overlap)", true),
         ("0 0 2 0 0 0 1", "(they touch)", false),
         ("0 0 3 0 0 0 1", "(apart)", false),
     ] {
@@ -112,7 +112,7 @@ fn a_body_and_itself_in_one_place_overlap() {
     }
     let help = folder.good(&["clearance", "--help"]);
     let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(help.contains("A negative one says that the bodies overlap"), "{help}");
+    assert!(help.contains("A negative clearance means that the bodies overlap"), "{help}");
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn check_points_at_repair_where_it_helps() {
     for (file, expected) in [
         ("bad/flipped_all.obj", "makes it encodable"),
         ("bad/duplicate_faces.obj", "makes it encodable"),
-        ("bad/open_half.obj", "nothing of it can be mended without guessing"),
+        ("bad/open_half.obj", "the mesh cannot be repaired without guessing"),
     ] {
         let (code, _, err) = folder.tesdf(&["check", &data(file)]);
         assert_eq!(code, Some(1), "{file}");
@@ -166,7 +166,7 @@ fn check_points_at_repair_where_it_helps() {
 }
 
 #[test]
-fn help_says_what_a_device_is() {
+fn help_explains_devices() {
     let folder = Folder::new();
     for command in [&["collide"][..], &["simulate"], &["encode"], &["bench", "collide"]] {
         let help = folder.good(&[command, &["--help"]].concat());

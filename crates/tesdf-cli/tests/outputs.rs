@@ -1,4 +1,4 @@
-//! What becomes of the file that `-o` names, whatever it is.
+//! The effect of every command on the file of its option `-o`.
 #![cfg(target_os = "linux")]
 mod folder;
 
@@ -34,7 +34,7 @@ translation = [0, 0, 1.001]
 const GLTF: &str =
     r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "m.bin", "byteLength": 4}, {"uri": "data:,"}]}"#;
 
-/// Meshes, assets, a scene and its run.
+/// A folder with meshes, assets, a scene and its run.
 fn workplace() -> Folder {
     let folder = Folder::new();
     folder.write("cube.obj", CUBE);
@@ -47,7 +47,7 @@ fn workplace() -> Folder {
     folder
 }
 
-/// Bytes, inode and mode of every file below the folder; of a link, where it leads.
+/// Bytes, inode and mode of every file in the folder; for a link, its target.
 fn snapshot(folder: &Path) -> BTreeMap<String, (Vec<u8>, u64, u32)> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
@@ -69,7 +69,7 @@ fn snapshot(folder: &Path) -> BTreeMap<String, (Vec<u8>, u64, u32)> {
 #[test]
 fn an_input_is_never_the_output() {
     let folder = workplace();
-    // What is refused before the work needs no meaning.
+    // The output is refused before the work, so these files need no valid content.
     for name in ["t.msh", "t.node", "t.ele", "m.bin", "cube.ply"] {
         folder.write(name, "precious");
     }
@@ -79,7 +79,7 @@ fn an_input_is_never_the_output() {
     for name in ["data/iso_m16_nut_c50.obj", "data/procedural/shaft_keyway.obj"] {
         folder.write(name, "precious");
     }
-    let cut = folder::cut_run(&folder, "scene.toml", 4);
+    let cut = folder::interrupted_run(&folder, "scene.toml", 4);
     folder.write("cut.tesrun", cut);
     let encode = ["encode", "cube.obj"];
     let of_run = ["render", "--run", "run.tesrun"];
@@ -120,7 +120,7 @@ fn an_input_is_never_the_output() {
         assert!(snapshot(&folder.path("")) == before, "{command:?} changed a file");
         [hard, soft].iter().for_each(|name| fs::remove_file(folder.path(name)).unwrap());
     }
-    // A table's files have names of their own.
+    // The files of a table have fixed names.
     let [mesh, table] =
         ["data/procedural/shaft_keyway.obj", "tables/table4.csv"].map(|name| folder.path(name));
     fs::hard_link(&mesh, &table).unwrap();
@@ -132,7 +132,7 @@ fn an_input_is_never_the_output() {
     assert_eq!(fs::read(mesh).unwrap(), b"precious");
 }
 
-/// Every command that writes one file: what it writes, without `-o`.
+/// All commands that write one file, without `-o`, each with a file name.
 const WRITERS: [(&[&str], &str); 6] = [
     (&["encode", "cube.obj", "--preset", "fast"], "out.tesdf"),
     (&["repair", "cube.obj"], "out.ply"),
@@ -155,7 +155,7 @@ fn stdout_carries_the_output_and_nothing_else() {
         assert_eq!(out.stderr.is_empty(), draws, "{command:?}: the result for people goes to stderr");
     }
     assert!(fs::symlink_metadata("/dev/stdout").unwrap().is_symlink());
-    // The shell's file is neither replaced nor written from its beginning.
+    // The shell's file must not be replaced, and must not be written from its beginning.
     let script = "{ echo before; \"$0\" repair cube.obj -o /dev/stdout; echo after; } >>all 2>/dev/null";
     folder.write("all", "first\n");
     let shell = Command::new("sh").args(["-c", script, folder::BINARY]).current_dir(folder.path("")).status();
@@ -215,7 +215,8 @@ fn permissions_are_kept_and_a_read_only_file_needs_consent() {
     }
 }
 
-/// As a user who is not the administrator, who may write everywhere; the binary and the folder are made accessible.
+/// Runs the binary as an ordinary user, because the administrator may write everywhere. The binary
+/// and the folder are made accessible to this user.
 fn as_a_user(folder: &Folder, args: &[&str]) -> (Option<i32>, String, String) {
     let mut command = folder.command(args);
     if fs::metadata("/proc/self").unwrap().uid() == 0 {
@@ -230,7 +231,8 @@ fn as_a_user(folder: &Folder, args: &[&str]) -> (Option<i32>, String, String) {
     texts(command.output().unwrap())
 }
 
-/// A mesh that cannot be encoded: an error about its output comes before the work.
+/// The mesh cannot be encoded, so an error about the output shows that the output was checked
+/// first.
 #[test]
 fn a_folder_that_takes_no_file_is_noticed_before_the_work() {
     let folder = Folder::new();
@@ -244,7 +246,7 @@ fn a_folder_that_takes_no_file_is_noticed_before_the_work() {
         ("no/f.tesdf", "error: cannot write no/f.tesdf: there is no folder no\n"),
         ("open.obj/f.tesdf", "error: cannot write open.obj/f.tesdf: there is no folder open.obj\n"),
         ("locked", "error: cannot write locked: it is a folder; expected the name of a file\n"),
-        // Where the administrator cannot create files either.
+        // Even the administrator cannot create files in this folder.
         ("/proc/f.tesdf", "error: cannot create a file in /proc: "),
     ] {
         let (code, _, err) = folder.tesdf(&encode(output));
@@ -255,23 +257,23 @@ fn a_folder_that_takes_no_file_is_noticed_before_the_work() {
         code == Some(2) && err.starts_with("error: cannot create a file in locked: Permission denied"),
         "{err}"
     );
-    // A file of somebody else, in a folder of somebody else.
+    // A file and a folder of another user.
     let (code, _, err) = as_a_user(&folder, &encode("locked/f.tesdf"));
     assert!(code == Some(2) && err.starts_with("error: "), "{err}");
     assert_eq!(fs::read(locked.join("f.tesdf")).unwrap(), b"old");
     assert_eq!(fs::read_dir(&locked).unwrap().count(), 1);
 }
 
-/// A place that takes few bytes.
+/// A place that has room for few bytes.
 enum FullDisk {
-    /// Of a file, by a limit of the process.
+    /// A file size limit of the process.
     Limit,
-    /// A file system of its own.
+    /// A small file system.
     Small,
 }
 
 impl FullDisk {
-    /// The limit, which every system has, and a file system where this process may mount it.
+    /// The limit works everywhere. The file system needs a process that may mount it.
     fn all(folder: &Folder) -> Vec<Self> {
         fs::create_dir(folder.path("disk")).unwrap();
         let mount = ["-t", "tmpfs", "-o", "size=12k", "none"];
@@ -282,7 +284,8 @@ impl FullDisk {
     }
 
     fn run(&self, folder: &Folder, args: &[&str]) -> (Option<i32>, String, String) {
-        // 8 or 16 kB, as shells differ in their unit. Without the trap the signal ends the process before it sees the error.
+        // The limit is 8 or 16 kB, because shells use different units. Without the trap, the signal
+        // would end the process before it sees the error.
         let script = "trap '' XFSZ; ulimit -f 16; exec \"$0\" \"$@\"";
         match self {
             Self::Limit => {
@@ -295,7 +298,7 @@ impl FullDisk {
     }
 }
 
-/// Takes the file system away again, also when a test fails.
+/// Unmounts the file system, also when a test fails.
 struct Unmount<'a>(&'a Folder);
 
 impl Drop for Unmount<'_> {
@@ -327,7 +330,11 @@ fn a_full_disk_leaves_the_old_file_and_a_run_its_steps() {
         let (code, out, err) = disk.run(&folder, &["simulate", "long.toml", "-o", "disk/r.tesrun"]);
         assert_eq!((code, out.as_str()), (Some(2), ""), "{err}");
         assert!(
-            err.starts_with("error: cannot write disk/r.tesrun: ") && err.contains("has the steps before"),
+            err.starts_with("error: cannot write disk/r.tesrun: ") && err.contains("has the previous steps"),
+            "{err}"
+        );
+        assert!(
+            err.ends_with("hint: `tesdf simulate --resume disk/r.tesrun` continues from there\n"),
             "{err}"
         );
         assert!(err.ends_with("hint: `tesdf simulate --resume disk/r.tesrun` goes on from there\n"), "{err}");
@@ -363,7 +370,7 @@ fn a_closed_or_full_stdout_takes_no_file_away() {
     );
     folder.good(&["verify", "f.tesdf", "--samples", "100"]);
 
-    // A reader that is gone did not get the output.
+    // A reader that closed the pipe did not get the output.
     let mut child = folder.command(&["encode", "cube.obj", "-o", "/dev/stdout"]);
     let mut child = child.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     drop(child.stdout.take());

@@ -1,4 +1,4 @@
-//! Pictures of scenes: what is seen where, and what the binary says.
+//! Pictures of scenes, and the messages of `tesdf render`.
 mod folder;
 
 use std::path::Path;
@@ -15,14 +15,14 @@ use tiny_skia::Pixmap;
 const RED: [u8; 3] = [220, 40, 40];
 const GREEN: [u8; 3] = [40, 190, 60];
 const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
-/// From the front: x to the right, z upwards.
+/// A view from the front, with x to the right and z upwards.
 const FRONT: View = View { azimuth: -90.0, elevation: 0.0, field_of_view: None, zoom: 1.0, target: None };
 
 fn drawn(shape: &Shape, at: DVec3, rgb: [u8; 3], exposure: Exposure) -> Drawn<'_> {
     Drawn { shape, placement: Placement { pose: Pose::at(at), scale: 1.0 }, colour: linear(rgb), exposure }
 }
 
-/// Pixels that are clearly red, clearly green, and neither.
+/// Numbers of pixels that are clearly red, clearly green, and neither.
 fn hues(map: &Pixmap) -> [usize; 3] {
     map.pixels().iter().fold([0; 3], |mut counts, p| {
         let (r, g) = (i32::from(p.red()), i32::from(p.green()));
@@ -59,7 +59,8 @@ fn a_sphere_covers_its_disc_and_the_nearer_body_hides_the_other() {
     ];
     let picture =
         |bodies: &[Drawn]| render(&Scenery { bodies, cut: &cut, contacts: &[] }, &FRONT, [200, 200]).unwrap();
-    // Fitted: the radius is 44 % of the side, the block half of it.
+    // In the fitted picture the radius of the sphere is 44 % of the side, and the block is half as
+    // large as the sphere.
     let disc = std::f64::consts::PI * 88.0 * 88.0;
     let [red, green, _] = hues(&picture(&bodies[..1]));
     assert!((red as f64 - disc).abs() < 0.02 * disc && green == 0, "{red} {green}, {disc}");
@@ -69,9 +70,9 @@ fn a_sphere_covers_its_disc_and_the_nearer_body_hides_the_other() {
 }
 
 #[test]
-fn a_cut_opens_what_it_should_and_shows_overlaps() {
+fn a_cut_opens_the_chosen_bodies_and_shows_overlaps() {
     let (outer, inner) = (Shape::Box { half_extents: DVec3::ONE }, Shape::Sphere { radius: 0.5 });
-    // In front of the plane y = 0 the box is removed, the ball in it is not.
+    // In front of the plane y = 0 the box is removed. The ball inside it is not removed.
     let cut = Cut(vec![HalfSpace::new(DVec3::NEG_Y, 0.0).unwrap()]);
     let at = |ball: Exposure, x: u32, y: u32| {
         let bodies = [
@@ -82,7 +83,7 @@ fn a_cut_opens_what_it_should_and_shows_overlaps() {
         hue_at(&map, x, y)
     };
     assert_eq!([at(Exposure::Whole, 100, 100), at(Exposure::Whole, 30, 40)], ['-', 'g']);
-    // Where both are cut, both are inside of the ball: red.
+    // When both are cut, the point is in the overlap of both sections, which is red.
     assert_eq!([at(Exposure::Cut, 110, 100), at(Exposure::Cut, 30, 40)], ['r', 'g']);
 }
 
@@ -163,7 +164,7 @@ fn the_binary_draws_the_same_bytes_on_any_number_of_threads() {
     assert_eq!(folder.names(), ["p.png", "t.obj", "t.tesdf"]);
 }
 
-/// A ball falls by 14 of its radii beside a body that stays.
+/// A ball falls by 14 of its radii beside a fixed body.
 const DROP: &str = r#"
 time_step = 0.05
 duration = 0.5
@@ -207,7 +208,7 @@ fn a_run_is_drawn_at_a_time_like_its_bodies_by_hand() {
     assert!(end != by_hand(4), "the ball falls");
     assert!(end == picture(&["--run", "run"]), "the end");
     assert!(by_hand(4) == picture(&["--run", "run", "--time", "0.21"]), "the nearest step");
-    // Contacts are kept of the steps 0, 4 and 8; there are none.
+    // Contacts are recorded at the steps 0, 4 and 8; there are none.
     assert!(by_hand(8) == picture(&["--run", "run", "--contacts"]), "the nearest step with contacts");
 
     std::fs::rename(folder.path("scene"), folder.path("elsewhere")).unwrap();

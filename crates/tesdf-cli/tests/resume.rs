@@ -1,11 +1,11 @@
-//! `tesdf simulate --resume`, Ctrl-C, and what other commands make of a run that was cut.
+//! `tesdf simulate --resume`, Ctrl-C, and how other commands read an interrupted run.
 mod folder;
 
 use std::fs;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
-use folder::{Folder, cut_run, texts};
+use folder::{Folder, interrupted_run, texts};
 use tesdf_sim::RunRecord;
 
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
@@ -42,7 +42,7 @@ fn workplace() -> Folder {
     folder.write("cube.obj", CUBE);
     folder.write("scene.toml", SCENE);
     folder.good(&["simulate", "scene.toml", "-o", "whole"]);
-    let cut = cut_run(&folder, "scene.toml", 7);
+    let cut = interrupted_run(&folder, "scene.toml", 7);
     folder.write("run", cut);
     folder
 }
@@ -52,14 +52,14 @@ fn read(folder: &Folder, name: &str) -> Vec<u8> {
 }
 
 #[test]
-fn a_cut_run_goes_on_to_the_same_bytes() {
+fn an_interrupted_run_resumes_to_the_same_bytes() {
     let folder = workplace();
     let (whole, cut) = (read(&folder, "whole"), read(&folder, "run"));
-    // Elsewhere, and the run itself stays.
+    // With another output, the interrupted run stays as it is.
     let text = folder.good(&["simulate", "--resume", "run", "-o", "other"]);
     assert!(text.contains("other, 20 steps over 0.04 s"), "{text}");
     assert!(read(&folder, "other") == whole && read(&folder, "run") == cut);
-    // With the same scene and options, said again.
+    // The scene and options of the run may be given again.
     let same = [
         "simulate",
         "scene.toml",
@@ -74,12 +74,12 @@ fn a_cut_run_goes_on_to_the_same_bytes() {
     ];
     folder.good(&same);
     assert!(read(&folder, "other") == whole);
-    // A step that was half written.
+    // The last step is incomplete.
     folder.write("torn", &cut[..cut.len() - 5]);
     assert_eq!(RunRecord::open(folder.path("torn")).unwrap().steps(), 6);
     folder.good(&["simulate", "--resume", "torn"]);
     assert!(read(&folder, "torn") == whole);
-    // The mesh has moved.
+    // The mesh has been moved.
     fs::rename(folder.path("cube.obj"), folder.path("moved.obj")).unwrap();
     let (code, _, err) = folder.tesdf(&["simulate", "--resume", "run"]);
     assert!(code == Some(2) && err.contains("cube.obj"), "{err}");
@@ -94,7 +94,7 @@ fn the_summary_is_that_of_the_whole_run() {
     let summary = |args: &[&str]| {
         let json = folder.good(&[args, &["-o", "other", "--json"]].concat());
         let mut json: serde_json::Value = serde_json::from_str(&json).unwrap();
-        // Wall times, and the file that was read.
+        // These values are wall times, and the name of the input file.
         for key in ["detection_ms", "solution_ms", "scene"] {
             json.as_object_mut().unwrap().remove(key).unwrap();
         }
@@ -139,10 +139,9 @@ fn a_run_is_not_resumed_with_something_else() {
 }
 
 #[test]
-fn other_commands_read_a_cut_run_and_say_so() {
+fn other_commands_read_an_interrupted_run_with_a_note() {
     let folder = workplace();
-    let note =
-        "note: run has 7 of 20 steps: it still grows, or it was cut; `tesdf simulate --resume run` goes on\n";
+    let note = "note: run has 7 of 20 steps: it is still running, or it was interrupted; `tesdf simulate --resume run` continues it\n";
     let render = ["render", "--run", "run", "-o", "cut.png", "--size", "64x64", "--contacts"];
     let (code, _, err) = folder.tesdf(&render);
     assert_eq!((code, err.as_str()), (Some(0), note));
@@ -162,7 +161,7 @@ fn start(folder: &Folder, steps: u64) -> Child {
     folder.write("long.toml", long(steps));
     let mut command = folder.command(&["simulate", "long.toml", "-o", "run"]);
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // The run of the test's beginning is shorter.
+    // The run from the beginning of the test is shorter.
     while !RunRecord::open(folder.path("run"))
         .is_ok_and(|run| run.planned_steps() == Some(steps) && run.steps() > 2)
     {
@@ -173,7 +172,7 @@ fn start(folder: &Folder, steps: u64) -> Child {
 
 #[cfg(unix)]
 #[test]
-fn ctrl_c_keeps_the_steps_and_says_how_to_go_on() {
+fn ctrl_c_keeps_the_steps_and_says_how_to_continue() {
     let folder = workplace();
     let child = start(&folder, 2000);
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
@@ -182,7 +181,7 @@ fn ctrl_c_keeps_the_steps_and_says_how_to_go_on() {
     let steps = RunRecord::open(folder.path("run")).unwrap().steps();
     assert!((3..2000).contains(&steps));
     let expected = format!(
-        "error: interrupted after {steps} of 2000 steps; run has them\nhint: `tesdf simulate --resume run` goes on from there\n"
+        "error: interrupted after {steps} of 2000 steps; run has them\nhint: `tesdf simulate --resume run` continues from there\n"
     );
     assert_eq!(err, expected);
     assert_eq!(folder.names(), ["cube.obj", "long.toml", "run", "scene.toml", "whole"]);
@@ -201,7 +200,7 @@ fn a_run_that_is_being_written_is_left_to_its_process() {
         let (code, _, err) = folder.tesdf(args);
         assert_eq!((code, err.as_str()), (Some(2), busy), "{args:?}");
     }
-    // Reading it does no harm.
+    // Reading the run must not disturb it.
     folder.good(&["render", "--run", "run", "-o", "now.png", "--size", "32x32"]);
     assert!(child.try_wait().unwrap().is_none(), "the scene is too short for this test");
     child.kill().unwrap();
@@ -210,7 +209,7 @@ fn a_run_that_is_being_written_is_left_to_its_process() {
     assert!(read(&folder, "run") == read(&folder, "whole"));
 }
 
-/// As before: until the first step is made, a run leaves the file that was there.
+/// A run leaves an existing file unchanged until its first step is made.
 #[test]
 fn a_run_that_fails_before_its_first_step_leaves_the_old_file() {
     let folder = workplace();

@@ -20,7 +20,7 @@ density = 1000
 translation = [0, 0, 0.011]
 "#;
 
-/// A ball cannot turn down a thread that is not there.
+/// The ball has no thread, so it cannot meet this criterion.
 const SCREW: &str = r#"
 [criterion.screw]
 body = "ball"
@@ -84,7 +84,7 @@ fn errors_leave_no_file() {
     assert_eq!(folder.names(), ["drop.toml", "good.toml"]);
 }
 
-/// Two equal boxes, one over the other: no node of either is ever inside of the other.
+/// Two equal boxes, one above the other. No vertex of either is ever inside the other.
 const TWINS: &str = r#"
 time_step = 2e-3
 duration = 0.2
@@ -106,7 +106,7 @@ translation = [0, 0, 0.016]
 "#;
 
 #[test]
-fn an_overlap_that_no_contact_shows_is_told_and_meets_no_criterion() {
+fn a_hidden_overlap_is_reported_and_meets_no_criterion() {
     let folder = Folder::new();
     folder.write("twins.toml", TWINS);
     let (code, out, err) = folder.tesdf(&["simulate", "twins.toml", "-o", "run", "--json"]);
@@ -118,7 +118,7 @@ fn an_overlap_that_no_contact_shows_is_told_and_meets_no_criterion() {
     let depth = pair["depth"].as_f64().unwrap();
     assert!(depth > 2e-3 && json["deepest_penetration"].as_f64().unwrap() >= depth, "{json}");
     assert!(err.contains("bodies below and above overlapped by") && err.contains("--mode face"), "{err}");
-    // The record has it, too.
+    // The record has it as well.
     let record = RunRecord::open(folder.path("run")).unwrap();
     assert_eq!(serde_json::to_value(record.hidden_pairs()).unwrap(), json["hidden"]);
 

@@ -1,4 +1,4 @@
-//! The slice picture on solids whose distance is a formula.
+//! Pictures of `tesdf slice` for solids whose distance is a formula.
 use tesdf::glam::{DVec2, DVec3};
 use tesdf_cli::slice::{
     Axis, CellLabel, CellOutline, Deviation, Overlay, View, cut_tetrahedron, cut_triangle, draw, draw_error,
@@ -18,7 +18,8 @@ fn torus_point(i: u32, j: u32, [n, m]: [u32; 2]) -> DVec3 {
     DVec3::new(r * u.cos(), r * u.sin(), MINOR * v.sin())
 }
 
-/// Triangles of the torus and the six tetrahedra of each cube of a grid around it, cut by the plane.
+/// The triangles of the torus, and the six tetrahedra of each cube of a grid around it, cut by the
+/// plane.
 fn overlay(view: &View) -> Overlay {
     let mut overlay = Overlay::default();
     let counts @ [n, m] = [160, 64];
@@ -76,7 +77,7 @@ fn torus_is_warm_inside_blue_outside_and_dark_on_the_surface() {
         let (r, b) = (i32::from(p.red()), i32::from(p.blue()));
         [warm + usize::from(r > b + 20), blue + usize::from(b > r + 20), dark + usize::from(r + b < 90)]
     });
-    // By area the torus fills pi * (14^2 - 6^2) / (28 + margin)^2 of the plot.
+    // The torus fills pi * (14^2 - 6^2) / (28 + margin)^2 of the plot.
     let area = std::f64::consts::PI * (196.0 - 36.0) / (view.max - view.min).element_product();
     let share = counts[0] as f64 / (counts[0] + counts[1]) as f64;
     assert!((share - area).abs() < 0.02, "{share} of the plot is warm; expected {area}");
@@ -117,7 +118,7 @@ fn distances_that_are_not_finite_stay_grey() {
 #[test]
 fn errors_are_red_where_they_are_and_nowhere_else() {
     let view = view(Axis::Z);
-    // Off by 1 in the half with x > 0, from 2 below the surface on.
+    // The error is 1 in the half with x > 0, deeper than 2 below the surface.
     let is_off = |p: DVec3| p.x > 0.0 && torus(p) < -2.0;
     let deviation = |p: DVec3| {
         let error = if is_off(p) { 1.0 } else { 1e-9 };
@@ -129,7 +130,7 @@ fn errors_are_red_where_they_are_and_nowhere_else() {
         map.pixels().iter().filter(|p| pick(of(p))).count() as f64
     };
     let (red, green) = (count(&|[r, _, b]| r == 142 && b == 32), count(&|rgb| rgb == [214, 232, 220]));
-    // The pixels of each, by sampling the plot.
+    // The expected numbers of pixels, from samples of the plot.
     let extent = view.max - view.min;
     let points = (0..400 * 400).map(|i| {
         let share = DVec2::new(f64::from(i % 400) + 0.5, f64::from(i / 400) + 0.5) / 400.0;

@@ -1,4 +1,4 @@
-//! What makes a run a success, and the analytic screw that a run is compared with.
+//! Success criteria of a run, and the analytic screw that a run is compared with.
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
@@ -7,59 +7,63 @@ use tesdf::glam::DVec3;
 
 use crate::{Mass, MassProperties, System};
 
-/// A body turns along a thread: at every moment its travel along the axis is its turns × pitch, up to the backlash.
+/// The body moves along a thread: at every step its travel along the axis differs from its number
+/// of turns times the pitch by at most the backlash.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScrewCriterion {
     /// Name of the body.
     pub body: String,
-    /// Direction in which it is expected to move; unit.
+    /// Direction of the expected motion: a unit vector in the world frame.
     pub axis: [f64; 3],
-    /// Travel per turn, right-handed, m.
+    /// Travel per turn of a right-handed thread, m.
     pub pitch: f64,
-    /// Turns that it makes at least.
+    /// Minimum number of turns that the body makes.
     pub min_turns: f64,
-    /// How far travel and turns × pitch may differ, m.
+    /// Maximum difference between the travel and turns × pitch, m.
     pub backlash: f64,
-    /// Share of the acceleration of an ideal screw that it reaches at least.
+    /// Minimum acceleration along the axis, as a fraction of the acceleration of an ideal screw.
     #[serde(default)]
     pub min_acceleration: f64,
-    /// Share of the lost potential energy that its motion may have at most.
+    /// Maximum kinetic energy at the end of the run, as a fraction of the potential energy lost
+    /// since the beginning.
     #[serde(default = "no_gain")]
     pub max_energy: f64,
 }
 
-/// Energy does not grow: rounding, and what the contacts' springs hold, aside.
+/// Energy must not grow. The extra 0.1 % allows for rounding and for the energy that the springs of
+/// the contacts store.
 fn no_gain() -> f64 {
     1.001
 }
 
-/// What became of a screw.
+/// Result of a screw criterion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScrewReport {
-    /// Of the centre of mass along the axis, m.
+    /// Travel of the centre of mass along the axis, m.
     pub travel: f64,
-    /// About the axis, right-handed.
+    /// Turns about the axis, right-handed.
     pub turns: f64,
-    /// Largest difference of travel and turns × pitch at any step, m.
+    /// Largest difference between the travel and turns × pitch at any step, m.
     pub largest_pitch_error: f64,
-    /// Over the second half of the run, along the axis, m/s².
+    /// Mean acceleration along the axis over the second half of the run, m/s².
     pub acceleration: f64,
-    /// Of an ideal frictionless screw, m/s².
+    /// Acceleration of an ideal frictionless screw, m/s².
     pub analytic_acceleration: f64,
-    /// Travel, as a share of the ideal screw's.
+    /// Travel as a fraction of the travel of the ideal screw.
     pub travel_of_analytic: f64,
-    /// Energy of the motion, as a share of the lost potential energy.
+    /// Kinetic energy at the end, as a fraction of the potential energy lost since the beginning.
     pub energy: f64,
-    /// Which demands were not met; empty when it passed.
+    /// The requirements that the run did not meet; empty when it passed.
     pub failures: Vec<String>,
 }
 
 impl ScrewCriterion {
-    /// Checks the values, and that the body is there and free.
+    /// Checks the values, and that the body exists and is free.
+    ///
     ///
     /// # Errors
-    /// What was found and expected.
+    /// A message that names the value that was found and the expected range.
     pub fn validate(&self, system: &System) -> Result<(), String> {
         let axis = DVec3::from_array(self.axis);
         if (axis.length() - 1.0).abs() > 1e-6 || axis.is_nan() {
@@ -94,13 +98,16 @@ impl ScrewCriterion {
     }
 }
 
-/// Acceleration of an ideal frictionless screw along its axis under an acceleration `along` in that direction: the part
-/// 1 / (1 + (k / (p / 2π))²) of it, as the rest turns the body. `gyration` is k, `pitch` p.
+/// Acceleration, m/s², of an ideal frictionless screw along its axis.
+///
+/// `along` is the acceleration that acts along the axis, m/s², `gyration` the radius of gyration k,
+/// m, and `pitch` the pitch p, m. The result is `along` / (1 + (k / (p / 2π))²): the rest of the
+/// work turns the body.
 pub fn screw_acceleration(along: f64, gyration: f64, pitch: f64) -> f64 {
     along / (1.0 + (gyration * TAU / pitch).powi(2))
 }
 
-/// Follows a body along a run.
+/// Records the travel and the turns of one body during a run.
 #[derive(Clone, Debug)]
 pub struct ScrewTracker {
     criterion: ScrewCriterion,
@@ -113,15 +120,15 @@ pub struct ScrewTracker {
     turns: f64,
     time: f64,
     largest_pitch_error: f64,
-    /// Time at the end of each step, and travel up to there.
+    /// For each step the time at its end, s, and the travel until then, m.
     path: Vec<(f64, f64)>,
 }
 
 impl ScrewTracker {
-    /// From the state at the beginning.
+    /// A tracker that starts from the current state of `system`.
     ///
     /// # Errors
-    /// As [`ScrewCriterion::validate`].
+    /// The same errors as [`ScrewCriterion::validate`].
     pub fn new(criterion: &ScrewCriterion, system: &System) -> Result<Self, String> {
         criterion.validate(system)?;
         let (body, mass) = criterion.find(system)?;
@@ -143,7 +150,7 @@ impl ScrewTracker {
         })
     }
 
-    /// Takes in the state after a step of `time_step` seconds.
+    /// Records the state after a step of `time_step` seconds.
     pub fn observe(&mut self, system: &System, time_step: f64) {
         let pose = system.states()[self.body].pose;
         let turn = (pose.rotation * self.last.rotation.inverse()).to_scaled_axis().dot(self.axis);
@@ -167,7 +174,7 @@ impl ScrewTracker {
         self.turns
     }
 
-    /// What came of it.
+    /// Compares the run so far with the criterion.
     pub fn report(&self, system: &System) -> ScrewReport {
         let kinetic = system.kinetic_energy();
         let criterion = &self.criterion;
@@ -207,14 +214,14 @@ impl ScrewTracker {
         demand(
             energy <= criterion.max_energy,
             format!(
-                "the motion has {energy:.4} of the lost potential energy; expected at most {}",
+                "the kinetic energy is {energy:.4} of the lost potential energy; expected at most {}",
                 criterion.max_energy
             ),
         );
         report
     }
 
-    /// Slope of the velocity over the second half, by least squares.
+    /// Slope of the velocity over the second half of the run, by least squares.
     fn acceleration(&self) -> f64 {
         let velocities: Vec<(f64, f64)> = self.path[self.path.len() / 2..]
             .windows(2)

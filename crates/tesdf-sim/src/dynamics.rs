@@ -4,92 +4,95 @@ use tesdf::collide::{CollideError, Contact, HiddenOverlap};
 
 use crate::{State, System};
 
-/// An engine that moves the bodies of a [`System`].
+/// A physics engine that moves the bodies of a [`System`].
 pub trait Dynamics {
-    /// The bodies and their states now.
+    /// The bodies and their current states.
     fn system(&self) -> &System;
 
-    /// Places a body and sets its velocity; the velocity of a fixed body is not used.
+    /// Sets the pose and the velocities of a body. The velocity of a fixed body has no effect.
     ///
     /// # Errors
-    /// [`DynamicsError::NoBody`], and [`DynamicsError::NotFinite`] for numbers that are no state.
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::NotFinite`] when a number of the state is not
+    /// finite.
     fn set_state(&mut self, body: usize, state: State) -> Result<(), DynamicsError>;
 
-    /// Moves all bodies by `time_step` seconds.
+    /// Advances all bodies by `time_step` seconds.
     ///
     /// # Errors
-    /// The time step is no positive number, the detection refused the scene, or a body's state stopped being finite. The
-    /// states are then as they were.
+    /// The time step is not a positive number, the detection refused the scene, or the state of a
+    /// body stopped being finite. The states are then unchanged.
     fn step(&mut self, time_step: f64) -> Result<StepReport, DynamicsError>;
 
-    /// The contacts at the beginning of the last step, those ahead of time included; sorted as the detector sorts.
+    /// The contacts at the beginning of the last step, in the order of the detector. They include
+    /// speculative contacts, which the motion of the step could close.
     fn contacts(&self) -> &[Contact];
 
-    /// The pairs that overlapped at the beginning of the last step although no contact showed it.
+    /// The pairs of bodies that overlapped at the beginning of the last step without a contact that
+    /// shows it.
     fn hidden(&self) -> &[HiddenOverlap];
 }
 
-/// What a step did.
+/// Statistics of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StepReport {
-    /// Contacts at the beginning of the step, those ahead of time included.
+    /// Number of contacts at the beginning of the step, including speculative contacts.
     pub contacts: usize,
-    /// The least signed distance among them; `None` without contacts.
+    /// The smallest signed distance of these contacts, m; `None` when there are none.
     pub deepest: Option<f64>,
-    /// How often contacts were detected.
+    /// Number of times that contacts were detected.
     pub detections: u32,
-    /// Groups of bodies that were solved by themselves, in the last solve.
+    /// Number of islands in the last solve: groups of bodies that are solved independently.
     pub islands: usize,
-    /// Iterations of the slowest island, over all solves of the step.
+    /// Iterations of the slowest island, summed over all solves of the step.
     pub iterations: u32,
     /// Whether every solve reached its tolerance.
     pub converged: bool,
-    /// Time spent on detection.
+    /// Wall time of the detection.
     pub detection: Duration,
-    /// Time spent on everything else.
+    /// Wall time of everything else.
     pub solution: Duration,
 }
 
-/// Why a step, or a state, is refused.
+/// Why a step or a state is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DynamicsError {
-    /// No such body.
+    /// The system has no body of this number.
     #[error("there is no body {body}; the system has {bodies}, counted from 0")]
     NoBody {
-        /// The number given.
+        /// The number that was given.
         body: usize,
-        /// How many there are.
+        /// Number of bodies in the system.
         bodies: usize,
     },
-    /// Not as many states as bodies.
+    /// The number of states differs from the number of bodies.
     #[error("{found} states for {expected} bodies")]
     States {
-        /// How many were given.
+        /// Number of states that were given.
         found: usize,
-        /// How many bodies there are.
+        /// Number of bodies.
         expected: usize,
     },
-    /// A number that is not finite, in a state given or computed.
+    /// A number of a given or computed state is not finite.
     #[error("the state of body {body} ({name}) is not finite: {found}")]
     NotFinite {
-        /// The body.
+        /// Number of the body.
         body: usize,
         /// Its name.
         name: String,
-        /// The state.
+        /// The state, as text.
         found: String,
     },
-    /// An option has a value that makes no sense.
+    /// The value of an option is out of range.
     #[error("{option} is {found}; expected {expected}")]
     Option {
-        /// The option's name.
+        /// Name of the option.
         option: &'static str,
         /// Its value.
         found: f64,
-        /// What was expected.
+        /// The expected range.
         expected: &'static str,
     },
-    /// The scene or the detection.
+    /// An error of the scene or of the detection.
     #[error(transparent)]
     Collide(#[from] CollideError),
 }

@@ -7,41 +7,43 @@ use tesdf::collide::Shape;
 /// Mass, centre of mass and inertia of a rigid body, in the frame of its mesh or shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
-    /// kg; positive.
+    /// Mass, kg; positive.
     pub mass: f64,
-    /// Centre of mass, m.
+    /// Centre of mass, m, in the body's frame.
     pub center: DVec3,
-    /// Inertia about the centre of mass, axes of the body's frame, kg m²; symmetric and positive definite.
+    /// Inertia about the centre of mass, kg m², along the axes of the body's frame; symmetric and
+    /// positive definite.
     pub inertia: DMat3,
 }
 
 /// Why a body has no mass properties.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MassError {
-    /// A density or mass that is none.
+    /// The density or mass is not a positive finite number.
     #[error("{what} {found}; expected a finite number greater than 0")]
     NotPositive {
-        /// Density or mass.
+        /// `density` or `mass`.
         what: &'static str,
-        /// Its value.
+        /// The value that was given.
         found: f64,
     },
-    /// A half space.
+    /// The shape is a half space.
     #[error("a plane has no finite mass; make the body fixed")]
     Plane,
-    /// The mesh bounds no volume.
+    /// The mesh encloses no positive volume.
     #[error("the mesh encloses {volume:e} m³; a free body needs a closed mesh whose faces point outward")]
     NoVolume {
-        /// The signed volume.
+        /// The signed volume, m³.
         volume: f64,
     },
 }
 
 impl MassProperties {
-    /// Of a shape of uniform density, kg/m³, with `scale` world units per unit of the shape.
+    /// Mass properties of a shape of uniform `density`, kg/m³. `scale` is the length of one unit of
+    /// the shape, m.
     ///
-    /// A mesh counts by its winding number: the volume that two of its shells share counts twice, and a volume where the surface is
-    /// inside out counts as negative.
+    /// The volume of a mesh is weighted by the winding number: a volume that two shells share
+    /// counts twice, and a volume inside an inverted surface counts as negative.
     ///
     /// # Errors
     /// A density that is not positive, a plane, or a mesh without volume.
@@ -75,15 +77,18 @@ impl MassProperties {
         })
     }
 
-    /// Of the solid of density 1 that outward triangles bound: exact integrals over the tetrahedra between each triangle and a
-    /// point near the middle.
+    /// Mass properties of the solid of density 1 that outward-facing triangles enclose.
+    ///
+    /// The integrals over the tetrahedra between each triangle and the mean of all corners are
+    /// closed formulas, so only rounding makes them inexact.
     ///
     /// # Errors
     /// [`MassError::NoVolume`].
     pub fn of_triangles(
         triangles: impl ExactSizeIterator<Item = [DVec3; 3]> + Clone,
     ) -> Result<Self, MassError> {
-        // About a point near the body, or a body far from the origin would lose its digits to cancellation.
+        // The mean of the corners is the reference point: with the origin, a body far from it would
+        // lose digits to cancellation.
         let count = 3.0 * triangles.len().max(1) as f64;
         let middle: DVec3 = triangles.clone().flatten().sum::<DVec3>() / count;
         let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
@@ -108,7 +113,7 @@ impl MassProperties {
         })
     }
 
-    /// The same distribution with another mass, kg.
+    /// The same distribution of mass, scaled to the total `mass`, kg.
     ///
     /// # Errors
     /// A mass that is not positive.
@@ -117,7 +122,8 @@ impl MassProperties {
         Ok(Self { mass, inertia: self.inertia * (mass / self.mass), ..self })
     }
 
-    /// Radius of gyration about the axis of direction `axis` (body frame, unit) through the centre of mass, m.
+    /// Radius of gyration, m, about the axis through the centre of mass along `axis`, a unit vector
+    /// in the body's frame.
     pub fn radius_of_gyration(&self, axis: DVec3) -> f64 {
         (axis.dot(self.inertia * axis) / self.mass).sqrt()
     }
@@ -141,7 +147,7 @@ mod tests {
 
     use super::*;
 
-    /// Corners of a box's twelve triangles, outward.
+    /// The twelve outward-facing triangles of a box.
     fn box_triangles(half: DVec3) -> Vec<[DVec3; 3]> {
         let corner = |k: usize| {
             let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
@@ -168,7 +174,7 @@ mod tests {
         let triangles = box_triangles(half);
         assert_close(&MassProperties::of_triangles(triangles.iter().copied()).unwrap(), &formula, 1e-14);
 
-        // Turned, and a thousand sizes from the origin.
+        // The same box, rotated and a thousand times its size away from the origin.
         let turn = DQuat::from_scaled_axis(DVec3::new(0.3, -1.0, 0.7));
         let offset = DVec3::new(3000.0, -2000.0, 1000.0);
         let moved = triangles.iter().map(|t| t.map(|p| turn * p + offset));
@@ -178,7 +184,7 @@ mod tests {
         assert_close(&MassProperties::of_triangles(moved).unwrap(), &expected, 1e-11);
     }
 
-    /// Integrates by slices: a body of revolution of radius `r(z)` is a stack of discs.
+    /// Integrates over slices: a solid of revolution of radius `r(z)` is a stack of discs.
     fn revolved(radius: impl Fn(f64) -> f64, half: f64) -> MassProperties {
         let n = 200_000;
         let dz = 2.0 * half / f64::from(n);
@@ -216,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_mass_is_refused() {
+    fn shapes_without_mass_are_refused() {
         assert_eq!(MassProperties::of_shape(&Shape::Plane, 1.0, 1.0), Err(MassError::Plane));
         let sphere = Shape::Sphere { radius: 1.0 };
         let zero = MassProperties::of_shape(&sphere, 1.0, 0.0);

@@ -1,28 +1,36 @@
-//! Runs as files: safetensors when the run is complete, a [journal](RunJournal) as long as it grows.
+//! Run files: a safetensors file of a complete run, and a [journal](RunJournal) of a run that still
+//! grows.
 //!
-//! A complete run:
+//! A complete run has these tensors:
 //!
 //! | tensor | type | content |
 //! |---|---|---|
-//! | `times` | `f64 [S + 1]` | s; the first is the beginning |
-//! | `poses` | `f64 [S + 1, B, 7]` | of each body's frame: translation, quaternion x y z w |
-//! | `velocities` | `f64 [S + 1, B, 6]` | of the centre of mass, then angular |
-//! | `contacts.steps` | `u64 [R]` | the steps whose contacts are kept, from 0; the contacts are those at its beginning, `poses[step]` |
-//! | `contacts.starts` | `u64 [R + 1]` | where the contacts of each of them begin |
-//! | `contacts.points`, `contacts.normals` | `f32 [C, 3]` | `point_a` and `normal` of [`Contact`], world |
-//! | `contacts.distances` | `f32 [C]` | signed distance |
+//! | `times` | `f64 [S + 1]` | s; the first value is the beginning of the run |
+//! | `poses` | `f64 [S + 1, B, 7]` | pose of each body's frame: x y z in m, quaternion x y z w |
+//! | `velocities` | `f64 [S + 1, B, 6]` | of the centre of mass, m/s; angular, rad/s |
+//! | `contacts.steps` | `u64 [R]` | numbers of the steps with recorded contacts, from 0 |
+//! | `contacts.starts` | `u64 [R + 1]` | index of the first contact of each of these steps |
+//! | `contacts.points` | `f32 [C, 3]` | `point_a` of [`Contact`], m, world frame |
+//! | `contacts.normals` | `f32 [C, 3]` | `normal` of [`Contact`], unit, world frame |
+//! | `contacts.distances` | `f32 [C]` | signed distance, m |
 //! | `contacts.ids` | `u32 [C, 4]` | body of the face, body of the field, face of a, face of b |
-//! | `hidden.steps` | `u64 [H]` | a row for each step and pair of bodies that overlapped at its beginning although no contact showed it |
-//! | `hidden.ids` | `u32 [H, 2]` | the bodies |
-//! | `hidden.depths` | `f64 [H]` | how deep, at least, m |
+//! | `hidden.steps` | `u64 [H]` | steps with hidden overlaps: one row per step and pair |
+//! | `hidden.ids` | `u32 [H, 2]` | the two bodies |
+//! | `hidden.depths` | `f64 [H]` | lower bound of the depth, m |
 //!
-//! The tensors `hidden.…` are left out when they have no rows.
+//! S is the number of steps, B of bodies, R of steps with recorded contacts, C of contacts, and H
+//! of hidden overlaps. The contacts and hidden overlaps of a step are those at its beginning, that
+//! is, at `poses[step]`. An overlap of two bodies is hidden when no contact shows it.
 //!
-//! The metadata has one key, `tesdf_run`: JSON with `version`, `bodies` (names), `scene` (the scene as JSON), and `folder`, which the
-//! scene's paths are relative to.
+//! A file without hidden overlaps has no `hidden.…` tensors.
 //!
-//! A run grows as a journal of steps under its final name, and the complete file replaces the journal at the end. [`RunRecord::open`] reads both;
-//! [`CutRun`] reads a journal so that the run goes on to the same bytes.
+//! The metadata has one key, `tesdf_run`. Its value is JSON with `version`, `bodies` (names),
+//! `scene` (the scene as JSON) and `folder`, the folder that the scene's paths are relative to. A
+//! run that was saved before its end also has `planned`, its planned number of steps.
+//!
+//! A run grows as a journal of steps under its final name. At the end the complete file replaces
+//! the journal. [`RunRecord::open`] reads both. [`InterruptedRun`] reads a journal to resume the run; the
+//! resumed run ends with the same bytes as an uninterrupted run.
 mod hidden;
 mod journal;
 mod origin;
@@ -42,23 +50,23 @@ use crate::{State, System};
 
 pub use hidden::HiddenPair;
 use hidden::HiddenRows;
-pub use journal::{CutRun, RunJournal};
+pub use journal::{InterruptedRun, RunJournal};
 pub use origin::RunOrigin;
 
-/// The version that is written and read.
+/// The format version that this build writes and reads.
 pub const RUN_VERSION: u32 = 1;
 const KEY: &str = "tesdf_run";
 
-/// States of all bodies over time, and contacts of some steps.
+/// States of all bodies over time, and the contacts of some steps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunRecord {
     /// Names of the bodies.
     pub bodies: Vec<String>,
-    /// The scene as JSON.
+    /// The scene, as JSON.
     pub scene: serde_json::Value,
-    /// What the scene's paths are relative to; empty: the folder of whoever reads.
+    /// The folder that the scene's paths are relative to. Empty: the current folder of the reader.
     pub folder: String,
-    /// Steps that the run was to have; `None`: it has them.
+    /// Planned number of steps; `None` when the run is complete.
     planned: Option<u64>,
     times: Vec<f64>,
     poses: Vec<[f64; 7]>,
@@ -72,67 +80,68 @@ pub struct RunRecord {
     hidden: HiddenRows,
 }
 
-/// A contact as it is kept.
+/// A contact as a run file stores it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordedContact {
-    /// World.
+    /// `point_a` of the contact, m, world frame.
     pub point: [f32; 3],
-    /// World, from b to a.
+    /// Unit normal from b to a, world frame.
     pub normal: [f32; 3],
-    /// Signed.
+    /// Signed distance, m.
     pub distance: f32,
-    /// The body whose face it is, and the body whose field it is.
+    /// The body of the face and the body of the field.
     pub bodies: [u32; 2],
-    /// Face of a, face of b.
+    /// The face of a and the face of b.
     pub faces: [u32; 2],
 }
 
 /// Why a run file cannot be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The file cannot be written.
+    /// An error while the file was written.
     #[error(transparent)]
     Save(#[from] SaveError),
-    /// The operating system.
+    /// The file cannot be read.
     #[error("cannot read {}: {source}", .path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What it said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// No safetensors file.
+    /// The file is not a safetensors file.
     #[error("not a run of tesdf: no safetensors file: {0}; `tesdf simulate` writes runs")]
     Container(#[from] SafeTensorError),
-    /// No run.
+    /// The file is not a run.
     #[error("not a run of tesdf: {0}; `tesdf simulate` writes runs")]
     NotARun(String),
-    /// Another version.
+    /// The file has another format version.
     #[error("the run has version {found}; this build reads {RUN_VERSION}: simulate the scene again")]
     Version {
         /// The version in the file.
         found: u32,
     },
-    /// Nothing is left to do.
+    /// The run is complete, so there is nothing to resume.
     #[error("the run is complete: it has all of its {steps} steps")]
     Complete {
-        /// Its steps.
+        /// Number of steps of the run.
         steps: u64,
     },
-    /// Going on would not give the bits of a run that was never cut.
+    /// The scene or the environment differs from that of the run, so a resumed run would not give
+    /// the bits of an uninterrupted run.
     #[error("{what} is {found}, but the run was made with {expected}")]
     Differs {
-        /// A key of the scene, `version` or `device`.
+        /// A key of the scene, or `version` or `device`.
         what: String,
-        /// Its value now.
+        /// The current value.
         found: String,
-        /// Its value when the run began.
+        /// The value when the run began.
         expected: String,
     },
-    /// A body is another one.
+    /// The geometry of a body has changed.
     #[error("the geometry of body {body} is not the one that the run was made with")]
     Geometry {
-        /// Its name.
+        /// Name of the body.
         body: String,
     },
 }
@@ -157,7 +166,7 @@ impl RunRecord {
         record
     }
 
-    /// A record without a state.
+    /// An empty record, without the state at the beginning.
     fn of_about(about: About) -> Self {
         let About { bodies, scene, folder, planned, .. } = about;
         Self { bodies, scene, folder, planned, contact_starts: vec![0], ..Self::default() }
@@ -173,17 +182,18 @@ impl RunRecord {
         }
     }
 
-    /// Steps made.
+    /// Number of steps in the record.
     pub fn steps(&self) -> u64 {
         self.times.len().saturating_sub(1) as u64
     }
 
-    /// The steps that the run was to have, when it was cut before or still grows; `None` of a complete run.
+    /// Planned number of steps of a run that was interrupted or still grows; `None` for a complete
+    /// run.
     pub fn planned_steps(&self) -> Option<u64> {
         self.planned
     }
 
-    /// Makes room for the states of a run of `steps` steps.
+    /// Reserves memory for the states of a run of `steps` steps.
     pub(crate) fn reserve(&mut self, steps: u64) -> Result<(), TryReserveError> {
         let more = usize::try_from(steps.saturating_sub(self.steps())).unwrap_or(usize::MAX);
         let states = more.saturating_mul(self.bodies.len());
@@ -192,12 +202,13 @@ impl RunRecord {
         self.velocities.try_reserve_exact(states)
     }
 
-    /// Says how many steps the run is to have, or that it has them.
+    /// Sets the planned number of steps; `None` marks the run as complete.
     pub(crate) fn plan(&mut self, steps: Option<u64>) {
         self.planned = steps;
     }
 
-    /// The states of all bodies after `step` steps, bit for bit; `None` when the run does not have them.
+    /// The states of all bodies after `step` steps, bit for bit. `None` when the record ends
+    /// earlier.
     pub(crate) fn states(&self, step: usize) -> Option<Vec<State>> {
         let state = |body| {
             let [linear, angular] = self.velocity(step, body)?;
@@ -206,7 +217,7 @@ impl RunRecord {
         (0..self.bodies.len()).map(state).collect()
     }
 
-    /// Adds the state of `system` at a time.
+    /// Appends the state of `system` at `time` seconds.
     pub fn push(&mut self, time: f64, system: &System) {
         self.times.push(time);
         for State { pose, linear, angular } in system.states() {
@@ -218,7 +229,7 @@ impl RunRecord {
         }
     }
 
-    /// Adds the contacts at the beginning of a step; steps ascend.
+    /// Appends the contacts at the beginning of `step`. The steps of successive calls must ascend.
     pub fn push_contacts(&mut self, step: u64, contacts: &[Contact], system: &System) {
         let body = |instance| system.body_of(instance).map_or(u32::MAX, |body| body as u32);
         self.contact_steps.push(step);
@@ -232,38 +243,39 @@ impl RunRecord {
         self.contact_starts.push(self.distances.len() as u64);
     }
 
-    /// Times, s; as many as there are states.
+    /// Time of each state, s.
     pub fn times(&self) -> &[f64] {
         &self.times
     }
 
-    /// The number of steps after which the time is nearest to `time`; the earlier one of two.
+    /// Number of the step whose time is nearest to `time`; the earlier step of a tie.
     pub fn nearest_step(&self, time: f64) -> Option<usize> {
         nearest(0..self.times.len(), |step| self.times[step], time)
     }
 
-    /// As [`nearest_step`](Self::nearest_step), among the steps whose contacts are kept.
+    /// As [`nearest_step`](Self::nearest_step), but only among steps with recorded contacts.
     pub fn nearest_contacts(&self, time: f64) -> Option<usize> {
         let kept =
             self.contact_steps.iter().map(|&step| step as usize).filter(|&step| step < self.times.len());
         nearest(kept, |step| self.times[step], time)
     }
 
-    /// Pose of a body after `step` steps.
+    /// Pose of a body after `step` steps, in the world frame.
     pub fn pose(&self, step: usize, body: usize) -> Option<Pose> {
         let at = (body < self.bodies.len()).then(|| step * self.bodies.len() + body)?;
         let [x, y, z, i, j, k, w] = *self.poses.get(at)?;
         Some(Pose { translation: DVec3::new(x, y, z), rotation: DQuat::from_xyzw(i, j, k, w) })
     }
 
-    /// Velocity of a body's centre of mass, and its angular velocity, after `step` steps.
+    /// Velocity of a body's centre of mass, m/s, and its angular velocity, rad/s, after `step`
+    /// steps.
     pub fn velocity(&self, step: usize, body: usize) -> Option<[DVec3; 2]> {
         let at = (body < self.bodies.len()).then(|| step * self.bodies.len() + body)?;
         let [x, y, z, i, j, k] = *self.velocities.get(at)?;
         Some([DVec3::new(x, y, z), DVec3::new(i, j, k)])
     }
 
-    /// The steps whose contacts are kept, with the contacts.
+    /// The steps with recorded contacts, each with its contacts.
     pub fn contacts(&self) -> impl Iterator<Item = (u64, Vec<RecordedContact>)> {
         let contact = |k: usize| RecordedContact {
             point: self.points[k],
@@ -278,19 +290,20 @@ impl RunRecord {
             .map(move |(&step, range)| (step, (range[0] as usize..range[1] as usize).map(contact).collect()))
     }
 
-    /// Where the contacts of a step are, if they are kept.
+    /// Indices of the contacts of `step`, if they are recorded.
     fn contact_range(&self, step: u64) -> Option<Range<usize>> {
         let at = self.contact_steps.binary_search(&step).ok()?;
         Some(self.contact_starts[at] as usize..self.contact_starts[at + 1] as usize)
     }
 
-    /// The file's bytes; the same record gives the same bytes.
+    /// The bytes of the run file. Equal records give equal bytes.
     ///
     /// # Errors
-    /// Metadata larger than safetensors allows.
+    /// The metadata is larger than safetensors allows.
     pub fn to_bytes(&self) -> Result<Vec<u8>, RecordError> {
         let about = serde_json::to_string(&self.about()).map_err(|e| RecordError::NotARun(e.to_string()))?;
-        // One key: the crate keeps metadata in a hash map, and the order of several would vary from run to run.
+        // There is only one key: safetensors keeps metadata in a hash map, so the order of several
+        // keys would vary.
         let metadata = HashMap::from([(KEY.to_string(), about)]);
         let (states, bodies) = (self.times.len(), self.bodies.len());
         let contacts = self.distances.len();
@@ -314,29 +327,30 @@ impl RunRecord {
         Ok(serialize(tensors, Some(metadata))?)
     }
 
-    /// Writes the file whole or not at all.
+    /// Writes the file completely or not at all.
     ///
     /// # Errors
-    /// What the operating system refused.
+    /// [`RecordError::Save`], and the errors of [`to_bytes`](Self::to_bytes).
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), RecordError> {
         Ok(save_atomic(path, &self.to_bytes()?)?)
     }
 
-    /// Reads a run file.
+    /// Reads a run file or a journal.
     ///
     /// # Errors
-    /// As [`from_bytes`](Self::from_bytes), and what the operating system refused.
+    /// [`RecordError::Read`], and the errors of [`from_bytes`](Self::from_bytes).
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordError> {
         Self::from_bytes(&read(path.as_ref())?)
     }
 
-    /// A record from a file's bytes; of a journal, up to its last whole step.
+    /// The record that the bytes of a run file hold. A journal is read up to its last complete
+    /// step.
     ///
     /// # Errors
-    /// No run, another version, or tensors that do not fit each other.
+    /// The bytes are not a run, have another version, or have tensors whose shapes do not match.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, RecordError> {
         if journal::is_journal(bytes) {
-            return Ok(CutRun::from_bytes(bytes.to_vec())?.run.record);
+            return Ok(InterruptedRun::from_bytes(bytes.to_vec())?.run.record);
         }
         let (_, header) = SafeTensors::read_metadata(bytes)?;
         let about = header.metadata().as_ref().and_then(|m| m.get(KEY));
@@ -393,7 +407,7 @@ impl RunRecord {
             return Ok(());
         }
         Err(RecordError::NotARun(
-            "its tensors do not fit each other, as it was damaged or made by hand".into(),
+            "the shapes of its tensors do not match: it was damaged or made by hand".into(),
         ))
     }
 }
@@ -416,7 +430,8 @@ fn tensor<'a, T: bytemuck::Pod>(
     Ok((name, TensorView::new(dtype, shape, bytemuck::cast_slice(values))?))
 }
 
-/// The rows of a tensor of shape `[n, row…]`; copied, as a file's tensors need not be aligned.
+/// The rows of a tensor of shape `[n, row…]`. They are copied because the tensors of a file may be
+/// unaligned.
 fn values<T: bytemuck::AnyBitPattern>(
     file: &SafeTensors<'_>,
     name: &str,

@@ -1,4 +1,4 @@
-//! A scene from its beginning to its end.
+//! Simulates a scene over its duration.
 use std::ops::ControlFlow;
 use std::time::Duration;
 
@@ -8,84 +8,84 @@ use crate::criterion::{ScrewReport, ScrewTracker};
 use crate::scene_file::{LimitError, SceneFile};
 use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
 
-/// Where a run is; given after each step.
+/// The state of a run after a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Moment<'a> {
-    /// Steps made.
+    /// Number of steps so far.
     pub step: u64,
-    /// Steps in all.
+    /// Number of steps of the whole run.
     pub steps: u64,
     /// Simulated time, s.
     pub time: f64,
-    /// What the step did.
+    /// Statistics of the step.
     pub report: StepReport,
-    /// The bodies now.
+    /// The bodies after the step.
     pub system: &'a System,
-    /// The run so far, this step included.
+    /// The run so far, including this step.
     pub record: &'a RunRecord,
 }
 
-/// What a run came to.
+/// Summary of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Summary {
-    /// Steps made.
+    /// Number of steps.
     pub steps: u64,
     /// Simulated time, s.
     pub seconds: f64,
-    /// Contacts per step, those ahead of time included.
+    /// Mean number of contacts per step, including speculative contacts.
     pub mean_contacts: f64,
-    /// The most.
+    /// Largest number of contacts in a step.
     pub most_contacts: usize,
-    /// Greatest penetration that the detection saw at the beginning of a step, m; 0 when it saw none. Where contacts hide an overlap its
-    /// depth is taken, at least.
+    /// Greatest penetration that the detection found at the beginning of a step, m; 0 when it found
+    /// none. For a hidden overlap this uses the lower bound of its depth.
     pub deepest_penetration: f64,
     /// Kinetic energy at the end, J.
     pub kinetic_energy: f64,
-    /// Kinetic energy at the beginning and potential energy lost since, J.
+    /// Kinetic energy at the beginning plus the potential energy lost during the run, J.
     pub released_energy: f64,
-    /// Solver iterations per step.
+    /// Mean number of solver iterations per step.
     pub mean_iterations: f64,
-    /// Steps whose solution is not within the tolerance.
+    /// Number of steps whose solution did not reach the tolerance.
     pub unconverged_steps: u64,
-    /// Wall time per step for detection, ms.
+    /// Mean wall time of the detection per step, ms.
     pub detection_ms: f64,
-    /// Wall time per step for the rest, ms.
+    /// Mean wall time of the rest of a step, ms.
     pub solution_ms: f64,
-    /// Pairs of bodies that overlapped although no contact showed it, so that nothing kept them apart; sorted by bodies. A run with such
-    /// pairs meets no criterion.
+    /// Pairs of bodies that overlapped without a contact that shows it, so that nothing kept them
+    /// apart; sorted by the numbers of the bodies. A run with such pairs meets no criterion.
     pub hidden: Vec<HiddenPair>,
-    /// The screw of the criterion.
+    /// Result of the screw criterion, if the scene has one.
     pub screw: Option<ScrewReport>,
-    /// Whether the criterion holds; `None` without one.
+    /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
 }
 
-/// Why a run ended early.
+/// Why a run ended before its duration.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
     /// A step failed.
     #[error("step {step}: {source}")]
     Step {
-        /// The step, from 0.
+        /// Number of the step, from 0.
         step: u64,
-        /// Why.
+        /// The error of the step.
         source: DynamicsError,
     },
-    /// The scene is too large.
+    /// The scene exceeds a limit.
     #[error(transparent)]
     Limit(#[from] LimitError),
-    /// The criterion does not fit the bodies.
+    /// The criterion does not match the bodies.
     #[error("criterion: {0}")]
     Criterion(String),
-    /// The caller broke off.
+    /// The caller stopped the run.
     #[error("interrupted after {steps} steps")]
     Interrupted {
-        /// Steps made.
+        /// Number of steps made.
         steps: u64,
     },
 }
 
-/// A run up to some step: the beginning of a new run, or a [`CutRun`](crate::CutRun) as it was read.
+/// A run up to some step: either a new run, or a [`InterruptedRun`](crate::InterruptedRun) that was read.
 #[derive(Clone, Debug)]
 pub struct PartialRun {
     /// All states so far.
@@ -94,27 +94,30 @@ pub struct PartialRun {
 }
 
 impl PartialRun {
-    /// The beginning of a run of `scene`: the state of `system` now, at time 0. `folder` is what the scene's paths are relative to; empty: the
-    /// folder of whoever reads the run.
+    /// A new run of `scene` that starts from the current state of `system` at time 0. `folder` is
+    /// the folder that the scene's paths are relative to; empty means the current folder of the
+    /// reader of the run.
     pub fn new(scene: &SceneFile, system: &System, folder: String) -> Self {
         let mut record = RunRecord::new(system, serde_json::to_value(scene).unwrap_or_default());
         record.folder = folder;
         Self { record, totals: Totals::default() }
     }
 
-    /// Puts the bodies of `system` where the last step left them.
+    /// Sets the bodies of `system` to the states after the last step.
     ///
     /// # Errors
-    /// The system has other bodies.
+    /// [`DynamicsError::States`] when the system has another number of bodies.
     pub fn restore(&self, system: &mut System) -> Result<(), DynamicsError> {
         system.set_states(self.record.states(self.record.steps() as usize).unwrap_or_default())
     }
 }
 
-/// Runs `engine`, which was made for `scene`, for the scene's duration. `watch` is called after each step and may break off.
+/// Runs `engine`, which must be made for `scene`, for the scene's duration. `watch` is called after
+/// each step and may stop the run.
 ///
 /// # Errors
-/// A step that failed, or the caller breaking off.
+/// A step failed, the scene exceeds a limit, the criterion does not match, or `watch` stopped the
+/// run.
 pub fn simulate(
     scene: &SceneFile,
     engine: &mut dyn Dynamics,
@@ -124,11 +127,12 @@ pub fn simulate(
     simulate_from(scene, engine, run, watch)
 }
 
-/// As [`simulate`], from the last step of `run`, where `engine` is, too. Steps depend on the bodies' states alone, so the record is that of
-/// a run that was never cut, bit for bit.
+/// As [`simulate`], but continues from the last step of `run`; `engine` must have the states of
+/// that step. A step depends on the states of the bodies alone, so the record equals that of an
+/// uninterrupted run, bit for bit.
 ///
 /// # Errors
-/// As [`simulate`].
+/// The same errors as [`simulate`].
 pub fn simulate_from(
     scene: &SceneFile,
     engine: &mut dyn Dynamics,
@@ -181,7 +185,7 @@ pub fn simulate_from(
     Ok((record, summary))
 }
 
-/// Follows the criterion along the steps that are made; with the energy at the beginning.
+/// The screw tracker after the recorded steps, and the energy at the beginning, J.
 fn replay(
     scene: &SceneFile,
     system: &System,
@@ -203,7 +207,7 @@ fn replay(
     Ok((Some(tracker), energy))
 }
 
-/// Sums over the steps.
+/// Sums over the steps of a run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Totals {
     steps: u64,

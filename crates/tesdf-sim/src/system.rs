@@ -3,30 +3,30 @@ use tesdf::collide::{CollideError, Instance, InstanceId, Pose, Scene, Shape, Sha
 
 use crate::{DynamicsError, MassProperties};
 
-/// What forces do to a body.
+/// Whether a body moves, and its mass properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mass {
-    /// Nothing moves it.
+    /// The body never moves.
     Fixed,
-    /// It moves freely.
+    /// The body moves freely.
     Free(MassProperties),
 }
 
-/// A rigid body: an instance of the scene, and its mass.
+/// A rigid body: an instance in the scene, with a name and a mass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
-    /// For people.
+    /// Name, for messages and files.
     pub name: String,
-    /// The instance of the system's scene.
+    /// The body's instance in the system's scene.
     pub instance: InstanceId,
     /// Fixed, or its mass properties.
     pub mass: Mass,
 }
 
-/// Where a body is and how it moves, in the world's frame.
+/// Pose and velocities of a body, in the world frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
-    /// Of the body's frame, which is that of its mesh or shape.
+    /// Pose of the body's frame, which is the frame of its mesh or shape.
     pub pose: Pose,
     /// Velocity of the centre of mass, m/s; zero for a fixed body.
     pub linear: DVec3,
@@ -35,12 +35,12 @@ pub struct State {
 }
 
 impl State {
-    /// Not moving.
+    /// A state at rest.
     pub fn at_rest(pose: Pose) -> Self {
         Self { pose, linear: DVec3::ZERO, angular: DVec3::ZERO }
     }
 
-    /// Whether every number is finite.
+    /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         self.pose.translation.is_finite()
             && self.pose.rotation.is_finite()
@@ -51,7 +51,9 @@ impl State {
 
 /// Bodies, their states, and gravity.
 ///
-/// The scene holds the geometry; what moves is kept here, and [`scene_at`](Self::scene_at) hands it on.
+/// The scene holds the geometry and the poses at the last detection. The current poses and
+/// velocities are the states of the system; [`scene_at`](Self::scene_at) copies states into the
+/// scene.
 #[derive(Clone, Debug, Default)]
 pub struct System {
     scene: Scene,
@@ -62,23 +64,24 @@ pub struct System {
 }
 
 impl System {
-    /// No bodies.
+    /// A system without bodies, where `gravity` is an acceleration in m/s².
     pub fn new(gravity: DVec3) -> Self {
         Self { gravity, ..Self::default() }
     }
 
-    /// Adds a shape that bodies may share.
+    /// Adds a shape, which several bodies may share.
     ///
     /// # Errors
-    /// As [`Scene::add_shape`].
+    /// The same errors as [`Scene::add_shape`].
     pub fn add_shape(&mut self, shape: impl Into<Shape>) -> Result<ShapeId, CollideError> {
         self.scene.add_shape(shape)
     }
 
-    /// Adds a body and says its number: 0, 1, 2, … in the order of adding. The velocity of a free body is that of `instance`.
+    /// Adds a body and returns its number: 0, 1, 2, … in the order of the calls. A free body starts
+    /// with the velocity of `instance`.
     ///
     /// # Errors
-    /// As [`Scene::add`].
+    /// The same errors as [`Scene::add`].
     pub fn add(
         &mut self,
         name: impl Into<String>,
@@ -97,7 +100,7 @@ impl System {
         Ok(self.bodies.len() - 1)
     }
 
-    /// Two bodies never meet from now on.
+    /// Excludes contacts between two bodies from now on.
     ///
     /// # Errors
     /// [`DynamicsError::NoBody`].
@@ -111,17 +114,18 @@ impl System {
         &self.bodies
     }
 
-    /// Their states.
+    /// The current states of the bodies.
     pub fn states(&self) -> &[State] {
         &self.states
     }
 
-    /// The geometry. Its instances are where the last detection saw them; the bodies are where [`states`](Self::states) says.
+    /// The geometry. Its instances have the poses of the last detection; [`states`](Self::states)
+    /// has the current poses.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// One body.
+    /// One body, by its number.
     ///
     /// # Errors
     /// [`DynamicsError::NoBody`].
@@ -129,16 +133,18 @@ impl System {
         self.bodies.get(body).ok_or(DynamicsError::NoBody { body, bodies: self.bodies.len() })
     }
 
-    /// The body of an instance.
+    /// The number of the body of an instance.
     pub fn body_of(&self, instance: InstanceId) -> Option<usize> {
-        // Instances are numbered in the order of adding, so the bodies are sorted by them.
+        // Instances are numbered in the order in which they are added, so the bodies are sorted by
+        // them.
         self.bodies.binary_search_by_key(&instance, |body| body.instance).ok()
     }
 
-    /// Replaces a body's state.
+    /// Replaces the state of a body.
     ///
     /// # Errors
-    /// [`DynamicsError::NoBody`]; [`DynamicsError::NotFinite`]; a rotation that is not of unit length.
+    /// [`DynamicsError::NoBody`], [`DynamicsError::NotFinite`], or [`DynamicsError::Collide`] when
+    /// the rotation is not of unit length.
     pub fn set_state(&mut self, body: usize, state: State) -> Result<(), DynamicsError> {
         self.check(body, &state)?;
         let pose = Pose::new(state.pose.translation, state.pose.rotation)?;
@@ -146,10 +152,12 @@ impl System {
         Ok(())
     }
 
-    /// Replaces all states bit for bit, or none: rotations are taken as they are, of unit length.
+    /// Replaces all states bit for bit. Rotations must be of unit length; this is not checked. On
+    /// an error no state changes.
     ///
     /// # Errors
-    /// [`DynamicsError::NotFinite`]; [`DynamicsError::States`] when there are not as many states as bodies.
+    /// [`DynamicsError::NotFinite`], or [`DynamicsError::States`] when the number of states differs
+    /// from the number of bodies.
     pub fn set_states(&mut self, states: Vec<State>) -> Result<(), DynamicsError> {
         if states.len() != self.bodies.len() {
             return Err(DynamicsError::States { found: states.len(), expected: self.bodies.len() });
@@ -167,10 +175,10 @@ impl System {
         Err(DynamicsError::NotFinite { body, name: name.clone(), found: format!("{state:?}") })
     }
 
-    /// The scene with every instance where `states` says, moving as they say.
+    /// Moves the instances of the scene to `states` and sets their velocities. Returns the scene.
     ///
     /// # Errors
-    /// As [`Scene::update`].
+    /// The same errors as [`Scene::update`].
     pub fn scene_at(&mut self, states: &[State]) -> Result<&Scene, CollideError> {
         let mut updates = Vec::with_capacity(states.len());
         for (body, state) in self.bodies.iter().zip(states) {
@@ -193,12 +201,14 @@ impl System {
         self.free().map(|(mass, state)| mass.kinetic_energy(state)).sum()
     }
 
-    /// Potential energy of all free bodies, J; 0 with the centre of mass at the world's origin.
+    /// Potential energy of all free bodies, J; it is zero when the centre of mass is at the world's
+    /// origin.
     pub fn potential_energy(&self) -> f64 {
         self.free().map(|(mass, state)| -mass.mass * self.gravity.dot(state.pose.to_world(mass.center))).sum()
     }
 
-    /// Linear momentum, and angular momentum about the world's origin.
+    /// Linear momentum, kg m/s, and angular momentum about the world's origin, kg m²/s, of all free
+    /// bodies.
     pub fn momentum(&self) -> (DVec3, DVec3) {
         self.free().fold((DVec3::ZERO, DVec3::ZERO), |(linear, angular), (mass, state)| {
             let p = mass.mass * state.linear;
@@ -216,13 +226,13 @@ impl System {
 }
 
 impl MassProperties {
-    /// Inertia about the centre of mass, axes of the world.
+    /// Inertia about the centre of mass, kg m², along the axes of the world.
     pub fn inertia_in_world(&self, pose: Pose) -> DMat3 {
         let r = DMat3::from_quat(pose.rotation);
         r * self.inertia * r.transpose()
     }
 
-    /// ½ m v² + ½ ω · I ω, J.
+    /// Kinetic energy ½ m v² + ½ ω · I ω, J.
     pub fn kinetic_energy(&self, state: &State) -> f64 {
         let spin = state.pose.rotation.inverse() * state.angular;
         0.5 * (self.mass * state.linear.length_squared() + spin.dot(self.inertia * spin))

@@ -1,15 +1,17 @@
-//! Runs that are cut: what is left of them, and that going on gives the bits of a run that was never cut.
+//! Interrupted runs: what remains of them, and that a resumed run gives the bits of an
+//! uninterrupted run.
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
 use tesdf::save::{Destination, SaveOptions};
-use tesdf_sim::record::{CutRun, RecordError, RunJournal, RunOrigin, RunRecord};
+use tesdf_sim::record::{InterruptedRun, RecordError, RunJournal, RunOrigin, RunRecord};
 use tesdf_sim::scene_file::LoadedScene;
 use tesdf_sim::{PartialRun, SimulateError, Summary, simulate, simulate_from};
 
-/// A wedge tumbles onto a floor and a brick; a screw is followed that neither of them is.
+/// A wedge falls onto a floor and a brick. The criterion follows it as a screw, although it is not
+/// one.
 const SCENE: &str = r#"
 time_step = 2e-3
 duration = 0.06
@@ -71,14 +73,19 @@ impl Bench {
         RunOrigin::of(&self.system(), "cpu").unwrap()
     }
 
-    /// Never cut.
+    /// An uninterrupted run.
     fn whole(&self) -> (RunRecord, Summary) {
         let mut engine = self.loaded.newton(self.system()).unwrap();
         simulate(&self.loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap()
     }
 
-    /// Up to a step, from the beginning or from a cut run; `None`: to the end.
-    fn run(&self, cut: Option<&CutRun>, until: Option<u64>) -> Result<(RunRecord, Summary), SimulateError> {
+    /// Runs from the beginning or from an interrupted run, to the step `until`, or to the end for
+    /// `None`.
+    fn run(
+        &self,
+        cut: Option<&InterruptedRun>,
+        until: Option<u64>,
+    ) -> Result<(RunRecord, Summary), SimulateError> {
         let mut system = self.system();
         let run = match cut {
             Some(cut) => {
@@ -89,7 +96,7 @@ impl Bench {
             None => PartialRun::new(&self.loaded.scene, &system, String::new()),
         };
         let mut engine = self.loaded.newton(system).unwrap();
-        let mut journal = cut.map(|cut| RunJournal::go_on(&self.destination(), cut).unwrap().unwrap());
+        let mut journal = cut.map(|cut| RunJournal::resume(&self.destination(), cut).unwrap().unwrap());
         simulate_from(&self.loaded.scene, &mut engine, run, |moment| {
             let journal = journal.get_or_insert_with(|| {
                 RunJournal::begin(&self.destination(), moment.record, &self.origin()).unwrap().unwrap()
@@ -111,13 +118,13 @@ impl Bench {
     }
 }
 
-/// But for wall times, which no two runs share.
+/// The summary without wall times, which differ between runs.
 fn timeless(summary: &Summary) -> Summary {
     Summary { detection_ms: 0.0, solution_ms: 0.0, ..summary.clone() }
 }
 
 #[test]
-fn a_run_that_was_cut_at_any_step_goes_on_to_the_same_bytes() {
+fn a_run_interrupted_at_any_step_resumes_to_the_same_bytes() {
     let bench = Bench::new();
     let (whole, summary) = bench.whole();
     let expected = whole.to_bytes().unwrap();
@@ -133,13 +140,14 @@ fn a_run_that_was_cut_at_any_step_goes_on_to_the_same_bytes() {
         assert_eq!((&record, timeless(&found)), (&whole, timeless(&summary)), "cut at {at}");
         assert!(found.detection_ms > 0.0 && found.solution_ms > 0.0);
     }
-    // The whole journal is there, but the complete file is not: nothing is left but to write it.
+    // The journal is complete, but the complete file was not written. Resuming only has to write
+    // it.
     let (record, _) = bench.run(Some(&bench.open()), None).unwrap();
     assert!(record.to_bytes().unwrap() == expected);
 }
 
 #[test]
-fn a_run_may_be_cut_again_and_again() {
+fn a_run_may_be_interrupted_again_and_again() {
     let bench = Bench::new();
     assert!(bench.run(None, Some(4)).is_err());
     for at in [5, 9, 10, 22] {
@@ -149,7 +157,8 @@ fn a_run_may_be_cut_again_and_again() {
     assert_eq!(record, bench.whole().0);
 }
 
-/// What a kill leaves: every prefix is no run yet, or a run up to a whole step that is that of the whole run.
+/// A kill leaves a prefix of the journal. Each prefix is not yet a run, or a run up to a complete
+/// step that equals the uninterrupted run.
 #[test]
 fn a_journal_is_read_up_to_its_last_whole_step() {
     let bench = Bench::new();
@@ -174,7 +183,7 @@ fn a_journal_is_read_up_to_its_last_whole_step() {
         }
     }
     assert_eq!(steps, Some(STEPS));
-    // What a power cut leaves: blocks that were never written, then others.
+    // A power failure can leave unwritten blocks before written blocks.
     for at in (0..bytes.len()).step_by(97) {
         let mut damaged = bytes.clone();
         damaged[at] ^= 0x10;
@@ -186,7 +195,7 @@ fn a_journal_is_read_up_to_its_last_whole_step() {
 }
 
 #[test]
-fn what_would_give_other_bits_is_refused() {
+fn changes_that_would_give_other_bits_are_refused() {
     let bench = Bench::new();
     assert!(bench.run(None, Some(2)).is_err());
     let cut = bench.open();
@@ -219,10 +228,10 @@ fn what_would_give_other_bits_is_refused() {
 }
 
 #[test]
-fn a_complete_run_and_what_is_no_run_say_so() {
+fn complete_runs_and_other_files_are_not_resumed() {
     let bench = Bench::new();
     let path = bench.folder.path().join("run");
-    let open = || CutRun::open(&path).unwrap_err();
+    let open = || InterruptedRun::open(&path).unwrap_err();
     bench.whole().0.save(&path).unwrap();
     assert!(matches!(open(), RecordError::Complete { steps: STEPS }));
     fs::write(&path, b"tesdfrun\x09\0\0\0").unwrap();
@@ -232,10 +241,10 @@ fn a_complete_run_and_what_is_no_run_say_so() {
         let text = open().to_string();
         assert!(text.starts_with("not a run of tesdf: ") && text.contains("simulate"), "{text}");
     }
-    assert!(matches!(CutRun::open(Path::new("none")), Err(RecordError::Read { .. })));
+    assert!(matches!(InterruptedRun::open(Path::new("none")), Err(RecordError::Read { .. })));
 }
 
-/// The record of a run that is not complete says so in every form.
+/// An incomplete record stays marked as incomplete when it is written and read.
 #[test]
 fn an_unfinished_record_is_marked() {
     let bench = Bench::new();

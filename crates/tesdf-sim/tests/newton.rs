@@ -1,4 +1,4 @@
-//! The embedded engine on simple shapes and on hand-made contacts.
+//! Tests of the built-in engine with simple shapes and hand-made contacts.
 use tesdf::collide::{
     CollideError, CollideOptions, Contacts, Instance, Mode, Pose, Scene, Shape, Velocity, detect,
 };
@@ -49,8 +49,8 @@ fn free_fall_is_symplectic_euler() {
     assert_eq!((pose.rotation, angular), (DQuat::IDENTITY, DVec3::ZERO));
 }
 
-/// Without torque the implicit gyroscopic term keeps momentum and energy up to the first order of the time step: halving the step
-/// halves the drift.
+/// Without torque, the implicit gyroscopic term conserves momentum and energy to first order in the
+/// time step: half the step gives half the drift.
 #[test]
 fn torque_free_rotation_drifts_by_its_order() {
     let drift = |h: f64| {
@@ -93,17 +93,17 @@ fn a_box_comes_to_rest_on_a_plane() {
         for step in 0..1500 {
             let report = engine.step(1e-3).unwrap();
             assert!(report.converged, "{report:?}");
-            // Removing a penetration lifts the box by as much; nothing else may add energy.
+            // Removing a penetration lifts the box by its depth. Nothing else may add energy.
             let lift = weight * (-report.deepest.unwrap_or(0.0)).max(0.0);
             let now = energy(&engine);
             assert!(now <= before + 1.001 * lift + 1e-12, "step {step}: {before} J to {now} J, {lift}");
             before = now;
         }
         let State { pose, linear, angular } = engine.system().states()[body];
-        // Nothing stops it from turning about the normal.
+        // Nothing stops a rotation about the normal.
         let rolling = angular.truncate().length();
         assert!(linear.length() < 1e-4 && rolling < 1e-2, "{linear} {angular}");
-        // It lies on a side: the lowest corner touches the plane within the sag of 1e-7 m.
+        // The box lies on a side: its lowest corner touches the plane, within the sag of 1e-7 m.
         let corners = (0..8).map(|k| {
             let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
             pose.to_world(DVec3::new(0.01 * sign(0), 0.02 * sign(1), 0.03 * sign(2))).z
@@ -113,15 +113,17 @@ fn a_box_comes_to_rest_on_a_plane() {
     }
 }
 
-/// Contacts at the poses of the beginning keep both momenta. Pushing bodies apart moves their centres, and a re-detected contact acts
-/// where the bodies were predicted to touch: both change the angular momentum by the first order of the time step.
+/// Contacts at the initial poses conserve linear and angular momentum. Pushing bodies apart moves
+/// their centres, and a re-detected contact acts where the bodies were predicted to touch. Both
+/// change the angular momentum to first order in the time step.
 #[test]
 fn a_collision_of_two_bodies_keeps_momentum() {
     let angular_error = |options: NewtonOptions, h: f64| {
         let mut system = System::new(DVec3::ZERO);
         let turned = DQuat::from_scaled_axis(DVec3::new(0.4, 0.5, 0.6));
         let speed = |x: f64| Velocity { linear: DVec3::new(x, 0.1, 0.0), angular: DVec3::new(0.0, 1.0, 3.0) };
-        // Cubes and spheres: their inertia is the same about all axes, so free rotation keeps momentum exactly.
+        // The inertia of cubes and spheres is the same about all axes, so free rotation conserves
+        // momentum exactly.
         let cube = Shape::Box { half_extents: DVec3::splat(0.02) };
         add_free(&mut system, cube, Pose { translation: DVec3::ZERO, rotation: turned }, speed(0.5));
         let ball = Shape::Sphere { radius: 0.02 };
@@ -159,7 +161,7 @@ fn a_fast_ball_does_not_pass_a_plane() {
     for _ in 0..30 {
         engine.step(5e-3).unwrap();
         let height = (tilted * DVec3::Z).dot(engine.system().states()[ball].pose.translation);
-        // The springs give way by the motion of a step / κ.
+        // The springs yield by 1 / κ of the motion in a step.
         assert!(height > radius - 50.0 * 5e-3 / 100.0, "{height}");
     }
 }
@@ -188,7 +190,7 @@ fn islands_of_any_size_give_the_same_motion() {
     }
 }
 
-/// Ten bricks that fall on a plane and never meet: ten islands, solved in parallel.
+/// Ten bricks that fall on a plane and never meet form ten islands, which are solved in parallel.
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let run = || {
@@ -222,7 +224,7 @@ fn deep_overlap_is_removed_without_a_kick() {
         assert!(engine.system().states()[body].linear.length() < 1e-6);
         let now = 0.03 - engine.system().states()[body].pose.translation.z;
         assert!(now <= depth + 1e-12, "{depth} {now}");
-        // 0.5 m/s at most, and not more than half of it.
+        // A step removes at most half of the depth, and at most 0.5 m/s.
         assert!(depth - now <= (0.5 * depth).min(0.5e-3) + 1e-12, "{depth} {now}, {report:?}");
         depth = now;
     }
@@ -230,7 +232,7 @@ fn deep_overlap_is_removed_without_a_kick() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn values_out_of_range_are_refused() {
     let system = System::new(GRAVITY);
     let bad = NewtonOptions { redetections: 3, ..NewtonOptions::default() };
     let refused = Newton::new(system.clone(), nothing, nodes(0.0), bad);
@@ -243,9 +245,10 @@ fn what_makes_no_sense_is_refused() {
     assert_eq!(engine.set_state(0, state), Err(DynamicsError::NoBody { body: 0, bodies: 0 }));
 }
 
-/// A brick that is on the edges of its twin has no node inside of it: it falls through, and the engine says so at every step.
+/// A brick that slides along the edges of its twin has no vertex inside of it, so it falls through.
+/// The engine must report the hidden overlap at every step.
 #[test]
-fn a_fall_through_a_twin_is_told() {
+fn a_fall_through_a_twin_is_reported() {
     let mut system = System::new(GRAVITY);
     let shape = system.add_shape(BRICK).unwrap();
     system.add("fixed", Instance::new(shape, Pose::IDENTITY), Mass::Fixed).unwrap();
@@ -255,7 +258,8 @@ fn a_fall_through_a_twin_is_told() {
     for _ in 0..150 {
         let before = engine.system().states()[falling].pose.translation;
         engine.step(1e-3).unwrap();
-        // The bricks are 0.06 high and 0.02 wide, and nothing less deep than 0.05 · 0.01 is told.
+        // The bricks are 0.06 m high and 0.02 m wide, and overlaps less deep than 0.05 · 0.01 m are
+        // not reported.
         let is_deep = before.x.abs().max(before.y.abs()) < 1e-9 && (0.001..0.059).contains(&before.z.abs());
         assert!(!is_deep || engine.hidden().len() == 1, "nothing is told at {before}");
         told += engine.hidden().len();

@@ -1,4 +1,4 @@
-//! Scene files, their errors, and run files.
+//! Tests of scene files, their error messages, and run files.
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -32,7 +32,7 @@ fn load(text: &str) -> Result<LoadedScene, SceneError> {
     LoadedScene::parse(text.into(), Path::new("drop.toml"))
 }
 
-/// What becomes of a text: the error of parsing it or of building its system and engine.
+/// The error message of parsing a text or of building its system and engine.
 fn refusal(text: &str) -> String {
     let error = load(text).and_then(|scene| {
         let system = scene.system()?;
@@ -122,7 +122,7 @@ fn a_run_survives_its_file() {
 }
 
 #[test]
-fn what_is_no_run_is_refused() {
+fn files_that_are_no_runs_are_refused() {
     let bytes = RunRecord::new(&tesdf_sim::System::new(DVec3::ZERO), "scene".into()).to_bytes().unwrap();
     assert!(RunRecord::from_bytes(&bytes).is_ok());
     for end in 0..bytes.len() {
@@ -138,7 +138,7 @@ fn what_is_no_run_is_refused() {
 }
 
 #[test]
-fn a_run_can_be_broken_off() {
+fn a_run_can_be_stopped() {
     let loaded = load(DROP).unwrap();
     let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
     let stop = |m: &tesdf_sim::Moment<'_>| match m.step {
@@ -150,7 +150,7 @@ fn a_run_can_be_broken_off() {
 }
 
 #[test]
-fn what_a_scene_asks_for_is_bounded() {
+fn the_size_of_a_scene_is_bounded() {
     let change = |from: &str, to: &str| refusal(&DROP.replacen(from, to, 1));
     for (error, expected) in [
         (
@@ -189,7 +189,7 @@ fn what_a_scene_asks_for_is_bounded() {
     assert!(error.contains("66000000 bytes; expected a scene of at most 65536000"), "{error}");
 }
 
-/// A scene of bodies of one mesh, and assets with a unit.
+/// A scene whose bodies use one mesh, and assets of that mesh with different units.
 fn cubes(bodies: &str) -> (tempfile::TempDir, LoadedScene) {
     let folder = tempfile::tempdir().unwrap();
     let corner = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);

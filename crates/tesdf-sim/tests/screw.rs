@@ -1,4 +1,4 @@
-//! A frictionless nut turns down its bolt; without contacts it does not, and the criterion says so.
+//! A frictionless nut turns down its bolt. Without contacts it does not, and the criterion fails.
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Summary, System, simulate};
 
-/// The scene of the repository with the coarse bolt, shorter.
+/// The bolt-nut scene of the repository, with the coarse bolt and a shorter duration.
 fn scene() -> (LoadedScene, System) {
     static SCENE: OnceLock<(LoadedScene, System)> = OnceLock::new();
     SCENE
@@ -16,7 +16,7 @@ fn scene() -> (LoadedScene, System) {
             let bolt = loaded.scene.bodies[0].get_mut();
             bolt.mesh = Some("../data/procedural/iso_m16_bolt_6k.obj".into());
             loaded.scene.duration = 0.06;
-            // In 60 ms an ideal screw makes 0.0083 turns.
+            // An ideal screw makes 0.0083 turns in 60 ms.
             loaded.scene.criterion.screw.as_mut().unwrap().min_turns = 0.003;
             loaded.scene.criterion.screw.as_mut().unwrap().min_acceleration = 0.0;
             let system = loaded.system().unwrap();
@@ -41,7 +41,7 @@ fn the_nut_turns_down_the_bolt() {
             loaded.scene.solver.redetections = redetections;
         });
         assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");
-        // A fifth of the clearance of 50 µm.
+        // This is a fifth of the clearance of 50 µm.
         assert!(summary.deepest_penetration < 1e-5, "{summary:?}");
         assert!(summary.mean_contacts > 100.0, "{summary:?}");
     }

@@ -1,4 +1,4 @@
-//! Opening a `.tesdf` file the way every command does.
+//! Opens `.tesdf` files for all commands.
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,25 +10,25 @@ use tesdf::geometry::Aabb;
 
 use crate::report::{self, Failure};
 
-/// Opens an asset; the message names the file.
+/// Opens an asset. The error message names the file.
 ///
 /// # Errors
-/// As [`TeSdf::open`].
+/// The same errors as [`TeSdf::open`].
 pub fn open(path: &Path) -> Result<TeSdf, Failure> {
     TeSdf::open(path).map_err(|e| failure(path, &e))
 }
 
-/// Assets by their files, so that a file that is named twice is opened once.
+/// Assets by path, so a file that is named twice is opened once.
 #[derive(Default)]
 pub struct Assets(BTreeMap<PathBuf, Arc<TeSdf>>);
 
 impl Assets {
-    /// Opens an asset, or gives the one that was opened.
+    /// Opens an asset, or returns the asset that is already open.
     ///
     /// # Errors
-    /// As [`open`].
+    /// The same errors as [`open`].
     pub fn open(&mut self, path: &Path) -> Result<Arc<TeSdf>, Failure> {
-        // A pipe has no such path, and gives its bytes once.
+        // The path of a pipe cannot be canonicalised. A pipe also gives its bytes only once.
         let file = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         if let Some(asset) = self.0.get(&file) {
             return Ok(asset.clone());
@@ -39,11 +39,11 @@ impl Assets {
     }
 }
 
-/// Whether the coordinates of assets fit together. Units that differ are an error; a unit that is
-/// recorded for some of them alone is a warning.
+/// Checks that the coordinates of assets are in the same unit. Different units are an error. If
+/// only some of the assets record a unit, that is a warning.
 ///
 /// # Errors
-/// Names two files and their units.
+/// The message names two files and their units.
 pub fn check_units<'a>(assets: impl IntoIterator<Item = (&'a Path, &'a TeSdf)>) -> Result<(), Failure> {
     let (mut known, mut without): (Option<(&Path, &str)>, Option<&Path>) = (None, None);
     for (path, asset) in assets {
@@ -66,7 +66,7 @@ pub fn check_units<'a>(assets: impl IntoIterator<Item = (&'a Path, &'a TeSdf)>) 
     Ok(())
 }
 
-/// The error with the file's name.
+/// The error as a failure whose message names the file.
 pub fn failure(path: &Path, error: &AssetError) -> Failure {
     match error {
         AssetError::Io { .. } => Failure::new(error),
@@ -74,7 +74,7 @@ pub fn failure(path: &Path, error: &AssetError) -> Failure {
     }
 }
 
-/// Bounds of the faces, mesh unit.
+/// Bounding box of the faces, in the mesh's unit.
 pub fn bounds(asset: &TeSdf) -> Aabb {
     (0..asset.face_count()).fold(Aabb::EMPTY, |b, face| b.union(Aabb::of(&asset.face_corners(face))))
 }

@@ -1,4 +1,4 @@
-//! Outputs: every command that writes a file opens its output here, before the work.
+//! Output files: every command that writes a file opens it here, before the work.
 use std::path::{Path, PathBuf};
 
 use tesdf::save::{Destination, ReadOnly, SaveError, SaveOptions};
@@ -8,7 +8,7 @@ use crate::report::{self, Failure};
 /// The option of every command that writes a file.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct Consent {
-    /// Replace the output even when it is read-only; its permissions are kept
+    /// Replace the output even if it is read-only; its permissions are kept
     #[arg(long)]
     pub force: bool,
 }
@@ -19,11 +19,11 @@ impl Consent {
     }
 }
 
-/// Checks that `path` can be written and is none of the inputs. When it is the standard output, results for people go to
-/// stderr from now on.
+/// Checks that `path` can be written and is not an input. If it is stdout, results for users go to
+/// stderr from then on.
 ///
 /// # Errors
-/// As [`Destination::new`].
+/// The same errors as [`Destination::new`].
 pub fn open(path: &Path, inputs: &[PathBuf], consent: Consent) -> Result<Destination, Failure> {
     let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
     let options = SaveOptions { inputs: &inputs, read_only: consent.read_only() };
@@ -37,7 +37,7 @@ pub fn open(path: &Path, inputs: &[PathBuf], consent: Consent) -> Result<Destina
 /// Writes the bytes of the result.
 ///
 /// # Errors
-/// As [`Destination::write`].
+/// The same errors as [`Destination::write`].
 pub fn write(destination: &Destination, bytes: &[u8]) -> Result<(), Failure> {
     destination.write(bytes).map_err(failure)
 }

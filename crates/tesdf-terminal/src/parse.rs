@@ -1,12 +1,12 @@
-//! Values of options.
+//! Parsers for the values of options.
 use tesdf::collide::{Motion, Pose, Velocity};
 use tesdf::geometry::Aabb;
 use tesdf::glam::{DQuat, DVec3};
 
-/// A finite number.
+/// Parses a finite number.
 ///
 /// # Errors
-/// Says what was found.
+/// The message says what was found.
 pub fn number(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
@@ -15,10 +15,10 @@ pub fn number(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A length: a finite number that is not negative.
+/// Parses a length: a finite number that is not negative.
 ///
 /// # Errors
-/// Says what was found.
+/// The message says what was found.
 pub fn length(text: &str) -> Result<f64, String> {
     number(text).and_then(|value| match value >= 0.0 {
         true => Ok(value),
@@ -26,10 +26,10 @@ pub fn length(text: &str) -> Result<f64, String> {
     })
 }
 
-/// A number from 0 to 1.
+/// Parses a number from 0 to 1.
 ///
 /// # Errors
-/// Says what was found.
+/// The message says what was found.
 pub fn fraction(text: &str) -> Result<f64, String> {
     number(text).and_then(|value| match (0.0..=1.0).contains(&value) {
         true => Ok(value),
@@ -37,10 +37,11 @@ pub fn fraction(text: &str) -> Result<f64, String> {
     })
 }
 
-/// A box as `x0 y0 z0 x1 y1 z1`, separated by spaces or commas; the first corner is the lower one.
+/// Parses a box as `x0 y0 z0 x1 y1 z1`, separated by spaces or commas. The first corner is the
+/// lower one.
 ///
 /// # Errors
-/// Says which number is at fault.
+/// The message names the number at fault.
 pub fn region(text: &str) -> Result<Aabb, String> {
     let values: [f64; 6] = numbers(text, "six, \"x0 y0 z0 x1 y1 z1\"")?;
     let [min, max] = [0, 3].map(|i| DVec3::new(values[i], values[i + 1], values[i + 2]));
@@ -53,36 +54,36 @@ pub fn region(text: &str) -> Result<Aabb, String> {
     Ok(Aabb { min, max })
 }
 
-/// A pose as `tx ty tz qx qy qz qw`, separated by spaces or commas.
+/// Parses a pose as `tx ty tz qx qy qz qw`, separated by spaces or commas.
 ///
 /// # Errors
-/// Says which number is at fault, or that the quaternion is not of unit length.
+/// The message names the number at fault, or says that the quaternion is not of unit length.
 pub fn pose(text: &str) -> Result<Pose, String> {
     let [x, y, z, i, j, k, w] = numbers(text, "seven, \"tx ty tz qx qy qz qw\"")?;
     Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| e.to_string())
 }
 
-/// A point as `x y z`.
+/// Parses a point as `x y z`.
 ///
 /// # Errors
-/// As [`numbers`].
+/// The same errors as [`numbers`].
 pub fn point(text: &str) -> Result<DVec3, String> {
     numbers(text, "three, \"x y z\"").map(DVec3::from_array)
 }
 
-/// The size of a picture, `WIDTHxHEIGHT`.
+/// Parses the size of a picture in pixels as `WIDTHxHEIGHT`.
 ///
 /// # Errors
-/// Says what was expected.
+/// The message says what was expected.
 pub fn size(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
     sides.ok_or_else(|| "expected WIDTHxHEIGHT in pixels, such as 1200x800".into())
 }
 
-/// A direction to look from, `azimuth elevation` in degrees.
+/// Parses a viewing direction as `azimuth elevation`, in degrees.
 ///
 /// # Errors
-/// As [`numbers`]; the elevation is -90 to 90.
+/// The errors of [`numbers`], or an elevation outside of -90 to 90.
 pub fn direction(text: &str) -> Result<[f64; 2], String> {
     let [azimuth, elevation] = numbers(text, "two, \"azimuth elevation\"")?;
     match (-90.0..=90.0).contains(&elevation) {
@@ -91,10 +92,10 @@ pub fn direction(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-/// An angle of view, in degrees.
+/// Parses a field of view, in degrees.
 ///
 /// # Errors
-/// Says what was found.
+/// The message says what was found.
 pub fn field_of_view(text: &str) -> Result<f64, String> {
     number(text).and_then(|value| match (1.0..=150.0).contains(&value) {
         true => Ok(value),
@@ -102,10 +103,10 @@ pub fn field_of_view(text: &str) -> Result<f64, String> {
     })
 }
 
-/// A finite number greater than 0.
+/// Parses a finite number greater than 0.
 ///
 /// # Errors
-/// Says what was found.
+/// The message says what was found.
 pub fn factor(text: &str) -> Result<f64, String> {
     number(text).and_then(|value| match value > 0.0 {
         true => Ok(value),
@@ -113,20 +114,20 @@ pub fn factor(text: &str) -> Result<f64, String> {
     })
 }
 
-/// A velocity as `vx vy vz wx wy wz`, separated by spaces or commas.
+/// Parses a velocity as `vx vy vz wx wy wz`, separated by spaces or commas.
 ///
 /// # Errors
-/// Says which number is at fault.
+/// The message names the number at fault.
 pub fn velocity(text: &str) -> Result<Motion, String> {
     let [x, y, z, u, v, w] = numbers(text, "six, \"vx vy vz wx wy wz\"")?;
     let velocity = Velocity { linear: DVec3::new(x, y, z), angular: DVec3::new(u, v, w) };
     Ok(Motion::Linear { velocity })
 }
 
-/// A screw as `px py pz ax ay az omega pitch`, separated by spaces or commas.
+/// Parses a screw motion as `px py pz ax ay az omega pitch`, separated by spaces or commas.
 ///
 /// # Errors
-/// Says which number is at fault, or that the axis has no direction.
+/// The message names the number at fault, or says that the axis has no direction.
 pub fn screw(text: &str) -> Result<Motion, String> {
     let [x, y, z, i, j, k, angular_speed, pitch] = numbers(text, "eight, \"px py pz ax ay az omega pitch\"")?;
     let axis = DVec3::new(i, j, k);
@@ -136,10 +137,10 @@ pub fn screw(text: &str) -> Result<Motion, String> {
     }
 }
 
-/// A part of a body as `PART` or `INSTANCE:PART`.
+/// Parses a face or vertex of a body as `PART` or `INSTANCE:PART`.
 ///
 /// # Errors
-/// Says what was expected.
+/// The message says what was expected.
 pub fn part(text: &str) -> Result<(u32, u32), String> {
     let (instance, part) = text.split_once(':').unwrap_or(("0", text));
     match (instance.trim().parse(), part.trim().parse()) {
@@ -148,10 +149,10 @@ pub fn part(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// `N` numbers, separated by spaces or commas; `expected` says how many they are.
+/// Parses `N` numbers, separated by spaces or commas. `expected` describes them in error messages.
 ///
 /// # Errors
-/// Says how many were found, or which is at fault.
+/// The message says how many numbers were found, or which one is at fault.
 pub fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
     let words: Vec<&str> =
         text.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty()).collect();

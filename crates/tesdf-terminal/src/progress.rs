@@ -1,4 +1,4 @@
-//! Progress on stderr and Ctrl-C.
+//! Progress bars on stderr, and Ctrl-C.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -9,17 +9,18 @@ use tesdf::{Progress, Stage};
 
 use crate::report::Failure;
 
-/// A bar on stderr, with an estimate of the time left; nothing is drawn when stderr is not a terminal.
+/// A progress bar on stderr with the estimated remaining time. Nothing is drawn unless stderr is a
+/// terminal.
 #[derive(Debug)]
 pub struct Bar {
     bar: ProgressBar,
 }
 
-/// The bar's steps: finer than it can be drawn.
+/// Number of steps of a bar; finer than a terminal can draw.
 const STEPS: u64 = 10_000;
 
 impl Bar {
-    /// A bar named after what is being done, such as `encoding`.
+    /// A bar with the name of the activity, such as `encoding`.
     pub fn new(what: &'static str) -> Self {
         let bar = ProgressBar::new(STEPS).with_message(what);
         if let Ok(style) = ProgressStyle::with_template("{msg} [{bar:40}] {percent:>3} %  {eta} left") {
@@ -29,7 +30,7 @@ impl Bar {
         Self { bar }
     }
 
-    /// Names what is being done now; the estimate begins anew when that changes.
+    /// Sets the name of the activity. When it changes, the estimate starts again.
     pub fn stage(&self, what: &'static str) {
         if self.bar.message() != what {
             self.bar.set_message(what);
@@ -38,7 +39,7 @@ impl Bar {
         }
     }
 
-    /// Sets the share done, 0 to 1; may be called from any thread.
+    /// Sets the completed fraction, 0 to 1. Any thread may call this.
     pub fn set(&self, share: f64) {
         self.bar.set_position((share.clamp(0.0, 1.0) * STEPS as f64) as u64);
     }
@@ -50,17 +51,17 @@ impl Drop for Bar {
     }
 }
 
-/// A flag that the first Ctrl-C sets; the second ends the process at once.
+/// Returns a flag that the first Ctrl-C sets. The second Ctrl-C ends the process at once.
 ///
 /// # Errors
-/// When the system refuses the handler, or one is installed already.
+/// The system refuses the handler, or a handler is already installed.
 pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     ctrlc::set_handler(move || {
         if seen.swap(true, Ordering::Relaxed) {
-            // Files are written aside and renamed, so nothing half-written is left under a final name; a run that grows is read up to
-            // its last whole step.
+            // Files are written under a temporary name and then renamed, so no incomplete file has
+            // its final name. The journal of a run is readable up to its last complete step.
             std::process::exit(2);
         }
     })
@@ -68,7 +69,7 @@ pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Runs `work` while another thread draws its progress and hands Ctrl-C on.
+/// Runs `work` while another thread draws its progress and passes Ctrl-C on to it.
 pub fn watched<T>(progress: &Progress, interrupted: &AtomicBool, work: impl FnOnce() -> T) -> T {
     let done = AtomicBool::new(false);
     thread::scope(|scope| {
@@ -88,7 +89,7 @@ pub fn watched<T>(progress: &Progress, interrupted: &AtomicBool, work: impl FnOn
                 thread::park_timeout(Duration::from_millis(100));
             }
         });
-        // Also when `work` panics, or the scope would wait for the watcher for ever.
+        // `work` may panic; without this the scope would wait for the watcher forever.
         let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(work));
         done.store(true, Ordering::Release);
         watcher.thread().unpark();

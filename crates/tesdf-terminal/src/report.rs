@@ -1,19 +1,19 @@
-//! What a person or a program sees: results on stdout, everything else on stderr.
+//! Output for users and programs: results on stdout, everything else on stderr.
 use std::borrow::Cow;
 use std::fmt;
 use std::io::{self, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// How a command that did its work ended.
+/// Result of a command that completed its work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// Exit code 0.
     Good,
-    /// Exit code 1: the mesh or file is not good.
+    /// Exit code 1: the mesh or file has defects, or the run does not meet its criterion.
     NotGood,
 }
 
-/// Why a command could not do its work, and what to do next; exit code 2.
+/// Why a command could not complete its work, and what to do next. Exit code 2.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     /// What was found, where, and what was expected.
@@ -28,18 +28,19 @@ impl Failure {
         Self { message: message.to_string(), hint: None }
     }
 
-    /// Adds what to do next.
+    /// Adds a hint.
     pub fn hint(mut self, hint: impl fmt::Display) -> Self {
         self.hint = Some(hint.to_string());
         self
     }
 }
 
-/// Characters of a line of a message: a longer one is cut in its middle, where a long value is.
+/// Maximum number of characters in a line of a message. A longer line is cut in its middle, where a
+/// long value is.
 const LONGEST: usize = 1200;
 
-/// Text that may come from a file, for a terminal: characters that control it, or that change the direction of text, are
-/// escaped. Only ends of lines stay.
+/// Makes text from a file safe for a terminal: escapes characters that control the terminal or the
+/// direction of text. Line ends stay.
 pub fn printable(text: &str) -> Cow<'_, str> {
     let directs =
         |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
@@ -55,7 +56,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     Cow::Owned(clean)
 }
 
-/// A message as it is printed: [`printable`], and no line longer than some hundred words.
+/// Prepares a message for printing: applies [`printable`] and cuts long lines.
 pub fn message(text: &str) -> String {
     let cut = |line: &str| {
         let count = line.chars().count();
@@ -72,15 +73,16 @@ pub fn message(text: &str) -> String {
 
 fn line(label: &str, colour: &str, text: &str) {
     let text = message(text);
-    // Nothing is left to do when stderr is closed. The colour goes when stderr is not a terminal.
+    // An error on stderr is ignored. `anstream` removes the colour when stderr is not a terminal.
     let _ = writeln!(anstream::stderr(), "\x1b[1;{colour}m{label}:\x1b[0m {text}");
 }
 
-/// Prints what clap says: help and version on stdout; bad usage, which may repeat long arguments, on stderr.
+/// Prints an error of clap: help and version go to stdout. Bad usage goes to stderr, and long
+/// arguments in it are cut.
 pub fn usage(found: &clap::Error) {
     let plain = found.render().to_string();
     let clean = message(&plain);
-    // Nothing is left to do when stdout or stderr is closed.
+    // An error is ignored: stdout or stderr is closed.
     let _ = if clean == plain { found.print() } else { writeln!(io::stderr(), "{clean}") };
 }
 
@@ -110,7 +112,8 @@ pub fn hint(text: &str) {
 /// Whether stdout carries the bytes of an output.
 static STDOUT_IS_TAKEN: AtomicBool = AtomicBool::new(false);
 
-/// From now on results go to stderr, as stdout carries the bytes of the output (`-o /dev/stdout`).
+/// Sends results to stderr from now on, because stdout carries the bytes of the output (`-o
+/// /dev/stdout`).
 pub fn leave_stdout_to_the_output() {
     STDOUT_IS_TAKEN.store(true, Ordering::Relaxed);
 }
@@ -118,7 +121,7 @@ pub fn leave_stdout_to_the_output() {
 /// Writes a result to stdout, or to stderr when stdout carries the bytes of the output.
 ///
 /// # Errors
-/// When it cannot be written. A reader that has seen enough and closed the pipe (`| head`) is not an error.
+/// The result cannot be written. A closed pipe (`| head`) is not an error.
 pub fn result(bytes: &[u8]) -> Result<(), Failure> {
     let (name, out): (_, &mut dyn Write) = match STDOUT_IS_TAKEN.load(Ordering::Relaxed) {
         true => ("stderr", &mut io::stderr()),
@@ -132,10 +135,10 @@ pub fn result(bytes: &[u8]) -> Result<(), Failure> {
     }
 }
 
-/// Writes a result for people to stdout.
+/// Writes a text result to stdout.
 ///
 /// # Errors
-/// As [`result`].
+/// The same errors as [`result`].
 pub fn text(text: &str) -> Result<(), Failure> {
     result(printable(text).as_bytes())
 }
@@ -143,7 +146,7 @@ pub fn text(text: &str) -> Result<(), Failure> {
 /// Writes `value` to stdout as indented JSON.
 ///
 /// # Errors
-/// As [`result`].
+/// The same errors as [`result`].
 pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
     let mut bytes =
         serde_json::to_vec_pretty(value).map_err(|e| Failure::new(format!("cannot write JSON: {e}")))?;
@@ -154,16 +157,16 @@ pub fn json(value: &impl serde::Serialize) -> Result<(), Failure> {
 /// Writes names and values to stdout in two columns.
 ///
 /// # Errors
-/// As [`result`].
+/// The same errors as [`result`].
 pub fn table<N: AsRef<str>, V: fmt::Display>(rows: &[(N, V)]) -> Result<(), Failure> {
     let width = rows.iter().map(|(name, _)| name.as_ref().chars().count()).max().unwrap_or(0);
-    // A value from a file may have ends of lines, which would look like rows.
+    // A value from a file may contain line ends, which would look like new rows.
     let row =
         |name: &str, value: &V| format!("{name:<width$}  {value}").trim_end().replace('\n', "\\n") + "\n";
     text(&rows.iter().map(|(name, value)| row(name.as_ref(), value)).collect::<String>())
 }
 
-/// A number with the word for it: `1 face`, `2 faces`.
+/// A number with its noun: `1 face`, `2 faces`.
 pub fn count(number: usize, word: &str) -> String {
     let plural = match word.strip_suffix("ex") {
         Some(stem) => format!("{stem}ices"),
@@ -172,12 +175,12 @@ pub fn count(number: usize, word: &str) -> String {
     format!("{number} {}", if number == 1 { word } else { &plural })
 }
 
-/// A point for people.
+/// Formats a point for users.
 pub fn point(p: tesdf::glam::DVec3) -> String {
     format!("{:.6e} {:.6e} {:.6e}", p.x, p.y, p.z)
 }
 
-/// A number of bytes for people, in powers of 1000.
+/// Formats a number of bytes for users, in powers of 1000.
 pub fn size(bytes: usize) -> String {
     match bytes as f64 {
         b if b < 1e3 => count(bytes, "byte"),
@@ -192,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_controls_a_terminal_is_escaped() {
+    fn control_characters_are_escaped() {
         let hostile = "a\u{1b}[31mb\u{7}\r\u{9b}0m\u{202e}txt\u{0}é\n…";
         let clean = printable(hostile);
         assert_eq!(clean, "a\\u{1b}[31mb\\u{7}\\r\\u{9b}0m\\u{202e}txt\\u{0}é\n…");

@@ -1,4 +1,4 @@
-//! Opening a run the way every command does.
+//! Opens run files for all commands.
 use std::path::Path;
 
 use tesdf_sim::RunRecord;
@@ -6,22 +6,22 @@ use tesdf_sim::record::RecordError;
 
 use crate::report::{self, Failure};
 
-/// Opens a run, and says so when it is not complete.
+/// Opens a run, and prints a note if it is not complete.
 ///
 /// # Errors
-/// As [`RunRecord::open`]; the message names the file.
+/// The same errors as [`RunRecord::open`]. The message names the file.
 pub fn open(path: &Path) -> Result<RunRecord, Failure> {
     let record = RunRecord::open(path).map_err(|e| failure(path, e))?;
     if let Some(planned) = record.planned_steps() {
         let (name, made) = (path.display(), record.steps());
         report::note(&format!(
-            "{name} has {made} of {planned} steps: it still grows, or it was cut; `tesdf simulate --resume {name}` goes on"
+            "{name} has {made} of {planned} steps: it is still running, or it was interrupted; `tesdf simulate --resume {name}` continues it"
         ));
     }
     Ok(record)
 }
 
-/// The error with the file's name.
+/// The error as a failure whose message names the file.
 pub fn failure(path: &Path, error: RecordError) -> Failure {
     match error {
         RecordError::Read { .. } | RecordError::Save(_) => Failure::new(error),

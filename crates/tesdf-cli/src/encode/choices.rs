@@ -1,4 +1,4 @@
-//! From arguments to the library's choices.
+//! Converts arguments to the library's options.
 use clap::ValueEnum;
 use tesdf::encode::{Deformation, EncodeChoices, Refinement, Threshold};
 use tesdf::geometry::Aabb;
@@ -6,27 +6,28 @@ use tesdf::geometry::Aabb;
 use super::Args;
 use tesdf_terminal::parse;
 
-/// Ways to find the closest faces of a tetrahedron.
+/// Methods that find the closest faces of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum EncoderChoice {
-    /// Proven: no face that can be closest is left out
+    /// Proven: no face that can be closest is missing
     Certified,
-    /// Faces that are closest at samples, as in the paper; between samples some may be missing
+    /// Faces that are closest at samples, as in the paper; faces that are closest only between
+    /// samples may be missing
     Sampled,
 }
 
-/// Points on the curve of memory and speed.
+/// Trade-offs between memory, query speed and encoding time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Preset {
     /// Fast queries
     Default,
-    /// Quickest to encode
+    /// Fast encoding
     Fast,
-    /// Smallest
+    /// Small files
     Compact,
-    /// The paper's encoder: sampled, 129 samples along an edge, tetrahedra as they are
+    /// The paper's encoder: sampled, 129 samples along an edge, tetrahedra not bisected
     Paper,
-    /// Sampled so that nothing is missing
+    /// Sampled with a threshold that is large enough that no needed face is missing
     SampledSafe,
 }
 
@@ -52,7 +53,7 @@ impl From<Preset> for tesdf::encode::Preset {
 }
 
 impl Args {
-    /// What the library is asked for.
+    /// The options for the library.
     pub fn choices(&self) -> EncodeChoices {
         let numbers = |r: &Aabb| [r.min.x, r.min.y, r.min.z, r.max.x, r.max.y, r.max.z];
         EncodeChoices {
@@ -71,10 +72,10 @@ impl Args {
     }
 }
 
-/// A length, or `safe`.
+/// Parses a length, or `safe`.
 ///
 /// # Errors
-/// Says what was found.
+/// The message says what was found.
 pub fn threshold(text: &str) -> Result<Threshold, String> {
     match text {
         "safe" => Ok(Threshold::CoveringRadius),

@@ -1,4 +1,4 @@
-//! `tesdf query FILE --points PTS.csv`
+//! `tesdf query FILE --points PTS.csv`: signed distances at points.
 mod points;
 
 use std::io::{self, IsTerminal};
@@ -17,26 +17,28 @@ use tesdf_terminal::report::{self, Failure, Outcome};
 pub struct Args {
     /// A .tesdf file
     pub file: PathBuf,
-    /// CSV file with the columns x, y and z in the mesh's unit; others are ignored
+    /// CSV file with the columns x, y and z in the mesh's unit; other columns are ignored
     #[arg(long, value_name = "CSV")]
     pub points: PathBuf,
 }
 
-/// Points that are answered before their rows are written: enough work for all threads, some MB of text.
+/// Number of points that are answered before their rows are written: enough work for all threads,
+/// and some MB of text.
 const CHUNK: usize = 1 << 15;
 
-/// Reads the points, answers them on the f64 path, and prints the rows in order. A point that is not finite has a row
-/// without an answer.
+/// Reads the points, answers them in f64, and prints the rows in order. A point that is not finite
+/// has a row without an answer.
 ///
 /// # Errors
-/// The asset or the points cannot be read, naming line and column, or stdout cannot be written.
+/// The asset or the points cannot be read, or stdout cannot be written. Errors in the points name
+/// the line and column.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let asset = asset_file::open(&args.file)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.points.display()));
     let bytes = input::read(&args.points).map_err(|e| at(&e))?;
     let points =
         read(&bytes).map_err(|e| at(&e).hint("expected a CSV file whose header has the columns x, y, z"))?;
-    // Rows that run over the terminal show the progress themselves.
+    // Rows on the terminal show the progress themselves.
     let bar = (!io::stdout().is_terminal()).then(|| Bar::new("querying"));
     report::result(HEADER.as_bytes())?;
     let mut rows = Vec::new();

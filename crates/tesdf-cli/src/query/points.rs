@@ -1,4 +1,4 @@
-//! Points in, answers out, as CSV.
+//! Points and answers as CSV.
 use std::io::{self, Write};
 
 use tesdf::glam::DVec3;
@@ -7,40 +7,40 @@ use tesdf::query::Answer;
 /// Why points cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum PointsError {
-    /// There is not even a header.
+    /// The file has no header.
     #[error("the file is empty")]
     Empty,
-    /// A column is missing or there twice.
-    #[error("line 1: the column {column} is there {count} times; expected once; the header is: {header}")]
+    /// A column is missing or occurs twice.
+    #[error("line 1: the column {column} occurs {count} times; expected once; the header is: {header}")]
     Column {
         /// `x`, `y` or `z`.
         column: &'static str,
         /// Number of columns with that name.
         count: usize,
-        /// The header found.
+        /// The header that was found.
         header: String,
     },
-    /// A row ends before the column.
-    #[error("line {line}: {fields} fields, so none for the column {column}; expected at least {expected}")]
+    /// A row ends before a needed column.
+    #[error("line {line}: {fields} fields, and none for the column {column}; expected at least {expected}")]
     Short {
-        /// Line, 1-based.
+        /// Line number, from 1.
         line: usize,
         /// `x`, `y` or `z`.
         column: &'static str,
-        /// Number of fields found.
+        /// Number of fields in the row.
         fields: usize,
-        /// Number of fields needed.
+        /// Number of fields that are needed.
         expected: usize,
     },
-    /// A row has fields that belong to no column.
+    /// A row has more fields than the header.
     #[error(
-        "line {line}: {fields} fields under {columns} columns; expected a field for each column: numbers need a decimal point, as a \
+        "line {line}: {fields} fields under {columns} columns; expected one field per column: numbers need a decimal point, because a \
          comma ends a field"
     )]
     Long {
-        /// Line, 1-based.
+        /// Line number, from 1.
         line: usize,
-        /// Number of fields found.
+        /// Number of fields in the row.
         fields: usize,
         /// Number of columns of the header.
         columns: usize,
@@ -48,11 +48,11 @@ pub enum PointsError {
     /// A field is not a number.
     #[error("line {line}, column {column}: {found:?} is not a number")]
     Number {
-        /// Line, 1-based.
+        /// Line number, from 1.
         line: usize,
         /// `x`, `y` or `z`.
         column: &'static str,
-        /// The field.
+        /// The text of the field.
         found: String,
     },
     /// The file is not CSV.
@@ -61,15 +61,17 @@ pub enum PointsError {
 }
 
 const COLUMNS: [&str; 3] = ["x", "y", "z"];
-/// A longer field in an error says nothing more.
+/// Error messages cut a field after this number of characters.
 const SHOWN: usize = 80;
 
-/// The points of a CSV file, by the columns `x`, `y`, `z` of its header, in any order and case; other columns are ignored.
+/// Reads the points of a CSV file from the columns `x`, `y` and `z` of its header. They may have
+/// any order and case; other columns are ignored.
 ///
-/// A byte-order mark, CRLF, quotes, blank lines and empty fields at the end of a row are accepted. `nan` and `inf` are numbers here.
+/// A byte-order mark, CRLF, quotes, blank lines and empty fields at the end of a row are accepted.
+/// `nan` and `inf` are valid numbers.
 ///
 /// # Errors
-/// [`PointsError`] names line and column.
+/// [`PointsError`] names the line and column.
 pub fn read(bytes: &[u8]) -> Result<Vec<DVec3>, PointsError> {
     let mut reader = csv::ReaderBuilder::new().flexible(true).trim(csv::Trim::All).from_reader(bytes);
     let header = reader.byte_headers()?.clone();
@@ -116,7 +118,8 @@ pub fn read(bytes: &[u8]) -> Result<Vec<DVec3>, PointsError> {
     Ok(points)
 }
 
-/// The line, 1-based, of the row that `start` leads to. The crate's own line numbers leave out blank lines before a row.
+/// Line number, from 1, of the row at byte `start`. The line numbers of the `csv` crate do not
+/// count blank lines before a row.
 fn line_of(bytes: &[u8], start: u64) -> usize {
     let start = usize::try_from(start).map_or(bytes.len(), |s| s.min(bytes.len()));
     let blank = bytes[start..].iter().take_while(|b| matches!(b, b'\r' | b'\n')).count();
@@ -128,15 +131,17 @@ fn line_of(bytes: &[u8], start: u64) -> usize {
 /// The header of the answers.
 pub const HEADER: &str = "x,y,z,signed_distance,gx,gy,gz,cx,cy,cz,face\n";
 
-/// Writes one row per point. Numbers are the shortest that give the same f64 again; a point without an answer (one that
-/// is not finite) has `NaN` in every column but the first three, and an empty face.
+/// Writes one row per point. Numbers have the fewest digits that read back as the same f64. A point
+/// that is not finite has no answer: its row has `NaN` in every column after the first three, and
+/// an empty face.
 ///
 /// # Errors
-/// When `out` cannot be written.
+/// `out` cannot be written.
 pub fn write(mut out: impl Write, points: &[DVec3], answers: &[Answer]) -> io::Result<()> {
     for (p, answer) in points.iter().zip(answers) {
         let Answer { signed_distance, gradient: g, closest_point: c, face } = answer;
-        // {:?} is the shortest text that reads back equal, with an exponent where {} would print 300 digits.
+        // `{:?}` is the shortest text that reads back as the same number; `{}` would print up to
+        // 300 digits.
         write!(out, "{:?},{:?},{:?},{signed_distance:?},", p.x, p.y, p.z)?;
         write!(out, "{:?},{:?},{:?},{:?},{:?},{:?},", g.x, g.y, g.z, c.x, c.y, c.z)?;
         match *face {
@@ -173,12 +178,12 @@ mod tests {
     fn errors_name_line_and_column() {
         for (text, expected) in [
             (&b""[..], "the file is empty"),
-            (b"x;y;z\n1;2;3", "line 1: the column x is there 0 times; expected once; the header is: x;y;z"),
-            (b"x,y,Y,z\n", "line 1: the column y is there 2 times; expected once; the header is: x,y,Y,z"),
-            (b"x,y,z\n1,2,3\n\n1,2\n", "line 4: 2 fields, so none for the column z; expected at least 3"),
+            (b"x;y;z\n1;2;3", "line 1: the column x occurs 0 times; expected once; the header is: x;y;z"),
+            (b"x,y,Y,z\n", "line 1: the column y occurs 2 times; expected once; the header is: x,y,Y,z"),
+            (b"x,y,z\n1,2,3\n\n1,2\n", "line 4: 2 fields, and none for the column z; expected at least 3"),
             (
                 b"x,y,z\n1,2,3\n1,5,2,5,3,5\n",
-                "line 3: 6 fields under 3 columns; expected a field for each column: numbers need a decimal point, as a comma \
+                "line 3: 6 fields under 3 columns; expected one field per column: numbers need a decimal point, because a comma \
                  ends a field",
             ),
             (b"x,y,z\r\n1,,3\r\n", "line 2, column y: \"\" is not a number"),

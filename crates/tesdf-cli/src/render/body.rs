@@ -1,4 +1,4 @@
-//! Bodies as they are named on the command line.
+//! Bodies on the command line.
 use std::path::PathBuf;
 
 use tesdf::collide::Shape;
@@ -8,7 +8,7 @@ use tesdf_terminal::asset_file::{Assets, check_units};
 use tesdf_terminal::parse;
 use tesdf_terminal::report::Failure;
 
-/// A body's geometry: a file, or a simple shape.
+/// Geometry of a body: a file or a simple shape.
 #[derive(Clone, Debug)]
 pub enum BodyName {
     /// A .tesdf file.
@@ -17,10 +17,11 @@ pub enum BodyName {
     Simple(Shape),
 }
 
-/// `plane`, `box:HX,HY,HZ`, `sphere:R`, `capsule:HALF_HEIGHT,R`, or else the name of a file.
+/// Parses `plane`, `box:HX,HY,HZ`, `sphere:R` or `capsule:HALF_HEIGHT,R`. Any other text is the
+/// name of a file.
 ///
 /// # Errors
-/// Says which number is at fault.
+/// The message names the number at fault.
 pub fn body_name(text: &str) -> Result<BodyName, String> {
     let shape = match text.split_once(':') {
         None if text == "plane" => Shape::Plane,
@@ -41,10 +42,10 @@ pub fn body_name(text: &str) -> Result<BodyName, String> {
     Ok(BodyName::Simple(shape))
 }
 
-/// The shapes of bodies; a file that is named twice is opened once.
+/// The shapes of the bodies. A file that is named twice is opened once.
 ///
 /// # Errors
-/// A file cannot be opened, or units differ.
+/// A file cannot be opened, or the units differ.
 pub fn open(names: &[BodyName]) -> Result<Vec<Shape>, Failure> {
     let mut assets = Assets::default();
     let shape = |name: &BodyName| match name {

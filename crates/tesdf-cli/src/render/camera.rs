@@ -1,28 +1,29 @@
 use tesdf::glam::{DVec2, DVec3};
 
-/// From where, and how, a scene is seen.
+/// Position and projection of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Degrees around the z axis, from x towards y: where the camera stands.
+    /// Azimuth of the camera around the z axis, degrees, from x towards y.
     pub azimuth: f64,
-    /// Degrees above the plane z = 0, -90 to 90.
+    /// Elevation of the camera above the plane z = 0, degrees, -90 to 90.
     pub elevation: f64,
-    /// Degrees from the left to the right border of a square picture, more than 0 and less than 180; `None` is orthographic.
+    /// Angle between the left and right borders of a square picture, degrees, between 0 and 180;
+    /// `None` is an orthographic projection.
     pub field_of_view: Option<f64>,
-    /// How much larger than fitted the scene is drawn; positive.
+    /// Magnification relative to a picture that fits the scene; positive.
     pub zoom: f64,
-    /// The point in the middle of the picture, world unit; `None` is the middle of what is seen.
+    /// The point in the middle of the picture, in world units; `None` is the middle of the scene.
     pub target: Option<DVec3>,
 }
 
 impl Default for View {
-    /// From the front right, above; orthographic.
+    /// An orthographic view from the front right and above.
     fn default() -> Self {
         Self { azimuth: -60.0, elevation: 25.0, field_of_view: None, zoom: 1.0, target: None }
     }
 }
 
-/// Rays for the pixels of a picture. The world's z axis points up in it.
+/// A camera that gives the rays of a picture's pixels. The world's z axis points up in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// Unit vector to the right of the picture.
@@ -33,27 +34,28 @@ pub struct Camera {
     pub forward: DVec3,
     eye: DVec3,
     projection: Projection,
-    /// Picture plane coordinates of the middle of the picture.
+    /// Coordinates of the picture's middle in the picture plane.
     centre: DVec2,
-    /// Length of a pixel in the picture plane.
+    /// Edge length of a pixel in the picture plane.
     pixel: f64,
-    /// Pixels.
+    /// Size of the picture, pixels.
     size: DVec2,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Projection {
-    /// Rays start on the plane through the eye, all forward. The picture plane is that plane.
+    /// Parallel rays that start on the plane through the eye. The picture plane is that plane.
     Orthographic,
-    /// Rays start at the eye. The picture plane lies one unit ahead.
+    /// Rays that start at the eye. The picture plane lies one unit ahead.
     Perspective,
 }
 
-/// Share of the picture that stays free on each side.
+/// Margin on each side, as a fraction of the picture.
 const MARGIN: f64 = 0.06;
 
 impl Camera {
-    /// The camera that sees all `points` of the world, in a picture of `size` pixels; `None` when they have no extent.
+    /// The camera that sees all `points`, in world units, in a picture of `size` pixels. `None`
+    /// when the points have no extent.
     pub fn fitted(view: &View, points: &[DVec3], size: [u32; 2]) -> Option<Self> {
         let (azimuth, elevation) = (view.azimuth.to_radians(), view.elevation.to_radians());
         let right = DVec3::new(-azimuth.sin(), azimuth.cos(), 0.0);
@@ -74,7 +76,8 @@ impl Camera {
             None => {
                 let middle = 0.5 * (low + high);
                 let extent = (high - low).truncate();
-                // Rays start one extent ahead of the scene, so that shadows and bounds have room.
+                // Rays start one extent ahead of the scene, which leaves room for shadows and
+                // bounds.
                 let eye = from_seen(DVec3::new(middle.x, middle.y, low.z - depth));
                 let pixel = (extent / usable).max_element();
                 Self {
@@ -91,7 +94,8 @@ impl Camera {
             Some(degrees) => {
                 let tangent = (0.5 * degrees.to_radians()).tan();
                 let slope = usable / usable.max_element() * tangent;
-                // Each point wants the eye behind the planes through it that bound the picture.
+                // For each point the eye must lie behind the planes through the point that bound
+                // the picture.
                 let bound = |axis: usize, sign: f64| {
                     seen().map(|p| sign * p[axis] - slope[axis] * p.z).fold(f64::NEG_INFINITY, f64::max)
                 };
@@ -123,7 +127,8 @@ impl Camera {
         (camera.pixel > 0.0 && camera.pixel.is_finite() && camera.eye.is_finite()).then_some(camera)
     }
 
-    /// Origin and unit direction of the ray through a point of the picture, in pixels from its upper left corner.
+    /// Origin and unit direction of the ray through `at`, in pixels from the upper left corner of
+    /// the picture.
     pub fn ray(&self, at: DVec2) -> [DVec3; 2] {
         let q = self.centre + (at - 0.5 * self.size) * DVec2::new(self.pixel, -self.pixel);
         let across = self.right * q.x + self.up * q.y;
@@ -133,15 +138,15 @@ impl Camera {
         }
     }
 
-    /// Where a point of the world is in the picture, in pixels from the upper left corner, and its distance along the
-    /// ray there; `None` behind the camera.
+    /// Position of a world point in the picture, in pixels from the upper left corner, and its
+    /// distance along the ray. `None` when the point is behind the camera.
     pub fn project(&self, p: DVec3) -> Option<(DVec2, f64)> {
         let (q, distance) = self.plane_coordinates(p)?;
         let q = (q - self.centre) / self.pixel;
         Some((0.5 * self.size + DVec2::new(q.x, -q.y), distance))
     }
 
-    /// Length of a pixel at a distance along a ray, world unit.
+    /// Edge length of a pixel at a distance along a ray, in world units.
     pub fn pixel_at(&self, distance: f64) -> f64 {
         match self.projection {
             Projection::Orthographic => self.pixel,

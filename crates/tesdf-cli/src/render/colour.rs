@@ -1,9 +1,9 @@
 use tesdf::glam::Vec3;
 
-/// Red, green, blue, proportional to light; 1 is white.
+/// Red, green and blue in linear light; 1 is white.
 pub type Linear = Vec3;
 
-/// Colours of bodies, in the order they are given out: steel, amber, then others that go with them.
+/// Colours of bodies in the order in which they are used: steel, amber, then matching colours.
 const PALETTE: [[u8; 3]; 8] = [
     [122, 152, 189],
     [236, 160, 76],
@@ -15,12 +15,12 @@ const PALETTE: [[u8; 3]; 8] = [
     [166, 146, 128],
 ];
 
-/// The colour of the body at a place in the list.
+/// The colour of the body at index `body`.
 pub fn of_body(body: usize) -> Linear {
     linear(PALETTE[body % PALETTE.len()])
 }
 
-/// Light of an sRGB colour.
+/// Converts sRGB to linear light.
 pub fn linear(rgb: [u8; 3]) -> Linear {
     Vec3::from_array(rgb.map(|c| {
         let c = f32::from(c) / 255.0;
@@ -28,7 +28,7 @@ pub fn linear(rgb: [u8; 3]) -> Linear {
     }))
 }
 
-/// The sRGB colour of light.
+/// Converts linear light to sRGB.
 pub fn srgb(light: Linear) -> [u8; 3] {
     light.to_array().map(|c| {
         let c = c.clamp(0.0, 1.0);

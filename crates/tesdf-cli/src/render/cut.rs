@@ -1,16 +1,17 @@
 use tesdf::glam::DVec3;
 
-/// A half space `normal · x > offset`.
+/// The half space `normal · x > offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfSpace {
     /// Unit normal, pointing into the half space.
     pub normal: DVec3,
-    /// Distance of its plane from the origin along the normal, world unit.
+    /// Distance of its plane from the origin along the normal, in world units.
     pub offset: f64,
 }
 
 impl HalfSpace {
-    /// The half space `normal · x > offset` for a normal of any length; `None` when it has no direction.
+    /// The half space `normal · x > offset` for a normal of any length; `None` when the normal has
+    /// no direction.
     pub fn new(normal: DVec3, offset: f64) -> Option<Self> {
         let length = normal.length();
         (length > 0.0 && length.is_finite())
@@ -18,23 +19,24 @@ impl HalfSpace {
     }
 }
 
-/// What is cut away: the common part of half spaces. One removes a half, two a wedge; none removes nothing.
+/// The removed space: the intersection of half spaces. One half space removes a half, two remove a
+/// wedge, and none removes nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Cut(pub Vec<HalfSpace>);
 
-/// The part of a ray that is cut away.
+/// The part of a ray in the removed space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CutSpan {
-    /// Where the ray enters the removed space.
+    /// Distance along the ray at which it enters the removed space.
     pub enter: f64,
-    /// Where it leaves it.
+    /// Distance along the ray at which it leaves the removed space.
     pub leave: f64,
-    /// The half space whose plane it leaves through.
+    /// The half space through whose plane the ray leaves.
     pub through: HalfSpace,
 }
 
 impl Cut {
-    /// The part with `t >= 0` of the ray that lies in all half spaces.
+    /// The part of the ray with `t >= 0` that lies in all half spaces.
     pub fn span(&self, origin: DVec3, along: DVec3) -> Option<CutSpan> {
         let first = *self.0.first()?;
         let mut span = CutSpan { enter: 0.0, leave: f64::INFINITY, through: first };
@@ -52,7 +54,8 @@ impl Cut {
         (span.enter < span.leave).then_some(span)
     }
 
-    /// Signed distance to the removed space, negative in it, as a lower bound outside of it; infinite when nothing is removed.
+    /// Signed distance to the removed space, negative inside. Outside it is a lower bound; it is
+    /// infinite when nothing is removed.
     pub fn signed_distance(&self, p: DVec3) -> f64 {
         let outside = self.0.iter().map(|half| half.offset - half.normal.dot(p)).reduce(f64::max);
         outside.unwrap_or(f64::INFINITY)

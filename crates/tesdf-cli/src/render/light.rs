@@ -1,32 +1,32 @@
-//! The colour of what a ray meets: two lights, the sky, and how much of them gets there.
+//! Shading: two lamps and the sky, with shadows and ambient occlusion.
 use tesdf::glam::{DVec3, Vec3};
 
 use super::camera::Camera;
 use super::colour::{Linear, linear};
 use super::stage::{Met, Part, Stage};
 
-/// Reach of ambient occlusion, as a share of the scene's diagonal.
+/// Reach of ambient occlusion, as a fraction of the scene's diagonal.
 const OCCLUSION: f64 = 0.07;
-/// Steps of ambient occlusion along the normal.
+/// Number of steps of ambient occlusion along the normal.
 const OCCLUSION_STEPS: u32 = 6;
-/// How sharp shadows are: the lamp's distance over its size.
+/// Sharpness of shadows: the distance of the lamp divided by its size.
 const SHARPNESS: f64 = 9.0;
-/// Steps of a shadow ray at most.
+/// Maximum number of steps of a shadow ray.
 const SHADOW_STEPS: usize = 96;
-/// Distance between the lines of a hatch, in pixels of a picture of 1200.
+/// Distance between the lines of a hatch, in pixels of a picture of 1200 pixels.
 const HATCH: f64 = 14.0;
 
 pub struct Lights<'a> {
     stage: &'a Stage<'a>,
     camera: &'a Camera,
-    /// Towards the lamp, unit.
+    /// Unit vector towards the main lamp.
     key: DVec3,
-    /// Towards the weaker lamp, unit.
+    /// Unit vector towards the weaker lamp.
     fill: DVec3,
     diagonal: f64,
-    /// Lines of the hatch per unit of length.
+    /// Number of hatch lines per unit of length.
     hatch: f64,
-    /// Edge of the floor's checks.
+    /// Edge length of the floor's squares.
     check: f64,
 }
 
@@ -50,7 +50,7 @@ impl<'a> Lights<'a> {
         }
     }
 
-    /// The light that a met point sends back along the ray.
+    /// The light that the hit point sends back along the ray.
     pub fn colour(&self, met: &Met, along: DVec3, background: Linear) -> Linear {
         let facing = |n: DVec3| if n.dot(along) > 0.0 { -n } else { n };
         let (normal, smooth) = (facing(met.normal), met.smooth);
@@ -77,7 +77,7 @@ impl<'a> Lights<'a> {
         colour * (ambient + key + fill) + Vec3::splat(gloss + grazing)
     }
 
-    /// Flat, hatched, with a line where the surface is.
+    /// A flat, hatched colour, with a dark line along the surface.
     fn section(&self, met: &Met, normal: DVec3) -> Linear {
         let body = &self.stage.bodies[met.body];
         let (colour, deep) = match met.part {
@@ -85,14 +85,14 @@ impl<'a> Lights<'a> {
             _ => (body.drawn.colour.lerp(Vec3::ONE, 0.24), body.drawn.colour * 0.85),
         };
         let pixel = self.camera.pixel_at(met.t);
-        // Neighbours in a section differ by the slope of their lines.
+        // Neighbouring bodies have hatch lines of opposite slope.
         let slope = if met.body.is_multiple_of(2) { 1.0 } else { -1.0 };
         let across = normal.any_orthonormal_pair();
         let (u, v) = upright(normal).unwrap_or(across);
         let phase =
             (met.point.dot(u) + slope * met.point.dot(v)) * self.hatch * std::f64::consts::FRAC_1_SQRT_2;
         let hatched = (phase - phase.floor()) < 0.16;
-        // The planes of a wedge look different.
+        // The planes of a wedge differ in brightness.
         let shade = (0.86 + 0.14 * normal.z.abs()) as f32;
         let depth = -body.signed_distance(met.point);
         if depth < 1.1 * pixel {
@@ -119,7 +119,7 @@ impl<'a> Lights<'a> {
         background.lerp(light, seen as f32)
     }
 
-    /// How much of the sky a point sees, 0 to 1, judged by the distances of points above it.
+    /// The visible fraction of the sky, 0 to 1, estimated from the distances at points above `p`.
     fn openness(&self, p: DVec3, normal: DVec3) -> f64 {
         let reach = OCCLUSION * self.diagonal;
         let (mut hidden, mut total) = (0.0, 0.0);
@@ -135,7 +135,8 @@ impl<'a> Lights<'a> {
         0.12 + 0.88 * open * open.sqrt()
     }
 
-    /// How much of the lamp a point sees, 0 to 1: a march through the distances remembers how close it passed.
+    /// The visible fraction of the lamp, 0 to 1: a march along the shadow ray records how closely
+    /// it passes a surface.
     fn shadow(&self, p: DVec3, normal: DVec3) -> f64 {
         let start = 2e-3 * self.diagonal;
         let origin = p + start * normal;
@@ -148,7 +149,8 @@ impl<'a> Lights<'a> {
                 return 0.0;
             }
             seen = seen.min(SHARPNESS * found / t);
-            // Full steps pass the closest point at random; their shadows have streaks.
+            // Full steps would pass the closest point at random, and the shadows would have
+            // streaks.
             let step = if found < enough { 0.5 * found } else { found };
             t += step.max(2e-3 * self.diagonal);
             if t > self.diagonal {
@@ -159,7 +161,8 @@ impl<'a> Lights<'a> {
     }
 }
 
-/// Axes in the plane of a normal: level, and as upright as can be; `None` for a level plane.
+/// Axes in the plane with this normal: a horizontal axis, and the axis perpendicular to it. `None`
+/// for a horizontal plane.
 fn upright(normal: DVec3) -> Option<(DVec3, DVec3)> {
     let level = DVec3::Z.cross(normal).try_normalize()?;
     Some((level, normal.cross(level)))

@@ -1,7 +1,9 @@
-//! `tesdf render BODY... -o out.png`, `tesdf render --run RUN -o out.png`: a picture of a scene, with a cutaway on request.
+//! `tesdf render BODY... -o out.png` and `tesdf render --run RUN -o out.png`: a picture of a scene,
+//! optionally cut open.
 //!
-//! In go bodies with their places in the world ([`Drawn`]), what is cut away ([`Cut`]), contacts, and a [`View`]; out
-//! comes a picture ([`render`]). Rays find the surface in the encoded mesh; its distances give shadows and occlusion.
+//! [`render`] takes bodies with their poses ([`Drawn`]), the removed space ([`Cut`]), contacts and
+//! a [`View`], and returns a picture. Rays find the surface in the encoded mesh, and its distances
+//! give shadows and ambient occlusion.
 mod body;
 mod camera;
 mod colour;
@@ -31,19 +33,19 @@ use tesdf_terminal::output::{self, Consent};
 use tesdf_terminal::parse;
 use tesdf_terminal::report::{Failure, Outcome};
 
-/// Why there is no picture.
+/// Why a picture cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError {
-    /// The picture cannot have this size.
+    /// The size of the picture is out of range.
     #[error("a picture of {}x{} pixels; expected {min} to {max} each", .0[0], .0[1], min = picture::SIZES.start(), max = picture::SIZES.end())]
     Size([u32; 2]),
-    /// The memory does not hold the picture while it is drawn.
+    /// There is not enough memory to draw the picture.
     #[error("no memory is left for a picture of {}x{} pixels; draw a smaller one", .0[0], .0[1])]
     Memory([u32; 2]),
-    /// There are only planes, or coordinates that overflow.
-    #[error("nothing to fit the picture to; add a body that is no plane")]
+    /// The scene has only planes, or coordinates that overflow.
+    #[error("nothing to fit the picture to; add a body that is not a plane")]
     Nothing,
-    /// The PNG cannot be made.
+    /// The PNG cannot be encoded.
     #[error("the picture cannot be encoded: {0}")]
     Encode(String),
 }
@@ -54,54 +56,58 @@ pub struct Args {
     /// A .tesdf file, or plane, box:HX,HY,HZ, sphere:R, capsule:HALF_HEIGHT,R
     #[arg(required_unless_present = "run", value_name = "BODY", value_parser = body_name)]
     pub bodies: Vec<BodyName>,
-    /// Draw the bodies of this run instead, as `tesdf simulate` wrote it
+    /// Draw the bodies of this run, which `tesdf simulate` wrote
     #[arg(long, value_name = "RUN", conflicts_with_all = ["bodies", "poses"])]
     pub run: Option<PathBuf>,
-    /// Time of the run, s; the nearest step is drawn [default: its end]
+    /// Time in the run, s; the nearest step is drawn [default: the end of the run]
     #[arg(long, value_name = "SECONDS", value_parser = parse::number, allow_hyphen_values = true)]
     pub time: Option<f64>,
-    /// Draw the run's contacts too, gaps up to its contact distance included, at the nearest step whose contacts are recorded
+    /// Also draw the run's contacts, including gaps up to its contact distance, at the nearest step
+    /// with recorded contacts
     #[arg(long)]
     pub contacts: bool,
-    /// Instead of the geometry of a body of the run: a .tesdf file, or a mesh that is encoded; may be given several times
+    /// Replace the geometry of a body of the run by a .tesdf file, or by a mesh, which is encoded;
+    /// may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry)]
     pub geometries: Vec<(String, PathBuf)>,
-    /// The PNG file to write; an existing one is replaced, a pipe or device is written to
+    /// Output PNG file; an existing file is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "PNG")]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
     #[command(flatten)]
     pub consent: Consent,
-    /// Translation and rotation of a body, one option per body in their order [default: none is moved]
+    /// Translation and rotation of a body; one option per body, in their order [default: no body is
+    /// moved]
     #[arg(long = "pose", value_name = "tx ty tz qx qy qz qw", value_parser = parse::pose, allow_hyphen_values = true)]
     pub poses: Vec<Pose>,
-    /// Pixels
+    /// Size of the picture, pixels
     #[arg(long, value_name = "WxH", value_parser = parse::size, default_value = "1200x800")]
     pub size: [u32; 2],
-    /// Where the camera stands, in degrees around the z axis and above the ground
+    /// Direction of the camera: degrees around the z axis, and degrees above the ground
     #[arg(long, value_name = "azimuth elevation", value_parser = parse::direction, default_value = "-60 25", allow_hyphen_values = true)]
     pub view: [f64; 2],
-    /// Perspective with this angle, in degrees [default: orthographic]
+    /// Perspective with this field of view, in degrees [default: orthographic]
     #[arg(long, value_name = "DEGREES", value_parser = parse::field_of_view, allow_hyphen_values = true)]
     pub field_of_view: Option<f64>,
-    /// How much larger than fitted to draw
+    /// Magnification relative to a picture that fits the scene
     #[arg(long, value_name = "FACTOR", value_parser = parse::factor, default_value = "1", allow_hyphen_values = true)]
     pub zoom: f64,
     /// The point in the middle of the picture [default: the middle of the scene]
     #[arg(long, value_name = "x y z", value_parser = parse::point, allow_hyphen_values = true)]
     pub target: Option<DVec3>,
-    /// Removes what has nx x + ny y + nz z > d and shows the section; given twice, only what both remove
+    /// Remove the half space nx x + ny y + nz z > d and show the section; given twice, remove the
+    /// intersection of both
     #[arg(long = "cut", value_name = "nx ny nz d", value_parser = half_space, allow_hyphen_values = true)]
     pub cuts: Vec<HalfSpace>,
-    /// Bodies that are cut, by their place in the list from 0 [default: all but planes]
-    #[arg(long, value_name = "PLACES", value_delimiter = ',', requires = "cuts")]
+    /// Bodies that are cut, by their index in the list, from 0 [default: all except planes]
+    #[arg(long, value_name = "INDICES", value_delimiter = ',', requires = "cuts")]
     pub cut_bodies: Option<Vec<usize>>,
 }
 
-/// A half space from `nx ny nz d`.
+/// Parses a half space as `nx ny nz d`.
 ///
 /// # Errors
-/// Says which number is at fault.
+/// The message names the number at fault.
 fn half_space(text: &str) -> Result<HalfSpace, String> {
     let [x, y, z, offset] = parse::numbers(text, "four, \"nx ny nz d\"")?;
     HalfSpace::new(DVec3::new(x, y, z), offset)
@@ -109,13 +115,13 @@ fn half_space(text: &str) -> Result<HalfSpace, String> {
 }
 
 impl Args {
-    /// The camera's place.
+    /// The camera's position and projection.
     pub fn view(&self) -> View {
         let Self { view: [azimuth, elevation], field_of_view, zoom, target, .. } = *self;
         View { azimuth, elevation, field_of_view, zoom, target }
     }
 
-    /// Which body is cut, for the shapes of all.
+    /// For each shape, whether the body is cut.
     fn exposures(&self, shapes: &[Shape]) -> Result<Vec<Exposure>, Failure> {
         if let Some(&place) = self.cut_bodies.iter().flatten().find(|&&place| place >= shapes.len()) {
             let last = shapes.len().saturating_sub(1);
@@ -133,7 +139,8 @@ impl Args {
 /// Draws the scene and saves it.
 ///
 /// # Errors
-/// A file cannot be opened, the options do not fit each other, nothing can be drawn, or the file cannot be written.
+/// A file cannot be opened, the options do not match each other, nothing can be drawn, or the file
+/// cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let of_run = [
         ("--time", args.time.is_some()),
@@ -144,13 +151,13 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         Some(run) => run_file::posed(args, run)?,
         None => match of_run.iter().find(|(_, given)| *given) {
             Some((name, _)) => {
-                return Err(Failure::new(format!("{name} is of a recorded run; add --run <RUN>")));
+                return Err(Failure::new(format!("{name} only applies to a recorded run; add --run <RUN>")));
             }
             None => named(args)?,
         },
     };
     let exposures = args.exposures(&shapes)?;
-    // Planes are grey and take no colour from the others.
+    // Planes are grey and do not use up a colour of the palette.
     let mut colours = (0..).map(of_body);
     let bodies: Vec<Drawn> = shapes
         .iter()
@@ -174,15 +181,15 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Good)
 }
 
-/// Bodies in their places.
+/// Bodies with their poses.
 struct Posed {
     shapes: Vec<Shape>,
-    /// One per shape.
+    /// The placement of each shape.
     placements: Vec<Placement>,
     contacts: Vec<ContactMark>,
 }
 
-/// The bodies that the command line names, and the output, which is none of them.
+/// The bodies on the command line, and the output file, which must not be one of them.
 fn named(args: &Args) -> Result<(Posed, Destination), Failure> {
     if !args.poses.is_empty() && args.poses.len() != args.bodies.len() {
         let message = format!("--pose is given {} times for {} bodies", args.poses.len(), args.bodies.len());

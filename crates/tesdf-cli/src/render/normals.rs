@@ -1,16 +1,19 @@
-//! Normals that make the facets of a round surface look round, and leave its edges sharp.
+//! Shading normals that make round surfaces look smooth and keep sharp edges.
 use tesdf::TeSdf;
 use tesdf::glam::{DVec3, Vec3};
 
-/// Faces that meet at more than this angle have an edge between them: cos 20°. A round of 24 facets is smooth, the chamfer of a nut is not.
+/// Cosine of the crease angle, 20°: faces that meet at a larger angle have a sharp edge. A circle
+/// of 24 facets is smooth, the chamfer of a nut is not.
 const CREASE: f64 = 0.94;
 
-/// For each face, by its id in the source mesh: its corners, mesh unit, and a unit normal at each.
+/// For each face, by its id in the source mesh: its corners in the mesh's unit, and a unit normal
+/// at each corner.
 pub struct SmoothNormals(Vec<([DVec3; 3], [Vec3; 3])>);
 
 impl SmoothNormals {
-    /// At each corner of a face, the sum of the normals of the faces around its vertex that are within the crease angle,
-    /// weighted by their angle there.
+    /// Computes the normals of all corners. The normal at a corner is the sum of the normals of the
+    /// faces around its vertex that are within the crease angle, weighted by their angle at the
+    /// vertex.
     pub fn new(asset: &TeSdf) -> Self {
         let faces: Vec<_> = (0..asset.face_count())
             .map(|position| {
@@ -46,7 +49,8 @@ impl SmoothNormals {
         Self(smooth)
     }
 
-    /// The normal at a point of a face, mesh unit; `None` for a face that is not there or has no area.
+    /// The normal at point `p` of a face, in the mesh's unit. `None` for a face that does not exist
+    /// or has no area.
     pub fn at(&self, face: u32, p: DVec3) -> Option<DVec3> {
         let ([a, b, c], normals) = self.0.get(face as usize)?;
         let full = (b - a).cross(c - a);

@@ -1,32 +1,32 @@
-//! Contacts on top of a picture.
+//! Draws contacts on top of a picture.
 use tesdf::glam::{DVec2, DVec3};
 use tiny_skia::{Color, FillRule, LineCap, Paint, Path, PathBuilder, Pixmap, Stroke, Transform};
 
 use super::camera::Camera;
 
-/// Radius of a disc, as a share of the picture's longer side.
+/// Radius of a disc, as a fraction of the picture's longer side.
 const RADIUS: f64 = 0.006;
-/// Length of a normal, in radii.
+/// Length of an arrow along the normal, in radii.
 const NORMAL: f64 = 4.5;
-/// Opacity of what a body hides.
+/// Opacity of a contact that a body hides.
 const HIDDEN: f32 = 0.30;
 const DISC: [u8; 3] = [214, 30, 60];
 const RIM: [u8; 3] = [255, 255, 255];
 const ARROW: [u8; 3] = [120, 10, 40];
-/// Corners of a disc's outline.
+/// Number of corners of a disc's outline.
 const CORNERS: u32 = 28;
 
-/// Where a contact is drawn.
+/// Position and normal of a contact that is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactMark {
-    /// World.
+    /// Point, in world units.
     pub point: DVec3,
-    /// Unit, world.
+    /// Unit normal, world frame.
     pub normal: DVec3,
 }
 
-/// Draws each contact as a disc across its normal at its point, and the normal; `depth` gives the distance that the
-/// picture shows at a pixel.
+/// Draws each contact as a disc and an arrow along its normal. `depth` returns the distance of the
+/// surface at a pixel.
 pub fn contacts(
     map: &mut Pixmap,
     camera: &Camera,
@@ -40,7 +40,7 @@ pub fn contacts(
         .filter(|(at, _, _)| at.x >= 0.0 && at.y >= 0.0)
         .filter(|(at, _, _)| at.x < f64::from(map.width()) && at.y < f64::from(map.height()))
         .collect();
-    // The nearest last, on top; contacts at one distance keep their order.
+    // The nearest contacts are drawn last, on top. Contacts at the same distance keep their order.
     seen.sort_by(|a, b| b.1.total_cmp(&a.1));
     for (at, far, contact) in seen {
         let radius = RADIUS * longer * camera.pixel_at(far);

@@ -11,32 +11,33 @@ use super::stage::{Drawn, Part, Stage};
 use super::{ContactMark, RenderError, overlay};
 use crate::slice::ticks;
 
-/// Pixels of each side of a picture.
+/// Allowed size of each side of a picture, pixels.
 pub const SIZES: std::ops::RangeInclusive<u32> = 16..=8192;
-/// Rays per pixel where its colour differs from a neighbour's, along each side.
+/// Rays per pixel and axis where the colour differs from a neighbouring pixel.
 const FINE: u32 = 4;
-/// Difference in sRGB, 0 to 255, from which on a pixel gets more rays.
+/// Difference in sRGB, 0 to 255, at which a pixel gets more rays.
 const DIFFERENCE: u8 = 5;
-/// Edges of the floor's checks per diagonal of the scene, at most.
+/// Minimum number of floor squares per diagonal of the scene.
 const CHECKS: f64 = 8.0;
 
-/// What is in a picture.
+/// The contents of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Scenery<'a> {
     /// The bodies.
     pub bodies: &'a [Drawn<'a>],
-    /// What is removed of those that are cut.
+    /// The space that is removed from the bodies with [`Exposure::Cut`](super::Exposure::Cut).
     pub cut: &'a Cut,
-    /// Drawn as discs with their normals; faint where a body hides them.
+    /// Contacts, drawn as discs with their normals; faint where a body hides them.
     pub contacts: &'a [ContactMark],
 }
 
-/// Draws bodies, fitted into a picture of `size` pixels; planes are floor and do not count for the fit.
+/// Draws the bodies in a picture of `size` pixels. The picture fits all bodies except planes, which
+/// are floors.
 ///
 /// The same input gives the same picture on any number of threads.
 ///
 /// # Errors
-/// [`RenderError`]: the size or the scene cannot be drawn.
+/// [`RenderError`] when the size or the scene cannot be drawn.
 pub fn render(scenery: &Scenery, view: &View, size: [u32; 2]) -> Result<Pixmap, RenderError> {
     if !size.iter().all(|side| SIZES.contains(side)) {
         return Err(RenderError::Size(size));
@@ -49,7 +50,7 @@ pub fn render(scenery: &Scenery, view: &View, size: [u32; 2]) -> Result<Pixmap, 
     let artist = Artist { stage: &stage, camera: &camera, lights: &lights, size };
 
     let [width, height] = size.map(|side| side as usize);
-    // Before the work; the largest picture takes 4 GB.
+    // Memory is reserved before the work; the largest picture takes 4 GB.
     let (mut coarse, mut colours) = (Vec::<Sample>::new(), Vec::<[u8; 3]>::new());
     let memory = coarse.try_reserve_exact(width * height).and(colours.try_reserve_exact(width * height));
     let map = memory.ok().and_then(|()| Pixmap::new(size[0], size[1]));
@@ -69,7 +70,7 @@ pub fn render(scenery: &Scenery, view: &View, size: [u32; 2]) -> Result<Pixmap, 
     Ok(map)
 }
 
-/// Points whose hull holds the body; none for a plane.
+/// Points whose convex hull contains the body; none for a plane.
 fn outer_points(body: &Drawn) -> Vec<DVec3> {
     let points: Vec<DVec3> = match body.shape {
         Shape::Plane => Vec::new(),
@@ -96,11 +97,11 @@ fn pixel(i: usize, width: usize) -> DVec2 {
     DVec2::new((i % width) as f64, (i / width) as f64)
 }
 
-/// What one ray sees.
+/// What a ray sees.
 #[derive(Clone, Copy)]
 struct Sample {
     light: Linear,
-    /// Body and part; `None` for the background.
+    /// Body and part that the ray hits; `None` for the background.
     seen: Option<(usize, Part)>,
     /// Distance along the ray; infinite for the background.
     depth: f64,
@@ -114,7 +115,8 @@ struct Artist<'a> {
 }
 
 impl Artist<'_> {
-    /// `within` is the point of the pixel, from its upper left corner.
+    /// Traces the ray through a point of the pixel. `within` is measured from the pixel's upper
+    /// left corner.
     fn sample(&self, pixel: DVec2, within: DVec2) -> Sample {
         let at = pixel + within;
         let background = background(at.y / f64::from(self.size[1]));
@@ -133,18 +135,20 @@ impl Artist<'_> {
         let step = 1.0 / f64::from(FINE);
         let offsets =
             (0..FINE * FINE).map(|k| DVec2::new(f64::from(k % FINE) + 0.5, f64::from(k / FINE) + 0.5) * step);
-        // Bright light is clipped before it is averaged, or edges of highlights would be jagged.
+        // Bright light is clipped before the average, because the edges of highlights would be
+        // jagged otherwise.
         let sum: Linear = offsets.map(|within| self.sample(pixel, within).light.min(Linear::ONE)).sum();
         srgb(sum / (FINE * FINE) as f32)
     }
 }
 
-/// From white above to a cool grey below.
+/// A gradient from white at the top to cool grey at the bottom.
 fn background(down: f64) -> Linear {
     linear([250, 251, 253]).lerp(linear([226, 231, 238]), down as f32)
 }
 
-/// Whether all pixels around look alike.
+/// Whether the pixel has the body, part and, up to [`DIFFERENCE`], the colour of its four
+/// neighbours.
 fn is_plain(samples: &[Sample], i: usize, width: usize, height: usize) -> bool {
     let (x, y) = (i % width, i / width);
     let own = srgb(samples[i].light);

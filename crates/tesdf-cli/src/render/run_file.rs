@@ -14,10 +14,12 @@ use tesdf_terminal::progress::{interrupt_flag, watched};
 use tesdf_terminal::report::Failure;
 use tesdf_terminal::{output, run_file};
 
-/// Reads a run and opens what its bodies are; with the output, which is none of these files.
+/// Reads a run and opens the geometries of its bodies. Also returns the output file, which must not
+/// be one of these files.
 ///
 /// # Errors
-/// No run, geometry that is not where it was, or no contacts where some are asked for.
+/// The file is not a run, a geometry is missing, or the run has no contacts although they are to be
+/// drawn.
 pub fn posed(args: &Args, run: &Path) -> Result<(Posed, Destination), Failure> {
     let at = |reason: &dyn std::fmt::Display| Failure::new(format!("{}: {reason}", run.display()));
     let record = run_file::open(run)?;
@@ -56,7 +58,7 @@ pub fn posed(args: &Args, run: &Path) -> Result<(Posed, Destination), Failure> {
     Ok((posed, output))
 }
 
-/// On the body whose field it is, as the normal points away from it.
+/// The mark lies on the body with the field, because the normal points away from it.
 fn mark(contact: &RecordedContact) -> ContactMark {
     let [point, normal] = [contact.point, contact.normal].map(|v| Vec3::from_array(v).as_dvec3());
     ContactMark { point: point - f64::from(contact.distance) * normal, normal }

@@ -1,4 +1,5 @@
-//! What a picture is made of, ready for rays: where a ray meets it first, and how far it is from a point.
+//! The scene of a picture, prepared for rays: the first hit of a ray, and the distance from a
+//! point.
 use std::sync::Arc;
 
 use tesdf::collide::{Placement, Shape};
@@ -14,53 +15,53 @@ use super::normals::SmoothNormals;
 pub struct Drawn<'a> {
     /// Its geometry.
     pub shape: &'a Shape,
-    /// Where it is in the world.
+    /// Pose and scale in the world.
     pub placement: Placement,
-    /// Its colour; a plane is a floor of grey checks.
+    /// Its colour. A plane ignores it and is a floor of grey squares.
     pub colour: Linear,
     /// Whether it is cut.
     pub exposure: Exposure,
 }
 
-/// Whether the cut goes through a body.
+/// Whether a body is cut open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exposure {
     /// The body is shown whole.
     Whole,
-    /// What lies in the removed space is not shown.
+    /// The part in the removed space is not shown.
     Cut,
 }
 
-/// What a ray meets first.
+/// The first hit of a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Met {
-    /// Distance along the ray, world unit.
+    /// Distance along the ray, in world units.
     pub t: f64,
     pub point: DVec3,
     /// Outward unit normal of the surface.
     pub normal: DVec3,
-    /// The normal to shade with: continuous over round surfaces.
+    /// Normal for shading, which is continuous over round surfaces.
     pub smooth: DVec3,
-    /// Which body, as its place in the list.
+    /// Index of the body in the list.
     pub body: usize,
     pub part: Part,
 }
 
-/// What of a body a ray meets.
+/// The part of a body that a ray hits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Its surface.
     Skin,
-    /// Its inside, laid open by the cut.
+    /// Its interior, exposed by the cut.
     Section,
-    /// A section where it and another body overlap.
+    /// A section where it overlaps another body.
     Overlap,
 }
 
 pub struct Body<'a> {
     pub drawn: Drawn<'a>,
     normals: Option<Arc<SmoothNormals>>,
-    /// World.
+    /// Bounding box, in world units.
     bounds: Aabb,
 }
 
@@ -69,18 +70,18 @@ impl Body<'_> {
         matches!(self.drawn.shape, Shape::Plane)
     }
 
-    /// Signed distance of the whole body, world unit.
+    /// Signed distance of the whole body, in world units.
     pub fn signed_distance(&self, p: DVec3) -> f64 {
         let Placement { scale, .. } = self.drawn.placement;
         self.drawn.shape.signed_distance_f32(self.drawn.placement.to_shape(p)) * scale
     }
 }
 
-/// All bodies and the cut.
+/// All bodies, and the removed space.
 pub struct Stage<'a> {
     pub bodies: Vec<Body<'a>>,
     pub cut: &'a Cut,
-    /// Of all bodies but planes, world.
+    /// Bounding box of all bodies except planes, in world units.
     pub bounds: Aabb,
 }
 
@@ -109,7 +110,7 @@ impl<'a> Stage<'a> {
         Self { bodies: ready, cut, bounds }
     }
 
-    /// What the ray meets first; `along` is a unit vector.
+    /// The first hit of a ray; `along` is a unit vector.
     pub fn first(&self, origin: DVec3, along: DVec3) -> Option<Met> {
         let span = self.cut.span(origin, along);
         let mut best: Option<Met> = None;
@@ -161,7 +162,7 @@ impl<'a> Stage<'a> {
         })
     }
 
-    /// The section of a solid where the ray leaves the removed space.
+    /// The section of a body at the point where the ray leaves the removed space.
     fn section(
         &self,
         body: usize,
@@ -177,14 +178,16 @@ impl<'a> Stage<'a> {
             && t.is_finite()
             && bounds.contains(point)
             && drawn.shape.contains(drawn.placement.to_shape(point));
-        // The removed half space lies on the side of the normal, as air lies outside of a surface.
+        // The normal of the removed half space points into the removed space, as an outward surface
+        // normal does.
         let normal = through.normal;
         inside.then_some(Met { t, point, normal, smooth: normal, body, part: Part::Section })
     }
 
-    /// Distance from `p` to what is shown, negative inside, where it is below `limit`; `limit` where it is not.
+    /// Distance from `p` to the visible bodies, negative inside, if it is below `limit`; otherwise
+    /// `limit`.
     ///
-    /// Sections count as surface. Near the cut it is a lower bound.
+    /// Sections count as surface. Near the cut the result is a lower bound.
     pub fn distance(&self, p: DVec3, limit: f64) -> f64 {
         let removed = self.cut.signed_distance(p);
         let mut least = limit;

@@ -1,34 +1,39 @@
-//! The file of a run while it grows.
+//! Records a run while it is simulated.
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use tesdf::save::Destination;
 use tesdf_sim::record::RecordError;
-use tesdf_sim::{CutRun, Moment, RunJournal, RunOrigin, RunRecord, SimulateError};
+use tesdf_sim::{InterruptedRun, Moment, RunJournal, RunOrigin, RunRecord, SimulateError};
 
 use tesdf_terminal::output;
 use tesdf_terminal::report::Failure;
 
-/// Records each step of a run at its destination. The first step replaces what was there.
+/// Records each step of a run at its destination. The first step replaces the existing file.
 pub struct Recorder<'a> {
     destination: &'a Destination,
     origin: &'a RunOrigin,
-    /// What the run goes on from.
-    cut: Option<&'a CutRun>,
+    /// The interrupted run that is resumed.
+    earlier: Option<&'a InterruptedRun>,
     /// `None` before the first step, and when the destination is a pipe or device.
     journal: Option<RunJournal>,
     /// Why the last step could not be recorded.
     failed: Option<RecordError>,
-    /// Steps in all.
+    /// Number of steps of the whole run.
     steps: u64,
 }
 
 impl<'a> Recorder<'a> {
-    pub fn new(destination: &'a Destination, origin: &'a RunOrigin, cut: Option<&'a CutRun>) -> Self {
-        Self { destination, origin, cut, journal: None, failed: None, steps: 0 }
+    pub fn new(
+        destination: &'a Destination,
+        origin: &'a RunOrigin,
+        earlier: Option<&'a InterruptedRun>,
+    ) -> Self {
+        Self { destination, origin, earlier, journal: None, failed: None, steps: 0 }
     }
 
-    /// Records a step; breaks off when that is not possible, and [`failure`](Self::failure) says why.
+    /// Records a step. Stops the run when that fails; [`failure`](Self::failure) then has the
+    /// reason.
     pub fn push(&mut self, moment: &Moment<'_>) -> ControlFlow<()> {
         self.steps = moment.steps;
         match self.try_push(moment) {
@@ -45,8 +50,8 @@ impl<'a> Recorder<'a> {
             return Ok(());
         }
         if self.journal.is_none() {
-            self.journal = match self.cut {
-                Some(cut) => RunJournal::go_on(self.destination, cut)?,
+            self.journal = match self.earlier {
+                Some(earlier) => RunJournal::resume(self.destination, earlier)?,
                 None => RunJournal::begin(self.destination, moment.record, self.origin)?,
             };
         }
@@ -56,14 +61,14 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Puts the complete run in the place of the journal.
+    /// Replaces the journal by the complete run.
     ///
     /// # Errors
-    /// The file cannot be written; the journal is then still there.
+    /// The file cannot be written. The journal then remains.
     pub fn finish(mut self, record: &RunRecord) -> Result<(), Failure> {
         let bytes = record.to_bytes().map_err(Failure::new)?;
         let is_recorded = self.journal.is_some();
-        // An open file cannot be replaced everywhere.
+        // Some systems cannot replace an open file.
         self.journal = None;
         output::write(self.destination, &bytes).map_err(|e| match is_recorded {
             true => e.hint(self.next()),
@@ -75,8 +80,8 @@ impl<'a> Recorder<'a> {
     pub fn failure(&mut self, error: SimulateError, source: &Path) -> Failure {
         let path = self.destination.path().display();
         let kept = match (&self.journal, self.destination.file_path()) {
-            (Some(_), _) => format!("{path} has the steps before"),
-            (None, Some(_)) => format!("{path} is as it was"),
+            (Some(_), _) => format!("{path} has the previous steps"),
+            (None, Some(_)) => format!("{path} is unchanged"),
             (None, None) => "nothing was written".into(),
         };
         let failure = match (self.failed.take(), error) {
@@ -94,6 +99,6 @@ impl<'a> Recorder<'a> {
     }
 
     fn next(&self) -> String {
-        format!("`tesdf simulate --resume {}` goes on from there", self.destination.path().display())
+        format!("`tesdf simulate --resume {}` continues from there", self.destination.path().display())
     }
 }

@@ -2,7 +2,7 @@ use std::fmt;
 
 use tesdf::glam::{DVec2, DVec3};
 
-/// The axis that the plane is perpendicular to.
+/// The axis that is perpendicular to the plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Axis {
     /// The picture shows y to the right and z upwards.
@@ -14,7 +14,8 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// Index of the coordinate that is constant, and of those to the right and upwards.
+    /// Indices of the coordinate along the axis, the coordinate to the right, and the coordinate
+    /// upwards.
     const fn indices(self) -> (usize, usize, usize) {
         match self {
             Self::X => (0, 1, 2),
@@ -34,7 +35,7 @@ impl Axis {
         DVec2::new(p[right], p[up])
     }
 
-    /// The point at `offset` along the axis and `q` across it.
+    /// The point at `offset` along the axis and `q` in the plane.
     pub fn point(self, offset: f64, q: DVec2) -> DVec3 {
         let (along, right, up) = self.indices();
         let mut p = DVec3::ZERO;
@@ -49,16 +50,16 @@ impl fmt::Display for Axis {
     }
 }
 
-/// The part of the plane that is drawn, and what is written around it.
+/// The part of the plane that is drawn, and its title.
 #[derive(Clone, Debug)]
 pub struct View {
     /// The plane is perpendicular to this axis.
     pub axis: Axis,
-    /// Coordinate of the plane along the axis, mesh unit.
+    /// Coordinate of the plane along the axis, in the mesh's unit.
     pub offset: f64,
-    /// Lower left corner, mesh unit.
+    /// Lower left corner, in the mesh's unit.
     pub min: DVec2,
-    /// Upper right corner, mesh unit.
+    /// Upper right corner, in the mesh's unit.
     pub max: DVec2,
     /// Name of the unit, such as `mm`; empty when it is not known.
     pub unit: String,
@@ -67,9 +68,11 @@ pub struct View {
 }
 
 impl View {
-    /// The plane at `offset` over the box from `min` to `max`, with a margin of 6 % of the picture's diagonal.
+    /// The plane at `offset`, over the box from `min` to `max`, with a margin of 6 % of the
+    /// picture's diagonal.
     ///
-    /// A long thin cut is widened, a tall one to 1 : 2, a wide one to 4 : 1, so that there is room for what is written.
+    /// A narrow view is widened to at least 1 : 2, and a flat view is made higher to at most 4 : 1,
+    /// so that there is room for the text.
     pub fn of_box(axis: Axis, offset: f64, min: DVec3, max: DVec3) -> Self {
         let (min, max) = (axis.across(min), axis.across(max));
         let extent = max - min;
@@ -87,29 +90,30 @@ impl View {
     }
 }
 
-/// The point where the segment meets the plane; its ends lie on different sides.
+/// The point where a segment meets the plane. The ends of the segment lie on different sides.
 fn cut_segment(axis: Axis, offset: f64, a: DVec3, b: DVec3) -> [f64; 2] {
-    // The same ends in either order give the same point, so that neighbours meet.
+    // The same ends in either order give the same point, so neighbouring outlines meet.
     let (a, b) = if axis.along(a) < axis.along(b) { (a, b) } else { (b, a) };
     let t = (offset - axis.along(a)) / (axis.along(b) - axis.along(a));
     axis.across(a.lerp(b, t)).to_array()
 }
 
-/// Where the plane cuts the tetrahedron: a triangle or a convex quadrilateral, corners in order; `None` when it misses it.
+/// The section of a tetrahedron: a triangle or a convex quadrilateral, with its corners in order.
+/// `None` when the plane misses the tetrahedron.
 ///
-/// A corner on the plane counts as above it.
+/// A corner on the plane counts as above the plane.
 pub fn cut_tetrahedron(axis: Axis, offset: f64, corners: [DVec3; 4]) -> Option<Vec<[f64; 2]>> {
     let (below, above): (Vec<DVec3>, Vec<DVec3>) = corners.iter().partition(|&&p| axis.along(p) < offset);
     let cut = |a: DVec3, b: DVec3| cut_segment(axis, offset, a, b);
     match (&below[..], &above[..]) {
         ([a], [b, c, d]) | ([b, c, d], [a]) => Some(vec![cut(*a, *b), cut(*a, *c), cut(*a, *d)]),
-        // Around the quadrilateral neighbouring corners share one end.
+        // Neighbouring corners of the quadrilateral lie on edges with a common end.
         ([a, b], [c, d]) => Some(vec![cut(*a, *c), cut(*a, *d), cut(*b, *d), cut(*b, *c)]),
         _ => None,
     }
 }
 
-/// Where the plane cuts the triangle; a corner on the plane counts as above it.
+/// The section of a triangle. A corner on the plane counts as above the plane.
 pub fn cut_triangle(axis: Axis, offset: f64, corners: [DVec3; 3]) -> Option<[[f64; 2]; 2]> {
     let (below, above): (Vec<DVec3>, Vec<DVec3>) = corners.iter().partition(|&&p| axis.along(p) < offset);
     let cut = |a: DVec3, b: DVec3| cut_segment(axis, offset, a, b);

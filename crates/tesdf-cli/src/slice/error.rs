@@ -1,4 +1,4 @@
-//! Where an asset is exact on a plane, and by how much it is off elsewhere: as Fig. 11 of the paper.
+//! Draws where an asset is exact on a plane, and its error elsewhere, as Fig. 11 of the paper.
 use rayon::prelude::*;
 use tesdf::glam::DVec3;
 use tiny_skia::{Color, Paint, PathBuilder, Pixmap, Rect, Transform};
@@ -7,17 +7,17 @@ use super::picture::{Frame, INK, PictureError, QUIET, line, paint_overlay, paint
 use super::text::{Anchor, Lettering};
 use super::{Overlay, View, colour, ticks};
 
-/// Exact points.
+/// Colour of exact points.
 const EXACT: colour::Rgb = [214, 232, 220];
-/// Points without a value.
+/// Colour of points without a value.
 const NONE: colour::Rgb = [236; 3];
 
-/// The signed distance at a point, and how far the asset is off.
+/// The exact signed distance at a point, and the error of the asset.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
-    /// The exact signed distance, mesh unit.
+    /// The exact signed distance, in the mesh's unit.
     pub exact: f64,
-    /// Absolute difference of the asset's signed distance, mesh unit.
+    /// Absolute error of the asset's signed distance, in the mesh's unit.
     pub error: f64,
 }
 
@@ -26,11 +26,13 @@ struct Field {
     values: Vec<Option<Deviation>>,
     width: usize,
     max_error: f64,
-    /// Errors up to this count as none.
+    /// Errors up to this value count as exact.
     tolerance: f64,
-    /// Greatest exact distance from the surface inside.
+    /// Greatest exact distance from the surface inside the solid.
     max_inside: f64,
-    /// Nearer to the surface than this no pixel has an error, or none above 1 % of `max_inside`; infinite when there is none.
+    /// Half widths of two bands around the surface: no pixel of the first has an error, and no
+    /// pixel of the second has an error above 1 % of `max_inside`. Infinite when there is no such
+    /// error.
     widths: [f64; 2],
 }
 
@@ -62,7 +64,7 @@ impl Field {
         }
     }
 
-    /// Small errors show, too: the colour goes by the root of the error.
+    /// The colour depends on the square root of the error, which makes small errors visible.
     fn colour(&self, error: f64) -> colour::Rgb {
         if error <= self.tolerance {
             return EXACT;
@@ -70,7 +72,8 @@ impl Field {
         colour::of(-(error / self.max_error).sqrt(), 1.0, 1.0)
     }
 
-    /// How much of the pixel the borders of the bands cover: pixels whose neighbour is on the other side.
+    /// Whether a border of a band passes near the pixel: a neighbour within `reach` lies on its
+    /// other side.
     fn border(&self, at: usize, reach: usize) -> bool {
         let Some(here) = self.values[at] else { return false };
         let (row, column) = (at / self.width, at % self.width);
@@ -104,13 +107,14 @@ impl Field {
     }
 }
 
-/// Where the asset is exact on the plane, as a PNG whose longer side has `size` pixels; grey lines border the bands around the surface
-/// in which no pixel has an error above `tolerance`, and none above 1 % of the greatest distance inside.
+/// Draws where the asset is exact on the plane, as a PNG whose longer side has `size` pixels.
 ///
-/// `deviation` is asked once per pixel, from several threads; `None` is grey.
+/// Grey lines bound two bands around the surface: no pixel of the first has an error above
+/// `tolerance`, and no pixel of the second has an error above 1 % of the greatest distance inside.
+/// `deviation` is called once per pixel, from several threads; a pixel with `None` is grey.
 ///
 /// # Errors
-/// [`PictureError`]: the size or the view cannot be drawn.
+/// [`PictureError`] when the size or the view cannot be drawn.
 pub fn draw_error(
     view: &View,
     overlay: &Overlay,
@@ -159,7 +163,7 @@ fn paint_words(map: &mut Pixmap, frame: &Frame, field: &Field, view: &View, lett
     paint_bar(map, frame, field, lettering);
 }
 
-/// Exact below, the largest error on top.
+/// Draws the legend: exact at the bottom, the largest error at the top.
 fn paint_bar(map: &mut Pixmap, frame: &Frame, field: &Field, lettering: &Lettering) {
     let k = frame.scale;
     let [x, top] = [(frame.origin[0] + frame.plot[0]) as f32 + 24.0 * k, frame.origin[1] as f32];

@@ -1,9 +1,10 @@
-//! `tesdf slice FILE -o out.png`: the signed distance on an axis-aligned plane, with contours, cells and the surface.
+//! `tesdf slice FILE -o out.png`: draws the signed distance on an axis-aligned plane, with
+//! contours, cells and the surface.
 //!
-//! With `--error` it is where the asset is exact instead ([`draw_error`]).
+//! With `--error` it draws where the asset is exact instead ([`draw_error`]).
 //!
-//! In go a [`View`], a function that gives the signed distance and the [`Overlay`] of what the plane cuts; out comes a
-//! PNG. Nothing here knows what an asset is.
+//! [`draw`] takes a [`View`], a function that returns the signed distance, and the [`Overlay`] of
+//! the plane's sections. It returns a PNG and does not depend on the asset.
 mod colour;
 mod cut;
 mod error;
@@ -31,7 +32,7 @@ use tesdf_terminal::{asset_file, parse};
 pub struct Args {
     /// A .tesdf file
     pub file: PathBuf,
-    /// The PNG file to write; an existing one is replaced, a pipe or device is written to
+    /// Output PNG file; an existing file is replaced, a pipe or device is written to
     #[arg(short, long, value_name = "PNG")]
     pub output: PathBuf,
     /// Whether a read-only output is replaced.
@@ -40,22 +41,24 @@ pub struct Args {
     /// The plane is perpendicular to this axis
     #[arg(long, value_enum, default_value_t = Axis::Z)]
     pub axis: Axis,
-    /// Where the plane is: 0 at the lower end of the mesh, 1 at the upper [default: 0.5]
+    /// Relative position of the plane: 0 is the lower end of the mesh, 1 the upper end [default:
+    /// 0.5]
     #[arg(long, value_name = "FRACTION", value_parser = parse::fraction, conflicts_with = "offset", allow_hyphen_values = true)]
     pub at: Option<f64>,
-    /// Coordinate of the plane along the axis, mesh unit
+    /// Coordinate of the plane along the axis, in the mesh's unit
     #[arg(long, value_name = "LENGTH", value_parser = parse::number, allow_hyphen_values = true)]
     pub offset: Option<f64>,
-    /// Draw where the signed distance is exact, in the domain, and how far it is off elsewhere: for lists that are truncated or sampled
+    /// Draw where the signed distance is exact in the domain, and its error elsewhere; useful for
+    /// truncated or sampled lists
     #[arg(long)]
     pub error: bool,
-    /// Pixels of the picture's longer side
+    /// Length of the picture's longer side, pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 1200)]
     pub size: u32,
 }
 
 impl Args {
-    /// The plane through a mesh with these bounds, titled with the file's name.
+    /// The plane through a mesh with these bounds, with the file's name as title.
     pub fn view(&self, bounds: Aabb, unit: &str) -> View {
         let [low, high] = [bounds.min, bounds.max].map(|p| self.axis.along(p));
         let offset = self.offset.unwrap_or_else(|| low + (high - low) * self.at.unwrap_or(0.5));
@@ -107,39 +110,39 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     Ok(Outcome::Good)
 }
 
-/// Where a cell lies.
+/// Position of a cell relative to the solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CellLabel {
     /// Inside the solid.
     Inside,
     /// Outside the solid.
     Outside,
-    /// On both sides of the surface.
+    /// Crossed by the surface.
     Crossing,
-    /// Far from the surface, without a list.
+    /// Far from the surface, without a list of faces.
     Far,
 }
 
-/// A tetrahedron cut by the plane.
+/// The section of a tetrahedron with the plane.
 #[derive(Clone, Debug)]
 pub struct CellOutline {
-    /// Corners in the plane, three or four, in order around the polygon; mesh unit.
+    /// Three or four corners in the plane, in order around the polygon, in the mesh's unit.
     pub polygon: Vec<[f64; 2]>,
-    /// Where the cell lies.
+    /// Position of the cell relative to the solid.
     pub label: CellLabel,
 }
 
-/// What is drawn over the colours.
+/// Lines that are drawn over the colours.
 #[derive(Clone, Debug, Default)]
 pub struct Overlay {
-    /// Cells, as thin lines.
+    /// Sections of cells, as thin lines.
     pub cells: Vec<CellOutline>,
-    /// The surface cut by the plane, as a strong line; mesh unit.
+    /// Section of the surface, as a strong line, in the mesh's unit.
     pub surface: Vec<[[f64; 2]; 2]>,
 }
 
 impl Overlay {
-    /// What the plane of `view` cuts of labelled tetrahedra and of the triangles of the surface.
+    /// The sections of labelled tetrahedra and of the surface's triangles with the plane of `view`.
     pub fn of(
         view: &View,
         cells: impl IntoIterator<Item = ([DVec3; 4], CellLabel)>,

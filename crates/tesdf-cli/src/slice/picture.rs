@@ -7,16 +7,16 @@ use tiny_skia::{
 use super::text::{Anchor, Lettering};
 use super::{CellLabel, Overlay, View, colour, ticks};
 
-/// Why there is no picture.
+/// Why a picture cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// The picture cannot have this size.
+    /// The size of the picture is out of range.
     #[error("a picture of {0} pixels; expected {min} to {max}", min = SIZES.start(), max = SIZES.end())]
     Size(u32),
-    /// The memory does not hold the picture while it is drawn.
+    /// There is not enough memory to draw the picture.
     #[error("no memory is left for a picture of {0} pixels; draw a smaller one")]
     Memory(u32),
-    /// The view is empty, not finite or too small for its place.
+    /// The view is empty, not finite, or too small for its distance from the origin.
     #[error("the view from {min:?} to {max:?} has no area; give a plane that cuts the domain")]
     View {
         /// Lower left corner.
@@ -24,22 +24,22 @@ pub enum PictureError {
         /// Upper right corner.
         max: [f64; 2],
     },
-    /// The PNG cannot be made.
+    /// The PNG cannot be encoded.
     #[error("the picture cannot be encoded: {0}")]
     Encode(String),
 }
 
-/// Pixels of the picture's longer side.
+/// Allowed length of the picture's longer side, pixels.
 const SIZES: std::ops::RangeInclusive<u32> = 256..=8192;
-/// What a pixel takes while a picture is drawn.
+/// Memory per pixel while a picture is drawn, bytes.
 const BYTES_PER_PIXEL: usize = 32;
-/// The layout below is drawn for this size and scaled.
+/// The layout constants below are for this size; other sizes scale them.
 const REFERENCE: f32 = 1200.0;
 const LEFT: f32 = 28.0;
 const TOP: f32 = 92.0;
 const RIGHT: f32 = 148.0;
 const BOTTOM: f32 = 32.0;
-/// Contours on the side of the surface that goes farther.
+/// Minimum number of contours on the side of the surface with the larger distances.
 const CONTOURS: f64 = 8.0;
 
 pub(super) const INK: [u8; 3] = [24, 30, 40];
@@ -51,12 +51,13 @@ pub(super) fn solid(rgb: [u8; 3], alpha: f32) -> Color {
     c
 }
 
-/// The signed distance on the plane as a PNG whose longer side has `size` pixels.
+/// Draws the signed distance on the plane as a PNG whose longer side has `size` pixels.
 ///
-/// `signed_distance` is asked once per pixel, from several threads; where it is not finite the picture stays grey.
+/// `signed_distance` is called once per pixel, from several threads. A pixel whose value is not
+/// finite stays grey.
 ///
 /// # Errors
-/// [`PictureError`]: the size or the view cannot be drawn.
+/// [`PictureError`] when the size or the view cannot be drawn.
 pub fn draw(
     view: &View,
     overlay: &Overlay,
@@ -76,18 +77,18 @@ pub fn draw(
     map.encode_png().map_err(|e| PictureError::Encode(e.to_string()))
 }
 
-/// Where everything lies, in pixels from the upper left corner.
+/// Positions in the picture, in pixels from the upper left corner.
 pub(super) struct Frame {
     pub picture: [u32; 2],
     /// Left and upper border of the plot.
     pub origin: [u32; 2],
     /// Width and height of the plot.
     pub plot: [u32; 2],
-    /// Upper left corner of the plot, mesh unit.
+    /// Upper left corner of the plot, in the mesh's unit.
     corner: DVec2,
-    /// Mesh units per pixel.
+    /// Edge length of a pixel, in the mesh's unit.
     pixel: f64,
-    /// Size of the picture over [`REFERENCE`].
+    /// Size of the picture divided by [`REFERENCE`].
     pub scale: f32,
 }
 
@@ -111,7 +112,7 @@ impl Frame {
         let plot = [extent.x, extent.y].map(|e| (e / pixel).round().max(1.0) as u32);
         let picture = [0, 1].map(|i| plot[i] + margin[i].round() as u32);
         let origin = [LEFT, TOP].map(|m| (m * scale).round() as u32);
-        // Asked for and given back: values, colours, and the copies that the PNG is made from.
+        // Reserved and released again: the memory of values, colours, and copies for the PNG.
         let memory = picture[0] as usize * picture[1] as usize * BYTES_PER_PIXEL;
         if Vec::<u8>::new().try_reserve_exact(memory).is_err() {
             return Err(PictureError::Memory(size));
@@ -119,7 +120,7 @@ impl Frame {
         Ok(Self { picture, origin, plot, corner: DVec2::new(view.min.x, view.max.y), pixel, scale })
     }
 
-    /// Centre of a pixel of the plot, mesh unit.
+    /// Centre of a pixel of the plot, in the mesh's unit.
     pub(super) fn place(&self, column: u32, row: u32) -> DVec2 {
         self.corner + self.pixel * DVec2::new(f64::from(column) + 0.5, -(f64::from(row) + 0.5))
     }
@@ -141,10 +142,11 @@ impl Frame {
 struct Field {
     values: Vec<f64>,
     width: usize,
-    /// Largest distance on each side; a side that is hardly there gets half of the other's.
+    /// Largest distance on each side of the surface. A side with small distances gets half of the
+    /// other's.
     outside: f64,
     inside: f64,
-    /// Range of the values.
+    /// Smallest and largest value.
     range: [f64; 2],
     /// Distance between contours.
     step: f64,
@@ -171,7 +173,7 @@ impl Field {
         }
     }
 
-    /// Change of the value per pixel, along the plane.
+    /// Gradient length of the values in the plane, per pixel.
     fn slope(&self, at: usize) -> f64 {
         let (row, column) = (at / self.width, at % self.width);
         let last_row = self.values.len() / self.width - 1;
@@ -184,19 +186,21 @@ impl Field {
         across.hypot(along)
     }
 
-    /// How much of the pixel a contour covers, 0 to 1, and whether it is the surface's.
+    /// The fraction of the pixel that a contour covers, 0 to 1, and whether this contour is the
+    /// surface.
     fn contour(&self, at: usize, frame: &Frame) -> (f64, bool) {
         let value = self.values[at];
         let level = (value / self.step).round();
         let slope = self.slope(at);
-        // Where the plane nearly touches a level set, a contour is a spot without a meaning: fade it.
+        // Where the plane nearly touches a level set, a contour would be a meaningless spot, so it
+        // fades out.
         let clear = (slope / (0.25 * frame.pixel)).min(1.0);
         let width = f64::from(frame.scale) * if level == 0.0 { 2.6 } else { 1.1 };
         let distance = (value - level * self.step).abs() / slope.max(f64::MIN_POSITIVE);
         (clear * (0.5 * width + 0.5 - distance).clamp(0.0, 1.0) * width.min(1.0), level == 0.0)
     }
 
-    /// `with_surface`: nothing else shows the surface, so its contour is drawn.
+    /// With `with_surface` the zero contour is drawn, because no overlay shows the surface.
     fn paint(&self, map: &mut Pixmap, frame: &Frame, with_surface: bool) {
         let stride = frame.picture[0] as usize;
         let rows = map.data_mut().par_chunks_mut(4 * stride).skip(frame.origin[1] as usize);
@@ -265,7 +269,7 @@ pub(super) fn line(map: &mut Pixmap, path: &Path, colour: Color, width: f32, mas
     map.stroke_path(path, &paint, &stroke, Transform::identity(), mask);
 }
 
-/// Title, colour bar, scale bar and border.
+/// Draws the title, colour bar, scale bar and border.
 fn paint_surroundings(
     map: &mut Pixmap,
     frame: &Frame,
@@ -310,7 +314,7 @@ fn paint_colour_bar(
     let x = (frame.origin[0] + frame.plot[0]) as f32 + 24.0 * k;
     let width = 22.0 * k;
     let [low, high] = field.range;
-    // Room for the unit above the bar.
+    // Leaves room for the unit above the bar.
     let head = if unit.is_empty() { 0.0 } else { 26.0 * k };
     let (top, height) = (top + head, frame.plot[1] as f32 - head);
     if height < 40.0 * k || high <= low {

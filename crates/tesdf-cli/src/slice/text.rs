@@ -3,10 +3,11 @@ use skrifa::outline::{DrawSettings, OutlinePen};
 use skrifa::{FontRef, GlyphId, MetadataProvider};
 use tiny_skia::{Color, FillRule, Paint, Path, PathBuilder, Pixmap, Transform};
 
-/// Latin-1 of DejaVu Sans, so that no font of the system is needed; licence in `assets/`.
+/// The Latin-1 characters of DejaVu Sans, so that no system font is needed; its licence is in
+/// `assets/`.
 const FONT: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
 
-/// Where a text stands relative to its point.
+/// Alignment of a text at its point.
 #[derive(Clone, Copy)]
 pub enum Anchor {
     /// The text starts at the point.
@@ -38,12 +39,12 @@ impl Lettering {
         self.font.charmap().map(c).unwrap_or_default()
     }
 
-    /// Width of `text` in pixels, `size` pixels per em.
+    /// Width of `text` in pixels, at `size` pixels per em.
     pub fn width(&self, text: &str, size: f32) -> f32 {
         text.chars().map(|c| self.advance(c)).sum::<f32>() * size
     }
 
-    /// `text`, cut with an ellipsis where it is wider than `width` pixels.
+    /// `text`, shortened with an ellipsis if it is wider than `width` pixels.
     pub fn fit(&self, text: &str, size: f32, width: f32) -> String {
         if self.width(text, size) <= width {
             return text.to_string();
@@ -89,7 +90,7 @@ impl Lettering {
     }
 }
 
-/// Glyph outlines in pixels, y downwards.
+/// Collects glyph outlines in pixels, y downwards.
 struct Glyphs {
     path: PathBuilder,
     x: f32,

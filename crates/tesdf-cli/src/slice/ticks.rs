@@ -1,4 +1,5 @@
-/// The largest of 1, 2, 5 times a power of ten that fits `count` times into `range`, a positive length.
+/// The largest step of 1, 2 or 5 times a power of ten that divides `range`, a positive length, into
+/// at least `count` parts.
 pub fn round_step(range: f64, count: f64) -> f64 {
     let rough = range / count;
     let power = 10_f64.powf(rough.log10().floor());
@@ -6,7 +7,7 @@ pub fn round_step(range: f64, count: f64) -> f64 {
     factor * power
 }
 
-/// `value` with the decimals that a multiple of `step` needs, and a true minus sign.
+/// Formats `value` with the decimals that a multiple of `step` needs, and with a true minus sign.
 pub fn label(value: f64, step: f64) -> String {
     let text = if value == 0.0 {
         "0".to_string()
@@ -19,7 +20,7 @@ pub fn label(value: f64, step: f64) -> String {
     text.replace('-', "−")
 }
 
-/// At most four significant digits, for a title.
+/// Formats `value` with at most four significant digits, for titles.
 pub fn short(value: f64) -> String {
     if value == 0.0 {
         return "0".into();

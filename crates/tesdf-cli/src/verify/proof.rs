@@ -1,17 +1,17 @@
-//! `tesdf verify --prove FILE`
+//! `tesdf verify --prove FILE`: the proof.
 use std::sync::atomic::AtomicBool;
 
 use tesdf::TeSdf;
 use tesdf::verify::{Fault, ProveError, ProveOptions, ProveReport, Tally, Verdict, prove};
 
-use super::{Args, go_on, uninterrupted};
+use super::{Args, show_progress, uninterrupted};
 use tesdf_terminal::progress::Bar;
 use tesdf_terminal::report::{Failure, count};
 
-/// Proves what the file says of itself.
+/// Proves the claims of the file's certificate.
 ///
 /// # Errors
-/// Ctrl-C was pressed. That nothing can be proved is a result.
+/// Ctrl-C was pressed. A file that cannot be proved is a result.
 pub fn run(
     args: &Args,
     asset: &TeSdf,
@@ -22,12 +22,12 @@ pub fn run(
     if let Some(pieces) = args.pieces {
         options.pieces = pieces.get();
     }
-    let found = prove(asset, &options, |share| go_on(&bar, share, interrupted));
+    let found = prove(asset, &options, |share| show_progress(&bar, share, interrupted));
     uninterrupted(interrupted)?;
     Ok(found)
 }
 
-/// What was found, for a person.
+/// The result as text.
 pub fn text(report: &ProveReport) -> String {
     let of = if report.certified {
         "the certificate's"
@@ -41,20 +41,20 @@ pub fn text(report: &ProveReport) -> String {
         report.delta_of_diagonal,
     );
     if let Some(within) = report.within {
-        text += &format!("  only within     {within:e} of the surface, as lists are cut\n");
+        text += &format!("  only within     {within:e} of the surface, because lists are truncated\n");
     }
     text += &tally("distances", "list", &report.distances);
     text += &tally("signs", "label", &report.signs);
     text += &tally("face tree", "tree", &report.face_tree);
     text += &format!(
-        "  pieces          {}, at most {} of one cell\n",
+        "  pieces          {}, at most {} per cell\n",
         count(report.pieces as usize, "piece"),
         report.most_pieces
     );
     report.faults.iter().for_each(|fault| text += &fault_text(fault));
     let undecided = report.distances.undecided + report.signs.undecided;
     if undecided > 0 {
-        text += "  undecided is not wrong: --pieces with a larger number may tell\n";
+        text += "  undecided does not mean wrong: a larger --pieces may decide\n";
     }
     text
 }

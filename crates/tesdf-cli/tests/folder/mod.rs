@@ -1,5 +1,5 @@
-//! A folder of its own for each test, and the binary run in it.
-// Each test file is a crate of its own and uses a part of this.
+//! A folder for each test, and the binary that runs in it.
+// Each test file is a separate crate and uses only some of these functions.
 #![allow(dead_code)]
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ impl Folder {
         std::fs::write(self.path(name), bytes).unwrap();
     }
 
-    /// Names of all files, sorted.
+    /// The names of all files, sorted.
     pub fn names(&self) -> Vec<String> {
         let entries = std::fs::read_dir(self.0.path()).unwrap();
         let mut names: Vec<_> =
@@ -39,12 +39,12 @@ impl Folder {
         command
     }
 
-    /// Exit code, stdout, stderr.
+    /// Runs the binary. Returns its exit code, stdout and stderr.
     pub fn tesdf(&self, args: &[&str]) -> (Option<i32>, String, String) {
         texts(self.command(args).output().unwrap())
     }
 
-    /// As [`tesdf`](Self::tesdf), for a run that must be 0; stdout.
+    /// As [`tesdf`](Self::tesdf), for a command that must succeed. Returns stdout.
     pub fn good(&self, args: &[&str]) -> String {
         let (code, out, err) = self.tesdf(args);
         assert_eq!(code, Some(0), "{args:?}: {out}{err}");
@@ -52,21 +52,21 @@ impl Folder {
     }
 }
 
-/// Exit code, stdout, stderr.
+/// Exit code, stdout and stderr.
 pub fn texts(out: Output) -> (Option<i32>, String, String) {
     let text = |bytes| String::from_utf8(bytes).unwrap();
     (out.status.code(), text(out.stdout), text(out.stderr))
 }
 
-/// The library's test data.
+/// A path in the library's test data.
 pub fn data(name: &str) -> String {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tesdf/tests/data").join(name).display().to_string()
 }
 
-/// The binary that is tested.
+/// The tested binary.
 pub const BINARY: &str = env!("CARGO_BIN_EXE_tesdf");
 
-/// A block of `n` × `n` × `n` cubes, as its surface.
+/// The surface of a block of `n` × `n` × `n` unit cubes.
 pub fn block(n: u32) -> String {
     let mut text = String::new();
     let mut corners = 0;
@@ -96,7 +96,7 @@ pub fn cut_run(folder: &Folder, scene: &str, steps: u64) -> Vec<u8> {
     let origin = RunOrigin::of(&system, "cpu").unwrap();
     let run = PartialRun::new(&loaded.scene, &system, folder.0.path().display().to_string());
     let mut engine = loaded.newton(system).unwrap();
-    let path = folder.path("run that is cut");
+    let path = folder.path("interrupted run");
     let destination = Destination::new(&path, &SaveOptions::default()).unwrap();
     let mut journal = None;
     let ended = simulate_from(&loaded.scene, &mut engine, run, |moment| {
@@ -104,7 +104,7 @@ pub fn cut_run(folder: &Folder, scene: &str, steps: u64) -> Vec<u8> {
         journal.get_or_insert_with(begin).push(moment.record, &moment.report).unwrap();
         if moment.step == steps { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    assert!(ended.is_err(), "the run was over before it was cut");
+    assert!(ended.is_err(), "the run ended before it was interrupted");
     let bytes = std::fs::read(&path).unwrap();
     std::fs::remove_file(path).unwrap();
     bytes

@@ -13,12 +13,13 @@ use super::problem::{Minimum, Problem};
 use super::rows::{FreeBody, Row};
 use crate::{Dynamics, DynamicsError, Mass, State, StepReport, System};
 
-/// Finds the contacts of a scene, as [`tesdf::collide::detect`] does; every function of its signature is a detector.
+/// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
+/// signature implement this trait.
 pub trait Detect: Send + Sync {
-    /// All contacts within the options' distances, in an order that depends on the scene alone.
+    /// All contacts within the distances of `options`, in an order that depends on the scene alone.
     ///
     /// # Errors
-    /// What the detection refuses.
+    /// The errors of the detection, as [`CollideError`].
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError>;
 }
 
@@ -31,49 +32,53 @@ where
     }
 }
 
-/// The embedded engine: regularised Newton over all contacts.
+/// The built-in engine: Newton's method on a regularised convex problem of all contacts.
 pub struct Newton {
     system: System,
     detector: Box<dyn Detect>,
     collide: CollideOptions,
     options: NewtonOptions,
-    /// Diagonal of each body's bounds.
+    /// Diagonal of each body's bounding box, m.
     sizes: Vec<f64>,
     /// What the last step found at its beginning.
     found: Contacts,
 }
 
-/// What stays the same within a step.
+/// Values that are constant during a step.
 struct Step {
     h: f64,
-    /// Poses at the beginning.
+    /// Poses at the beginning of the step.
     poses: Vec<Pose>,
     free: Vec<FreeBody>,
-    /// The free body of each body.
+    /// For each body its index in `free`, or `None` when it is fixed.
     free_of: Vec<Option<usize>>,
-    /// Velocities without contacts.
+    /// Velocities at the end of the step without contacts.
     target: Vec<Vector6<f64>>,
     report: StepReport,
 }
 
-/// How deep each part of a body is in another at the beginning of the step.
+/// For each pair of instances and feature of the first one: its penetration depth at the beginning
+/// of the step, m.
 struct Depths(Vec<((InstanceId, InstanceId, u32), f64)>);
 
-/// Which of a row's gaps is meant.
+/// The two gaps of a row.
 #[derive(Clone, Copy)]
 enum Gap {
-    /// With what pushes penetrating bodies apart.
+    /// Includes the correction that pushes penetrating bodies apart.
     Position,
-    /// Without.
+    /// Without that correction.
     Relaxed,
 }
 
 impl Newton {
-    /// An engine for `system`. Of `collide` everything is used but the speculative time, which follows from the time step;
-    /// contacts are best left unreduced: with 64 per pair, a nut of 50 µm clearance tunnelled.
+    /// An engine for `system`.
+    ///
+    /// All values of `collide` are used except the speculative time, which follows from the time
+    /// step. The contacts should not be reduced: with 64 contacts per pair, a nut of 50 µm
+    /// clearance tunnelled.
     ///
     /// # Errors
-    /// An option that makes no sense.
+    /// An option of `options` or `collide` is out of range.
     pub fn new(
         system: System,
         detector: impl Detect + 'static,
@@ -107,7 +112,7 @@ impl Newton {
         Step { h, poses, free, free_of, target, report }
     }
 
-    /// The states after moving from the beginning of the step with `velocities`; they carry those velocities.
+    /// The states after moving for one step at `velocities`. Their velocities are `velocities`.
     fn moved(&self, step: &Step, velocities: &[Vector6<f64>]) -> Vec<State> {
         let mut states = self.system.states().to_vec();
         for (free, v) in step.free.iter().zip(velocities) {
@@ -129,7 +134,7 @@ impl Newton {
         Ok(contacts)
     }
 
-    /// How much of a penetration a step removes.
+    /// The part of a penetration of `depth` metres that one step of `h` seconds removes, m.
     fn correction(&self, depth: f64, h: f64) -> f64 {
         (self.options.correction * depth).min(self.options.correction_speed * h)
     }
@@ -139,7 +144,7 @@ impl Newton {
         Row::of_contact(contact, &self.system, poses, &step.free, &step.free_of, softness)
     }
 
-    /// Rows of the contacts at the beginning of the step.
+    /// The rows of the contacts at the beginning of the step.
     fn first_rows(&self, step: &Step, contacts: &[Contact]) -> Vec<Row> {
         let row = |contact: &Contact| {
             let mut row = self.row(step, contact, &step.poses)?;
@@ -152,7 +157,8 @@ impl Newton {
         contacts.iter().filter_map(row).collect()
     }
 
-    /// Rows of the contacts at the poses that `velocities` predict: the distance there, taken back along its gradient.
+    /// The rows of the contacts at the poses that `velocities` predict. Each gap is the predicted
+    /// distance, extrapolated back to the beginning of the step along its gradient.
     fn predicted_rows(
         &self,
         step: &Step,
@@ -172,7 +178,8 @@ impl Newton {
         contacts.iter().filter_map(row).collect()
     }
 
-    /// For each free body, whether its island is too deep in another body for a linear prediction.
+    /// For each free body: whether a body of its island penetrates too deeply for a linear
+    /// prediction.
     fn deep(&self, step: &Step, contacts: &[Contact], rows: &[Row]) -> Vec<bool> {
         let mut deep = vec![false; step.free.len()];
         for contact in contacts.iter().filter(|c| c.distance < 0.0) {
@@ -190,11 +197,13 @@ impl Newton {
         deep
     }
 
-    /// Velocities that minimise the problem of every island, from `start`; bodies in none keep their target.
+    /// Minimises the problem of every island from `start`. A body without rows keeps its target
+    /// velocity.
     fn solve(&self, step: &mut Step, rows: &[Row], gap: Gap, start: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
         let islands = islands(step.free.len(), rows);
         let minimum = |island: &Island| self.solve_island(step, island, rows, gap, start);
-        // Collected in order, each computed by one thread: the same bits on any number of threads.
+        // One thread computes each minimum, and they are collected in order: the bits do not depend
+        // on the number of threads.
         let minima: Vec<Minimum> = islands.par_iter().map(minimum).collect();
         let mut velocities = step.target.clone();
         let report = &mut step.report;
@@ -219,7 +228,7 @@ impl Newton {
     ) -> Minimum {
         let local = |mut row: Row| {
             for (body, _) in row.sides.iter_mut().flatten() {
-                // Every body of the island's rows is one of its bodies, which ascend.
+                // Every free body of an island's rows is in `island.bodies`, which is sorted.
                 *body = island.bodies.partition_point(|b| b < body);
             }
             let gap = match gap {
@@ -234,7 +243,7 @@ impl Newton {
         Problem::new(bodies, of(&step.target), rows, step.h).minimise(of(start), &self.options)
     }
 
-    /// Velocities that the poses are integrated with, and those that are carried on.
+    /// The velocities that move the poses, and the velocities that the next step starts from.
     fn velocities(
         &mut self,
         step: &mut Step,
@@ -282,7 +291,8 @@ impl Dynamics for Newton {
             return Err(DynamicsError::Option { option: "time step", found: time_step, expected });
         }
         let mut step = self.begin(time_step);
-        // Contacts ahead of time must reach as far as the step may go, so as far as the velocity that gravity leads to.
+        // The detection must reach as far as the step can move the bodies, so it uses the
+        // velocities after gravity.
         let mut ahead = self.system.states().to_vec();
         for (free, target) in step.free.iter().zip(&step.target) {
             (ahead[free.body].linear, ahead[free.body].angular) = unpack(target);
@@ -316,13 +326,13 @@ impl Depths {
         let key = |c: &Contact| (c.instance_a, c.instance_b, c.feature.a);
         let penetrating = contacts.iter().filter(|c| c.distance < 0.0);
         let mut depths: Vec<_> = penetrating.map(|c| (key(c), -c.distance)).collect();
-        // The deepest of each first, as a face may touch in several cells.
+        // The deepest contact of each key comes first, because a face may touch in several cells.
         depths.sort_by(|(k, d), (l, e)| k.cmp(l).then(e.total_cmp(d)));
         depths.dedup_by_key(|(key, _)| *key);
         Self(depths)
     }
 
-    /// Of the part that a contact belongs to; 0 when it did not penetrate.
+    /// Depth of the feature that `contact` belongs to, m; 0 when it did not penetrate.
     fn of(&self, contact: &Contact) -> f64 {
         let key = (contact.instance_a, contact.instance_b, contact.feature.a);
         self.0.binary_search_by_key(&key, |&(key, _)| key).map_or(0.0, |at| self.0[at].1)

@@ -1,33 +1,35 @@
-//! Motion of one body: without contacts, and along a velocity.
+//! The motion of one body: its velocity without contacts, and its pose after moving at a velocity.
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::Vector6;
 use tesdf::collide::Pose;
 
 use crate::{MassProperties, State};
 
-/// Linear velocity of the centre of mass, then angular velocity, both in the world.
+/// Linear velocity of the centre of mass, then angular velocity, both in the world frame.
 pub fn velocity(state: &State) -> Vector6<f64> {
     pack(state.linear, state.angular)
 }
 
-/// Two vectors as one.
+/// Joins two vectors into one.
 pub fn pack(a: DVec3, b: DVec3) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
-/// One vector as two.
+/// Splits a vector into its first three and last three components.
 pub fn unpack(v: &Vector6<f64>) -> (DVec3, DVec3) {
     (DVec3::new(v[0], v[1], v[2]), DVec3::new(v[3], v[4], v[5]))
 }
 
-/// The velocity at the end of a step of `h` seconds without contacts: gravity, and the gyroscopic term, implicit.
+/// The velocity after a step of `h` seconds without contacts: gravity and an implicit gyroscopic
+/// term.
 pub fn free_velocity(mass: &MassProperties, state: &State, gravity: DVec3, h: f64) -> Vector6<f64> {
     let rotation = state.pose.rotation;
     let before = rotation.inverse() * state.angular;
     let inertia = mass.inertia;
     let mut spin = before;
-    // I (ω − ω₀) + h ω × I ω = 0 in the body's frame. Newton's method from ω₀; the term is small against I for
-    // any step that resolves the rotation, so that a few iterations reach rounding.
+    // Newton's method from ω₀ solves I (ω − ω₀) + h ω × I ω = 0 in the body's frame. The gyroscopic
+    // term is small compared with I for any step that resolves the rotation, so a few iterations
+    // reach rounding.
     for _ in 0..8 {
         let momentum = inertia * spin;
         let residual = inertia * (spin - before) + h * spin.cross(momentum);
@@ -44,7 +46,8 @@ pub fn free_velocity(mass: &MassProperties, state: &State, gravity: DVec3, h: f6
     pack(state.linear + h * gravity, rotation * spin)
 }
 
-/// The pose after moving for `h` seconds at constant velocity of the centre of mass and constant angular velocity.
+/// The pose after moving for `h` seconds with a constant velocity of the centre of mass and a
+/// constant angular velocity.
 pub fn moved(mass: &MassProperties, pose: Pose, v: &Vector6<f64>, h: f64) -> Pose {
     let (linear, angular) = unpack(v);
     let center = pose.to_world(mass.center) + h * linear;

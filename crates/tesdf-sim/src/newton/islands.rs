@@ -1,22 +1,22 @@
-//! Groups of free bodies that no row connects to others.
+//! Islands: groups of free bodies that no row connects to another group.
 use super::rows::Row;
 
-/// Free bodies, and the rows between them, both ascending.
+/// Free bodies and the rows between them, both in ascending order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Island {
-    /// Free bodies.
+    /// Indices of the free bodies.
     pub bodies: Vec<usize>,
-    /// Rows, as positions in the list of rows.
+    /// Indices of the rows in the list of rows.
     pub rows: Vec<usize>,
 }
 
-/// The islands, by their lowest body; bodies without rows are in none.
+/// The islands, sorted by their lowest body. A body without rows is in no island.
 pub fn islands(bodies: usize, rows: &[Row]) -> Vec<Island> {
     let mut parent: Vec<usize> = (0..bodies).collect();
     for row in rows {
         if let [Some((a, _)), Some((b, _))] = row.sides {
             let (a, b) = (root(&mut parent, a), root(&mut parent, b));
-            // The lowest body is the root, so the order of the rows does not matter.
+            // The root is the lowest body, so the result does not depend on the order of the rows.
             parent[a.max(b)] = a.min(b);
         }
     }

@@ -1,14 +1,14 @@
-//! Symmetric positive definite matrices of 6 × 6 blocks, one row of blocks per body.
+//! Symmetric positive definite matrices of 6 × 6 blocks, with one block row per body.
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix6, Vector6};
 
-/// Which bodies share a block.
+/// The off-diagonal blocks that may be nonzero.
 #[derive(Clone, Debug)]
 pub struct Pattern {
-    /// Pairs of different bodies, the lower first, ascending.
+    /// Pairs of different bodies, the lower one first; sorted.
     pub pairs: Vec<(usize, usize)>,
 }
 
-/// A symmetric matrix; of two blocks that mirror each other the upper one is kept.
+/// A symmetric block matrix. Of each pair of mirrored blocks it stores the upper one.
 #[derive(Clone, Debug)]
 pub struct BlockMatrix<'a> {
     pattern: &'a Pattern,
@@ -16,16 +16,18 @@ pub struct BlockMatrix<'a> {
     upper: Vec<Matrix6<f64>>,
 }
 
-/// Share of the right-hand side that conjugate gradients leave: below what the line search and the next iteration mend.
+/// Conjugate gradients stop at this relative residual. The line search and the next Newton
+/// iteration correct a smaller error.
 const RESIDUAL: f64 = 1e-8;
 
 impl<'a> BlockMatrix<'a> {
-    /// Diagonal blocks alone.
+    /// A block-diagonal matrix; the blocks of `pattern` are zero.
     pub fn new(pattern: &'a Pattern, diagonal: Vec<Matrix6<f64>>) -> Self {
         Self { pattern, diagonal, upper: vec![Matrix6::zeros(); pattern.pairs.len()] }
     }
 
-    /// Adds `k j jᵀ`, where `j` is zero but at the given bodies; `pair` is that of the two.
+    /// Adds `k j jᵀ`, where `j` is zero except at the bodies of `sides`. `pair` is the index of
+    /// these two bodies in the pattern.
     #[inline]
     pub fn add(&mut self, sides: &[Option<(usize, Vector6<f64>)>; 2], pair: Option<usize>, k: f64) {
         for (body, j) in sides.iter().flatten() {
@@ -37,7 +39,8 @@ impl<'a> BlockMatrix<'a> {
         }
     }
 
-    /// Solves by dense Cholesky; `None` when rounding left the matrix indefinite.
+    /// Solves by dense Cholesky factorisation. Returns `None` when rounding made the matrix
+    /// indefinite.
     pub fn solve_dense(&self, rhs: &[Vector6<f64>]) -> Option<Vec<Vector6<f64>>> {
         if let ([block], [rhs]) = (self.diagonal.as_slice(), rhs) {
             return Some(vec![Cholesky::new(*block)?.solve(rhs)]);
@@ -47,7 +50,7 @@ impl<'a> BlockMatrix<'a> {
         for (k, block) in self.diagonal.iter().enumerate() {
             dense.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(block);
         }
-        // Cholesky reads the lower half alone.
+        // The factorisation reads the lower triangle only.
         for (&(a, b), block) in self.pattern.pairs.iter().zip(&self.upper) {
             dense.fixed_view_mut::<6, 6>(6 * b, 6 * a).copy_from(&block.transpose());
         }
@@ -56,7 +59,8 @@ impl<'a> BlockMatrix<'a> {
         Some((0..rhs.len()).map(|k| x.fixed_rows::<6>(6 * k).into_owned()).collect())
     }
 
-    /// Solves by conjugate gradients, preconditioned with the diagonal blocks; `None` when rounding left one of them indefinite.
+    /// Solves by conjugate gradients, preconditioned with the diagonal blocks. Returns `None` when
+    /// rounding made one of these blocks indefinite.
     pub fn solve_iterative(&self, rhs: &[Vector6<f64>]) -> Option<Vec<Vector6<f64>>> {
         let factors: Vec<_> = self.diagonal.iter().map(|b| Cholesky::new(*b)).collect::<Option<_>>()?;
         let precondition =
@@ -67,7 +71,8 @@ impl<'a> BlockMatrix<'a> {
         let mut p = z.clone();
         let mut rz = dot(&r, &z);
         let goal = RESIDUAL * RESIDUAL * rz;
-        // In exact arithmetic as many iterations as unknowns suffice; twice as many bound the effect of rounding.
+        // In exact arithmetic one iteration per unknown suffices. Twice that number allows for
+        // rounding.
         for _ in 0..12 * rhs.len() {
             if rz <= goal {
                 break;
@@ -102,7 +107,7 @@ impl<'a> BlockMatrix<'a> {
     }
 }
 
-/// Scalar product.
+/// Scalar product of two block vectors.
 pub fn dot(a: &[Vector6<f64>], b: &[Vector6<f64>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
@@ -112,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_ways_solve_the_system() {
+    fn dense_and_iterative_solve_the_system() {
         let random = &mut fastrand::Rng::with_seed(7);
         let mut vector = || Vector6::from_fn(|_, _| random.f64() - 0.5);
         let pattern = Pattern { pairs: vec![(0, 1), (0, 3), (1, 2), (2, 3)] };

@@ -2,30 +2,35 @@ use serde::{Deserialize, Serialize};
 
 use crate::DynamicsError;
 
-/// How the embedded engine solves a step. Every field is used.
+/// Parameters of the built-in engine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct NewtonOptions {
-    /// κ: stiffness of a contact, in units of what its two bodies' inertia gives within one step. Measured on a pile of 128
-    /// shafts: 10 is too soft, 1000 overshoots; a nut on a bolt does not care from 1e2 to 1e6.
+    /// κ: stiffness of a contact, relative to the stiffness that the inertia of its two bodies
+    /// gives within one step. Measured on a pile of 128 shafts: 10 is too soft, and 1000
+    /// overshoots. A nut on a bolt behaves the same from 1e2 to 1e6.
     pub stiffness: f64,
-    /// β: share of a penetration that one step removes.
+    /// β: fraction of a penetration that one step removes.
     pub correction: f64,
-    /// At most this fast, m/s.
+    /// Maximum speed at which penetrating bodies are pushed apart, m/s.
     pub correction_speed: f64,
-    /// How often contacts are detected again at the predicted pose: 0, 1, or 2 where accuracy matters.
+    /// Number of times that contacts are detected again at the predicted pose: 0, 1, or 2 for more
+    /// accuracy.
     pub redetections: u32,
-    /// No re-detection for bodies that penetrate deeper than this share of the diagonal of the smaller one: linear
-    /// predictions of a deep overlap inject energy. The default is 10 µm for a part of 3 cm.
+    /// Bodies that penetrate deeper than this fraction of the smaller body's diagonal are not
+    /// detected again, because linear predictions of a deep overlap add energy. The default is 10
+    /// µm for a part of 3 cm.
     pub deep: f64,
-    /// Contacts are taken ahead of time as far as the motion of this many steps can close. With a fixed distance instead a
-    /// peg of 50 µm clearance tunnelled at steps of 5 ms.
+    /// Contacts are detected as far ahead as the motion of this number of steps can close. With a
+    /// fixed distance instead, a peg of 50 µm clearance tunnelled at steps of 5 ms.
     pub speculation: f64,
-    /// Islands of up to so many free bodies, at most 256, are solved by dense Cholesky, larger ones by conjugate gradients.
+    /// Islands of at most this number of free bodies are solved by dense Cholesky factorisation,
+    /// larger islands by conjugate gradients. At most 256.
     pub dense_bodies: usize,
-    /// A solve ends when the decrease that its next iteration promises is below the square of this, as a share of the energy.
+    /// A solve ends when the predicted decrease of the next iteration, relative to the energy, is
+    /// below the square of this value.
     pub tolerance: f64,
-    /// Iterations after which a solve ends anyway, at most 10000.
+    /// Maximum number of Newton iterations of a solve, 1 to 10000.
     pub max_iterations: u32,
 }
 
@@ -49,10 +54,10 @@ impl Default for NewtonOptions {
 }
 
 impl NewtonOptions {
-    /// Checks that every value makes sense.
+    /// Checks that every value is in its range.
     ///
     /// # Errors
-    /// Names the option.
+    /// [`DynamicsError::Option`] names the first option that is out of range.
     pub fn validate(&self) -> Result<(), DynamicsError> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let share = |x: f64| (0.0..=1.0).contains(&x);

@@ -1,11 +1,11 @@
-//! The convex problem of an island, and Newton's method on it.
+//! The convex problem of one island, and Newton's method that minimises it.
 use nalgebra::Vector6;
 
 use super::NewtonOptions;
 use super::linear::{BlockMatrix, Pattern, dot};
 use super::rows::{FreeBody, Row};
 
-/// `½ |v − target|²_M + Σ ½ K min(0, gap + h J v)²`
+/// The function `½ |v − target|²_M + Σ ½ K min(0, gap + h J v)²` of the velocities `v`.
 #[derive(Debug)]
 pub struct Problem<'a> {
     bodies: Vec<&'a FreeBody>,
@@ -15,7 +15,7 @@ pub struct Problem<'a> {
     time_step: f64,
 }
 
-/// A row with the bodies counted within the island.
+/// A row whose bodies are indices within the island.
 #[derive(Clone, Debug)]
 struct Spring {
     sides: [Option<(usize, Vector6<f64>)>; 2],
@@ -24,22 +24,24 @@ struct Spring {
     stiffness: f64,
 }
 
-/// Where a minimisation ended.
+/// Result of a minimisation.
 #[derive(Clone, Debug)]
 pub struct Minimum {
-    /// Velocities of the island's bodies.
+    /// Velocities of the bodies of the island.
     pub velocity: Vec<Vector6<f64>>,
-    /// Iterations made.
+    /// Number of Newton iterations.
     pub iterations: u32,
-    /// Whether the tolerance was reached.
+    /// Whether the minimisation reached the tolerance.
     pub converged: bool,
 }
 
-/// Evaluations of a line search; a piecewise linear derivative has its root after a few.
+/// Maximum number of evaluations of a line search. The derivative is piecewise linear, so its root
+/// is usually found after a few.
 const LINE_SEARCH: usize = 60;
 
 impl<'a> Problem<'a> {
-    /// `target` and `gap` are those of the bodies and rows given, in their order; the rows name bodies by position in `bodies`.
+    /// `target` has one velocity per body, in the order of `bodies`. Each row comes with its gap,
+    /// m, and refers to bodies by their index in `bodies`.
     pub fn new(
         bodies: Vec<&'a FreeBody>,
         target: Vec<Vector6<f64>>,
@@ -62,7 +64,7 @@ impl<'a> Problem<'a> {
         Self { bodies, target, rows, pattern: Pattern { pairs }, time_step }
     }
 
-    /// Newton's method from `start`, with an exact line search.
+    /// Minimises by Newton's method from `start`, with an exact line search.
     pub fn minimise(&self, start: Vec<Vector6<f64>>, options: &NewtonOptions) -> Minimum {
         let h = self.time_step;
         let mut velocity = start;
@@ -73,7 +75,7 @@ impl<'a> Problem<'a> {
             let Some(direction) = self.direction(&gaps, &force, options) else {
                 return Minimum { velocity, iterations: iteration, converged: false };
             };
-            // The decrease that a quadratic function would have, twice.
+            // This is twice the decrease that a quadratic function would have.
             if dot(&force, &direction) <= goal {
                 return Minimum { velocity, iterations: iteration, converged: true };
             }
@@ -87,14 +89,16 @@ impl<'a> Problem<'a> {
                 same &= before == (*gap < 0.0);
             }
             if same && self.bodies.len() <= options.dense_bodies {
-                // The function is quadratic between where we were and where we are, so this is its minimum.
+                // All springs kept their state, so the function is quadratic along the step and
+                // this is its minimum.
                 return Minimum { velocity, iterations: iteration, converged: true };
             }
         }
         Minimum { velocity, iterations: options.max_iterations, converged: false }
     }
 
-    /// What the tolerance is a share of: the energy of the motion without contacts, and of the springs that it would compress.
+    /// The energy that the tolerance is relative to: twice the kinetic energy of the motion without
+    /// contacts, plus twice the energy of the springs that this motion would compress.
     fn energy(&self) -> f64 {
         let springs = self
             .rows
@@ -134,7 +138,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The step along `direction` at which the derivative, increasing and piecewise linear, is zero.
+    /// The step length along `direction` at which the derivative is zero. The derivative increases
+    /// and is piecewise linear.
     fn line_search(
         &self,
         velocity: &[Vector6<f64>],
@@ -198,7 +203,7 @@ mod tests {
     use super::*;
     use crate::{MassProperties, State};
 
-    /// A chain of bodies with random rows, some to a fixed body.
+    /// A chain of bodies with random rows; some rows connect a body to a fixed body.
     fn random_problem(free: &[FreeBody], h: f64, seed: u64) -> Problem<'_> {
         let random = &mut fastrand::Rng::with_seed(seed);
         let mut number = || random.f64() - 0.5;

@@ -1,4 +1,4 @@
-//! From contacts to rows.
+//! Converts contacts to rows of the convex problem.
 use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 use tesdf::collide::{Contact, Pose};
@@ -6,19 +6,19 @@ use tesdf::collide::{Contact, Pose};
 use super::integrate::pack;
 use crate::{Mass, MassProperties, State, System};
 
-/// Inertia of a free body in a step: that of its pose at the beginning.
+/// A free body and its inertia, in the pose at the beginning of a step.
 #[derive(Clone, Debug)]
 pub struct FreeBody {
-    /// The body of the system.
+    /// Index of the body in the system.
     pub body: usize,
-    /// Mass and inertia in the world.
+    /// Mass and inertia in the world frame: linear components first, then angular.
     pub inertia: Matrix6<f64>,
-    /// Its inverse.
+    /// Inverse of `inertia`.
     pub inverse: Matrix6<f64>,
 }
 
 impl FreeBody {
-    /// Of a body in a state.
+    /// The free body of index `body` in `state`.
     pub fn new(body: usize, mass: &MassProperties, state: &State) -> Self {
         let world = mass.inertia_in_world(state.pose);
         let blocks = |linear: f64, angular: glam::DMat3| {
@@ -35,29 +35,32 @@ impl FreeBody {
     }
 }
 
-/// A gap between bodies that must not close: `gap + h Σ jacobian · v ≥ 0`, by a spring.
+/// A gap between two bodies. A spring keeps `gap + h Σ jacobian · v ≥ 0`.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// Up to two free bodies, as numbers of the list of free bodies, and how their velocities open the gap.
+    /// Up to two free bodies: the index of each in the list of free bodies, and the derivative of
+    /// the gap by its velocity.
     pub sides: [Option<(usize, Vector6<f64>)>; 2],
     /// Gap at the beginning of the step, m.
     pub gap: f64,
-    /// The same without what pushes penetrating bodies apart.
+    /// The gap without the correction that pushes penetrating bodies apart, m.
     pub relaxed_gap: f64,
-    /// K, N/m.
+    /// Stiffness K, N/m.
     pub stiffness: f64,
 }
 
 impl Row {
-    /// Rate of the gap.
+    /// Rate of change of the gap at `velocity`, m/s.
     #[inline]
     pub fn rate(&self, velocity: &[Vector6<f64>]) -> f64 {
         self.sides.iter().flatten().map(|(free, jacobian)| jacobian.dot(&velocity[*free])).sum()
     }
 
-    /// A contact without its gap; `None` when neither body is free.
+    /// The row of a contact, with the contact's distance as its gap. Returns `None` when neither
+    /// body is free.
     ///
-    /// `free_of` maps bodies to free bodies; `poses` are those that the contact was detected at; `softness` is h² / κ.
+    /// `poses` are the poses at which the contact was detected, `free_of` maps bodies to free
+    /// bodies, and `softness` is h² / κ, s².
     pub fn of_contact(
         contact: &Contact,
         system: &System,
@@ -70,7 +73,8 @@ impl Row {
             let body = system.body_of(instance)?;
             let free = free_of[body]?;
             let Mass::Free(mass) = system.bodies()[body].mass else { return None };
-            // One point for both: the witnesses lie on one line along the normal, so the rate is that of the distance.
+            // Both sides use one point. The closest points lie on a line along the normal, so the
+            // rate is the rate of the distance.
             let arm = contact.point_a - poses[body].to_world(mass.center);
             Some((free, pack(direction, arm.cross(direction))))
         };

@@ -1,4 +1,4 @@
-//! Overlaps that no contact showed, as a run keeps them.
+//! Hidden overlaps in a run. An overlap of two bodies is hidden when no contact shows it.
 use std::collections::BTreeMap;
 
 use serde::Serialize;
@@ -7,21 +7,21 @@ use tesdf::collide::HiddenOverlap;
 use super::RunRecord;
 use crate::System;
 
-/// Two bodies that overlapped although no contact showed it, during a run.
+/// Two bodies that overlapped during a run without a contact that shows it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct HiddenPair {
     /// Names of the bodies.
     pub bodies: [String; 2],
-    /// The first step at whose beginning they did, from 0.
+    /// The first step, from 0, at whose beginning the overlap was hidden.
     pub first_step: u64,
-    /// The number of such steps.
+    /// Number of steps with a hidden overlap of this pair.
     pub steps: u64,
-    /// The greatest depth, m, at least.
+    /// Lower bound of the greatest depth, m.
     pub depth: f64,
 }
 
 impl HiddenPair {
-    /// A sentence for people.
+    /// A message for users.
     pub fn message(&self) -> String {
         let Self { bodies: [a, b], first_step, depth, .. } = self;
         format!(
@@ -30,23 +30,23 @@ impl HiddenPair {
     }
 }
 
-/// All that a record keeps, a row for each step and pair; steps ascend.
+/// All hidden overlaps of a record, one row per step and pair. Steps ascend.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct HiddenRows {
     pub steps: Vec<u64>,
-    /// Numbers of the bodies.
+    /// Numbers of the two bodies.
     pub ids: Vec<[u32; 2]>,
-    /// m, at least.
+    /// Lower bounds of the depths, m.
     pub depths: Vec<f64>,
 }
 
 impl HiddenRows {
-    /// The rows of a step.
+    /// The rows of one step.
     pub fn of_step(&self, step: u64) -> std::ops::Range<usize> {
         self.steps.partition_point(|&s| s < step)..self.steps.partition_point(|&s| s <= step)
     }
 
-    /// Whether they are of one length, of steps and bodies that there are.
+    /// Whether all columns have the same length and refer to existing steps and bodies.
     pub fn fit(&self, steps: u64, bodies: usize) -> bool {
         [self.ids.len(), self.depths.len()] == [self.steps.len(); 2]
             && self.steps.is_sorted()
@@ -56,7 +56,8 @@ impl HiddenRows {
 }
 
 impl RunRecord {
-    /// Adds the pairs that overlapped at the beginning of a step although no contact showed it; steps ascend.
+    /// Appends the hidden overlaps at the beginning of `step`. The steps of successive calls must
+    /// ascend.
     pub fn push_hidden(&mut self, step: u64, overlaps: &[HiddenOverlap], system: &System) {
         for overlap in overlaps {
             let bodies = [overlap.instance_a, overlap.instance_b].map(|instance| system.body_of(instance));
@@ -68,7 +69,8 @@ impl RunRecord {
         }
     }
 
-    /// The pairs of bodies that overlapped at the beginning of some step although no contact showed it, sorted by the numbers of the bodies.
+    /// The pairs of bodies with a hidden overlap at the beginning of some step, sorted by their
+    /// numbers.
     pub fn hidden_pairs(&self) -> Vec<HiddenPair> {
         let mut pairs: BTreeMap<[u32; 2], HiddenPair> = BTreeMap::new();
         let rows = &self.hidden;

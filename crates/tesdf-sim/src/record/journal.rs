@@ -1,17 +1,25 @@
-//! A run as it grows: a file that gains a frame with each step, and that is readable up to its last whole frame.
+//! The journal of a run: a file that gains one frame per step and is readable up to its last
+//! complete frame.
 //!
 //! ```text
 //! byte 0   "tesdfrun", then the version of the journal, u32
 //!     12   frames: length n of the payload, u64; checksum, 16 bytes; payload, n bytes
 //! ```
 //!
-//! All numbers are little-endian. The checksum is the beginning of BLAKE3 of the frame's number (u64, from 0) and the payload. Frame 0 is
-//! JSON: what the metadata of a complete run hold, `planned` (steps in all) and `origin` ([`RunOrigin`]). Frame k + 1 is the state
-//! after k steps: a [`StateHead`], then poses, velocities, and the contacts at the beginning of the last step where they are kept: points, normals,
-//! distances, ids, in the types of the complete file; at last ids and depths of the overlaps at that beginning that no contact showed.
+//! All numbers are little-endian. The checksum is the first 16 bytes of the BLAKE3 hash of the
+//! frame's number (u64, from 0) and the payload.
 //!
-//! A frame is written by one call, without waiting for the disk. So a process that is killed loses at most the step that it was at;
-//! a machine that loses power also loses what the system had not yet written. Reading stops at the first frame that is not whole.
+//! Frame 0 is JSON: the metadata of a complete run, `planned` (the planned number of steps) and
+//! `origin` ([`RunOrigin`]).
+//!
+//! Frame k + 1 is the state after k steps: a [`StateHead`], then poses and velocities. The contacts
+//! at the beginning of the last step follow if they are recorded: points, normals, distances and
+//! ids, in the types of the complete file. The ids and depths of the hidden overlaps at that time
+//! come last.
+//!
+//! Each frame is written by one call, which does not wait for the disk. A process that is killed
+//! therefore loses at most its current step. A power failure also loses the data that the operating
+//! system had not yet written. Reading stops at the first incomplete frame.
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -24,25 +32,25 @@ use crate::simulate::{PartialRun, Totals};
 use crate::{RunOrigin, StepReport};
 
 const MAGIC: &[u8; 8] = b"tesdfrun";
-/// The version that is written and read.
+/// The journal version that this build writes and reads.
 const JOURNAL_VERSION: u32 = 1;
 const HEAD: usize = MAGIC.len() + size_of::<u32>();
 const CHECKSUM: usize = 16;
-/// Instead of a number of contacts: they are not kept.
+/// In place of a number of contacts: the contacts are not recorded.
 const NOT_KEPT: u64 = u64::MAX;
 
-/// A run that was cut, with everything that going on needs.
+/// An interrupted run, with everything that is needed to resume it.
 #[derive(Clone, Debug)]
-pub struct CutRun {
-    /// Its steps so far.
+pub struct InterruptedRun {
+    /// The steps so far.
     pub run: PartialRun,
-    /// What the run was made with.
+    /// The software and geometry that the run was made with.
     pub origin: RunOrigin,
-    /// The file up to its last whole frame.
-    whole: Vec<u8>,
+    /// The bytes of the file up to its last complete frame.
+    bytes: Vec<u8>,
 }
 
-/// The file of a run that grows. The file stays when this is dropped.
+/// The open journal of a run. The file remains when this value is dropped.
 #[derive(Debug)]
 pub struct RunJournal {
     file: GrowingFile,
@@ -58,22 +66,23 @@ struct First {
     origin: RunOrigin,
 }
 
-/// The numbers of a state, and of the step that led to it; those of the step are 0 in the first state.
+/// The fixed-size numbers of a state and of the step that led to it. The values of the step are 0
+/// in the first state.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct StateHead {
-    /// s.
+    /// Time, s.
     time: f64,
-    /// The least signed distance; NaN without contacts.
+    /// The smallest signed distance, m; NaN without contacts.
     deepest: f64,
     contacts: u64,
-    /// ns.
+    /// Wall time of the detection, ns.
     detection: u64,
-    /// ns.
+    /// Wall time of the rest of the step, ns.
     solution: u64,
-    /// Contacts in this frame, or [`NOT_KEPT`].
+    /// Number of contacts in this frame, or [`NOT_KEPT`].
     kept: u64,
-    /// Overlaps in this frame that no contact showed.
+    /// Number of hidden overlaps in this frame.
     hidden: u64,
     iterations: u32,
     converged: u32,
@@ -81,16 +90,17 @@ struct StateHead {
 
 const _: () = assert!(size_of::<StateHead>() == 64);
 
-/// Whether the bytes are those of a journal.
+/// Whether `bytes` begin like a journal.
 pub(super) fn is_journal(bytes: &[u8]) -> bool {
     bytes.starts_with(MAGIC)
 }
 
 impl RunJournal {
-    /// Replaces the destination by a journal of the first state of `record`; `None` when the destination is no regular file.
+    /// Replaces the destination by a journal with the first state of `record`. Returns `None` when
+    /// the destination is not a regular file.
     ///
     /// # Errors
-    /// What the operating system refused; the destination is then as it was.
+    /// [`RecordError::Save`]; the destination is then unchanged.
     pub fn begin(
         destination: &Destination,
         record: &RunRecord,
@@ -104,12 +114,13 @@ impl RunJournal {
         Self::write(destination, &bytes, 2)
     }
 
-    /// Replaces the destination by the whole frames of a run that was cut, to which more are added; `None` as in [`begin`](Self::begin).
+    /// Replaces the destination by the complete frames of an interrupted run; [`push`](Self::push)
+    /// appends to them. Returns `None` when the destination is not a regular file.
     ///
     /// # Errors
-    /// As [`begin`](Self::begin).
-    pub fn go_on(destination: &Destination, cut: &CutRun) -> Result<Option<Self>, RecordError> {
-        Self::write(destination, &cut.whole, 2 + cut.run.record.steps())
+    /// The same errors as [`begin`](Self::begin).
+    pub fn resume(destination: &Destination, earlier: &InterruptedRun) -> Result<Option<Self>, RecordError> {
+        Self::write(destination, &earlier.bytes, 2 + earlier.run.record.steps())
     }
 
     fn write(destination: &Destination, bytes: &[u8], frames: u64) -> Result<Option<Self>, RecordError> {
@@ -119,14 +130,14 @@ impl RunJournal {
         Ok(Some(Self { file: part.finish()?, path, frames, bytes: bytes.len() as u64 }))
     }
 
-    /// Adds the last state of `record`, and what the step that led to it did.
+    /// Appends the last state of `record` and the report of the step that led to it.
     ///
     /// # Errors
-    /// What the operating system refused; the file then ends with the step before.
+    /// [`RecordError::Save`]; the file then ends with the step before.
     pub fn push(&mut self, record: &RunRecord, report: &StepReport) -> Result<(), RecordError> {
         let frame = frame(self.frames, &state(record, record.steps() as usize, report));
         self.file.write_all(&frame).map_err(|source| {
-            // Half a frame does no harm, but on a full disk its room may be needed.
+            // Readers skip an incomplete frame, but a full disk may need its space.
             let _ = self.file.cut(self.bytes);
             failed(&self.path, source)
         })?;
@@ -140,24 +151,25 @@ fn failed(path: &Path, source: std::io::Error) -> RecordError {
     RecordError::Save(SaveError::Io { action: "write", path: path.to_path_buf(), source })
 }
 
-impl CutRun {
-    /// Reads a run that was cut.
+impl InterruptedRun {
+    /// Reads the journal of an interrupted run.
     ///
     /// # Errors
-    /// As [`RunRecord::open`]; [`RecordError::Complete`] when nothing is missing.
+    /// The errors of [`RunRecord::open`], and [`RecordError::Complete`] when the run is complete.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordError> {
         let bytes = super::read(path.as_ref())?;
         if !is_journal(&bytes) {
             let record = RunRecord::from_bytes(&bytes)?;
             return Err(match record.planned_steps() {
                 None => RecordError::Complete { steps: record.steps() },
-                Some(_) => RecordError::NotARun("it was cut, but saved without its journal".into()),
+                Some(_) => RecordError::NotARun("it was interrupted, but saved without its journal".into()),
             });
         }
         Self::from_bytes(bytes)
     }
 
-    /// As [`open`](Self::open), from the bytes of a journal. Bytes after the last whole frame are left out.
+    /// As [`open`](Self::open), but from the bytes of a journal. Bytes after the last complete
+    /// frame are dropped.
     pub(super) fn from_bytes(mut bytes: Vec<u8>) -> Result<Self, RecordError> {
         let version = bytes.get(MAGIC.len()..HEAD).and_then(|version| version.try_into().ok());
         match version.map(u32::from_le_bytes) {
@@ -179,18 +191,18 @@ impl CutRun {
             return Err(RecordError::NotARun(NO_STATE.into()));
         }
         bytes.truncate(frames.at);
-        Ok(Self { run, origin, whole: bytes })
+        Ok(Self { run, origin, bytes })
     }
 }
 
-const NO_STATE: &str = "it was cut before its first state was written; simulate the scene again";
+const NO_STATE: &str = "it was interrupted before its first state was written; simulate the scene again";
 
-/// The payloads of all frames up to the first that is not whole.
+/// Iterates over the payloads of the complete frames.
 struct Frames<'a> {
     bytes: &'a [u8],
-    /// Where the next frame begins.
+    /// Offset of the next frame.
     at: usize,
-    /// Its number.
+    /// Number of the next frame.
     number: u64,
 }
 
@@ -258,7 +270,7 @@ fn nanoseconds(duration: std::time::Duration) -> u64 {
     u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 
-/// Adds a state to a run; `None` when the payload has another length than it says.
+/// Appends a state to a run. Returns `None` when the length of the payload does not match its head.
 fn read_state(mut payload: &[u8], run: &mut PartialRun) -> Option<()> {
     let record = &mut run.record;
     let (steps, bodies) = (record.times.len() as u64, record.bodies.len());
@@ -295,7 +307,8 @@ fn read_state(mut payload: &[u8], run: &mut PartialRun) -> Option<()> {
     payload.is_empty().then_some(())
 }
 
-/// The next `count` values of the payload; copied, as a file's numbers need not be aligned.
+/// Removes `count` values from the front of the payload. They are copied because the numbers of a
+/// file may be unaligned.
 fn take<T: Pod>(payload: &mut &[u8], count: usize) -> Option<Vec<T>> {
     let (values, rest) = payload.split_at_checked(count.checked_mul(size_of::<T>())?)?;
     *payload = rest;

@@ -1,29 +1,31 @@
-//! What the bits of a run depend on besides the scene.
+//! What determines the bits of a run besides its scene.
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tesdf::TeSdf;
 use tesdf::collide::{CollideError, Shape};
 
-use super::{CutRun, RecordError};
+use super::{InterruptedRun, RecordError};
 use crate::System;
 use crate::scene_file::SceneFile;
 
-/// What a run was made with. Runs of equal scenes with equal origins have the same bits.
+/// The software and geometry that a run was made with. Runs of equal scenes with equal origins have
+/// the same bits.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunOrigin {
-    /// Version of this crate.
+    /// Version of `tesdf-sim`.
     pub version: String,
-    /// Where contacts are found; `cpu`, or the name of a device.
+    /// Where contacts are detected: `cpu`, or the name of a GPU device.
     pub device: String,
-    /// For each body that is an encoded mesh: BLAKE3 of its vertices, faces, cells and lists, in hexadecimal.
+    /// For each body that is an encoded mesh: the BLAKE3 hash of its vertices, faces, cells and
+    /// lists, in hexadecimal. `None` for other bodies.
     pub geometries: Vec<Option<String>>,
 }
 
 impl RunOrigin {
-    /// Of a system whose contacts are found on `device`.
+    /// The origin of a run of `system` whose contacts are detected on `device`.
     ///
     /// # Errors
-    /// None for a system that is well formed.
+    /// Never for a system that was built through its methods.
     pub fn of(system: &System, device: &str) -> Result<Self, CollideError> {
         let geometry = |body: &crate::Body| {
             let instance = system.scene().instance(body.instance)?;
@@ -40,10 +42,10 @@ impl RunOrigin {
     }
 }
 
-/// Without the name of the source, so that a mesh may be renamed.
+/// A hash of the geometry. The name of the source file is left out, so a mesh may be renamed.
 fn fingerprint(asset: &TeSdf) -> String {
     let mut hasher = blake3::Hasher::new();
-    // What is proved of the lists decides how they are used.
+    // How the detector uses the lists depends on what the certificate proves about them.
     hasher.update(asset.container().metadata().get("certificate").map_or(&[], String::as_bytes));
     for section in asset.sections() {
         hasher.update(section.spec.name.as_bytes());
@@ -53,12 +55,12 @@ fn fingerprint(asset: &TeSdf) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-impl CutRun {
-    /// Whether going on with `scene` and `origin` gives the bits of a run that was never cut. Paths of geometries may differ, but not
-    /// the geometries.
+impl InterruptedRun {
+    /// Checks that a run resumed with `scene` and `origin` gives the bits of an uninterrupted run.
+    /// The paths of geometry files may differ, but not the geometries.
     ///
     /// # Errors
-    /// [`RecordError::Differs`] names the first difference.
+    /// [`RecordError::Differs`] or [`RecordError::Geometry`] for the first difference.
     pub fn check(&self, scene: &SceneFile, origin: &RunOrigin) -> Result<(), RecordError> {
         let differs = |what: String, found: &Value, expected: &Value| {
             let [found, expected] = [found, expected].map(shown);
@@ -96,7 +98,7 @@ fn without_paths(mut scene: Value) -> Value {
     scene
 }
 
-/// The first value that is not equal, and its place.
+/// The first place where the values differ, with both values.
 fn difference<'a>(at: &str, a: &'a Value, b: &'a Value) -> Option<(String, &'a Value, &'a Value)> {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
@@ -111,7 +113,7 @@ fn difference<'a>(at: &str, a: &'a Value, b: &'a Value) -> Option<(String, &'a V
     }
 }
 
-/// A longer value says nothing more.
+/// Messages cut values after this number of characters.
 const SHOWN: usize = 80;
 
 fn shown(value: &Value) -> String {

@@ -15,22 +15,23 @@ use super::{BodySection, DetectorMode, DetectorSection, SceneError, ShapeSection
 use crate::newton::{Detect, Newton};
 use crate::{DynamicsError, Mass, MassProperties, System};
 
-/// Share of the smallest free body's diagonal up to which contacts are taken by default.
+/// Default contact distance, as a fraction of the smallest free body's diagonal.
 const CONTACT_DISTANCE: f64 = 5e-3;
 
 impl LoadedScene {
-    /// Opens and encodes what the bodies are, and makes the system.
+    /// Opens or encodes the geometries of the bodies, and builds the system.
     ///
     /// # Errors
-    /// The body at fault, with its line.
+    /// The first body or value at fault, with its line.
     pub fn system(&self) -> Result<System, SceneError> {
         self.system_watched(&Progress::default())
     }
 
-    /// As [`system`](Self::system), with `progress` for another thread, which can watch every encoding and cancel.
+    /// As [`system`](Self::system). Another thread can watch every encoding through `progress` and
+    /// cancel it.
     ///
     /// # Errors
-    /// As [`system`](Self::system); or [`SceneError::Cancelled`].
+    /// The same errors as [`system`](Self::system), and [`SceneError::Cancelled`].
     pub fn system_watched(&self, progress: &Progress) -> Result<System, SceneError> {
         let scene = &self.scene;
         scene.steps().map_err(|e| self.value(e.key, e.reason))?;
@@ -63,18 +64,20 @@ impl LoadedScene {
         Ok(system)
     }
 
-    /// The embedded engine for the scene's system.
+    /// The built-in engine for the scene's system.
     ///
     /// # Errors
-    /// A value of the sections `detector` and `solver` that makes no sense.
+    /// [`SceneError::Value`] for a value of the sections `detector` or `solver` that is out of
+    /// range.
     pub fn newton(&self, system: System) -> Result<Newton, SceneError> {
         self.newton_with(system, detect)
     }
 
-    /// The same with another detector, which takes the place of [`tesdf::collide::detect`] unless the scene's mode is `off`.
+    /// As [`newton`](Self::newton), with `detector` in place of [`tesdf::collide::detect`]. The
+    /// mode `off` still turns detection off.
     ///
     /// # Errors
-    /// As [`newton`](Self::newton).
+    /// The same errors as [`newton`](Self::newton).
     pub fn newton_with(&self, system: System, detector: impl Detect + 'static) -> Result<Newton, SceneError> {
         let collide = collide_options(&self.scene.detector, &system);
         collide.validate().map_err(|e| match e {
@@ -111,7 +114,7 @@ fn nothing(_: &Scene, _: &CollideOptions) -> Result<Contacts, CollideError> {
     Ok(Contacts::default())
 }
 
-/// What the detector is asked for.
+/// The detection options of a scene.
 fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions {
     let mode = match section.mode {
         DetectorMode::Node | DetectorMode::Off => Mode::Node,
@@ -130,7 +133,7 @@ fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions
     }
 }
 
-/// Diagonal of the smallest free body; 0 when there is none.
+/// Diagonal of the smallest free body, m; 0 when there is none.
 fn smallest_free_body(system: &System) -> f64 {
     let size = |body: &crate::Body| {
         let instance = system.scene().instance(body.instance).ok()?;
@@ -145,7 +148,7 @@ enum ShapeFailure {
     Reason(String),
 }
 
-/// Shapes by file, so that bodies share them.
+/// The shapes of files, by path: bodies share them.
 #[derive(Default)]
 struct Shapes(BTreeMap<PathBuf, ShapeId>);
 
@@ -160,7 +163,7 @@ impl Shapes {
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
                 let file = scene.resolve(file);
-                // One file under several names is still opened once.
+                // A file that is reached by several paths is opened only once.
                 let key = file.canonicalize().unwrap_or_else(|_| file.clone());
                 if let Some(&shape) = self.0.get(&key) {
                     return Ok(shape);
@@ -240,7 +243,7 @@ fn instance(body: &BodySection, shape: ShapeId) -> Result<Instance, String> {
     Ok(Instance { velocity, scale: body.scale, ..Instance::new(shape, pose) })
 }
 
-/// Without the number of the instance: the body is named already.
+/// The reason alone: the caller's message already names the body.
 fn instance_reason(error: CollideError) -> String {
     match error {
         CollideError::Instance { reason, .. } => reason,

@@ -8,42 +8,43 @@ pub enum SceneError {
     Read {
         /// The scene file.
         path: PathBuf,
-        /// What the operating system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// It is no scene: not TOML, a field unknown or missing, a value of another type. The message has line and column.
+    /// The file is not a scene: it is not TOML, a field is unknown or missing, or a value has
+    /// another type. The message names the line and column.
     #[error("{}: {message}", .path.display())]
     Parse {
         /// The scene file.
         path: PathBuf,
-        /// Where and what.
+        /// Position and reason.
         message: String,
     },
-    /// A value that makes no sense.
+    /// A value is out of range.
     #[error("{}{}: {key}: {reason}", .path.display(), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
     Value {
         /// The scene file.
         path: PathBuf,
-        /// Where the field is, from 1; `None` when the file does not have it.
+        /// Line of the field, from 1; `None` when the file does not have the field.
         line: Option<usize>,
-        /// The field.
+        /// Name of the field, such as `solver.tolerance`.
         key: String,
         /// What was found and what was expected.
         reason: String,
     },
-    /// A body that cannot be.
+    /// A body is invalid.
     #[error("{}, line {line}, body {name}: {reason}", .path.display())]
     Body {
         /// The scene file.
         path: PathBuf,
-        /// Where the body begins, from 1.
+        /// Line where the body begins, from 1.
         line: usize,
-        /// Its name.
+        /// Name of the body.
         name: String,
         /// What was found and what was expected.
         reason: String,
     },
-    /// Encoding was cancelled.
+    /// The encoding was cancelled.
     #[error("cancelled")]
     Cancelled,
 }

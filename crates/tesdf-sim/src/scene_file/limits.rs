@@ -1,21 +1,21 @@
-//! What a scene may ask for.
+//! Limits on the size of a scene.
 use super::SceneFile;
 
-/// Most bodies.
+/// Maximum number of bodies.
 pub const MAX_BODIES: usize = 1 << 16;
-/// Most steps.
+/// Maximum number of steps.
 pub const MAX_STEPS: u64 = 100_000_000;
-/// Most bytes that the states of all bodies may take in the run file: 16 GiB.
+/// Maximum size of the states of all bodies in the run file: 16 GiB.
 pub const MAX_STATE_BYTES: u64 = 1 << 34;
-/// Bytes of a body's pose and velocities.
+/// Size of a body's pose and velocities, bytes.
 const STATE: u64 = 13 * 8;
 
 impl SceneFile {
-    /// The number of steps of the whole duration.
+    /// Number of steps of the whole duration.
     ///
     /// # Errors
-    /// What was found and expected: a time step or duration that is no positive number, more bodies or steps than can be, or a run that
-    /// would be too large.
+    /// The time step or duration is not a positive number, the scene has too many bodies or steps,
+    /// or the run would be too large.
     pub fn steps(&self) -> Result<u64, LimitError> {
         for (key, value) in [("time_step", self.time_step), ("duration", self.duration)] {
             if !(value > 0.0 && value.is_finite()) {
@@ -49,11 +49,11 @@ impl SceneFile {
     }
 }
 
-/// A scene that is too large to be run.
+/// A scene that exceeds a limit.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{key}: {reason}")]
 pub struct LimitError {
-    /// The field.
+    /// The field at fault.
     pub key: &'static str,
     /// What was found and what was expected.
     pub reason: String,

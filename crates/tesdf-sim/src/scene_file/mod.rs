@@ -1,27 +1,28 @@
-//! Scenes as TOML: bodies, detection, solver, what is recorded, and what counts as success.
+//! Scene files in TOML: bodies, detection, solver, recording and success criteria.
 //!
 //! ```toml
-//! time_step = 1e-3                      # s
-//! duration = 0.3                        # s
-//! gravity = [0, 0, -9.81]               # m/s²
+//! time_step = 1e-3             # s
+//! duration = 0.3               # s
+//! gravity = [0, 0, -9.81]      # m/s²
 //!
 //! [[bodies]]
 //! name = "floor"
-//! shape = "plane"                       # or { box = { half_extents = [x, y, z] } }, sphere, capsule
+//! shape = "plane"              # or { box = { half_extents = [x, y, z] } }, sphere, capsule
 //! fixed = true
 //!
 //! [[bodies]]
 //! name = "nut"
-//! mesh = "nut.obj"                      # encoded when the scene is loaded; or asset = "nut.tesdf"; metres
-//! density = 7850                        # kg/m³; or mass = 0.1
-//! translation = [0, 0, 0.05]            # of the mesh's origin; rotation = [x, y, z, w]
+//! mesh = "nut.obj"             # metres; encoded when the scene is loaded; or asset = "nut.tesdf"
+//! density = 7850               # kg/m³; or mass = 0.1
+//! translation = [0, 0, 0.05]   # of the mesh's origin; rotation = [x, y, z, w]
 //!
 //! [detector]
-//! mode = "exact"                        # node, face, exact, or off
+//! mode = "exact"               # node, face, exact, or off
 //! ```
 //!
-//! Paths are relative to the scene's folder. Lengths are metres: a body's `scale` says how many metres a unit of its mesh has. When assets record
-//! different units, scales that do not make one unit of them are an error.
+//! Paths are relative to the scene's folder. Lengths are metres: a body's `scale` is the length of
+//! one unit of its mesh, m. If the assets record different units, their scales must agree with
+//! these units, or loading fails.
 
 mod build;
 mod error;
@@ -41,24 +42,24 @@ pub use read::LoadedScene;
 use crate::criterion::ScrewCriterion;
 use crate::newton::NewtonOptions;
 
-/// A scene as its file says it. SI units.
+/// The content of a scene file, in SI units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
-    /// s.
+    /// Time step, s.
     pub time_step: f64,
-    /// s; rounded to whole steps, at most [`MAX_STEPS`].
+    /// Duration, s; rounded to whole steps, at most [`MAX_STEPS`].
     pub duration: f64,
-    /// m/s².
+    /// Gravitational acceleration, m/s².
     #[serde(default = "earth")]
     pub gravity: [f64; 3],
-    /// How contacts are found.
+    /// How contacts are detected.
     #[serde(default)]
     pub detector: DetectorSection,
-    /// How the embedded engine solves.
+    /// Parameters of the built-in engine.
     #[serde(default)]
     pub solver: NewtonOptions,
-    /// What is written to the run file.
+    /// What the run file records besides the states.
     #[serde(default)]
     pub record: RecordSection,
     /// What makes the run a success.
@@ -72,16 +73,16 @@ fn earth() -> [f64; 3] {
     [0.0, 0.0, -9.81]
 }
 
-/// A body. One of `asset`, `mesh` and `shape` says what it is.
+/// A body. Exactly one of `asset`, `mesh` and `shape` gives its geometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BodySection {
-    /// Named once.
+    /// Name, unique in the scene.
     pub name: String,
-    /// A `.tesdf` file.
+    /// Path of a `.tesdf` file.
     #[serde(default)]
     pub asset: Option<PathBuf>,
-    /// A mesh file, encoded with the preset `fast` when the scene is loaded.
+    /// Path of a mesh file, which is encoded with the preset `fast` when the scene is loaded.
     #[serde(default)]
     pub mesh: Option<PathBuf>,
     /// A simple shape.
@@ -90,25 +91,25 @@ pub struct BodySection {
     /// Metres per unit of the mesh or shape.
     #[serde(default = "one")]
     pub scale: f64,
-    /// Of the body's origin, m.
+    /// Position of the body's origin, m, world frame.
     #[serde(default)]
     pub translation: [f64; 3],
-    /// Unit quaternion x y z w.
+    /// Orientation: a unit quaternion x y z w.
     #[serde(default = "identity")]
     pub rotation: [f64; 4],
-    /// Of the body's origin, m/s.
+    /// Velocity of the body's origin, m/s.
     #[serde(default)]
     pub velocity: [f64; 3],
-    /// rad/s.
+    /// Angular velocity, rad/s.
     #[serde(default)]
     pub angular_velocity: [f64; 3],
-    /// kg/m³; this or `mass` for a free body.
+    /// Density, kg/m³. A free body has either `density` or `mass`.
     #[serde(default)]
     pub density: Option<f64>,
-    /// kg.
+    /// Mass, kg.
     #[serde(default)]
     pub mass: Option<f64>,
-    /// Whether nothing moves it.
+    /// Whether the body never moves.
     #[serde(default)]
     pub fixed: bool,
 }
@@ -121,59 +122,59 @@ fn identity() -> [f64; 4] {
     [0.0, 0.0, 0.0, 1.0]
 }
 
-/// A simple shape; as [`tesdf::collide::Shape`].
+/// A simple shape, as [`tesdf::collide::Shape`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ShapeSection {
     /// The half space z ≤ 0.
     Plane,
-    /// Centred on the origin.
+    /// A box, centred on the origin.
     Box {
-        /// m.
+        /// Half of the edge lengths along x, y and z, m.
         half_extents: [f64; 3],
     },
-    /// Around the origin.
+    /// A ball, centred on the origin.
     Sphere {
-        /// m.
+        /// Radius, m.
         radius: f64,
     },
-    /// Around a segment of the z axis.
+    /// A capsule: the points within `radius` of a segment of the z axis, centred on the origin.
     Capsule {
         /// Half of the segment's length, m.
         half_height: f64,
-        /// m.
+        /// Radius, m.
         radius: f64,
     },
 }
 
-/// What is tested against the other body's field.
+/// The features of one body that are tested against the distance field of the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DetectorMode {
     /// The vertices.
     Node,
-    /// The faces, by Frank–Wolfe iterations.
+    /// The faces, by a fixed number of Frank–Wolfe iterations.
     Face,
-    /// The faces, the exact minimum.
+    /// The faces, with the exact minimum.
     Exact,
-    /// Nothing: bodies pass through each other. A criterion that still holds tests nothing.
+    /// Nothing: bodies pass through each other. A criterion that holds even then tests nothing.
     Off,
 }
 
-/// How contacts are found.
+/// How contacts are detected.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DetectorSection {
-    /// Nodes, faces, or none.
+    /// Which features are tested.
     pub mode: DetectorMode,
-    /// Of the mode `face`.
+    /// Number of Frank–Wolfe iterations in the mode `face`.
     pub iterations: u32,
-    /// Of the mode `exact`: share of the diagonal of the field's body.
+    /// Tolerance in the mode `exact`, as a fraction of the diagonal of the body with the field.
     pub tolerance: f64,
     /// Cosine filter of the modes `face` and `exact`.
     pub cos_theta: Option<f64>,
-    /// Contacts are taken up to this distance, m, besides what motion can close in a step [default: 0.5 % of the diagonal of the
-    /// smallest free body].
+    /// Contacts are recorded up to this distance, m, in addition to the distance that motion can
+    /// close in a step [default: 0.5 % of the diagonal of the smallest free body].
     pub contact_distance: Option<f64>,
 }
 
@@ -189,18 +190,19 @@ impl Default for DetectorSection {
     }
 }
 
-/// What is written besides poses and velocities.
+/// What the run file records besides poses and velocities.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RecordSection {
-    /// Contacts of every so many steps, beginning with the first; 0: none. A contact takes 44 bytes.
+    /// Contacts are recorded at every step whose number, from 0, is a multiple of this value; 0
+    /// records none. A contact takes 44 bytes.
     pub contacts_every: u32,
 }
 
-/// What makes a run a success; every part that is given must hold.
+/// The success criteria of a run. Every criterion that is given must hold.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct CriterionSection {
-    /// A body turns along a thread.
+    /// A body must move along a thread.
     pub screw: Option<ScrewCriterion>,
 }

@@ -6,15 +6,15 @@ use toml::de::DeTable;
 use super::{BodySection, MAX_BODIES, SceneError, SceneFile};
 use crate::RunRecord;
 
-/// Most bytes of a scene: a thousand per body.
+/// Maximum size of a scene file: a thousand bytes per body.
 const MAX_TEXT: usize = 1000 * MAX_BODIES;
 
-/// A scene file with what its errors and paths refer to.
+/// A scene file, with the path and text that error messages and relative paths refer to.
 #[derive(Clone, Debug)]
 pub struct LoadedScene {
-    /// What it says.
+    /// The content of the file.
     pub scene: SceneFile,
-    /// Where it is.
+    /// The path of the file.
     pub path: PathBuf,
     text: String,
 }
@@ -23,7 +23,7 @@ impl LoadedScene {
     /// Reads a scene file.
     ///
     /// # Errors
-    /// [`SceneError::Read`], [`SceneError::Parse`].
+    /// [`SceneError::Read`] or [`SceneError::Parse`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let text = tesdf::input::read_to_string(path)
@@ -31,7 +31,7 @@ impl LoadedScene {
         Self::parse(text, path)
     }
 
-    /// As [`read`](Self::read), from its text; paths in it are relative to the folder of `path`.
+    /// As [`read`](Self::read), but from `text`. Paths in it are relative to the folder of `path`.
     ///
     /// # Errors
     /// [`SceneError::Parse`].
@@ -51,10 +51,11 @@ impl LoadedScene {
         Ok(Self { scene, path: path.to_path_buf(), text })
     }
 
-    /// The scene of a run that was read from `run`. Errors of bodies name the run and its line 1: the scene's own lines are not kept.
+    /// The scene that is stored in a run, where `run` is the path of the run file. Errors of bodies
+    /// name the run and line 1, because the run does not keep the lines of the scene file.
     ///
     /// # Errors
-    /// [`SceneError::Parse`]: the run holds no scene.
+    /// [`SceneError::Parse`] when the run holds no scene.
     pub fn of_run(record: &RunRecord, run: impl AsRef<Path>) -> Result<Self, SceneError> {
         Self::of_record(record, run.as_ref())
     }
@@ -62,7 +63,7 @@ impl LoadedScene {
     fn of_record(record: &RunRecord, run: &Path) -> Result<Self, SceneError> {
         let no_scene =
             |e| SceneError::Parse { path: run.to_path_buf(), message: format!("the scene in it: {e}") };
-        // `Spanned` reads from TOML only.
+        // `Spanned` can only be read from TOML.
         let mut json = record.scene.clone();
         let bodies = json.get_mut("bodies").map(serde_json::Value::take).unwrap_or_default();
         let bodies: Vec<BodySection> = serde_json::from_value(bodies).map_err(no_scene)?;
@@ -74,8 +75,9 @@ impl LoadedScene {
         Ok(Self { scene, path, text: String::new() })
     }
 
-    /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`, a mesh otherwise. A relative path is
-    /// relative to the scene's folder. `false`: there is no such body.
+    /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
+    /// otherwise a mesh. A relative path is relative to the scene's folder. Returns `false` when
+    /// the scene has no such body.
     #[must_use]
     pub fn replace_geometry(&mut self, body: &str, file: impl Into<PathBuf>) -> bool {
         let file = file.into();
@@ -88,7 +90,7 @@ impl LoadedScene {
         true
     }
 
-    /// All files that the geometries of the bodies are read from; of a mesh in several files, all of them.
+    /// All files of the bodies' geometries, including every file of a mesh that has several.
     pub fn geometry_files(&self) -> Vec<PathBuf> {
         let of_body = |body: &Spanned<BodySection>| {
             let BodySection { asset, mesh, .. } = body.get_ref();
@@ -100,12 +102,12 @@ impl LoadedScene {
         self.scene.bodies.iter().flat_map(of_body).collect()
     }
 
-    /// Line of a byte of the text, from 1.
+    /// Line number, from 1, of a byte of the text.
     pub(super) fn line(&self, byte: usize) -> usize {
         1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count()
     }
 
-    /// A path of the scene, relative to its folder.
+    /// Joins the scene's folder and a path of the scene.
     pub(super) fn resolve(&self, path: &Path) -> PathBuf {
         self.path.parent().map_or_else(|| path.to_path_buf(), |folder| folder.join(path))
     }
@@ -115,7 +117,7 @@ impl LoadedScene {
         SceneError::Value { path, line, key: key.into(), reason: reason.to_string() }
     }
 
-    /// Line of a field, such as `criterion.screw`, or of the section that it would be in.
+    /// Line of a field, such as `criterion.screw`. A missing field has the line of its section.
     fn line_of(&self, key: &str) -> Option<usize> {
         let document = DeTable::parse(&self.text).ok()?;
         let (mut table, mut line) = (Some(document.get_ref()), None);
