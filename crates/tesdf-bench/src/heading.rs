@@ -1,8 +1,8 @@
-//! Where, when and how a table was made.
+//! The heading of a table: when, where and how it was made.
 use std::fs;
 use std::path::Path;
 
-/// The command of this process, as a shell would read it.
+/// The command of this process, with quotes where a shell needs them.
 pub fn command() -> String {
     let quoted = |word: String| {
         if word.is_empty() || word.contains(char::is_whitespace) { format!("'{word}'") } else { word }
@@ -19,7 +19,7 @@ pub fn version_and_date() -> String {
     format!("{now} UTC, tesdf {}", env!("CARGO_PKG_VERSION"))
 }
 
-/// The model of the processor and its number of cores.
+/// The model of the processor, and its number of cores.
 pub fn processor() -> String {
     let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find(|l| l.starts_with("model name")).and_then(|l| l.split_once(':'));
@@ -28,7 +28,8 @@ pub fn processor() -> String {
     format!("{model}; {cores} cores")
 }
 
-/// The mean number of running processes over the last minute and the last 15 minutes, where the system tells it.
+/// The mean number of running processes over the last minute and over the last 15 minutes. `None`
+/// where the system does not report it.
 pub fn load() -> Option<[String; 2]> {
     let text = fs::read_to_string("/proc/loadavg").ok()?;
     let mut words = text.split(' ');

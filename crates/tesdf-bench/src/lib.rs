@@ -3,8 +3,8 @@
 //! - [`detection`]: `tesdf bench`.
 //! - [`evaluate`]: `tesdf evaluate`.
 //!
-//! The program `tesdf-bench` compares with peers; it is built with the feature `peers`. Each table says on which
-//! processor, when and by which command it was made ([`heading`]).
+//! The program `tesdf-bench` compares tesdf with peers; it needs the feature `peers`. Each table
+//! names its processor, date and command ([`heading`]).
 #![warn(missing_docs)]
 
 pub mod detection;

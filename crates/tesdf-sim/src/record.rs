@@ -29,8 +29,8 @@
 //! run that was saved before its end also has `planned`, its planned number of steps.
 //!
 //! A run grows as a journal of steps under its final name. At the end the complete file replaces
-//! the journal. [`RunRecord::open`] reads both. [`InterruptedRun`] reads a journal to resume the run; the
-//! resumed run ends with the same bytes as an uninterrupted run.
+//! the journal. [`RunRecord::open`] reads both. [`InterruptedRun`] reads a journal to resume the
+//! run; the resumed run ends with the same bytes as an uninterrupted run.
 mod hidden;
 mod journal;
 mod origin;

@@ -85,7 +85,8 @@ pub enum SimulateError {
     },
 }
 
-/// A run up to some step: either a new run, or a [`InterruptedRun`](crate::InterruptedRun) that was read.
+/// A run up to some step: either a new run, or an [`InterruptedRun`](crate::InterruptedRun) that
+/// was read.
 #[derive(Clone, Debug)]
 pub struct PartialRun {
     /// All states so far.

@@ -1,6 +1,7 @@
-//! What the commands of tesdf share: reports, progress, values of options, opening of files and devices.
+//! Shared parts of tesdf's commands: reports, progress bars, option values, input and output files,
+//! and devices.
 //!
-//! stdout carries only a command's result; notes, warnings, errors and progress go to stderr.
+//! Stdout carries only a command's result; notes, warnings, errors and progress go to stderr.
 #![warn(missing_docs)]
 
 pub mod asset_file;

@@ -1,4 +1,4 @@
-//! `tesdf bench collide SCENE|RUN|POSES`
+//! `tesdf bench collide SCENE|RUN|POSES`: the cost of a detection, stage by stage.
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -15,46 +15,47 @@ use tesdf_terminal::report::{self as output, Failure, Outcome};
 /// Arguments of `tesdf bench collide`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// A scene (.toml), a run (.tesrun) whose poses are replayed, or a file of poses (.json)
+    /// Scene (.toml), run (.tesrun) whose poses are replayed, or file of poses (.json)
     #[arg(value_name = "SCENE|RUN|POSES")]
     pub source: PathBuf,
     /// Where contacts are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Best, help = device::help("contacts are found"))]
     pub device: Choice,
-    /// What is tested against the other body's field
+    /// Features that are tested against the distance field of the other body
     #[arg(long, value_enum, default_value_t = ModeName::Face)]
     pub mode: ModeName,
-    /// Frank-Wolfe iterations of the mode `face`
+    /// Number of Frank-Wolfe iterations in the mode `face`
     #[arg(long, value_name = "K", default_value_t = 16)]
     pub iterations: u32,
     /// Threshold of the cosine filter
     #[arg(long, value_name = "C", value_parser = parse::number, default_value_t = 0.3, allow_hyphen_values = true)]
     pub cos_theta: f64,
-    /// Contacts are taken up to this signed distance [default: what the file says, else 0]
+    /// Contacts are detected up to this signed distance [default: the distance in the file,
+    /// otherwise 0]
     #[arg(long, value_name = "D", value_parser = parse::length)]
     pub contact_distance: Option<f64>,
-    /// Longest lists of meshes that are encoded for a file of poses [default: not cut]
+    /// Maximum list length of meshes that are encoded for a file of poses [default: not truncated]
     #[arg(long, value_name = "E")]
     pub e_max: Option<u32>,
-    /// Keep at most N contacts of a pair of bodies
+    /// Keep at most N contacts per pair of bodies
     #[arg(long, value_name = "N")]
     pub reduce: Option<u32>,
-    /// The scene so many times, in worlds of their own
+    /// Number of copies of the scene, each in its own world
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub worlds: u32,
-    /// Frames of a run or of a file of poses, at most
+    /// Maximum number of frames of a run or of a file of poses
     #[arg(long, value_name = "N", default_value_t = 16)]
     pub frames: usize,
-    /// Measurements of each frame
+    /// Number of measurements per frame
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub repeat: u32,
-    /// Threads that work on a polygon
+    /// Threads that process a polygon
     #[arg(long, value_enum, default_value_t = LanesName::Group)]
     pub lanes: LanesName,
-    /// Exchange values through shared memory, where there are planes of 32 threads too
+    /// Exchange values through shared memory, even where subgroups of 32 threads are available
     #[arg(long)]
     pub shared: bool,
-    /// Detect on the processor too, and print the ratio
+    /// Also detect on the processor, and print the ratio of the times
     #[arg(long)]
     pub against_cpu: bool,
     /// Print the result as JSON
@@ -62,7 +63,7 @@ pub struct Args {
     pub json: bool,
 }
 
-/// What is tested.
+/// The features that are tested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ModeName {
@@ -70,24 +71,24 @@ pub enum ModeName {
     Node,
     /// The faces, by Frank-Wolfe iterations
     Face,
-    /// The faces, exactly
+    /// The faces, with the exact minimum
     Exact,
 }
 
-/// How a polygon is worked on.
+/// Threads that process a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LanesName {
-    /// 32 threads, which share the faces of the list
+    /// 32 threads, which divide the faces of the list among them
     Group,
-    /// A thread alone
+    /// One thread
     Single,
 }
 
-/// Measures and prints.
+/// Measures a detection and prints the result.
 ///
 /// # Errors
-/// A file that cannot be read, or a device that fails.
+/// A file cannot be read, or a device fails.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let device = args.device.open()?;
     let mut frames = Frames::read(&args.source, args.frames, args.worlds, args.e_max)?;

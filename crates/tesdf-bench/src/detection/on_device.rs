@@ -1,4 +1,4 @@
-//! Detection on a device, stage by stage.
+//! Measures a detection on a device, stage by stage.
 use std::time::{Duration, Instant};
 
 use tesdf::collide::{CollideOptions, Reduction};
@@ -9,7 +9,8 @@ use super::collide::{Args, LanesName, ModeName};
 use super::frames::Frames;
 use super::report::{Bytes, Counts, PHASES, Report, Spread, Stage, ms};
 
-/// Of a stage, among all; what only prepares a launch belongs to that. Reduction is none of the three.
+/// The phase of a stage. A stage that only prepares a launch belongs to the phase of that launch.
+/// Reduction is in none of the three phases.
 fn phase(stages: &[(&str, Duration)], stage: usize) -> &'static str {
     match stages[stage].0 {
         "groups" if stage + 1 < stages.len() => phase(stages, stage + 1),
@@ -20,7 +21,8 @@ fn phase(stages: &[(&str, Duration)], stage: usize) -> &'static str {
     }
 }
 
-/// Measures all frames on the device, once more with operations counted, and once more without pruning.
+/// Measures all frames on the device: first as they are, then with counted operations, then without
+/// pruning.
 ///
 /// # Errors
 /// The device fails.
@@ -87,7 +89,7 @@ fn measure(
     let (mut walls, mut reports) = (Vec::new(), Vec::new());
     for frame in 0..frames.poses.len() {
         frames.show(frame)?;
-        // Buffers grow, and kernels are compiled, before anything is measured.
+        // The first detection grows the buffers and compiles the kernels.
         detector.detect(&frames.scene, options).map_err(Failure::new)?;
         for _ in 0..repeat {
             let start = Instant::now();

@@ -7,7 +7,7 @@ use tesdf_terminal::report::size;
 
 use super::collide::{LanesName, ModeName};
 
-/// Mean, 99th percentile and greatest of some numbers.
+/// Mean, 99th percentile and maximum of a series.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Spread {
     pub mean: f64,
@@ -16,7 +16,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of the values.
+    /// The figures of a series of values.
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_unstable_by(f64::total_cmp);
         let last = values.len().saturating_sub(1);
@@ -29,7 +29,7 @@ impl Spread {
 #[derive(Serialize)]
 pub struct Stage {
     pub name: &'static str,
-    /// `BP`, `MP` or `NP`: the paper's broad, middle and narrow phase; or `reduction`.
+    /// `BP`, `MP` or `NP` for the paper's broad, middle and narrow phase, or `reduction`.
     pub phase: &'static str,
     pub ms: Spread,
 }
@@ -40,13 +40,13 @@ pub struct Counts {
     pub meshlets: Spread,
     pub candidates: Spread,
     pub queries: Spread,
-    /// Without pruning by least signed distances.
+    /// The queries without pruning by smallest signed distances.
     pub queries_unpruned: Option<Spread>,
     pub contacts: Spread,
     pub filtered: Spread,
-    /// Of the contacts, those that a reduction keeps.
+    /// The contacts that a reduction keeps.
     pub kept: Option<Spread>,
-    /// Of Face-TES: evaluations of the field, and point–triangle distances of the lists.
+    /// In the mode `face`: evaluations of the field, and point–triangle distances of the lists.
     pub evaluations: Option<Spread>,
     pub distances: Option<Spread>,
 }
@@ -61,7 +61,7 @@ pub struct Bytes {
     pub products: usize,
     pub products_by_buffer: Vec<(&'static str, usize)>,
     pub per_instance: usize,
-    /// Shapes, products and instances.
+    /// Shapes, pipeline buffers and instances.
     pub total: usize,
 }
 
@@ -79,19 +79,19 @@ pub struct Report {
     pub instances: usize,
     pub frames: usize,
     pub repeat: u32,
-    /// Launches of one pass.
+    /// Number of launches of a detection.
     pub launches: usize,
     pub stages: Vec<Stage>,
-    /// Device time by phase; without pruning for comparison.
+    /// Device time of each phase; also without pruning, for comparison.
     pub phases_ms: [(&'static str, f64); 3],
     pub phases_unpruned_ms: Option<[(&'static str, f64); 3]>,
     pub counts: Counts,
     pub bytes: Option<Bytes>,
-    /// From the poses to the contacts on the processor.
+    /// Time from the poses to the contacts in host memory.
     pub wall_ms: Spread,
-    /// The same on the processor.
+    /// The same time for a detection on the processor.
     pub cpu_wall_ms: Option<Spread>,
-    /// Time of the processor over that of the device.
+    /// Time on the processor divided by the time on the device.
     pub cpu_over_device: Option<f64>,
 }
 
@@ -102,7 +102,7 @@ pub fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-/// Lines for people.
+/// The figures as lines of text.
 pub fn text(r: &Report) -> String {
     let mut text = String::new();
     let mut line = |name: &str, value: String| {
@@ -122,7 +122,7 @@ pub fn text(r: &Report) -> String {
     if r.launches > 0 {
         line("meshlets", spread(&r.counts.meshlets));
     }
-    line("faces or nodes", spread(&r.counts.candidates));
+    line("faces or vertices", spread(&r.counts.candidates));
     line("narrow-phase queries", spread(&r.counts.queries));
     if let Some(all) = &r.counts.queries_unpruned {
         line("  without pruning", spread(all));

@@ -33,7 +33,7 @@ impl Row {
 /// Prints the devices.
 ///
 /// # Errors
-/// There is none, or stdout cannot be written.
+/// There is no device, or stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let rows: Vec<Row> = devices().into_iter().enumerate().map(Row::new).collect();
     if args.json {

@@ -1,4 +1,4 @@
-//! `tesdf devices`
+//! `tesdf devices`: lists the compute devices.
 use tesdf_terminal::report::{Failure, Outcome};
 
 #[cfg(feature = "gpu")]
@@ -15,16 +15,16 @@ pub struct Args {
 /// Lists the devices.
 ///
 /// # Errors
-/// There is none, stdout cannot be written, or the tool was built without the feature `gpu`.
+/// There is no device, stdout cannot be written, or the tool was built without the feature `gpu`.
 #[cfg(feature = "gpu")]
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     list::run(args)
 }
 
-/// Lists the devices, of which there are none.
+/// Reports that this tool was built without devices.
 ///
 /// # Errors
-/// Always: says how to build the tool with the feature `gpu`.
+/// Always. The message says how to build the tool with the feature `gpu`.
 #[cfg(not(feature = "gpu"))]
 pub fn run(_: &Args) -> Result<Outcome, Failure> {
     Err(tesdf_terminal::device::built_without(""))

@@ -11,10 +11,11 @@ use crate::report::Failure;
 /// An open device.
 pub struct Device(pub tesdf_gpu::Device);
 
-/// Opens the device whose number or name is given, or the one that `TESDF_DEVICE` names, or the best one.
+/// Opens the device with this number or name. With `None` it opens the device that `TESDF_DEVICE`
+/// names, or the best device.
 ///
 /// # Errors
-/// There is no such device.
+/// The device does not exist.
 pub fn open(name: Option<&str>) -> Result<Device, Failure> {
     tesdf_gpu::Device::choose(name)
         .map(Device)
@@ -22,17 +23,17 @@ pub fn open(name: Option<&str>) -> Result<Device, Failure> {
 }
 
 impl Device {
-    /// Its name, as the driver tells it.
+    /// The name that the driver reports.
     pub fn name(&self) -> &str {
         &self.0.info().name
     }
 
-    /// Takes the samples of Algorithm 1 on the device.
+    /// A sampler that evaluates the samples of Algorithm 1 on this device.
     pub fn into_sampler(self) -> Box<dyn Sampler> {
         Box::new(DeviceSampler::new(self.0))
     }
 
-    /// Finds contacts on the device.
+    /// A detector that finds contacts on this device.
     pub fn into_detector(self) -> impl Detect {
         DeviceDetector { device: self.0, detector: Mutex::new(None) }
     }

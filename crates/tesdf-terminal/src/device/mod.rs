@@ -1,7 +1,7 @@
-//! The option `--device` of commands: the processor, or a device that the GPU crate opens.
+//! The option `--device`: the processor, or a device of the crate `tesdf-gpu`.
 //!
-//! A tool built without the feature `gpu` has the same option; each choice but `cpu` is then an error that
-//! says how to build the tool with it.
+//! A tool that was built without the feature `gpu` has the same option. Each choice except `cpu` is
+//! then an error that says how to build the tool with the feature.
 use tesdf::encode::Processor;
 use tesdf::encode::Sampler;
 
@@ -17,7 +17,7 @@ pub use gpu::{Device, open};
 #[cfg(not(feature = "gpu"))]
 pub use no_gpu::{Device, built_without, open};
 
-/// The help of `--device`: where `what` is done.
+/// The help of `--device`. `what` completes the sentence "Where …".
 pub fn help(what: &str) -> String {
     format!(
         "Where {what}: cpu (64 bits), gpu (32 bits; what TESDF_DEVICE names, else the best device), or a device by its number or a part \
@@ -31,17 +31,17 @@ pub enum Choice {
     /// The processor.
     #[default]
     Processor,
-    /// The device that `TESDF_DEVICE` names, or the best device there is.
+    /// The device that `TESDF_DEVICE` names, or the best device.
     Best,
     /// A device, by its number or a part of its name.
     Named(String),
 }
 
 impl Choice {
-    /// `cpu`, `gpu`, or the number or name of a device.
+    /// Parses `cpu`, `gpu`, or the number or name of a device.
     ///
     /// # Errors
-    /// None: [`open`](Self::open) finds out whether there is such a device.
+    /// Never: a device that does not exist is an error of [`open`](Self::open).
     pub fn parse(text: &str) -> Result<Self, std::convert::Infallible> {
         Ok(match text {
             "cpu" => Self::Processor,
@@ -53,7 +53,7 @@ impl Choice {
     /// Opens the device; `None` for the processor.
     ///
     /// # Errors
-    /// There is no such device, or the tool was built without the feature `gpu`.
+    /// The device does not exist, or the tool was built without the feature `gpu`.
     pub fn open(&self) -> Result<Option<Device>, Failure> {
         match self {
             Self::Processor => Ok(None),
@@ -62,10 +62,10 @@ impl Choice {
         }
     }
 
-    /// The sampler of Algorithm 1 on that device.
+    /// The sampler of Algorithm 1 on this device.
     ///
     /// # Errors
-    /// As [`open`](Self::open).
+    /// The same errors as [`open`](Self::open).
     pub fn sampler(&self) -> Result<Box<dyn Sampler>, Failure> {
         Ok(match self.open()? {
             Some(device) => device.into_sampler(),

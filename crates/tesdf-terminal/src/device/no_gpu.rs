@@ -1,22 +1,22 @@
-//! What stands for a device in a tool without the feature `gpu`: a type without values.
+//! The device of a tool without the feature `gpu`: a type without values.
 use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene};
 use tesdf::encode::Sampler;
 use tesdf_sim::newton::Detect;
 
 use crate::report::Failure;
 
-/// A device, of which there is none.
+/// A device. No value of this type exists.
 pub enum Device {}
 
-/// Always an error, as no device can be opened.
+/// Always an error, because no device can be opened.
 ///
 /// # Errors
-/// Says how to build the tool with the feature `gpu`.
+/// The message says how to build the tool with the feature `gpu`.
 pub fn open(name: Option<&str>) -> Result<Device, Failure> {
     Err(built_without(&format!("--device {}: ", name.unwrap_or("gpu"))))
 }
 
-/// The error of everything that needs a device.
+/// The error of every operation that needs a device. `prefix` starts the message.
 pub fn built_without(prefix: &str) -> Failure {
     Failure::new(format!("{prefix}this tesdf was built without the GPU")).hint(
         "build it in the repository with `cargo build --release --features gpu --bin tesdf`; `cpu` is the processor",
@@ -24,17 +24,17 @@ pub fn built_without(prefix: &str) -> Failure {
 }
 
 impl Device {
-    /// Its name.
+    /// The name of the device.
     pub fn name(&self) -> &str {
         match *self {}
     }
 
-    /// Takes the samples of Algorithm 1 on the device.
+    /// A sampler that evaluates the samples of Algorithm 1 on this device.
     pub fn into_sampler(self) -> Box<dyn Sampler> {
         match self {}
     }
 
-    /// Finds contacts on the device.
+    /// A detector that finds contacts on this device.
     pub fn into_detector(self) -> impl Detect {
         self
     }

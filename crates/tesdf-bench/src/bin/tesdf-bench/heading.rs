@@ -4,7 +4,7 @@ use tesdf_bench::heading::{command, load, processor, version_and_date};
 
 use crate::{Failure, output};
 
-/// Prints the command, the date, the processor and what the build uses of it.
+/// Prints the command, the date, the processor, and the instruction sets of the build.
 pub fn print() -> Result<(), Failure> {
     output::line(&format!("`{}`\n", command()))?;
     output::line(&format!("- {}", version_and_date()))?;
@@ -13,7 +13,7 @@ pub fn print() -> Result<(), Failure> {
     output::line(&format!("- compiled for {}; tesdf chose {:?} at run time\n", target(), Isa::detect()))
 }
 
-/// The instruction sets that the whole program, peers included, was compiled for.
+/// The instruction sets that the whole program, including the peers, was compiled for.
 fn target() -> String {
     let mut all = vec![std::env::consts::ARCH];
     for (has, name) in [
