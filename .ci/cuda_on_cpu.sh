@@ -1,4 +1,5 @@
-# Sourced by ./test: builds what stands for CUDA's driver and NVRTC where there is no NVIDIA GPU, and sets cuda_on_cpu to its folder.
+# Sourced by ./test: builds the replacement of CUDA's driver and NVRTC for machines without an
+# NVIDIA GPU, and sets cuda_on_cpu to its folder.
 
 cuda_on_cpu=$PWD/target/cuda_on_cpu
 cuda_on_cpu_source=$PWD/crates/tesdf-gpu/tests/cuda_on_cpu

@@ -1,4 +1,4 @@
-# Sourced where C++ is compiled: finds a compiler, or installs one.
+# Sourced where C++ is compiled: finds or installs a compiler.
 
 if ! command -v c++ >/dev/null && command -v apt-get >/dev/null; then
     as_root=

@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
-# Licences, sources and known vulnerabilities of all dependencies, by cargo-deny; deny.toml says what is allowed. Vulnerabilities are those of
-# https://github.com/RustSec/advisory-db: where that cannot be fetched, a warning says so, and the rest is checked.
+# Checks the licences, sources and known vulnerabilities of all dependencies with cargo-deny;
+# deny.toml lists what is allowed. The vulnerabilities come from
+# https://github.com/RustSec/advisory-db. If it cannot be fetched, a warning says so, and the rest
+# is checked.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
@@ -8,7 +10,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 version=0.20.2
 deny=target/tools/bin/cargo-deny
 if [ "$("$deny" --version 2>/dev/null)" != "cargo-deny $version" ]; then
-    # Not optimised: it runs for seconds, and compiling is what takes time.
+    # Not optimised: the program runs for seconds, and compiling it takes most of the time.
     step cargo install --quiet --locked --debug --root target/tools "cargo-deny@$version"
 fi
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Builds all fuzz targets with the compiler of the project and runs each for the given number of seconds (default 13: two minutes for all), from the inputs in
-# fuzz/corpus. An input that fails is written to fuzz/artifacts. Needs a C++ compiler, for libFuzzer.
+# Builds all fuzz targets with the compiler of the project and runs each for the given number of
+# seconds (default 13, which is two minutes for all), from the inputs in fuzz/corpus. A failing
+# input is written to fuzz/artifacts. libFuzzer needs a C++ compiler.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
@@ -10,7 +11,8 @@ seconds=${1:-13}
 only=${2:-}
 target=$(rustc -vV | sed -n 's/^host: //p')
 out=$PWD/target/fuzz
-# What `cargo fuzz` sets, without the sanitizer, which only a nightly compiler has. With `--target`, build scripts are compiled without it.
+# The flags of `cargo fuzz` without the sanitizer, which needs a nightly compiler. With `--target`,
+# build scripts are compiled without these flags.
 coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
 -Cllvm-args=-sanitizer-coverage-pc-table -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1"
 RUSTFLAGS=$coverage step cargo build --manifest-path fuzz/Cargo.toml --release --target "$target" --target-dir "$out" --bins
@@ -19,7 +21,8 @@ mkdir -p fuzz/artifacts
 for file in fuzz/fuzz_targets/*.rs; do
     name=$(basename "$file" .rs)
     [ -z "$only" ] || [ "$only" = "$name" ] || continue
-    # New inputs stay in the target folder: the corpus is what was chosen by hand or by `-merge=1`.
+    # New inputs stay in the target folder. The corpus only has inputs that were chosen by hand or
+    # by `-merge=1`.
     found=$out/found/$name
     mkdir -p "$found" "fuzz/corpus/$name"
     step "$out/$target/release/$name" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=3000 -print_final_stats=1 -verbosity=0 \

@@ -1,12 +1,14 @@
-# Sourced by ./test: sets TESDF_GMSH to a Gmsh that runs, or says how to get one. Tests run it, nothing links it.
+# Sourced by ./test: sets TESDF_GMSH to a Gmsh that runs, or explains how to install one. Tests run
+# it as a program; nothing links it.
 #
-# Taken in this order: TESDF_GMSH, `gmsh` of the PATH, the one that an earlier call put into target/gmsh, the wheel of
-# PyPI, which needs Python with pip but neither root nor a virtual environment. The wheel wants X11 and OpenGL libraries,
-# although it opens no window; where they are missing and apt is there, they are unpacked beside it.
+# It tries in this order: TESDF_GMSH, `gmsh` in the PATH, the Gmsh that an earlier call installed in
+# target/gmsh, and the wheel of PyPI. The wheel needs Python with pip, but neither root nor a
+# virtual environment. It also needs X11 and OpenGL libraries, although it opens no window. If they
+# are missing and apt exists, they are unpacked next to it.
 
 gmsh_version=4.15.2
 gmsh_folder=$PWD/target/gmsh
-# Of Debian and Ubuntu; some have other names in some releases.
+# Names in Debian and Ubuntu; a library may have another name in some releases.
 gmsh_libraries="libglu1-mesa libgl1 libglx0 libglvnd0 libopengl0 libx11-6 libxcb1 libxau6 libxdmcp6 libxrender1 libxcursor1
     libxfixes3 libxext6 libxft2 libxinerama1 libfontconfig1 libfreetype6 libexpat1 libpng16-16 libpng16-16t64 libbrotli1
     libbsd0 libmd0 libgomp1"
@@ -17,12 +19,12 @@ gmsh_runs() {
 
 gmsh_install() {
     mkdir -p "$gmsh_folder"
-    # Not --target, which leaves out the shared library.
+    # Not with --target, which leaves out the shared library.
     python3 -m pip install --quiet --disable-pip-version-check --root-user-action=ignore --no-deps --ignore-installed \
         --prefix "$gmsh_folder" "gmsh==$gmsh_version" || return 1
     cat >"$gmsh_folder/run" <<'WRAPPER'
 #!/bin/sh
-# Gmsh by its Python module, with libraries of this folder where the system has none.
+# Runs Gmsh through its Python module, with the libraries of this folder where the system has none.
 folder=$(dirname "$0")
 libraries=$(find "$folder/libraries" -type d -name '*-linux-gnu' 2>/dev/null | paste -sd : -)
 if [ -n "$libraries" ]; then
@@ -38,7 +40,7 @@ WRAPPER
     command -v apt-get >/dev/null || return 1
     mkdir -p "$gmsh_folder/debs"
     for library in $gmsh_libraries; do
-        # A name that this release does not have is no error: what counts is whether Gmsh runs in the end.
+        # A name that this release does not have is not an error: Gmsh must run in the end.
         (cd "$gmsh_folder/debs" && apt-get download --quiet "$library" >/dev/null 2>&1) || true
     done
     for package in "$gmsh_folder"/debs/*.deb; do

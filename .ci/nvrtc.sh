@@ -1,7 +1,9 @@
-# Sourced by ./test: puts NVRTC, which compiles the kernels for CUDA, into LD_LIBRARY_PATH, or says how to get it. Compiling needs no GPU.
+# Sourced by ./test: adds NVRTC, which compiles the kernels for CUDA, to LD_LIBRARY_PATH, or
+# explains how to install it. Compiling needs no GPU.
 #
-# Taken in this order: the one that the system's loader knows, the one that an earlier call put into target/nvrtc, the wheel of PyPI, which needs
-# Python with pip but neither root nor a virtual environment.
+# It tries in this order: the NVRTC of the system's loader, the one that an earlier call installed
+# in target/nvrtc, and the wheel of PyPI. The wheel needs Python with pip, but neither root nor a
+# virtual environment.
 
 nvrtc_version=12.9.86
 nvrtc_folder=$PWD/target/nvrtc

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the wheel of the Python package and tests it in a clean virtual environment; needs the network, or pip's cache. Some tests
-# run Gmsh.
+# Builds the wheel of the Python package and tests it in a clean virtual environment. It needs the
+# network, or pip's cache. Some tests run Gmsh.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
@@ -21,10 +21,10 @@ if ! "$tools/bin/python" -m pip --disable-pip-version-check freeze 2>/dev/null |
     step "$tools/bin/python" "${pip[@]}" "$maturin"
 fi
 rm -rf "$wheels"
-# Optimised as the tests are, so that the crates below are compiled once.
+# With the optimisation level of the tests, so that the crates below are compiled once.
 CARGO_PROFILE_DEV_OPT_LEVEL=2 step "$tools/bin/maturin" build --quiet --profile dev --locked -m python/Cargo.toml --out "$wheels"
 step "$python" -m venv --clear "$env"
 step "$env/bin/python" "${pip[@]}" "$wheels"/*.whl -r python/tests/requirements.txt
 step "$env/bin/python" -m pytest python/tests
-# The stubs say what the module has; the tests use it as they say.
+# Compares the stubs with the module. The tests use the module as the stubs describe it.
 step "$env/bin/python" -m mypy.stubtest tesdf

@@ -1,7 +1,7 @@
-# Sourced by ./demo, ./test and .ci/run: finds cargo and a linker, or says how to get them.
+# Sourced by ./demo, ./test and .ci/run: finds cargo and a linker, or explains how to install them.
 
 if ! command -v cargo >/dev/null && [ -f "${CARGO_HOME:-$HOME/.cargo}/env" ]; then
-    # rustup was installed, but this shell was not told.
+    # rustup is installed, but this shell does not know it.
     . "${CARGO_HOME:-$HOME/.cargo}/env"
 fi
 if ! command -v cargo >/dev/null; then

@@ -1,8 +1,9 @@
-# Sourced by ./test: the software Vulkan driver, on which the tests of the GPU run, so that they give the same on every machine. With
-# TESDF_DEVICE set they run on that device instead: `TESDF_DEVICE=0 ./test`.
+# Sourced by ./test: finds or installs the software Vulkan driver. The GPU tests run on it, so they
+# have the same result on every machine. With TESDF_DEVICE they run on that device instead:
+# `TESDF_DEVICE=0 ./test`.
 
 vulkan_driver() {
-    # Debian and Ubuntu, Fedora, a driver of one's own.
+    # Debian and Ubuntu, Fedora, and a driver built from source.
     for file in /usr/share/vulkan/icd.d/lvp_icd*.json /usr/local/share/vulkan/icd.d/lvp_icd*.json; do
         if [ -e "$file" ]; then
             echo "$file"
@@ -24,7 +25,7 @@ if [ -z "${TESDF_DEVICE:-}" ]; then
         exit 2
     fi
     VK_DRIVER_FILES=$(vulkan_driver)
-    # Older loaders know this name only.
+    # Older loaders only know this name.
     VK_ICD_FILENAMES=$VK_DRIVER_FILES
     export VK_DRIVER_FILES VK_ICD_FILENAMES
 fi
