@@ -196,10 +196,10 @@ fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
     }
     if !hidden.is_empty() {
         report::hint(match mode {
-            Mode::Node => "the mode node tests vertices alone: use --mode face or --mode exact",
+            Mode::Node => "the mode `node` only tests vertices: use --mode face or --mode exact",
             Mode::Face | Mode::Exact => {
-                "their surfaces are hardly inside of each other, as of bodies in one place: `tesdf clearance` tells how far, and a \
-                 pose that parts them ends it"
+                "their surfaces hardly enter each other, as when both bodies have the same pose: `tesdf clearance` measures the \
+                 overlap; move the bodies apart"
             }
         });
     }

@@ -136,7 +136,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let choices = args.choices();
     let options = choices.options().map_err(Failure::new)?;
     if options.method == Method::Certified && args.device != Choice::Processor {
-        return Err(Failure::new("--device is of the sampled encoder; add --encoder sampled"));
+        return Err(Failure::new("--device only applies to the sampled encoder; add --encoder sampled"));
     }
     let sampler = args.device.sampler()?;
     let encoded = watched(&progress, &interrupted, || {

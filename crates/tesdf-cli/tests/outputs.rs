@@ -337,7 +337,10 @@ fn a_full_disk_leaves_the_old_file_and_a_run_its_steps() {
             err.ends_with("hint: `tesdf simulate --resume disk/r.tesrun` continues from there\n"),
             "{err}"
         );
-        assert!(err.ends_with("hint: `tesdf simulate --resume disk/r.tesrun` goes on from there\n"), "{err}");
+        assert!(
+            err.ends_with("hint: `tesdf simulate --resume disk/r.tesrun` continues from there\n"),
+            "{err}"
+        );
         let record = RunRecord::open(folder.path("disk/r.tesrun")).unwrap();
         assert!(record.planned_steps() == Some(500) && (10..500).contains(&record.steps()));
         folder.good(&["simulate", "--resume", "disk/r.tesrun", "-o", "again.tesrun"]);

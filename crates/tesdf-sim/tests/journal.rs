@@ -109,8 +109,8 @@ impl Bench {
         })
     }
 
-    fn open(&self) -> CutRun {
-        CutRun::open(self.folder.path().join("run")).unwrap()
+    fn open(&self) -> InterruptedRun {
+        InterruptedRun::open(self.folder.path().join("run")).unwrap()
     }
 
     fn bytes(&self) -> Vec<u8> {

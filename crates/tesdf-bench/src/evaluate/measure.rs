@@ -75,11 +75,11 @@ impl Setup {
         let asset = watched(&progress, &never, || {
             Encoder::new()
                 .options(self.options.clone())
-                .domain(place.domain())
-                .source(place.source.clone())
+                .domain(subject.domain())
+                .source(subject.source.clone())
                 .sampler(sampler)
                 .progress(&progress)
-                .encode(&place.solid)
+                .encode(&subject.solid)
         });
         let asset = asset.map_err(|e| Failure::new(format!("{}: {e}", subject.source.name)))?;
         Ok((asset, start.elapsed().as_secs_f64()))

@@ -32,7 +32,7 @@ pub fn posed(args: &Args, run: &Path) -> Result<(Posed, Destination), Failure> {
     let system =
         watched(&progress, &interrupted, || loaded.system_watched(&progress)).map_err(|e| match e {
             SceneError::Body { name, reason, .. } => at(&format!("body {name}: {reason}"))
-                .hint("the run holds paths, not meshes; --geometry BODY=FILE says where they are now"),
+                .hint("the run stores paths, not meshes; give their current place with --geometry BODY=FILE"),
             e => Failure::new(e),
         })?;
 

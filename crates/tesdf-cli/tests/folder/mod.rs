@@ -90,7 +90,7 @@ pub fn block(n: u32) -> String {
 }
 
 /// The file of a run that was killed after `steps` steps.
-pub fn cut_run(folder: &Folder, scene: &str, steps: u64) -> Vec<u8> {
+pub fn interrupted_run(folder: &Folder, scene: &str, steps: u64) -> Vec<u8> {
     let loaded = LoadedScene::read(folder.path(scene)).unwrap();
     let system = loaded.system().unwrap();
     let origin = RunOrigin::of(&system, "cpu").unwrap();
