@@ -129,3 +129,13 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Completions(args) => completions::run(args),
     }
 }
+
+/// The programs of the documents compile.
+#[cfg(all(doctest, feature = "gpu"))]
+mod documents {
+    #[doc = include_str!("../../../README.md")]
+    struct Readme;
+
+    #[doc = include_str!("../../../docs/gpu/using.md")]
+    struct UsingAGpu;
+}
