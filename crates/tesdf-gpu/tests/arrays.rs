@@ -6,39 +6,41 @@ use support::bodies::{body, rotation};
 use support::random::Random;
 use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::glam::{DVec3, Vec3};
-use tesdf_gpu::{Device, DeviceAnswers, DeviceArray, GpuError, Images, query, query_arrays};
+use tesdf_gpu::{Device, DeviceAnswers, DeviceArray, GpuError, GpuShapeId, GpuShapes};
 
-/// What a distance may be off by, as a share of the diagonal: what `query` promises, and a point that is rounded to `f32` in the world.
+/// What a distance may be off by, as a share of the diagonal: what `signed_distances` promises, and a point that is rounded to `f32` in the world.
 const DISTANCE: f64 = 4e-6;
 
 #[test]
 fn arrays_get_the_answers_of_a_query() {
     let device = Device::choose(None).expect("a device");
     let (mesh, ball) = (Shape::Mesh(body("l_bracket").asset.clone()), Shape::Sphere { radius: 0.5 });
-    let shapes = [&mesh, &ball];
-    let images = Images::new(&device, &shapes).expect("fits");
+    let shapes = [mesh, ball];
+    let on_device = GpuShapes::upload(&device, &shapes).expect("fits");
+    let ids = on_device.ids();
     let mut random = Random(11);
-    let instances: Vec<(usize, Placement)> = (0..4)
+    let instances: Vec<(GpuShapeId, Placement)> = (0..4)
         .map(|k| {
             let pose = Pose { translation: 0.5 * random.in_cube(), rotation: rotation(&mut random) };
-            (k % 2, Placement { pose, scale: random.between(0.5, 2.0) })
+            (ids[k % 2], Placement { pose, scale: random.between(0.5, 2.0) })
         })
         .collect();
     let mut points: Vec<Vec3> = (0..300).map(|_| (2.0 * random.in_cube()).as_vec3()).collect();
     points[7] = Vec3::new(0.0, f32::INFINITY, 0.0);
     points[8] = Vec3::splat(f32::NAN);
     let world: Vec<DVec3> = points.iter().map(|p| p.as_dvec3()).collect();
-    let expected = query(&device, &images, &shapes, &instances, &world).expect("answers");
+    let expected = on_device.signed_distances(&world, &instances).expect("answers");
     let flat: Vec<f32> = points.iter().flat_map(Vec3::to_array).collect();
     let uploaded = DeviceArray::upload(&device, &flat).expect("fits");
     let answers = DeviceAnswers::empty(&device, instances.len() * points.len()).expect("fits");
-    query_arrays(&device, &images, &shapes, &instances, &uploaded, &answers).expect("fits");
+    on_device.signed_distances_into(&uploaded, &instances, &answers).expect("fits");
     let distances = answers.signed_distances.read(&device).expect("answers");
     let gradients = answers.gradients.read(&device).expect("answers");
     let closest = answers.closest_points.read(&device).expect("answers");
     let faces = answers.faces.read(&device).expect("answers");
-    for (i, (shape, at)) in instances.iter().enumerate() {
-        let size = at.scale * shapes[*shape].diagonal();
+    for (i, (_, at)) in instances.iter().enumerate() {
+        let shape = &shapes[i % 2];
+        let size = at.scale * shape.diagonal();
         for (k, answer) in expected[i].iter().enumerate() {
             let n = i * points.len() + k;
             if k == 7 || k == 8 {
@@ -59,7 +61,7 @@ fn arrays_get_the_answers_of_a_query() {
             assert!((gradient.length() - 1.0).abs() < 1e-5, "{gradient}");
             let back = on + f64::from(distances[n]) * gradient;
             assert!(back.distance(world[k]) < 4.0 * DISTANCE * far, "instance {i}, point {k}: {back}");
-            if let Shape::Mesh(asset) = shapes[*shape] {
+            if let Shape::Mesh(asset) = shape {
                 let corners = asset.face_corners(faces[n] as usize);
                 let to_face = tesdf::geometry::Triangle::new(corners).closest(at.to_shape(on)).distance;
                 assert!(
@@ -75,13 +77,12 @@ fn arrays_get_the_answers_of_a_query() {
 #[test]
 fn arrays_that_do_not_fit_are_errors() {
     let device = Device::choose(None).expect("a device");
-    let shapes = [&Shape::Plane];
-    let images = Images::new(&device, &shapes).expect("fits");
-    let instances = [(0, Placement { pose: Pose::IDENTITY, scale: 1.0 })];
+    let shapes = GpuShapes::upload(&device, &[Shape::Plane]).expect("fits");
+    let instances = [(shapes.ids()[0], Placement { pose: Pose::IDENTITY, scale: 1.0 })];
     let query = |points: &[f32], room: usize| {
         let points = DeviceArray::upload(&device, points).expect("fits");
         let answers = DeviceAnswers::empty(&device, room).expect("fits");
-        query_arrays(&device, &images, &shapes, &instances, &points, &answers).map(|()| answers)
+        shapes.signed_distances_into(&points, &instances, &answers).map(|()| answers)
     };
     let error = query(&[0.0; 4], 2).err().expect("not whole");
     assert_eq!(error.to_string(), "array \"points\" has 4 elements; expected a multiple of 3: x y z each");
@@ -106,15 +107,15 @@ fn pointers_are_for_cuda() {
             return;
         }
     };
-    let shapes = [&Shape::Plane];
-    let images = Images::new(&device, &shapes).expect("fits");
-    let instances = [(0, Placement { pose: Pose::IDENTITY, scale: 1.0 })];
+    let shapes = GpuShapes::upload(&device, &[Shape::Plane]).expect("fits");
+    let instances = [(shapes.ids()[0], Placement { pose: Pose::IDENTITY, scale: 1.0 })];
     let mut answers = DeviceAnswers::empty(&device, 1).expect("fits");
     // SAFETY: both are memory of `array`, which lives on.
-    let points = unsafe { DeviceArray::<f32>::outside(&device, pointer + 4, 3) }.expect("of CUDA");
+    let points = unsafe { DeviceArray::<f32>::from_raw_ptr(&device, pointer + 4, 3) }.expect("of CUDA");
     // SAFETY: as above.
-    answers.signed_distances = unsafe { DeviceArray::<f32>::outside(&device, pointer, 1) }.expect("of CUDA");
-    query_arrays(&device, &images, &shapes, &instances, &points, &answers).expect("fits");
+    answers.signed_distances =
+        unsafe { DeviceArray::<f32>::from_raw_ptr(&device, pointer, 1) }.expect("of CUDA");
+    shapes.signed_distances_into(&points, &instances, &answers).expect("fits");
     assert_eq!(array.read(&device).expect("numbers"), [1.5, 0.0, 0.0, 1.5]);
     device.wait().expect("done");
 }

@@ -14,7 +14,7 @@ use tesdf::domain::ConformingMesh;
 use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset, Refinement};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
-use tesdf_gpu::{Detector, DetectorOptions, DeviceArray, GpuError, Images, query};
+use tesdf_gpu::{Detector, DetectorOptions, DeviceArray, GpuError, GpuShapes};
 
 fn plain() -> EncodeOptions {
     EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Fast) }
@@ -43,14 +43,15 @@ fn distances_are_those_of_the_host() {
         for options in encodings() {
             let asset = encoded(&solid, &domain, &options);
             let shape = Shape::from(asset.clone());
-            let images = Images::new(&device, &[&shape]).expect("fits");
+            let on_device = GpuShapes::upload(&device, std::slice::from_ref(&shape)).expect("fits");
             let (bounds, diagonal) = (shape.bounds(), shape.diagonal());
             // The device's points are off by half a unit in the last place; at borders lists of few faces jump.
             let truncated = asset.about().certificate().truncated();
             let points: Vec<DVec3> =
                 (0..3000).map(|_| bounds.center() + 0.9 * bounds.extent() * random.in_cube()).collect();
             let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
-            let answers = query(&device, &images, &[&shape], &[(0, at)], &points).expect("answers").remove(0);
+            let answers =
+                on_device.signed_distances(&points, &[(on_device.ids()[0], at)]).expect("answers").remove(0);
             let mut others = 0;
             for (p, answer) in points.iter().zip(&answers) {
                 let expected = asset.signed_distance(*p);
@@ -131,14 +132,15 @@ fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
             let array = DeviceArray::upload(&device, &positions(&domain, bend)).expect("fits");
             // Distances.
             let shape = Shape::from(rest.clone());
-            let mut images = Images::new(&device, &[&Shape::Plane, &shape]).expect("fits");
-            images.move_vertices(&device, 1, &array).expect("as many vertices");
+            let shapes = [Shape::Plane, shape.clone()];
+            let mut on_device = GpuShapes::upload(&device, &shapes).expect("fits");
+            let id = on_device.ids()[1];
+            on_device.move_vertices(id, &array).expect("as many vertices");
             let (bounds, diagonal) = (bent.bounds(), shape.diagonal());
             let points: Vec<DVec3> =
                 (0..2000).map(|_| bounds.center() + 0.9 * bounds.extent() * random.in_cube()).collect();
             let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
-            let answers =
-                query(&device, &images, &[&Shape::Plane, &shape], &[(1, at)], &points).expect("answers");
+            let answers = on_device.signed_distances(&points, &[(id, at)]).expect("answers");
             let off = |(p, found): (&DVec3, f64)| (bent.signed_distance(*p) - found).abs();
             let distances = answers[0].iter().map(|a| a.signed_distance);
             let others = points.iter().zip(distances).map(off).filter(|off| *off > 2e-6 * diagonal).count();

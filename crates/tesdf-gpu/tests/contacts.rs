@@ -215,7 +215,8 @@ fn buffers_grow_or_say_what_they_need() {
     let scene = worlds(6, &mut random);
     let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::Face) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
-    let capacities = Capacities { directions: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1, kept: 1 };
+    let capacities =
+        Capacities { ordered_pairs: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1, kept: 1 };
     let little = DetectorOptions { capacities, ..DetectorOptions::default() };
     let (grown, detector) = found(&scene, &options, little);
     assert_eq!(grown.as_slice(), expected.as_slice());
@@ -241,7 +242,7 @@ fn the_same_however_a_polygon_is_worked_on() {
         DetectorOptions { lanes: Lanes::Single, ..usual },
         DetectorOptions { exchange: Exchange::Shared, ..usual },
         DetectorOptions { pruning: Pruning::Bounds, ..usual },
-        DetectorOptions { most_pair_tests: 0, ..usual },
+        DetectorOptions { max_pair_tests: 0, ..usual },
     ] {
         let (other, _) = found(&scene, &options, with);
         let lost = |x: &Contacts, y: &Contacts| {

@@ -49,7 +49,7 @@ fn a_refused_kernel_says_why() {
 #[test]
 fn arguments_are_pointers_then_scalars_and_lengths() {
     let named = |name: &str| SOURCES.iter().find(|s| s.kernel == name).expect("the kernel is listed");
-    let direct = named("query::signed_distances");
+    let direct = named("field::query::signed_distances");
     let parameters = parameters(direct);
     // Shapes, instances, shapes of instances, points, answers, faces: three, one, one, one, one, one.
     let types: Vec<&str> = parameters.iter().map(|p| p.split_whitespace().next().unwrap_or("")).collect();
@@ -65,7 +65,7 @@ fn arguments_are_pointers_then_scalars_and_lengths() {
     let info = between(&direct.text, "struct info_st {", "};");
     let fields: Vec<&str> = info.split_inclusive(';').map(str::trim).filter(|f| !f.is_empty()).collect();
     assert_eq!(fields, ["uint32_t scalars_u32[4];", "uint32_t static_meta[8];"]);
-    let indirect = named("clip::nodes");
+    let indirect = named("middle::nodes::nodes");
     assert!(indirect.count == Count::Indirect && indirect.entry.ends_with("_indirect"));
     assert!(indirect.text.contains(&format!(" {}(", indirect.entry)));
     assert!(
@@ -73,22 +73,29 @@ fn arguments_are_pointers_then_scalars_and_lengths() {
     );
 }
 
-/// The list of kernels is whole: what `src/kernels` marks for launching is on it.
+/// The list of kernels is whole: every kernel of `src/kernels` is on it.
 #[test]
 fn every_kernel_is_listed() {
     let listed: BTreeSet<String> =
         SOURCES.iter().map(|s| s.kernel.split(' ').next().unwrap_or("").to_owned()).collect();
     let mut written = BTreeSet::new();
-    for file in
-        std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("src/kernels")).expect("a folder")
-    {
-        let path = file.expect("a file").path();
-        let text = std::fs::read_to_string(&path).expect("text");
-        let module = path.file_stem().expect("a name").to_string_lossy().into_owned();
-        let names = text.split("#[cube(launch").skip(1).map(|after| between(after, "fn ", "(").to_owned());
-        written.extend(names.map(|name| format!("{module}::{name}")));
-    }
+    add_kernels(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/kernels"), "", &mut written);
     assert_eq!(listed, written);
+}
+
+/// Adds the names of the kernels in a folder, each with its modules.
+fn add_kernels(folder: &Path, modules: &str, names: &mut BTreeSet<String>) {
+    for file in std::fs::read_dir(folder).expect("a folder") {
+        let path = file.expect("a file").path();
+        let module = format!("{modules}{}::", path.file_stem().expect("a name").to_string_lossy());
+        if path.is_dir() {
+            add_kernels(&path, &module, names);
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).expect("text");
+        let kernels = text.split("#[cube(launch").skip(1).map(|after| between(after, "fn ", "("));
+        names.extend(kernels.map(|name| format!("{module}{name}")));
+    }
 }
 
 fn parameters(source: &CudaSource) -> Vec<&str> {

@@ -16,9 +16,7 @@ use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset, Refinement};
 use tesdf::geometry::Triangle;
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
-use tesdf_gpu::{
-    Detector, DetectorOptions, DeviceAnswers, DeviceArray, Images, WorldAnswer, query, query_arrays,
-};
+use tesdf_gpu::{Detector, DetectorOptions, DeviceAnswers, DeviceArray, GpuShapes, WorldAnswer};
 
 /// As a share of the diagonal.
 const DISTANCE: f64 = 2e-6;
@@ -107,7 +105,8 @@ fn distances_and_gradients() {
     for (name, solid) in solids() {
         let (asset, reference) = (encoded(&solid), Reference::new(solid.mesh()));
         let shape = Shape::from(asset);
-        let images = Images::new(&device, &[&shape]).expect("fits");
+        let on_device = GpuShapes::upload(&device, std::slice::from_ref(&shape)).expect("fits");
+        let id = on_device.ids()[0];
         let bounds = shape.bounds();
         let mut points: Vec<DVec3> =
             (0..500).map(|_| bounds.center() + 0.8 * bounds.extent() * random.in_cube()).collect();
@@ -117,7 +116,7 @@ fn distances_and_gradients() {
             points.extend([a, a.midpoint(b), a + 1e-7 * shape.diagonal() * random.direction()]);
         }
         let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
-        let answers = query(&device, &images, &[&shape], &[(0, at)], &points).expect("answers").remove(0);
+        let answers = on_device.signed_distances(&points, &[(id, at)]).expect("answers").remove(0);
         for (p, answer) in points.iter().zip(&answers) {
             let expected = reference.signed_distance(*p);
             check_answer(&name, *p, answer, expected, shape.diagonal() + expected.abs());
@@ -126,7 +125,7 @@ fn distances_and_gradients() {
         let flat: Vec<f32> = points.iter().flat_map(|p| p.as_vec3().to_array()).collect();
         let uploaded = DeviceArray::upload(&device, &flat).expect("fits");
         let arrays = DeviceAnswers::empty(&device, points.len()).expect("fits");
-        query_arrays(&device, &images, &[&shape], &[(0, at)], &uploaded, &arrays).expect("fits");
+        on_device.signed_distances_into(&uploaded, &[(id, at)], &arrays).expect("fits");
         let gradients = arrays.gradients.read(&device).expect("answers");
         for g in gradients.chunks(3) {
             let length = g.iter().map(|x| x * x).sum::<f32>().sqrt();
@@ -194,10 +193,11 @@ fn what_collapses_on_the_device() {
             &|p| p.with_z(middle.z + 1e-8 * (p.z - middle.z)),
         ];
         for (k, collapse) in collapses.into_iter().enumerate() {
-            let mut images = Images::new(&device, &[&shape]).expect("fits");
+            let mut on_device = GpuShapes::upload(&device, std::slice::from_ref(&shape)).expect("fits");
+            let id = on_device.ids()[0];
             let positions = positions(&domain, collapse);
             let array = DeviceArray::upload(&device, &positions).expect("fits");
-            images.move_vertices(&device, 0, &array).expect("as many vertices");
+            on_device.move_vertices(id, &array).expect("as many vertices");
             let corner = |v: &u32| {
                 let at = 3 * *v as usize;
                 DVec3::new(positions[at].into(), positions[at + 1].into(), positions[at + 2].into())
@@ -212,14 +212,14 @@ fn what_collapses_on_the_device() {
             let out = |random: &mut Random| middle + random.between(0.8, 1.5) * diagonal * random.direction();
             let points: Vec<DVec3> = (0..300).map(|_| out(&mut random)).collect();
             let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
-            let answers = query(&device, &images, &[&shape], &[(0, at)], &points).expect("answers").remove(0);
+            let answers = on_device.signed_distances(&points, &[(id, at)]).expect("answers").remove(0);
             for (p, answer) in points.iter().zip(&answers) {
                 let least = faces.iter().map(|t| t.closest(*p).distance).fold(f64::INFINITY, f64::min);
                 check_answer(&format!("collapse {k}"), *p, answer, least, 2.0 * diagonal);
             }
             // On what has collapsed.
             let points: Vec<DVec3> = faces.iter().map(|t| t.corners[0]).collect();
-            let answers = query(&device, &images, &[&shape], &[(0, at)], &points).expect("answers").remove(0);
+            let answers = on_device.signed_distances(&points, &[(id, at)]).expect("answers").remove(0);
             for (p, answer) in points.iter().zip(&answers) {
                 assert!((answer.gradient.length() - 1.0).abs() < 1e-5, "collapse {k}: {p}: {answer:?}");
                 assert!(answer.signed_distance.is_finite());

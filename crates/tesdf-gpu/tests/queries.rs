@@ -6,7 +6,7 @@ use support::bodies::{body, rotation};
 use support::random::Random;
 use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::glam::DVec3;
-use tesdf_gpu::{Device, Images, query};
+use tesdf_gpu::{Device, GpuShapeId, GpuShapes};
 
 /// What a distance may be off by, as a share of the diagonal: twice what `f32` queries of the host promise.
 const DISTANCE: f64 = 2e-6;
@@ -18,9 +18,8 @@ fn distances_are_those_of_the_host() {
     let mut random = Random(7);
     let names = ["tetra", "cube", "l_bracket", "torus_quads", "beam", "iso_m16_bolt_6k", "spoon", "spot"];
     let shapes: Vec<Shape> = names.iter().map(|n| Shape::Mesh(body(n).asset.clone())).collect();
-    let shapes: Vec<&Shape> = shapes.iter().collect();
-    let images = Images::new(&device, &shapes).expect("fits");
-    for (number, shape) in shapes.iter().enumerate() {
+    let uploaded = GpuShapes::upload(&device, &shapes).expect("fits");
+    for ((number, shape), id) in shapes.iter().enumerate().zip(uploaded.ids()) {
         let Shape::Mesh(asset) = shape else { unreachable!("all are meshes") };
         let (bounds, diagonal) = (asset.bounds(), shape.diagonal());
         // A scale that is no power of two, and far from the origin.
@@ -37,7 +36,7 @@ fn distances_are_those_of_the_host() {
             points.push(bounds.center() + 30.0 * diagonal * random.direction());
         }
         let world: Vec<DVec3> = points.iter().map(|p| at.to_world(*p)).collect();
-        let answers = query(&device, &images, &shapes, &[(number, at)], &world).expect("answers").remove(0);
+        let answers = uploaded.signed_distances(&world, &[(id, at)]).expect("answers").remove(0);
         let mut off: f64 = 0.0;
         for (p, answer) in points.iter().zip(&answers) {
             let expected = at.scale * asset.signed_distance(*p);
@@ -73,32 +72,34 @@ fn points_times_instances() {
     let ball = Shape::Sphere { radius: 0.5 };
     let block = Shape::Box { half_extents: DVec3::new(0.1, 0.2, 0.3) };
     let rod = Shape::Capsule { half_height: 1.0, radius: 0.25 };
-    let shapes = [&mesh, &ball, &block, &rod, &Shape::Plane];
-    let images = Images::new(&device, &shapes).expect("fits");
+    let shapes = [mesh, ball, block, rod, Shape::Plane];
+    let uploaded = GpuShapes::upload(&device, &shapes).expect("fits");
+    let ids = uploaded.ids();
     let mut random = Random(3);
-    let instances: Vec<(usize, Placement)> = (0..shapes.len())
+    let instances: Vec<(GpuShapeId, Placement)> = (0..shapes.len())
         .chain(0..3)
         .map(|shape| {
             let pose = Pose { translation: 0.3 * random.in_cube(), rotation: rotation(&mut random) };
-            (shape, Placement { pose, scale: random.between(0.5, 2.0) })
+            (ids[shape], Placement { pose, scale: random.between(0.5, 2.0) })
         })
         .collect();
     let mut points: Vec<DVec3> = (0..100).map(|_| 2.0 * random.in_cube()).collect();
     points.push(DVec3::new(f64::NAN, 0.0, 0.0));
-    let answers = query(&device, &images, &shapes, &instances, &points).expect("answers");
+    let answers = uploaded.signed_distances(&points, &instances).expect("answers");
     // Without the point that is no number, which equals nothing.
-    let again = query(&device, &images, &shapes, &instances, &points[..100]).expect("answers");
+    let again = uploaded.signed_distances(&points[..100], &instances).expect("answers");
     let same = answers.iter().zip(&again).all(|(x, y)| x[..100] == y[..]);
     assert!(same, "two runs differ");
     assert_eq!(answers.len(), instances.len());
-    for ((shape, at), answers) in instances.iter().zip(&answers) {
+    for ((id, at), answers) in instances.iter().zip(&answers) {
+        let shape = ids.iter().position(|other| other == id).expect("of these");
         for (p, answer) in points.iter().zip(answers) {
             if !p.is_finite() {
                 assert!(answer.signed_distance.is_nan());
                 continue;
             }
             let local = at.to_shape(*p);
-            let expected = match shapes[*shape] {
+            let expected = match &shapes[shape] {
                 Shape::Mesh(asset) => asset.signed_distance(local),
                 Shape::Plane => local.z,
                 Shape::Sphere { radius } => local.length() - radius,
@@ -121,11 +122,12 @@ fn points_times_instances() {
 #[test]
 fn what_cannot_be_is_an_error() {
     let device = Device::choose(None).expect("a device");
-    let shapes = [&Shape::Plane];
-    let images = Images::new(&device, &shapes).expect("fits");
+    let shapes = GpuShapes::upload(&device, &[Shape::Plane]).expect("fits");
+    let others = GpuShapes::upload(&device, &[(); 4].map(|()| Shape::Plane)).expect("fits");
     let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
-    let error =
-        query(&device, &images, &shapes, &[(0, at), (3, at)], &[DVec3::ZERO]).expect_err("no shape 3");
+    let error = shapes
+        .signed_distances(&[DVec3::ZERO], &[(shapes.ids()[0], at), (others.ids()[3], at)])
+        .expect_err("no shape 3");
     assert_eq!(error.to_string(), "instance 1: shape 3; expected one of 1");
     let error = Device::choose(Some("no such device")).expect_err("no such device");
     assert!(

@@ -191,7 +191,8 @@ fn buffers_grow_or_say_what_they_need() {
     let options = CollideOptions { reduction: Reduction::PerPair(8), ..all };
     let (expected, detector) = detected(&scene, &options, DetectorOptions::default());
     let launches = detector.report().launches;
-    let capacities = Capacities { directions: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1, kept: 1 };
+    let capacities =
+        Capacities { ordered_pairs: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1, kept: 1 };
     let little = DetectorOptions { capacities, ..DetectorOptions::default() };
     let (grown, mut detector) = detected(&scene, &options, little);
     assert_eq!((grown.as_slice(), &grown.reductions), (expected.as_slice(), &expected.reductions));

@@ -105,7 +105,9 @@ fn measure(
         Stage { name, phase: phase(&reports[0].stages, k), ms }
     };
     let stages = (0..reports.first().map_or(0, |r| r.stages.len())).map(stage).collect();
-    let count = |k: usize| Spread::of(reports.iter().map(|r| f64::from(r.counts[k])).collect());
+    let count = |value: fn(&tesdf_gpu::Counts) -> u32| {
+        Spread::of(reports.iter().map(|r| f64::from(value(&r.counts))).collect())
+    };
     let bytes = |value: fn(&tesdf_gpu::DeviceReport) -> usize| {
         Spread::of(reports.iter().map(|r| value(r) as f64).collect())
     };
@@ -113,16 +115,16 @@ fn measure(
     Ok(Measured {
         stages,
         counts: Counts {
-            directions: count(0),
-            meshlets: count(2),
-            queries: count(3),
-            contacts: count(4),
-            filtered: count(5),
-            kept: (options.reduction != Reduction::None).then(|| count(14)),
-            candidates: count(6),
+            directions: count(|c| c.ordered_pairs),
+            meshlets: count(|c| c.meshlets),
+            queries: count(|c| c.polygons),
+            contacts: count(|c| c.contacts),
+            filtered: count(|c| c.filtered),
+            kept: (options.reduction != Reduction::None).then(|| count(|c| c.kept)),
+            candidates: count(|c| c.candidates),
             queries_unpruned: None,
-            evaluations: Some(count(8)),
-            distances: Some(count(9)),
+            evaluations: Some(count(|c| c.evaluations)),
+            distances: Some(count(|c| c.distances)),
         },
         bytes: Bytes {
             sent: bytes(|r| r.sent),
@@ -130,10 +132,10 @@ fn measure(
             shapes_table: held.shapes.table,
             shapes_words: held.shapes.words,
             shapes_rows: held.shapes.rows,
-            products: held.products.iter().map(|(_, bytes)| bytes).sum(),
+            products: held.pipeline.iter().map(|(_, bytes)| bytes).sum(),
             total: held.with_instances(frames.scene.instances().len()),
             per_instance: held.per_instance,
-            products_by_buffer: held.products,
+            products_by_buffer: held.pipeline,
         },
         wall_ms: Spread::of(walls),
     })

@@ -22,9 +22,9 @@ impl Row {
             number,
             name: info.name,
             kind: info.kind.to_string(),
-            plane: info.plane,
-            plane_operations: info.has_plane_operations,
-            most_buffer_bytes: info.most_bytes,
+            plane: info.subgroup_size,
+            plane_operations: info.has_subgroup_operations,
+            most_buffer_bytes: info.max_buffer_bytes,
             timestamps: info.has_timestamps,
         }
     }

@@ -1,4 +1,4 @@
-//! What runs launches on a CUDA device.
+//! The server that runs launches on a CUDA device.
 use std::collections::HashMap;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -107,8 +107,8 @@ fn id(index: usize) -> DeviceId {
     DeviceId::new(0, index as u16)
 }
 
-/// A buffer that is memory of others; none on a device that is not of this server.
-pub fn outside(client: &Client, pointer: u64, bytes: u64) -> Option<Handle> {
+/// A buffer in memory that others allocated; `None` on a device that is not of this server.
+pub fn from_raw_ptr(client: &Client, pointer: u64, bytes: u64) -> Option<Handle> {
     let device = client.service_id().device;
     if client.service_id() != ServiceId::of::<CudaServer>(device) {
         return None;

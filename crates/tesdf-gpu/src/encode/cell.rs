@@ -2,8 +2,8 @@ use bytemuck::{Pod, Zeroable};
 use tesdf::encode::{SampledCell, Sampling};
 use tesdf::glam::DVec3;
 
-use crate::kernels::sample::{BLOCK, CELL_ROWS, block_limit};
-use crate::kernels::vector::V3;
+use crate::kernels::encode::sample::{BLOCK, CELL_ROWS, block_limit};
+use crate::kernels::math::vector::V3;
 
 /// The samples of a cell, in blocks.
 pub struct Grid {

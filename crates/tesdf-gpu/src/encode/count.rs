@@ -8,7 +8,7 @@ use tesdf::encode::{EncodeError, SampledCell, Sampler, Sampling};
 
 use super::cell::{CellRows, Grid};
 use super::face::CandidateFace;
-use crate::kernels::sample::{GROUP, TILE, squared_distance};
+use crate::kernels::encode::sample::{GROUP, TILE};
 
 /// A [`Sampler`] that counts distances and measures next to none: its lists are of no use.
 #[derive(Debug)]
@@ -28,7 +28,7 @@ pub struct SampleCounts {
     /// What Lemma 1 leaves, over all cells.
     pub candidates: u64,
     /// And in the cell where that is most.
-    pub most_candidates: u64,
+    pub max_candidates: u64,
     /// Pairs of a sample and a candidate of its cell: the distances of Algorithm 1. Lines 12 and 14 each take them all.
     pub pairs: u64,
     /// Distances that choose the candidates of the blocks.
@@ -90,7 +90,7 @@ impl Sampler for SampleCounter {
             let candidates = cell.faces.len() as u64;
             let times = if cell.faces.len() > TILE { 3 } else { 2 };
             counts.candidates += candidates;
-            counts.most_candidates = counts.most_candidates.max(candidates);
+            counts.max_candidates = counts.max_candidates.max(candidates);
             counts.pairs += samples * candidates;
             counts.looks += times * blocks * candidates;
         }
@@ -131,7 +131,7 @@ impl SampleCounter {
         let step = grid.blocks.len().div_ceil(self.blocks);
         for &block in grid.blocks.iter().skip(step / 2).step_by(step) {
             let middle = rows.middle(block, grid.resolution);
-            let squared: Vec<f32> = faces.iter().map(|&f| squared_distance(f, middle)).collect();
+            let squared: Vec<f32> = faces.iter().map(|&f| f.squared_distance(middle)).collect();
             let nearest = squared.iter().copied().fold(f32::INFINITY, f32::min).sqrt();
             let limit = rows.block_limit(nearest);
             groups += 1;

@@ -1,8 +1,8 @@
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
-use crate::kernels::sample::{Candidate, FACE_ROWS, Row};
-use crate::kernels::vector::V3;
+use crate::kernels::encode::sample::{self, Candidate, Entry, FACE_ROWS};
+use crate::kernels::math::vector::V3;
 
 /// What of a face does not depend on the cell.
 pub struct CandidateFace {
@@ -52,10 +52,12 @@ impl CandidateFace {
 
     /// As the kernel has it, on the host.
     pub fn candidate(&self, center: DVec3) -> Candidate {
-        let row = |[x, y, z, number]: [f32; 4]| Row { vector: V3 { x, y, z }, number };
+        let entry = |[x, y, z, number]: [f32; 4]| Entry { vector: V3 { x, y, z }, number };
         let [plane, side_0, side_1, side_2, begin_0, end_0, begin_1, end_1, begin_2, end_2] =
-            self.rows(center).map(row);
-        Candidate { plane, side_0, side_1, side_2, begin_0, end_0, begin_1, end_1, begin_2, end_2 }
+            self.rows(center).map(entry);
+        let [edge_0, edge_1, edge_2] = [(begin_0, end_0), (begin_1, end_1), (begin_2, end_2)]
+            .map(|(begin, end)| sample::Edge { begin, end });
+        Candidate { plane, side_0, side_1, side_2, edge_0, edge_1, edge_2 }
     }
 }
 
@@ -64,7 +66,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::kernels::sample::{ROUNDING, squared_distance};
+    use crate::kernels::encode::sample::ROUNDING;
     use crate::testing::{degenerate, exact};
 
     /// Numbers from −1 to 1.
@@ -100,7 +102,7 @@ mod tests {
             let face = CandidateFace::new(&triangle).candidate(center);
             for _ in 0..10 {
                 let p = (radius * random.point() / 3f64.sqrt()).as_vec3();
-                let found = squared_distance(face, V3 { x: p.x, y: p.y, z: p.z });
+                let found = face.squared_distance(V3 { x: p.x, y: p.y, z: p.z });
                 let expected = triangle.closest(center + p.as_dvec3()).distance;
                 let off = (f64::from(found).sqrt() - expected).abs() / (radius + expected);
                 assert!(off <= DISTANCE, "{off} at {p} of {corners:?} from {center}");
@@ -123,7 +125,7 @@ mod tests {
             let offset = (radius * DVec3::from_array(way)).as_vec3();
             let center = p - offset.as_dvec3();
             let face = CandidateFace::new(&Triangle::new(corners)).candidate(center);
-            let squared = squared_distance(face, V3 { x: offset.x, y: offset.y, z: offset.z });
+            let squared = face.squared_distance(V3 { x: offset.x, y: offset.y, z: offset.z });
             let found = f64::from(squared).sqrt();
             let exact = exact::squared_distance(center + offset.as_dvec3(), corners);
             prop_assert!(exact::is_root(found, &exact, DISTANCE * (radius + found)), "{found}, cell of {radius}");

@@ -1,6 +1,6 @@
 //! The list of all kernels, in each variant that the host launches.
 //!
-//! What has to be done to every kernel, such as compiling it for CUDA, is done to this list. A test fails for a kernel that is not on it.
+//! Checks of all kernels, such as compiling them for CUDA, go over this list. A test fails for a kernel that is not on it.
 use std::sync::Arc;
 
 use cubecl::ir::{DeviceProperties, TargetProperties};
@@ -9,12 +9,21 @@ use cubecl::server::Handle;
 use cubecl_common::device::{DeviceId, ServiceId};
 use cubecl_environment::stream::StreamId;
 
-use super::assets::AssetsLaunch;
-use super::{
-    broad, choice, clip, deform, exact, hidden, members, narrow, outside, pairs, products, query, reduce,
-    sample,
-};
-
+use super::broad::meshlets::BlocksLaunch;
+use super::broad::ordered_pair::OrderedPairsLaunch;
+use super::broad::pairs::{FoundLaunch, InstancesLaunch, PairsLaunch};
+use super::counters::{self, CountersLaunch};
+use super::deform::bounds::MovingLaunch;
+use super::encode::sample::SamplesLaunch;
+use super::field::query;
+use super::field::shapes::ShapesLaunch;
+use super::middle::items::{ItemsLaunch, PolygonsLaunch};
+use super::narrow::contacts::ContactsLaunch;
+use super::narrow::exact::AskedExactLaunch;
+use super::narrow::exchange::{LANES, Variant};
+use super::narrow::faces::AskedLaunch;
+use super::reduce::members::{MembersLaunch, TouchingLaunch};
+use super::{broad, deform, encode, field, middle, narrow, reduce};
 use crate::cuda::Count;
 
 /// A kernel that can be compiled.
@@ -26,120 +35,154 @@ pub struct Named {
     pub kernel: Box<dyn CubeKernel>,
 }
 
-/// All of them.
-pub fn kernels(device: &Arc<DeviceProperties>, target: &Arc<TargetProperties>) -> Vec<Named> {
+/// Adds kernels to a list: how each is launched, the kernel, threads of a group, arguments as in the Rust function;
+/// variants are told apart by the text after `;`.
+macro_rules! kernels {
+    ($all:ident, $device:ident, $target:ident;
+     $($count:ident $($path:ident)::+, $threads:expr, ($($argument:expr),* $(,)?) $(; $variant:expr)?;;)*) => {
+        $($all.push(Named {
+            count: Count::$count,
+            name: [stringify!($($path)::+).replace(' ', ""), $(format!(" {}", $variant))?].concat(),
+            kernel: Box::new($($path)::+::create_dummy_kernel(
+                $device.clone(),
+                $target.clone(),
+                CubeCount::Static(1, 1, 1),
+                CubeDim::new_1d($threads),
+                $($argument),*
+            )),
+        });)*
+    };
+}
+
+type Device = Arc<DeviceProperties>;
+type Target = Arc<TargetProperties>;
+
+/// All kernels.
+pub fn kernels(device: &Device, target: &Target) -> Vec<Named> {
     let mut all = Vec::new();
-    /// How it is launched, kernel, threads of a group, arguments as in the Rust function; what follows `;` tells variants apart.
-    macro_rules! kernel {
-        ($count:ident $($path:ident)::+, $threads:expr, ($($argument:expr),* $(,)?) $(; $variant:expr)?) => {
-            all.push(Named {
-                count: Count::$count,
-                name: [stringify!($($path)::+).replace(' ', ""), $(format!(" {}", $variant))?].concat(),
-                kernel: Box::new($($path)::+::create_dummy_kernel(
-                    device.clone(),
-                    target.clone(),
-                    CubeCount::Static(1, 1, 1),
-                    CubeDim::new_1d($threads),
-                    $($argument),*
-                )),
-            })
-        };
-    }
-    let counted =
-        [products::BLOCKS, products::MESHLETS, products::POLYGONS, products::CONTACTS, products::TOUCHING];
-    kernel!(Direct pairs::instance_bounds, 64, (assets(), rows(), words(), words(), rows(), 1, 0.0));
-    kernel!(
-        Direct pairs::instance_pairs,
-        64,
-        (assets(), rows(), rows(), words(), words(), words(), words(), rows(), words(), 1, 0, 0.0, 1, 1)
-    );
-    kernel!(
-        Direct pairs::given_pairs,
-        64,
-        (assets(), rows(), words(), words(), words(), words(), rows(), words(), 1, 0.0, 1, 1)
-    );
-    kernel!(Direct deform::follow, 64, (words(), words(), rows(), words(), rows(), 0));
-    kernel!(Direct deform::refit, deform::GROUP, (words(), words(), rows(), words(), rows(), 0));
-    for product in counted {
-        kernel!(Direct products::groups_for, 1, (words(), words(), 1, 1, product); product);
-    }
-    let group = narrow::LANES;
-    kernel!(Indirect broad::meshlets, group, (assets(), words(), rows(), words(), words(), words(), 1, 1, 1));
-    kernel!(Indirect clip::nodes, group, (assets(), words(), rows(), words(), words(), words(), 1, 1, 1));
-    kernel!(
-        Indirect clip::polygons,
-        group,
-        (assets(), words(), rows(), words(), words(), words(), rows(), 1, 1, 1)
-    );
-    kernel!(
-        Indirect hidden::hidden,
-        group,
-        (assets(), words(), rows(), words(), words(), words(), 1, 1)
-    );
-    kernel!(
-        Indirect outside::outside_polygons,
-        group,
-        (assets(), words(), rows(), words(), words(), words(), rows(), 1, 1, 1)
-    );
-    kernel!(
-        Indirect narrow::narrow_nodes,
-        64,
-        (assets(), words(), rows(), words(), words(), words(), rows(), 1, 1)
-    );
-    for (lanes, planes, counting) in [
-        (group, true, false),
-        (group, false, false),
-        (1, true, false),
-        (1, false, false),
-        (group, true, true),
-        (group, false, true),
-        (1, true, true),
-        (1, false, true),
-    ] {
-        kernel!(
-            Indirect narrow::narrow_faces, group,
-            (assets(), words(), rows(), words(), rows(), words(), words(), rows(), 1, 0.0, 1, 1, lanes, planes, counting);
-            format!(
-                "{lanes} lanes, {}{}",
-                if planes { "planes" } else { "shared memory" },
-                if counting { ", counting" } else { "" }
-            )
-        );
-    }
-    kernel!(
-        Indirect exact::narrow_exact,
-        group,
-        (assets(), words(), rows(), words(), rows(), words(), words(), rows(), words(), 0.0, 1, 1)
-    );
-    kernel!(Direct members::clear, members::GROUP, (words(), 1));
-    kernel!(Indirect members::count, members::GROUP, (words(), words(), words(), 1));
-    kernel!(Direct members::place, members::GROUP, (words(), words(), words(), words(), 1));
-    kernel!(
-        Indirect members::fill,
-        members::GROUP,
-        (words(), rows(), words(), rows(), words(), words(), words(), rows(), 1)
-    );
-    kernel!(
-        Indirect reduce::reduce,
-        choice::GROUP,
-        (words(), rows(), words(), words(), words(), rows(), rows(), words(), rows(), 1, 1, 1)
-    );
-    kernel!(Direct query::signed_distances, 64, (assets(), rows(), words(), rows(), rows(), words(), 1, 0, 1));
-    kernel!(
-        Direct query::world_distances,
-        64,
-        (assets(), rows(), words(), words(), words(), words(), words(), words(), 1, 1)
-    );
-    kernel!(
-        Direct sample::sample,
-        sample::GROUP as u32,
-        (rows(), rows(), words(), words(), words(), 1, 1, 0, 1)
-    );
+    add_shapes(&mut all, device, target);
+    add_broad(&mut all, device, target);
+    add_middle(&mut all, device, target);
+    add_narrow(&mut all, device, target);
+    add_reduce(&mut all, device, target);
     all
 }
 
-fn assets() -> AssetsLaunch {
-    AssetsLaunch::new(words(), words(), rows())
+/// Queries, deformation and encoding.
+fn add_shapes(all: &mut Vec<Named>, device: &Device, target: &Target) {
+    let instances = || query::InstancesLaunch::new(rows(), words());
+    let answers = || query::AnswersLaunch::new(rows(), words());
+    let world = || query::WorldAnswersLaunch::new(words(), words(), words(), words());
+    let moving = || MovingLaunch::new(words(), words(), rows(), words(), rows(), 0);
+    let samples = || SamplesLaunch::new(rows(), rows(), words(), words(), 1, 1);
+    let batch = query::BatchLaunch::new(1, 0, 1);
+    let group = encode::sample::GROUP as u32;
+    kernels!(all, device, target;
+        Direct field::query::signed_distances, 64, (shapes(), instances(), rows(), answers(), batch);;
+        Direct field::query::world_distances, 64, (shapes(), instances(), words(), world(), 1, 1);;
+        Direct deform::follow::follow, 64, (moving());;
+        Direct deform::refit::refit, deform::refit::GROUP, (moving());;
+        Direct encode::sample::sample, group, (samples(), words(), 0, 1);;
+    );
+}
+
+/// Instance pairs and meshlets; groups of launches.
+fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
+    let instances = || InstancesLaunch::new(rows(), words(), 1, 0.0);
+    let some = || PairsLaunch::new(words(), 0);
+    let found = || FoundLaunch::new(pairs(), blocks());
+    kernels!(all, device, target;
+        Direct broad::pairs::instance_bounds, 64, (shapes(), instances(), counters(), rows());;
+        Direct broad::pairs::instance_pairs, 64, (shapes(), instances(), rows(), some(), counters(), found());;
+        Direct broad::pairs::given_pairs, 64, (shapes(), instances(), some(), counters(), found());;
+        Indirect broad::meshlets::meshlets, LANES, (shapes(), pairs(), blocks(), counters(), blocks(), 1);;
+    );
+    for counter in
+        [counters::BLOCKS, counters::MESHLETS, counters::POLYGONS, counters::CONTACTS, counters::TOUCHING]
+    {
+        kernels!(all, device, target;
+            Direct counters::groups_for, 1, (counters(), words(), 1, 1, counter); counter;;
+        );
+    }
+}
+
+/// Nodes, polygons and hidden overlaps.
+fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
+    kernels!(all, device, target;
+        Indirect middle::nodes::nodes, LANES, (shapes(), pairs(), blocks(), counters(), items(), 1);;
+        Indirect middle::clip::clip_polygons, LANES,
+            (shapes(), pairs(), blocks(), counters(), polygons(), 1);;
+        Indirect middle::outside::outside_polygons, LANES,
+            (shapes(), pairs(), blocks(), counters(), polygons(), 1);;
+        Indirect middle::hidden::hidden, LANES, (shapes(), pairs(), blocks(), counters(), words(), 1);;
+    );
+}
+
+/// Contacts.
+fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
+    let exact = || AskedExactLaunch::new(words(), 0.0);
+    kernels!(all, device, target;
+        Indirect narrow::nodes::narrow_nodes, 64, (shapes(), pairs(), items(), counters(), contacts());;
+        Indirect narrow::exact::narrow_exact, LANES,
+            (shapes(), pairs(), polygons(), counters(), contacts(), exact());;
+    );
+    for counting in [false, true] {
+        for lanes in [LANES, 1] {
+            for subgroups in [true, false] {
+                let variant = Variant { lanes, subgroups, counting };
+                let exchange = if subgroups { "subgroups" } else { "shared memory" };
+                let counting = if counting { ", counting" } else { "" };
+                kernels!(all, device, target;
+                    Indirect narrow::faces::narrow_faces, LANES,
+                        (shapes(), pairs(), polygons(), counters(), contacts(), AskedLaunch::new(1, 0.0), variant);
+                        format!("{lanes} lanes, {exchange}{counting}");;
+                );
+            }
+        }
+    }
+}
+
+/// Reduced contacts.
+fn add_reduce(all: &mut Vec<Named>, device: &Device, target: &Target) {
+    let group = reduce::members::GROUP;
+    let touching = || TouchingLaunch::new(words(), 1);
+    let members = || MembersLaunch::new(words(), rows());
+    kernels!(all, device, target;
+        Direct reduce::members::clear, group, (words(), 1);;
+        Indirect reduce::members::count, group, (contacts(), counters(), words());;
+        Direct reduce::members::allot, group, (pairs(), counters(), words(), touching());;
+        Indirect reduce::members::fill, group, (pairs(), contacts(), counters(), words(), members());;
+        Indirect reduce::reduce::reduce, reduce::choice::GROUP,
+            (contacts(), counters(), touching(), members(), rows(), contacts(), 1);;
+    );
+}
+
+fn shapes() -> ShapesLaunch {
+    ShapesLaunch::new(words(), words(), rows())
+}
+
+fn counters() -> CountersLaunch {
+    CountersLaunch::new(words())
+}
+
+fn pairs() -> OrderedPairsLaunch {
+    OrderedPairsLaunch::new(words(), rows(), 1)
+}
+
+fn blocks() -> BlocksLaunch {
+    BlocksLaunch::new(words(), 1)
+}
+
+fn items() -> ItemsLaunch {
+    ItemsLaunch::new(words(), 1)
+}
+
+fn polygons() -> PolygonsLaunch {
+    PolygonsLaunch::new(items(), rows())
+}
+
+fn contacts() -> ContactsLaunch {
+    ContactsLaunch::new(words(), rows(), 1)
 }
 
 /// A buffer of words or `f32`.

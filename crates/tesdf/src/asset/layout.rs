@@ -94,12 +94,25 @@ pub enum Node {
     NotOfDomain,
 }
 
-const LEAF: u32 = 1 << 31;
-const CODE: u32 = 28;
+/// The bit of a word of the forest or of the face tree that says "no children".
+pub const LEAF: u32 = 1 << 31;
+/// The lowest bit of a cell's code.
+pub const CODE: u32 = 28;
+/// Code of a cell outside, with a list.
+pub const OUTSIDE: u32 = 0;
+/// Code of a cell inside, with a list.
+pub const INSIDE: u32 = 1;
+/// Code of a crossing cell with winding number 0; the winding number is added.
+pub const CROSSING: u32 = 2;
+/// Code of a cell without a list; its offset is 1 inside, 0 outside.
+pub const FAR: u32 = 6;
+/// Code of a cell that is not of the domain.
+pub const NOT_OF_DOMAIN: u32 = 7;
 /// The offsets of lists are below this.
 pub const MAX_LIST_OFFSET: u32 = 1 << CODE;
 /// From this winding number on, the number is written before the list.
 pub const LONG_WINDING: u32 = 3;
+const LONG_CROSSING: u32 = CROSSING + LONG_WINDING;
 
 impl Node {
     /// Whether the word is that of a bisected cell. The word is then the place of its children.
@@ -116,16 +129,16 @@ impl Node {
         }
         let offset = word & (MAX_LIST_OFFSET - 1);
         match (word >> CODE) & 7 {
-            0 => Self::Listed(Label::Outside, offset),
-            1 => Self::Listed(Label::Inside, offset),
-            code @ 2..=4 => Self::Listed(Label::Crossing(code - 2), offset),
-            5 => {
+            OUTSIDE => Self::Listed(Label::Outside, offset),
+            INSIDE => Self::Listed(Label::Inside, offset),
+            code @ CROSSING..LONG_CROSSING => Self::Listed(Label::Crossing(code - CROSSING), offset),
+            LONG_CROSSING => {
                 let at = (offset as usize).checked_sub(4);
                 let bytes = at.and_then(|at| lists.get(at..)?.first_chunk::<4>());
                 Self::Listed(Label::Crossing(bytes.map_or(0, |b| u32::from_le_bytes(*b))), offset)
             }
-            6 if offset == 1 => Self::Far(Side::Inside),
-            6 => Self::Far(Side::Outside),
+            FAR if offset == 1 => Self::Far(Side::Inside),
+            FAR => Self::Far(Side::Outside),
             _ => Self::NotOfDomain,
         }
     }
@@ -136,14 +149,14 @@ impl Node {
             Self::Split(children) => children,
             Self::Listed(label, offset) => {
                 let code = match label {
-                    Label::Outside => 0,
-                    Label::Inside => 1,
-                    Label::Crossing(winding) => 2 + winding.min(LONG_WINDING),
+                    Label::Outside => OUTSIDE,
+                    Label::Inside => INSIDE,
+                    Label::Crossing(winding) => CROSSING + winding.min(LONG_WINDING),
                 };
                 LEAF | code << CODE | offset
             }
-            Self::Far(side) => LEAF | 6 << CODE | u32::from(side == Side::Inside),
-            Self::NotOfDomain => LEAF | 7 << CODE,
+            Self::Far(side) => LEAF | FAR << CODE | u32::from(side == Side::Inside),
+            Self::NotOfDomain => LEAF | NOT_OF_DOMAIN << CODE,
         }
     }
 }

@@ -103,7 +103,7 @@ fn row(args: &Args, input: &Input, name: DomainName) -> Result<(), Failure> {
         format!("{name:?}"),
         counts.cells.to_string(),
         format!("{:.0}", counts.candidates as f64 / counts.cells.max(1) as f64),
-        counts.most_candidates.to_string(),
+        counts.max_candidates.to_string(),
         counts.samples.to_string(),
         format!("{:.2e}", counts.pairs as f64),
         seconds(2.0 * counts.pairs as f64),

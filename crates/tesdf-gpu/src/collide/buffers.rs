@@ -1,0 +1,168 @@
+//! Pipeline buffers: memory between the stages.
+use super::Capacities;
+use crate::GpuError;
+use crate::device::{Buffer, Device};
+use crate::kernels::broad::meshlets::{BlocksLaunch, WORDS as BLOCK_WORDS};
+use crate::kernels::broad::ordered_pair::{OrderedPairsLaunch, ROWS as PAIR_ROWS, WORDS as PAIR_WORDS};
+use crate::kernels::broad::pairs::FoundLaunch;
+use crate::kernels::middle::items::{ItemsLaunch, PolygonsLaunch, ROWS as POLYGON_ROWS, WORDS as ITEM_WORDS};
+use crate::kernels::narrow::contacts::{ContactsLaunch, ROWS as CONTACT_ROWS, WORDS as CONTACT_WORDS};
+use crate::kernels::reduce::members::{MembersLaunch, ROWS as MEMBER_ROWS, TOUCHING_WORDS, TouchingLaunch};
+use crate::kernels::reduce::reduce::REPORT_ROWS;
+
+/// Bytes of a word and of a row of four `f32`.
+pub const WORD: usize = 4;
+pub const ROW: usize = 16;
+
+/// Buffers between the stages.
+pub struct PipelineBuffers {
+    /// Most elements of each.
+    pub room: Capacities,
+    pub pair_words: Buffer,
+    pair_rows: Buffer,
+    blocks: Buffer,
+    meshlets: Buffer,
+    items: Buffer,
+    /// From the first detection of faces on.
+    weights: Option<Buffer>,
+    pub contact_words: Buffer,
+    pub contact_rows: Buffer,
+    /// Of ordered pairs: how deep they overlap, where contacts need not show it.
+    pub depths: Buffer,
+    pub groups: Buffer,
+    /// From the first reduction on.
+    pub members: Option<MemberBuffers>,
+}
+
+fn words(device: &Device, name: &'static str, count: u32, each: u32) -> Result<Buffer, GpuError> {
+    device.empty(name, count as usize * each as usize * WORD)
+}
+
+fn rows(device: &Device, name: &'static str, count: u32, each: u32) -> Result<Buffer, GpuError> {
+    device.empty(name, count as usize * each as usize * ROW)
+}
+
+impl PipelineBuffers {
+    pub fn new(device: &Device, room: Capacities) -> Result<Self, GpuError> {
+        let words = |name, count, each| words(device, name, count, each);
+        let rows = |name, count, each| rows(device, name, count, each);
+        Ok(Self {
+            room,
+            pair_words: words("ordered pairs", room.ordered_pairs, PAIR_WORDS)?,
+            pair_rows: rows("maps of ordered pairs", room.ordered_pairs, PAIR_ROWS)?,
+            blocks: words("blocks", room.blocks, BLOCK_WORDS)?,
+            meshlets: words("meshlets", room.meshlets, BLOCK_WORDS)?,
+            items: words("polygons", room.polygons, ITEM_WORDS)?,
+            weights: None,
+            contact_words: words("contacts", room.contacts, CONTACT_WORDS)?,
+            contact_rows: rows("rows of contacts", room.contacts, CONTACT_ROWS)?,
+            depths: words("depths of ordered pairs", room.ordered_pairs, 1)?,
+            groups: words("groups", 1, 3)?,
+            members: None,
+        })
+    }
+
+    /// Makes room for the vertices of polygons; nodes have none.
+    pub fn add_weights(&mut self, device: &Device) -> Result<(), GpuError> {
+        if self.weights.is_none() {
+            let weights = rows(device, "weights of polygons", self.room.polygons, POLYGON_ROWS as u32)?;
+            self.weights = Some(weights);
+        }
+        Ok(())
+    }
+
+    /// Makes room for a reduction.
+    pub fn add_members(&mut self, device: &Device) -> Result<(), GpuError> {
+        if self.members.is_none() {
+            self.members = Some(MemberBuffers::new(device, self.room)?);
+        }
+        Ok(())
+    }
+
+    pub fn ordered_pairs(&self) -> OrderedPairsLaunch {
+        OrderedPairsLaunch::new(self.pair_words.words(), self.pair_rows.rows(), self.room.ordered_pairs)
+    }
+
+    pub fn blocks(&self) -> BlocksLaunch {
+        BlocksLaunch::new(self.blocks.words(), self.room.blocks)
+    }
+
+    pub fn found(&self) -> FoundLaunch {
+        FoundLaunch::new(self.ordered_pairs(), self.blocks())
+    }
+
+    pub fn meshlets(&self) -> BlocksLaunch {
+        BlocksLaunch::new(self.meshlets.words(), self.room.meshlets)
+    }
+
+    pub fn items(&self) -> ItemsLaunch {
+        ItemsLaunch::new(self.items.words(), self.room.polygons)
+    }
+
+    pub fn polygons(&self) -> PolygonsLaunch {
+        // Without weights nothing launches a kernel of polygons.
+        let weights = self.weights.as_ref().unwrap_or(&self.items);
+        PolygonsLaunch::new(self.items(), weights.rows())
+    }
+
+    pub fn contacts(&self) -> ContactsLaunch {
+        ContactsLaunch::new(self.contact_words.words(), self.contact_rows.rows(), self.room.contacts)
+    }
+
+    /// Names and bytes of all.
+    pub fn account(&self) -> Vec<(&'static str, usize)> {
+        let Self { pair_words, pair_rows, blocks, meshlets, items, contact_words, contact_rows, .. } = self;
+        let pairs = [pair_words, pair_rows, blocks, meshlets, items];
+        let own = pairs.into_iter().chain([contact_words, contact_rows, &self.depths, &self.groups]);
+        let members = self.members.as_ref().map(MemberBuffers::buffers);
+        let all = own.chain(&self.weights).chain(members.into_iter().flatten());
+        all.map(|buffer| (buffer.name(), buffer.bytes())).collect()
+    }
+}
+
+/// Buffers of a reduction.
+pub struct MemberBuffers {
+    room: Capacities,
+    /// Contacts of each pair of instances, then the next place for one.
+    pub tallies: Buffer,
+    pub touching: Buffer,
+    /// The contact that a member is.
+    contacts: Buffer,
+    rows: Buffer,
+    pub reports: Buffer,
+    pub kept_words: Buffer,
+    pub kept_rows: Buffer,
+}
+
+impl MemberBuffers {
+    fn new(device: &Device, room: Capacities) -> Result<Self, GpuError> {
+        let pairs = room.ordered_pairs / 2;
+        Ok(Self {
+            room,
+            tallies: words(device, "tallies of pairs", pairs, 1)?,
+            touching: words(device, "pairs that touch", pairs, TOUCHING_WORDS)?,
+            contacts: words(device, "contacts of members", room.contacts, 1)?,
+            rows: rows(device, "members of pairs", room.contacts, MEMBER_ROWS)?,
+            reports: rows(device, "reports of pairs", pairs, REPORT_ROWS)?,
+            kept_words: words(device, "kept contacts", room.kept, CONTACT_WORDS)?,
+            kept_rows: rows(device, "rows of kept contacts", room.kept, CONTACT_ROWS)?,
+        })
+    }
+
+    pub fn touching(&self) -> TouchingLaunch {
+        TouchingLaunch::new(self.touching.words(), self.room.ordered_pairs / 2)
+    }
+
+    pub fn members(&self) -> MembersLaunch {
+        MembersLaunch::new(self.contacts.words(), self.rows.rows())
+    }
+
+    pub fn kept(&self) -> ContactsLaunch {
+        ContactsLaunch::new(self.kept_words.words(), self.kept_rows.rows(), self.room.kept)
+    }
+
+    fn buffers(&self) -> [&Buffer; 7] {
+        let Self { tallies, touching, contacts, rows, reports, kept_words, kept_rows, .. } = self;
+        [tallies, touching, contacts, rows, reports, kept_words, kept_rows]
+    }
+}

@@ -1,0 +1,157 @@
+//! Contacts of the device in the form and the order of `tesdf::collide::detect`.
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use tesdf::collide::{Contact, FeatureB, FeatureId, Mode, PairReduction, Shape};
+
+use super::scene::instances::Instances;
+use crate::kernels::field::shapes::NONE;
+use crate::kernels::narrow::contacts::{CONVERGED, ROWS, WORDS};
+use crate::kernels::reduce::members::TOUCHING_WORDS;
+use crate::kernels::reduce::reduce::REPORT_ROWS;
+
+/// Words of a contact, as kernels write them.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Words {
+    a: u32,
+    b: u32,
+    face_a: u32,
+    cell: u32,
+    face_b: u32,
+    feature: u32,
+    corner: u32,
+    ordered_pair: u32,
+}
+
+/// Rows of a contact, as kernels write them.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Row {
+    point_a: [f32; 3],
+    distance: f32,
+    gradient: [f32; 4],
+    point_b: [f32; 4],
+}
+
+/// A pair that touches, as kernels write it.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Touching {
+    a: u32,
+    b: u32,
+    contacts: u32,
+    first_member: u32,
+    kept: u32,
+}
+
+/// What reducing it has lost, as kernels write it.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Report {
+    center: [f32; 3],
+    length: f32,
+    error: f32,
+    unused: [f32; 3],
+}
+
+const _: () = assert!(size_of::<Words>() == 4 * WORDS as usize);
+const _: () = assert!(size_of::<Row>() == 16 * ROWS as usize);
+const _: () = assert!(size_of::<Touching>() == 4 * TOUCHING_WORDS as usize);
+const _: () = assert!(size_of::<Report>() == 16 * REPORT_ROWS as usize);
+
+/// The same in the world. Instances of a world are in the order of their ids, and the surface of the first ordered pair is
+/// that of the first one.
+pub fn pair_reduction(instances: &Instances, touching: &Touching, report: &Report) -> PairReduction {
+    let at = &instances.placed[touching.b as usize];
+    PairReduction {
+        instance_a: instances.ids[touching.a as usize],
+        instance_b: instances.ids[touching.b as usize],
+        contacts: touching.contacts as usize,
+        kept: touching.kept as usize,
+        wrench_error: f64::from(report.error),
+        center: at.to_world(Vec3::from_array(report.center)),
+        length: f64::from(report.length) * at.unit,
+    }
+}
+
+/// Contacts in the world, sorted by world, pair of instances, ordered pair, face, feature and cell.
+pub fn contacts(
+    shapes: &[&Shape],
+    instances: &Instances,
+    mode: Mode,
+    words: &[Words],
+    rows: &[Row],
+) -> Vec<Contact> {
+    let mut found: Vec<((u32, u32, bool), Contact)> = words
+        .par_iter()
+        .zip(rows)
+        .map(|(words, row)| {
+            let (a, b) = (words.a, words.b);
+            ((a.min(b), a.max(b), a > b), contact(shapes, instances, mode, words, row))
+        })
+        .collect();
+    // Instances are sorted by world and id. A face may have several parts in no cell, outside of the cube.
+    found.par_sort_unstable_by_key(|(pair, c)| {
+        (*pair, c.face_a, c.feature.a, c.tet_b, c.point_a.to_array().map(f64::to_bits))
+    });
+    found.into_iter().map(|(_, contact)| contact).collect()
+}
+
+fn contact(shapes: &[&Shape], instances: &Instances, mode: Mode, words: &Words, row: &Row) -> Contact {
+    let (a, b) = (words.a as usize, words.b as usize);
+    let at = &instances.placed[b];
+    let (face_a, feature_a) = surface_names(shapes[instances.shapes[a]], mode, words);
+    let (face_b, feature_b) = field_names(shapes[instances.shapes[b]], words);
+    Contact {
+        point_a: at.to_world(Vec3::from_array(row.point_a)),
+        point_b: at.to_world(Vec3::from_slice(&row.point_b)),
+        normal: at.rotate(Vec3::from_slice(&row.gradient)),
+        distance: f64::from(row.distance) * at.unit,
+        face_a,
+        face_b,
+        tet_b: (words.cell != NONE).then_some(words.cell),
+        instance_a: instances.ids[a],
+        instance_b: instances.ids[b],
+        feature: FeatureId { a: feature_a, b: feature_b },
+        converged: words.corner >= CONVERGED,
+    }
+}
+
+/// The user's number of the face, and of the feature: the face, or the node.
+fn surface_names(shape: &Shape, mode: Mode, words: &Words) -> (u32, u32) {
+    let (part, corner) = (words.face_a, (words.corner % CONVERGED) as usize);
+    match (mode, shape) {
+        (Mode::Node, Shape::Mesh(asset)) => {
+            let node = asset.face_vertices(part as usize)[corner];
+            (asset.arrays().lowest_faces[node as usize], node)
+        }
+        (Mode::Node, simple) => {
+            let point: DVec3 = simple.parts().0[part as usize][corner];
+            let node = simple.nodes().iter().position(|&(p, _)| p == point).unwrap_or(0);
+            (part, node as u32)
+        }
+        (Mode::Face | Mode::Exact, Shape::Mesh(asset)) => {
+            let face = asset.face_id(part as usize);
+            (face, face)
+        }
+        (Mode::Face | Mode::Exact, Shape::Plane) => (0, 0),
+        (Mode::Face | Mode::Exact, _) => (part, part),
+    }
+}
+
+/// The user's number of the nearest face, and the part of it that is nearest.
+fn field_names(shape: &Shape, words: &Words) -> (u32, FeatureB) {
+    let Shape::Mesh(asset) = shape else { return (words.face_b, FeatureB::Face(words.face_b)) };
+    let corners = asset.face_vertices(words.face_b as usize);
+    let face = asset.face_id(words.face_b as usize);
+    let feature = match words.feature {
+        0 => FeatureB::Face(face),
+        edge @ 1..=3 => {
+            let (a, b) = (corners[edge as usize - 1], corners[edge as usize % 3]);
+            FeatureB::Edge(a.min(b), a.max(b))
+        }
+        corner => FeatureB::Vertex(corners[(corner as usize - 4) % 3]),
+    };
+    (face, feature)
+}

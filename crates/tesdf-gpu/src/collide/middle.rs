@@ -1,0 +1,83 @@
+//! Middle phase: hidden overlaps, then nodes with their cells, or polygons.
+use cubecl::prelude::*;
+use tesdf::collide::Mode;
+
+use super::pass::Pass;
+use super::stages::launch;
+use crate::GpuError;
+use crate::device::spread;
+use crate::kernels::middle::{clip, hidden, nodes, outside};
+use crate::kernels::narrow::exchange::LANES;
+use crate::kernels::reduce::members;
+
+impl Pass<'_> {
+    pub(super) fn middle(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
+        self.hidden(per_meshlet)?;
+        match self.options.mode {
+            Mode::Node => self.nodes(per_meshlet),
+            Mode::Face | Mode::Exact => self.polygons(per_meshlet),
+        }
+    }
+
+    /// Overlaps that contacts need not show.
+    fn hidden(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
+        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+        let (depths, count) = (&buffers.depths, buffers.room.ordered_pairs);
+        let (pairs, meshlets, counters) = (buffers.ordered_pairs(), buffers.meshlets(), self.counters());
+        let by_faces = u32::from(self.options.mode == Mode::Node);
+        launch!(
+            self.stages,
+            "no depths",
+            spread(count.div_ceil(members::GROUP)),
+            members::GROUP,
+            members::clear(depths.words(), count)
+        )?;
+        launch!(
+            self.stages,
+            "hidden overlaps",
+            per_meshlet.clone(),
+            LANES,
+            hidden::hidden(shapes.argument(), pairs, meshlets, counters, depths.words(), by_faces)
+        )
+    }
+
+    /// Nodes with their cells.
+    fn nodes(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
+        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+        let (pairs, meshlets, items) = (buffers.ordered_pairs(), buffers.meshlets(), buffers.items());
+        let (counters, prune) = (self.counters(), self.prune());
+        launch!(
+            self.stages,
+            "nodes",
+            per_meshlet.clone(),
+            LANES,
+            nodes::nodes(shapes.argument(), pairs, meshlets, counters, items, prune)
+        )
+    }
+
+    /// Faces clipped by cells, and their parts around conforming domains.
+    fn polygons(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
+        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+        let (pairs, meshlets, polygons) = (buffers.ordered_pairs(), buffers.meshlets(), buffers.polygons());
+        let (counters, prune) = (self.counters(), self.prune());
+        launch!(
+            self.stages,
+            "polygons",
+            per_meshlet.clone(),
+            LANES,
+            clip::clip_polygons(shapes.argument(), pairs, meshlets, counters, polygons, prune)
+        )?;
+        if !shapes.has_conforming() {
+            return Ok(());
+        }
+        let (pairs, meshlets, polygons) = (buffers.ordered_pairs(), buffers.meshlets(), buffers.polygons());
+        let counters = self.counters();
+        launch!(
+            self.stages,
+            "outside of domains",
+            per_meshlet.clone(),
+            LANES,
+            outside::outside_polygons(shapes.argument(), pairs, meshlets, counters, polygons, prune)
+        )
+    }
+}

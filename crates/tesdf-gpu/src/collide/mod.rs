@@ -1,0 +1,276 @@
+//! All contacts of a scene in one pass: as many launches for one pair of bodies as for thousands of worlds.
+mod broad;
+mod buffers;
+mod contacts;
+mod counts;
+mod middle;
+mod narrow;
+mod options;
+mod pass;
+pub mod queries;
+mod reduce;
+pub mod scene;
+mod stages;
+
+use std::collections::BTreeMap;
+
+use tesdf::Length;
+use tesdf::collide::{
+    CollideError, CollideOptions, Contacts, HiddenOverlap, Reduction, Scene, Shape, ShapeId, Statistics,
+};
+
+use buffers::{PipelineBuffers, ROW, WORD};
+use contacts::contacts;
+pub use counts::Counts;
+pub use options::{
+    Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
+};
+use scene::instances::Instances;
+use scene::placed::{FieldFrame, Placed};
+use scene::{GpuShapeId, GpuShapes};
+use stages::Timing;
+
+use crate::GpuError;
+use crate::device::{Device, DeviceArray};
+use crate::kernels::broad::ordered_pair::WORDS as PAIR_WORDS;
+use crate::kernels::broad::pairs::{BOUNDS_ROWS, INSTANCE_ROWS, INSTANCE_WORDS};
+
+/// Finds contacts on a device; keeps shapes and buffers there from step to step.
+pub struct Detector {
+    device: Device,
+    options: DetectorOptions,
+    shapes: GpuShapes,
+    shape_ids: Vec<ShapeId>,
+    frames: Vec<FieldFrame>,
+    /// Diagonals of the shapes' bounds.
+    diagonals: Vec<f64>,
+    buffers: PipelineBuffers,
+    report: DeviceReport,
+}
+
+/// The finest tolerance of the exact mode, in the frame of a field: a few times the rounding of distances in `f32`.
+const FINEST: f64 = 1e-6;
+
+impl Detector {
+    /// Uploads the shapes of a scene; [`detect`](Self::detect) uploads again when there are others.
+    ///
+    /// # Errors
+    /// [`GpuError::Shape`] for a shape that the device cannot hold, [`GpuError::TooLarge`].
+    pub fn new(device: &Device, scene: &Scene, options: DetectorOptions) -> Result<Self, GpuError> {
+        let buffers = PipelineBuffers::new(device, options.capacities)?;
+        let mut detector = Self {
+            device: device.clone(),
+            options,
+            shapes: GpuShapes::upload(device, &[])?,
+            shape_ids: Vec::new(),
+            frames: Vec::new(),
+            diagonals: Vec::new(),
+            buffers,
+            report: DeviceReport::default(),
+        };
+        detector.upload(scene)?;
+        Ok(detector)
+    }
+
+    /// Uploads all shapes of a scene, also those that are there: after vertices have moved.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn upload(&mut self, scene: &Scene) -> Result<(), GpuError> {
+        let ids = shape_ids(scene);
+        let shapes: Vec<Shape> = ids.iter().map(|&id| scene.shape(id).cloned()).collect::<Result<_, _>>()?;
+        self.shapes = GpuShapes::upload(&self.device, &shapes)?;
+        self.frames = shapes.iter().map(FieldFrame::new).collect();
+        self.diagonals = shapes.iter().map(Shape::diagonal).collect();
+        self.shape_ids = ids;
+        Ok(())
+    }
+
+    /// Moves all vertices of a shape with a conforming domain, on the device: see [`GpuShapes::move_vertices`]. Overrides
+    /// the scene's vertices until the next [`upload`](Self::upload).
+    ///
+    /// # Errors
+    /// As [`GpuShapes::move_vertices`]; the shape's number is its place among those of the scene's instances, by id.
+    pub fn move_vertices(&mut self, shape: ShapeId, positions: &DeviceArray<f32>) -> Result<(), GpuError> {
+        let number = self.shape_ids.binary_search(&shape).map_err(|_| CollideError::NoShape(shape))?;
+        self.shapes.move_vertices(GpuShapeId(number as u32), positions)
+    }
+
+    /// All contacts of a scene, as [`tesdf::collide::detect`] finds them, in the same order; computed in `f32`. The exact
+    /// mode's tolerance is 1e-6 of the local frame at the finest. A reduction goes by the same rules, with bounds of
+    /// distances in place of distances, so it may keep others.
+    ///
+    /// The same input gives the same bytes on the same device.
+    ///
+    /// # Errors
+    /// [`GpuError::Collide`] for options that no detector takes; [`GpuError::Full`] with fixed memory; a device that
+    /// refuses.
+    pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
+        self.run(scene, options, Timing::Off)
+    }
+
+    /// The same, with the device time of each stage in the [`report`](Self::report); slower, as stages wait for each other.
+    ///
+    /// # Errors
+    /// As [`detect`](Self::detect).
+    pub fn detect_timed(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
+        self.run(scene, options, Timing::On)
+    }
+
+    /// The report of the last detection.
+    pub fn report(&self) -> &DeviceReport {
+        &self.report
+    }
+
+    /// The device.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+
+    /// Bytes that are held on the device.
+    pub fn bytes(&self) -> DeviceBytes {
+        DeviceBytes {
+            shapes: self.shapes.bytes(),
+            pipeline: self.buffers.account(),
+            per_instance: (INSTANCE_ROWS + BOUNDS_ROWS) as usize * ROW + INSTANCE_WORDS as usize * WORD,
+        }
+    }
+
+    fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
+        options.validate()?;
+        if shape_ids(scene) != self.shape_ids {
+            if self.shapes.have_moved() {
+                return Err(GpuError::Unavailable {
+                    what: "a scene with other shapes than those that have moved".into(),
+                    instead: "upload the scene, and move its vertices again",
+                });
+            }
+            self.upload(scene)?;
+        }
+        // The processor's tree does not know the vertices that have moved here.
+        let max_tests = if self.shapes.have_moved() { u64::MAX } else { self.options.max_pair_tests };
+        let instances = Instances::new(scene, options, &self.shape_ids, &self.frames, max_tests)?;
+        self.report = DeviceReport::default();
+        loop {
+            self.report.passes += 1;
+            if options.reduction != Reduction::None {
+                self.buffers.add_members(&self.device)?;
+            }
+            let counts = self.pass(&instances, options, timing)?;
+            if !self.grow(&counts)? {
+                self.report.counts = counts;
+                return self.contacts(scene, &instances, options);
+            }
+        }
+    }
+
+    /// Makes room for the elements that a pass has wanted. Whether there was too little; later stages have then had too few
+    /// elements as well.
+    fn grow(&mut self, counts: &Counts) -> Result<bool, GpuError> {
+        let mut room = self.buffers.room;
+        let wanted = [
+            ("ordered pairs", &mut room.ordered_pairs, counts.ordered_pairs),
+            ("blocks", &mut room.blocks, counts.blocks),
+            ("meshlets", &mut room.meshlets, counts.meshlets),
+            ("polygons", &mut room.polygons, counts.polygons),
+            ("contacts", &mut room.contacts, counts.contacts),
+            ("kept contacts", &mut room.kept, counts.kept),
+        ];
+        for (buffer, capacity, needed) in wanted {
+            if needed > *capacity {
+                if self.options.memory == Memory::Fixed {
+                    let device = self.device.info().name.clone();
+                    return Err(GpuError::Full { device, buffer, capacity: *capacity, needed });
+                }
+                *capacity = needed.saturating_add(needed / 4);
+            }
+        }
+        if room == self.buffers.room {
+            return Ok(false);
+        }
+        self.buffers = PipelineBuffers::new(&self.device, room)?;
+        Ok(true)
+    }
+
+    /// In the frame of each instance's field; not finer than `f32` allows.
+    fn tolerances(&self, instances: &Instances, tolerance: Length) -> Vec<f32> {
+        let in_field = |(at, &shape): (&Placed, &usize)| {
+            let scale = at.unit / self.frames[shape].unit();
+            let diagonal = self.diagonals[shape].min(f64::MAX) * scale;
+            (tolerance.resolve(diagonal) / at.unit).max(FINEST) as f32
+        };
+        instances.placed.iter().zip(&instances.shapes).map(in_field).collect()
+    }
+
+    fn contacts(
+        &mut self,
+        scene: &Scene,
+        instances: &Instances,
+        options: &CollideOptions,
+    ) -> Result<Contacts, GpuError> {
+        let counts = self.report.counts;
+        let shapes: Vec<&Shape> =
+            self.shape_ids.iter().map(|&id| scene.shape(id)).collect::<Result<_, _>>()?;
+        let buffers = &self.buffers;
+        let (words, rows, count) = match (options.reduction, &buffers.members) {
+            (Reduction::PerPair(_), Some(own)) => (&own.kept_words, &own.kept_rows, counts.kept),
+            _ => (&buffers.contact_words, &buffers.contact_rows, counts.contacts),
+        };
+        let words = self.device.read(words, count as usize)?;
+        let rows = self.device.read(rows, count as usize)?;
+        self.report.read += size_of_val(words.as_slice()) + size_of_val(rows.as_slice());
+        let contacts = contacts(&shapes, instances, options.mode, &words, &rows);
+        let reductions = self.reductions(instances, options.reduction)?;
+        let unconverged = match options.reduction {
+            Reduction::None => contacts.iter().filter(|c| !c.converged).count(),
+            Reduction::PerPair(_) => counts.unconverged as usize,
+        };
+        let pipeline: usize = self.buffers.account().iter().map(|(_, bytes)| bytes).sum();
+        let statistics = Statistics {
+            instance_pairs: counts.ordered_pairs as usize,
+            candidates: counts.candidates as usize,
+            polygons: counts.polygons as usize,
+            touching: (counts.contacts + counts.filtered) as usize,
+            filtered: counts.filtered as usize,
+            reduced: counts.contacts as usize - contacts.len(),
+            unconverged,
+            bytes: pipeline + size_of_val(contacts.as_slice()),
+        };
+        let hidden = HiddenOverlap::not_shown(self.overlaps(instances)?, &contacts);
+        Ok(Contacts::new(contacts, statistics, reductions, hidden))
+    }
+
+    /// The pairs of instances with an overlap that contacts need not show.
+    fn overlaps(&mut self, instances: &Instances) -> Result<Vec<HiddenOverlap>, GpuError> {
+        if self.report.counts.hidden == 0 {
+            return Ok(Vec::new());
+        }
+        let count = self.report.counts.ordered_pairs as usize;
+        let depths: Vec<f32> = self.device.read(&self.buffers.depths, count)?;
+        let pairs: Vec<[u32; PAIR_WORDS as usize]> = self.device.read(&self.buffers.pair_words, count)?;
+        self.report.read += size_of_val(depths.as_slice()) + size_of_val(pairs.as_slice());
+        let mut deepest: BTreeMap<(usize, usize), f64> = BTreeMap::new();
+        for (depth, [a, b, ..]) in depths.into_iter().zip(pairs).filter(|(depth, _)| *depth > 0.0) {
+            let (a, b) = (a as usize, b as usize);
+            let of_pair = deepest.entry((a.min(b), a.max(b))).or_default();
+            *of_pair = of_pair.max(f64::from(depth) * instances.placed[b].unit);
+        }
+        let overlap = |((a, b), depth)| HiddenOverlap {
+            instance_a: instances.ids[a],
+            instance_b: instances.ids[b],
+            depth,
+        };
+        Ok(deepest.into_iter().map(overlap).collect())
+    }
+}
+
+/// The shapes of all instances, sorted: few shapes of many instances.
+fn shape_ids(scene: &Scene) -> Vec<ShapeId> {
+    let mut ids = Vec::new();
+    for (_, instance) in scene.instances() {
+        if let Err(at) = ids.binary_search(&instance.shape) {
+            ids.insert(at, instance.shape);
+        }
+    }
+    ids
+}

@@ -1,0 +1,83 @@
+//! Narrow phase: Node-TES, Face-TES or the exact minimum.
+use tesdf::collide::Mode;
+
+use super::pass::{GROUP, Pass};
+use super::stages::launch;
+use super::{Counting, Exchange, Lanes};
+use crate::GpuError;
+use crate::kernels::counters::POLYGONS;
+use crate::kernels::narrow::exact::AskedExactLaunch;
+use crate::kernels::narrow::exchange::{LANES, Variant};
+use crate::kernels::narrow::faces::AskedLaunch;
+use crate::kernels::narrow::{exact, faces, nodes};
+
+impl Pass<'_> {
+    pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
+        match self.options.mode {
+            Mode::Node => self.narrow_nodes(),
+            Mode::Face => self.narrow_faces(),
+            Mode::Exact => self.narrow_exact(),
+        }
+    }
+
+    fn narrow_nodes(&mut self) -> Result<(), GpuError> {
+        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+        let per_node = self.groups_for(buffers.room.polygons, GROUP, POLYGONS)?;
+        let (pairs, items, contacts) = (buffers.ordered_pairs(), buffers.items(), buffers.contacts());
+        let counters = self.counters();
+        launch!(
+            self.stages,
+            "node narrow phase",
+            per_node,
+            GROUP,
+            nodes::narrow_nodes(shapes.argument(), pairs, items, counters, contacts)
+        )
+    }
+
+    /// Cosines of angles below which contacts are dropped: above any cosine nothing is.
+    fn cos_theta(&self) -> f32 {
+        self.options.cos_theta.map_or(-2.0, |cos| cos as f32)
+    }
+
+    fn narrow_faces(&mut self) -> Result<(), GpuError> {
+        let (shapes, buffers, with) = (&self.detector.shapes, &self.detector.buffers, &self.detector.options);
+        let (per, lanes) = match with.lanes {
+            Lanes::Single => (LANES, 1),
+            Lanes::Group => (1, LANES),
+        };
+        let variant = Variant {
+            lanes,
+            subgroups: with.exchange == Exchange::Device && self.detector.device.has_subgroups_of_32(),
+            counting: with.counting == Counting::Operations,
+        };
+        let per_polygon = self.groups_for(buffers.room.polygons, per, POLYGONS)?;
+        let (pairs, polygons, contacts) = (buffers.ordered_pairs(), buffers.polygons(), buffers.contacts());
+        let (counters, asked) =
+            (self.counters(), AskedLaunch::new(self.options.iterations, self.cos_theta()));
+        launch!(
+            self.stages,
+            "face narrow phase",
+            per_polygon,
+            LANES,
+            faces::narrow_faces(shapes.argument(), pairs, polygons, counters, contacts, asked, variant)
+        )
+    }
+
+    fn narrow_exact(&mut self) -> Result<(), GpuError> {
+        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+        let per_polygon = self.groups_for(buffers.room.polygons, 1, POLYGONS)?;
+        let tolerances = self.detector.tolerances(self.instances, self.options.tolerance);
+        let tolerances = self.detector.device.upload("tolerances", &tolerances)?;
+        self.sent += tolerances.bytes();
+        let (pairs, polygons, contacts) = (buffers.ordered_pairs(), buffers.polygons(), buffers.contacts());
+        let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
+        let counters = self.counters();
+        launch!(
+            self.stages,
+            "exact narrow phase",
+            per_polygon,
+            LANES,
+            exact::narrow_exact(shapes.argument(), pairs, polygons, counters, contacts, asked)
+        )
+    }
+}

@@ -1,0 +1,110 @@
+//! One pass: the launches of all stages.
+use cubecl::prelude::*;
+use tesdf::collide::{CollideOptions, Mode};
+
+use super::buffers::WORD;
+use super::counts::Counts;
+use super::scene::instances::Instances;
+use super::stages::{Stages, Timing, launch};
+use super::{Detector, Pruning};
+use crate::GpuError;
+use crate::device::Buffer;
+use crate::kernels::counters::{self, COUNTERS, CountersLaunch};
+
+/// Threads of a group where each works alone.
+pub const GROUP: u32 = 64;
+
+/// What the launches of a pass share.
+pub struct Pass<'a> {
+    pub detector: &'a Detector,
+    pub options: &'a CollideOptions,
+    pub instances: &'a Instances,
+    counters: Buffer,
+    pub stages: Stages<'a>,
+    /// Bytes sent to the device.
+    pub sent: usize,
+}
+
+impl Detector {
+    /// Launches all stages, and reads the counters.
+    pub(super) fn pass(
+        &mut self,
+        instances: &Instances,
+        options: &CollideOptions,
+        timing: Timing,
+    ) -> Result<Counts, GpuError> {
+        let device = self.device.clone();
+        if options.mode != Mode::Node {
+            self.buffers.add_weights(&device)?;
+        }
+        let counters = device.upload("counters", &[0u32; COUNTERS])?;
+        let mut pass = Pass {
+            detector: self,
+            options,
+            instances,
+            sent: counters.bytes(),
+            counters: counters.clone(),
+            stages: Stages::new(&device, timing),
+        };
+        pass.broad()?;
+        let per_meshlet = pass.groups_for(pass.detector.buffers.room.meshlets, 1, counters::MESHLETS)?;
+        pass.middle(&per_meshlet)?;
+        pass.narrow()?;
+        pass.reduce()?;
+        let Pass { sent, stages: Stages { launches, times, .. }, .. } = pass;
+        self.report.sent += sent;
+        self.report.launches = launches;
+        self.report.stages = times;
+        let counts = Counts::read(&device, &counters)?;
+        self.report.read += COUNTERS * WORD;
+        self.check(&counts)?;
+        Ok(counts)
+    }
+
+    /// Errors that only threads of the device find.
+    fn check(&self, counts: &Counts) -> Result<(), GpuError> {
+        if counts.badly_moved > 0 {
+            return Err(self.shapes.badly_moved()?);
+        }
+        if counts.broken_off > 0 {
+            return Err(GpuError::Device {
+                device: self.device.info().name.clone(),
+                doing: "detecting contacts",
+                reason: format!(
+                    "the driver broke off the loops of {} threads, as Mesa's llvmpipe does after 65,535 iterations: a \
+                     face meets too many cells, or a pair has too many contacts to reduce. Detect on the processor or \
+                     on a GPU",
+                    counts.broken_off
+                ),
+            });
+        }
+        Ok(())
+    }
+}
+
+impl Pass<'_> {
+    pub fn counters(&self) -> CountersLaunch {
+        CountersLaunch::new(self.counters.words())
+    }
+
+    /// Groups of the next launch over the elements that `counter` counts, of a buffer with room for `room`, `per` to a
+    /// group: see [`groups_for`](counters::groups_for).
+    pub fn groups_for(&mut self, room: u32, per: u32, counter: u32) -> Result<CubeCount, GpuError> {
+        let groups = self.detector.buffers.groups.clone();
+        let counters = self.counters();
+        let one = CubeCount::Static(1, 1, 1);
+        launch!(
+            self.stages,
+            "groups",
+            one,
+            1,
+            counters::groups_for(counters, groups.words(), room, per, counter)
+        )?;
+        Ok(groups.count())
+    }
+
+    /// 1 when cells, faces and meshlets are left out by least signed distances.
+    pub fn prune(&self) -> u32 {
+        u32::from(self.detector.options.pruning == Pruning::LeastDistance)
+    }
+}

@@ -1,0 +1,91 @@
+//! Reduction: the launches that reduce the contacts of each pair, and its report.
+use tesdf::collide::{PairReduction, Reduction};
+
+use super::Detector;
+use super::contacts::{Report, Touching, pair_reduction};
+use super::pass::Pass;
+use super::scene::instances::Instances;
+use super::stages::launch;
+use crate::GpuError;
+use crate::device::spread;
+use crate::kernels::counters;
+use crate::kernels::reduce::{choice, members, reduce};
+
+impl Pass<'_> {
+    /// Reduces the contacts of each pair, if that is asked for: count, allot, fill, reduce.
+    pub(super) fn reduce(&mut self) -> Result<(), GpuError> {
+        let buffers = &self.detector.buffers;
+        let (Reduction::PerPair(per_pair), Some(own)) = (self.options.reduction, &buffers.members) else {
+            return Ok(());
+        };
+        let pairs = buffers.room.ordered_pairs / 2;
+        let per_pair_of_instances = spread(pairs.div_ceil(members::GROUP));
+        launch!(
+            self.stages,
+            "no members",
+            per_pair_of_instances.clone(),
+            members::GROUP,
+            members::clear(own.tallies.words(), pairs)
+        )?;
+        let per_contact = self.groups_for(buffers.room.contacts, members::GROUP, counters::CONTACTS)?;
+        let counters = self.counters();
+        launch!(
+            self.stages,
+            "members counted",
+            per_contact.clone(),
+            members::GROUP,
+            members::count(buffers.contacts(), counters, own.tallies.words())
+        )?;
+        let counters = self.counters();
+        launch!(
+            self.stages,
+            "members allotted",
+            per_pair_of_instances,
+            members::GROUP,
+            members::allot(buffers.ordered_pairs(), counters, own.tallies.words(), own.touching())
+        )?;
+        let counters = self.counters();
+        let (pairs_launch, contacts) = (buffers.ordered_pairs(), buffers.contacts());
+        launch!(
+            self.stages,
+            "members",
+            per_contact,
+            members::GROUP,
+            members::fill(pairs_launch, contacts, counters, own.tallies.words(), own.members())
+        )?;
+        let per_touching = self.groups_for(pairs, 1, counters::TOUCHING)?;
+        let (contacts, counters) = (buffers.contacts(), self.counters());
+        let (touching, reports) = (own.touching(), own.reports.rows());
+        launch!(
+            self.stages,
+            "reduction",
+            per_touching,
+            choice::GROUP,
+            reduce::reduce(contacts, counters, touching, own.members(), reports, own.kept(), per_pair)
+        )
+    }
+}
+
+impl Detector {
+    /// What the last pass has lost, by pair of instances.
+    pub(super) fn reductions(
+        &mut self,
+        instances: &Instances,
+        reduction: Reduction,
+    ) -> Result<Vec<PairReduction>, GpuError> {
+        let (Reduction::PerPair(_), Some(members)) = (reduction, &self.buffers.members) else {
+            return Ok(Vec::new());
+        };
+        let count = self.report.counts.touching as usize;
+        let touching: Vec<Touching> = self.device.read(&members.touching, count)?;
+        let reports: Vec<Report> = self.device.read(&members.reports, count)?;
+        self.report.read += size_of_val(touching.as_slice()) + size_of_val(reports.as_slice());
+        let mut reductions: Vec<PairReduction> = touching
+            .iter()
+            .zip(&reports)
+            .map(|(touching, report)| pair_reduction(instances, touching, report))
+            .collect();
+        reductions.sort_unstable_by_key(|r| (r.instance_a, r.instance_b));
+        Ok(reductions)
+    }
+}

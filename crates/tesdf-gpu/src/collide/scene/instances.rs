@@ -1,0 +1,87 @@
+//! The instances of a scene as the device holds them.
+use tesdf::collide::{CollideOptions, InstanceId, InstancePair, Scene, ShapeId, instance_pairs};
+
+use super::placed::{FieldFrame, Placed};
+use crate::GpuError;
+use crate::kernels::broad::pairs::{INSTANCE_ROWS, INSTANCE_WORDS};
+
+/// All instances, those of a world side by side, by id within it.
+pub struct Instances {
+    /// Their ids.
+    pub ids: Vec<InstanceId>,
+    /// Their poses.
+    pub placed: Vec<Placed>,
+    /// The number of the shape of each.
+    pub shapes: Vec<usize>,
+    /// [`INSTANCE_ROWS`] each.
+    pub rows: Vec<[f32; 4]>,
+    /// [`INSTANCE_WORDS`] each.
+    pub words: Vec<u32>,
+    /// Pairs that never meet, by place, sorted.
+    pub excluded: Vec<u32>,
+    /// All pairs whose bounds meet, by place, when worlds are so large that a tree on the processor is faster than all
+    /// pairs on the device.
+    pub pairs: Option<Vec<u32>>,
+}
+
+impl Instances {
+    /// `shape_ids` and `frames` are those of the uploaded shapes, sorted by id; beyond `max_tests` pairs of bounds the pairs
+    /// are found here.
+    pub fn new(
+        scene: &Scene,
+        options: &CollideOptions,
+        shape_ids: &[ShapeId],
+        frames: &[FieldFrame],
+        max_tests: u64,
+    ) -> Result<Self, GpuError> {
+        let mut order: Vec<(u32, InstanceId)> = scene.instances().map(|(id, i)| (i.world, id)).collect();
+        order.sort_unstable();
+        let mut all = Self {
+            ids: order.iter().map(|&(_, id)| id).collect(),
+            placed: Vec::with_capacity(order.len()),
+            shapes: Vec::with_capacity(order.len()),
+            rows: Vec::with_capacity(INSTANCE_ROWS as usize * order.len()),
+            words: Vec::with_capacity(INSTANCE_WORDS as usize * order.len()),
+            excluded: Vec::new(),
+            pairs: None,
+        };
+        let mut end = 0;
+        for (k, &(world, id)) in order.iter().enumerate() {
+            if k >= end {
+                end = k + order[k..].partition_point(|&(w, _)| w == world);
+            }
+            let instance = scene.instance(id)?;
+            let shape = scene.shape(instance.shape)?;
+            let number = shape_ids.binary_search(&instance.shape).map_err(|_| GpuError::Instance {
+                instance: id.0 as usize,
+                reason: format!("shape {} is not on the device; upload the scene again", instance.shape.0),
+            })?;
+            let placed = Placed::new(frames[number], instance.placement());
+            let motion = instance.motion_ahead(shape, options.speculative_time);
+            let [high, mut low, rotation] = placed.rows();
+            low[3] = motion as f32;
+            all.rows.extend([high, low, rotation]);
+            let groups = instance.groups;
+            all.words.extend([number as u32, end as u32, groups.memberships, groups.filter]);
+            all.placed.push(placed);
+            all.shapes.push(number);
+        }
+        let mut place = vec![0u32; order.iter().map(|&(_, id)| id.0 as usize + 1).max().unwrap_or(0)];
+        all.ids.iter().enumerate().for_each(|(k, id)| place[id.0 as usize] = k as u32);
+        let mut excluded: Vec<[u32; 2]> = scene
+            .excluded()
+            .map(|(a, b)| [place[a.0 as usize], place[b.0 as usize]])
+            .map(|[a, b]| [a.min(b), a.max(b)])
+            .collect();
+        excluded.sort_unstable();
+        all.excluded = excluded.into_flattened();
+        let tests: u64 =
+            order.chunk_by(|(v, _), (w, _)| v == w).map(|world| (world.len() as u64).pow(2) / 2).sum();
+        if tests > max_tests {
+            let pairs = instance_pairs(scene, options.contact_distance, options.speculative_time)?;
+            let places = |p: &InstancePair| [p.first, p.second].map(|id| place[id.0 as usize]);
+            all.pairs = Some(pairs.iter().flat_map(places).collect());
+        }
+        Ok(all)
+    }
+}

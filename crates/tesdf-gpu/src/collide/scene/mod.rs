@@ -1,0 +1,9 @@
+//! Shapes and instances as the device holds them.
+pub mod instances;
+mod moving;
+pub mod pack;
+pub mod placed;
+mod roots;
+mod shapes;
+
+pub use shapes::{GpuShapeId, GpuShapes, ShapeBytes};

@@ -1,0 +1,140 @@
+//! Vertices of conforming domains that move on the device.
+use cubecl::prelude::*;
+use tesdf::asset::layout::TreeChild;
+use tesdf::collide::Shape;
+
+use super::placed::split;
+use super::{GpuShapeId, GpuShapes};
+use crate::GpuError;
+use crate::device::{DeviceArray, spread};
+use crate::kernels::deform::bounds::MovingLaunch;
+use crate::kernels::deform::follow::follow;
+use crate::kernels::deform::refit::{self, GROUP};
+use crate::kernels::field::shapes::{BAD_VERTEX, NONE, STRIDE, TREE_NODES};
+
+/// What moving the vertices of a shape needs on the host.
+#[derive(Clone, Debug)]
+pub struct Moving {
+    faces: u32,
+    tree_nodes: u32,
+    vertices: usize,
+    /// Middle of the cube in the shape's unit as high and low `f32`, with the scale of the local frame.
+    frame: [[f32; 4]; 2],
+}
+
+impl Moving {
+    /// Of a shape with a conforming domain, and its entry of the table.
+    pub fn new((entry, shape): (&[u32], &Shape)) -> Option<Self> {
+        let tree_nodes = entry[TREE_NODES as usize];
+        let Shape::Mesh(asset) = shape else { return None };
+        let mesh = asset.arrays();
+        let (high, low) = split(mesh.frame.to_world(mesh.cube.middle()));
+        (tree_nodes > 0).then(|| Self {
+            faces: mesh.faces.len() as u32,
+            tree_nodes,
+            vertices: mesh.vertices.len() + mesh.domain_vertices.len(),
+            frame: [high.extend(mesh.frame.scale as f32).to_array(), low.extend(0.0).to_array()],
+        })
+    }
+}
+
+impl GpuShapes {
+    /// Moves all vertices of a shape with a conforming domain (Sec. V-D): x y z each, in the shape's unit, the mesh's
+    /// vertices and then the domain's own, as [`ConformingMesh::vertices`](tesdf::domain::ConformingMesh::vertices)
+    /// numbers them. `positions` may be memory of others ([`DeviceArray::from_raw_ptr`]), and is read before later
+    /// launches.
+    ///
+    /// As [`TeSdf::move_vertices`](tesdf::TeSdf::move_vertices): faces, tetrahedra and the trees over them follow;
+    /// connectivity, lists and labels stay, so distances are those to the listed faces, and distances outside of the
+    /// domain are exact. Two launches, whatever has moved. A vertex that is not finite, or farther from the middle than two
+    /// sides of the cube, is an error of the next detection.
+    ///
+    /// # Errors
+    /// [`GpuError::Shape`] for a shape of others or without a conforming domain, [`GpuError::Length`] for another number of
+    /// vertices.
+    pub fn move_vertices(&mut self, shape: GpuShapeId, positions: &DeviceArray<f32>) -> Result<(), GpuError> {
+        let (count, number) = (self.len(), shape.0 as usize);
+        let refused = |reason: String| GpuError::Shape { number, reason };
+        let moving = self.moving.get(number).ok_or_else(|| refused(format!("expected one of {count}")))?;
+        let moving = moving.as_ref().ok_or_else(|| {
+            refused("its cells do not follow the surface; encode the mesh in a conforming domain".into())
+        })?;
+        if positions.len() != 3 * moving.vertices {
+            let expected = format!("{}: x y z of each vertex", 3 * moving.vertices);
+            return Err(GpuError::Length { array: "positions", found: positions.len(), expected });
+        }
+        let frame = self.device.upload("frame of a shape", &moving.frame)?;
+        let threads = moving.faces + moving.tree_nodes;
+        let [table, words, rows] = self.buffers();
+        let positions = positions.buffer();
+        let argument = || {
+            let (table, words, rows) = (table.words(), words.words(), rows.rows());
+            MovingLaunch::new(table, words, rows, positions.words(), frame.rows(), shape.0)
+        };
+        let (client, groups) = (self.device.client(), spread(threads.div_ceil(64)));
+        follow::launch(client, groups, CubeDim::new_1d(64), argument());
+        refit::refit::launch(client, CubeCount::Static(1, 1, 1), CubeDim::new_1d(GROUP), argument());
+        self.moved = true;
+        Ok(())
+    }
+
+    /// The error of the first shape with a vertex that was moved to an impossible position.
+    pub(crate) fn badly_moved(&self) -> Result<GpuError, GpuError> {
+        let table: Vec<u32> = self.device.read(&self.table, self.len() * STRIDE as usize)?;
+        let bad = |row: &[u32]| Some(row[BAD_VERTEX as usize]).filter(|&vertex| vertex != NONE);
+        let first = table.chunks(STRIDE as usize).enumerate().find_map(|(n, row)| Some((n, bad(row)?)));
+        let (number, vertex) = first.unwrap_or_default();
+        let reason = format!(
+            "vertex {vertex} was moved to where none can be; expected finite numbers within two sides of the cube of its \
+             middle. Move it again"
+        );
+        Ok(GpuError::Shape { number, reason })
+    }
+
+    /// Whether vertices have moved here since the upload.
+    pub(crate) fn have_moved(&self) -> bool {
+        self.moved
+    }
+}
+
+/// Inner nodes of the face tree by their height over the leaves, as [`refit`] reads them.
+pub fn face_levels(children: &[[u32; 2]]) -> Vec<u32> {
+    let mut heights = vec![0u32; children.len()];
+    for node in (0..heights.len()).rev() {
+        let height = |word| match TreeChild::decode(word) {
+            TreeChild::Node(c) => heights[c as usize] + 1,
+            TreeChild::Leaf(..) => 0,
+        };
+        heights[node] = children[node].map(height).into_iter().max().unwrap_or(0);
+    }
+    levels((0..).zip(heights))
+}
+
+/// Inner nodes of the tree over tetrahedra, likewise.
+pub fn tree_levels(tree: &[[u32; 2]]) -> Vec<u32> {
+    let mut heights = vec![0u32; tree.len()];
+    for node in (0..heights.len()).rev() {
+        let mut child = node + 1;
+        while child < tree[node][0] as usize {
+            heights[node] = heights[node].max(heights[child] + 1);
+            child = tree[child][0] as usize;
+        }
+    }
+    let inner = (0..).zip(heights).zip(tree).filter(|(_, [_, tetrahedron])| *tetrahedron == NONE);
+    levels(inner.map(|((node, height), _)| (node, height - 1)))
+}
+
+/// The number of levels, where each begins and the last ends, and the nodes level by level.
+fn levels(nodes: impl Iterator<Item = (u32, u32)>) -> Vec<u32> {
+    let mut by_level: Vec<Vec<u32>> = Vec::new();
+    for (node, height) in nodes {
+        by_level.resize(by_level.len().max(height as usize + 1), Vec::new());
+        by_level[height as usize].push(node);
+    }
+    let ends = by_level.iter().scan(0, |end, level| {
+        *end += level.len() as u32;
+        Some(*end)
+    });
+    let head = [by_level.len() as u32, 0].into_iter().chain(ends);
+    head.chain(by_level.iter().flatten().copied()).collect()
+}

@@ -1,0 +1,252 @@
+//! Shapes packed into the arrays that kernels read.
+use glam::{DVec3, Vec3};
+use tesdf::asset::FaceRecord;
+use tesdf::asset::layout::{SignHints, TreeChild};
+use tesdf::collide::Shape;
+use tesdf::geometry::Triangle;
+use tesdf::query::Arrays;
+
+use super::moving::{face_levels, tree_levels};
+use super::roots::Roots;
+use crate::kernels::broad::meshlets::MESHLETS_OF_BLOCK;
+use crate::kernels::deform::refit::GROWN;
+use crate::kernels::field::nearest::TREE_DEPTH;
+use crate::kernels::field::shapes::{self, STRIDE};
+
+/// Most faces of a meshlet: one for each thread of a group.
+const MESHLET: u32 = MESHLETS_OF_BLOCK;
+
+/// The buffers of [`Shapes`](crate::kernels::field::shapes::Shapes).
+#[derive(Default)]
+pub struct Packed {
+    pub table: Vec<u32>,
+    pub words: Vec<u32>,
+    pub rows: Vec<[f32; 4]>,
+}
+
+impl Packed {
+    /// Adds a shape.
+    ///
+    /// # Errors
+    /// Why kernels cannot read it.
+    pub fn add(&mut self, shape: &Shape) -> Result<(), String> {
+        let entry = self.entry(shape)?;
+        self.table.extend(entry);
+        Ok(())
+    }
+
+    /// The arrays of a shape, and its entry of the table.
+    fn entry(&mut self, shape: &Shape) -> Result<[u32; STRIDE as usize], String> {
+        let mut row = [0u32; STRIDE as usize];
+        let mut sizes = |kind: u32, sizes: DVec3| {
+            row[shapes::KIND as usize] = kind;
+            let at = shapes::SIZES as usize;
+            row[at..at + 3].copy_from_slice(&sizes.as_vec3().to_array().map(f32::to_bits));
+        };
+        match shape {
+            Shape::Mesh(asset) => return self.add_mesh(&asset.arrays()),
+            Shape::Plane => sizes(shapes::PLANE, DVec3::ZERO),
+            Shape::Box { half_extents } => sizes(shapes::BOX, *half_extents),
+            Shape::Sphere { radius } => sizes(shapes::ROUND, DVec3::new(0.0, *radius, 0.0)),
+            Shape::Capsule { half_height, radius } => {
+                sizes(shapes::ROUND, DVec3::new(*half_height, *radius, 0.0));
+            }
+        }
+        row[shapes::MESHLET_COUNT as usize] = 1;
+        row[shapes::BAD_VERTEX as usize] = shapes::NONE;
+        // Two triangles of a plane depend on the field that they meet.
+        row[shapes::FACE_COUNT as usize] = 2;
+        if !matches!(shape, Shape::Plane) {
+            let records = simple_records(shape);
+            row[shapes::FACE_COUNT as usize] = records.len() as u32;
+            row[shapes::RECORDS as usize] = self.rows_at(records.into_iter().flat_map(four))?;
+        }
+        row[shapes::INNER_BALL as usize] = self.rows_at([inner_ball(shape.inner_ball())].into_iter())?;
+        Ok(row)
+    }
+
+    fn add_mesh(&mut self, mesh: &Arrays) -> Result<[u32; STRIDE as usize], String> {
+        let depth = depth(mesh);
+        // A node's children are pushed at its own level.
+        if depth + 2 > TREE_DEPTH {
+            return Err(format!("a face tree of {depth} levels; expected {} at most", TREE_DEPTH - 2));
+        }
+        let mut row = [0u32; STRIDE as usize];
+        let mut set = |at: u32, value: u32| row[at as usize] = value;
+        set(shapes::KIND, shapes::MESH);
+        set(shapes::NODES, self.words_at(mesh.nodes.iter().copied())?);
+        set(shapes::LISTS, self.bytes_at(mesh.lists)?);
+        set(shapes::PALETTE_STARTS, self.words_at(mesh.palette_starts.iter().copied())?);
+        let halves =
+            mesh.palettes.chunks(2).map(|c| u32::from(c[0]) | u32::from(*c.get(1).unwrap_or(&0)) << 16);
+        set(shapes::PALETTES, self.words_at(halves)?);
+        set(shapes::PALETTES_HIGH, mesh.palettes_high.map_or(Ok(shapes::NONE), |high| self.bytes_at(high))?);
+        set(shapes::BOUNDS, self.bytes_at(mesh.cell_bounds)?);
+        set(shapes::CHILDREN, self.words_at(mesh.tree_children.as_flattened().iter().copied())?);
+        set(shapes::RECORDS, self.rows_at(records(mesh).into_iter().flat_map(four))?);
+        set(
+            shapes::BOXES,
+            self.rows_at(mesh.tree_boxes.iter().flat_map(|b| {
+                let (rows, _) = b.as_chunks::<4>();
+                rows.to_vec()
+            }))?,
+        );
+        let meshlets = meshlets(mesh);
+        set(shapes::MESHLETS, self.rows_at(meshlets.iter().map(|&(start, count)| ball(mesh, start, count)))?);
+        set(
+            shapes::MESHLET_FACES,
+            self.words_at(meshlets.iter().flat_map(|&(start, count)| [start, count]))?,
+        );
+        set(shapes::MESHLET_COUNT, meshlets.len() as u32);
+        set(shapes::FACE_COUNT, mesh.faces.len() as u32);
+        set(shapes::EXACT_LISTS, u32::from(mesh.has_exact_lists));
+        let roots = Roots::new(mesh);
+        set(shapes::TETRAHEDRA, self.rows_at(roots.rows.into_iter())?);
+        set(shapes::TREE_BOXES, self.rows_at(roots.boxes.into_iter())?);
+        set(shapes::TREE, self.words_at(roots.tree.iter().flatten().copied())?);
+        set(shapes::TREE_NODES, roots.tree.len() as u32);
+        set(shapes::INNER_BALL, self.rows_at([inner_ball(mesh.inner_ball)].into_iter())?);
+        set(shapes::BAD_VERTEX, shapes::NONE);
+        if !roots.tree.is_empty() {
+            set(shapes::FACE_VERTICES, self.words_at(mesh.faces.as_flattened().iter().copied())?);
+            set(shapes::TET_VERTICES, self.words_at(mesh.tetrahedra.as_flattened().iter().copied())?);
+            set(shapes::FACE_LEVELS, self.words_at(face_levels(mesh.tree_children).into_iter())?);
+            set(shapes::TREE_LEVELS, self.words_at(tree_levels(&roots.tree).into_iter())?);
+            set(shapes::VERTEX_COUNT, (mesh.vertices.len() + mesh.domain_vertices.len()) as u32);
+        }
+        let mut set = |at: u32, value: f64| set(at, (value as f32).to_bits());
+        set(shapes::SIDE, mesh.cube.side());
+        set(shapes::INVERSE_SIDE, 1.0 / mesh.cube.side());
+        set(shapes::BOUND_UNIT, mesh.cell_bound_unit);
+        set(shapes::BAND, mesh.band);
+        for axis in 0..3 {
+            set(shapes::LOW + axis as u32, (mesh.bounds.min - mesh.cube.middle())[axis]);
+            set(shapes::HIGH + axis as u32, (mesh.bounds.max - mesh.cube.middle())[axis]);
+        }
+        Ok(row)
+    }
+
+    fn words_at(&mut self, words: impl Iterator<Item = u32>) -> Result<u32, String> {
+        let at = self.words.len();
+        self.words.extend(words);
+        u32::try_from(at).map_err(|_| "more than 2^32 words of arrays".to_owned())
+    }
+
+    fn bytes_at(&mut self, bytes: &[u8]) -> Result<u32, String> {
+        let word = |chunk: &[u8]| {
+            let mut word = [0; 4];
+            word[..chunk.len()].copy_from_slice(chunk);
+            u32::from_le_bytes(word)
+        };
+        // A byte of room: half words are read a byte at a time, but a list may end with the section.
+        self.words_at(bytes.chunks(4).map(word).chain([0]))
+    }
+
+    fn rows_at(&mut self, rows: impl Iterator<Item = [f32; 4]>) -> Result<u32, String> {
+        let at = self.rows.len();
+        self.rows.extend(rows);
+        u32::try_from(at).map_err(|_| "more than 2^32 rows of arrays".to_owned())
+    }
+}
+
+fn four(record: [f32; 16]) -> [[f32; 4]; 4] {
+    std::array::from_fn(|i| std::array::from_fn(|k| record[4 * i + k]))
+}
+
+/// The faces as kernels read them. Each owns the corners that no face before has.
+fn records(mesh: &Arrays) -> Vec<[f32; 16]> {
+    let mut seen = vec![false; mesh.lowest_faces.len()];
+    let record = |(record, corners): (&FaceRecord, &[u32; 3])| {
+        let owned = (0..3).filter(|&k| !std::mem::replace(&mut seen[corners[k] as usize], true));
+        with_owned(*record.as_array(), owned)
+    };
+    mesh.records.iter().zip(mesh.faces).map(record).collect()
+}
+
+/// The parts of a simple shape as faces: two corners of a segment are equal, and three of a point.
+fn simple_records(shape: &Shape) -> Vec<[f32; 16]> {
+    let (parts, nodes) = (shape.parts().0, shape.nodes());
+    let record = |(number, points): (usize, &Vec<DVec3>)| {
+        let corners = std::array::from_fn(|k| points[k.min(points.len() - 1)]);
+        let triangle = Triangle::new(corners);
+        let mut record = *FaceRecord::new(&triangle, DVec3::ZERO, SignHints::default()).as_array();
+        // Which faces are flat depends on the frame of a mesh; a simple shape may be of any size.
+        record[9..12].copy_from_slice(&triangle.normal.as_vec3().to_array());
+        let owned = (0..points.len()).filter(|&k| nodes.contains(&(points[k], number as u32)));
+        with_owned(record, owned)
+    };
+    parts.iter().enumerate().map(record).collect()
+}
+
+/// With a normal of zero instead of NaN, as shaders may assume that no number is NaN.
+pub(crate) fn without_nan(mut record: [f32; 16]) -> [f32; 16] {
+    if record[9].is_nan() {
+        record[9..12].fill(0.0);
+    }
+    record
+}
+
+/// Without NaN, and with the owned corners as bits.
+fn with_owned(record: [f32; 16], owned: impl Iterator<Item = usize>) -> [f32; 16] {
+    let mut record = without_nan(record);
+    let hints = record[15].to_bits() & 0xFFFF;
+    let owned: u32 = owned.map(|k| 1 << (shapes::OWNED_CORNERS + k as u32)).sum();
+    record[15] = f32::from_bits(shapes::HINTS | hints | owned);
+    record
+}
+
+/// Middle and radius; 0 without a ball.
+fn inner_ball(ball: Option<(DVec3, f64)>) -> [f32; 4] {
+    let (center, radius) = ball.unwrap_or_default();
+    center.as_vec3().extend(radius as f32).to_array()
+}
+
+/// Levels of the face tree.
+fn depth(mesh: &Arrays) -> usize {
+    let mut levels = vec![1usize; mesh.tree_children.len()];
+    for node in (0..levels.len()).rev() {
+        for child in mesh.tree_children[node] {
+            if let TreeChild::Node(c) = TreeChild::decode(child) {
+                levels[node] = levels[node].max(levels[c as usize] + 1);
+            }
+        }
+    }
+    levels.first().copied().unwrap_or(0)
+}
+
+/// First face and number of faces of the largest parts of the face tree that have at most [`MESHLET`] faces, in order.
+fn meshlets(mesh: &Arrays) -> Vec<(u32, u32)> {
+    let mut ranges = vec![(u32::MAX, 0u32); mesh.tree_children.len()];
+    let range = |ranges: &[(u32, u32)], word| match TreeChild::decode(word) {
+        TreeChild::Node(c) => ranges[c as usize],
+        TreeChild::Leaf(start, count) => (start, count),
+    };
+    for node in (0..ranges.len()).rev() {
+        let [a, b] = mesh.tree_children[node].map(|word| range(&ranges, word));
+        ranges[node] = (a.0.min(b.0), a.1 + b.1);
+    }
+    let mut stack = vec![TreeChild::Node(0).encode()];
+    let mut meshlets = Vec::new();
+    while let Some(word) = stack.pop() {
+        let (start, count) = range(&ranges, word);
+        match TreeChild::decode(word) {
+            TreeChild::Node(node) if count > MESHLET => stack.extend(mesh.tree_children[node as usize]),
+            _ => meshlets.push((start, count)),
+        }
+    }
+    meshlets.sort_unstable();
+    meshlets
+}
+
+/// A ball around some faces, relative to the middle of the cube.
+fn ball(mesh: &Arrays, start: u32, count: u32) -> [f32; 4] {
+    let faces = &mesh.records[start as usize..(start + count) as usize];
+    let corners = faces.iter().flat_map(|r| r.triangle().corners);
+    let (low, high) =
+        corners.clone().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
+    let center: Vec3 = (0.5 * (low + high)).as_vec3();
+    let radius = corners.map(|c| c.distance(center.as_dvec3())).fold(0.0, f64::max);
+    let grown = f64::from(GROWN);
+    let radius = radius * (1.0 + grown) + grown * mesh.cube.side();
+    [center.x, center.y, center.z, radius as f32]
+}

@@ -1,0 +1,4 @@
+//! Broad phase: instance pairs, then the meshlets that can touch.
+pub mod meshlets;
+pub mod ordered_pair;
+pub mod pairs;

@@ -1,0 +1,239 @@
+//! Ordered pairs of instances: the surface of the first as the field of the second sees it.
+use cubecl::prelude::*;
+
+use super::super::field::shapes::{
+    Field, FieldExpand, HIGH, KIND, LOW, MESH, OWNED_CORNERS, PLANE, ROUND, SIZES, Shapes, ShapesExpand,
+};
+use super::super::field::tetrahedra::bounds_of;
+use super::super::math::vector::{Row, V3, last, pick, row_of, v3, xyz, zero};
+use super::super::middle::cut::Quarter;
+
+/// The ordered pairs of a scene. Those of a pair of instances are neighbours.
+#[derive(CubeType, CubeLaunch)]
+pub struct OrderedPairs {
+    /// [`WORDS`] each: instances a and b, shapes of a and b.
+    pub words: Box<[u32]>,
+    /// [`ROWS`] each: the linear part of the map by rows, each with its shift; then scale, reach and radius.
+    pub rows: Box<[Row]>,
+    /// Room for so many.
+    pub room: u32,
+}
+
+/// Words of an ordered pair.
+pub const WORDS: u32 = 4;
+/// Rows of an ordered pair.
+pub const ROWS: u32 = 4;
+
+/// An ordered pair of instances.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct OrderedPair {
+    /// Its number; the pair with both instances swapped is its neighbour.
+    pub number: u32,
+    pub a: u32,
+    pub b: u32,
+    pub shape_a: u32,
+    pub shape_b: u32,
+    /// Rows of the linear part of the map from the frame of a to the field's.
+    pub x: V3,
+    pub y: V3,
+    pub z: V3,
+    pub shift: V3,
+    /// Field units per unit of a.
+    pub scale: f32,
+    /// Signed distances up to this are contacts.
+    pub reach: f32,
+    /// The surface is all within this of its parts: the radius of what is round.
+    pub radius: f32,
+}
+
+#[cube]
+impl OrderedPairs {
+    /// Reads ordered pair `number`.
+    pub fn get(&self, number: u32) -> OrderedPair {
+        let word = (number * WORDS) as usize;
+        let row = (number * ROWS) as usize;
+        let (p, q, r, s) = (self.rows[row], self.rows[row + 1], self.rows[row + 2], self.rows[row + 3]);
+        OrderedPair {
+            number,
+            a: self.words[word],
+            b: self.words[word + 1],
+            shape_a: self.words[word + 2],
+            shape_b: self.words[word + 3],
+            x: xyz(p),
+            y: xyz(q),
+            z: xyz(r),
+            shift: v3(last(p), last(q), last(r)),
+            scale: s.extract(0usize),
+            reach: s.extract(1usize),
+            radius: s.extract(2usize),
+        }
+    }
+
+    /// Writes an ordered pair; its number is its place.
+    pub fn put(&mut self, pair: OrderedPair) {
+        let word = (pair.number * WORDS) as usize;
+        self.words[word] = pair.a;
+        self.words[word + 1] = pair.b;
+        self.words[word + 2] = pair.shape_a;
+        self.words[word + 3] = pair.shape_b;
+        let row = (pair.number * ROWS) as usize;
+        self.rows[row] = row_of(pair.x, pair.shift.x);
+        self.rows[row + 1] = row_of(pair.y, pair.shift.y);
+        self.rows[row + 2] = row_of(pair.z, pair.shift.z);
+        self.rows[row + 3] = row_of(v3(pair.scale, pair.reach, pair.radius), 0.0f32);
+    }
+}
+
+#[cube]
+impl OrderedPair {
+    /// Distances of parts of the surface up to this are contacts.
+    pub fn part_reach(self) -> f32 {
+        self.reach + self.radius
+    }
+
+    fn linear(self, p: V3) -> V3 {
+        v3(self.x.dot(p), self.y.dot(p), self.z.dot(p))
+    }
+
+    /// From the frame of a to the field's.
+    pub fn to_field(self, p: V3) -> V3 {
+        self.linear(p) + self.shift
+    }
+
+    /// A unit vector, likewise.
+    pub fn rotate(self, v: V3) -> V3 {
+        self.linear(v) * (1.0f32 / self.scale)
+    }
+
+    /// From the field's frame to that of a: the map is a similarity.
+    pub fn to_surface(self, p: V3) -> V3 {
+        let q = p - self.shift;
+        let back = (self.x * q.x + self.y * q.y) + self.z * q.z;
+        back * (1.0f32 / (self.scale * self.scale))
+    }
+}
+
+/// A face, or a part of a simple shape, in the field's frame.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Part {
+    pub a: V3,
+    pub b: V3,
+    pub c: V3,
+    /// Corners: 3, or 2 and 1 for the segments and points of capsules and spheres.
+    pub count: u32,
+    /// Corners that no part before has, as bits.
+    pub owned: u32,
+}
+
+#[cube]
+impl Part {
+    /// Corner `k`.
+    pub fn corner(self, k: u32) -> V3 {
+        pick(k == 1u32, self.b, pick(k == 2u32, self.c, self.a))
+    }
+
+    /// The point with weights `s` of the second and `t` of the third corner.
+    pub fn at(self, s: f32, t: f32) -> V3 {
+        (self.a + (self.b - self.a) * s) + (self.c - self.a) * t
+    }
+
+    /// A part of it.
+    pub fn quarter(self, q: Quarter) -> Part {
+        Part {
+            a: self.at(q.a_s, q.a_t),
+            b: self.at(q.b_s, q.b_t),
+            c: self.at(q.c_s, q.c_t),
+            count: self.count,
+            owned: 0u32,
+        }
+    }
+
+    /// The middle of the box around the part.
+    pub fn center(self) -> V3 {
+        let bounds = bounds_of(self.a, self.b, self.c);
+        (bounds.low + bounds.high) * 0.5f32
+    }
+
+    /// The greatest distance of a corner from a point.
+    pub fn radius_around(self, p: V3) -> f32 {
+        (self.a - p).length().max((self.b - p).length()).max((self.c - p).length())
+    }
+}
+
+#[cube]
+impl Field<'_> {
+    /// The middle of a body that has an end.
+    fn body_center(self) -> V3 {
+        let middle = (self.vector(LOW) + self.vector(HIGH)) * 0.5f32;
+        pick(self.is_mesh(), middle, zero())
+    }
+
+    /// The greatest distance of a point of a body from there.
+    fn body_radius(self) -> f32 {
+        let kind = self.entry(KIND);
+        let sizes = self.vector(SIZES);
+        let extent = self.vector(HIGH) - self.vector(LOW);
+        let round = select(kind == ROUND, sizes.x + sizes.y, sizes.length());
+        select(kind == MESH, 0.5f32 * extent.length(), round)
+    }
+
+    /// One of the two triangles of a plane, in its own frame: a square that covers the field's body.
+    fn plane_part(self, pair: OrderedPair, number: u32) -> Triangle {
+        let center = pair.to_surface(self.body_center());
+        let half = (self.body_radius() + pair.reach) / pair.scale;
+        let (low, high) = (center - v3(half, half, half), center + v3(half, half, half));
+        let is_first = number == 0u32;
+        Triangle {
+            a: v3(low.x, low.y, 0.0f32),
+            b: v3(high.x, select(is_first, low.y, high.y), 0.0f32),
+            c: v3(select(is_first, high.x, low.x), high.y, 0.0f32),
+        }
+    }
+}
+
+/// Three corners.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Triangle {
+    a: V3,
+    b: V3,
+    c: V3,
+}
+
+#[cube]
+impl Shapes {
+    /// Part `number` of the surface of an ordered pair, in the field's frame.
+    pub fn part(&self, pair: OrderedPair, number: u32) -> Part {
+        let surface = self.field(pair.shape_a);
+        let kind = surface.entry(KIND);
+        let mut corners = Triangle { a: zero(), b: zero(), c: zero() };
+        let mut count = 3u32;
+        let mut owned = 0u32;
+        if kind == PLANE {
+            corners = self.field(pair.shape_b).plane_part(pair, number);
+        } else {
+            let f = surface.face(number);
+            corners = Triangle { a: f.a, b: f.corner(1u32), c: f.corner(2u32) };
+            owned = (f.hints >> OWNED_CORNERS) & 7u32;
+            if kind == ROUND {
+                let is_sphere = surface.entry(SIZES) == 0u32;
+                count = select(is_sphere, 1u32, 2u32);
+            }
+        }
+        let (a, b, c) = (pair.to_field(corners.a), pair.to_field(corners.b), pair.to_field(corners.c));
+        Part { a, b, c, count, owned }
+    }
+
+    /// Unit normal of part `number`, in the field's frame; zero for what is round and for flat faces. It is that of the
+    /// face: the corners of a needle in another frame would give any.
+    pub fn part_normal(&self, pair: OrderedPair, number: u32) -> V3 {
+        let surface = self.field(pair.shape_a);
+        let mut normal = v3(0.0f32, 0.0f32, 1.0f32);
+        if surface.entry(KIND) != PLANE {
+            normal = surface.face(number).normal;
+        }
+        pair.rotate(normal)
+    }
+}

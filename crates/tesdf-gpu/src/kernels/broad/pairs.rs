@@ -1,0 +1,277 @@
+//! Instance pairs: those of one world whose bounds meet, as `tesdf::collide::instance_pairs` finds them.
+use cubecl::prelude::*;
+
+use super::super::counters::{BADLY_MOVED, BLOCKS, Counters, ORDERED_PAIRS};
+use super::super::field::shapes::{BAD_VERTEX, KIND, MESHLET_COUNT, NONE, PLANE, ROUND, SIZES, Shapes};
+use super::super::math::pose::{FarPoint, Pose, ROWS as POSE_ROWS, pose};
+use super::super::math::vector::{Row, V3, last, row_of, v3, xyz};
+use super::meshlets::{Blocks, MESHLETS_OF_BLOCK};
+use super::ordered_pair::{OrderedPair, OrderedPairs};
+
+/// The instances of a scene, those of a world side by side.
+#[derive(CubeType, CubeLaunch)]
+pub struct Instances {
+    /// A pose each, with the motion ahead behind the second row.
+    pub poses: Box<[Row]>,
+    /// [`INSTANCE_WORDS`] each: shape, end of the world, memberships, filter.
+    pub words: Box<[u32]>,
+    pub count: u32,
+    pub contact_distance: f32,
+}
+
+/// Rows of an instance.
+pub const INSTANCE_ROWS: u32 = POSE_ROWS;
+/// Words of an instance.
+pub const INSTANCE_WORDS: u32 = 4;
+/// Rows of an instance's bounds: their center as high and low, half their extent.
+pub const BOUNDS_ROWS: u32 = 3;
+
+/// Pairs of instances, two words each, sorted.
+#[derive(CubeType, CubeLaunch)]
+pub struct Pairs {
+    pub words: Box<[u32]>,
+    pub count: u32,
+}
+
+/// The buffers that instance pairs are written to.
+#[derive(CubeType, CubeLaunch)]
+pub struct Found {
+    pub pairs: OrderedPairs,
+    pub blocks: Blocks,
+}
+
+/// The groups of an instance.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Groups {
+    memberships: u32,
+    filter: u32,
+}
+
+#[cube]
+impl Groups {
+    fn meet(self, other: Groups) -> bool {
+        (self.memberships & other.filter) != 0u32 && (other.memberships & self.filter) != 0u32
+    }
+}
+
+#[cube]
+impl Instances {
+    fn shape(&self, instance: u32) -> u32 {
+        self.words[(instance * INSTANCE_WORDS) as usize]
+    }
+
+    /// The instance after the last one of its world.
+    fn end_of_world(&self, instance: u32) -> u32 {
+        self.words[(instance * INSTANCE_WORDS + 1u32) as usize]
+    }
+
+    fn groups(&self, instance: u32) -> Groups {
+        let at = (instance * INSTANCE_WORDS) as usize;
+        Groups { memberships: self.words[at + 2], filter: self.words[at + 3] }
+    }
+
+    fn pose(&self, instance: u32) -> Pose {
+        pose(&self.poses, instance)
+    }
+
+    /// How far the velocity can take a point of an instance.
+    fn motion(&self, instance: u32) -> f32 {
+        last(self.poses[(instance * INSTANCE_ROWS + 1u32) as usize])
+    }
+}
+
+#[cube]
+impl Pairs {
+    /// Whether a pair is among them.
+    fn contain(&self, a: u32, b: u32) -> bool {
+        let mut low = 0u32;
+        let mut high = self.count;
+        let mut found = false;
+        while low < high {
+            let middle = (low + high) / 2u32;
+            let x = self.words[(2u32 * middle) as usize];
+            let y = self.words[(2u32 * middle + 1u32) as usize];
+            let is_less = x < a || (x == a && y < b);
+            found = found || (x == a && y == b);
+            low = select(is_less, middle + 1u32, low);
+            high = select(is_less, high, middle);
+        }
+        found
+    }
+}
+
+/// Half the extent of a plane.
+const ENDLESS: f32 = 1e30;
+
+/// What half an extent is grown by, relative to it and to the vector from the field's origin to the center: more than
+/// rounding takes away.
+const GROWN: f32 = 2e-6;
+
+/// A thread for each instance: its bounds in the world, grown by its motion ahead and half the contact distance. Counts
+/// those of shapes with a vertex that was moved to an impossible position.
+#[cube(launch, create_dummy_kernel)]
+pub fn instance_bounds(shapes: &Shapes, instances: &Instances, counters: &Counters, bounds: &mut [Row]) {
+    let i = ABSOLUTE_POS as u32;
+    if i < instances.count {
+        let field = shapes.field(instances.shape(i));
+        let own = field.bounds();
+        let half = (own.high - own.low) * 0.5f32;
+        let at = instances.pose(i);
+        let off = at.rotation.rotate(((own.low + own.high) * 0.5f32) * at.unit);
+        let x = at.rotation.rotate(v3(at.unit * half.x, 0.0f32, 0.0f32));
+        let y = at.rotation.rotate(v3(0.0f32, at.unit * half.y, 0.0f32));
+        let z = at.rotation.rotate(v3(0.0f32, 0.0f32, at.unit * half.z));
+        let reach = (x.abs() + y.abs()) + z.abs();
+        let ahead = instances.motion(i);
+        let more = GROWN * (off.length() + reach.length()) + 0.5f32 * instances.contact_distance + ahead;
+        let endless = field.entry(KIND) == PLANE;
+        let to = (i * BOUNDS_ROWS) as usize;
+        bounds[to] = row_of(at.origin.high, 0.0f32);
+        bounds[to + 1] = row_of(at.origin.low + off, 0.0f32);
+        let grown = v3(
+            select(endless, ENDLESS, reach.x + more),
+            select(endless, ENDLESS, reach.y + more),
+            select(endless, ENDLESS, reach.z + more),
+        );
+        bounds[to + 2] = row_of(grown, 0.0f32);
+        if field.entry(BAD_VERTEX) != NONE {
+            counters.append(BADLY_MOVED);
+        }
+    }
+}
+
+/// Bounds in the world.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct WorldBounds {
+    center: FarPoint,
+    half: V3,
+}
+
+#[cube]
+fn world_bounds(rows: &[Row], instance: u32) -> WorldBounds {
+    let at = (instance * BOUNDS_ROWS) as usize;
+    WorldBounds { center: FarPoint { high: xyz(rows[at]), low: xyz(rows[at + 1]) }, half: xyz(rows[at + 2]) }
+}
+
+/// A thread for each instance meets all later ones of its world.
+#[cube(launch, create_dummy_kernel)]
+pub fn instance_pairs(
+    shapes: &Shapes,
+    instances: &Instances,
+    bounds: &[Row],
+    excluded: &Pairs,
+    counters: &Counters,
+    found: &mut Found,
+) {
+    let i = ABSOLUTE_POS as u32;
+    if i < instances.count {
+        let is_plane = shapes.field(instances.shape(i)).entry(KIND) == PLANE;
+        let groups = instances.groups(i);
+        let own = world_bounds(bounds, i);
+        let end = instances.end_of_world(i);
+        let mut j = i + 1u32;
+        while j < end {
+            let other = world_bounds(bounds, j);
+            let apart = other.center.from(own.center);
+            let overlap = apart.abs().is_at_most(own.half + other.half);
+            let meet = groups.meet(instances.groups(j));
+            let planes = is_plane && shapes.field(instances.shape(j)).entry(KIND) == PLANE;
+            if overlap && meet && !planes && !excluded.contain(i, j) {
+                write_pair(shapes, instances, counters, found, i, j);
+            }
+            j += 1u32;
+        }
+    }
+}
+
+/// A thread for each pair of instances that the processor found.
+#[cube(launch, create_dummy_kernel)]
+pub fn given_pairs(
+    shapes: &Shapes,
+    instances: &Instances,
+    pairs: &Pairs,
+    counters: &Counters,
+    found: &mut Found,
+) {
+    let pair = ABSOLUTE_POS as u32;
+    if pair < pairs.count {
+        let i = pairs.words[(2u32 * pair) as usize];
+        let j = pairs.words[(2u32 * pair + 1u32) as usize];
+        write_pair(shapes, instances, counters, found, i, j);
+    }
+}
+
+/// Both ordered pairs of two instances, and their blocks.
+#[cube]
+fn write_pair(
+    shapes: &Shapes,
+    instances: &Instances,
+    counters: &Counters,
+    found: &mut Found,
+    i: u32,
+    j: u32,
+) {
+    let at = counters.add(ORDERED_PAIRS, 2u32);
+    if at + 2u32 <= found.pairs.room {
+        let distance = instances.contact_distance + instances.motion(i) + instances.motion(j);
+        let first = ordered_pair(shapes, instances, distance, at, i, j);
+        found.pairs.put(first);
+        let second = ordered_pair(shapes, instances, distance, at + 1u32, j, i);
+        found.pairs.put(second);
+        write_blocks(shapes, counters, &mut found.blocks, at, instances.shape(i));
+        write_blocks(shapes, counters, &mut found.blocks, at + 1u32, instances.shape(j));
+    }
+}
+
+#[cube]
+fn write_blocks(shapes: &Shapes, counters: &Counters, blocks: &mut Blocks, pair: u32, shape: u32) {
+    let meshlets = shapes.field(shape).entry(MESHLET_COUNT);
+    let count = (meshlets + MESHLETS_OF_BLOCK - 1u32) / MESHLETS_OF_BLOCK;
+    let first = counters.add(BLOCKS, count);
+    let mut k = 0u32;
+    while k < count {
+        blocks.put(first + k, pair, k * MESHLETS_OF_BLOCK);
+        k += 1u32;
+    }
+}
+
+/// Surface of `a` against the field of `b`: field = linear · p + shift. Distances up to `distance` are contacts.
+#[cube]
+fn ordered_pair(
+    shapes: &Shapes,
+    instances: &Instances,
+    distance: f32,
+    number: u32,
+    a: u32,
+    b: u32,
+) -> OrderedPair {
+    let (from, to) = (instances.pose(a), instances.pose(b));
+    let scale = from.unit / to.unit;
+    let x = column(from, to, scale, v3(1.0f32, 0.0f32, 0.0f32));
+    let y = column(from, to, scale, v3(0.0f32, 1.0f32, 0.0f32));
+    let z = column(from, to, scale, v3(0.0f32, 0.0f32, 1.0f32));
+    let surface = shapes.field(instances.shape(a));
+    let is_round = surface.entry(KIND) == ROUND;
+    OrderedPair {
+        number,
+        a,
+        b,
+        shape_a: instances.shape(a),
+        shape_b: instances.shape(b),
+        x: v3(x.x, y.x, z.x),
+        y: v3(x.y, y.y, z.y),
+        z: v3(x.z, y.z, z.z),
+        shift: to.to_local(from.origin),
+        scale,
+        reach: distance / to.unit,
+        radius: select(is_round, scale * surface.number(comptime!(SIZES + 1)), 0.0f32),
+    }
+}
+
+/// Where the map takes a unit vector of the frame of `from`.
+#[cube]
+fn column(from: Pose, to: Pose, scale: f32, axis: V3) -> V3 {
+    to.rotation.rotate_back(from.rotation.rotate(axis)) * scale
+}

@@ -1,0 +1,167 @@
+//! Boxes, balls and bounds are fitted to moved faces and tetrahedra, from the leaves of the trees upwards: by one group for
+//! a shape, as nothing orders writes between groups but the end of a launch.
+use cubecl::prelude::*;
+
+use super::super::field::nearest::{NodeBoxes, TreeChild};
+use super::super::field::shapes::{
+    BAD_VERTEX, BOUND_UNIT, Bounds, CHILDREN, EXACT_LISTS, FACE_LEVELS, FACE_VERTICES, HIGH, INNER_BALL, LOW,
+    MESHLET_COUNT, MESHLET_FACES, MESHLETS, NONE, SIDE, TREE, TREE_BOXES, TREE_LEVELS, VERTEX_COUNT,
+};
+use super::super::math::vector::{V3, from_bits, last, row_of, to_bits, v3, xyz, zero};
+use super::bounds::{Moving, MovingExpand, no_bounds};
+
+/// Threads of the group.
+pub const GROUP: u32 = 256;
+
+/// What a ball is grown by, of its radius and of the cube: more than rounding to `f32` takes away.
+pub const GROWN: f32 = 1e-6;
+
+/// The inner nodes of a tree by level. As words: the number of levels, where each begins and the last ends, then the inner
+/// nodes, those over leaves first.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Levels {
+    at: u32,
+    count: u32,
+}
+
+#[cube]
+impl Moving {
+    fn levels(&self, #[comptime] entry: u32) -> Levels {
+        let at = self.entry(entry);
+        Levels { at, count: self.word(at) }
+    }
+
+    /// The place of the first node of a level; that of the level after the last is the end.
+    fn level_start(&self, levels: Levels, level: u32) -> u32 {
+        self.word(levels.at + 1u32 + level)
+    }
+
+    /// The node at a place.
+    fn level_node(&self, levels: Levels, i: u32) -> u32 {
+        self.word(levels.at + 2u32 + levels.count + i)
+    }
+
+    /// Fits the boxes of a node of the face tree.
+    fn refit_faces(&mut self, node: u32) {
+        let children = self.entry(CHILDREN) + 2u32 * node;
+        let left = TreeChild { word: self.word(children) };
+        let right = TreeChild { word: self.word(children + 1u32) };
+        let boxes = NodeBoxes { left: self.child_bounds(left), right: self.child_bounds(right) };
+        self.put_boxes(node, boxes);
+    }
+
+    /// Fits the box of a node of the tree over tetrahedra.
+    fn refit_tetrahedra(&mut self, node: u32) {
+        let tree = self.entry(TREE);
+        let boxes = self.entry(TREE_BOXES);
+        let mut bounds = no_bounds();
+        let end = self.word(tree + 2u32 * node);
+        let mut child = node + 1u32;
+        while child < end {
+            let at = (boxes + 2u32 * child) as usize;
+            bounds = bounds.with(Bounds { low: xyz(self.rows[at]), high: xyz(self.rows[at + 1]) });
+            child = self.word(tree + 2u32 * child);
+        }
+        let to = (boxes + 2u32 * node) as usize;
+        self.rows[to] = row_of(bounds.low, 0.0f32);
+        self.rows[to + 1] = row_of(bounds.high, 0.0f32);
+    }
+
+    /// Fits the ball of a meshlet.
+    fn refit_meshlet(&mut self, meshlet: u32) {
+        let range = self.entry(MESHLET_FACES) + 2u32 * meshlet;
+        let first = self.entry(FACE_VERTICES) + 3u32 * self.word(range);
+        let count = 3u32 * self.word(range + 1u32);
+        let bounds = self.around(first, count);
+        let center = (bounds.low + bounds.high) * 0.5f32;
+        let mut radius = 0.0f32;
+        let mut k = 0u32;
+        while k < count {
+            radius = radius.max((self.vertex(self.word(first + k)) - center).length());
+            k += 1u32;
+        }
+        radius += GROWN * (radius + from_bits(self.entry(SIDE)));
+        let to = (self.entry(MESHLETS) + meshlet) as usize;
+        self.rows[to] = row_of(center, radius);
+    }
+
+    /// The lowest vertex of this thread that is not finite, or farther out than `f32` can tell faces apart.
+    fn bad_vertex(&self) -> u32 {
+        let side = 2.0f32 * from_bits(self.entry(SIDE));
+        let limit = v3(side, side, side);
+        let mut lowest = NONE.runtime();
+        let mut v = UNIT_POS;
+        while v < self.entry(VERTEX_COUNT) {
+            let good = self.vertex(v).abs().is_at_most(limit);
+            lowest = select(good, lowest, lowest.min(v));
+            v += GROUP;
+        }
+        lowest
+    }
+
+    /// What of the table depends on vertices.
+    fn refit_table(&mut self) {
+        // Of moved lists and cells nothing is proved.
+        self.set_entry(EXACT_LISTS, 0u32);
+        self.set_entry(BOUND_UNIT, 0u32);
+        // The thickness is about that before, but not at the same place.
+        let inner = self.entry(INNER_BALL) as usize;
+        let thickness = last(self.rows[inner]).abs();
+        self.rows[inner] = row_of(zero(), -thickness);
+        let bounds = self.node_bounds(0u32);
+        self.set_vector(LOW, bounds.low);
+        self.set_vector(HIGH, bounds.high);
+    }
+
+    fn set_vector(&mut self, #[comptime] at: u32, v: V3) {
+        self.set_entry(at, to_bits(v.x));
+        self.set_entry(at + 1, to_bits(v.y));
+        self.set_entry(at + 2, to_bits(v.z));
+    }
+}
+
+/// One group of [`GROUP`] threads.
+#[cube(launch, create_dummy_kernel)]
+pub fn refit(moving: &mut Moving) {
+    let levels = moving.levels(FACE_LEVELS);
+    let mut level = 0u32;
+    while level < levels.count {
+        let mut i = moving.level_start(levels, level) + UNIT_POS;
+        while i < moving.level_start(levels, level + 1u32) {
+            moving.refit_faces(moving.level_node(levels, i));
+            i += GROUP;
+        }
+        sync_storage();
+        level += 1u32;
+    }
+    let levels = moving.levels(TREE_LEVELS);
+    level = 0u32;
+    while level < levels.count {
+        let mut i = moving.level_start(levels, level) + UNIT_POS;
+        while i < moving.level_start(levels, level + 1u32) {
+            moving.refit_tetrahedra(moving.level_node(levels, i));
+            i += GROUP;
+        }
+        sync_storage();
+        level += 1u32;
+    }
+    let mut i = UNIT_POS;
+    while i < moving.entry(MESHLET_COUNT) {
+        moving.refit_meshlet(i);
+        i += GROUP;
+    }
+    let mut bad = Shared::<[u32]>::new_slice(GROUP as usize);
+    let mut lowest = moving.bad_vertex();
+    bad[UNIT_POS as usize] = lowest;
+    sync_cube();
+    if UNIT_POS == 0u32 {
+        let mut k = 1u32;
+        while k < GROUP {
+            lowest = lowest.min(bad[k as usize]);
+            k += 1u32;
+        }
+        moving.set_entry(BAD_VERTEX, lowest);
+        moving.refit_table();
+    }
+}

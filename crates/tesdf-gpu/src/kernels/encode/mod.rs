@@ -1,0 +1,2 @@
+//! Encoding by samples.
+pub mod sample;

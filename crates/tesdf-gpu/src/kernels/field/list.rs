@@ -1,0 +1,58 @@
+//! The faces that a cell lists: [`tesdf::asset::layout::List`] has the bytes.
+use cubecl::prelude::*;
+use tesdf::asset::layout;
+
+use super::shapes::{Field, FieldExpand, LISTS, NONE, PALETTE_STARTS, PALETTES, PALETTES_HIGH};
+
+/// A list, ready to read faces from.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct List {
+    /// Number of faces.
+    pub count: u32,
+    /// Word where the bytes of the lists begin.
+    lists: u32,
+    /// Byte of the first slot or face.
+    first: u32,
+    /// Where the palette begins among the palette faces; [`NONE`] when faces are written out.
+    palette: u32,
+}
+
+const NO_PALETTE: u32 = layout::NO_PALETTE as u32;
+
+#[cube]
+impl Field<'_> {
+    /// The list at a byte.
+    pub fn list(self, offset: u32) -> List {
+        let lists = self.entry(LISTS);
+        let number = self.half(lists, offset);
+        let mut count = self.byte(lists, offset + 2u32);
+        let mut first = offset + 3u32;
+        let mut palette = NONE.runtime();
+        if number == NO_PALETTE {
+            count |= (self.byte(lists, offset + 3u32) << 8u32) | (self.half(lists, offset + 4u32) << 16u32);
+            first = offset + 6u32;
+        } else {
+            palette = self.word(self.entry(PALETTE_STARTS) + number);
+        }
+        List { count, lists, first, palette }
+    }
+
+    /// Position of face `i` of a list.
+    pub fn listed(self, list: List, i: u32) -> u32 {
+        let mut face = 0u32;
+        if list.palette == NONE {
+            let at = list.first + 4u32 * i;
+            face = self.half(list.lists, at) | (self.half(list.lists, at + 2u32) << 16u32);
+        } else {
+            let at = list.palette + self.byte(list.lists, list.first + i);
+            let low = self.word(self.entry(PALETTES) + at / 2u32);
+            face = (low >> (16u32 * (at % 2u32))) & 65535u32;
+            let high = self.entry(PALETTES_HIGH);
+            if high != NONE {
+                face |= self.byte(high, at) << 16u32;
+            }
+        }
+        face
+    }
+}

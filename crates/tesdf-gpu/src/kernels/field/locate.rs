@@ -1,0 +1,259 @@
+//! The cell that holds a point, by descending the bisection forest in barycentric coordinates, from a root of the cube or
+//! of a conforming domain.
+//!
+//! [`tesdf::domain::Cell`] has the rule. In `f32` a point is off by 2^-24 of the cube, which is far less than the margin
+//! of the lists: on a border a neighbour may be found instead, whose list is good there too.
+use cubecl::prelude::*;
+use tesdf::asset::layout;
+
+use super::super::math::vector::{V3, v3};
+use super::shapes::{BOUND_UNIT, BOUNDS, Field, FieldExpand, INVERSE_SIDE, NODES, NONE};
+
+/// Barycentric coordinates in a cell.
+#[derive(CubeType, CubeTypeMut, Clone, Copy, Debug, PartialEq)]
+#[expand(derive(Clone, Copy))]
+pub struct Lambda {
+    pub l0: f32,
+    pub l1: f32,
+    pub l2: f32,
+    pub l3: f32,
+}
+
+/// A cell of the forest: its word ([`tesdf::asset::layout::Node`]) and its number.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Cell {
+    pub word: u32,
+    /// [`NONE`] outside of all roots.
+    pub number: u32,
+}
+
+/// The word of points outside of all roots.
+pub const NOT_OF_DOMAIN: u32 = layout::LEAF | layout::NOT_OF_DOMAIN << layout::CODE;
+const LEAF: u32 = layout::LEAF;
+const CODE: u32 = layout::CODE;
+const OFFSET: u32 = layout::MAX_LIST_OFFSET - 1;
+const INSIDE: u32 = layout::INSIDE;
+const CROSSING: u32 = layout::CROSSING;
+const LONG_CROSSING: u32 = layout::CROSSING + layout::LONG_WINDING;
+const FAR: u32 = layout::FAR;
+const OUT: u32 = layout::NOT_OF_DOMAIN;
+
+/// Whether a word is of a bisected cell; it then names the first child.
+#[cube]
+pub fn is_split(word: u32) -> bool {
+    word & LEAF == 0u32
+}
+
+#[cube]
+impl Cell {
+    /// The code of the label.
+    pub fn code(self) -> u32 {
+        (self.word >> CODE) & 7u32
+    }
+
+    /// The byte of the list; of a far cell 1 inside, 0 outside.
+    pub fn offset(self) -> u32 {
+        self.word & OFFSET
+    }
+
+    /// Whether all of the cell is inside, with a list or far from the surface.
+    pub fn is_inside(self) -> bool {
+        self.code() == INSIDE || (self.code() == FAR && self.offset() == 1u32)
+    }
+
+    /// Whether the surface comes into the cell, or close to it.
+    pub fn is_crossing(self) -> bool {
+        self.code() >= CROSSING && self.code() <= LONG_CROSSING
+    }
+
+    /// The winding number at the centroid of a crossing cell, unless it is written before the list.
+    pub fn short_winding(self) -> u32 {
+        self.code() - CROSSING
+    }
+
+    /// Whether the winding number is written before the list.
+    pub fn has_long_winding(self) -> bool {
+        self.code() == LONG_CROSSING
+    }
+
+    /// Whether the cell has a list.
+    pub fn is_listed(self) -> bool {
+        self.code() <= LONG_CROSSING
+    }
+
+    /// Whether the point or cell is not of the domain.
+    pub fn is_out(self) -> bool {
+        self.code() == OUT
+    }
+
+    /// The number of a cell with a list, which contacts name; else [`NONE`].
+    pub fn name(self) -> u32 {
+        select(self.is_listed(), self.number, NONE)
+    }
+}
+
+/// The cell of points outside of all roots.
+#[cube]
+pub fn no_cell() -> Cell {
+    Cell { word: NOT_OF_DOMAIN.runtime(), number: NONE.runtime() }
+}
+
+/// The root that holds a point of the unit cube, by the order of its coordinates.
+#[cube]
+pub fn root(u: V3) -> u32 {
+    let xy = u.x >= u.y;
+    let xz = u.x >= u.z;
+    let yz = u.y >= u.z;
+    let x_first = select(yz, 0u32, 1u32);
+    let y_first = select(xz, 2u32, 3u32);
+    let z_first = select(xy, 4u32, 5u32);
+    select(xy && xz, x_first, select(yz && !xy, y_first, z_first))
+}
+
+/// The axes in the order in which a root walks them, as [`tesdf::domain::ROOTS`].
+#[cube]
+pub fn axes(root: u32) -> (u32, u32, u32) {
+    let i = root / 2u32;
+    // The lower of the other two comes first in even roots.
+    let low = select(i == 0u32, 1u32, 0u32);
+    let high = select(i == 2u32, 1u32, 2u32);
+    let even = root % 2u32 == 0u32;
+    (i, select(even, low, high), select(even, high, low))
+}
+
+/// Coordinates in a root of the cube: root `r` walks the axes i, j, k.
+#[cube]
+pub fn in_root(u: V3, root: u32) -> Lambda {
+    let (i, j, k) = axes(root);
+    let (x, y, z) = (u.at(i), u.at(j), u.at(k));
+    Lambda { l0: 1.0f32 - x, l1: x - y, l2: y - z, l3: z }
+}
+
+#[cube]
+impl Lambda {
+    /// Coordinate `k` (1 to 3).
+    pub fn at(self, k: u32) -> f32 {
+        select(k == 3u32, self.l3, select(k == 2u32, self.l2, self.l1))
+    }
+
+    /// Whether the point is in child 1 of a cell whose refinement edge ends at corner `k`.
+    pub fn is_in_second(self, k: u32) -> bool {
+        self.l0 < self.at(k)
+    }
+
+    /// Coordinates in child 0, or in child 1 when `second`, of a cell whose refinement edge ends at corner `k`.
+    pub fn in_child(self, k: u32, second: bool) -> Lambda {
+        let a = self.l0;
+        let b = self.at(k);
+        let kept = select(second, b - a, a - b);
+        let middle = 2.0f32 * select(second, a, b);
+        let is3 = k == 3u32;
+        let is2 = k == 2u32;
+        // k = 3: kept 1 2 middle, or 1 2 kept middle; k = 2: kept 1 middle 3, or 1 kept middle 3; k = 1: kept middle 2 3.
+        let shifted = second && k > 1u32;
+        let l1_of_2 = select(second, kept, self.l1);
+        let l1_of_3 = select(second, self.l2, self.l1);
+        let l2_of_3 = select(second, kept, self.l2);
+        Lambda {
+            l0: select(shifted, self.l1, kept),
+            l1: select(is3, l1_of_3, select(is2, l1_of_2, middle)),
+            l2: select(is3, l2_of_3, select(is2, middle, self.l2)),
+            l3: select(is3, middle, self.l3),
+        }
+    }
+
+    /// The least coordinate.
+    pub fn least(self) -> f32 {
+        self.l0.min(self.l1).min(self.l2).min(self.l3)
+    }
+}
+
+#[cube]
+pub fn no_lambda() -> Lambda {
+    Lambda { l0: 0.0f32, l1: 0.0f32, l2: 0.0f32, l3: 0.0f32 }
+}
+
+/// A point on its way down the forest.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Descent {
+    pub cell: Cell,
+    /// Coordinates of the point in the cell.
+    pub lambda: Lambda,
+    /// The corner that the cell's refinement edge ends at.
+    pub k: u32,
+}
+
+#[cube]
+impl Descent {
+    /// To a child of a bisected cell.
+    pub fn descend(&mut self, field: Field<'_>, second: bool) {
+        self.lambda = self.lambda.in_child(self.k, second);
+        self.cell.number = self.cell.word + select(second, 1u32, 0u32);
+        self.cell.word = field.cell_word(self.cell.number);
+        self.k = next_k(self.k);
+    }
+}
+
+/// The corner that the next refinement edge ends at.
+#[cube]
+pub fn next_k(k: u32) -> u32 {
+    select(k == 1u32, 3u32, k - 1u32)
+}
+
+#[cube]
+impl Field<'_> {
+    /// Where a point lies in the cube, each coordinate from 0 to 1.
+    pub fn in_cube(self, p: V3) -> V3 {
+        p * self.number(INVERSE_SIDE) + v3(0.5f32, 0.5f32, 0.5f32)
+    }
+
+    /// The word of a cell.
+    pub fn cell_word(self, number: u32) -> u32 {
+        self.word(self.entry(NODES) + number)
+    }
+
+    /// The cell of this number; outside of the domain for [`NONE`] and for simple shapes.
+    pub fn cell(self, number: u32) -> Cell {
+        let mut word = NOT_OF_DOMAIN.runtime();
+        if number != NONE && self.is_mesh() {
+            word = self.cell_word(number);
+        }
+        Cell { word, number }
+    }
+
+    /// The cell that holds a point, relative to the middle of the cube.
+    pub fn locate(self, p: V3) -> Cell {
+        let mut at = Descent { cell: no_cell(), lambda: no_lambda(), k: 3u32 };
+        if self.is_conforming() {
+            let held = self.root_holding(p);
+            at.cell.number = held.root;
+            at.lambda = held.lambda;
+        } else {
+            let u = self.in_cube(p);
+            if u.least() >= 0.0f32 && u.greatest() <= 1.0f32 {
+                at.cell.number = root(u);
+                at.lambda = in_root(u, root(u));
+            }
+        }
+        if at.cell.number != NONE {
+            at.cell.word = self.cell_word(at.cell.number);
+            while is_split(at.cell.word) {
+                let second = at.lambda.is_in_second(at.k);
+                at.descend(self, second);
+            }
+        }
+        at.cell
+    }
+
+    /// No point of the cell has a signed distance below this; 0 where the solid may be.
+    pub fn cell_bound(self, number: u32) -> f32 {
+        let mut least = 0.0f32;
+        if number != NONE {
+            let step = self.byte(self.entry(BOUNDS), number) as f32;
+            least = step * step * self.number(BOUND_UNIT);
+        }
+        least
+    }
+}

@@ -1,0 +1,10 @@
+//! The signed distance of a shape at a point.
+pub mod list;
+pub mod locate;
+pub mod nearest;
+pub mod query;
+pub mod shapes;
+pub mod simple;
+pub mod tetrahedra;
+pub mod value;
+pub mod winding;

@@ -1,0 +1,182 @@
+//! The nearest face to a point, of a list or of all faces.
+use cubecl::prelude::*;
+use tesdf::asset::layout;
+
+use super::super::math::vector::{V3, outside_box, v3};
+use super::list::List;
+use super::locate::Cell;
+use super::shapes::{BOXES, Bounds, CHILDREN, Field, FieldExpand, NONE};
+
+/// A face and how far it is.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Nearest {
+    /// Squared distance, with the part of the face in its low bits.
+    pub squared: f32,
+    /// Position of the face; [`NONE`] without one.
+    pub face: u32,
+}
+
+/// Farther than anything.
+pub const FAR: f32 = 1e30;
+
+/// Levels that the stack of the face tree holds; an asset with a deeper tree is refused.
+pub const TREE_DEPTH: usize = 48;
+
+const LEAF: u32 = layout::LEAF;
+/// Bits of the number of faces of a leaf.
+const LEAF_COUNT: u32 = layout::TREE_LEAF as u32 - 1;
+const LEAF_COUNT_BITS: u32 = layout::TREE_LEAF.trailing_zeros();
+
+/// No face nearer than `squared`.
+#[cube]
+pub fn none_within(squared: f32) -> Nearest {
+    Nearest { squared, face: NONE.runtime() }
+}
+
+#[cube]
+impl Nearest {
+    /// The nearer of two, of equally near ones that of the lower position.
+    pub fn or(self, other: Nearest) -> Nearest {
+        let nearer =
+            other.squared < self.squared || (other.squared == self.squared && other.face < self.face);
+        Nearest {
+            squared: select(nearer, other.squared, self.squared),
+            face: select(nearer, other.face, self.face),
+        }
+    }
+
+    /// The same, but the first of equally near ones stays.
+    fn or_nearer(self, other: Nearest) -> Nearest {
+        let nearer = other.squared < self.squared;
+        Nearest {
+            squared: select(nearer, other.squared, self.squared),
+            face: select(nearer, other.face, self.face),
+        }
+    }
+}
+
+/// A child of a node of the face tree, [`tesdf::asset::layout::TreeChild`]: a node, or the faces of a leaf.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct TreeChild {
+    pub word: u32,
+}
+
+#[cube]
+impl TreeChild {
+    pub fn is_leaf(self) -> bool {
+        self.word >= LEAF
+    }
+
+    /// First face of a leaf.
+    pub fn start(self) -> u32 {
+        (self.word & comptime!(!LEAF)) >> LEAF_COUNT_BITS
+    }
+
+    /// Number of faces of a leaf.
+    pub fn count(self) -> u32 {
+        (self.word & LEAF_COUNT) + 1u32
+    }
+}
+
+/// Both boxes of a node of the face tree.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct NodeBoxes {
+    pub left: Bounds,
+    pub right: Bounds,
+}
+
+/// Squared distance to a box.
+#[cube]
+fn to_box(p: V3, bounds: Bounds) -> f32 {
+    let outside = outside_box(p, bounds.low, bounds.high);
+    outside.dot(outside)
+}
+
+#[cube]
+impl Field<'_> {
+    /// The squared distance to a face.
+    fn to_face(self, position: u32, p: V3) -> Nearest {
+        Nearest { squared: self.face(position).distance_squared(p), face: position }
+    }
+
+    /// Of every `step`-th face of a list from `first` on; of equally near ones the lowest position.
+    pub fn nearest_in_list(self, list: List, first: u32, step: u32, p: V3) -> Nearest {
+        let mut found = none_within(FAR.runtime());
+        let mut i = first;
+        while i < list.count {
+            found = found.or(self.to_face(self.listed(list, i), p));
+            i += step;
+        }
+        found
+    }
+
+    /// Both boxes of a node of the face tree.
+    pub fn node_boxes(self, node: u32) -> NodeBoxes {
+        let at = self.entry(BOXES) + 3u32 * node;
+        let (r, s, t) = (self.row(at), self.row(at + 1u32), self.row(at + 2u32));
+        NodeBoxes {
+            left: Bounds {
+                low: v3(r.extract(0usize), r.extract(1usize), r.extract(2usize)),
+                high: v3(r.extract(3usize), s.extract(0usize), s.extract(1usize)),
+            },
+            right: Bounds {
+                low: v3(s.extract(2usize), s.extract(3usize), t.extract(0usize)),
+                high: v3(t.extract(1usize), t.extract(2usize), t.extract(3usize)),
+            },
+        }
+    }
+
+    /// Of all faces, by the face tree; faces farther than `limit` (squared) need not be found.
+    pub fn nearest_in_tree(self, p: V3, limit: f32) -> Nearest {
+        let children = self.entry(CHILDREN);
+        let mut words = Array::<u32>::new(TREE_DEPTH);
+        let mut bounds = Array::<f32>::new(TREE_DEPTH);
+        let mut found = none_within(limit);
+        let mut top = 1usize;
+        words[0] = 0u32;
+        bounds[0] = 0.0f32;
+        while top > 0usize {
+            top -= 1usize;
+            let child = TreeChild { word: words[top] };
+            if bounds[top] < found.squared {
+                if child.is_leaf() {
+                    let end = child.start() + child.count();
+                    let mut face = child.start();
+                    while face < end {
+                        found = found.or_nearer(self.to_face(face, p));
+                        face += 1u32;
+                    }
+                } else {
+                    let boxes = self.node_boxes(child.word);
+                    let left = to_box(p, boxes.left);
+                    let right = to_box(p, boxes.right);
+                    let left_word = self.word(children + 2u32 * child.word);
+                    let right_word = self.word(children + 2u32 * child.word + 1u32);
+                    let left_first = left <= right;
+                    words[top] = select(left_first, right_word, left_word);
+                    bounds[top] = left.max(right);
+                    words[top + 1usize] = select(left_first, left_word, right_word);
+                    bounds[top + 1usize] = left.min(right);
+                    top += 2usize;
+                }
+            }
+        }
+        found
+    }
+
+    /// The nearest face to a point of a cell; none of a simple shape.
+    pub fn nearest(self, cell: Cell, p: V3) -> Nearest {
+        let mut found = none_within(FAR.runtime());
+        if self.is_mesh() {
+            if cell.is_listed() {
+                found = self.nearest_in_list(self.list(cell.offset()), 0u32, 1u32, p);
+            } else {
+                found = self.nearest_in_tree(p, FAR.runtime());
+            }
+        }
+        found
+    }
+}

@@ -1,0 +1,134 @@
+//! Signed distances of many points to many instances.
+use cubecl::prelude::*;
+
+use super::super::math::pose::{FarPoint, pose};
+use super::super::math::vector::{Row, V3, from_bits, pick, row_of, to_bits, v3, xyz, zero};
+use super::shapes::Shapes;
+
+/// Rows of an answer: distance and gradient, closest point; in the field's frame.
+pub const ANSWER_ROWS: u32 = 2;
+
+/// Instances that are queried.
+#[derive(CubeType, CubeLaunch)]
+pub struct Instances {
+    /// Their poses.
+    pub poses: Box<[Row]>,
+    /// Their shapes.
+    pub shapes: Box<[u32]>,
+}
+
+/// Answers of one launch.
+#[derive(CubeType, CubeLaunch)]
+pub struct Answers {
+    /// [`ANSWER_ROWS`] each: gradient and distance, closest point.
+    pub rows: Box<[Row]>,
+    /// Positions of the nearest faces.
+    pub faces: Box<[u32]>,
+}
+
+/// Pairs of an instance and a point, point by point, that a launch answers.
+#[derive(CubeType, CubeLaunch)]
+pub struct Batch {
+    pub points: u32,
+    pub first: u32,
+    pub count: u32,
+}
+
+/// A thread for each point of each instance. `points` are two rows each: high, low.
+#[cube(launch, create_dummy_kernel)]
+pub fn signed_distances(
+    shapes: &Shapes,
+    instances: &Instances,
+    points: &[Row],
+    answers: &mut Answers,
+    batch: &Batch,
+) {
+    let index = ABSOLUTE_POS as u32;
+    if index < batch.count {
+        let pair = batch.first + index;
+        let instance = pair / batch.points;
+        let at = (2u32 * (pair % batch.points)) as usize;
+        let p = FarPoint { high: xyz(points[at]), low: xyz(points[at + 1]) };
+        let local = pose(&instances.poses, instance).to_local(p);
+        let v = shapes.field(instances.shapes[instance as usize]).value(local);
+        let out = (index * ANSWER_ROWS) as usize;
+        answers.rows[out] = row_of(v.gradient, v.distance);
+        answers.rows[out + 1] = row_of(v.point, 0.0f32);
+        answers.faces[index as usize] = v.face;
+    }
+}
+
+/// Answers in the world, three numbers a vector.
+#[derive(CubeType, CubeLaunch)]
+pub struct WorldAnswers {
+    pub distances: Box<[f32]>,
+    pub gradients: Box<[f32]>,
+    pub closest: Box<[f32]>,
+    pub faces: Box<[u32]>,
+}
+
+/// A thread for each point of each instance, in `f32` alone. `points` are three numbers each, in the world.
+#[cube(launch, create_dummy_kernel)]
+pub fn world_distances(
+    shapes: &Shapes,
+    instances: &Instances,
+    points: &[f32],
+    answers: &mut WorldAnswers,
+    point_count: u32,
+    count: u32,
+) {
+    let index = ABSOLUTE_POS as u32;
+    if index < count {
+        let instance = index / point_count;
+        let at = (3u32 * (index % point_count)) as usize;
+        let (x, y, z) = (points[at], points[at + 1], points[at + 2]);
+        let finite = is_finite(x) && is_finite(y) && is_finite(z);
+        let p = FarPoint { high: pick(finite, v3(x, y, z), zero()), low: zero() };
+        let frame = pose(&instances.poses, instance);
+        let v = shapes.field(instances.shapes[instance as usize]).value(frame.to_local(p));
+        answers.distances[index as usize] = or_nan(finite, v.distance * frame.unit);
+        put(&mut answers.gradients, index, finite, frame.rotation.rotate(v.gradient));
+        put(&mut answers.closest, index, finite, frame.to_world(v.point));
+        answers.faces[index as usize] = select(finite, v.face, u32::MAX);
+    }
+}
+
+#[cube]
+fn put(numbers: &mut [f32], index: u32, finite: bool, v: V3) {
+    let at = (3u32 * index) as usize;
+    numbers[at] = or_nan(finite, v.x);
+    numbers[at + 1] = or_nan(finite, v.y);
+    numbers[at + 2] = or_nan(finite, v.z);
+}
+
+const EXPONENT: u32 = 0x7F80_0000;
+const NAN: u32 = 0x7FC0_0000;
+
+/// By bits: a shader may assume that all numbers are finite.
+#[cube]
+fn is_finite(x: f32) -> bool {
+    to_bits(x) & EXPONENT != EXPONENT
+}
+
+/// The number, or NaN.
+#[cube]
+fn or_nan(is_number: bool, x: f32) -> f32 {
+    from_bits(select(is_number, to_bits(x), NAN))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_that_are_not_finite_have_no_answer() {
+        for x in [0.0, -1.5, f32::MIN_POSITIVE / 2.0, f32::MAX] {
+            assert!(is_finite(x) && is_finite(-x));
+            assert_eq!(or_nan(true, x), x);
+        }
+        for x in [f32::INFINITY, f32::NEG_INFINITY, f32::NAN, -f32::NAN] {
+            assert!(!is_finite(x));
+        }
+        assert!(or_nan(false, 1.0).is_nan());
+    }
+}

@@ -1,0 +1,105 @@
+//! Eq. (4): the signed distance of a shape at a point, with its gradient.
+//!
+//! Points are in the frame of the field: for a mesh its local frame relative to the middle of the cube, for a simple
+//! shape its own.
+use cubecl::prelude::*;
+use tesdf::asset::layout::SignHint;
+
+use super::super::math::triangle::part_of;
+use super::super::math::vector::{V3, pick, same};
+use super::locate::{Cell, no_cell};
+use super::nearest::{FAR, Nearest};
+use super::shapes::{Field, FieldExpand};
+
+/// The value of a field at a point.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Value {
+    /// Signed distance.
+    pub distance: f32,
+    /// Its gradient, unit.
+    pub gradient: V3,
+    /// The nearest point of the surface.
+    pub point: V3,
+    /// Position of the nearest face; of a box the number of its side.
+    pub face: u32,
+    /// 0 that face, 1–3 its edges, 4–6 its corners.
+    pub feature: u32,
+}
+
+/// Below this distance the gradient is the normal of the nearest face.
+const ON_SURFACE: f32 = 1e-6;
+/// Below this distance from a flat face no direction is left: its square is next to nothing in `f32`.
+const ON_EDGE: f32 = 1e-15;
+
+#[cube]
+impl Field<'_> {
+    /// The value at a point of a mesh whose nearest face is known.
+    pub fn mesh_value(self, cell: Cell, p: V3, nearest: Nearest) -> Value {
+        let f = self.face(nearest.face);
+        let c = f.closest(p, part_of(nearest.squared));
+        let distance = c.outward.length();
+        let flat = f.is_flat();
+        let mut inside = cell.is_inside();
+        if cell.is_crossing() {
+            let hint = (f.hints >> (2u32 * c.feature)) & 3u32;
+            inside = hint == INSIDE || (hint == BY_PLANE && c.height < 0.0f32);
+            // A flat face has no height that could decide.
+            if hint == BY_WINDING || (hint == BY_PLANE && flat) {
+                inside = self.winding(p) >= 1i32;
+            }
+        }
+        let sign = select(inside, -1.0f32, 1.0f32);
+        let away = distance > ON_EDGE;
+        let along = pick(away, c.outward * (sign / select(away, distance, 1.0f32)), f.across());
+        // In the plane of a face the height gives the direction better than the difference of two points.
+        let by_height = select(c.feature == 0u32 && !same(c.height < 0.0f32, inside), -1.0f32, 1.0f32);
+        let by_normal = !flat && (distance < ON_SURFACE || c.feature == 0u32);
+        let normal = pick(distance < ON_SURFACE, f.normal, f.normal * by_height);
+        Value {
+            distance: sign * distance,
+            gradient: pick(by_normal, normal, along),
+            point: c.point,
+            face: nearest.face,
+            feature: c.feature,
+        }
+    }
+
+    /// The value at a point of a cell, of any shape, when the nearest face is known.
+    pub fn value_near(self, cell: Cell, p: V3, nearest: Nearest) -> Value {
+        if self.is_mesh() { self.mesh_value(cell, p, nearest) } else { self.simple_value(p) }
+    }
+
+    /// The value at a point of a cell, of any shape.
+    pub fn value_in_cell(self, cell: Cell, p: V3) -> Value {
+        self.value_near(cell, p, self.nearest(cell, p))
+    }
+
+    /// The value at any point of any shape.
+    pub fn value(self, p: V3) -> Value {
+        let mut cell = no_cell();
+        if self.is_mesh() {
+            cell = self.locate(p);
+        }
+        self.value_in_cell(cell, p)
+    }
+
+    /// Signed distance to the surface, also where lists are not exact.
+    pub fn exact_distance(self, p: V3) -> f32 {
+        if self.is_mesh() {
+            let cell = self.locate(p);
+            let nearest = if cell.is_listed() && self.has_exact_lists() {
+                self.nearest_in_list(self.list(cell.offset()), 0u32, 1u32, p)
+            } else {
+                self.nearest_in_tree(p, FAR.runtime())
+            };
+            self.mesh_value(cell, p, nearest).distance
+        } else {
+            self.simple_value(p).distance
+        }
+    }
+}
+
+const BY_WINDING: u32 = SignHint::Winding as u32;
+const BY_PLANE: u32 = SignHint::Plane as u32;
+const INSIDE: u32 = SignHint::Inside as u32;

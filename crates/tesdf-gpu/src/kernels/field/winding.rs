@@ -1,0 +1,177 @@
+//! The winding number of a point: that at the centroid of its cell, and the faces that the segment to there crosses.
+use cubecl::prelude::*;
+
+use super::super::math::vector::{V3, pick, same, v3};
+use super::locate::{Cell, Descent, axes, in_root, is_split, root};
+use super::shapes::{Field, FieldExpand, LISTS, SIDE};
+
+/// A cell and its centroid.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Centered {
+    cell: Cell,
+    centroid: V3,
+}
+
+/// The corners of a cell.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Corners {
+    pub c0: V3,
+    pub c1: V3,
+    pub c2: V3,
+    pub c3: V3,
+}
+
+/// The corners of a root of the unit cube that walks the axes i, j, k: 0, e_i, e_i + e_j, (1, 1, 1).
+#[cube]
+pub fn corners_of_root(root: u32) -> Corners {
+    let (i, j, _k) = axes(root);
+    Corners {
+        c0: v3(0.0f32, 0.0f32, 0.0f32),
+        c1: v3(
+            select(i == 0u32, 1.0f32, 0.0f32),
+            select(i == 1u32, 1.0f32, 0.0f32),
+            select(i == 2u32, 1.0f32, 0.0f32),
+        ),
+        c2: v3(
+            select(i == 0u32 || j == 0u32, 1.0f32, 0.0f32),
+            select(i == 1u32 || j == 1u32, 1.0f32, 0.0f32),
+            select(i == 2u32 || j == 2u32, 1.0f32, 0.0f32),
+        ),
+        c3: v3(1.0f32, 1.0f32, 1.0f32),
+    }
+}
+
+#[cube]
+impl Corners {
+    /// The corners of child 0, or of child 1 when `second`, of a cell whose refinement edge ends at corner `k`, in the
+    /// order of [`Cell::child_corners`](tesdf::domain::Cell::child_corners).
+    pub fn of_child(self, k: u32, second: bool) -> Corners {
+        let end = pick(k == 3u32, self.c3, pick(k == 2u32, self.c2, self.c1));
+        let middle = (self.c0 + end) * 0.5f32;
+        let shifted = second && k > 1u32;
+        Corners {
+            c0: pick(second, self.c1, self.c0),
+            c1: pick(k == 1u32, middle, pick(shifted, self.c2, self.c1)),
+            c2: pick(k == 2u32, middle, pick(k == 3u32 && second, self.c3, self.c2)),
+            c3: pick(k == 3u32, middle, self.c3),
+        }
+    }
+}
+
+#[cube]
+impl Field<'_> {
+    /// The winding number of a point.
+    ///
+    /// The cell is the one that [`locate`](Self::locate) finds. On a border that may be another one than the caller's, with
+    /// another label and another centroid.
+    pub fn winding(self, p: V3) -> i32 {
+        let held = self.centered(p);
+        let cell = held.cell;
+        let mut sum = select(cell.is_inside(), 1i32, 0i32);
+        if cell.is_crossing() {
+            sum = self.winding_at_centroid(cell);
+            let faces = self.list(cell.offset());
+            let mut i = 0u32;
+            while i < faces.count {
+                let f = self.face(self.listed(faces, i));
+                sum += crossing(p, held.centroid, f.corner(0u32), f.corner(1u32), f.corner(2u32));
+                i += 1u32;
+            }
+        }
+        sum
+    }
+
+    /// The winding number at the centroid of a crossing cell.
+    fn winding_at_centroid(self, cell: Cell) -> i32 {
+        let mut sum = cell.short_winding() as i32;
+        if cell.has_long_winding() {
+            let lists = self.entry(LISTS);
+            let at = cell.offset() - 4u32;
+            sum = (self.half(lists, at) | (self.half(lists, at + 2u32) << 16u32)) as i32;
+        }
+        sum
+    }
+
+    /// The cell that holds a point, found as [`locate`](Self::locate) finds it, and its centroid. A point that rounding
+    /// puts out of the cube is moved into it.
+    fn centered(self, p: V3) -> Centered {
+        let free = self.in_cube(p);
+        let u = v3(free.x.clamp(0.0f32, 1.0f32), free.y.clamp(0.0f32, 1.0f32), free.z.clamp(0.0f32, 1.0f32));
+        let first = root(u);
+        let cell = Cell { word: self.cell_word(first), number: first };
+        let mut at = Descent { cell, lambda: in_root(u, first), k: 3u32 };
+        let mut corners = corners_of_root(first);
+        while is_split(at.cell.word) {
+            let second = at.lambda.is_in_second(at.k);
+            corners = corners.of_child(at.k, second);
+            at.descend(self, second);
+        }
+        let quarter = 0.25f32 * self.number(SIDE);
+        let half = 0.5f32 * self.number(SIDE);
+        let sum = ((corners.c0 + corners.c1) + corners.c2) + corners.c3;
+        Centered { cell: at.cell, centroid: sum * quarter - v3(half, half, half) }
+    }
+}
+
+/// 1 where the segment from `p` to `q` leaves the solid through the triangle, −1 where it enters, else 0.
+#[cube]
+pub fn crossing(p: V3, q: V3, a: V3, b: V3, c: V3) -> i32 {
+    let normal = (b - a).cross(c - a);
+    let p_over = normal.dot(p - a) >= 0.0f32;
+    let q_over = normal.dot(q - a) >= 0.0f32;
+    let along = q - p;
+    let (pa, pb, pc) = (a - p, b - p, c - p);
+    let ab = is_left(along, pa, pb);
+    let bc = is_left(along, pb, pc);
+    let ca = is_left(along, pc, pa);
+    let through = !same(p_over, q_over) && same(ab, bc) && same(bc, ca);
+    select(through, select(p_over, -1i32, 1i32), 0i32)
+}
+
+/// Whether the origin is on the left of the segment from `a` to `b`, seen along `along`; of a segment and its reverse
+/// exactly one is true.
+///
+/// Two faces at an edge ask for either: the same number has to answer both, or a segment through the edge would meet
+/// none of them, or both. Where the number is 0, as in symmetric bodies, the segment counts as moved a little in a fixed
+/// direction.
+#[cube]
+fn is_left(along: V3, a: V3, b: V3) -> bool {
+    let swapped = b.x < a.x || (b.x == a.x && (b.y < a.y || (b.y == a.y && b.z < a.z)));
+    let (first, second) = (pick(swapped, b, a), pick(swapped, a, b));
+    let turn = along.dot(first.cross(second));
+    let moved = v3(0.54f32, 0.21f32, 0.81f32);
+    let tie = moved.cross(along).dot(second - first) >= 0.0f32;
+    !same(select(turn == 0.0f32, tie, turn > 0.0f32), swapped)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Segments through edges and corners of a cube, as its symmetry makes them, enter it once, and leave it once.
+    #[test]
+    fn a_segment_through_an_edge_or_a_corner_crosses_once() {
+        let corner = |k: u32| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit as f32 * 2.0 - 1.0);
+        let squares = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let faces = squares.map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).concat();
+        let sum = |p: V3, q: V3| -> i32 {
+            let of = |f: &[u32; 3]| f.map(corner).map(|[x, y, z]| v3(x, y, z));
+            faces.iter().map(of).map(|[a, b, c]| crossing(p, q, a, b, c)).sum()
+        };
+        let steps = [-3.0, -2.0, -1.5, 0.0, 1.5, 2.0, 3.0f32];
+        for x in steps {
+            for y in steps {
+                for z in steps {
+                    if x == 0.0 && y == 0.0 && z == 0.0 {
+                        continue;
+                    }
+                    let (out, middle) = (v3(x, y, z), v3(0.0, 0.0, 0.0));
+                    assert_eq!((sum(out, middle), sum(middle, out)), (-1, 1), "{x} {y} {z}");
+                    assert_eq!(sum(out, v3(-x, -y, -z)), 0, "{x} {y} {z}, to the other side");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! The greatest minimum of four linear functions over a triangle, each given by its values at the corners: a bound on
+//! the depth of a piece.
+use cubecl::prelude::*;
+
+use super::vector::{V3, v3};
+
+/// Four linear functions.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Functions {
+    pub f: V3,
+    pub g: V3,
+    pub h: V3,
+    pub k: V3,
+}
+
+#[cube]
+impl Functions {
+    /// The least of the four at barycentric weights.
+    fn least_at(self, w: V3) -> f32 {
+        self.f.dot(w).min(self.g.dot(w)).min(self.h.dot(w).min(self.k.dot(w)))
+    }
+
+    /// The greater of `least` and the least of all four where two of them, with difference `d`, are equal on an edge.
+    fn on_edges(self, least: f32, d: V3) -> f32 {
+        let mut greatest = least;
+        if d.x * d.y < 0.0f32 {
+            let w = d.x / (d.x - d.y);
+            greatest = greatest.max(self.least_at(v3(1.0f32 - w, w, 0.0f32)));
+        }
+        if d.y * d.z < 0.0f32 {
+            let w = d.y / (d.y - d.z);
+            greatest = greatest.max(self.least_at(v3(0.0f32, 1.0f32 - w, w)));
+        }
+        if d.z * d.x < 0.0f32 {
+            let w = d.z / (d.z - d.x);
+            greatest = greatest.max(self.least_at(v3(w, 0.0f32, 1.0f32 - w)));
+        }
+        greatest
+    }
+
+    /// The same where three are equal inside, given two of their differences.
+    fn inside(self, least: f32, d: V3, e: V3) -> f32 {
+        let w = d.cross(e);
+        let sum = w.x + w.y + w.z;
+        let some = sum != 0.0f32;
+        let at = w * select(some, 1.0f32 / select(some, sum, 1.0f32), 0.0f32);
+        let mut greatest = least;
+        if some && at.x >= 0.0f32 && at.y >= 0.0f32 && at.z >= 0.0f32 {
+            greatest = greatest.max(self.least_at(at));
+        }
+        greatest
+    }
+
+    /// The greatest minimum: at a corner, where two functions are equal on an edge, or three inside. Written out, as a
+    /// loop over pairs and triples would be most of the iterations of a search.
+    pub fn greatest_minimum(self) -> f32 {
+        let (fg, fh, fk) = (self.f - self.g, self.f - self.h, self.f - self.k);
+        let (gh, gk, hk) = (self.g - self.h, self.g - self.k, self.h - self.k);
+        let mut greatest = self
+            .least_at(v3(1.0f32, 0.0f32, 0.0f32))
+            .max(self.least_at(v3(0.0f32, 1.0f32, 0.0f32)))
+            .max(self.least_at(v3(0.0f32, 0.0f32, 1.0f32)));
+        greatest = self.on_edges(greatest, fg);
+        greatest = self.on_edges(greatest, fh);
+        greatest = self.on_edges(greatest, fk);
+        greatest = self.on_edges(greatest, gh);
+        greatest = self.on_edges(greatest, gk);
+        greatest = self.on_edges(greatest, hk);
+        greatest = self.inside(greatest, fg, fh);
+        greatest = self.inside(greatest, fg, fk);
+        greatest = self.inside(greatest, fh, fk);
+        self.inside(greatest, gh, gk)
+    }
+}

@@ -1,0 +1,128 @@
+//! Wrenches of unit forces, and their residuals from a convex hull: the difference of a wrench and a point of the hull.
+//!
+//! A step shortens a residual to the shortest one from a triangle: of its point and two vertices of the hull. With
+//! segments to one vertex alone (Frank–Wolfe) steps go to and fro between the vertices of a face: eight of them left
+//! bounds three times as far from the distances where 64 contacts of a curved patch are kept.
+use cubecl::prelude::*;
+
+use super::vector::{V3, pick};
+
+/// Force, and torque over a length; or the difference of two such.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Wrench {
+    pub force: V3,
+    pub torque: V3,
+}
+
+/// A residual, and what rounding may have added to its length or taken away.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Residual {
+    pub wrench: Wrench,
+    pub rounding: f32,
+}
+
+/// Rounding of a step, as a share of the lengths that it adds: six operations on each coordinate, 6e-8 each.
+const STEP_ROUNDING: f32 = 4e-7;
+/// Two directions count as one below this share of the product of their squares.
+const PARALLEL: f32 = 1e-6;
+/// No division by less.
+const LEAST: f32 = 1e-30;
+
+#[cube]
+impl Wrench {
+    pub fn add(self, other: Wrench) -> Wrench {
+        Wrench { force: self.force + other.force, torque: self.torque + other.torque }
+    }
+
+    pub fn sub(self, other: Wrench) -> Wrench {
+        Wrench { force: self.force - other.force, torque: self.torque - other.torque }
+    }
+
+    pub fn mul(self, factor: f32) -> Wrench {
+        Wrench { force: self.force * factor, torque: self.torque * factor }
+    }
+
+    pub fn dot(self, other: Wrench) -> f32 {
+        self.force.dot(other.force) + self.torque.dot(other.torque)
+    }
+}
+
+impl std::ops::Add for Wrench {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Wrench::add(self, other)
+    }
+}
+
+impl std::ops::Sub for Wrench {
+    type Output = Self;
+
+    fn sub(self, other: Self) -> Self {
+        Wrench::sub(self, other)
+    }
+}
+
+impl std::ops::Mul<f32> for Wrench {
+    type Output = Self;
+
+    fn mul(self, factor: f32) -> Self {
+        Wrench::mul(self, factor)
+    }
+}
+
+/// `first` where the condition holds, else `second`, without a branch.
+#[cube]
+pub fn pick_wrench(condition: bool, first: Wrench, second: Wrench) -> Wrench {
+    Wrench {
+        force: pick(condition, first.force, second.force),
+        torque: pick(condition, first.torque, second.torque),
+    }
+}
+
+#[cube]
+impl Residual {
+    /// The residual from the nearest point of the triangle of this one's point and the vertices from which `to_f` and
+    /// `to_g` come; itself where that is no shorter.
+    pub fn shortened(self, to_f: Wrench, to_g: Wrench) -> Residual {
+        let x = self.wrench;
+        let along_f = x - to_f;
+        let along_g = x - to_g;
+        let ff = along_f.dot(along_f);
+        let gg = along_g.dot(along_g);
+        let fg = along_f.dot(along_g);
+        let xf = x.dot(along_f);
+        let xg = x.dot(along_g);
+        let square = x.dot(x);
+        let area = ff * gg - fg * fg;
+        let inside_f = (xf * gg - xg * fg) / area.max(LEAST);
+        let inside_g = (xg * ff - xf * fg) / area.max(LEAST);
+        let is_inside = area > PARALLEL * ff * gg
+            && inside_f >= 0.0f32
+            && inside_g >= 0.0f32
+            && inside_f + inside_g <= 1.0f32;
+        // On the side from x to f.
+        let of_f = (xf / ff.max(LEAST)).max(0.0f32).min(1.0f32);
+        let of_f_square = square - 2.0f32 * of_f * xf + of_f * of_f * ff;
+        // On the side from g to f.
+        let side = to_g - to_f;
+        let side_square = side.dot(side);
+        let of_g = to_g.dot(side);
+        let from_g = (of_g / side_square.max(LEAST)).max(0.0f32).min(1.0f32);
+        let from_g_square = to_g.dot(to_g) - 2.0f32 * from_g * of_g + from_g * from_g * side_square;
+        let on_side = !is_inside && from_g_square < of_f_square;
+        let f = select(is_inside, inside_f, select(on_side, from_g, of_f));
+        let g = select(is_inside, inside_g, select(on_side, 1.0f32 - from_g, 0.0f32));
+        let rest = select(on_side, 0.0f32, (1.0f32 - f - g).max(0.0f32));
+        let new = x * rest + (to_f * f + to_g * g);
+        let lengths = rest * square.sqrt() + f * to_f.dot(to_f).sqrt() + g * to_g.dot(to_g).sqrt();
+        let rounding = rest * self.rounding + STEP_ROUNDING * lengths;
+        let is_shorter = new.dot(new) < square;
+        Residual {
+            wrench: pick_wrench(is_shorter, new, x),
+            rounding: select(is_shorter, rounding, self.rounding),
+        }
+    }
+}

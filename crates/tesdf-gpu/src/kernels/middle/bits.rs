@@ -1,0 +1,47 @@
+//! Bits by level of the forest, on the way of a walk.
+use cubecl::prelude::*;
+
+/// Levels of the forest: the deepest cell, as in `tesdf::domain::MAX_DEPTH`, and the roots.
+pub const LEVELS: usize = tesdf::domain::MAX_DEPTH as usize + 1;
+/// Words of bits; read three levels at a time.
+const WORDS: usize = LEVELS.div_ceil(32);
+
+/// A bit for each level.
+#[derive(CubeType)]
+pub struct Bits {
+    words: Array<u32>,
+}
+
+#[cube]
+pub fn no_bits() -> Bits {
+    Bits { words: Array::<u32>::new(WORDS) }
+}
+
+#[cube]
+impl Bits {
+    pub fn clear(&mut self) {
+        self.words[0] = 0u32;
+        self.words[1] = 0u32;
+        self.words[2] = 0u32;
+    }
+
+    pub fn get(&self, level: u32) -> bool {
+        (self.words[(level / 32u32) as usize] >> (level % 32u32)) & 1u32 == 1u32
+    }
+
+    pub fn set(&mut self, level: u32, value: bool) {
+        let mask = 1u32 << (level % 32u32);
+        let at = (level / 32u32) as usize;
+        let cleared = self.words[at] & !mask;
+        self.words[at] = select(value, cleared | mask, cleared);
+    }
+
+    /// One more than the highest level whose bit is set; 0 without one.
+    pub fn last(&self) -> u32 {
+        let (low, middle, high) = (self.words[0], self.words[1], self.words[2]);
+        let of_low = 32u32 - low.leading_zeros();
+        let of_middle = 64u32 - middle.leading_zeros();
+        let of_high = 96u32 - high.leading_zeros();
+        select(high > 0u32, of_high, select(middle > 0u32, of_middle, of_low))
+    }
+}

@@ -1,0 +1,122 @@
+//! Barycentric coordinates of the three corners of a face.
+use cubecl::prelude::*;
+
+use super::super::broad::ordered_pair::Part;
+use super::super::field::locate::Lambda;
+use super::super::field::tetrahedra::Tetrahedron;
+use super::super::math::vector::{V3, v3};
+use super::bits::{Bits, BitsExpand};
+use super::cut::Cut;
+
+/// Coordinates of the corners of a face in a cell.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Corners {
+    pub a: Lambda,
+    pub b: Lambda,
+    pub c: Lambda,
+}
+
+/// Below in all corners, or touching from below.
+#[cube]
+fn is_out(heights: V3) -> bool {
+    let greatest = heights.greatest();
+    greatest < 0.0f32 || (greatest <= 0.0f32 && heights.least() < 0.0f32)
+}
+
+/// Of the levels that are left one, two, or three and more.
+#[cube]
+fn pick_lambda(left: u32, one: Lambda, two: Lambda, three: Lambda) -> Lambda {
+    Lambda {
+        l0: select(left == 1u32, one.l0, select(left == 2u32, two.l0, three.l0)),
+        l1: select(left == 1u32, one.l1, select(left == 2u32, two.l1, three.l1)),
+        l2: select(left == 1u32, one.l2, select(left == 2u32, two.l2, three.l2)),
+        l3: select(left == 1u32, one.l3, select(left == 2u32, two.l3, three.l3)),
+    }
+}
+
+/// The corners of a part in a root.
+#[cube]
+pub fn corners_in(root: Tetrahedron, part: Part) -> Corners {
+    Corners { a: root.lambda(part.a), b: root.lambda(part.b), c: root.lambda(part.c) }
+}
+
+#[cube]
+impl Corners {
+    /// Heights of the corners over side `side` of the cell, over that of the opposite corner.
+    pub fn over(self, side: u32) -> V3 {
+        v3(over(self.a, side), over(self.b, side), over(self.c, side))
+    }
+
+    /// Whether the face is all on the outer side of a side of the cell.
+    pub fn is_separate(self) -> bool {
+        is_out(v3(self.a.l0, self.b.l0, self.c.l0))
+            || is_out(v3(self.a.l1, self.b.l1, self.c.l1))
+            || is_out(v3(self.a.l2, self.b.l2, self.c.l2))
+            || is_out(v3(self.a.l3, self.b.l3, self.c.l3))
+    }
+
+    /// Whether the face is all in the cell.
+    pub fn is_within(self) -> bool {
+        self.a.least().min(self.b.least()).min(self.c.least()) >= 0.0f32
+    }
+
+    /// In child 0, or in child 1 when `second`, of a cell whose refinement edge ends at corner `k`.
+    pub fn in_child(self, k: u32, second: bool) -> Corners {
+        Corners {
+            a: self.a.in_child(k, second),
+            b: self.b.in_child(k, second),
+            c: self.c.in_child(k, second),
+        }
+    }
+
+    /// Heights over the plane that bisects the cell: above it is child 0.
+    pub fn over_bisection(self, k: u32) -> V3 {
+        v3(self.a.l0 - self.a.at(k), self.b.l0 - self.b.at(k), self.c.l0 - self.c.at(k))
+    }
+
+    /// Cuts the face's polygon to the part that the cell holds.
+    pub fn clip(self, polygon: &mut Cut) {
+        polygon.cut(v3(self.a.l0, self.b.l0, self.c.l0), 1.0f32);
+        polygon.cut(v3(self.a.l1, self.b.l1, self.c.l1), 1.0f32);
+        polygon.cut(v3(self.a.l2, self.b.l2, self.c.l2), 1.0f32);
+        polygon.cut(v3(self.a.l3, self.b.l3, self.c.l3), 1.0f32);
+    }
+
+    /// The corners of one of two faces, without a branch.
+    pub fn pick(condition: bool, first: Corners, second: Corners) -> Corners {
+        Corners {
+            a: pick_lambda(select(condition, 1u32, 2u32), first.a, second.a, second.a),
+            b: pick_lambda(select(condition, 1u32, 2u32), first.b, second.b, second.b),
+            c: pick_lambda(select(condition, 1u32, 2u32), first.c, second.c, second.c),
+        }
+    }
+}
+
+#[cube]
+fn over(l: Lambda, side: u32) -> f32 {
+    select(side == 0u32, l.l0, l.at(side))
+}
+
+#[cube]
+impl Bits {
+    /// The corners in the cell that the first `depth` bits of a path lead to, from those in a root.
+    pub fn follow(&self, root: Corners, depth: u32) -> Corners {
+        let mut held = root;
+        // Three levels a turn, each with its refinement edge.
+        let mut level = 0u32;
+        while level < depth {
+            let one = held.in_child(3u32, self.get(level));
+            let two = one.in_child(2u32, self.get(level + 1u32));
+            let three = two.in_child(1u32, self.get(level + 2u32));
+            let left = depth - level;
+            held = Corners {
+                a: pick_lambda(left, one.a, two.a, three.a),
+                b: pick_lambda(left, one.b, two.b, three.b),
+                c: pick_lambda(left, one.c, two.c, three.c),
+            };
+            level += 3u32;
+        }
+        held
+    }
+}

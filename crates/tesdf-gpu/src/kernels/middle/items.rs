@@ -1,0 +1,120 @@
+//! What the middle phase hands to the narrow phase: nodes with their cells, and polygons.
+use cubecl::prelude::*;
+
+use super::super::broad::ordered_pair::{OrderedPair, Part};
+use super::super::counters::{Counters, POLYGONS};
+use super::super::math::vector::{Row, row};
+use super::cut::{Cut, CutExpand};
+
+/// Nodes, or polygons without their vertices.
+#[derive(CubeType, CubeLaunch)]
+pub struct Items {
+    /// [`WORDS`] each: ordered pair, face of a, cell, number.
+    pub words: Box<[u32]>,
+    /// Room for so many.
+    pub room: u32,
+}
+
+/// Polygons: parts of faces clipped by cells.
+#[derive(CubeType, CubeLaunch)]
+pub struct Polygons {
+    pub items: Items,
+    /// [`ROWS`] each: the vertices, two to a row, as weights of the second and the third corner of the face.
+    pub weights: Box<[Row]>,
+}
+
+/// Words of an item.
+pub const WORDS: u32 = 4;
+/// Rows of a polygon.
+pub const ROWS: usize = 4;
+/// Most vertices of a polygon: a triangle clipped by a tetrahedron has seven.
+pub const MAX_VERTICES: usize = 8;
+
+/// A node or a polygon.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Item {
+    /// The ordered pair.
+    pub pair: u32,
+    /// The face of its first instance.
+    pub face: u32,
+    /// The cell in the field of the second one; [`NONE`](super::super::field::shapes::NONE) outside of the domain.
+    pub cell: u32,
+    /// Of a node the corner of the face, of a polygon the number of vertices.
+    pub number: u32,
+}
+
+/// A face in the field's frame.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Subject {
+    pub pair: OrderedPair,
+    pub face: u32,
+    pub part: Part,
+}
+
+/// A point of a face: weights of its second and third corner.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Weights {
+    pub s: f32,
+    pub t: f32,
+}
+
+#[cube]
+impl Items {
+    pub fn get(&self, item: u32) -> Item {
+        let at = (item * WORDS) as usize;
+        Item {
+            pair: self.words[at],
+            face: self.words[at + 1],
+            cell: self.words[at + 2],
+            number: self.words[at + 3],
+        }
+    }
+
+    pub fn put(&mut self, at: u32, item: Item) {
+        let at = (at * WORDS) as usize;
+        self.words[at] = item.pair;
+        self.words[at + 1] = item.face;
+        self.words[at + 2] = item.cell;
+        self.words[at + 3] = item.number;
+    }
+}
+
+#[cube]
+impl Polygons {
+    /// Vertex `i` of a polygon.
+    pub fn vertex(&self, item: u32, i: u32) -> Weights {
+        let row = self.weights[(item * comptime!(ROWS as u32) + i / 2u32) as usize];
+        let is_first = i % 2u32 == 0u32;
+        Weights {
+            s: select(is_first, row.extract(0usize), row.extract(2usize)),
+            t: select(is_first, row.extract(1usize), row.extract(3usize)),
+        }
+    }
+}
+
+#[cube]
+impl Cut {
+    /// Appends a polygon of a face.
+    pub fn write(&self, polygons: &mut Polygons, counters: &Counters, subject: Subject, cell: u32) {
+        let at = counters.append(POLYGONS);
+        if at < polygons.items.room {
+            // Rounding may leave more than eight, all but on a line: the first ones cover the polygon.
+            let number = self.count.min(comptime!(MAX_VERTICES as u32));
+            polygons.items.put(at, Item { pair: subject.pair.number, face: subject.face, cell, number });
+            let first = at as usize * ROWS;
+            let mut k = 0usize;
+            while k < ROWS {
+                polygons.weights[first + k] = row(
+                    self.s[2usize * k],
+                    self.t[2usize * k],
+                    self.s[2usize * k + 1usize],
+                    self.t[2usize * k + 1usize],
+                );
+                k += 1usize;
+            }
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Middle phase of the mode `node`: the cells of nodes.
+use cubecl::prelude::*;
+
+use super::super::broad::meshlets::Blocks;
+use super::super::broad::ordered_pair::OrderedPairs;
+use super::super::counters::{self, CANDIDATES, Counters};
+use super::super::field::shapes::{BAND, Field, FieldExpand, NONE, Shapes};
+use super::super::math::vector::V3;
+use super::items::{Item, Items};
+
+/// The cell of a node, and whether it can touch.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Located {
+    cell: u32,
+    kept: bool,
+}
+
+#[cube]
+impl Field<'_> {
+    fn locate_node(self, p: V3, reach: f32, prune: u32) -> Located {
+        let mut found = Located { cell: NONE.runtime(), kept: true };
+        if self.is_mesh() {
+            let cell = self.locate(p);
+            found.cell = cell.number;
+            found.kept = (!cell.is_out() || reach >= self.number(BAND))
+                && (prune == 0u32 || self.cell_bound(cell.number) <= reach);
+        }
+        found
+    }
+}
+
+/// A group for each meshlet, a thread for each face with the corners that no face before has. Nodes that can touch are
+/// written with their cells.
+#[cube(launch, create_dummy_kernel)]
+pub fn nodes(
+    shapes: &Shapes,
+    pairs: &OrderedPairs,
+    meshlets: &Blocks,
+    counters: &Counters,
+    nodes: &mut Items,
+    prune: u32,
+) {
+    let item = CUBE_POS as u32;
+    if item < counters.within(counters::MESHLETS, meshlets.room) {
+        let pair = pairs.get(meshlets.pair(item));
+        let meshlet = meshlets.meshlet(item);
+        let surface = shapes.field(pair.shape_a);
+        if UNIT_POS < surface.faces_of(meshlet) {
+            let face = surface.first_face(meshlet) + UNIT_POS;
+            let part = shapes.part(pair, face);
+            let field = shapes.field(pair.shape_b);
+            let mut k = 0u32;
+            while k < 3u32 {
+                if (part.owned >> k) & 1u32 == 1u32 {
+                    counters.append(CANDIDATES);
+                    let node = field.locate_node(part.corner(k), pair.part_reach(), prune);
+                    if node.kept {
+                        let at = counters.append(counters::POLYGONS);
+                        if at < nodes.room {
+                            nodes.put(at, Item { pair: pair.number, face, cell: node.cell, number: k });
+                        }
+                    }
+                }
+                k += 1u32;
+            }
+        }
+    }
+}

@@ -1,0 +1,119 @@
+//! The buffer of contacts.
+use cubecl::prelude::*;
+
+use super::super::broad::ordered_pair::OrderedPair;
+use super::super::counters::{CONTACTS, Counters};
+use super::super::field::value::Value;
+use super::super::math::vector::{Row, V3, row_of, xyz};
+
+/// Contacts, or those of them that a reduction keeps.
+#[derive(CubeType, CubeLaunch)]
+pub struct Contacts {
+    /// [`WORDS`] each: instances a and b, face of a, cell, face of b, its feature, corner of a with [`CONVERGED`] when the
+    /// minimum was found, ordered pair.
+    pub words: Box<[u32]>,
+    /// [`ROWS`] each: point of a and distance, gradient, point of b; in the field's frame.
+    pub rows: Box<[Row]>,
+    /// Room for so many.
+    pub room: u32,
+}
+
+/// Words of a contact.
+pub const WORDS: u32 = 8;
+/// Rows of a contact.
+pub const ROWS: u32 = 3;
+/// Added to the corner of a contact whose minimum was found.
+pub const CONVERGED: u32 = 4;
+
+/// A part of a surface in a cell, and where in it the least signed distance is.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Touch {
+    pub face: u32,
+    /// The number of the cell, when it has a list.
+    pub cell: u32,
+    /// The corner, plus [`CONVERGED`].
+    pub corner: u32,
+    pub point: V3,
+}
+
+/// What a contact is sorted by within its pair of instances, besides the bits of its point.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Name {
+    /// 1 for the second ordered pair of two instances.
+    pub order: u32,
+    pub face: u32,
+    pub cell: u32,
+    pub corner: u32,
+}
+
+#[cube]
+impl Contacts {
+    /// Appends a contact.
+    pub fn append(&mut self, counters: &Counters, pair: OrderedPair, touch: Touch, v: Value) {
+        let at = counters.append(CONTACTS);
+        if at < self.room {
+            let word = (at * WORDS) as usize;
+            self.words[word] = pair.a;
+            self.words[word + 1] = pair.b;
+            self.words[word + 2] = touch.face;
+            self.words[word + 3] = touch.cell;
+            self.words[word + 4] = v.face;
+            self.words[word + 5] = v.feature;
+            self.words[word + 6] = touch.corner;
+            self.words[word + 7] = pair.number;
+            let row = (at * ROWS) as usize;
+            let on_surface = touch.point + v.gradient * -pair.radius;
+            self.rows[row] = row_of(on_surface, v.distance - pair.radius);
+            self.rows[row + 1] = row_of(v.gradient, 0.0f32);
+            self.rows[row + 2] = row_of(v.point, 0.0f32);
+        }
+    }
+
+    /// The ordered pair of a contact.
+    pub fn pair(&self, contact: u32) -> u32 {
+        self.words[(contact * WORDS + 7u32) as usize]
+    }
+
+    pub fn has_converged(&self, contact: u32) -> bool {
+        self.words[(contact * WORDS + 6u32) as usize] >= CONVERGED
+    }
+
+    pub fn name(&self, contact: u32) -> Name {
+        let at = (contact * WORDS) as usize;
+        Name {
+            order: self.words[at + 7] % 2u32,
+            face: self.words[at + 2],
+            cell: self.words[at + 3],
+            corner: self.words[at + 6],
+        }
+    }
+
+    /// Point of a, and the distance.
+    pub fn point_and_distance(&self, contact: u32) -> Row {
+        self.rows[(contact * ROWS) as usize]
+    }
+
+    pub fn point(&self, contact: u32) -> V3 {
+        xyz(self.point_and_distance(contact))
+    }
+
+    pub fn gradient(&self, contact: u32) -> V3 {
+        xyz(self.rows[(contact * ROWS + 1u32) as usize])
+    }
+
+    /// Copies a contact of `other` to place `at`.
+    pub fn copy(&mut self, at: u32, other: &Contacts, contact: u32) {
+        let mut k = 0u32;
+        while k < WORDS {
+            self.words[(at * WORDS + k) as usize] = other.words[(contact * WORDS + k) as usize];
+            k += 1u32;
+        }
+        k = 0u32;
+        while k < ROWS {
+            self.rows[(at * ROWS + k) as usize] = other.rows[(contact * ROWS + k) as usize];
+            k += 1u32;
+        }
+    }
+}

@@ -1,0 +1,270 @@
+//! The exact mode: the least signed distance over a polygon to a tolerance.
+//!
+//! Outside of the solid it is the least distance between the polygon and a face of the list, in closed form, a face to
+//! each thread. Inside it is found by branch and bound, a piece of the polygon to each thread.
+use cubecl::prelude::*;
+
+use super::super::broad::meshlets::ROUNDING;
+use super::super::broad::ordered_pair::OrderedPairs;
+use super::super::counters::{self, Counters};
+use super::super::field::nearest::FAR;
+use super::super::field::shapes::Shapes;
+use super::super::math::vector::V3;
+use super::super::middle::items::{Polygons, Weights};
+use super::contacts::{CONVERGED, Contacts, Touch};
+use super::exchange::LANES;
+use super::piece::{Lowest, POOL, Piece, Pool, Region, empty_pool, region};
+use super::polygon_distance::{Disk, Polygon};
+
+/// Rounds after which a search gives up; up to 32 pieces are halved in each.
+const ROUNDS: u32 = 96;
+/// Closer to the surface than this a polygon may cross it.
+const CLEAR: f32 = 1e-6;
+
+/// What a search looks for: distances up to `reach` that are lower than the best by more than `tolerance`.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Goal {
+    reach: f32,
+    tolerance: f32,
+}
+
+#[cube]
+impl Goal {
+    fn is_open(self, bound: f32, best: Lowest) -> bool {
+        bound < best.distance - self.tolerance && bound <= self.reach
+    }
+}
+
+/// The result of a search.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Searched {
+    best: Lowest,
+    converged: bool,
+}
+
+/// The least distance between a polygon and the faces of the cell's list, a face to each thread.
+#[cube]
+fn nearest_listed(region: Region<'_>, polygon: Polygon<'_>, normal: V3, pool: &mut Pool) -> Lowest {
+    let ball = polygon.ball();
+    let center = polygon.part.at(ball.center.s, ball.center.t);
+    let disk = Disk { normal, center, radius: ball.radius };
+    let field = region.field;
+    let faces = field.list(region.cell.offset());
+    let mut mine = Lowest { distance: FAR.runtime(), at: ball.center };
+    let mut i = UNIT_POS;
+    while i < faces.count {
+        let apart = polygon.distance_to(disk, field.face(field.listed(faces, i)));
+        mine = mine.or(apart.distance, apart.at);
+        i += LANES;
+    }
+    pool.lowest(mine)
+}
+
+/// The pieces that a search starts with: a fan of triangles, one to each thread; a polygon without area is a triangle with
+/// equal corners. Their number, and the lowest value seen.
+#[cube]
+fn fan(region: Region<'_>, polygon: Polygon<'_>, triangles: u32, pool: &mut Pool) -> Lowest {
+    let mut lowest = Lowest { distance: FAR.runtime(), at: polygon.ball().center };
+    if UNIT_POS < triangles {
+        let mut piece = Piece {
+            a: polygon.vertex(0u32),
+            b: polygon.vertex((UNIT_POS + 1u32).min(polygon.count - 1u32)),
+            c: polygon.vertex((UNIT_POS + 2u32).min(polygon.count - 1u32)),
+            face_a: 0u32,
+            face_b: 0u32,
+            face_c: 0u32,
+            bound: FAR.runtime(),
+        };
+        // One place evaluates the field, as its code is long.
+        let mut k = 0u32;
+        while k < 3u32 {
+            let at = piece.corner(k);
+            let v = region.value(at);
+            piece.face_a = select(k == 0u32, v.face, piece.face_a);
+            piece.face_b = select(k == 1u32, v.face, piece.face_b);
+            piece.face_c = select(k == 2u32, v.face, piece.face_c);
+            lowest = lowest.or(v.distance, at);
+            k += 1u32;
+        }
+        let found = region.bound(piece);
+        piece.bound = found.bound;
+        lowest = lowest.or(found.distance, piece.center());
+        pool.put(UNIT_POS, piece);
+    }
+    pool.lowest(lowest)
+}
+
+/// Both halves of a piece, and which of them are open.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Halves {
+    first: Piece,
+    second: Piece,
+    first_open: bool,
+    second_open: bool,
+    lowest: Lowest,
+}
+
+/// Halves a piece that is open.
+#[cube]
+fn halve(region: Region<'_>, goal: Goal, whole: Piece, best: Lowest) -> Halves {
+    let piece = whole.turned(region.part);
+    let middle = Weights { s: 0.5f32 * (piece.a.s + piece.b.s), t: 0.5f32 * (piece.a.t + piece.b.t) };
+    let at_middle = region.value(middle);
+    let mut halves = Halves {
+        first: piece.half(true, middle, at_middle.face),
+        second: piece.half(false, middle, at_middle.face),
+        first_open: false,
+        second_open: false,
+        lowest: Lowest { distance: at_middle.distance, at: middle },
+    };
+    // One place bounds a half, as its code is long.
+    let mut half = 0u32;
+    while half < 2u32 {
+        let is_first = half == 0u32;
+        let this = piece.half(is_first, middle, at_middle.face);
+        let found = region.bound(this);
+        halves.lowest = halves.lowest.or(found.distance, this.center());
+        let open = goal.is_open(found.bound, best);
+        halves.first_open = select(is_first, open, halves.first_open);
+        halves.second_open = select(is_first, halves.second_open, open);
+        halves.first.bound = select(is_first, found.bound, halves.first.bound);
+        halves.second.bound = select(is_first, halves.second.bound, found.bound);
+        half += 1u32;
+    }
+    halves
+}
+
+/// Branch and bound over the pieces of a polygon.
+#[cube]
+fn search(region: Region<'_>, polygon: Polygon<'_>, goal: Goal, start: Lowest, pool: &mut Pool) -> Searched {
+    let triangles = select(polygon.count > 2u32, polygon.count - 2u32, 1u32);
+    let mut best = start;
+    let found = fan(region, polygon, triangles, pool);
+    best = best.or(found.distance, found.at);
+    let mut waiting = triangles;
+    let mut round = 0u32;
+    while waiting > 0u32 && round < ROUNDS {
+        sync_cube();
+        // The youngest pieces, as many as their halves have room.
+        let taken = waiting.min(LANES).min(POOL - waiting).max(1u32);
+        let base = waiting - taken;
+        let mut halves = no_halves(best);
+        if UNIT_POS < taken {
+            let at = base + UNIT_POS;
+            if goal.is_open(pool.bound(at), best) {
+                halves = halve(region, goal, pool.get(at), best);
+            }
+        }
+        let mine = select(halves.first_open, 1u32, 0u32) + select(halves.second_open, 1u32, 0u32);
+        let kept = pool.count(mine);
+        let mut to = base + kept.before;
+        if halves.first_open {
+            pool.put(to, halves.first);
+            to += 1u32;
+        }
+        if halves.second_open {
+            pool.put(to, halves.second);
+        }
+        let found = pool.lowest(halves.lowest);
+        best = best.or(found.distance, found.at);
+        waiting = base + kept.all;
+        round += 1u32;
+        if waiting >= POOL {
+            round = ROUNDS.runtime();
+        }
+    }
+    Searched { best, converged: waiting == 0u32 }
+}
+
+/// Those of a thread without a piece.
+#[cube]
+fn no_halves(best: Lowest) -> Halves {
+    let none =
+        Piece { a: best.at, b: best.at, c: best.at, face_a: 0u32, face_b: 0u32, face_c: 0u32, bound: 0.0f32 };
+    Halves {
+        first: none,
+        second: none,
+        first_open: false,
+        second_open: false,
+        lowest: Lowest { distance: FAR.runtime(), at: best.at },
+    }
+}
+
+/// The least signed distance over a polygon, given that at its center.
+#[cube]
+fn minimize(region: Region<'_>, polygon: Polygon<'_>, normal: V3, goal: Goal, pool: &mut Pool) -> Searched {
+    let (field, cell) = (region.field, region.cell);
+    let ball = polygon.ball();
+    let at_center = region.value(ball.center).distance;
+    let mut found = Searched { best: Lowest { distance: at_center, at: ball.center }, converged: true };
+    if at_center - ball.radius <= goal.reach + ROUNDING {
+        let crossing = cell.is_crossing();
+        let all_inside = cell.is_inside() || (crossing && at_center < -ball.radius - ROUNDING);
+        let mut searches = true;
+        if field.is_mesh() && cell.is_listed() && !all_inside {
+            let nearest = nearest_listed(region, polygon, normal, pool);
+            found.best = Lowest { distance: region.value(nearest.at).distance, at: nearest.at };
+            // It may cross the surface, or be all inside.
+            searches = crossing && (nearest.distance <= CLEAR || found.best.distance < 0.0f32);
+        }
+        if searches {
+            found = search(region, polygon, goal, found.best, pool);
+        }
+    } else {
+        found.best.distance = FAR.runtime();
+    }
+    found
+}
+
+/// What is asked of the exact mode.
+#[derive(CubeType, CubeLaunch)]
+pub struct AskedExact {
+    /// By instance of the field, in its frame.
+    pub tolerances: Box<[f32]>,
+    /// Contacts with a gradient less opposed to the face's normal are dropped.
+    pub cos_theta: f32,
+}
+
+/// A group for each polygon.
+#[cube(launch, create_dummy_kernel)]
+pub fn narrow_exact(
+    shapes: &Shapes,
+    pairs: &OrderedPairs,
+    polygons: &Polygons,
+    counters: &Counters,
+    contacts: &mut Contacts,
+    asked: &AskedExact,
+) {
+    let mut pool = empty_pool();
+    let number = CUBE_POS as u32;
+    let count = counters.within(counters::POLYGONS, polygons.items.room);
+    if number < count {
+        let item = polygons.items.get(number);
+        let pair = pairs.get(item.pair);
+        let part = shapes.part(pair, item.face);
+        let normal = shapes.part_normal(pair, item.face);
+        let field = shapes.field(pair.shape_b);
+        let cell = field.cell(item.cell);
+        let region = region(field, cell, part);
+        let reach = pair.part_reach();
+        let goal = Goal { reach, tolerance: asked.tolerances[pair.b as usize] };
+        let found = minimize(region, polygons.polygon(number, part), normal, goal, &mut pool);
+        if found.best.distance <= reach && UNIT_POS == 0u32 {
+            let point = part.at(found.best.at.s, found.best.at.t);
+            let v = field.value_in_cell(cell, point);
+            if v.distance <= reach {
+                if part.count == 3u32 && v.gradient.dot(normal) > -asked.cos_theta {
+                    counters.append(counters::FILTERED);
+                } else {
+                    let corner = select(found.converged, CONVERGED, 0u32);
+                    let touch = Touch { face: item.face, cell: cell.name(), corner, point };
+                    contacts.append(counters, pair, touch, v);
+                }
+            }
+        }
+        counters.tell_if_broken_off(count);
+    }
+}

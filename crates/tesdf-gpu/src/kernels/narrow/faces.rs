@@ -1,0 +1,435 @@
+//! Face-TES (Eq. 9): the least signed distance over a clipped polygon, and the cosine filter (Eq. 10).
+//!
+//! Frank–Wolfe as `tesdf` does it: from the best of center and vertices, steps of 2 / (k + 2) towards the vertex that lies
+//! farthest down the gradient; the best point seen.
+use cubecl::prelude::*;
+
+use super::super::broad::meshlets::ROUNDING;
+use super::super::broad::ordered_pair::{OrderedPairs, Part};
+use super::super::counters::{self, Counters};
+use super::super::field::list::List;
+use super::super::field::locate::Cell;
+use super::super::field::nearest::{FAR, Nearest};
+use super::super::field::shapes::{Field, NONE, Shapes};
+use super::super::field::value::Value;
+use super::super::math::triangle::Face;
+use super::super::math::vector::{Row, row_of, xyz};
+use super::super::middle::items::{MAX_VERTICES, Polygons, Weights};
+use super::contacts::{CONVERGED, Contacts, Touch};
+use super::exchange::{Exchange, LANES, Variant, exchange, width_for};
+use super::polygon_distance::Polygon;
+
+/// What is asked of the narrow phase of faces.
+#[derive(CubeType, CubeLaunch)]
+pub struct Asked {
+    /// Steps of Frank–Wolfe.
+    pub iterations: u32,
+    /// Contacts with a gradient less opposed to the face's normal are dropped.
+    pub cos_theta: f32,
+}
+
+/// The list of a cell, shared by the threads of a group.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct SharedList {
+    cell: Cell,
+    faces: List,
+    /// The face that this thread keeps in registers, and its position, when it has one.
+    own: Face,
+    position: u32,
+    /// Threads that share a point.
+    width: u32,
+    /// Points at a time.
+    points: u32,
+}
+
+/// The number of a thread among those that share a polygon.
+#[cube]
+fn lane_of(#[comptime] lanes: u32) -> u32 {
+    select(lanes == 1u32, 0u32, UNIT_POS)
+}
+
+#[cube]
+fn share_list(field: Field<'_>, cell: Cell, #[comptime] lanes: u32) -> SharedList {
+    let listed = cell.is_listed();
+    let faces = field.list(select(listed, cell.offset(), 0u32));
+    let width = width_for(select(listed, faces.count, 0u32));
+    let lane = lane_of(lanes);
+    let mut position = 0u32;
+    if listed && lane % width < faces.count {
+        position = field.listed(faces, lane % width);
+    }
+    SharedList {
+        cell,
+        faces,
+        own: field.face(position),
+        position,
+        width,
+        points: select(lanes == 1u32, 1u32, LANES / width),
+    }
+}
+
+#[cube]
+impl SharedList {
+    /// The field at a point of the cell, by `width` threads of the group together: each part of the group may have a
+    /// point of its own.
+    fn value(
+        self,
+        field: Field<'_>,
+        surface: Part,
+        at: Weights,
+        exchange: &mut Exchange,
+        #[comptime] lanes: u32,
+    ) -> Value {
+        let p = surface.at(at.s, at.t);
+        let mut found = Nearest { squared: FAR.runtime(), face: NONE.runtime() };
+        if field.is_mesh() && self.cell.is_listed() {
+            let first = select(lanes == 1u32, 0u32, UNIT_POS % self.width);
+            if first < self.faces.count {
+                found = Nearest { squared: self.own.distance_squared(p), face: self.position };
+            }
+            found = found.or(field.nearest_in_list(self.faces, first + lanes, lanes, p));
+            found = exchange.least(found, self.width);
+        } else {
+            found = field.nearest(self.cell, p);
+        }
+        field.value_near(self.cell, p, found)
+    }
+}
+
+/// How the field falls along both edges of a face.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Slope {
+    s: f32,
+    t: f32,
+}
+
+/// A point of the iteration.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Iterate {
+    at: Weights,
+    slope: Slope,
+}
+
+/// The state of a search. One place evaluates the field, as its code is long: at the center, the vertices, then the steps.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Search {
+    /// Number of the next evaluation, and their end.
+    evaluation: u32,
+    end: u32,
+    /// Number of vertices.
+    n: u32,
+    here: Iterate,
+    /// The best point so far, and its distance.
+    best: Weights,
+    distance: f32,
+    /// Evaluations that were made, by the group and by point.
+    made: u32,
+    made_points: u32,
+}
+
+/// The next evaluation.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Next {
+    at: Weights,
+    /// The vertex that this thread looks at, when it is one.
+    vertex: u32,
+    is_vertex: bool,
+    is_step: bool,
+    /// Whether the field is known there.
+    is_known: bool,
+    /// Whether the search ends.
+    ends: bool,
+}
+
+#[cube]
+impl Search {
+    fn next(&self, list: SharedList, polygon: Polygon<'_>, lane: u32) -> Next {
+        let is_step = self.evaluation > self.n;
+        let is_vertex = self.evaluation >= 1u32 && !is_step;
+        let mut next =
+            Next { at: self.here.at, vertex: 0u32, is_vertex, is_step, is_known: false, ends: false };
+        if is_vertex {
+            next.vertex = (self.evaluation - 1u32 + lane / list.width).min(self.n - 1u32);
+            next.at = polygon.vertex(next.vertex);
+        }
+        next
+    }
+
+    /// The vertex that lies farthest down the gradient: the height of a corner over the first one, in weights.
+    fn lowest(&self, polygon: Polygon<'_>) -> Target {
+        let mut lowest = FAR.runtime();
+        let mut to = Target { vertex: 0u32, at: Weights { s: 0.0f32, t: 0.0f32 } };
+        let mut i = 0u32;
+        while i < self.n {
+            let v = polygon.vertex(i);
+            let height = self.here.slope.s * v.s + self.here.slope.t * v.t;
+            let lower = height < lowest;
+            lowest = select(lower, height, lowest);
+            to = Target {
+                vertex: select(lower, i, to.vertex),
+                at: Weights { s: select(lower, v.s, to.at.s), t: select(lower, v.t, to.at.t) },
+            };
+            i += 1u32;
+        }
+        to
+    }
+
+    /// A step towards a vertex.
+    fn step(&self, next: &mut Next, to: Target) {
+        let at = self.here.at;
+        let step = 2.0f32 / ((self.evaluation - self.n - 1u32) as f32 + 2.0f32);
+        next.at = Weights { s: at.s + step * (to.at.s - at.s), t: at.t + step * (to.at.t - at.t) };
+        // At a vertex that is the target itself every further step stays there: most minima are such.
+        next.ends = to.at.s == at.s && to.at.t == at.t;
+        next.is_known = next.ends;
+    }
+
+    fn is_first_step(&self) -> bool {
+        self.evaluation == self.n + 1u32
+    }
+
+    /// Takes an evaluation.
+    fn take(&mut self, next: Next, distance: f32, found: Iterate) {
+        let lower = distance < self.distance;
+        self.best =
+            Weights { s: select(lower, found.at.s, self.best.s), t: select(lower, found.at.t, self.best.t) };
+        self.distance = select(lower, distance, self.distance);
+        // The start is the best of center and vertices.
+        let moves = next.is_step || lower;
+        let here = self.here;
+        self.here = Iterate {
+            at: Weights { s: select(moves, found.at.s, here.at.s), t: select(moves, found.at.t, here.at.t) },
+            slope: Slope {
+                s: select(moves, found.slope.s, here.slope.s),
+                t: select(moves, found.slope.t, here.slope.t),
+            },
+        };
+    }
+
+    /// On to the next evaluation.
+    fn on(&mut self, next: Next, points: u32) {
+        let after_vertices = (self.evaluation + points).min(self.n + 1u32);
+        let following = select(next.is_vertex, after_vertices, self.evaluation + 1u32);
+        self.evaluation = select(next.ends, self.end, following);
+    }
+}
+
+/// A vertex of a polygon.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Target {
+    vertex: u32,
+    at: Weights,
+}
+
+/// The field at the best point: only the contact needs it, so it is in shared memory; threads have too few registers.
+#[derive(CubeType)]
+struct Best {
+    rows: Shared<[Row]>,
+    words: Shared<[u32]>,
+}
+
+#[cube]
+impl Best {
+    fn put(&mut self, at: u32, v: Value) {
+        let at = (2u32 * at) as usize;
+        self.rows[at] = row_of(v.gradient, 0.0f32);
+        self.rows[at + 1usize] = row_of(v.point, 0.0f32);
+        self.words[at] = v.face;
+        self.words[at + 1usize] = v.feature;
+    }
+
+    fn get(&self, at: u32, distance: f32) -> Value {
+        let at = (2u32 * at) as usize;
+        Value {
+            distance,
+            gradient: xyz(self.rows[at]),
+            point: xyz(self.rows[at + 1usize]),
+            face: self.words[at],
+            feature: self.words[at + 1usize],
+        }
+    }
+}
+
+/// The slopes of the field at the vertices, each with the threads that had it.
+#[derive(CubeType)]
+struct Slopes {
+    numbers: Array<f32>,
+}
+
+#[cube]
+impl Slopes {
+    fn put(&mut self, turn: u32, slope: Slope) {
+        let at = (2u32 * turn) as usize;
+        self.numbers[at] = slope.s;
+        self.numbers[at + 1usize] = slope.t;
+    }
+
+    /// At a vertex, from the thread that had it.
+    fn get(&self, vertex: u32, list: SharedList, exchange: &mut Exchange) -> Slope {
+        let at = (2u32 * (vertex / list.points)) as usize;
+        let from = vertex % list.points * list.width;
+        Slope {
+            s: exchange.of_lane(self.numbers[at], from),
+            t: exchange.of_lane(self.numbers[at + 1usize], from),
+        }
+    }
+}
+
+/// An evaluation, and the thread that has its value.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Found {
+    distance: f32,
+    iterate: Iterate,
+    lane: u32,
+}
+
+/// Of the vertices of this turn the lowest.
+#[cube]
+fn lowest_of(mine: Found, search: Search, vertex: u32, list: SharedList, exchange: &mut Exchange) -> Found {
+    let first = exchange.least(Nearest { squared: mine.distance, face: vertex }, LANES.runtime());
+    let lane = ((first.face - (search.evaluation - 1u32)) * list.width).min(comptime!(LANES - 1));
+    Found {
+        distance: first.squared,
+        iterate: Iterate {
+            at: Weights {
+                s: exchange.of_lane(mine.iterate.at.s, lane),
+                t: exchange.of_lane(mine.iterate.at.t, lane),
+            },
+            slope: Slope {
+                s: exchange.of_lane(mine.iterate.slope.s, lane),
+                t: exchange.of_lane(mine.iterate.slope.t, lane),
+            },
+        },
+        lane,
+    }
+}
+
+/// Minimizes the field over a polygon; `best` gets the field at the best point, at place `held`.
+#[cube]
+fn minimize(
+    field: Field<'_>,
+    list: SharedList,
+    polygon: Polygon<'_>,
+    reach: f32,
+    iterations: u32,
+    exchange: &mut Exchange,
+    best: &mut Best,
+) -> Search {
+    let lanes = comptime!(exchange.variant.lanes);
+    let lane = lane_of(lanes);
+    let held = select(lanes == 1u32, UNIT_POS, 0u32);
+    let part = polygon.part;
+    let n = polygon.count;
+    let ball = polygon.ball();
+    let mut slopes = Slopes { numbers: Array::<f32>::new(comptime!(2 * MAX_VERTICES)) };
+    let mut search = Search {
+        evaluation: 0u32,
+        end: select(n > 1u32, 1u32 + n + iterations, 1u32),
+        n,
+        here: Iterate { at: ball.center, slope: Slope { s: 0.0f32, t: 0.0f32 } },
+        best: ball.center,
+        distance: FAR.runtime(),
+        made: 0u32,
+        made_points: 0u32,
+    };
+    while search.evaluation < search.end {
+        let mut next = search.next(list, polygon, lane);
+        if next.is_step {
+            let to = search.lowest(polygon);
+            search.step(&mut next, to);
+            if search.is_first_step() {
+                // It goes all the way to a vertex, where the field is known.
+                next.is_known = true;
+                search.here = Iterate { at: to.at, slope: slopes.get(to.vertex, list, exchange) };
+            }
+        }
+        if !next.is_known {
+            search.made += 1u32;
+            let vertices = list.points.min(n + 1u32 - search.evaluation);
+            search.made_points += select(next.is_vertex, vertices, 1u32);
+            let here = list.value(field, part, next.at, exchange, lanes);
+            let slope =
+                Slope { s: here.gradient.dot(part.b - part.a), t: here.gradient.dot(part.c - part.a) };
+            let iterate = Iterate { at: next.at, slope };
+            let mut found = Found { distance: here.distance, iterate, lane: 0u32 };
+            if next.is_vertex {
+                slopes.put((search.evaluation - 1u32) / list.points, slope);
+                if list.points > 1u32 {
+                    found = lowest_of(found, search, next.vertex, list, exchange);
+                }
+            }
+            if found.distance < search.distance && lane == found.lane {
+                best.put(held, here);
+            }
+            search.take(next, found.distance, found.iterate);
+            // From the center: can any point be within reach?
+            next.ends = search.evaluation == 0u32 && found.distance - ball.radius > reach + ROUNDING;
+        }
+        search.on(next, list.points);
+    }
+    search
+}
+
+/// Face-TES. With 32 lanes a group works on each polygon, each thread with a face of the list in registers and with every
+/// 32nd of the rest; a list of 16 faces or less leaves threads for more vertices at a time. With one lane a thread works
+/// on each polygon alone.
+#[cube(launch, create_dummy_kernel)]
+pub fn narrow_faces(
+    shapes: &Shapes,
+    pairs: &OrderedPairs,
+    polygons: &Polygons,
+    counters: &Counters,
+    contacts: &mut Contacts,
+    asked: &Asked,
+    #[comptime] variant: Variant,
+) {
+    let lanes = comptime!(variant.lanes);
+    let mut exchange = exchange(variant);
+    let held = comptime!(2 * (LANES / lanes) as usize);
+    let mut best = Best { rows: Shared::<[Row]>::new_slice(held), words: Shared::<[u32]>::new_slice(held) };
+    let number = select(lanes == 1u32, ABSOLUTE_POS as u32, CUBE_POS as u32);
+    let count = counters.within(counters::POLYGONS, polygons.items.room);
+    if number < count {
+        let item = polygons.items.get(number);
+        let pair = pairs.get(item.pair);
+        let part = shapes.part(pair, item.face);
+        let field = shapes.field(pair.shape_b);
+        let cell = field.cell(item.cell);
+        let list = share_list(field, cell, lanes);
+        let polygon = polygons.polygon(number, part);
+        let reach = pair.part_reach();
+        let search = minimize(field, list, polygon, reach, asked.iterations, &mut exchange, &mut best);
+        if comptime!(lanes > 1) {
+            // The thread that writes the contact need not be the one that found it.
+            sync_cube();
+        }
+        let lane = lane_of(lanes);
+        if comptime!(variant.counting) {
+            if lane == 0u32 {
+                counters.add(counters::EVALUATIONS, search.made);
+                if cell.is_listed() && field.is_mesh() {
+                    counters.add(counters::DISTANCES, search.made_points * list.faces.count);
+                }
+            }
+        }
+        if search.distance <= reach && lane == 0u32 {
+            let v = best.get(select(lanes == 1u32, UNIT_POS, 0u32), search.distance);
+            let point = part.at(search.best.s, search.best.t);
+            let is_face = part.count == 3u32;
+            if is_face && v.gradient.dot(shapes.part_normal(pair, item.face)) > -asked.cos_theta {
+                counters.append(counters::FILTERED);
+            } else {
+                let touch = Touch { face: item.face, cell: cell.name(), corner: CONVERGED.runtime(), point };
+                contacts.append(counters, pair, touch, v);
+            }
+        }
+        counters.tell_if_broken_off(count);
+    }
+}

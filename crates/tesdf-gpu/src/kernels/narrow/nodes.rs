@@ -1,0 +1,32 @@
+//! Node-TES: the signed distance at a node.
+use cubecl::prelude::*;
+
+use super::super::broad::ordered_pair::OrderedPairs;
+use super::super::counters::{Counters, POLYGONS};
+use super::super::field::shapes::Shapes;
+use super::super::middle::items::Items;
+use super::contacts::{CONVERGED, Contacts, Touch};
+
+/// A thread for each node and its cell.
+#[cube(launch, create_dummy_kernel)]
+pub fn narrow_nodes(
+    shapes: &Shapes,
+    pairs: &OrderedPairs,
+    nodes: &Items,
+    counters: &Counters,
+    contacts: &mut Contacts,
+) {
+    let number = ABSOLUTE_POS as u32;
+    if number < counters.within(POLYGONS, nodes.room) {
+        let item = nodes.get(number);
+        let pair = pairs.get(item.pair);
+        let point = shapes.part(pair, item.face).corner(item.number);
+        let field = shapes.field(pair.shape_b);
+        let cell = field.cell(item.cell);
+        let v = field.value_in_cell(cell, point);
+        if v.distance <= pair.part_reach() {
+            let corner = item.number + CONVERGED;
+            contacts.append(counters, pair, Touch { face: item.face, cell: cell.name(), corner, point }, v);
+        }
+    }
+}

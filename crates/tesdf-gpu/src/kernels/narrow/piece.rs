@@ -1,0 +1,301 @@
+//! Pieces of a polygon that wait in the branch and bound of the exact mode.
+use cubecl::prelude::*;
+
+use super::super::broad::ordered_pair::Part;
+use super::super::field::locate::Cell;
+use super::super::field::shapes::Field;
+use super::super::field::value::Value;
+use super::super::math::greatest_minimum::Functions;
+use super::super::math::vector::{V3, v3};
+use super::super::middle::items::Weights;
+use super::exchange::LANES;
+
+/// Pieces that can wait.
+pub const POOL: u32 = 128;
+const THIRD: f32 = 0.333_333_34;
+
+/// A triangle of a polygon, the nearest face at each corner, and its bound: no point of it has a lower signed distance.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Piece {
+    pub a: Weights,
+    pub b: Weights,
+    pub c: Weights,
+    pub face_a: u32,
+    pub face_b: u32,
+    pub face_c: u32,
+    pub bound: f32,
+}
+
+/// A signed distance, and where it was found.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Lowest {
+    pub distance: f32,
+    pub at: Weights,
+}
+
+/// A cell of a field, and the part of a surface in it.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Region<'a> {
+    pub field: Field<'a>,
+    pub cell: Cell,
+    pub part: Part,
+}
+
+#[cube]
+pub fn region<'a>(field: Field<'a>, cell: Cell, part: Part) -> Region<'a> {
+    Region::<'a> { field, cell, part }
+}
+
+#[cube]
+impl Lowest {
+    /// The lower of two, of equal ones the first.
+    pub fn or(self, distance: f32, at: Weights) -> Lowest {
+        let lower = distance < self.distance;
+        Lowest {
+            distance: select(lower, distance, self.distance),
+            at: Weights { s: select(lower, at.s, self.at.s), t: select(lower, at.t, self.at.t) },
+        }
+    }
+}
+
+/// A corner of a piece, and the nearest face there.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct PieceCorner {
+    pub at: Weights,
+    pub face: u32,
+}
+
+#[cube]
+fn pick_corner(condition: bool, first: PieceCorner, second: PieceCorner) -> PieceCorner {
+    PieceCorner {
+        at: Weights {
+            s: select(condition, first.at.s, second.at.s),
+            t: select(condition, first.at.t, second.at.t),
+        },
+        face: select(condition, first.face, second.face),
+    }
+}
+
+#[cube]
+impl Piece {
+    /// Corner `k`.
+    pub fn corner(self, k: u32) -> Weights {
+        Weights {
+            s: select(k == 0u32, self.a.s, select(k == 1u32, self.b.s, self.c.s)),
+            t: select(k == 0u32, self.a.t, select(k == 1u32, self.b.t, self.c.t)),
+        }
+    }
+
+    /// The mean of its corners.
+    pub fn center(self) -> Weights {
+        Weights { s: THIRD * (self.a.s + self.b.s + self.c.s), t: THIRD * (self.a.t + self.b.t + self.c.t) }
+    }
+
+    /// The same piece with its longest edge from a to b.
+    pub fn turned(self, part: Part) -> Piece {
+        let a = PieceCorner { at: self.a, face: self.face_a };
+        let b = PieceCorner { at: self.b, face: self.face_b };
+        let c = PieceCorner { at: self.c, face: self.face_c };
+        let pa = part.at(a.at.s, a.at.t);
+        let pb = part.at(b.at.s, b.at.t);
+        let pc = part.at(c.at.s, c.at.t);
+        let ab = (pa - pb).length();
+        let bc = (pb - pc).length();
+        let ca = (pc - pa).length();
+        let is_ab = ab >= bc && ab >= ca;
+        let is_bc = !is_ab && bc >= ca;
+        let first = pick_corner(is_ab, a, pick_corner(is_bc, b, c));
+        let second = pick_corner(is_ab, b, pick_corner(is_bc, c, a));
+        let third = pick_corner(is_ab, c, pick_corner(is_bc, a, b));
+        Piece {
+            a: first.at,
+            b: second.at,
+            c: third.at,
+            face_a: first.face,
+            face_b: second.face,
+            face_c: third.face,
+            bound: self.bound,
+        }
+    }
+
+    /// The half with corner a, or with corner b; the bound is still that of the whole.
+    pub fn half(self, with_a: bool, middle: Weights, face: u32) -> Piece {
+        let a = PieceCorner { at: self.a, face: self.face_a };
+        let b = PieceCorner { at: self.b, face: self.face_b };
+        let kept = pick_corner(with_a, a, b);
+        Piece {
+            a: kept.at,
+            b: middle,
+            c: self.c,
+            face_a: kept.face,
+            face_b: face,
+            face_c: self.face_c,
+            bound: self.bound,
+        }
+    }
+}
+
+/// The signed distance at the middle of a piece, and its bound.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Bounded {
+    pub distance: f32,
+    pub bound: f32,
+}
+
+/// The corners of a piece in the field's frame.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Points {
+    a: V3,
+    b: V3,
+    c: V3,
+}
+
+#[cube]
+impl Region<'_> {
+    /// The field at a point of the part.
+    pub fn value(self, at: Weights) -> Value {
+        self.field.value_in_cell(self.cell, self.part.at(at.s, at.t))
+    }
+
+    /// Distances from three points to a face.
+    fn distances(self, face: u32, points: Points) -> V3 {
+        let f = self.field.face(face);
+        v3(
+            f.distance_squared(points.a).sqrt(),
+            f.distance_squared(points.b).sqrt(),
+            f.distance_squared(points.c).sqrt(),
+        )
+    }
+
+    /// The bound of a piece. The distance to one face is convex: over a triangle it is at most the linear function
+    /// through its corners, so the field is at least minus the greatest minimum of those of some faces.
+    pub fn bound(self, piece: Piece) -> Bounded {
+        let points = Points {
+            a: self.part.at(piece.a.s, piece.a.t),
+            b: self.part.at(piece.b.s, piece.b.t),
+            c: self.part.at(piece.c.s, piece.c.t),
+        };
+        let middle = ((points.a + points.b) + points.c) * THIRD;
+        let radius =
+            (points.a - middle).length().max((points.b - middle).length()).max((points.c - middle).length());
+        let here = self.field.value_in_cell(self.cell, middle);
+        let mut bound = here.distance - radius;
+        if self.field.is_mesh() && here.distance - radius < 0.0f32 {
+            let functions = Functions {
+                f: self.distances(here.face, points),
+                g: self.distances(piece.face_a, points),
+                h: self.distances(piece.face_b, points),
+                k: self.distances(piece.face_c, points),
+            };
+            bound = bound.max(-functions.greatest_minimum());
+        }
+        Bounded { distance: here.distance, bound }
+    }
+}
+
+/// The pieces that wait, and memory for exchanges, shared by a group.
+#[derive(CubeType)]
+pub struct Pool {
+    numbers: Shared<[f32]>,
+    faces: Shared<[u32]>,
+    /// A value and two weights of each thread.
+    found: Shared<[f32]>,
+    /// Pieces that each thread keeps.
+    kept: Shared<[u32]>,
+}
+
+/// How many pieces the threads before this one keep, and how many all of them keep.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Kept {
+    pub before: u32,
+    pub all: u32,
+}
+
+#[cube]
+pub fn empty_pool() -> Pool {
+    Pool {
+        numbers: Shared::<[f32]>::new_slice(comptime!(7 * POOL as usize)),
+        faces: Shared::<[u32]>::new_slice(comptime!(3 * POOL as usize)),
+        found: Shared::<[f32]>::new_slice(comptime!(3 * LANES as usize)),
+        kept: Shared::<[u32]>::new_slice(comptime!(LANES as usize)),
+    }
+}
+
+#[cube]
+impl Pool {
+    pub fn put(&mut self, at: u32, piece: Piece) {
+        let first = (7u32 * at) as usize;
+        self.numbers[first] = piece.a.s;
+        self.numbers[first + 1usize] = piece.a.t;
+        self.numbers[first + 2usize] = piece.b.s;
+        self.numbers[first + 3usize] = piece.b.t;
+        self.numbers[first + 4usize] = piece.c.s;
+        self.numbers[first + 5usize] = piece.c.t;
+        self.numbers[first + 6usize] = piece.bound;
+        let first = (3u32 * at) as usize;
+        self.faces[first] = piece.face_a;
+        self.faces[first + 1usize] = piece.face_b;
+        self.faces[first + 2usize] = piece.face_c;
+    }
+
+    pub fn bound(&self, at: u32) -> f32 {
+        self.numbers[(7u32 * at + 6u32) as usize]
+    }
+
+    pub fn get(&self, at: u32) -> Piece {
+        let n = (7u32 * at) as usize;
+        let f = (3u32 * at) as usize;
+        Piece {
+            a: Weights { s: self.numbers[n], t: self.numbers[n + 1usize] },
+            b: Weights { s: self.numbers[n + 2usize], t: self.numbers[n + 3usize] },
+            c: Weights { s: self.numbers[n + 4usize], t: self.numbers[n + 5usize] },
+            face_a: self.faces[f],
+            face_b: self.faces[f + 1usize],
+            face_c: self.faces[f + 2usize],
+            bound: self.numbers[n + 6usize],
+        }
+    }
+
+    /// The lowest value over the group; of equal ones that of the lowest thread. All threads call it.
+    pub fn lowest(&mut self, mine: Lowest) -> Lowest {
+        sync_cube();
+        let own = (3u32 * UNIT_POS) as usize;
+        self.found[own] = mine.distance;
+        self.found[own + 1usize] = mine.at.s;
+        self.found[own + 2usize] = mine.at.t;
+        sync_cube();
+        let mut lowest =
+            Lowest { distance: self.found[0], at: Weights { s: self.found[1], t: self.found[2] } };
+        let mut lane = 1u32;
+        while lane < LANES {
+            let at = (3u32 * lane) as usize;
+            let there = Weights { s: self.found[at + 1usize], t: self.found[at + 2usize] };
+            lowest = lowest.or(self.found[at], there);
+            lane += 1u32;
+        }
+        lowest
+    }
+
+    /// How many pieces are kept. All threads call it.
+    pub fn count(&mut self, mine: u32) -> Kept {
+        sync_cube();
+        self.kept[UNIT_POS as usize] = mine;
+        sync_cube();
+        let mut before = 0u32;
+        let mut all = 0u32;
+        let mut lane = 0u32;
+        while lane < LANES {
+            before += select(lane < UNIT_POS, self.kept[lane as usize], 0u32);
+            all += self.kept[lane as usize];
+            lane += 1u32;
+        }
+        Kept { before, all }
+    }
+}

@@ -1,0 +1,115 @@
+//! The member of a pair with the greatest key; of equal ones that with the lowest name, so that the order of members does
+//! not matter.
+use cubecl::prelude::*;
+
+use super::super::field::nearest::FAR;
+use super::super::field::shapes::NONE;
+use super::super::math::vector::to_bits;
+use super::super::narrow::contacts::Contacts;
+use super::members::{Members, MembersExpand};
+
+/// Threads that choose together.
+pub const GROUP: u32 = 256;
+
+/// A member and its key.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Chosen {
+    pub key: f32,
+    /// [`NONE`] without one.
+    pub member: u32,
+}
+
+/// Memory for a choice, shared by a group.
+#[derive(CubeType)]
+pub struct Chooser {
+    keys: Shared<[f32]>,
+    members: Shared<[u32]>,
+}
+
+#[cube]
+pub fn chooser() -> Chooser {
+    Chooser {
+        keys: Shared::<[f32]>::new_slice(GROUP as usize),
+        members: Shared::<[u32]>::new_slice(GROUP as usize),
+    }
+}
+
+#[cube]
+pub fn nothing_chosen() -> Chosen {
+    Chosen { key: -FAR.runtime(), member: NONE.runtime() }
+}
+
+/// 0 undecided, 1 the first is before, 2 after.
+#[cube]
+fn compare(order: u32, a: u32, b: u32) -> u32 {
+    select(order == 0u32, select(a < b, 1u32, select(a > b, 2u32, 0u32)), order)
+}
+
+#[cube]
+impl Members {
+    /// Whether the name of one contact is before that of the other of its pair: ordered pair, face, cell, corner, bits of
+    /// the point.
+    fn is_before(&self, contacts: &Contacts, member: u32, other: u32) -> bool {
+        let (x, y) = (self.contacts[member as usize], self.contacts[other as usize]);
+        let (a, b) = (contacts.name(x), contacts.name(y));
+        let (p, q) = (contacts.point(x), contacts.point(y));
+        let mut order = compare(0u32, a.order, b.order);
+        order = compare(order, a.face, b.face);
+        order = compare(order, a.cell, b.cell);
+        order = compare(order, a.corner, b.corner);
+        order = compare(order, to_bits(p.x), to_bits(q.x));
+        order = compare(order, to_bits(p.y), to_bits(q.y));
+        order = compare(order, to_bits(p.z), to_bits(q.z));
+        order == 1u32
+    }
+
+    /// Whether a member has the greater key, or an equal one and the lower name.
+    pub fn wins(&self, contacts: &Contacts, a: Chosen, b: Chosen) -> bool {
+        let is_greater = a.key > b.key;
+        let mut better = false;
+        if a.key == b.key && a.member != NONE && b.member != NONE {
+            better = self.is_before(contacts, a.member, b.member);
+        }
+        is_greater || better
+    }
+
+    /// The best of all threads. All threads call it.
+    pub fn best(&self, contacts: &Contacts, chooser: &mut Chooser, mine: Chosen) -> Chosen {
+        // Nobody writes while another still reads the last result.
+        sync_cube();
+        let unit = UNIT_POS as usize;
+        chooser.keys[unit] = mine.key;
+        chooser.members[unit] = mine.member;
+        sync_cube();
+        let mut apart = comptime!(GROUP / 2).runtime();
+        while apart > 0u32 {
+            if UNIT_POS < apart {
+                let at = (UNIT_POS + apart) as usize;
+                let other = Chosen { key: chooser.keys[at], member: chooser.members[at] };
+                let own = Chosen { key: chooser.keys[unit], member: chooser.members[unit] };
+                if self.wins(contacts, other, own) {
+                    chooser.keys[unit] = other.key;
+                    chooser.members[unit] = other.member;
+                }
+            }
+            apart /= 2u32;
+            sync_cube();
+        }
+        Chosen { key: chooser.keys[0], member: chooser.members[0] }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_difference_decides() {
+        let of = |a: &[u32], b: &[u32]| a.iter().zip(b).fold(0, |order, (&a, &b)| compare(order, a, b));
+        assert_eq!(
+            [of(&[1, 2, 3], &[1, 2, 3]), of(&[1, 2, 9], &[1, 3, 0]), of(&[1, 4, 0], &[1, 3, 9])],
+            [0, 1, 2]
+        );
+    }
+}
