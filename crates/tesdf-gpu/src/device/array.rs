@@ -49,7 +49,7 @@ impl<T: Word> DeviceArray<T> {
     #[cfg(feature = "cuda")]
     pub unsafe fn from_raw_ptr(device: &Device, pointer: u64, len: usize) -> Result<Self, GpuError> {
         // SAFETY: by the caller.
-        let buffer = unsafe { device.from_raw_ptr("array of others", pointer, len * size_of::<T>()) }?;
+        let buffer = unsafe { device.adopt("array of others", pointer, len * size_of::<T>()) }?;
         Ok(Self { buffer, len, elements: PhantomData })
     }
 

@@ -227,7 +227,7 @@ impl Device {
     /// # Safety
     /// That memory is on this device, and stays until the buffer is dropped and all launches with it are done.
     #[cfg(feature = "cuda")]
-    pub(crate) unsafe fn from_raw_ptr(
+    pub(crate) unsafe fn adopt(
         &self,
         name: &'static str,
         pointer: u64,

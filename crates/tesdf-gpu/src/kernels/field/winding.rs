@@ -13,33 +13,25 @@ struct Centered {
     centroid: V3,
 }
 
-/// The corners of a cell.
-#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+/// One coordinate of the four corners of a cell.
+#[derive(CubeType, Clone, Copy, Debug, PartialEq)]
 #[expand(derive(Clone, Copy))]
 pub struct Corners {
-    pub c0: V3,
-    pub c1: V3,
-    pub c2: V3,
-    pub c3: V3,
+    pub c0: f32,
+    pub c1: f32,
+    pub c2: f32,
+    pub c3: f32,
 }
 
-/// The corners of a root of the unit cube that walks the axes i, j, k: 0, e_i, e_i + e_j, (1, 1, 1).
+/// Coordinate `axis` of the corners of a root of the unit cube that walks the axes i, j, k: 0, e_i, e_i + e_j, (1, 1, 1).
 #[cube]
-pub fn corners_of_root(root: u32) -> Corners {
+pub fn corners_of_root(root: u32, axis: u32) -> Corners {
     let (i, j, _k) = axes(root);
     Corners {
-        c0: v3(0.0f32, 0.0f32, 0.0f32),
-        c1: v3(
-            select(i == 0u32, 1.0f32, 0.0f32),
-            select(i == 1u32, 1.0f32, 0.0f32),
-            select(i == 2u32, 1.0f32, 0.0f32),
-        ),
-        c2: v3(
-            select(i == 0u32 || j == 0u32, 1.0f32, 0.0f32),
-            select(i == 1u32 || j == 1u32, 1.0f32, 0.0f32),
-            select(i == 2u32 || j == 2u32, 1.0f32, 0.0f32),
-        ),
-        c3: v3(1.0f32, 1.0f32, 1.0f32),
+        c0: 0.0f32.runtime(),
+        c1: select(axis == i, 1.0f32, 0.0f32),
+        c2: select(axis == i || axis == j, 1.0f32, 0.0f32),
+        c3: 1.0f32.runtime(),
     }
 }
 
@@ -48,14 +40,62 @@ impl Corners {
     /// The corners of child 0, or of child 1 when `second`, of a cell whose refinement edge ends at corner `k`, in the
     /// order of [`Cell::child_corners`](tesdf::domain::Cell::child_corners).
     pub fn of_child(self, k: u32, second: bool) -> Corners {
-        let end = pick(k == 3u32, self.c3, pick(k == 2u32, self.c2, self.c1));
-        let middle = (self.c0 + end) * 0.5f32;
+        let end = select(k == 3u32, self.c3, select(k == 2u32, self.c2, self.c1));
+        let middle = 0.5f32 * (self.c0 + end);
         let shifted = second && k > 1u32;
         Corners {
-            c0: pick(second, self.c1, self.c0),
-            c1: pick(k == 1u32, middle, pick(shifted, self.c2, self.c1)),
-            c2: pick(k == 2u32, middle, pick(k == 3u32 && second, self.c3, self.c2)),
-            c3: pick(k == 3u32, middle, self.c3),
+            c0: select(second, self.c1, self.c0),
+            c1: select(k == 1u32, middle, select(shifted, self.c2, self.c1)),
+            c2: select(k == 2u32, middle, select(k == 3u32 && second, self.c3, self.c2)),
+            c3: select(k == 3u32, middle, self.c3),
+        }
+    }
+
+    fn sum(self) -> f32 {
+        self.c0 + self.c1 + self.c2 + self.c3
+    }
+}
+
+/// The corners of a cell, in memory rather than in registers: in most evaluations no winding number is asked for.
+#[derive(CubeType)]
+struct CellCorners {
+    coordinates: Array<f32>,
+}
+
+#[cube]
+impl CellCorners {
+    fn get(&self, axis: u32) -> Corners {
+        let at = (4u32 * axis) as usize;
+        Corners {
+            c0: self.coordinates[at],
+            c1: self.coordinates[at + 1usize],
+            c2: self.coordinates[at + 2usize],
+            c3: self.coordinates[at + 3usize],
+        }
+    }
+
+    fn put(&mut self, axis: u32, corners: Corners) {
+        let at = (4u32 * axis) as usize;
+        self.coordinates[at] = corners.c0;
+        self.coordinates[at + 1usize] = corners.c1;
+        self.coordinates[at + 2usize] = corners.c2;
+        self.coordinates[at + 3usize] = corners.c3;
+    }
+
+    fn start(&mut self, root: u32) {
+        let mut axis = 0u32;
+        while axis < 3u32 {
+            self.put(axis, corners_of_root(root, axis));
+            axis += 1u32;
+        }
+    }
+
+    fn descend(&mut self, k: u32, second: bool) {
+        let mut axis = 0u32;
+        while axis < 3u32 {
+            let below = self.get(axis).of_child(k, second);
+            self.put(axis, below);
+            axis += 1u32;
         }
     }
 }
@@ -102,15 +142,16 @@ impl Field<'_> {
         let first = root(u);
         let cell = Cell { word: self.cell_word(first), number: first };
         let mut at = Descent { cell, lambda: in_root(u, first), k: 3u32 };
-        let mut corners = corners_of_root(first);
+        let mut corners = CellCorners { coordinates: Array::<f32>::new(12usize) };
+        corners.start(first);
         while is_split(at.cell.word) {
             let second = at.lambda.is_in_second(at.k);
-            corners = corners.of_child(at.k, second);
+            corners.descend(at.k, second);
             at.descend(self, second);
         }
         let quarter = 0.25f32 * self.number(SIDE);
         let half = 0.5f32 * self.number(SIDE);
-        let sum = ((corners.c0 + corners.c1) + corners.c2) + corners.c3;
+        let sum = v3(corners.get(0u32).sum(), corners.get(1u32).sum(), corners.get(2u32).sum());
         Centered { cell: at.cell, centroid: sum * quarter - v3(half, half, half) }
     }
 }

@@ -411,12 +411,11 @@ pub fn narrow_faces(
             sync_cube();
         }
         let lane = lane_of(lanes);
-        if comptime!(variant.counting) {
-            if lane == 0u32 {
-                counters.add(counters::EVALUATIONS, search.made);
-                if cell.is_listed() && field.is_mesh() {
-                    counters.add(counters::DISTANCES, search.made_points * list.faces.count);
-                }
+        let counting = comptime!(variant.counting);
+        if counting && lane == 0u32 {
+            counters.add(counters::EVALUATIONS, search.made);
+            if cell.is_listed() && field.is_mesh() {
+                counters.add(counters::DISTANCES, search.made_points * list.faces.count);
             }
         }
         if search.distance <= reach && lane == 0u32 {
