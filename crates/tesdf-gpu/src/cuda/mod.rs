@@ -37,7 +37,7 @@
 //! # Memory of others
 //!
 //! All work is in one stream of the GPU's primary context, which torch and Warp use too. That stream waits for the legacy default stream and the
-//! other way round; who works in further streams has to wait for them. [`DeviceArray::outside`](crate::DeviceArray) takes a pointer as an array, and nothing is copied.
+//! other way round; who works in further streams has to wait for them. [`DeviceArray::from_raw_ptr`](crate::DeviceArray) takes a pointer as an array, and nothing is copied.
 #[cfg(feature = "cuda")]
 mod driver;
 #[cfg(feature = "cuda")]
