@@ -1,13 +1,15 @@
-use skrifa::instance::{LocationRef, Size};
-use skrifa::outline::{DrawSettings, OutlinePen};
-use skrifa::{FontRef, GlyphId, MetadataProvider};
+use std::collections::BTreeMap;
+
 use tiny_skia::{Color, FillRule, Paint, Path, PathBuilder, Pixmap, Transform};
 
-/// The Latin-1 characters of DejaVu Sans, so that no system font is needed; its licence is in
-/// `assets/`.
-const FONT: &[u8] = include_bytes!("../../assets/DejaVuSans-subset.ttf");
+/// Outlines of Latin-1 of DejaVu Sans, so that neither a font of the system nor a reader of fonts is needed.
+/// The example `outlines` makes them from the font, and a test compares the two. The licence is in `assets/`.
+///
+/// The first line has the units per em. Each other line has a code point (hexadecimal; `0` for characters
+/// that are not there), the advance, and the outline as the path of an SVG file, y upwards.
+const OUTLINES: &str = include_str!("../../assets/DejaVuSans-outlines.txt");
 
-/// Alignment of a text at its point.
+/// Where a text stands relative to its point.
 #[derive(Clone, Copy)]
 pub enum Anchor {
     /// The text starts at the point.
@@ -18,33 +20,50 @@ pub enum Anchor {
 
 /// Draws single lines of text.
 pub struct Lettering {
-    font: FontRef<'static>,
     units_per_em: f32,
+    glyphs: BTreeMap<char, Glyph>,
 }
+
+/// A character, in units of the font.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Glyph {
+    advance: f32,
+    outline: Vec<Segment>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Segment {
+    Move([f32; 2]),
+    Line([f32; 2]),
+    Quad([f32; 2], [f32; 2]),
+    Close,
+}
+
+/// What stands for a character without a glyph.
+const MISSING: char = '\0';
 
 impl Lettering {
     /// The built-in font.
     pub fn new() -> Option<Self> {
-        let font = FontRef::new(FONT).ok()?;
-        let units_per_em = font.metrics(Size::unscaled(), LocationRef::default()).units_per_em;
-        Some(Self { font, units_per_em: f32::from(units_per_em) })
+        let mut lines = OUTLINES.lines();
+        let units_per_em = lines.next()?.parse().ok()?;
+        Some(Self { units_per_em, glyphs: lines.map(parse).collect::<Option<_>>()? })
+    }
+
+    fn glyph(&self, c: char) -> Option<&Glyph> {
+        self.glyphs.get(&c).or_else(|| self.glyphs.get(&MISSING))
     }
 
     fn advance(&self, c: char) -> f32 {
-        let metrics = self.font.glyph_metrics(Size::unscaled(), LocationRef::default());
-        metrics.advance_width(self.glyph(c)).unwrap_or(0.0) / self.units_per_em
+        self.glyph(c).map_or(0.0, |glyph| glyph.advance / self.units_per_em)
     }
 
-    fn glyph(&self, c: char) -> GlyphId {
-        self.font.charmap().map(c).unwrap_or_default()
-    }
-
-    /// Width of `text` in pixels, at `size` pixels per em.
+    /// Width of `text` in pixels, `size` pixels per em.
     pub fn width(&self, text: &str, size: f32) -> f32 {
         text.chars().map(|c| self.advance(c)).sum::<f32>() * size
     }
 
-    /// `text`, shortened with an ellipsis if it is wider than `width` pixels.
+    /// `text`, cut with an ellipsis where it is wider than `width` pixels.
     pub fn fit(&self, text: &str, size: f32, width: f32) -> String {
         if self.width(text, size) <= width {
             return text.to_string();
@@ -68,16 +87,21 @@ impl Lettering {
             Anchor::Start => 0.0,
             Anchor::Middle => 0.5 * self.width(text, size),
         };
-        let outlines = self.font.outline_glyphs();
-        let mut glyphs = Glyphs { path: PathBuilder::new(), x: 0.0, y, scale };
+        let mut path = PathBuilder::new();
         for c in text.chars() {
-            glyphs.x = pen;
-            let settings = DrawSettings::unhinted(Size::unscaled(), LocationRef::default());
-            // A space has no outline.
-            let _ = outlines.get(self.glyph(c)).map(|outline| outline.draw(settings, &mut glyphs));
+            // Pixels, y downwards.
+            let at = |[u, v]: [f32; 2]| (pen + scale * u, y - scale * v);
+            for segment in self.glyph(c).map_or(&[][..], |glyph| &glyph.outline) {
+                match *segment {
+                    Segment::Move(to) => path.move_to(at(to).0, at(to).1),
+                    Segment::Line(to) => path.line_to(at(to).0, at(to).1),
+                    Segment::Quad(by, to) => path.quad_to(at(by).0, at(by).1, at(to).0, at(to).1),
+                    Segment::Close => path.close(),
+                }
+            }
             pen += self.advance(c) * size;
         }
-        glyphs.path.finish()
+        path.finish()
     }
 
     /// Draws `text` with its baseline at `y`.
@@ -90,42 +114,36 @@ impl Lettering {
     }
 }
 
-/// Collects glyph outlines in pixels, y downwards.
-struct Glyphs {
-    path: PathBuilder,
-    x: f32,
-    y: f32,
-    scale: f32,
+/// A line of [`OUTLINES`].
+fn parse(line: &str) -> Option<(char, Glyph)> {
+    let mut words = line.split(' ');
+    let c = char::from_u32(u32::from_str_radix(words.next()?, 16).ok()?)?;
+    let mut glyph = Glyph { advance: words.next()?.parse().ok()?, outline: Vec::new() };
+    while let Some(command) = words.next() {
+        let mut point = || Some([words.next()?.parse().ok()?, words.next()?.parse().ok()?]);
+        glyph.outline.push(match command {
+            "M" => Segment::Move(point()?),
+            "L" => Segment::Line(point()?),
+            "Q" => Segment::Quad(point()?, point()?),
+            "Z" => Segment::Close,
+            _ => return None,
+        });
+    }
+    Some((c, glyph))
 }
 
-impl Glyphs {
-    fn at(&self, x: f32, y: f32) -> (f32, f32) {
-        (self.x + self.scale * x, self.y - self.scale * y)
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl OutlinePen for Glyphs {
-    fn move_to(&mut self, x: f32, y: f32) {
-        let (x, y) = self.at(x, y);
-        self.path.move_to(x, y);
-    }
-
-    fn line_to(&mut self, x: f32, y: f32) {
-        let (x, y) = self.at(x, y);
-        self.path.line_to(x, y);
-    }
-
-    fn quad_to(&mut self, x1: f32, y1: f32, x: f32, y: f32) {
-        let ((x1, y1), (x, y)) = (self.at(x1, y1), self.at(x, y));
-        self.path.quad_to(x1, y1, x, y);
-    }
-
-    fn curve_to(&mut self, x1: f32, y1: f32, x2: f32, y2: f32, x: f32, y: f32) {
-        let ((x1, y1), (x2, y2), (x, y)) = (self.at(x1, y1), self.at(x2, y2), self.at(x, y));
-        self.path.cubic_to(x1, y1, x2, y2, x, y);
-    }
-
-    fn close(&mut self) {
-        self.path.close();
+    #[test]
+    fn all_of_latin_1_has_a_glyph_and_other_characters_a_box() {
+        let lettering = Lettering::new().expect("the outlines can be read");
+        for c in (' '..='~').chain('\u{a1}'..='\u{ff}').chain(['…', 'µ', '−']) {
+            assert!(lettering.advance(c) > 0.2, "{c}");
+        }
+        assert_eq!(lettering.glyph('\u{4e00}'), lettering.glyphs.get(&MISSING));
+        assert!(lettering.width("mm", 10.0) > lettering.width("ii", 10.0));
+        assert!(lettering.outline("0.5 mm", 12.0, [3.0, 20.0], Anchor::Middle).is_some());
     }
 }
