@@ -1,4 +1,5 @@
-//! Makes the outlines of the built-in font, `assets/DejaVuSans-outlines.txt`, from the font; its test in `tests/outlines.rs` compares the two.
+//! Writes the outlines of the built-in font, `assets/DejaVuSans-outlines.txt`. The test
+//! `tests/outlines.rs` compares the file with the font.
 //!
 //! `cargo run -p tesdf-cli --example outlines > crates/tesdf-cli/assets/DejaVuSans-outlines.txt`
 use std::error::Error;

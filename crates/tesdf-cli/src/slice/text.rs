@@ -2,14 +2,15 @@ use std::collections::BTreeMap;
 
 use tiny_skia::{Color, FillRule, Paint, Path, PathBuilder, Pixmap, Transform};
 
-/// Outlines of Latin-1 of DejaVu Sans, so that neither a font of the system nor a reader of fonts is needed.
-/// The example `outlines` makes them from the font, and a test compares the two. The licence is in `assets/`.
+/// Outlines of the Latin-1 characters of DejaVu Sans, so that neither a system font nor a font
+/// parser is needed. The example `outlines` makes this file from the font, and a test compares the
+/// two. The licence is in `assets/`.
 ///
-/// The first line has the units per em. Each other line has a code point (hexadecimal; `0` for characters
-/// that are not there), the advance, and the outline as the path of an SVG file, y upwards.
+/// The first line has the units per em. Each other line has a code point (hexadecimal; `0` for
+/// missing characters), the advance, and the outline as an SVG path, y upwards.
 const OUTLINES: &str = include_str!("../../assets/DejaVuSans-outlines.txt");
 
-/// Where a text stands relative to its point.
+/// Alignment of a text at its point.
 #[derive(Clone, Copy)]
 pub enum Anchor {
     /// The text starts at the point.
@@ -39,7 +40,7 @@ enum Segment {
     Close,
 }
 
-/// What stands for a character without a glyph.
+/// The key of the glyph that is drawn for missing characters.
 const MISSING: char = '\0';
 
 impl Lettering {
@@ -58,12 +59,12 @@ impl Lettering {
         self.glyph(c).map_or(0.0, |glyph| glyph.advance / self.units_per_em)
     }
 
-    /// Width of `text` in pixels, `size` pixels per em.
+    /// Width of `text` in pixels, at `size` pixels per em.
     pub fn width(&self, text: &str, size: f32) -> f32 {
         text.chars().map(|c| self.advance(c)).sum::<f32>() * size
     }
 
-    /// `text`, cut with an ellipsis where it is wider than `width` pixels.
+    /// `text`, shortened with an ellipsis if it is wider than `width` pixels.
     pub fn fit(&self, text: &str, size: f32, width: f32) -> String {
         if self.width(text, size) <= width {
             return text.to_string();
