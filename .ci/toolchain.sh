@@ -15,8 +15,12 @@ if ! command -v cc >/dev/null; then
     exit 2
 fi
 
-# Prints a command, then runs it.
+# Prints a command, then runs it. Adds its seconds to the file STEP_TIMES, where that is set.
 step() {
     echo "+ $*"
+    local start=$SECONDS
     "$@"
+    if [ -n "${STEP_TIMES:-}" ]; then
+        printf '%6d s  %s\n' $((SECONDS - start)) "$*" >>"$STEP_TIMES"
+    fi
 }
