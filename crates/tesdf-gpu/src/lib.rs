@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Kernels are written once, with [CubeCL](https://github.com/tracel-ai/cubecl), and run through wgpu on Vulkan, Metal and
-//! DirectX 12, and as generated CUDA C++ ([`cuda`]). Everything is computed in `f32`, in the local frame of the field; `docs/gpu.md` has stages, layouts and limits.
+//! DirectX 12, and as generated CUDA C++ ([`cuda`]). Everything is computed in `f32`, in the local frame of the field; `docs/gpu/design.md` has stages and layouts.
 #![warn(missing_docs)]
 
 mod collide;
