@@ -8,7 +8,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 for features in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf vtu gmsh gltf,collide encode,collide,parallel,gltf,vtu,gmsh; do
     RUSTFLAGS="-D warnings" step cargo check --quiet --lib -p tesdf --no-default-features --features "$features" --target-dir target/features
 done
-step cargo test --quiet --lib -p tesdf-terminal device
+# Not optimised: one test of an error message.
+CARGO_PROFILE_TEST_OPT_LEVEL=0 step cargo test --quiet --lib -p tesdf-terminal device --target-dir target/features
 
 most=20
 found=$(cargo tree -p tesdf --no-default-features -e normal --prefix none --no-dedupe | sed 's/ (.*//' | sort -u | wc -l)
