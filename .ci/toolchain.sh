@@ -18,9 +18,10 @@ fi
 # Prints a command, then runs it. Adds its seconds to the file STEP_TIMES, where that is set.
 step() {
     echo "+ $*"
-    local start=$SECONDS
-    "$@"
+    local start=$SECONDS status=0
+    "$@" || status=$?
     if [ -n "${STEP_TIMES:-}" ]; then
         printf '%6d s  %s\n' $((SECONDS - start)) "$*" >>"$STEP_TIMES"
     fi
+    return $status
 }
