@@ -143,8 +143,8 @@ impl Asset {
         self.answers(points, precision, Extent::Everywhere)
     }
 
-    /// As query, but with NaN and NO_FACE for points outside of the encoded domain. The domain ends at
-    /// the width of the band from the solid, up to about the size of a cell.
+    /// As query, but with NaN and NO_FACE for points outside of the encoded domain. The domain ends
+    /// at the width of the band from the solid, up to about the size of a cell.
     #[pyo3(signature = (points, precision = "f64"))]
     fn query_in_domain<'py>(
         &self,

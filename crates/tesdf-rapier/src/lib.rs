@@ -29,11 +29,14 @@
 //! let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj)?.mesh)?;
 //! let asset = Arc::new(Encoder::new().encode(&solid)?);
 //!
-//! let mut world = PhysicsWorld { gravity: Vector::new(0.0, 0.0, -9.81), ..PhysicsWorld::default() };
-//! world.narrow_phase.set_query_dispatcher(query_dispatcher(CollideOptions::with_mode(Mode::Exact)));
+//! let gravity = Vector::new(0.0, 0.0, -9.81);
+//! let mut world = PhysicsWorld { gravity, ..PhysicsWorld::default() };
+//! let dispatcher = query_dispatcher(CollideOptions::with_mode(Mode::Exact));
+//! world.narrow_phase.set_query_dispatcher(dispatcher);
 //! world.integration_parameters = RapierOptions::default().parameters(1e-3, 1e-3); // s, m
 //! world.insert_collider(ColliderBuilder::new(SharedShape::new(HalfSpace::new(Vector::Z))), None);
-//! let body = world.insert_body(RigidBodyBuilder::dynamic().translation(Vector::new(0.0, 0.0, 1e-3)));
+//! let start = Vector::new(0.0, 0.0, 1e-3);
+//! let body = world.insert_body(RigidBodyBuilder::dynamic().translation(start));
 //! let tetra = SharedShape::new(TesdfShape::new(asset));
 //! world.insert_collider(ColliderBuilder::new(tetra).density(1000.0), Some(body));
 //! for _ in 0..100 {
