@@ -1,4 +1,5 @@
 //! `tesdf bench`: measures the cost of a detection on a device, stage by stage.
+mod arguments;
 mod collide;
 mod frames;
 #[cfg(feature = "gpu")]
@@ -18,7 +19,7 @@ pub struct Args {
 #[derive(clap::Subcommand, Debug)]
 enum Benchmark {
     /// Detect the contacts of recorded or generated poses; print time, launches, bytes and queries
-    Collide(collide::Args),
+    Collide(arguments::Args),
     /// Write a file of poses with overlapping bodies, from a seed
     Poses(poses::Args),
 }

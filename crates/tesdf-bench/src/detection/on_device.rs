@@ -5,18 +5,19 @@ use tesdf::collide::{CollideOptions, Reduction};
 use tesdf_gpu::{Counting, Detector, DetectorOptions, Device, Exchange, Lanes, Memory, Pruning};
 use tesdf_terminal::report::Failure;
 
-use super::collide::{Args, LanesName, ModeName};
+use super::arguments::{Args, LanesName, ModeName};
 use super::frames::Frames;
 use super::report::{Bytes, Counts, PHASES, Report, Spread, Stage, ms};
 
 /// The phase of a stage. A stage that only prepares a launch belongs to the phase of that launch.
-/// Reduction is in none of the three phases.
+/// The search for hidden overlaps and the reduction are in none of the three phases.
 fn phase(stages: &[(&str, Duration)], stage: usize) -> &'static str {
     match stages[stage].0 {
         "groups" if stage + 1 < stages.len() => phase(stages, stage + 1),
         "instance bounds" | "instance pairs" | "meshlets" => "BP",
         "polygons" | "outside of domains" | "nodes" => "MP",
         "face narrow phase" | "node narrow phase" | "exact narrow phase" => "NP",
+        "no depths" | "hidden overlaps" => "hidden overlaps",
         _ => "reduction",
     }
 }

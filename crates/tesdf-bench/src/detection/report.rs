@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 use tesdf_terminal::report::size;
 
-use super::collide::{LanesName, ModeName};
+use super::arguments::{LanesName, ModeName};
 
 /// Mean, 99th percentile and maximum of a series.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -29,7 +29,7 @@ impl Spread {
 #[derive(Serialize)]
 pub struct Stage {
     pub name: &'static str,
-    /// `BP`, `MP` or `NP` for the paper's broad, middle and narrow phase, or `reduction`.
+    /// `BP`, `MP` or `NP` for the paper's broad, middle and narrow phase, `hidden overlaps` or `reduction`.
     pub phase: &'static str,
     pub ms: Spread,
 }
