@@ -1,4 +1,4 @@
-/// Why something could not be done on a device.
+/// The reason why an operation on a device failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
     /// This machine has no device that kernels can run on.
@@ -7,101 +7,101 @@ pub enum GpuError {
          mesa-vulkan-drivers` for AMD, Intel and the software device, the package nvidia-driver for NVIDIA"
     )]
     NoDevice,
-    /// No device of this machine is meant by a name or number.
+    /// No device has the requested name or number.
     #[error("no device is named {asked:?}; this machine has {}", list(.found))]
     NoSuchDevice {
-        /// What was asked for.
+        /// Name or number that was requested.
         asked: String,
-        /// Names of the devices there are.
+        /// Names of all devices, in the order of [`devices`](crate::devices).
         found: Vec<String>,
     },
-    /// The device refused a buffer, a kernel or a read.
+    /// A buffer, a launch, a timing or a read on the device failed.
     #[error("{device}: {doing}: {reason}")]
     Device {
         /// Name of the device.
         device: String,
-        /// What was being done.
+        /// The operation that failed, or the name of the buffer that was read.
         doing: &'static str,
-        /// What the driver said.
+        /// Message of the driver.
         reason: String,
     },
-    /// A scene or options that no detector takes.
+    /// The scene or the options are invalid on every device.
     #[error(transparent)]
     Collide(#[from] tesdf::collide::CollideError),
-    /// What kernels cannot do.
+    /// This device has no such operation.
     #[error("{what} is not available on a device; {instead}")]
     Unavailable {
-        /// What was asked for.
+        /// The operation that was requested.
         what: String,
-        /// What to do instead.
+        /// Advice: what to do instead.
         instead: &'static str,
     },
-    /// Fixed memory that does not hold what a scene needs. Nothing was lost: there is no result.
+    /// A buffer of fixed size is too small for the scene. The detection returns no contacts.
     #[error(
         "{device}: buffer {buffer:?} holds {capacity} elements; the scene needs {needed}. Raise it, or let buffers grow"
     )]
     Full {
         /// Name of the device.
         device: String,
-        /// Which buffer.
+        /// Name of the buffer.
         buffer: &'static str,
-        /// Elements that it holds.
+        /// Capacity of the buffer, in elements.
         capacity: u32,
-        /// Elements that are needed.
+        /// Elements that the scene needs.
         needed: u32,
     },
-    /// An array on a device that is too short, or not whole.
+    /// An array on a device is too short, or its length is not a multiple of the element size.
     #[error("array {array:?} has {found} elements; expected {expected}")]
     Length {
-        /// Which array.
+        /// Name of the array.
         array: &'static str,
-        /// Elements that it has.
+        /// Length of the array, in numbers.
         found: usize,
-        /// What was expected.
+        /// The length that is expected, in words.
         expected: String,
     },
-    /// A kernel that a compiler refused.
+    /// CUDA C++ cannot express a kernel, or NVRTC rejects it.
     #[error("kernel {kernel}: {reason}")]
     Kernel {
-        /// Its name.
+        /// Name of the kernel.
         kernel: String,
-        /// What the compiler said.
+        /// Messages of the compiler.
         reason: String,
     },
-    /// Kernels cannot be compiled for CUDA.
+    /// The library NVRTC, which compiles kernels for CUDA, is missing.
     #[error(
         "NVRTC, which compiles kernels for CUDA, was not found; expected libnvrtc.so.12 or nvrtc64_12.dll. Install the CUDA toolkit 12, \
          or `pip install nvidia-cuda-nvrtc-cu12` and put its folder nvidia/cuda_nvrtc/lib into LD_LIBRARY_PATH"
     )]
     NoNvrtc,
-    /// A shape that kernels cannot read.
+    /// The kernels cannot read a shape, or cannot move its vertices.
     #[error("shape {number}: {reason}")]
     Shape {
-        /// Its place in the list that was to be uploaded.
+        /// Index of the shape in the list of uploaded shapes.
         number: usize,
-        /// What was found, and what was expected.
+        /// What is wrong with the shape, and what is expected.
         reason: String,
     },
-    /// An instance that cannot be.
+    /// An instance refers to a shape that was not uploaded.
     #[error("instance {instance}: {reason}")]
     Instance {
-        /// Its place in the list.
+        /// Index of the instance in the list.
         instance: usize,
-        /// What was found, and what was expected.
+        /// What is wrong with the instance, and what is expected.
         reason: String,
     },
-    /// A buffer is larger than the device can bind.
+    /// A buffer is larger than the device allows.
     #[error(
         "{device}: buffer {buffer:?} needs {needed} bytes; the device binds {limit} at most. Split the scene, or raise the limit of the driver"
     )]
     TooLarge {
         /// Name of the device.
         device: String,
-        /// Which buffer.
+        /// Name of the buffer.
         buffer: &'static str,
-        /// Bytes that are needed.
+        /// Size that the buffer needs, in bytes.
         needed: u64,
-        /// Bytes that there can be.
+        /// Largest size that the device can bind, in bytes.
         limit: u64,
     },
 }

@@ -6,8 +6,13 @@
 //! Scene ──Detector──▶ contacts, in the form and order of `tesdf::collide::detect`
 //! ```
 //!
-//! Kernels are written once, with [CubeCL](https://github.com/tracel-ai/cubecl), and run through wgpu on Vulkan, Metal and
-//! DirectX 12, and as generated CUDA C++ ([`cuda`]). Everything is computed in `f32`, in the local frame of the field; `docs/gpu/design.md` has stages and layouts.
+//! Each kernel is written once, in Rust with [CubeCL](https://github.com/tracel-ai/cubecl). It runs
+//! through wgpu on Vulkan, Metal and DirectX 12, or as generated CUDA C++ ([`cuda`]). Tests run on
+//! Vulkan's software driver, and run the CUDA C++ on the processor. Not run yet: a graphics card, a
+//! CUDA device, Metal and DirectX 12.
+//!
+//! Kernels compute in `f32`, in the local frame of the field. `docs/gpu/design.md` describes the
+//! stages and the memory layouts.
 #![warn(missing_docs)]
 
 mod collide;
@@ -16,7 +21,7 @@ mod device;
 mod encode;
 mod error;
 mod kernels;
-// What the kernels of the processor are compared with.
+// Code of `tesdf` that unit tests compare the kernels with.
 #[cfg(test)]
 #[path = "../../tesdf/src/testing/mod.rs"]
 #[allow(dead_code, reason = "other crates use the rest")]

@@ -1,4 +1,4 @@
-//! A GPU, through NVIDIA's driver, which is loaded when it is first needed.
+//! A GPU through NVIDIA's driver. The driver's library is loaded at the first use.
 use std::ffi::{CString, c_void};
 use std::sync::LazyLock;
 
@@ -7,11 +7,11 @@ use cudarc::driver::sys::CUdevice_attribute as Attribute;
 use cudarc::driver::sys::CUresult;
 use cudarc::driver::{DriverError, result, sys};
 
-/// What failed, in the words of the server that launches.
+/// Turns an error of a driver call into a failure of the server.
 pub fn failed(call: &'static str) -> impl FnOnce(DriverError) -> Failure {
     move |error| {
         let status = error.0 as u32;
-        // After these the context answers nothing else.
+        // After one of these errors, all later calls in the context fail.
         let ends_the_context = matches!(
             error.0,
             CUresult::CUDA_ERROR_ILLEGAL_ADDRESS
@@ -25,31 +25,32 @@ pub fn failed(call: &'static str) -> impl FnOnce(DriverError) -> Failure {
     }
 }
 
-/// Number of CUDA devices; none without a driver.
+/// Number of CUDA devices; 0 when no driver is installed.
 pub fn count() -> usize {
-    // SAFETY: it opens libraries by the names that NVIDIA gives them, and a driver's initialisers are trusted.
+    // SAFETY: the call opens libraries by NVIDIA's names, and the initialisers of a driver are
+    // trusted.
     static PRESENT: LazyLock<bool> =
         LazyLock::new(|| unsafe { sys::is_culib_present() } && result::init().is_ok());
     if *PRESENT { result::device::get_count().map_or(0, |n| n.max(0) as usize) } else { 0 }
 }
 
-/// What the driver tells of a device, without a context on it.
+/// Facts about a device that the driver reports without a context.
 #[derive(Clone, Debug, Default)]
 pub struct Facts {
     pub name: String,
-    /// Compute capability, as 90.
+    /// Compute capability times 10, such as 90.
     pub capability: i32,
     pub memory_bytes: u64,
     pub shared_bytes: usize,
     pub multiprocessors: u32,
-    /// Whether memory is taken and given back in the order of a stream.
+    /// Whether the device has memory pools: memory is then allocated and freed in stream order.
     has_pools: bool,
 }
 
 /// Asks the driver about device `index`.
 pub fn facts(index: usize) -> Result<Facts, Failure> {
     let device = result::device::get(index as i32).map_err(failed("cuDeviceGet"))?;
-    // SAFETY: the driver gave the device.
+    // SAFETY: the driver returned this device.
     let ask = |attribute| unsafe {
         result::device::get_attribute(device, attribute).map_err(failed("cuDeviceGetAttribute"))
     };
@@ -67,7 +68,7 @@ pub fn facts(index: usize) -> Result<Facts, Failure> {
     })
 }
 
-/// The primary context of a device, and one stream.
+/// The primary context of a device, with one stream.
 #[derive(Debug)]
 pub struct Gpu {
     pub facts: Facts,
@@ -75,7 +76,8 @@ pub struct Gpu {
     stream: sys::CUstream,
 }
 
-// SAFETY: the driver may be called from any thread, and from many at a time, once the context is current there.
+// SAFETY: any thread may call the driver, also several threads at the same time, once the context
+// is current on the thread.
 unsafe impl Send for Gpu {}
 // SAFETY: as above.
 unsafe impl Sync for Gpu {}
@@ -86,7 +88,7 @@ pub struct Function {
     function: sys::CUfunction,
     threads: (u32, u32, u32),
     shared_bytes: usize,
-    /// Blocks that the GPU runs at a time.
+    /// Blocks of this kernel that the whole GPU runs at the same time.
     pub resident: u32,
 }
 
@@ -95,7 +97,7 @@ unsafe impl Send for Function {}
 // SAFETY: as for `Gpu`.
 unsafe impl Sync for Function {}
 
-/// A point in the order of the stream.
+/// A position in the stream.
 #[derive(Debug)]
 pub struct Event(sys::CUevent);
 
@@ -104,27 +106,30 @@ unsafe impl Send for Event {}
 
 impl Drop for Event {
     fn drop(&mut self) {
-        // SAFETY: created once, destroyed once. A failure leaves nothing to do.
+        // SAFETY: the event was created once, and is destroyed once. After a failure nothing is
+        // left to do.
         let _ = unsafe { result::event::destroy(self.0) };
     }
 }
 
 impl Gpu {
-    /// Opens device `index`. What it allocates stays: contexts live as long as the process.
+    /// Opens device `index`. Its context and allocations live as long as the process.
     pub fn open(index: usize) -> Result<Self, Failure> {
         let facts = facts(index)?;
         let device = result::device::get(index as i32).map_err(failed("cuDeviceGet"))?;
-        // SAFETY: the driver gave the device, and the context is current for the stream.
+        // SAFETY: the driver returned this device, and the context is current when the stream is
+        // created.
         unsafe {
             let context = result::primary_ctx::retain(device).map_err(failed("cuDevicePrimaryCtxRetain"))?;
             result::ctx::set_current(context).map_err(failed("cuCtxSetCurrent"))?;
-            // Of the default kind: in order with the legacy default stream, on which others work.
+            // A stream of the default kind is ordered with the legacy default stream, in which
+            // other libraries work.
             let stream = result::stream::create(result::stream::StreamKind::Default)
                 .map_err(failed("cuStreamCreate"))?;
             if facts.has_pools {
                 let pool = result::device::get_default_mem_pool(device)
                     .map_err(failed("cuDeviceGetDefaultMemPool"))?;
-                // Memory that is given back is kept for the next buffer.
+                // The pool keeps freed memory for later buffers.
                 let mut kept = u64::MAX;
                 let attribute = sys::CUmemPool_attribute::CU_MEMPOOL_ATTR_RELEASE_THRESHOLD;
                 result::mem_pool::set_attribute(pool, attribute, (&raw mut kept).cast())
@@ -134,14 +139,14 @@ impl Gpu {
         }
     }
 
-    /// To be called before anything else on a thread.
+    /// Makes the context current on this thread. Must come before any other call on a thread.
     pub fn make_current(&self) -> Result<(), Failure> {
         // SAFETY: the context is never released.
         unsafe { result::ctx::set_current(self.context) }.map_err(failed("cuCtxSetCurrent"))
     }
 
     pub fn allocate(&self, bytes: usize) -> Result<u64, Failure> {
-        // SAFETY: the stream is never destroyed, and what is allocated is used on it alone.
+        // SAFETY: the stream is never destroyed, and the memory is used in this stream alone.
         unsafe {
             if self.facts.has_pools {
                 result::malloc_async(self.stream, bytes).map_err(failed("cuMemAllocAsync"))
@@ -152,9 +157,10 @@ impl Gpu {
     }
 
     /// # Safety
-    /// `pointer` came from [`Gpu::allocate`], and nothing uses it from now on.
+    /// `pointer` came from [`Gpu::allocate`], and no later call uses it.
     pub unsafe fn free(&self, pointer: u64) -> Result<(), Failure> {
-        // SAFETY: by the caller; work that was launched before comes first on the stream.
+        // SAFETY: the caller guarantees the condition; earlier launches complete first in stream
+        // order.
         unsafe {
             if self.facts.has_pools {
                 result::free_async(pointer, self.stream).map_err(failed("cuMemFreeAsync"))
@@ -165,19 +171,20 @@ impl Gpu {
     }
 
     /// # Safety
-    /// `bytes.len()` bytes of the device begin at `pointer`.
+    /// The memory at `pointer` on the device has at least `bytes.len()` bytes.
     pub unsafe fn write(&self, pointer: u64, bytes: &[u8]) -> Result<(), Failure> {
-        // SAFETY: by the caller. Ordinary memory has been read when the call returns.
+        // SAFETY: the caller guarantees the condition. `bytes` is pageable, so it has been copied
+        // when the call returns.
         unsafe { result::memcpy_htod_async(pointer, bytes, self.stream) }.map_err(failed("cuMemcpyHtoDAsync"))
     }
 
-    /// Waits for all that was launched, and reads.
+    /// Waits for all earlier launches, and reads `bytes` bytes.
     ///
     /// # Safety
-    /// `bytes` bytes of the device begin at `pointer`.
+    /// The memory at `pointer` on the device has at least `bytes` bytes.
     pub unsafe fn read(&self, pointer: u64, bytes: usize) -> Result<Vec<u8>, Failure> {
         let mut read = vec![0; bytes];
-        // SAFETY: by the caller; `read` outlives the copy.
+        // SAFETY: the caller guarantees the condition; `read` outlives the copy.
         unsafe { result::memcpy_dtoh_async(&mut read, pointer, self.stream) }
             .map_err(failed("cuMemcpyDtoHAsync"))?;
         self.wait()?;
@@ -198,7 +205,7 @@ impl Gpu {
         shared_bytes: usize,
     ) -> Result<Function, Failure> {
         let entry = CString::new(entry).unwrap_or_default();
-        // SAFETY: the image is what NVRTC made. The module is never unloaded.
+        // SAFETY: NVRTC made the image. The module is never unloaded.
         unsafe {
             let module =
                 result::module::load_data(image.as_ptr().cast()).map_err(failed("cuModuleLoadData"))?;
@@ -220,14 +227,16 @@ impl Gpu {
     }
 
     /// # Safety
-    /// `arguments` point to what the kernel takes, in order, and the kernel stays within its buffers.
+    /// `arguments` point to the arguments of the kernel, in order, and the kernel stays within its
+    /// buffers.
     pub unsafe fn launch(
         &self,
         kernel: Function,
         blocks: (u32, u32, u32),
         arguments: &mut [*mut c_void],
     ) -> Result<(), Failure> {
-        // SAFETY: by the caller; arguments have been copied when the call returns.
+        // SAFETY: the caller guarantees the conditions; the arguments have been copied when the
+        // call returns.
         unsafe {
             result::launch_kernel(
                 kernel.function,
@@ -241,19 +250,19 @@ impl Gpu {
         .map_err(failed("cuLaunchKernel"))
     }
 
-    /// Marks what was launched until now.
+    /// Records an event after all earlier launches.
     pub fn mark(&self) -> Result<Event, Failure> {
         let event =
             result::event::create(sys::CUevent_flags::CU_EVENT_DEFAULT).map_err(failed("cuEventCreate"))?;
         let event = Event(event);
-        // SAFETY: both are alive.
+        // SAFETY: the event and the stream are alive.
         unsafe { result::event::record(event.0, self.stream) }.map_err(failed("cuEventRecord"))?;
         Ok(event)
     }
 
-    /// Milliseconds of the device's clock between two marks; waits for the second.
+    /// Milliseconds between two events, by the clock of the device. Waits for the second event.
     pub fn between(&self, from: &Event, to: &Event) -> Result<f32, Failure> {
-        // SAFETY: both are alive and were recorded.
+        // SAFETY: both events are alive and recorded.
         unsafe {
             result::event::synchronize(to.0).map_err(failed("cuEventSynchronize"))?;
             result::event::elapsed(from.0, to.0).map_err(failed("cuEventElapsedTime"))

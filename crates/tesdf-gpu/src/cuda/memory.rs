@@ -1,4 +1,4 @@
-//! Buffers of a CUDA device: what was allocated for them, or what others own.
+//! Buffers of a CUDA device: allocated here, or in memory of other libraries.
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use cubecl_runtime::storage::{ComputeStorage, StorageHandle, StorageId, StorageU
 
 use super::driver::Gpu;
 
-/// Bytes that allocations begin at a multiple of.
+/// Every allocation begins at a multiple of this number of bytes.
 pub const ALIGNMENT: usize = 256;
 
 /// Allocations of a GPU.
@@ -20,7 +20,7 @@ pub struct Storage {
 }
 
 impl ComputeStorage for Storage {
-    /// Where it begins on the device.
+    /// Address on the device.
     type Resource = u64;
 
     fn alignment(&self) -> usize {
@@ -45,7 +45,8 @@ impl ComputeStorage for Storage {
 
     fn dealloc(&mut self, id: StorageId) {
         if let Some((pointer, _)) = self.held.remove(&id) {
-            // SAFETY: it was allocated here, and is now forgotten. A driver that refuses keeps it.
+            // SAFETY: the memory was allocated here, and its entry was just removed. If the driver
+            // refuses, the memory stays allocated.
             let _ = unsafe { self.gpu.free(pointer) };
         }
     }
@@ -57,22 +58,22 @@ impl ComputeStorage for Storage {
     }
 }
 
-/// Whose memory a buffer is.
+/// Origin of a buffer's memory.
 #[derive(Debug)]
 enum Place {
     Ours(StorageHandle),
-    /// Pointer.
+    /// Memory of another library, at this address.
     Outside(u64),
-    /// There was no memory left.
+    /// The allocation failed for lack of memory.
     None,
 }
 
 #[derive(Debug)]
 struct Allocation {
-    /// Knows whether a buffer still refers to it.
+    /// Tells whether a buffer still refers to this memory.
     handle: ManagedMemoryHandle,
     place: Place,
-    /// Why it does not hold what it should.
+    /// The reason why the contents are invalid.
     failure: Option<ServerError>,
 }
 
@@ -88,7 +89,7 @@ impl Memory {
         Self { storage: Storage { gpu, held: HashMap::new() }, allocations: HashMap::new() }
     }
 
-    /// Takes memory for a buffer.
+    /// Allocates memory for a buffer.
     pub fn allocate(&mut self, handle: ManagedMemoryHandle, bytes: u64) -> Result<(), ServerError> {
         self.give_back();
         let (place, failure) = match self.storage.alloc(bytes.max(1)) {
@@ -99,7 +100,7 @@ impl Memory {
         failure.map_or(Ok(()), Err)
     }
 
-    /// Takes a pointer that others own as a buffer.
+    /// Registers an address of another library as a buffer.
     pub fn adopt(&mut self, handle: ManagedMemoryHandle, pointer: u64) {
         self.insert(handle, Place::Outside(pointer), None);
     }
@@ -108,7 +109,7 @@ impl Memory {
         self.allocations.insert(handle.descriptor().id, Allocation { handle, place, failure });
     }
 
-    /// Frees what no buffer refers to any more.
+    /// Frees the memory that no buffer refers to any more.
     pub fn give_back(&mut self) {
         let storage = &mut self.storage;
         self.allocations.retain(|_, allocation| {
@@ -120,7 +121,7 @@ impl Memory {
         });
     }
 
-    /// Where a buffer begins.
+    /// Address of a buffer on the device.
     pub fn pointer(&mut self, buffer: &BufferBinding) -> Result<u64, ServerError> {
         let lost = || ServerError::Generic {
             reason: "a buffer without memory".into(),
@@ -135,7 +136,7 @@ impl Memory {
         Ok(begin + buffer.offset_start.unwrap_or(0))
     }
 
-    /// Whether a buffer holds what it should.
+    /// Fails when the contents of a buffer are invalid.
     pub fn check(&self, buffer: &BufferBinding) -> Result<(), ServerError> {
         match self.allocations.get(&buffer.memory.id()).and_then(|a| a.failure.clone()) {
             Some(failure) => Err(failure),
@@ -143,7 +144,7 @@ impl Memory {
         }
     }
 
-    /// Notes whether what was to be written was.
+    /// Records whether the launch or copy that writes these buffers succeeded.
     pub fn written<'a>(
         &mut self,
         buffers: impl Iterator<Item = &'a BufferBinding>,

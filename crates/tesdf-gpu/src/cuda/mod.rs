@@ -1,43 +1,57 @@
-//! The kernels as CUDA C++, and NVIDIA GPUs that have CUDA but no graphics driver.
+//! The kernels as CUDA C++, for NVIDIA GPUs with CUDA, also where no graphics driver is installed.
+//!
+//! Tests compile each kernel with NVRTC, and run the generated code on the processor. No kernel has
+//! been run on a CUDA device yet.
 //!
 //! # One way to launch
 //!
-//! Host code launches a kernel as `kernel::launch(device.client(), count, threads, arguments…)`, whatever the device is: a
-//! [`Client`](cubecl::client::Client) hides which server runs the launch. wgpu's server comes with CubeCL. `cuda::server` is ours for CUDA; CubeCL's
-//! own builds LLVM, reads indirect counts back, and takes no memory that others allocated.
+//! Host code launches a kernel in one way on every device:
+//! `kernel::launch(device.client(), count, threads, arguments…)`. A
+//! [`Client`](cubecl::client::Client) hides the server that runs the launch. CubeCL has the server
+//! for wgpu. The server for CUDA, `cuda::server`, belongs to this crate, because CubeCL's server
+//! for CUDA builds LLVM, reads indirect counts back to the host, and accepts no memory of other
+//! libraries.
 //!
 //! ```text
 //! kernel ──source──▶ CUDA C++ ──nvrtc──▶ machine code ──driver──▶ launch
 //!           cubecl-cpp           library of CUDA           driver of the GPU
 //! ```
 //!
-//! What makes the text needs no GPU and no CUDA, what compiles it no GPU: [`sources`] gives the text of every kernel in
-//! `kernels::catalog`, and tests compile all of it.
+//! Generating the text needs neither a GPU nor CUDA, and compiling it needs no GPU. [`sources`]
+//! returns the text of every kernel in `kernels::catalog`, and tests compile each of them.
 //!
 //! # Binary interface
 //!
-//! A kernel is an `extern "C"` function. Its arguments, in order:
-//! 1. a pointer for each buffer, in the order of the Rust function; a struct of buffers is its fields, in order,
-//! 2. `info_st`, by value: the scalars, each type in an array of its own, padded to 8 bytes (`u32` is `scalars_u32`), then `static_meta`, the
-//!    length of each buffer in elements, in the order of the pointers. It is absent from a kernel with neither,
-//! 3. with an indirect count, a pointer to three `u32`: blocks in x, y, z.
+//! A kernel is an `extern "C"` function. It takes these arguments, in this order:
+//! 1. a pointer for each buffer, in the order of the Rust function; a struct of buffers gives one
+//!    pointer for each field, in the order of the fields;
+//! 2. `info_st`, by value: first the scalars, with one array for each type, padded to 8 bytes
+//!    (`u32` is `scalars_u32`), then `static_meta`, the length of each buffer in elements, in the
+//!    order of the pointers. A kernel without scalars and lengths has no `info_st`;
+//! 3. in an indirect launch, a pointer to three `u32`: the number of blocks in x, y and z.
 //!
-//! Threads of a block are fixed by the kernel ([`CudaSource::threads`]), its shared memory is dynamic ([`CudaSource::shared_bytes`]).
+//! The kernel fixes the number of threads of a block ([`CudaSource::threads`]). Its shared memory
+//! is dynamic ([`CudaSource::shared_bytes`]).
 //!
 //! # Indirect counts
 //!
-//! wgpu reads the number of blocks from a buffer when the launch begins. CUDA cannot, so `cuda::source` puts a loop around the kernel: as many
-//! blocks are launched as the GPU runs at a time, and each takes every so-many-th block of the count. Nothing is read back.
+//! wgpu reads the number of blocks from a buffer when the launch begins. CUDA cannot do this, so
+//! `cuda::source` puts a loop around the kernel. The number of launched blocks depends on the GPU
+//! alone: a few times the blocks that it runs at the same time. Together these blocks step through
+//! all blocks of the count. The host reads nothing back.
 //!
 //! # Numbers
 //!
-//! Products and sums are rounded one by one, divisions and roots are rounded right: CUDA gives the same bits on every GPU. Nothing tests
-//! bounds: where a shader reads zero or another element, a CUDA kernel may end the context.
+//! Each product and each sum is rounded by itself, and divisions and square roots are correctly
+//! rounded. By the rules of CUDA, the bits are then equal on every GPU. Kernels have no bounds
+//! checks: where a shader reads zero or another element, a CUDA kernel may end the context.
 //!
-//! # Memory of others
+//! # Memory of other libraries
 //!
-//! All work is in one stream of the GPU's primary context, which torch and Warp use too. That stream waits for the legacy default stream and the
-//! other way round; who works in further streams has to wait for them. [`DeviceArray::from_raw_ptr`](crate::DeviceArray) takes a pointer as an array, and nothing is copied.
+//! All work is in one stream of the GPU's primary context, which torch and Warp use too. This
+//! stream and the legacy default stream wait for each other. A caller that works in other streams
+//! must wait for this stream. [`DeviceArray::from_raw_ptr`](crate::DeviceArray) wraps a pointer as
+//! an array, without a copy.
 #[cfg(feature = "cuda")]
 mod driver;
 #[cfg(feature = "cuda")]

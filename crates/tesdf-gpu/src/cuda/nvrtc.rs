@@ -1,4 +1,4 @@
-//! The compiler of CUDA C++, a library that is loaded when it is first needed.
+//! NVRTC, the compiler of CUDA C++. The library is loaded at the first use.
 use std::ffi::{CStr, CString, c_char};
 use std::fmt;
 use std::sync::LazyLock;
@@ -8,34 +8,35 @@ use cudarc::nvrtc::{result, sys};
 use super::CudaSource;
 use crate::GpuError;
 
-/// A kernel in the language of a GPU.
+/// A compiled kernel.
 #[derive(Clone, Debug)]
 pub struct Compiled {
-    /// Machine code (`sm_…`), or PTX that ends with a zero (`compute_…`).
+    /// Machine code (for `sm_…`), or PTX with a final zero byte (for `compute_…`).
     pub image: Vec<u8>,
-    /// What a thread or block of it takes; of PTX only the driver knows.
+    /// Resources that the kernel takes; `None` for PTX, where only the driver knows them.
     pub resources: Option<Resources>,
 }
 
-/// What machine code takes of a GPU.
+/// Resources of the GPU that the machine code of a kernel takes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Resources {
-    /// Registers of a thread.
+    /// Registers per thread.
     pub registers: u32,
-    /// Bytes of a thread's stack: arrays with an index that is computed, and spilled registers.
+    /// Stack per thread, in bytes: spilled registers, and arrays with a computed index.
     pub stack_bytes: u32,
-    /// Bytes of registers that are spilled, stored and loaded.
+    /// Stores and loads of spilled registers, in bytes: (stored, loaded).
     pub spilled_bytes: (u32, u32),
-    /// Bytes of static shared memory of a block.
+    /// Static shared memory per block, in bytes.
     pub shared_bytes: u32,
 }
 
 impl Resources {
-    /// Warps of blocks of `threads` threads that a multiprocessor runs at a time, as far as registers say: of compute capability 8.0 and
-    /// 9.0, with 65,536 registers, 64 warps and 32 blocks at most.
+    /// Number of warps that a multiprocessor runs at the same time, in blocks of `threads` threads,
+    /// as limited by registers. This holds for compute capability 8.0 and 9.0: 65,536 registers, at
+    /// most 64 warps and 32 blocks.
     pub fn warps(&self, threads: u32) -> u32 {
         let of_block = threads.div_ceil(32).max(1);
-        // A warp gets registers in units of 256.
+        // Registers are allocated to a warp in units of 256.
         let registers = of_block * (32 * self.registers.max(1)).next_multiple_of(256);
         of_block * (65_536 / registers).min(64 / of_block).min(32)
     }
@@ -52,10 +53,11 @@ impl fmt::Display for Resources {
     }
 }
 
-/// Compiles a kernel for an architecture: `sm_90a` gives machine code, `compute_75` PTX.
+/// Compiles a kernel for an architecture. `sm_90a` gives machine code, and `compute_75` gives PTX.
 ///
 /// # Errors
-/// [`GpuError::NoNvrtc`]; [`GpuError::Kernel`] with the compiler's messages.
+/// [`GpuError::NoNvrtc`] when NVRTC is not installed; [`GpuError::Kernel`] with the compiler's
+/// messages when NVRTC rejects the text.
 pub fn compile(source: &CudaSource, architecture: &str) -> Result<Compiled, GpuError> {
     if !is_present() {
         return Err(GpuError::NoNvrtc);
@@ -76,7 +78,8 @@ pub fn compile(source: &CudaSource, architecture: &str) -> Result<Compiled, GpuE
     Ok(Compiled { image, resources: is_machine_code.then(|| resources(&log)) })
 }
 
-/// The architecture to compile for on a GPU of a compute capability such as 90: its own, or the next one below that the compiler knows, as PTX.
+/// The architecture to compile for, on a GPU with compute capability `capability`, such as 90:
+/// machine code for this GPU, or PTX for the next lower capability that NVRTC knows.
 pub(super) fn architecture(capability: i32) -> Result<String, GpuError> {
     if !is_present() {
         return Err(GpuError::NoNvrtc);
@@ -95,14 +98,16 @@ pub(super) fn architecture(capability: i32) -> Result<String, GpuError> {
 }
 
 fn is_present() -> bool {
-    // SAFETY: it opens libraries by the names that NVIDIA gives them, and their initialisers are trusted as the driver's are.
+    // SAFETY: the call opens libraries by NVIDIA's names. Their initialisers are trusted, as for
+    // the driver.
     static PRESENT: LazyLock<bool> = LazyLock::new(|| unsafe { sys::is_culib_present() });
     *PRESENT
 }
 
 fn supported() -> Vec<i32> {
     let mut count = 0;
-    // SAFETY: the first call writes one number, the second as many as the first said.
+    // SAFETY: the first call writes one number. The second call writes as many numbers as the first
+    // returned.
     unsafe {
         if sys::nvrtcGetNumSupportedArchs(&mut count).result().is_err() {
             return Vec::new();
@@ -115,10 +120,10 @@ fn supported() -> Vec<i32> {
     }
 }
 
-/// A program of NVRTC, destroyed when dropped.
+/// A program of NVRTC. Dropping it destroys it.
 struct Program<'a> {
     program: sys::nvrtcProgram,
-    /// NVRTC may refer to it.
+    /// NVRTC may keep a pointer to the text.
     _text: &'a CStr,
 }
 
@@ -128,14 +133,14 @@ impl<'a> Program<'a> {
     }
 
     fn compile(&mut self, options: &[String]) -> Result<(), result::NvrtcError> {
-        // SAFETY: the program is alive until drop. The options are without zeros.
+        // SAFETY: the program is alive until it is dropped. The options contain no zero bytes.
         unsafe {
             result::compile_program(self.program, &options.iter().map(String::as_str).collect::<Vec<_>>())
         }
     }
 
     fn log(&self) -> String {
-        // SAFETY: the program is alive; the log ends with a zero.
+        // SAFETY: the program is alive, and the log ends with a zero byte.
         let log = unsafe { result::get_program_log(self.program) }.unwrap_or_default();
         let bytes: Vec<u8> = log.iter().map(|&c| c as u8).take_while(|&c| c != 0).collect();
         String::from_utf8_lossy(&bytes).into_owned()
@@ -143,7 +148,7 @@ impl<'a> Program<'a> {
 
     fn image(&self, is_machine_code: bool) -> Result<Vec<u8>, result::NvrtcError> {
         let mut size = 0;
-        // SAFETY: the program is alive, and the buffer has the size that NVRTC told.
+        // SAFETY: the program is alive, and the buffer has the size that NVRTC returned.
         unsafe {
             if is_machine_code {
                 sys::nvrtcGetCUBINSize(self.program, &mut size).result()?;
@@ -164,12 +169,14 @@ impl<'a> Program<'a> {
 
 impl Drop for Program<'_> {
     fn drop(&mut self) {
-        // SAFETY: created by `new`, destroyed once. A failure leaves nothing to do.
+        // SAFETY: `new` created the program, and it is destroyed once. After a failure nothing is
+        // left to do.
         let _ = unsafe { result::destroy_program(self.program) };
     }
 }
 
-/// Reads what ptxas says with `-v`: of the kernel, and of the function that it calls when its count is indirect.
+/// Reads the output of `ptxas -v`: for the kernel, and for the function that an indirect kernel
+/// calls.
 fn resources(log: &str) -> Resources {
     let sum_before = |what: &str| -> u32 {
         log.match_indices(what)
@@ -196,9 +203,9 @@ mod tests {
         let expected =
             Resources { registers: 30, stack_bytes: 160, spilled_bytes: (8, 12), shared_bytes: 64 };
         assert_eq!(resources(log), expected);
-        // 30 registers are given as 32.
+        // 30 registers are rounded up to 32.
         assert_eq!(expected.warps(64), 64);
-        // No more than 32 blocks.
+        // At most 32 blocks.
         assert_eq!(expected.warps(32), 32);
         assert_eq!(Resources { registers: 65, ..expected }.warps(64), 28);
         assert_eq!(Resources { registers: 65, ..expected }.warps(128), 28);

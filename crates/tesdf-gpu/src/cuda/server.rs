@@ -1,4 +1,4 @@
-//! The server that runs launches on a CUDA device.
+//! The server that runs the launches on a CUDA device.
 use std::collections::HashMap;
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -33,21 +33,22 @@ use super::nvrtc::{architecture, compile};
 use super::source::{Count, least_hardware, properties, source};
 use crate::GpuError;
 
-/// Blocks of an indirect launch, for each that the GPU runs at a time: more than one, so that it starts one where another is done early.
+/// An indirect launch starts this many blocks for each block that the GPU runs at the same time.
+/// With more than one, the GPU starts the next block as soon as one ends early.
 const WAVES: u32 = 4;
 
-/// A CUDA device and its buffers and kernels.
+/// A CUDA device with its buffers and kernels.
 #[derive(Debug)]
 pub struct CudaServer {
     gpu: Arc<Gpu>,
-    /// What kernels are compiled for.
+    /// The architecture that kernels are compiled for.
     architecture: String,
     utilities: Arc<ServerUtilities>,
     memory: Memory,
     kernels: HashMap<(KernelId, Count), Arc<Loaded>>,
-    /// The first failure that nobody was told.
+    /// The first failure that no caller has received yet.
     failure: Option<ServerError>,
-    /// Begins of stages that are timed.
+    /// Start events of the stages that are being timed.
     stages: HashMap<u64, Event>,
     next_stage: u64,
 }
@@ -58,12 +59,13 @@ struct Loaded {
     io: Vec<BufferIOAttr>,
 }
 
-/// Number of CUDA devices; none without a driver.
+/// Number of CUDA devices; 0 when no driver is installed.
 pub fn count() -> usize {
     driver::count()
 }
 
-/// What CUDA device `index` is, without opening it. Of a device that does not answer, what any has.
+/// Properties of CUDA device `index`, without opening it. For a device that does not answer, the
+/// minimum that all devices have.
 pub fn properties_of(index: usize) -> DeviceProperties {
     properties_from(index, &driver::facts(index).unwrap_or_default())
 }
@@ -84,7 +86,7 @@ fn properties_from(index: usize, facts: &Facts) -> DeviceProperties {
     properties(identity, memory, hardware)
 }
 
-/// A client of CUDA device `index`.
+/// A client of CUDA device `index`. Opens the device at the first call.
 pub fn client(index: usize) -> Result<Client, GpuError> {
     static OPEN: Mutex<Vec<usize>> = Mutex::new(Vec::new());
     let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -107,7 +109,7 @@ fn id(index: usize) -> DeviceId {
     DeviceId::new(0, index as u16)
 }
 
-/// A buffer in memory that others allocated; `None` on a device that is not of this server.
+/// Wraps memory of another library as a buffer. `None` when the device is not a CUDA device.
 pub fn from_raw_ptr(client: &Client, pointer: u64, bytes: u64) -> Option<Handle> {
     let device = client.service_id().device;
     if client.service_id() != ServiceId::of::<CudaServer>(device) {
@@ -115,12 +117,12 @@ pub fn from_raw_ptr(client: &Client, pointer: u64, bytes: u64) -> Option<Handle>
     }
     let handle = Handle::new(client.service_id(), StreamId::current(), bytes);
     let memory = handle.memory.clone();
-    // In the order of launches.
+    // Submitted like a launch, so that it comes before later launches.
     DeviceHandle::<CudaServer>::new(device).submit(move |server| server.memory.adopt(memory, pointer));
     Some(handle)
 }
 
-/// Where a buffer is on the device.
+/// Address of a buffer on the device.
 pub fn pointer(client: &Client, handle: Handle) -> Result<u64, ServerError> {
     Ok(*client.get_resource::<CudaServer>(handle)?.resource())
 }
@@ -154,7 +156,7 @@ impl CudaServer {
         })
     }
 
-    /// A kernel, compiled when it is first asked for.
+    /// Returns a kernel, and compiles it at the first call.
     fn load(&mut self, kernel: &dyn CubeKernel, count: Count) -> Result<Arc<Loaded>, ServerError> {
         let key = (kernel.id(), count);
         if let Some(loaded) = self.kernels.get(&key) {
@@ -205,12 +207,14 @@ impl CudaServer {
             let at = arguments.resources.len();
             addresses.insert(at, info.as_ptr().cast_mut().cast());
         }
-        // SAFETY: in the order of the module's documentation. Kernels stay within their buffers.
+        // SAFETY: the arguments are in the order that the module's documentation gives. Kernels
+        // stay within their buffers.
         unsafe { self.gpu.launch(loaded.function, blocks, &mut addresses) }?;
         Ok(())
     }
 
-    /// Buffers that should have been written carry a failure. But an atomic counts as read alone, so whoever reads next is told, too.
+    /// Marks the buffers of a failed launch as invalid. An atomic buffer counts as read only, so
+    /// the next read of any buffer reports the failure, too.
     fn settle<'a>(
         &mut self,
         written: impl Iterator<Item = &'a BufferBinding>,
@@ -234,7 +238,7 @@ impl CudaServer {
             self.memory.check(&buffer.handle)?;
             let pointer = self.memory.pointer(&buffer.handle)?;
             let bytes = buffer.shape.iter().product::<usize>() * buffer.elem_size;
-            // SAFETY: buffers are contiguous, and as long as their shape says.
+            // SAFETY: buffers are contiguous, and their size follows from their shape.
             let bytes = unsafe { self.gpu.read(pointer, bytes) }?;
             read.push(Bytes::from_bytes_vec(bytes));
         }
@@ -243,7 +247,7 @@ impl CudaServer {
 
     fn write_now(&mut self, buffer: &BufferBinding, bytes: &[u8]) -> Result<(), ServerError> {
         let pointer = self.memory.pointer(buffer)?;
-        // SAFETY: as for reads.
+        // SAFETY: as in `read_now`.
         unsafe { self.gpu.write(pointer, bytes) }?;
         Ok(())
     }
@@ -260,7 +264,8 @@ fn ready<T: Send + 'static>(value: T) -> DynFut<T> {
 impl DeviceService for CudaServer {
     fn init(device_id: DeviceId) -> Self {
         let index = usize::from(device_id.index_id);
-        // `client` opens every device before it is loaded, and says what is wrong.
+        // `client` opens each device before the server starts, and reports why a device cannot be
+        // opened.
         Self::open(index).unwrap_or_else(|e| unreachable!("cuda:{index} was not opened: {e}"))
     }
 

@@ -1,4 +1,4 @@
-//! The text of a kernel.
+//! The CUDA C++ text of a kernel.
 use std::sync::Arc;
 
 use cubecl::features::Plane;
@@ -18,48 +18,54 @@ use cubecl_runtime::kernel::BufferIOAttr;
 use crate::GpuError;
 use crate::kernels::catalog;
 
-/// Before every kernel.
+/// Definitions before the text of each kernel.
 ///
-/// CubeCL fuses products into sums by itself, and `a·d − b·c` then is no longer `−(b·c − a·d)`: two faces would disagree on which side of their
-/// common edge a ray passes. And it lets the lanes exchange that happen to be together, where kernels mean all of a plane: lanes that went
-/// different ways need not have met again.
+/// CubeCL fuses products into sums on its own. `a·d − b·c` is then no longer equal to
+/// `−(b·c − a·d)`, and two faces would disagree about the side on which a ray passes their common
+/// edge.
+///
+/// In exchanges between lanes, CubeCL includes only the lanes that are active together, but the
+/// kernels mean all lanes of the subgroup. Lanes that took different branches need not have
+/// converged again.
 const HEAD: &str = "#define fma(a, b, c) ((a) * (b) + (c))
 #define __activemask() 0xFFFFFFFFu
 ";
 
-/// Kernels that are worth more blocks on a multiprocessor than the compiler takes registers for, by the name of their function: the blocks. What
-/// then lies in memory instead is mostly read after the loops; `cargo test --test cuda_source -- --nocapture` prints how much.
+/// Kernels for which a bound on registers pays: the start of the function's name, and the least
+/// number of resident blocks per multiprocessor. The compiler then spills registers to memory. Most
+/// spilled values are read only after the loops; `cargo test --test cuda_source -- --nocapture`
+/// prints the number of spilled bytes.
 const BLOCKS: [(&str, u32); 2] = [("narrow_faces_", 24), ("narrow_exact_", 20)];
 
-/// Where the number of blocks comes from.
+/// Source of the number of blocks of a launch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Count {
-    /// The host knows it.
+    /// The host knows the number.
     Direct,
-    /// A buffer of the device holds it.
+    /// A buffer on the device holds the number (an indirect dispatch).
     Indirect,
 }
 
-/// A kernel as CUDA C++.
+/// The CUDA C++ text of a kernel.
 #[derive(Clone, Debug)]
 pub struct CudaSource {
-    /// Name of the kernel and what tells its variants apart.
+    /// Name of the kernel, with the name of the variant.
     pub kernel: String,
-    /// Where the number of blocks comes from.
+    /// Source of the number of blocks.
     pub count: Count,
-    /// Name of the function to launch.
+    /// Name of the `extern "C"` function to launch.
     pub entry: String,
-    /// Threads of a block.
+    /// Threads per block in x, y and z.
     pub threads: (u32, u32, u32),
-    /// Bytes of dynamic shared memory.
+    /// Dynamic shared memory per block, in bytes.
     pub shared_bytes: usize,
-    /// The text. It includes nothing.
+    /// Text of the kernel, without `#include`.
     pub text: String,
-    /// What is done with each buffer.
+    /// Access to each buffer: read, written or both.
     pub(crate) io: Vec<BufferIOAttr>,
 }
 
-/// What kernels are told of the GPU.
+/// Properties of the GPU for the code generator.
 pub(crate) fn properties(
     identity: DeviceIdentity,
     memory: MemoryDeviceProperties,
@@ -77,7 +83,7 @@ pub(crate) fn properties(
     properties
 }
 
-/// The least of what a GPU of compute capability 7.5 or more has.
+/// The least hardware among GPUs of compute capability 7.5 or more.
 pub(crate) fn least_hardware() -> HardwareProperties {
     HardwareProperties {
         load_width: 128,
@@ -99,10 +105,11 @@ pub(crate) fn least_hardware() -> HardwareProperties {
     }
 }
 
-/// The text of every kernel in every variant, launched as the host launches it.
+/// Generates the text of every kernel in every variant, with direct or indirect counts as the host
+/// launches it.
 ///
 /// # Errors
-/// A kernel that CUDA C++ cannot express.
+/// [`GpuError::Kernel`] for a kernel that CUDA C++ cannot express.
 pub fn sources() -> Result<Vec<CudaSource>, GpuError> {
     let identity = DeviceIdentity { name: "CUDA".into(), fingerprint: "cuda".into(), physical: None };
     let properties = properties(identity, MemoryDeviceProperties::new(1 << 30, 256), least_hardware());
@@ -117,7 +124,7 @@ pub fn sources() -> Result<Vec<CudaSource>, GpuError> {
     kernels.iter().map(text).collect()
 }
 
-/// The text of a kernel, launched with a count that the host knows.
+/// Generates the text of a kernel with a direct count.
 pub(crate) fn source(kernel: &dyn CubeKernel, name: &str) -> Result<CudaSource, GpuError> {
     let refused = |reason: String| GpuError::Kernel { kernel: name.to_owned(), reason };
     let definition = define_kernel(kernel).map_err(|e| refused(e.to_string()))?;
@@ -140,7 +147,7 @@ pub(crate) fn source(kernel: &dyn CubeKernel, name: &str) -> Result<CudaSource, 
     })
 }
 
-/// The text, with the bound of [`BLOCKS`].
+/// Adds the bound of [`BLOCKS`] to the text.
 fn bounded(text: &str, entry: &str) -> String {
     match BLOCKS.iter().find(|(name, _)| entry.starts_with(name)) {
         Some((_, blocks)) => {
@@ -155,7 +162,7 @@ fn bounded(text: &str, entry: &str) -> String {
 }
 
 impl CudaSource {
-    /// The same, launched with a count that a buffer holds.
+    /// The same kernel with an indirect count.
     pub(crate) fn counted_by_device(self) -> Result<Self, GpuError> {
         let Some(text) = indirect(&self.text, &self.entry) else {
             let reason = format!("no function {} as it is expected in\n{}", self.entry, self.text);
@@ -165,7 +172,8 @@ impl CudaSource {
     }
 }
 
-/// The same kernel, with its blocks taken in a loop and their number from a buffer, as the module's documentation says.
+/// Puts a loop over the blocks around the kernel and reads their number from a buffer, as the
+/// module's documentation describes.
 fn indirect(text: &str, entry: &str) -> Option<String> {
     let head = text.find("extern \"C\" __global__")?;
     let open = head + text[head..].find(&format!("{entry}("))? + entry.len();
@@ -174,8 +182,9 @@ fn indirect(text: &str, entry: &str) -> Option<String> {
     let parameters = &text[open + 1..body];
     let names: Vec<&str> = parameters.split(", ").map(|p| p.rsplit(' ').next().unwrap_or(p)).collect();
     let arguments = names.join(", ");
-    // Only a kernel has parameters of the grid. The body is inlined: the parameters of a function take registers, two a pointer, those of a kernel none
-    // (the narrow phase of faces: 96 registers instead of 127).
+    // Only a kernel can have grid constants as parameters. The body is inlined, because the
+    // parameters of a function take registers (two for each pointer) and those of a kernel take
+    // none (narrow phase of faces: 96 registers instead of 127).
     let inner = parameters.replace("__grid_constant__ ", "");
     let before = &text[..head];
     let after = &text[body..];

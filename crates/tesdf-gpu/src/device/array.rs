@@ -6,7 +6,8 @@ use bytemuck::Pod;
 use super::{Buffer, Device};
 use crate::GpuError;
 
-/// An array on a device: in its own memory, or in memory that others allocated, such as a tensor of torch.
+/// An array on a device. Its memory belongs to this crate, or to another library, such as the
+/// memory of a torch tensor.
 #[derive(Clone)]
 pub struct DeviceArray<T> {
     buffer: Buffer,
@@ -14,63 +15,67 @@ pub struct DeviceArray<T> {
     elements: PhantomData<T>,
 }
 
-/// Numbers of 32 bits.
+/// The 32-bit element types of a [`DeviceArray`]: `f32` and `u32`.
 pub trait Word: Pod {}
 impl Word for f32 {}
 impl Word for u32 {}
 
 impl<T: Word> DeviceArray<T> {
-    /// A copy of `data`.
+    /// Copies `data` to a new array on the device.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`].
+    /// [`GpuError::TooLarge`] when the array is larger than the device can bind.
     pub fn upload(device: &Device, data: &[T]) -> Result<Self, GpuError> {
         Ok(Self { buffer: device.upload("array", data)?, len: data.len(), elements: PhantomData })
     }
 
-    /// An array of any contents.
+    /// Allocates an array of `len` elements with arbitrary contents.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`].
+    /// [`GpuError::TooLarge`] when the array is larger than the device can bind.
     pub fn empty(device: &Device, len: usize) -> Result<Self, GpuError> {
         Ok(Self { buffer: device.empty("array", len * size_of::<T>())?, len, elements: PhantomData })
     }
 
-    /// An array in memory that others own, on a CUDA device: `len` elements from `pointer` on (`tensor.data_ptr()` of
-    /// torch, `array.ptr` of Warp). Nothing is copied. Work here is in order with the legacy default stream, which is
-    /// torch's stream by default; work in further streams has to wait for it.
+    /// Wraps memory of another library on a CUDA device: `len` elements that begin at `pointer`
+    /// (`tensor.data_ptr()` of torch, `array.ptr` of Warp). Nothing is copied.
+    ///
+    /// This crate's work is ordered with the legacy default stream, which is torch's stream by
+    /// default. Work in other streams must be synchronized with the default stream by the caller.
     ///
     /// # Safety
-    /// That memory is on this device, begins at a multiple of 4 bytes, and stays until the array is dropped and a read or
-    /// [`Device::wait`] has ended all launches with it.
+    /// The memory is on this device and begins at a multiple of 4 bytes. It stays allocated until
+    /// the array is dropped, and until a read or [`Device::wait`] has completed all launches that
+    /// use it.
     ///
     /// # Errors
-    /// [`GpuError::Unavailable`] for a device that is not of CUDA.
+    /// [`GpuError::Unavailable`] when the device is not a CUDA device.
     #[cfg(feature = "cuda")]
     pub unsafe fn from_raw_ptr(device: &Device, pointer: u64, len: usize) -> Result<Self, GpuError> {
-        // SAFETY: by the caller.
+        // SAFETY: the caller guarantees the conditions above.
         let buffer = unsafe { device.adopt("array of others", pointer, len * size_of::<T>()) }?;
         Ok(Self { buffer, len, elements: PhantomData })
     }
 
-    /// Where it begins on a CUDA device, for others to read after [`Device::wait`] or in order with the default stream.
+    /// Address of the first element on a CUDA device. Other libraries may read the memory after
+    /// [`Device::wait`], or in the legacy default stream.
     ///
     /// # Errors
-    /// [`GpuError::Unavailable`] for a device that is not of CUDA.
+    /// [`GpuError::Unavailable`] when the device is not a CUDA device.
     #[cfg(feature = "cuda")]
     pub fn pointer(&self, device: &Device) -> Result<u64, GpuError> {
         device.pointer(&self.buffer)
     }
 
-    /// Waits for all launches, and reads.
+    /// Waits for all earlier launches, and copies the elements to the host.
     ///
     /// # Errors
-    /// [`GpuError::Device`] for a launch that failed.
+    /// [`GpuError::Device`] when a launch or the copy failed.
     pub fn read(&self, device: &Device) -> Result<Vec<T>, GpuError> {
         device.read(&self.buffer, self.len)
     }
 
-    /// For kernels.
+    /// The memory, as an argument for kernels.
     pub(crate) fn buffer(&self) -> &Buffer {
         &self.buffer
     }
@@ -80,7 +85,7 @@ impl<T: Word> DeviceArray<T> {
         self.len
     }
 
-    /// Whether there is no element.
+    /// Whether the array has no elements.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }

@@ -1,14 +1,15 @@
-//! Buffers of a device, and launches over them.
+//! Buffers of a device, and the number of groups of a launch.
 use cubecl::prelude::*;
 use cubecl::server::Handle;
 
-/// Groups of a launch, in two dimensions where they are more than one holds.
+/// The number of groups of a launch. A dimension of a launch is limited, so more than 32,768 groups
+/// are spread over two dimensions, and there may then be a few groups too many.
 pub(crate) fn spread(groups: u32) -> CubeCount {
     let wide = groups.clamp(1, 32768);
     CubeCount::Static(wide, groups.div_ceil(wide).max(1), 1)
 }
 
-/// Memory of a device.
+/// A named block of memory on a device.
 #[derive(Clone)]
 pub(crate) struct Buffer {
     pub(super) name: &'static str,
@@ -17,28 +18,28 @@ pub(crate) struct Buffer {
 }
 
 impl Buffer {
-    /// For a kernel, as elements of `size` bytes.
+    /// This buffer as an argument of a kernel, as elements of `size` bytes.
     pub fn argument(&self, size: usize) -> BufferArg {
-        // SAFETY: the buffer has that many elements, of plain numbers.
+        // SAFETY: the buffer has this number of elements, and every bit pattern is a valid number.
         unsafe { BufferArg::from_raw_parts(self.handle.clone(), self.bytes / size) }
     }
 
-    /// For a kernel that takes words or `f32`.
+    /// This buffer as an argument of a kernel that takes `u32` or `f32`.
     pub fn words(&self) -> BufferArg {
         self.argument(4)
     }
 
-    /// For a kernel that takes rows of four `f32`.
+    /// This buffer as an argument of a kernel that takes rows of four `f32`.
     pub fn rows(&self) -> BufferArg {
         self.argument(16)
     }
 
-    /// As the number of groups of a launch: x, y, z.
+    /// This buffer as the number of groups of an indirect launch: x, y and z.
     pub fn count(&self) -> CubeCount {
         CubeCount::Dynamic(self.handle.clone().binding())
     }
 
-    /// Its contents.
+    /// Name of the buffer: says what it contains.
     pub fn name(&self) -> &'static str {
         self.name
     }

@@ -1,4 +1,4 @@
-//! The devices of this machine, and memory on them.
+//! The devices of this machine, and their memory.
 mod array;
 mod buffer;
 
@@ -19,21 +19,21 @@ use crate::cuda;
 pub use array::DeviceArray;
 pub(crate) use buffer::{Buffer, spread};
 
-/// The environment variable that names the device when the program does not.
+/// The environment variable that selects the device when the program does not.
 pub const DEVICE_VARIABLE: &str = "TESDF_DEVICE";
 
 /// The kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeviceKind {
-    /// A graphics card.
+    /// A graphics card, or any CUDA device.
     Discrete,
-    /// Part of the processor.
+    /// A GPU inside the processor.
     Integrated,
-    /// A device of a virtual machine.
+    /// A virtual GPU of a virtual machine.
     Virtual,
-    /// A driver that computes on the processor.
+    /// A driver that runs kernels on the processor.
     Software,
-    /// Unknown.
+    /// The driver does not tell the kind.
     Other,
 }
 
@@ -49,24 +49,26 @@ impl fmt::Display for DeviceKind {
     }
 }
 
-/// A device of this machine.
+/// The description of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DeviceInfo {
-    /// Its name, by the driver.
+    /// Name that the driver reports.
     pub name: String,
-    /// Its kind.
+    /// Kind of the device.
     pub kind: DeviceKind,
-    /// Least and greatest size of a subgroup: threads that run in lockstep.
+    /// Smallest and largest size of a subgroup, in threads. The threads of a subgroup run in
+    /// lockstep.
     pub subgroup_size: (u32, u32),
     /// Whether the threads of a subgroup can exchange values without shared memory.
     pub has_subgroup_operations: bool,
-    /// Greatest size of a buffer that a kernel can bind, in bytes.
+    /// Size of the largest buffer that a kernel can bind, in bytes.
     pub max_buffer_bytes: u64,
-    /// Whether stages are timed by the device's own clock.
+    /// Whether the clock of the device measures the time of each stage. Otherwise the host measures
+    /// it.
     pub has_timestamps: bool,
 }
 
-/// A device, ready to run kernels. Cheap to clone.
+/// A device that is ready to run kernels. A clone refers to the same device and is cheap.
 #[derive(Clone)]
 pub struct Device {
     client: Client,
@@ -79,18 +81,18 @@ impl fmt::Debug for Device {
     }
 }
 
-/// The devices of this machine, the best first: graphics cards, the same through CUDA, then GPUs that are part of the
-/// processor, then software.
+/// All devices of this machine, the best first: graphics cards through wgpu, CUDA devices, GPUs
+/// inside the processor, virtual GPUs, others, software drivers.
 pub fn devices() -> Vec<DeviceInfo> {
     ids().into_iter().map(Id::info).collect()
 }
 
-/// How a device is reached.
+/// The interface through which a device is reached.
 #[derive(Clone, Copy)]
 enum Id {
-    /// Vulkan, Metal or DirectX 12.
+    /// Through wgpu: Vulkan, Metal or DirectX 12.
     Wgpu(DeviceId),
-    /// CUDA, by number.
+    /// Through CUDA, by the number of the device.
     #[cfg(feature = "cuda")]
     Cuda(usize),
 }
@@ -133,7 +135,8 @@ impl Id {
         }
     }
 
-    /// Name, kind and limits. A CUDA device is not opened for this, as that takes some of its memory.
+    /// Describes the device. This does not open a CUDA device, because an open device takes some of
+    /// its memory.
     fn info(self) -> DeviceInfo {
         let properties = match self {
             Self::Wgpu(id) => <WgpuRuntime>::client(&WgpuDevice::from_id(id)).properties().clone(),
@@ -152,12 +155,14 @@ impl Id {
 }
 
 impl Device {
-    /// Opens the device of this name: its number in [`devices`], or a part of its name, in upper or lower case, such as
-    /// `cuda:0`. Without a name that of the environment variable `TESDF_DEVICE` counts, else the best device is opened.
+    /// Opens a device. `asked` is the number of a device in [`devices`], or a part of its name,
+    /// such as `cuda:0`; upper and lower case are equal. With `None` the environment variable
+    /// `TESDF_DEVICE` selects the device. Without this variable the best device is opened.
     ///
     /// # Errors
-    /// [`GpuError::NoDevice`], [`GpuError::NoSuchDevice`]; [`GpuError::Device`] and [`GpuError::NoNvrtc`] when CUDA cannot
-    /// open the device.
+    /// [`GpuError::NoDevice`] when the machine has no device, [`GpuError::NoSuchDevice`] when no
+    /// device has this name; [`GpuError::Device`] or [`GpuError::NoNvrtc`] when CUDA cannot open
+    /// the device.
     pub fn choose(asked: Option<&str>) -> Result<Self, GpuError> {
         let variable = std::env::var(DEVICE_VARIABLE).ok().filter(|v| !v.is_empty());
         let ids = ids();
@@ -177,15 +182,15 @@ impl Device {
         Ok(Self { client: id.client()?, info: id.info() })
     }
 
-    /// Name, kind and limits.
+    /// The description of this device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
     }
 
-    /// Waits for all launches.
+    /// Waits until all launches are complete.
     ///
     /// # Errors
-    /// [`GpuError::Device`] for a launch that failed.
+    /// [`GpuError::Device`] when a launch failed.
     pub fn wait(&self) -> Result<(), GpuError> {
         cubecl::future::block_on(self.client.sync()).map_err(|e| GpuError::Device {
             device: self.info.name.clone(),
@@ -194,17 +199,18 @@ impl Device {
         })
     }
 
-    /// Launches kernels.
+    /// The client that launches kernels.
     pub(crate) fn client(&self) -> &Client {
         &self.client
     }
 
-    /// Whether 32 threads can exchange values without shared memory.
+    /// Whether the subgroups have 32 threads that can exchange values without shared memory.
     pub(crate) fn has_subgroups_of_32(&self) -> bool {
         self.info.has_subgroup_operations && self.info.subgroup_size == (32, 32)
     }
 
-    /// A buffer that holds `data`; one element at least, as nothing binds an empty buffer.
+    /// Copies `data` to a new buffer. A buffer has at least 16 bytes, because an empty buffer
+    /// cannot be bound.
     pub(crate) fn upload<T: NoUninit>(&self, name: &'static str, data: &[T]) -> Result<Buffer, GpuError> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         self.fits(name, bytes.len())?;
@@ -216,16 +222,17 @@ impl Device {
         Ok(Buffer { name, handle, bytes: bytes.len().max(16) })
     }
 
-    /// A buffer of any contents.
+    /// Allocates a buffer with arbitrary contents.
     pub(crate) fn empty(&self, name: &'static str, bytes: usize) -> Result<Buffer, GpuError> {
         self.fits(name, bytes)?;
         Ok(Buffer { name, handle: self.client.empty(bytes.max(16)), bytes: bytes.max(16) })
     }
 
-    /// A buffer in memory that others allocated, from `pointer` on. Only for CUDA devices.
+    /// Wraps memory of another library, which begins at `pointer`. Only for CUDA devices.
     ///
     /// # Safety
-    /// That memory is on this device, and stays until the buffer is dropped and all launches with it are done.
+    /// The memory is on this device, and stays allocated until the buffer is dropped and all
+    /// launches with it are complete.
     #[cfg(feature = "cuda")]
     pub(crate) unsafe fn adopt(
         &self,
@@ -238,7 +245,7 @@ impl Device {
         Ok(Buffer { name, handle, bytes })
     }
 
-    /// Where a buffer begins. Only for CUDA devices.
+    /// Address of a buffer on the device. Only for CUDA devices.
     #[cfg(feature = "cuda")]
     pub(crate) fn pointer(&self, buffer: &Buffer) -> Result<u64, GpuError> {
         cuda::server::pointer(&self.client, buffer.handle.clone()).map_err(|_| self.is_not_cuda())
@@ -260,7 +267,8 @@ impl Device {
         Ok(())
     }
 
-    /// Device time of what `launch` launches, once all before it is done.
+    /// Runs `launch`, and measures the device time of the kernels that it launches, after all
+    /// earlier launches are complete.
     pub(crate) fn time(&self, launch: impl FnOnce()) -> Result<Duration, GpuError> {
         let failed = |reason: String| GpuError::Device {
             device: self.info.name.clone(),
@@ -275,7 +283,7 @@ impl Device {
             .ok_or_else(|| failed("the device gave no time".into()))
     }
 
-    /// Waits for all that was launched, and reads the first `count` elements of a buffer.
+    /// Waits for all earlier launches, and reads the first `count` elements of a buffer.
     pub(crate) fn read<T: Pod>(&self, buffer: &Buffer, count: usize) -> Result<Vec<T>, GpuError> {
         let bytes = count * size_of::<T>();
         if bytes == 0 {
