@@ -1,4 +1,5 @@
-//! Broad phase: bounds of the instances, instance pairs, meshlets that can touch.
+//! Broad phase: finds the bounds of the instances, the pairs of instances whose bounds meet, and
+//! the meshlets that can touch.
 use super::buffers::ROW;
 use super::pass::{GROUP, Pass};
 use super::stages::launch;
@@ -15,7 +16,7 @@ impl Pass<'_> {
         self.meshlets()
     }
 
-    /// Bounds of the instances, and which of them meet.
+    /// Computes the bounds of all instances, and finds the pairs whose bounds meet.
     fn instance_pairs(&mut self) -> Result<(), GpuError> {
         let (device, shapes) = (&self.detector.device, &self.detector.shapes);
         let all = self.instances;
@@ -59,7 +60,7 @@ impl Pass<'_> {
         )
     }
 
-    /// Which meshlets can touch.
+    /// Finds the meshlets that can touch.
     fn meshlets(&mut self) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let per_block = self.groups_for(buffers.room.blocks, 1, counters::BLOCKS)?;

@@ -1,4 +1,4 @@
-//! Pipeline buffers: memory between the stages.
+//! Pipeline buffers: the memory between the stages of a pass.
 use super::Capacities;
 use crate::GpuError;
 use crate::device::{Buffer, Device};
@@ -10,27 +10,27 @@ use crate::kernels::narrow::contacts::{ContactsLaunch, ROWS as CONTACT_ROWS, WOR
 use crate::kernels::reduce::members::{MembersLaunch, ROWS as MEMBER_ROWS, TOUCHING_WORDS, TouchingLaunch};
 use crate::kernels::reduce::reduce::REPORT_ROWS;
 
-/// Bytes of a word and of a row of four `f32`.
+/// Size of a word and of a row of four `f32`, in bytes.
 pub const WORD: usize = 4;
 pub const ROW: usize = 16;
 
-/// Buffers between the stages.
+/// The buffers that one stage writes and the next stage reads.
 pub struct PipelineBuffers {
-    /// Most elements of each.
+    /// Capacity of each buffer, in elements.
     pub room: Capacities,
     pub pair_words: Buffer,
     pair_rows: Buffer,
     blocks: Buffer,
     meshlets: Buffer,
     items: Buffer,
-    /// From the first detection of faces on.
+    /// Vertices of the polygons as weights. Allocated at the first detection of faces.
     weights: Option<Buffer>,
     pub contact_words: Buffer,
     pub contact_rows: Buffer,
-    /// Of ordered pairs: how deep they overlap, where contacts need not show it.
+    /// For each ordered pair: the depth of an overlap that contacts need not show.
     pub depths: Buffer,
     pub groups: Buffer,
-    /// From the first reduction on.
+    /// Allocated at the first reduction.
     pub members: Option<MemberBuffers>,
 }
 
@@ -62,7 +62,7 @@ impl PipelineBuffers {
         })
     }
 
-    /// Makes room for the vertices of polygons; nodes have none.
+    /// Allocates the buffer for the vertices of polygons. Nodes need none.
     pub fn add_weights(&mut self, device: &Device) -> Result<(), GpuError> {
         if self.weights.is_none() {
             let weights = rows(device, "weights of polygons", self.room.polygons, POLYGON_ROWS as u32)?;
@@ -71,7 +71,7 @@ impl PipelineBuffers {
         Ok(())
     }
 
-    /// Makes room for a reduction.
+    /// Allocates the buffers of a reduction.
     pub fn add_members(&mut self, device: &Device) -> Result<(), GpuError> {
         if self.members.is_none() {
             self.members = Some(MemberBuffers::new(device, self.room)?);
@@ -100,7 +100,7 @@ impl PipelineBuffers {
     }
 
     pub fn polygons(&self) -> PolygonsLaunch {
-        // Without weights nothing launches a kernel of polygons.
+        // Kernels of polygons are launched only after `add_weights`.
         let weights = self.weights.as_ref().unwrap_or(&self.items);
         PolygonsLaunch::new(self.items(), weights.rows())
     }
@@ -109,7 +109,7 @@ impl PipelineBuffers {
         ContactsLaunch::new(self.contact_words.words(), self.contact_rows.rows(), self.room.contacts)
     }
 
-    /// Names and bytes of all.
+    /// Name and size in bytes of each buffer.
     pub fn account(&self) -> Vec<(&'static str, usize)> {
         let Self { pair_words, pair_rows, blocks, meshlets, items, contact_words, contact_rows, .. } = self;
         let pairs = [pair_words, pair_rows, blocks, meshlets, items];
@@ -120,13 +120,14 @@ impl PipelineBuffers {
     }
 }
 
-/// Buffers of a reduction.
+/// The buffers of a reduction.
 pub struct MemberBuffers {
     room: Capacities,
-    /// Contacts of each pair of instances, then the next place for one.
+    /// For each pair of instances: the number of its contacts, later the next free place for a
+    /// contact.
     pub tallies: Buffer,
     pub touching: Buffer,
-    /// The contact that a member is.
+    /// The index of the contact for each member.
     contacts: Buffer,
     rows: Buffer,
     pub reports: Buffer,

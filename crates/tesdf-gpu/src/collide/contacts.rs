@@ -1,4 +1,5 @@
-//! Contacts of the device in the form and the order of `tesdf::collide::detect`.
+//! Reads contacts of the device, and returns them in the form and order of
+//! `tesdf::collide::detect`.
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -10,7 +11,7 @@ use crate::kernels::narrow::contacts::{CONVERGED, ROWS, WORDS};
 use crate::kernels::reduce::members::TOUCHING_WORDS;
 use crate::kernels::reduce::reduce::REPORT_ROWS;
 
-/// Words of a contact, as kernels write them.
+/// The words of a contact, in the layout that kernels write.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Words {
@@ -24,7 +25,7 @@ pub struct Words {
     ordered_pair: u32,
 }
 
-/// Rows of a contact, as kernels write them.
+/// The rows of a contact, in the layout that kernels write.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Row {
@@ -34,7 +35,7 @@ pub struct Row {
     point_b: [f32; 4],
 }
 
-/// A pair that touches, as kernels write it.
+/// A touching pair, in the layout that kernels write.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Touching {
@@ -45,7 +46,7 @@ pub struct Touching {
     kept: u32,
 }
 
-/// What reducing it has lost, as kernels write it.
+/// The loss by the reduction of a pair, in the layout that kernels write.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Report {
@@ -60,8 +61,8 @@ const _: () = assert!(size_of::<Row>() == 16 * ROWS as usize);
 const _: () = assert!(size_of::<Touching>() == 4 * TOUCHING_WORDS as usize);
 const _: () = assert!(size_of::<Report>() == 16 * REPORT_ROWS as usize);
 
-/// The same in the world. Instances of a world are in the order of their ids, and the surface of the first ordered pair is
-/// that of the first one.
+/// The reduction of a pair of instances, in world units. The instances of a world are in the order
+/// of their ids, and the first ordered pair of a pair takes the surface of the first instance.
 pub fn pair_reduction(instances: &Instances, touching: &Touching, report: &Report) -> PairReduction {
     let at = &instances.placed[touching.b as usize];
     PairReduction {
@@ -91,7 +92,8 @@ pub fn contacts(
             ((a.min(b), a.max(b), a > b), contact(shapes, instances, mode, words, row))
         })
         .collect();
-    // Instances are sorted by world and id. A face may have several parts in no cell, outside of the cube.
+    // Instances are sorted by world and id. Outside of the cube, a face may have several parts
+    // without a cell.
     found.par_sort_unstable_by_key(|(pair, c)| {
         (*pair, c.face_a, c.feature.a, c.tet_b, c.point_a.to_array().map(f64::to_bits))
     });
@@ -118,7 +120,8 @@ fn contact(shapes: &[&Shape], instances: &Instances, mode: Mode, words: &Words, 
     }
 }
 
-/// The user's number of the face, and of the feature: the face, or the node.
+/// The face and the feature of the first body, with the ids of the source mesh. The feature is the
+/// face, or in Node-TES the node.
 fn surface_names(shape: &Shape, mode: Mode, words: &Words) -> (u32, u32) {
     let (part, corner) = (words.face_a, (words.corner % CONVERGED) as usize);
     match (mode, shape) {
@@ -140,7 +143,8 @@ fn surface_names(shape: &Shape, mode: Mode, words: &Words) -> (u32, u32) {
     }
 }
 
-/// The user's number of the nearest face, and the part of it that is nearest.
+/// The nearest face of the second body, by its id in the source mesh, and the nearest feature of
+/// this face.
 fn field_names(shape: &Shape, words: &Words) -> (u32, FeatureB) {
     let Shape::Mesh(asset) = shape else { return (words.face_b, FeatureB::Face(words.face_b)) };
     let corners = asset.face_vertices(words.face_b as usize);

@@ -1,47 +1,53 @@
-//! How many elements a pass has found, by stage.
+//! The number of elements that each stage of a pass has found.
 use crate::GpuError;
 use crate::device::{Buffer, Device};
 use crate::kernels::counters::{self, COUNTERS};
 
-/// What a pass has counted on the device.
+/// The number of elements that each stage of a detection has found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Ordered pairs of instances.
+    /// Ordered pairs of instances whose bounds meet: the broad phase tests the surface of the first
+    /// instance against the field of the second.
     pub ordered_pairs: u32,
-    /// Runs of 32 meshlets of an ordered pair.
+    /// Blocks: groups of up to 32 meshlets of the first instance, summed over all ordered pairs.
     pub blocks: u32,
     /// Meshlets that can touch.
     pub meshlets: u32,
-    /// Clipped faces, or nodes, with their cells: the queries of the narrow phase.
+    /// Polygons (faces clipped by cells), or in Node-TES nodes with their cells. The narrow phase
+    /// makes one query for each.
     pub polygons: u32,
-    /// Contacts, before a reduction.
+    /// Contacts before a reduction.
     pub contacts: u32,
     /// Contacts that the cosine filter dropped.
     pub filtered: u32,
-    /// Faces or nodes that the broad phase left.
+    /// Faces or nodes that the broad phase kept.
     pub candidates: u32,
-    /// Evaluations of the field by Face-TES, when they are counted.
+    /// Evaluations of the field by Face-TES; 0 without
+    /// [`Counting::Operations`](crate::Counting::Operations).
     pub evaluations: u32,
-    /// Point–triangle distances of their lists.
+    /// Point–triangle distances of these evaluations; 0 without
+    /// [`Counting::Operations`](crate::Counting::Operations).
     pub distances: u32,
-    /// Contacts that did not converge, when contacts are reduced.
+    /// Contacts whose narrow phase did not converge. Counted only in a reduction; otherwise each
+    /// contact tells.
     pub unconverged: u32,
-    /// Pairs of instances that touch, when contacts are reduced.
+    /// Pairs of instances with contacts. Counted only in a reduction.
     pub touching: u32,
-    /// Contacts as members of those pairs.
+    /// Contacts that belong to the touching pairs. Counted only in a reduction.
     pub members: u32,
     /// Contacts that the reduction keeps.
     pub kept: u32,
-    /// Threads that found an overlap that contacts need not show.
+    /// Threads that found a hidden overlap: one that contacts need not show.
     pub hidden: u32,
-    /// Instances of shapes with a vertex that was moved to an impossible position: an error.
+    /// Instances of shapes with a vertex that was moved to an invalid position. More than 0 is an
+    /// error.
     pub(super) badly_moved: u32,
-    /// Threads whose loops the driver has broken off: an error.
+    /// Threads whose loops the driver stopped early. More than 0 is an error.
     pub(super) broken_off: u32,
 }
 
 impl Counts {
-    /// Reads the counters.
+    /// Reads the counters from the device.
     pub(super) fn read(device: &Device, counters: &Buffer) -> Result<Self, GpuError> {
         let words: Vec<u32> = device.read(counters, COUNTERS)?;
         let at = |counter: u32| words[counter as usize];

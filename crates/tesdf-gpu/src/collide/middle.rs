@@ -1,4 +1,4 @@
-//! Middle phase: hidden overlaps, then nodes with their cells, or polygons.
+//! Middle phase: finds hidden overlaps, then the nodes with their cells, or the polygons.
 use cubecl::prelude::*;
 use tesdf::collide::Mode;
 
@@ -19,7 +19,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Overlaps that contacts need not show.
+    /// Finds overlaps that contacts need not show.
     fn hidden(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let (depths, count) = (&buffers.depths, buffers.room.ordered_pairs);
@@ -41,7 +41,7 @@ impl Pass<'_> {
         )
     }
 
-    /// Nodes with their cells.
+    /// Finds the nodes that can touch, with their cells.
     fn nodes(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let (pairs, meshlets, items) = (buffers.ordered_pairs(), buffers.meshlets(), buffers.items());
@@ -55,7 +55,8 @@ impl Pass<'_> {
         )
     }
 
-    /// Faces clipped by cells, and their parts around conforming domains.
+    /// Clips faces by cells. For conforming domains, finds the parts of faces outside of the
+    /// domain, too.
     fn polygons(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let (pairs, meshlets, polygons) = (buffers.ordered_pairs(), buffers.meshlets(), buffers.polygons());

@@ -1,4 +1,5 @@
-//! All contacts of a scene in one pass: as many launches for one pair of bodies as for thousands of worlds.
+//! Finds all contacts of a scene in one pass. A pass has the same number of launches for one pair
+//! of bodies as for thousands of worlds.
 mod broad;
 mod buffers;
 mod contacts;
@@ -35,27 +36,31 @@ use crate::device::{Device, DeviceArray};
 use crate::kernels::broad::ordered_pair::WORDS as PAIR_WORDS;
 use crate::kernels::broad::pairs::{BOUNDS_ROWS, INSTANCE_ROWS, INSTANCE_WORDS};
 
-/// Finds contacts on a device; keeps shapes and buffers there from step to step.
+/// Finds the contacts of a scene on a device. It keeps shapes and buffers on the device from one
+/// detection to the next.
 pub struct Detector {
     device: Device,
     options: DetectorOptions,
     shapes: GpuShapes,
     shape_ids: Vec<ShapeId>,
     frames: Vec<FieldFrame>,
-    /// Diagonals of the shapes' bounds.
+    /// Diagonal of each shape's bounds.
     diagonals: Vec<f64>,
     buffers: PipelineBuffers,
     report: DeviceReport,
 }
 
-/// The finest tolerance of the exact mode, in the frame of a field: a few times the rounding of distances in `f32`.
+/// The smallest tolerance of the exact mode, in the frame of a field: a few times the rounding
+/// error of distances in `f32`.
 const FINEST: f64 = 1e-6;
 
 impl Detector {
-    /// Uploads the shapes of a scene; [`detect`](Self::detect) uploads again when there are others.
+    /// Creates a detector and uploads the shapes of a scene. When a later scene has other shapes,
+    /// [`detect`](Self::detect) uploads these.
     ///
     /// # Errors
-    /// [`GpuError::Shape`] for a shape that the device cannot hold, [`GpuError::TooLarge`].
+    /// [`GpuError::Shape`] for a shape that the kernels cannot read, [`GpuError::TooLarge`] for a
+    /// buffer that is larger than the device can bind.
     pub fn new(device: &Device, scene: &Scene, options: DetectorOptions) -> Result<Self, GpuError> {
         let buffers = PipelineBuffers::new(device, options.capacities)?;
         let mut detector = Self {
@@ -72,10 +77,10 @@ impl Detector {
         Ok(detector)
     }
 
-    /// Uploads all shapes of a scene, also those that are there: after vertices have moved.
+    /// Uploads all shapes of a scene again. Use it after vertices of the scene's assets have moved.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// The errors of [`new`](Self::new).
     pub fn upload(&mut self, scene: &Scene) -> Result<(), GpuError> {
         let ids = shape_ids(scene);
         let shapes: Vec<Shape> = ids.iter().map(|&id| scene.shape(id).cloned()).collect::<Result<_, _>>()?;
@@ -86,33 +91,41 @@ impl Detector {
         Ok(())
     }
 
-    /// Moves all vertices of a shape with a conforming domain, on the device: see [`GpuShapes::move_vertices`]. Overrides
-    /// the scene's vertices until the next [`upload`](Self::upload).
+    /// Moves all vertices of a shape with a conforming domain on the device, as
+    /// [`GpuShapes::move_vertices`] does. The positions replace those of the scene until the next
+    /// [`upload`](Self::upload).
     ///
     /// # Errors
-    /// As [`GpuShapes::move_vertices`]; the shape's number is its place among those of the scene's instances, by id.
+    /// The errors of [`GpuShapes::move_vertices`]. They number a shape by its index among the
+    /// shapes of the scene's instances, sorted by id. [`GpuError::Collide`] when no instance has
+    /// this shape.
     pub fn move_vertices(&mut self, shape: ShapeId, positions: &DeviceArray<f32>) -> Result<(), GpuError> {
         let number = self.shape_ids.binary_search(&shape).map_err(|_| CollideError::NoShape(shape))?;
         self.shapes.move_vertices(GpuShapeId(number as u32), positions)
     }
 
-    /// All contacts of a scene, as [`tesdf::collide::detect`] finds them, in the same order; computed in `f32`. The exact
-    /// mode's tolerance is 1e-6 of the local frame at the finest. A reduction goes by the same rules, with bounds of
-    /// distances in place of distances, so it may keep others.
+    /// Finds all contacts of a scene in the form and order of [`tesdf::collide::detect`], computed
+    /// in `f32`. Points, normals and distances are in the world frame and the world's unit.
     ///
-    /// The same input gives the same bytes on the same device.
+    /// - The tolerance of the exact mode is at least 1e-6 in the local frame.
+    /// - A reduction follows the rules of the processor, but compares bounds of distances instead
+    ///   of distances. So it may keep other contacts.
+    /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors
-    /// [`GpuError::Collide`] for options that no detector takes; [`GpuError::Full`] with fixed memory; a device that
-    /// refuses.
+    /// [`GpuError::Collide`] for invalid options; [`GpuError::Full`] when a buffer of fixed size is
+    /// too small; [`GpuError::Unavailable`] when vertices have moved on the device and the scene
+    /// now has other shapes; [`GpuError::Device`] when the device fails.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::Off)
     }
 
-    /// The same, with the device time of each stage in the [`report`](Self::report); slower, as stages wait for each other.
+    /// Finds the same contacts, and measures the device time of each stage for the
+    /// [`report`](Self::report). This is slower than [`detect`](Self::detect), because the stages
+    /// wait for each other.
     ///
     /// # Errors
-    /// As [`detect`](Self::detect).
+    /// The errors of [`detect`](Self::detect).
     pub fn detect_timed(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::On)
     }
@@ -122,12 +135,12 @@ impl Detector {
         &self.report
     }
 
-    /// The device.
+    /// The device that this detector runs on.
     pub fn device(&self) -> &Device {
         &self.device
     }
 
-    /// Bytes that are held on the device.
+    /// Memory that the detector holds on the device, in bytes.
     pub fn bytes(&self) -> DeviceBytes {
         DeviceBytes {
             shapes: self.shapes.bytes(),
@@ -147,7 +160,7 @@ impl Detector {
             }
             self.upload(scene)?;
         }
-        // The processor's tree does not know the vertices that have moved here.
+        // The processor's tree does not know vertices that have moved on the device.
         let max_tests = if self.shapes.have_moved() { u64::MAX } else { self.options.max_pair_tests };
         let instances = Instances::new(scene, options, &self.shape_ids, &self.frames, max_tests)?;
         self.report = DeviceReport::default();
@@ -164,8 +177,8 @@ impl Detector {
         }
     }
 
-    /// Makes room for the elements that a pass has wanted. Whether there was too little; later stages have then had too few
-    /// elements as well.
+    /// Enlarges the buffers that were too small in a pass. Returns whether there was one. After a
+    /// buffer that was too small, later stages have found too few elements, too.
     fn grow(&mut self, counts: &Counts) -> Result<bool, GpuError> {
         let mut room = self.buffers.room;
         let wanted = [
@@ -192,7 +205,7 @@ impl Detector {
         Ok(true)
     }
 
-    /// In the frame of each instance's field; not finer than `f32` allows.
+    /// The tolerance for each instance, in the frame of its field. It is at least [`FINEST`].
     fn tolerances(&self, instances: &Instances, tolerance: Length) -> Vec<f32> {
         let in_field = |(at, &shape): (&Placed, &usize)| {
             let scale = at.unit / self.frames[shape].unit();
@@ -264,7 +277,7 @@ impl Detector {
     }
 }
 
-/// The shapes of all instances, sorted: few shapes of many instances.
+/// The shapes of all instances, sorted and without duplicates.
 fn shape_ids(scene: &Scene) -> Vec<ShapeId> {
     let mut ids = Vec::new();
     for (_, instance) in scene.instances() {

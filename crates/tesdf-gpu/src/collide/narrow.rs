@@ -34,7 +34,7 @@ impl Pass<'_> {
         )
     }
 
-    /// Cosines of angles below which contacts are dropped: above any cosine nothing is.
+    /// Threshold of the cosine filter. Without the filter it is −2, which keeps every contact.
     fn cos_theta(&self) -> f32 {
         self.options.cos_theta.map_or(-2.0, |cos| cos as f32)
     }

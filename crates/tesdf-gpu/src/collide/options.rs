@@ -1,28 +1,28 @@
-//! Options of a detector, and its report.
+//! The options and the report of a detector.
 use std::time::Duration;
 
 use super::counts::Counts;
 use super::scene::ShapeBytes;
 
-/// Room for the elements that stages hand on.
+/// Capacities of the pipeline buffers, in elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capacities {
     /// Ordered pairs of instances.
     pub ordered_pairs: u32,
-    /// Runs of 32 meshlets of an ordered pair.
+    /// Blocks: groups of up to 32 meshlets, of all ordered pairs.
     pub blocks: u32,
     /// Meshlets that can touch.
     pub meshlets: u32,
-    /// Clipped faces, or nodes, with their cells.
+    /// Polygons (faces clipped by cells), or in Node-TES nodes with their cells.
     pub polygons: u32,
-    /// Contacts.
+    /// Contacts before a reduction.
     pub contacts: u32,
-    /// Contacts that a reduction keeps. Without a reduction no memory is held for them.
+    /// Contacts that a reduction keeps. A detector that never reduces allocates no memory for them.
     pub kept: u32,
 }
 
 impl Default for Capacities {
-    /// Some 10 MiB.
+    /// Capacities that take about 10 MiB.
     fn default() -> Self {
         Self {
             ordered_pairs: 1 << 10,
@@ -35,78 +35,81 @@ impl Default for Capacities {
     }
 }
 
-/// What happens when a buffer is too small.
+/// The behavior when a buffer is too small.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Memory {
-    /// Buffers grow and the pass is redone.
+    /// The buffers grow, and the pass is repeated.
     #[default]
     Grow,
     /// The detection fails with [`GpuError::Full`](crate::GpuError::Full).
     Fixed,
 }
 
-/// How a polygon is worked on.
+/// The number of threads that work on a polygon.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Lanes {
     /// 32 threads, which share the faces of the cell's list.
     #[default]
     Group,
-    /// A thread alone, for comparison (Fig. 4).
+    /// One thread, for comparison (Fig. 4 of the paper).
     Single,
 }
 
-/// How a group finds the least of its distances. Contacts are the same.
+/// The way in which the threads of a group find their least distance. The contacts are the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Exchange {
-    /// Between the threads of a subgroup where those are 32, else through shared memory.
+    /// Subgroup operations where subgroups have 32 threads, and otherwise shared memory.
     #[default]
     Device,
-    /// Through shared memory.
+    /// Shared memory.
     Shared,
 }
 
-/// Which meshlets, faces and cells are left out before the narrow phase. Contacts are the same.
+/// The meshlets, faces and cells that are skipped before the narrow phase. The contacts are the
+/// same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pruning {
-    /// Those that their least signed distance rules out.
+    /// Skips elements whose least signed distance is above the contact distance.
     #[default]
     LeastDistance,
-    /// Those out of the bounds or the domain of the field, for comparison.
+    /// Skips only elements outside of the field's bounds or domain. For comparison.
     Bounds,
 }
 
-/// What is counted besides the elements that stages hand on.
+/// Counts in addition to the elements of each stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Counting {
-    /// Nothing.
+    /// No further counts.
     #[default]
     Elements,
-    /// Evaluations of the field and point–triangle distances of Face-TES; costs two atomic additions a polygon.
+    /// Evaluations of the field and point–triangle distances of Face-TES. This costs two atomic
+    /// additions per polygon.
     Operations,
 }
 
-/// Options of a detector.
+/// The options of a detector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DetectorOptions {
-    /// Room at the start.
+    /// Capacities of the buffers at the start.
     pub capacities: Capacities,
-    /// What happens when that is not enough.
+    /// The behavior when a capacity is exceeded.
     pub memory: Memory,
-    /// How a polygon is worked on.
+    /// The number of threads that work on a polygon.
     pub lanes: Lanes,
-    /// How its threads exchange values.
+    /// The way in which these threads exchange values.
     pub exchange: Exchange,
-    /// Which elements are left out before the narrow phase.
+    /// The elements that are skipped before the narrow phase.
     pub pruning: Pruning,
-    /// What is counted besides the elements.
+    /// Counts in addition to the elements of each stage.
     pub counting: Counting,
-    /// Up to so many pairs of instances within worlds the device tests all of them; beyond, the processor finds the pairs
-    /// that meet, by a tree.
+    /// Largest number of pairs of instances for which the device tests the bounds of all pairs of
+    /// each world. For more pairs, a tree on the processor finds the pairs whose bounds meet.
     pub max_pair_tests: u64,
 }
 
 impl Default for DetectorOptions {
-    /// Growing buffers, groups of 32, pruning, 2^27 tests of bounds.
+    /// Growing buffers, 32 threads per polygon, pruning by distances, and at most 2^27 tests of
+    /// bounds.
     fn default() -> Self {
         Self {
             capacities: Capacities::default(),
@@ -123,33 +126,34 @@ impl Default for DetectorOptions {
 /// The report of a detection.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DeviceReport {
-    /// Launches of one pass, whatever the scene.
+    /// Launches per pass. The number depends on the options, but not on the size of the scene.
     pub launches: usize,
-    /// Passes: more than one when buffers grew.
+    /// Passes. There is more than one when a buffer was too small.
     pub passes: usize,
     /// Bytes that were sent to the device.
     pub sent: usize,
-    /// Bytes that were read back.
+    /// Bytes that were read from the device.
     pub read: usize,
-    /// What was counted, by the last pass.
+    /// Counts of the last pass.
     pub counts: Counts,
-    /// Device time by stage, of [`Detector::detect_timed`](super::Detector::detect_timed).
+    /// Device time of each stage in launch order. Empty except after
+    /// [`Detector::detect_timed`](super::Detector::detect_timed).
     pub stages: Vec<(&'static str, Duration)>,
 }
 
-/// Bytes on the device, by buffer.
+/// Memory on the device, in bytes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceBytes {
-    /// Shapes, each once.
+    /// Memory of the shapes. Instances share shapes.
     pub shapes: ShapeBytes,
-    /// Pipeline buffers, by name.
+    /// Name and size of each pipeline buffer.
     pub pipeline: Vec<(&'static str, usize)>,
-    /// State of an instance, during a detection.
+    /// Memory for each instance during a detection.
     pub per_instance: usize,
 }
 
 impl DeviceBytes {
-    /// All, with the state of so many instances.
+    /// The total, with the memory of `instances` instances.
     pub fn with_instances(&self, instances: usize) -> usize {
         let ShapeBytes { table, words, rows } = self.shapes;
         let pipeline: usize = self.pipeline.iter().map(|(_, bytes)| bytes).sum();

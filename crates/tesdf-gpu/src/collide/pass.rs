@@ -11,17 +11,17 @@ use crate::GpuError;
 use crate::device::Buffer;
 use crate::kernels::counters::{self, COUNTERS, CountersLaunch};
 
-/// Threads of a group where each works alone.
+/// Threads per group in kernels where each thread works alone.
 pub const GROUP: u32 = 64;
 
-/// What the launches of a pass share.
+/// The data that all launches of a pass share.
 pub struct Pass<'a> {
     pub detector: &'a Detector,
     pub options: &'a CollideOptions,
     pub instances: &'a Instances,
     counters: Buffer,
     pub stages: Stages<'a>,
-    /// Bytes sent to the device.
+    /// Bytes that were sent to the device.
     pub sent: usize,
 }
 
@@ -61,7 +61,7 @@ impl Detector {
         Ok(counts)
     }
 
-    /// Errors that only threads of the device find.
+    /// Returns errors that only threads of the device detect.
     fn check(&self, counts: &Counts) -> Result<(), GpuError> {
         if counts.badly_moved > 0 {
             return Err(self.shapes.badly_moved()?);
@@ -87,8 +87,9 @@ impl Pass<'_> {
         CountersLaunch::new(self.counters.words())
     }
 
-    /// Groups of the next launch over the elements that `counter` counts, of a buffer with room for `room`, `per` to a
-    /// group: see [`groups_for`](counters::groups_for).
+    /// Number of groups for the next launch, with `per` elements per group. The device computes it
+    /// from the elements that `counter` has counted, but at most `room`, the capacity of the
+    /// buffer: see [`groups_for`](counters::groups_for).
     pub fn groups_for(&mut self, room: u32, per: u32, counter: u32) -> Result<CubeCount, GpuError> {
         let groups = self.detector.buffers.groups.clone();
         let counters = self.counters();
@@ -103,7 +104,7 @@ impl Pass<'_> {
         Ok(groups.count())
     }
 
-    /// 1 when cells, faces and meshlets are left out by least signed distances.
+    /// 1 when least signed distances rule out meshlets, faces and cells, and otherwise 0.
     pub fn prune(&self) -> u32 {
         u32::from(self.detector.options.pruning == Pruning::LeastDistance)
     }

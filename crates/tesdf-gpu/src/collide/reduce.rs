@@ -1,4 +1,4 @@
-//! Reduction: the launches that reduce the contacts of each pair, and its report.
+//! Reduction: the launches that reduce the contacts of each pair, and the report.
 use tesdf::collide::{PairReduction, Reduction};
 
 use super::Detector;
@@ -12,7 +12,8 @@ use crate::kernels::counters;
 use crate::kernels::reduce::{choice, members, reduce};
 
 impl Pass<'_> {
-    /// Reduces the contacts of each pair, if that is asked for: count, allot, fill, reduce.
+    /// Reduces the contacts of each pair, when the options ask for it. The launches are: count,
+    /// allot, fill, reduce.
     pub(super) fn reduce(&mut self) -> Result<(), GpuError> {
         let buffers = &self.detector.buffers;
         let (Reduction::PerPair(per_pair), Some(own)) = (self.options.reduction, &buffers.members) else {
@@ -67,7 +68,7 @@ impl Pass<'_> {
 }
 
 impl Detector {
-    /// What the last pass has lost, by pair of instances.
+    /// The loss of the last pass, for each pair of instances.
     pub(super) fn reductions(
         &mut self,
         instances: &Instances,

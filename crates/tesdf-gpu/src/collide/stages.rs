@@ -1,17 +1,17 @@
-//! Launches, counted and timed.
+//! Counts and times launches.
 use std::time::Duration;
 
 use crate::GpuError;
 use crate::device::Device;
 
-/// Whether stages are timed.
+/// Whether the device time of stages is measured.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Timing {
     Off,
     On,
 }
 
-/// Counts launches, and times them.
+/// Counts launches, and measures their device time.
 pub struct Stages<'a> {
     pub device: &'a Device,
     timing: Timing,
@@ -24,7 +24,7 @@ impl<'a> Stages<'a> {
         Self { device, timing, launches: 0, times: Vec::new() }
     }
 
-    /// Counts and times a launch; [`launch!`] makes one.
+    /// Counts and times a launch. The macro `launch!` calls it.
     pub fn run(&mut self, name: &'static str, launch: impl FnOnce(&Device)) -> Result<(), GpuError> {
         self.launches += 1;
         let device = self.device;
@@ -36,7 +36,8 @@ impl<'a> Stages<'a> {
     }
 }
 
-/// Launches a kernel: stages, the name of the stage, groups, threads of a group, and the kernel with its arguments.
+/// Launches a kernel. The arguments are: stages, name of the stage, number of groups, threads per
+/// group, and the kernel with its arguments.
 macro_rules! launch {
     ($stages:expr, $name:literal, $groups:expr, $threads:expr, $($kernel:ident)::+($($argument:expr),* $(,)?)) => {
         $stages.run($name, |device| {

@@ -5,11 +5,12 @@ use tesdf::glam::DVec3;
 use crate::kernels::encode::sample::{BLOCK, CELL_ROWS, block_limit};
 use crate::kernels::math::vector::V3;
 
-/// The samples of a cell, in blocks.
+/// The sample grid of a cell, divided into blocks.
 pub struct Grid {
     pub resolution: u32,
     shrink: f64,
-    /// Where each block is, in blocks, ten bits for each index.
+    /// Position of each block in the grid, counted in blocks, with ten bits for each of the three
+    /// indices.
     pub blocks: Vec<u32>,
 }
 
@@ -28,7 +29,7 @@ impl Grid {
     }
 }
 
-/// A cell as the kernel reads it.
+/// A cell as rows for the kernel: the corners relative to the centroid, each with one number.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct CellRows([[f32; 4]; CELL_ROWS]);
@@ -45,7 +46,7 @@ impl CellRows {
         Self(std::array::from_fn(row))
     }
 
-    /// The middle of a block, as the kernel has it.
+    /// Center of a block relative to the centroid, computed as the kernel computes it.
     pub fn middle(&self, block: u32, resolution: u32) -> V3 {
         let first = [block & 1023, (block >> 10) & 1023, block >> 20];
         let [i, j, k] =
@@ -58,7 +59,8 @@ impl CellRows {
         V3 { x: along(0), y: along(1), z: along(2) }
     }
 
-    /// How far from the middle of a block a face may be that is needed in it, when the nearest is so far.
+    /// Limit on the distance from the center of a block to a face that a sample of the block may
+    /// need. `nearest` is the distance from the center to the nearest face.
     pub fn block_limit(&self, nearest: f32) -> f32 {
         block_limit(nearest, self.0[0][3], self.0[1][3], self.0[2][3])
     }
@@ -73,7 +75,7 @@ fn at_least(x: f64) -> f32 {
     if f64::from(near) < x { near.next_up() } else { near }
 }
 
-/// No sample of a block is farther than this from its middle.
+/// Radius of a block: no sample of the block is farther than this from its center.
 fn block_radius([a, b, c, d]: &[DVec3; 4], resolution: u32) -> f64 {
     let half =
         |k: usize, corner: &DVec3| 0.5 * f64::from(BLOCK[k] - 1) / f64::from(resolution) * (*corner - *d);

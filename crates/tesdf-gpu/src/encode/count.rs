@@ -1,4 +1,4 @@
-//! What Algorithm 1 costs, counted instead of done.
+//! The cost of Algorithm 1, counted without running it.
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
@@ -10,7 +10,8 @@ use super::cell::{CellRows, Grid};
 use super::face::CandidateFace;
 use crate::kernels::encode::sample::{GROUP, TILE};
 
-/// A [`Sampler`] that counts distances and measures next to none: its lists are of no use.
+/// A [`Sampler`] that counts the distances which [`DeviceSampler`](super::DeviceSampler) would
+/// measure. It measures only a few of them, so its lists are not usable.
 #[derive(Debug)]
 pub struct SampleCounter {
     every: usize,
@@ -18,48 +19,52 @@ pub struct SampleCounter {
     counts: Mutex<SampleCounts>,
 }
 
-/// How many distances there are.
+/// Number of distances, and the sizes that it depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleCounts {
-    /// Cells with a list.
+    /// Cells that get a list.
     pub cells: u64,
-    /// Samples of a cell.
+    /// Samples per cell.
     pub samples: u64,
-    /// What Lemma 1 leaves, over all cells.
+    /// Candidate faces after Lemma 1, summed over all cells.
     pub candidates: u64,
-    /// And in the cell where that is most.
+    /// Candidate faces of the cell with the most.
     pub max_candidates: u64,
-    /// Pairs of a sample and a candidate of its cell: the distances of Algorithm 1. Lines 12 and 14 each take them all.
+    /// Pairs of a sample and a candidate of its cell. Line 12 of Algorithm 1 measures the distance
+    /// of each pair, and so does line 14.
     pub pairs: u64,
-    /// Distances that choose the candidates of the blocks.
+    /// Distances from block centers to candidates. The device measures them to select the
+    /// candidates of each block.
     pub looks: u64,
-    /// Groups: blocks of all cells.
+    /// Thread groups: one for each block of each cell.
     pub groups: u64,
-    /// Groups that were looked into, and the candidates that they were left with.
+    /// Thread groups that were inspected.
     pub seen_groups: u64,
-    /// See there.
+    /// Candidates that the inspected groups keep, in total.
     pub seen_survivors: u64,
 }
 
 impl SampleCounts {
-    /// Candidates that a block is left with, on average over those that were looked into.
+    /// Candidates that a group keeps, as the mean over the inspected groups.
     pub fn survivors(&self) -> f64 {
         self.seen_survivors as f64 / self.seen_groups.max(1) as f64
     }
 
-    /// Distances that the device measures, threads of a block without a sample included.
+    /// Distances that the device measures, as an estimate. It includes the threads of a block that
+    /// have no sample.
     pub fn distances(&self) -> f64 {
         self.looks as f64 + 2.0 * GROUP as f64 * self.groups as f64 * self.survivors()
     }
 }
 
 impl SampleCounter {
-    /// Looks into so many blocks of every so manieth cell.
+    /// Creates a counter that inspects about `blocks` blocks in each `every`-th cell. Zeros count
+    /// as 1.
     pub fn new(every: usize, blocks: usize) -> Self {
         Self { every: every.max(1), blocks: blocks.max(1), counts: Mutex::default() }
     }
 
-    /// What was counted up to now.
+    /// The counts of all calls of [`sample`](Sampler::sample) so far.
     pub fn counts(&self) -> SampleCounts {
         *self.counts.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -109,7 +114,7 @@ impl Sampler for SampleCounter {
             counts.seen_groups += groups;
             counts.seen_survivors += survivors;
         }
-        // Lists of one face: what is laid out afterwards is small.
+        // Lists of one face keep the layout of the asset small.
         let one = |cell: &SampledCell| {
             (0..cell.faces.len()).map(|k| if k == 0 { 0.0 } else { f64::INFINITY }).collect()
         };
@@ -118,7 +123,8 @@ impl Sampler for SampleCounter {
 }
 
 impl SampleCounter {
-    /// Blocks of a cell that are looked into, and how many candidates they are left with in all.
+    /// Inspects some blocks of a cell. Returns their number, and the number of candidates that they
+    /// keep in total.
     fn look_into(&self, surface: &Surface, cell: &SampledCell, grid: &Grid) -> (u64, u64) {
         let center = cell.cell.centroid();
         let faces: Vec<_> = cell

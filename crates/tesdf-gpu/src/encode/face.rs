@@ -4,20 +4,21 @@ use tesdf::glam::DVec3;
 use crate::kernels::encode::sample::{self, Candidate, Entry, FACE_ROWS};
 use crate::kernels::math::vector::V3;
 
-/// What of a face does not depend on the cell.
+/// The part of a face's data that does not depend on the cell.
 pub struct CandidateFace {
-    /// Unit normal; zero for a face that is no more than its edges.
+    /// Unit normal; zero for a face that is degenerate to its edges.
     normal: DVec3,
-    /// The longest first.
+    /// The edges, the longest first.
     edges: [Edge; 3],
 }
 
 struct Edge {
     from: DVec3,
-    /// Unit direction; zero for an edge without length.
+    /// Unit direction; zero for an edge of length zero.
     along: DVec3,
     length: f64,
-    /// In the plane of the face, inward.
+    /// Unit vector in the plane of the face, perpendicular to the edge, toward the inside of the
+    /// face.
     inward: DVec3,
 }
 
@@ -32,7 +33,8 @@ impl CandidateFace {
         Self { normal: triangle.normal, edges }
     }
 
-    /// As the kernel reads it, relative to a point. `f64` up to here: numbers are as small as the point is near.
+    /// The face as rows for the kernel, relative to `center`. Differences are computed in `f64`
+    /// before rounding, so the error in `f32` shrinks with the distance from `center`.
     pub fn rows(&self, center: DVec3) -> [[f32; 4]; FACE_ROWS] {
         let row = |v: DVec3, last: f64| [v.x as f32, v.y as f32, v.z as f32, last as f32];
         let mut rows = [[0.0; 4]; FACE_ROWS];
@@ -40,7 +42,7 @@ impl CandidateFace {
         rows[0] = row(self.normal, self.normal.dot(self.edges[0].from - center));
         for (k, edge) in self.edges.iter().enumerate() {
             let from = edge.from - center;
-            // Nothing is over a face that is no more than its edges.
+            // A face without area has no points beside its edges; a height of 1 excludes them.
             let height = if is_flat { 1.0 } else { edge.inward.dot(from) };
             rows[1 + k] = row(edge.inward, height);
             let begin = edge.along.dot(from);
@@ -50,7 +52,7 @@ impl CandidateFace {
         rows
     }
 
-    /// As the kernel has it, on the host.
+    /// The face as the kernel reads it, for tests and counts on the host.
     pub fn candidate(&self, center: DVec3) -> Candidate {
         let entry = |[x, y, z, number]: [f32; 4]| Entry { vector: V3 { x, y, z }, number };
         let [plane, side_0, side_1, side_2, begin_0, end_0, begin_1, end_1, begin_2, end_2] =
@@ -69,7 +71,7 @@ mod tests {
     use crate::kernels::encode::sample::ROUNDING;
     use crate::testing::{degenerate, exact};
 
-    /// Numbers from −1 to 1.
+    /// Generates numbers from −1 to 1.
     struct Random(u64);
 
     impl Random {
@@ -83,7 +85,8 @@ mod tests {
         }
     }
 
-    /// Half of what is allowed for the difference of two distances, less what moves the sample.
+    /// Half of the error that is allowed for the difference of two distances, minus the error from
+    /// moving the sample.
     const DISTANCE: f64 = 22.0 / 64.0 * ROUNDING as f64;
 
     #[test]
@@ -109,14 +112,15 @@ mod tests {
                 worst = worst.max(off);
             }
         }
-        // The bound is no idle one.
+        // Measured errors come close enough to the bound to test it.
         assert!(worst > DISTANCE / 40.0, "{worst}");
         println!("off by {:.2} ulp of R + d", worst * f64::from(1 << 24));
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
-        /// Within the same bound, in cells of any size around the point.
+        /// Distances to degenerate faces keep the same bound, in cells of any size around the
+        /// point.
         #[test]
         fn degenerate_faces_are_edges(
             (corners, p) in degenerate::face_and_point(), size in -6.0..0.0f64, way in prop::array::uniform3(-0.5..0.5f64),

@@ -16,46 +16,54 @@ use crate::GpuError;
 use crate::device::Device;
 use crate::kernels::encode::sample::{self as kernel, FACE_ROWS, GROUP, SamplesLaunch, sample};
 
-/// What is allowed for rounding of a gap, as a share of the cell's radius and the distance: docs/math.md, 3.
+/// Rounding error that is allowed for the difference of two distances, relative to the sum of the
+/// cell's radius and the distance: section 3 of docs/math.md.
 pub const ROUNDING: f64 = kernel::ROUNDING as f64;
 
-/// Looks at the samples of [`Method::Sampled`](tesdf::encode::Method::Sampled) on a device: give it to
-/// [`Encoder::sampler`](tesdf::Encoder::sampler).
+/// Measures the samples of [`Method::Sampled`](tesdf::encode::Method::Sampled) on a device.
+/// [`Encoder::sampler`](tesdf::Encoder::sampler) takes it.
 ///
-/// Distances are `f32` there. Lists name every face that the processor's name, and besides only faces whose gap at a sample is at most
-/// ε + 2 · [`ROUNDING`] · (R + d): R is the radius of the cell, d the distance. The certificate says on what class of device. The same device
-/// gives the same bytes. [`EncodeError::Sampler`] has the [`GpuError`] of a device that refuses.
+/// The device measures distances in `f32`. Its lists have every face of the processor's lists. Each
+/// further face is, at some sample, at most ε + 2 · [`ROUNDING`] · (R + d) farther than the nearest
+/// face, where R is the radius of the cell and d the distance. The certificate names the kind of
+/// device.
+///
+/// The same device gives the same bytes. When a device fails, [`EncodeError::Sampler`] carries the
+/// [`GpuError`].
 #[derive(Clone, Debug)]
 pub struct DeviceSampler {
     device: Device,
     limits: SamplerLimits,
-    /// Candidates whose rows a buffer can hold; a cell with more is left to the processor.
+    /// Candidates that fit into a buffer. The processor samples a cell with more candidates.
     max_candidates: usize,
 }
 
-/// How much a device gets at once. The result is the same for all limits.
+/// Limits on the work that a device gets at a time. They change the time, but not the result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SamplerLimits {
-    /// Candidates, of as many cells as it takes; a cell alone may have more. One takes 164 bytes.
+    /// Candidates per batch of cells. A single cell may have more. Each candidate takes 164 bytes.
     pub candidates: usize,
-    /// Distances of one launch, roughly: Ctrl-C and the drivers' watchdogs wait for it.
+    /// Distances per launch, approximately. Ctrl-C waits for the end of a launch, and the watchdog
+    /// of a driver may stop a long one.
     pub distances: u64,
 }
 
 impl Default for SamplerLimits {
-    /// 43 MB; some milliseconds on a graphics card, a second or two on the software device.
+    /// 2^18 candidates, which take 43 MB, and 2^28 distances. Such a launch takes one to two
+    /// seconds on the software device; on a graphics card it should take some milliseconds (not
+    /// measured).
     fn default() -> Self {
         Self { candidates: 1 << 18, distances: 1 << 28 }
     }
 }
 
 impl DeviceSampler {
-    /// With limits that suit most devices.
+    /// Creates a sampler with limits that suit most devices.
     pub fn new(device: Device) -> Self {
         Self::with_limits(device, SamplerLimits::default())
     }
 
-    /// With limits of choice.
+    /// Creates a sampler with the given limits.
     pub fn with_limits(device: Device, limits: SamplerLimits) -> Self {
         let max_bytes = usize::try_from(device.info().max_buffer_bytes).unwrap_or(usize::MAX);
         Self { device, limits, max_candidates: max_bytes / (FACE_ROWS * 16) }
@@ -94,7 +102,7 @@ impl DeviceSampler {
             .collect())
     }
 
-    /// Squared distances of all candidates, as bits.
+    /// Returns the squared distances of all candidates, as bits of `f32`.
     fn launch(
         &self,
         rows: &[[[f32; 4]; FACE_ROWS]],
@@ -133,7 +141,7 @@ impl DeviceSampler {
                 first as u32,
                 groups as u32,
             );
-            // One launch at a time, so that it can be stopped in between.
+            // Waits for each launch, so that the work can be cancelled between two launches.
             device.read::<u32>(&found, 1).map_err(refused)?;
         }
         device.read(&found, least.len()).map_err(refused)
@@ -168,11 +176,12 @@ impl DeviceSampler {
     }
 }
 
-/// Bits of a distance that was not found: no number.
+/// The result for a candidate that no sample needs. As an `f32` these bits are NaN.
 const NOT_FOUND: u32 = u32::MAX;
-/// Groups of a launch, each way: what every device can.
+/// Groups of a launch in each dimension. Every device allows this number.
 const MAX_GROUPS: usize = 32_768;
-/// Faces that a block of samples may need, for the estimate of what a launch takes.
+/// Number of faces that a block of samples is assumed to need. It serves to estimate the work of a
+/// launch.
 const SURVIVORS: usize = 32;
 
 impl Sampler for DeviceSampler {
@@ -212,7 +221,8 @@ impl Sampler for DeviceSampler {
     }
 }
 
-/// d_f, less what rounding may have made of it: the order of the faces of a cell stays.
+/// The distance d_f, minus the rounding error that it may have. The order of the faces of a cell
+/// stays the same.
 fn distance(bits: u32, radius: f64) -> f64 {
     if bits == NOT_FOUND {
         return f64::INFINITY;

@@ -8,25 +8,27 @@ use crate::GpuError;
 use crate::device::{Device, DeviceArray, spread};
 use crate::kernels::field::query::{WorldAnswersLaunch, world_distances};
 
-/// Arrays for answers: for each instance all points, in order.
+/// Arrays for answers on a device. The answers of the first instance to all points come first, then
+/// those of the second instance, and so on.
 #[derive(Clone)]
 pub struct DeviceAnswers {
-    /// Distance to the nearest face, negative inside, in the world's unit.
+    /// Distance to the nearest face, negative inside, in the world's unit. One number per answer.
     pub signed_distances: DeviceArray<f32>,
-    /// Unit gradients, x y z each.
+    /// Unit gradients in the world frame: x, y, z of each answer.
     pub gradients: DeviceArray<f32>,
-    /// Nearest points of the surface, x y z each.
+    /// Nearest points of the surface in the world frame: x, y, z of each answer.
     pub closest_points: DeviceArray<f32>,
-    /// Nearest faces, by their position in the asset: [`TeSdf::face_id`](tesdf::TeSdf::face_id) gives the id in the source
-    /// mesh. `u32::MAX` for a point that is not finite, whose numbers are NaN.
+    /// Index of the nearest face in the asset; [`TeSdf::face_id`](tesdf::TeSdf::face_id) gives its
+    /// id in the source mesh. For a point that is not finite the index is `u32::MAX`, and all other
+    /// numbers are NaN.
     pub faces: DeviceArray<u32>,
 }
 
 impl DeviceAnswers {
-    /// Room for `count` answers: instances × points.
+    /// Allocates arrays for `count` answers, the number of instances times the number of points.
     ///
     /// # Errors
-    /// [`GpuError::TooLarge`].
+    /// [`GpuError::TooLarge`] when an array is larger than the device can bind.
     pub fn empty(device: &Device, count: usize) -> Result<Self, GpuError> {
         Ok(Self {
             signed_distances: DeviceArray::empty(device, count)?,
@@ -47,13 +49,17 @@ impl DeviceAnswers {
 }
 
 impl GpuShapes {
-    /// Signed distances as of [`signed_distances`](Self::signed_distances), of points on the device, x y z each in the
-    /// world. Answers are left there, and nothing is waited for. Points are of `f32`, so far from the origin answers are off
-    /// by the rounding of a point.
+    /// Computes the signed distances of [`signed_distances`](Self::signed_distances) for points on
+    /// the device: x, y, z of each point, in the world frame. The answers stay on the device. The
+    /// call returns without waiting for the result.
+    ///
+    /// Points are `f32`. So far from the origin of the world the answers have the rounding error of
+    /// the points.
     ///
     /// # Errors
-    /// [`GpuError::Instance`] for an instance of a shape that is not among these, [`GpuError::Length`] for arrays that do
-    /// not fit.
+    /// [`GpuError::Instance`] for an instance of a shape that was not uploaded here;
+    /// [`GpuError::Length`] when the length of `points` is not a multiple of 3, or an array of
+    /// answers is too short.
     pub fn signed_distances_into(
         &self,
         points: &DeviceArray<f32>,

@@ -15,19 +15,21 @@ use crate::kernels::field::query::{
     ANSWER_ROWS, AnswersLaunch, BatchLaunch, InstancesLaunch, signed_distances,
 };
 
-/// The answer to a query, in the world.
+/// The answer to a query, in the world frame.
 ///
-/// A point that is not finite has no answer: the numbers are NaN and the face is
+/// For a point that is not finite, all numbers are NaN, and the face is
 /// [`NO_FACE`](tesdf::query::Answer::NO_FACE).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WorldAnswer {
-    /// Distance to the nearest face, negative inside; within 2e-6 of the instance's diagonal.
+    /// Distance to the nearest face, negative inside, in the world's unit. The error is at most
+    /// 2e-6 of the instance's diagonal.
     pub signed_distance: f64,
     /// Unit gradient of the signed distance.
     pub gradient: DVec3,
     /// The nearest point of the surface.
     pub closest_point: DVec3,
-    /// The nearest face, by its id in the source mesh; of a box its side, −x +x −y +y −z +z.
+    /// The nearest face, by its id in the source mesh. A box numbers its sides −x, +x, −y, +y, −z,
+    /// +z.
     pub face: u32,
 }
 
@@ -40,19 +42,22 @@ impl WorldAnswer {
     };
 }
 
-/// Threads of a group.
+/// Threads per group.
 const GROUP: u32 = 64;
-/// Answers of one launch: 4 MiB.
+/// Answers per launch; they take 4 MiB.
 const LAUNCH: usize = 1 << 17;
 
-/// Rows of an answer as the kernel writes them.
+/// The rows of an answer, as the kernel writes them.
 type AnswerRows = [[f32; 4]; ANSWER_ROWS as usize];
 
 impl GpuShapes {
-    /// Signed distances of points to placed shapes: for each instance the answers to all points, which are in the world.
+    /// Computes the signed distances of points to instances of shapes. The points are in the world
+    /// frame. The result has a list for each instance, with an answer for each point.
     ///
     /// # Errors
-    /// A device that refuses, [`GpuError::Instance`] for an instance of a shape that is not among these.
+    /// [`GpuError::Instance`] for an instance of a shape that was not uploaded here;
+    /// [`GpuError::TooLarge`] when a buffer is larger than the device can bind;
+    /// [`GpuError::Device`] when the device fails.
     pub fn signed_distances(
         &self,
         points: &[DVec3],
@@ -108,7 +113,7 @@ impl GpuShapes {
         }
     }
 
-    /// Uploads poses of instances, and their shapes.
+    /// Uploads the poses and shape numbers of instances.
     fn place(&self, instances: &[(GpuShapeId, Placement)]) -> Result<PlacedShapes, GpuError> {
         let field = |(instance, (shape, at)): (usize, &(GpuShapeId, Placement))| {
             let known = self.shapes.get(shape.0 as usize).ok_or_else(|| GpuError::Instance {
@@ -126,7 +131,7 @@ impl GpuShapes {
     }
 }
 
-/// Instances, and their buffers.
+/// Instances on the device.
 struct PlacedShapes {
     placed: Vec<Placed>,
     poses: Buffer,

@@ -1,32 +1,32 @@
-//! The instances of a scene as the device holds them.
+//! The instances of a scene, in the layout of the device.
 use tesdf::collide::{CollideOptions, InstanceId, InstancePair, Scene, ShapeId, instance_pairs};
 
 use super::placed::{FieldFrame, Placed};
 use crate::GpuError;
 use crate::kernels::broad::pairs::{INSTANCE_ROWS, INSTANCE_WORDS};
 
-/// All instances, those of a world side by side, by id within it.
+/// All instances, sorted by world and then by id.
 pub struct Instances {
-    /// Their ids.
+    /// Ids of the instances.
     pub ids: Vec<InstanceId>,
-    /// Their poses.
+    /// Poses of the instances' fields.
     pub placed: Vec<Placed>,
-    /// The number of the shape of each.
+    /// For each instance, the index of its shape.
     pub shapes: Vec<usize>,
-    /// [`INSTANCE_ROWS`] each.
+    /// [`INSTANCE_ROWS`] rows for each instance.
     pub rows: Vec<[f32; 4]>,
-    /// [`INSTANCE_WORDS`] each.
+    /// [`INSTANCE_WORDS`] words for each instance.
     pub words: Vec<u32>,
-    /// Pairs that never meet, by place, sorted.
+    /// Excluded pairs, by index, sorted.
     pub excluded: Vec<u32>,
-    /// All pairs whose bounds meet, by place, when worlds are so large that a tree on the processor is faster than all
-    /// pairs on the device.
+    /// All pairs whose bounds meet, by index. Only for worlds so large that a tree on the processor
+    /// is faster than testing all pairs on the device.
     pub pairs: Option<Vec<u32>>,
 }
 
 impl Instances {
-    /// `shape_ids` and `frames` are those of the uploaded shapes, sorted by id; beyond `max_tests` pairs of bounds the pairs
-    /// are found here.
+    /// Collects the instances of a scene. `shape_ids` and `frames` belong to the uploaded shapes,
+    /// sorted by id. With more than `max_tests` pairs of bounds to test, the pairs are found here.
     pub fn new(
         scene: &Scene,
         options: &CollideOptions,

@@ -1,4 +1,4 @@
-//! Vertices of conforming domains that move on the device.
+//! Moves the vertices of conforming domains on the device.
 use cubecl::prelude::*;
 use tesdf::asset::layout::TreeChild;
 use tesdf::collide::Shape;
@@ -12,18 +12,20 @@ use crate::kernels::deform::follow::follow;
 use crate::kernels::deform::refit::{self, GROUP};
 use crate::kernels::field::shapes::{BAD_VERTEX, NONE, STRIDE, TREE_NODES};
 
-/// What moving the vertices of a shape needs on the host.
+/// The host's data for moving the vertices of a shape.
 #[derive(Clone, Debug)]
 pub struct Moving {
     faces: u32,
     tree_nodes: u32,
     vertices: usize,
-    /// Middle of the cube in the shape's unit as high and low `f32`, with the scale of the local frame.
+    /// Center of the cube in the shape's unit, as high and low `f32`, and the scale of the local
+    /// frame.
     frame: [[f32; 4]; 2],
 }
 
 impl Moving {
-    /// Of a shape with a conforming domain, and its entry of the table.
+    /// The data of a shape with a conforming domain, from the shape and its entry of the table.
+    /// `None` for other shapes.
     pub fn new((entry, shape): (&[u32], &Shape)) -> Option<Self> {
         let tree_nodes = entry[TREE_NODES as usize];
         let Shape::Mesh(asset) = shape else { return None };
@@ -39,19 +41,25 @@ impl Moving {
 }
 
 impl GpuShapes {
-    /// Moves all vertices of a shape with a conforming domain (Sec. V-D): x y z each, in the shape's unit, the mesh's
-    /// vertices and then the domain's own, as [`ConformingMesh::vertices`](tesdf::domain::ConformingMesh::vertices)
-    /// numbers them. `positions` may be memory of others ([`DeviceArray::from_raw_ptr`]), and is read before later
-    /// launches.
+    /// Moves all vertices of a shape with a conforming domain (Sec. V-D of the paper).
     ///
-    /// As [`TeSdf::move_vertices`](tesdf::TeSdf::move_vertices): faces, tetrahedra and the trees over them follow;
-    /// connectivity, lists and labels stay, so distances are those to the listed faces, and distances outside of the
-    /// domain are exact. Two launches, whatever has moved. A vertex that is not finite, or farther from the middle than two
-    /// sides of the cube, is an error of the next detection.
+    /// `positions` has x, y, z of each vertex in the shape's frame and unit: first the mesh's
+    /// vertices, then the domain's other vertices, as
+    /// [`ConformingMesh::vertices`](tesdf::domain::ConformingMesh::vertices) numbers them. The
+    /// array may wrap memory of another library ([`DeviceArray::from_raw_ptr`]). Later launches see
+    /// the new positions.
+    ///
+    /// Faces, tetrahedra and the trees over them follow the vertices. Connectivity, lists and
+    /// labels stay, as with [`TeSdf::move_vertices`](tesdf::TeSdf::move_vertices). So distances in
+    /// the domain are those to the listed faces, and distances outside of the domain are exact up
+    /// to rounding.
+    ///
+    /// A move takes two launches, for any number of vertices. The next detection fails when a
+    /// vertex is not finite, or is farther from the center of the cube than two sides of the cube.
     ///
     /// # Errors
-    /// [`GpuError::Shape`] for a shape of others or without a conforming domain, [`GpuError::Length`] for another number of
-    /// vertices.
+    /// [`GpuError::Shape`] for a shape that was not uploaded here or has no conforming domain;
+    /// [`GpuError::Length`] for a wrong number of positions.
     pub fn move_vertices(&mut self, shape: GpuShapeId, positions: &DeviceArray<f32>) -> Result<(), GpuError> {
         let (count, number) = (self.len(), shape.0 as usize);
         let refused = |reason: String| GpuError::Shape { number, reason };
@@ -78,7 +86,7 @@ impl GpuShapes {
         Ok(())
     }
 
-    /// The error of the first shape with a vertex that was moved to an impossible position.
+    /// The error for the first shape with a vertex that was moved to an invalid position.
     pub(crate) fn badly_moved(&self) -> Result<GpuError, GpuError> {
         let table: Vec<u32> = self.device.read(&self.table, self.len() * STRIDE as usize)?;
         let bad = |row: &[u32]| Some(row[BAD_VERTEX as usize]).filter(|&vertex| vertex != NONE);
@@ -91,13 +99,14 @@ impl GpuShapes {
         Ok(GpuError::Shape { number, reason })
     }
 
-    /// Whether vertices have moved here since the upload.
+    /// Whether vertices have moved on the device since the upload.
     pub(crate) fn have_moved(&self) -> bool {
         self.moved
     }
 }
 
-/// Inner nodes of the face tree by their height over the leaves, as [`refit`] reads them.
+/// The inner nodes of the face tree by their height above the leaves, in the layout that [`refit`]
+/// reads.
 pub fn face_levels(children: &[[u32; 2]]) -> Vec<u32> {
     let mut heights = vec![0u32; children.len()];
     for node in (0..heights.len()).rev() {
@@ -110,7 +119,7 @@ pub fn face_levels(children: &[[u32; 2]]) -> Vec<u32> {
     levels((0..).zip(heights))
 }
 
-/// Inner nodes of the tree over tetrahedra, likewise.
+/// The inner nodes of the tree over tetrahedra, in the same layout.
 pub fn tree_levels(tree: &[[u32; 2]]) -> Vec<u32> {
     let mut heights = vec![0u32; tree.len()];
     for node in (0..heights.len()).rev() {
@@ -124,7 +133,8 @@ pub fn tree_levels(tree: &[[u32; 2]]) -> Vec<u32> {
     levels(inner.map(|((node, height), _)| (node, height - 1)))
 }
 
-/// The number of levels, where each begins and the last ends, and the nodes level by level.
+/// The number of levels, then the start of each level and the end of the last, then the nodes of
+/// each level.
 fn levels(nodes: impl Iterator<Item = (u32, u32)>) -> Vec<u32> {
     let mut by_level: Vec<Vec<u32>> = Vec::new();
     for (node, height) in nodes {

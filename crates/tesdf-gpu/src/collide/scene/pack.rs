@@ -1,4 +1,4 @@
-//! Shapes packed into the arrays that kernels read.
+//! Packs shapes into the arrays that kernels read.
 use glam::{DVec3, Vec3};
 use tesdf::asset::FaceRecord;
 use tesdf::asset::layout::{SignHints, TreeChild};
@@ -13,10 +13,10 @@ use crate::kernels::deform::refit::GROWN;
 use crate::kernels::field::nearest::TREE_DEPTH;
 use crate::kernels::field::shapes::{self, STRIDE};
 
-/// Most faces of a meshlet: one for each thread of a group.
+/// Largest number of faces of a meshlet: one face for each thread of a group.
 const MESHLET: u32 = MESHLETS_OF_BLOCK;
 
-/// The buffers of [`Shapes`](crate::kernels::field::shapes::Shapes).
+/// The contents of the buffers of [`Shapes`](crate::kernels::field::shapes::Shapes).
 #[derive(Default)]
 pub struct Packed {
     pub table: Vec<u32>,
@@ -28,14 +28,14 @@ impl Packed {
     /// Adds a shape.
     ///
     /// # Errors
-    /// Why kernels cannot read it.
+    /// The reason why kernels cannot read the shape.
     pub fn add(&mut self, shape: &Shape) -> Result<(), String> {
         let entry = self.entry(shape)?;
         self.table.extend(entry);
         Ok(())
     }
 
-    /// The arrays of a shape, and its entry of the table.
+    /// Appends the arrays of a shape, and returns its entry for the table.
     fn entry(&mut self, shape: &Shape) -> Result<[u32; STRIDE as usize], String> {
         let mut row = [0u32; STRIDE as usize];
         let mut sizes = |kind: u32, sizes: DVec3| {
@@ -54,7 +54,7 @@ impl Packed {
         }
         row[shapes::MESHLET_COUNT as usize] = 1;
         row[shapes::BAD_VERTEX as usize] = shapes::NONE;
-        // Two triangles of a plane depend on the field that they meet.
+        // A plane has two triangles, whose size depends on the field that they meet.
         row[shapes::FACE_COUNT as usize] = 2;
         if !matches!(shape, Shape::Plane) {
             let records = simple_records(shape);
@@ -67,7 +67,7 @@ impl Packed {
 
     fn add_mesh(&mut self, mesh: &Arrays) -> Result<[u32; STRIDE as usize], String> {
         let depth = depth(mesh);
-        // A node's children are pushed at its own level.
+        // A walk of the tree replaces a node on its stack by the two children.
         if depth + 2 > TREE_DEPTH {
             return Err(format!("a face tree of {depth} levels; expected {} at most", TREE_DEPTH - 2));
         }
@@ -138,7 +138,8 @@ impl Packed {
             word[..chunk.len()].copy_from_slice(chunk);
             u32::from_le_bytes(word)
         };
-        // A byte of room: half words are read a byte at a time, but a list may end with the section.
+        // Kernels read half words byte by byte, and a list may end with the section: the padding
+        // keeps such a read within the buffer.
         self.words_at(bytes.chunks(4).map(word).chain([0]))
     }
 
@@ -153,7 +154,7 @@ fn four(record: [f32; 16]) -> [[f32; 4]; 4] {
     std::array::from_fn(|i| std::array::from_fn(|k| record[4 * i + k]))
 }
 
-/// The faces as kernels read them. Each owns the corners that no face before has.
+/// The faces as kernels read them. Each corner belongs to the first face that has it.
 fn records(mesh: &Arrays) -> Vec<[f32; 16]> {
     let mut seen = vec![false; mesh.lowest_faces.len()];
     let record = |(record, corners): (&FaceRecord, &[u32; 3])| {
@@ -163,14 +164,16 @@ fn records(mesh: &Arrays) -> Vec<[f32; 16]> {
     mesh.records.iter().zip(mesh.faces).map(record).collect()
 }
 
-/// The parts of a simple shape as faces: two corners of a segment are equal, and three of a point.
+/// The parts of a simple shape as faces. A segment is a face with two equal corners, and a point
+/// one with three.
 fn simple_records(shape: &Shape) -> Vec<[f32; 16]> {
     let (parts, nodes) = (shape.parts().0, shape.nodes());
     let record = |(number, points): (usize, &Vec<DVec3>)| {
         let corners = std::array::from_fn(|k| points[k.min(points.len() - 1)]);
         let triangle = Triangle::new(corners);
         let mut record = *FaceRecord::new(&triangle, DVec3::ZERO, SignHints::default()).as_array();
-        // Which faces are flat depends on the frame of a mesh; a simple shape may be of any size.
+        // `FaceRecord` decides in the frame of a mesh whether a face is flat. A simple shape may
+        // have any size, so its normal is set here.
         record[9..12].copy_from_slice(&triangle.normal.as_vec3().to_array());
         let owned = (0..points.len()).filter(|&k| nodes.contains(&(points[k], number as u32)));
         with_owned(record, owned)
@@ -178,7 +181,7 @@ fn simple_records(shape: &Shape) -> Vec<[f32; 16]> {
     parts.iter().enumerate().map(record).collect()
 }
 
-/// With a normal of zero instead of NaN, as shaders may assume that no number is NaN.
+/// Replaces a normal of NaN by zero, because shaders may assume that no number is NaN.
 pub(crate) fn without_nan(mut record: [f32; 16]) -> [f32; 16] {
     if record[9].is_nan() {
         record[9..12].fill(0.0);
@@ -186,7 +189,7 @@ pub(crate) fn without_nan(mut record: [f32; 16]) -> [f32; 16] {
     record
 }
 
-/// Without NaN, and with the owned corners as bits.
+/// Removes NaN, and adds a bit for each owned corner.
 fn with_owned(record: [f32; 16], owned: impl Iterator<Item = usize>) -> [f32; 16] {
     let mut record = without_nan(record);
     let hints = record[15].to_bits() & 0xFFFF;
@@ -195,13 +198,13 @@ fn with_owned(record: [f32; 16], owned: impl Iterator<Item = usize>) -> [f32; 16
     record
 }
 
-/// Middle and radius; 0 without a ball.
+/// Center and radius of an inner ball; zeros without a ball.
 fn inner_ball(ball: Option<(DVec3, f64)>) -> [f32; 4] {
     let (center, radius) = ball.unwrap_or_default();
     center.as_vec3().extend(radius as f32).to_array()
 }
 
-/// Levels of the face tree.
+/// Number of levels of the face tree.
 fn depth(mesh: &Arrays) -> usize {
     let mut levels = vec![1usize; mesh.tree_children.len()];
     for node in (0..levels.len()).rev() {
@@ -214,7 +217,8 @@ fn depth(mesh: &Arrays) -> usize {
     levels.first().copied().unwrap_or(0)
 }
 
-/// First face and number of faces of the largest parts of the face tree that have at most [`MESHLET`] faces, in order.
+/// First face and number of faces of each meshlet, in order. The meshlets are the largest subtrees
+/// of the face tree with at most [`MESHLET`] faces.
 fn meshlets(mesh: &Arrays) -> Vec<(u32, u32)> {
     let mut ranges = vec![(u32::MAX, 0u32); mesh.tree_children.len()];
     let range = |ranges: &[(u32, u32)], word| match TreeChild::decode(word) {
@@ -238,7 +242,7 @@ fn meshlets(mesh: &Arrays) -> Vec<(u32, u32)> {
     meshlets
 }
 
-/// A ball around some faces, relative to the middle of the cube.
+/// A ball around the given faces, relative to the center of the cube.
 fn ball(mesh: &Arrays, start: u32, count: u32) -> [f32; 4] {
     let faces = &mesh.records[start as usize..(start + count) as usize];
     let corners = faces.iter().flat_map(|r| r.triangle().corners);

@@ -1,14 +1,14 @@
-//! The poses of instances, as kernels read them.
+//! Poses of instances, in the layout of the kernels.
 use glam::{DQuat, DVec3, Vec3};
 use tesdf::collide::{Placement, Shape};
 
-/// The frame that a shape's field is computed in: the local frame of a mesh relative to the middle of its cube; of all
-/// others the shape's own frame.
+/// The frame in which a shape's field is computed. For a mesh it is the local frame, moved to the
+/// center of the cube. For other shapes it is the shape's own frame.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldFrame {
-    /// Where its origin is, in the shape's frame.
+    /// Its origin in the shape's frame.
     origin: DVec3,
-    /// The shape's unit per unit of the field's.
+    /// Length of one unit of the field, in the shape's unit.
     unit: f64,
 }
 
@@ -26,20 +26,20 @@ impl FieldFrame {
         }
     }
 
-    /// The shape's unit per unit of the field's.
+    /// Length of one unit of the field, in the shape's unit.
     pub fn unit(&self) -> f64 {
         self.unit
     }
 }
 
-/// A field's frame, placed in the world.
+/// The frame of a field with its pose in the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed {
-    /// Where its origin is.
+    /// Its origin in the world.
     pub origin: DVec3,
     /// Its rotation.
     pub rotation: DQuat,
-    /// World units per unit of the field.
+    /// Length of one unit of the field, in the world's unit.
     pub unit: f64,
 }
 
@@ -52,18 +52,18 @@ impl Placed {
         }
     }
 
-    /// From the field's frame to the world.
+    /// Transforms a point from the field's frame to the world.
     pub fn to_world(self, p: Vec3) -> DVec3 {
         self.rotation * (self.unit * p.as_dvec3()) + self.origin
     }
 
-    /// A direction, likewise.
+    /// Rotates a direction from the field's frame to the world.
     pub fn rotate(self, v: Vec3) -> DVec3 {
         self.rotation * v.as_dvec3()
     }
 
-    /// Rows for the device, as `kernels::math::pose` reads them: origin rounded to `f32` and the unit, the rest of the
-    /// origin, the quaternion x y z w.
+    /// The rows that `kernels::math::pose` reads: the origin rounded to `f32`, with the unit; the
+    /// remainder of the origin; the quaternion x, y, z, w.
     pub fn rows(self) -> [[f32; 4]; 3] {
         let (high, low) = split(self.origin);
         [
@@ -74,7 +74,7 @@ impl Placed {
     }
 }
 
-/// A point as high + low `f32`, which keeps precision far from zero.
+/// Splits a point into a high and a low `f32`, which together keep the precision far from zero.
 pub fn split(p: DVec3) -> (Vec3, Vec3) {
     let high = p.as_vec3();
     (high, (p - high.as_dvec3()).as_vec3())

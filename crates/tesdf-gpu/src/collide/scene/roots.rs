@@ -1,4 +1,5 @@
-//! The roots of a forest, and the tree of boxes that finds those of a conforming domain.
+//! The roots of a forest, and the tree of boxes that finds the root of a point in a conforming
+//! domain.
 use glam::DVec3;
 use tesdf::geometry::{Aabb, AabbTree, Child};
 use tesdf::query::Arrays;
@@ -7,13 +8,14 @@ use crate::kernels::field::shapes::NONE;
 use crate::kernels::field::tetrahedra::{ROWS, Tetrahedron, tetrahedron_of};
 use crate::kernels::math::vector::{V3, v3};
 
-/// As kernels read them.
+/// The roots in the layout that kernels read.
 pub struct Roots {
-    /// [`ROWS`] a root.
+    /// [`ROWS`] rows for each root.
     pub rows: Vec<[f32; 4]>,
-    /// Least and greatest corner of each node's box.
+    /// Minimum and maximum corner of each node's box.
     pub boxes: Vec<[f32; 4]>,
-    /// Nodes, each before those below it: the node after all of those, and the tetrahedron of a leaf, else [`NONE`].
+    /// The nodes, each before its descendants. The first word is the index after the last
+    /// descendant. The second is the tetrahedron of a leaf, or [`NONE`].
     pub tree: Vec<[u32; 2]>,
 }
 
@@ -25,7 +27,7 @@ impl Roots {
             let rows = roots.flat_map(|corners| rows(&tetrahedron_of_corners(corners))).collect();
             return Self { rows, boxes: Vec::new(), tree: Vec::new() };
         }
-        // As rounded as the device has them.
+        // Rounded to `f32` as on the device.
         let vertices = positions(mesh);
         let corners = |t: &[u32; 4]| t.map(|v| DVec3::from_array(vertices[v as usize].map(f64::from)));
         let bounds: Vec<Aabb> = mesh.tetrahedra.iter().map(|t| Aabb::of(&corners(t))).collect();
@@ -40,7 +42,8 @@ impl Roots {
         all
     }
 
-    /// A node and all below it; [`AabbTree::MAX_DEPTH`] calls deep at most.
+    /// Appends a node and its descendants. The recursion is at most [`AabbTree::MAX_DEPTH`] calls
+    /// deep.
     fn add(&mut self, tree: &AabbTree, items: &[Aabb], bounds: Aabb, child: Child) {
         let at = self.tree.len();
         self.push(bounds, NONE);
@@ -64,7 +67,8 @@ impl Roots {
     }
 }
 
-/// The vertices of the mesh and of its domain in the local frame, relative to the middle of the cube.
+/// The vertices of the mesh and of its domain in the local frame, relative to the center of the
+/// cube.
 fn positions(mesh: &Arrays) -> Vec<[f32; 3]> {
     let local = |p: &[f64; 3]| mesh.frame.to_local(DVec3::from_array(*p)) - mesh.cube.middle();
     mesh.vertices.iter().chain(mesh.domain_vertices).map(|p| local(p).as_vec3().to_array()).collect()

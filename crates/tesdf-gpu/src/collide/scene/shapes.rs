@@ -1,4 +1,4 @@
-//! Shapes as the device holds them: each once, whatever the number of its instances.
+//! Shapes on the device. Each shape is stored once, for any number of instances.
 use tesdf::collide::Shape;
 
 use super::moving::Moving;
@@ -7,7 +7,7 @@ use crate::GpuError;
 use crate::device::{Buffer, Device};
 use crate::kernels::field::shapes::{STRIDE, ShapesLaunch};
 
-/// Shapes on a device.
+/// A list of shapes in the memory of a device.
 #[derive(Clone)]
 pub struct GpuShapes {
     pub(super) device: Device,
@@ -15,31 +15,33 @@ pub struct GpuShapes {
     words: Buffer,
     rows: Buffer,
     pub(crate) shapes: Vec<Shape>,
-    /// Of each shape; `None` for shapes whose cells do not follow the surface.
+    /// For each shape, the data to move its vertices; `None` for a shape without a conforming
+    /// domain.
     pub(super) moving: Vec<Option<Moving>>,
     pub(super) moved: bool,
 }
 
-/// A shape of [`GpuShapes`].
+/// The id of a shape in [`GpuShapes`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct GpuShapeId(pub(crate) u32);
 
-/// Bytes of shapes on the device, by what they are.
+/// Memory of shapes on the device, in bytes, by contents.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ShapeBytes {
-    /// Kinds of the shapes, and where their arrays begin.
+    /// Kind of each shape, and the start of its arrays.
     pub table: usize,
-    /// Forests, lists, palettes, cell bounds, children of the face trees.
+    /// Forests, lists, palettes, bounds of cells, children of face-tree nodes.
     pub words: usize,
     /// Faces, boxes of the face trees, balls of the meshlets.
     pub rows: usize,
 }
 
 impl GpuShapes {
-    /// Uploads shapes. [`ids`](Self::ids) names them, in the same order.
+    /// Uploads shapes. [`ids`](Self::ids) returns their ids in the same order.
     ///
     /// # Errors
-    /// [`GpuError::Shape`] for a shape that the device cannot hold, [`GpuError::TooLarge`].
+    /// [`GpuError::Shape`] for a shape that the kernels cannot read; [`GpuError::TooLarge`] for a
+    /// buffer that is larger than the device can bind.
     pub fn upload(device: &Device, shapes: &[Shape]) -> Result<Self, GpuError> {
         let mut packed = Packed::default();
         for (number, shape) in shapes.iter().enumerate() {
@@ -56,17 +58,17 @@ impl GpuShapes {
         })
     }
 
-    /// For a kernel.
+    /// The buffers as an argument of kernels.
     pub(crate) fn argument(&self) -> ShapesLaunch {
         ShapesLaunch::new(self.table.words(), self.words.words(), self.rows.rows())
     }
 
-    /// The device.
+    /// The device that holds the shapes.
     pub fn device(&self) -> &Device {
         &self.device
     }
 
-    /// The shapes, in the order in which they were uploaded.
+    /// The ids of the shapes, in the order of the upload.
     pub fn ids(&self) -> Vec<GpuShapeId> {
         (0..self.shapes.len() as u32).map(GpuShapeId).collect()
     }
@@ -76,22 +78,22 @@ impl GpuShapes {
         self.shapes.len()
     }
 
-    /// Whether there is no shape.
+    /// Whether the list has no shapes.
     pub fn is_empty(&self) -> bool {
         self.shapes.is_empty()
     }
 
-    /// Whether a shape has a conforming domain.
+    /// Whether at least one shape has a conforming domain.
     pub(crate) fn has_conforming(&self) -> bool {
         self.moving.iter().any(Option::is_some)
     }
 
-    /// Size on the device.
+    /// Memory of the shapes on the device, in bytes.
     pub fn bytes(&self) -> ShapeBytes {
         ShapeBytes { table: self.table.bytes(), words: self.words.bytes(), rows: self.rows.bytes() }
     }
 
-    /// For a kernel that writes shapes.
+    /// The buffers, for kernels that write shapes.
     pub(super) fn buffers(&self) -> [&Buffer; 3] {
         [&self.table, &self.words, &self.rows]
     }
