@@ -2,6 +2,7 @@
 #![no_main]
 
 #[path = "../../crates/tesdf/src/testing/exact.rs"]
+#[allow(dead_code, reason = "tests use the rest")]
 mod exact;
 mod support;
 
