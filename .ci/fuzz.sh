@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds all fuzz targets with the compiler of the project and runs each for the given number of
-# seconds (default 13, which is two minutes for all), from the inputs in fuzz/corpus. A failing
+# seconds (default 13), as many at a time as there are cores, from the inputs in fuzz/corpus. A failing
 # input is written to fuzz/artifacts. libFuzzer needs a C++ compiler.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -18,13 +18,21 @@ coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-l
 RUSTFLAGS=$coverage step cargo build --manifest-path fuzz/Cargo.toml --release --target "$target" --target-dir "$out" --bins
 
 mkdir -p fuzz/artifacts
-for file in fuzz/fuzz_targets/*.rs; do
-    name=$(basename "$file" .rs)
-    [ -z "$only" ] || [ "$only" = "$name" ] || continue
+run_target() {
+    local name=$1
     # New inputs stay in the target folder. The corpus only has inputs that were chosen by hand or
     # by `-merge=1`.
-    found=$out/found/$name
+    local found=$out/found/$name
     mkdir -p "$found" "fuzz/corpus/$name"
-    step "$out/$target/release/$name" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=3000 -print_final_stats=1 -verbosity=0 \
-        -artifact_prefix="fuzz/artifacts/$name-" "$found" "fuzz/corpus/$name"
-done
+    "$out/$target/release/$name" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=3000 -print_final_stats=1 -verbosity=0 \
+        -artifact_prefix="fuzz/artifacts/$name-" "$found" "fuzz/corpus/$name" >"$found.log" 2>&1 && return
+    tail -n 60 "$found.log" >&2
+    echo "error: the fuzz target $name failed; fuzz/artifacts has its input, $found.log its output" >&2
+    return 1
+}
+export -f run_target
+export out target seconds
+# A target uses one core.
+targets=$(basename -s .rs fuzz/fuzz_targets/*.rs)
+step xargs -P "$(nproc)" -I{} bash -c 'run_target {}' <<<"${only:-$targets}"
+(cd "$out/found" && grep "stat::number_of_executed_units" ./*.log)
