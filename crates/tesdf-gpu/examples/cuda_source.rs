@@ -1,4 +1,5 @@
-//! Prints kernels as CUDA C++: `cargo run -p tesdf-gpu --example cuda_source [PART OF A NAME]`. Needs neither CUDA nor a GPU.
+//! Prints kernels as CUDA C++: `cargo run -p tesdf-gpu --example cuda_source [PART OF A NAME]`. It
+//! needs neither CUDA nor a GPU.
 use tesdf_gpu::cuda::sources;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

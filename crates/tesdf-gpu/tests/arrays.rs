@@ -8,7 +8,8 @@ use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::glam::{DVec3, Vec3};
 use tesdf_gpu::{Device, DeviceAnswers, DeviceArray, GpuError, GpuShapeId, GpuShapes};
 
-/// What a distance may be off by, as a share of the diagonal: what `signed_distances` promises, and a point that is rounded to `f32` in the world.
+/// Largest error of a distance, relative to the diagonal: the documented error of
+/// `signed_distances`, and the rounding of a point of the world to `f32`.
 const DISTANCE: f64 = 4e-6;
 
 #[test]
@@ -93,7 +94,7 @@ fn arrays_that_do_not_fit_are_errors() {
     query(&[], 0).expect("nothing to do");
 }
 
-/// Memory of others is read and written in place.
+/// Queries read and write memory of another library in place.
 #[cfg(feature = "cuda")]
 #[test]
 fn pointers_are_for_cuda() {
@@ -110,7 +111,7 @@ fn pointers_are_for_cuda() {
     let shapes = GpuShapes::upload(&device, &[Shape::Plane]).expect("fits");
     let instances = [(shapes.ids()[0], Placement { pose: Pose::IDENTITY, scale: 1.0 })];
     let mut answers = DeviceAnswers::empty(&device, 1).expect("fits");
-    // SAFETY: both are memory of `array`, which lives on.
+    // SAFETY: both wrap memory of `array`, which outlives them.
     let points = unsafe { DeviceArray::<f32>::from_raw_ptr(&device, pointer + 4, 3) }.expect("of CUDA");
     // SAFETY: as above.
     answers.signed_distances =

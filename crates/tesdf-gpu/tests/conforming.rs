@@ -1,4 +1,4 @@
-//! Conforming domains on the device: distances and contacts as the host finds them.
+//! Conforming domains: the device finds the distances and contacts that the host finds.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
@@ -28,7 +28,7 @@ fn encoded(solid: &SolidMesh, domain: &ConformingMesh, options: &EncodeOptions) 
         .expect("valid options")
 }
 
-/// As the tetrahedra are, bisected, and with short lists.
+/// Undivided tetrahedra, bisected tetrahedra, and truncated lists.
 fn encodings() -> [EncodeOptions; 3] {
     let by_cost = EncodeOptions { refinement: Refinement::ByCost, byte_worth: 0.02, ..plain() };
     let few = EncodeOptions { max_entries: Some(16), ..plain() };
@@ -45,7 +45,8 @@ fn distances_are_those_of_the_host() {
             let shape = Shape::from(asset.clone());
             let on_device = GpuShapes::upload(&device, std::slice::from_ref(&shape)).expect("fits");
             let (bounds, diagonal) = (shape.bounds(), shape.diagonal());
-            // The device's points are off by half a unit in the last place; at borders lists of few faces jump.
+            // Points on the device have a rounding error. At the border of two cells, distances of
+            // truncated lists are not continuous.
             let truncated = asset.about().certificate().truncated();
             let points: Vec<DVec3> =
                 (0..3000).map(|_| bounds.center() + 0.9 * bounds.extent() * random.in_cube()).collect();
@@ -64,7 +65,8 @@ fn distances_are_those_of_the_host() {
     }
 }
 
-/// Above the beam, a little in it, and half way to its middle; `turn` is how much the other body may be turned.
+/// Three worlds: the other body is above the beam, a little inside it, and half way to its center.
+/// `turn` limits the rotation of the other body.
 fn meeting(beam: &TeSdf, other: &TeSdf, turn: f64, random: &mut Random) -> Scene {
     let mut scene = Scene::new();
     for (world, deep) in [0.0, 0.3, 0.7].into_iter().enumerate() {
@@ -86,7 +88,7 @@ fn contacts_are_those_of_the_host() {
         let options = EncodeOptions::preset(Preset::Fast);
         Encoder::new().options(options).encode(solid).expect("encodes")
     };
-    // Of small faces, and of faces larger than the beam.
+    // One body with small faces, and one with faces larger than the beam.
     let ball = bisected(&shapes::Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid());
     let block = bisected(
         &shapes::Shape::default().add_box(DVec3::new(-9.0, -1.0, -9.0), DVec3::new(9.0, 1.0, 9.0), 3).solid(),
@@ -107,12 +109,12 @@ fn contacts_are_those_of_the_host() {
     compared.is_good(1000);
 }
 
-/// All vertices of a domain as the device takes them.
+/// All vertices of a domain, as the device takes them.
 fn positions(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<f32> {
     domain.vertices().iter().flat_map(|&p| to(p).as_vec3().to_array()).collect()
 }
 
-/// To where the device's `f32` has it.
+/// Rounds a position as the device does.
 fn rounded(p: DVec3) -> DVec3 {
     bend(p).as_vec3().as_dvec3()
 }
@@ -130,7 +132,7 @@ fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
             let mut bent = rest.clone();
             assert!(bent.move_vertices(&moves(&domain, rounded)).expect("moderate").inverted.is_empty());
             let array = DeviceArray::upload(&device, &positions(&domain, bend)).expect("fits");
-            // Distances.
+            // Compare distances.
             let shape = Shape::from(rest.clone());
             let shapes = [Shape::Plane, shape.clone()];
             let mut on_device = GpuShapes::upload(&device, &shapes).expect("fits");
@@ -144,9 +146,10 @@ fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
             let off = |(p, found): (&DVec3, f64)| (bent.signed_distance(*p) - found).abs();
             let distances = answers[0].iter().map(|a| a.signed_distance);
             let others = points.iter().zip(distances).map(off).filter(|off| *off > 2e-6 * diagonal).count();
-            // Lists of moved faces jump at borders of cells, where rounding may find another one.
+            // At the borders of cells, distances of moved lists are not continuous, and rounding
+            // may find another cell.
             assert!(others <= 4, "{others} of {} points", points.len());
-            // Contacts.
+            // Compare contacts.
             let here = meeting(&rest, &ball, 2.0, &mut random);
             let mut there = here.clone();
             let mut detector = Detector::new(&device, &here, DetectorOptions::default()).expect("fits");
@@ -165,7 +168,7 @@ fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
                 println!("{:?}: {one:?}", options.mode);
                 compared.add(one);
             }
-            // And back again.
+            // Move the vertices back, and compare again.
             let array = DeviceArray::upload(&device, &positions(&domain, |p| p)).expect("fits");
             beams.iter().for_each(|&b| detector.move_vertices(b, &array).expect("as many vertices"));
             let [options, ..] = each_mode(8.0);

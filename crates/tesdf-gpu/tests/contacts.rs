@@ -1,4 +1,5 @@
-//! Contacts of the device against those of the host: the same parts touch, as deep, and every contact is true by the exact field.
+//! Compares contacts of the device with those of the host: the same parts touch, at the same
+//! depths, and each contact agrees with the exact field.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
@@ -37,7 +38,7 @@ fn pairs_of_bodies() {
     compared.is_good(3000);
 }
 
-/// Some meshes of the data in random poses; `TESDF_TEST_PAIRS` says how many pairs.
+/// Some meshes of the data in random poses. `TESDF_TEST_PAIRS` sets the number of pairs.
 #[test]
 fn data_meshes_in_random_poses() {
     let pairs = std::env::var("TESDF_TEST_PAIRS").map_or(2, |n| n.parse().expect("a number of pairs"));
@@ -107,7 +108,8 @@ fn simple_shapes_meet_meshes_and_each_other() {
     compared.is_good(5000);
 }
 
-/// Lists of at most 32 faces: distances of the lists, not of the mesh.
+/// Lists of at most 32 faces: both sides return the distance to the listed faces, which may differ
+/// from that to the mesh.
 #[test]
 fn truncated_lists() {
     let solid = meshes::manifest()
@@ -178,7 +180,8 @@ fn worlds_are_as_if_alone_and_cost_no_launches() {
                 let (a, b) = (y.instance_a.0 + 2 * world, y.instance_b.0 + 2 * world);
                 let names = (InstanceId(a), InstanceId(b), y.feature, y.face_a, y.face_b, y.tet_b);
                 assert_eq!((x.instance_a, x.instance_b, x.feature, x.face_a, x.face_b, x.tet_b), names);
-                // A scene divides quaternions by their length, again when the instance is added again.
+                // A scene normalizes quaternions, and normalizes them again when the instance is
+                // added again.
                 assert!(x.point_a.distance(y.point_a) < 1e-7 && (x.distance - y.distance).abs() < 1e-8);
             }
             rest = others;
@@ -229,8 +232,8 @@ fn buffers_grow_or_say_what_they_need() {
     assert_eq!(needed as usize, expected.len());
 }
 
-/// A thread alone finds what 32 find, shared memory what planes find, pruning loses nothing, and the processor finds
-/// the same pairs.
+/// The contacts do not depend on the number of threads, on the way in which they exchange values,
+/// on pruning, or on the side that finds the pairs.
 #[test]
 fn the_same_however_a_polygon_is_worked_on() {
     let mut random = Random(6);

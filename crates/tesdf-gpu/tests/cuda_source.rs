@@ -1,4 +1,4 @@
-//! Every kernel as CUDA C++: its form, and that NVRTC compiles it. Needs NVRTC, but no GPU.
+//! Checks the CUDA C++ text of every kernel, and that NVRTC compiles it. Needs NVRTC, but no GPU.
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -7,7 +7,7 @@ use tesdf_gpu::cuda::{Count, CudaSource, Resources, compile, sources};
 
 static SOURCES: LazyLock<Vec<CudaSource>> = LazyLock::new(|| sources().unwrap_or_else(|e| panic!("{e}")));
 
-/// Machine code for the GPUs of compute centers, with what each kernel takes of them.
+/// Compiles to machine code for GPUs of compute centers, and prints the resources of each kernel.
 #[test]
 fn every_kernel_compiles_to_machine_code() {
     println!("{:46} registers warps stack spilled shared", "kernel");
@@ -27,7 +27,7 @@ fn every_kernel_compiles_to_machine_code() {
     }
 }
 
-/// PTX for all GPUs from Turing on.
+/// Compiles to PTX for all GPUs from Turing on.
 #[test]
 fn every_kernel_compiles_to_ptx() {
     for source in SOURCES.iter() {
@@ -45,13 +45,14 @@ fn a_refused_kernel_says_why() {
     assert!(error.contains("error: identifier \"no\" is undefined"), "{error}");
 }
 
-/// What launches rely on, in the text of the kernel: pointers in order, then scalars and lengths by value.
+/// Checks the order of arguments that launches rely on: pointers, then scalars and lengths by
+/// value.
 #[test]
 fn arguments_are_pointers_then_scalars_and_lengths() {
     let named = |name: &str| SOURCES.iter().find(|s| s.kernel == name).expect("the kernel is listed");
     let direct = named("field::query::signed_distances");
     let parameters = parameters(direct);
-    // Shapes, instances, shapes of instances, points, answers, faces: three, one, one, one, one, one.
+    // Buffers: three for the shapes, two for the instances, one each for points, answers and faces.
     let types: Vec<&str> = parameters.iter().map(|p| p.split_whitespace().next().unwrap_or("")).collect();
     let rows = "float_4";
     assert_eq!(
@@ -61,7 +62,7 @@ fn arguments_are_pointers_then_scalars_and_lengths() {
     assert_eq!(parameters.len(), 9);
     assert!(parameters[8].starts_with("__grid_constant__ info_st const "), "{}", parameters[8]);
     assert_eq!(direct.threads, (64, 1, 1));
-    // Three scalars are padded to four; eight lengths follow.
+    // Three scalars are padded to four. Eight lengths follow.
     let info = between(&direct.text, "struct info_st {", "};");
     let fields: Vec<&str> = info.split_inclusive(';').map(str::trim).filter(|f| !f.is_empty()).collect();
     assert_eq!(fields, ["uint32_t scalars_u32[4];", "uint32_t static_meta[8];"]);
@@ -73,7 +74,7 @@ fn arguments_are_pointers_then_scalars_and_lengths() {
     );
 }
 
-/// The list of kernels is whole: every kernel of `src/kernels` is on it.
+/// The catalog has every kernel of `src/kernels`.
 #[test]
 fn every_kernel_is_listed() {
     let listed: BTreeSet<String> =
@@ -83,7 +84,7 @@ fn every_kernel_is_listed() {
     assert_eq!(listed, written);
 }
 
-/// Adds the names of the kernels in a folder, each with its modules.
+/// Adds the names of the kernels in a folder, with their modules.
 fn add_kernels(folder: &Path, modules: &str, names: &mut BTreeSet<String>) {
     for file in std::fs::read_dir(folder).expect("a folder") {
         let path = file.expect("a file").path();

@@ -1,4 +1,5 @@
-//! Faces that are points or segments, exactly or once rounded, in otherwise sound meshes: every kernel answers as without them.
+//! Meshes with faces that are points or segments, exactly or after rounding: every kernel answers
+//! as if these faces were absent.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
@@ -18,7 +19,7 @@ use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf_gpu::{Detector, DetectorOptions, DeviceAnswers, DeviceArray, GpuShapes, WorldAnswer};
 
-/// As a share of the diagonal.
+/// Largest error of a distance, relative to the diagonal.
 const DISTANCE: f64 = 2e-6;
 
 fn solid(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> SolidMesh {
@@ -29,7 +30,7 @@ fn encoded(solid: &SolidMesh) -> TeSdf {
     Encoder::new().preset(Preset::Fast).encode(solid).expect("encodes")
 }
 
-/// The cube from −1 to 1 with more vertices and faces.
+/// The cube from −1 to 1 with additional vertices and faces.
 fn cube_and(vertices: &[DVec3], faces: &[[u32; 3]]) -> SolidMesh {
     let mut cube = Faces::default().add_box(-DVec3::ONE, DVec3::ONE, 1);
     cube.vertices.extend(vertices);
@@ -37,13 +38,15 @@ fn cube_and(vertices: &[DVec3], faces: &[[u32; 3]]) -> SolidMesh {
     solid(cube.vertices, cube.faces)
 }
 
-/// A cube whose corner 0 is three vertices, up to `size` apart, with a face between them.
+/// A cube whose corner 0 is three vertices with a face between them. Their distances are at most
+/// `size`.
 fn chamfered(size: f64) -> SolidMesh {
     let Faces { mut vertices, mut faces } = Faces::default().add_box(-DVec3::ONE, DVec3::ONE, 1);
     let corner = vertices[0];
     let other = vertices.len() as u32;
     vertices.push(corner + size * DVec3::X);
-    // The first face at the corner takes the new vertex; two faces without height fill what opens along its sides.
+    // The first face at the corner takes the new vertex. Two faces without height fill the gaps
+    // along its sides.
     let at = faces.iter().position(|f| f.contains(&0)).expect("a corner has faces");
     let k = faces[at].iter().position(|&v| v == 0).expect("it has the corner");
     let (next, last) = (faces[at][(k + 1) % 3], faces[at][(k + 2) % 3]);
@@ -52,13 +55,14 @@ fn chamfered(size: f64) -> SolidMesh {
     solid(vertices, faces)
 }
 
-/// An icosphere with coordinates rounded to a step, so that faces collapse to edges and points.
+/// An icosphere with coordinates rounded to multiples of `step`, so that faces collapse to segments
+/// and points.
 fn on_a_grid(step: f64) -> SolidMesh {
     let sphere = Faces::default().add_sphere(DVec3::ZERO, 2, || 1.0);
     solid(sphere.vertices.iter().map(|v| (*v / step).round() * step).collect(), sphere.faces)
 }
 
-/// A member of a family with some edges shrunk to nothing, or nearly so.
+/// A member of a family with some edges shrunk to zero or nearly zero.
 fn shrunk(seed: u64) -> SolidMesh {
     let mut random = Random(seed);
     let member = FAMILIES[random.index(FAMILIES.len())].member(seed);
@@ -74,7 +78,7 @@ fn shrunk(seed: u64) -> SolidMesh {
         };
     }
     faces.push([random.index(vertices.len()) as u32; 3]);
-    // Shrinking an edge can turn a part inside out.
+    // Shrinking an edge can turn a part inside out. Then the member stays as it was.
     SolidMesh::new(TriangleMesh::new(vertices, faces).expect("valid ids")).unwrap_or(member)
 }
 
@@ -110,7 +114,7 @@ fn distances_and_gradients() {
         let bounds = shape.bounds();
         let mut points: Vec<DVec3> =
             (0..500).map(|_| bounds.center() + 0.8 * bounds.extent() * random.in_cube()).collect();
-        // On vertices and edges, of faces without area too, and a hair away from them.
+        // Points on vertices and edges, also of faces without area, and points very near to them.
         for face in 0..solid.mesh().faces().len() {
             let [a, b, _] = solid.mesh().triangle(face);
             points.extend([a, a.midpoint(b), a + 1e-7 * shape.diagonal() * random.direction()]);
@@ -121,7 +125,7 @@ fn distances_and_gradients() {
             let expected = reference.signed_distance(*p);
             check_answer(&name, *p, answer, expected, shape.diagonal() + expected.abs());
         }
-        // The kernel that computes in the world.
+        // Check the kernel that computes in the world frame.
         let flat: Vec<f32> = points.iter().flat_map(|p| p.as_vec3().to_array()).collect();
         let uploaded = DeviceArray::upload(&device, &flat).expect("fits");
         let arrays = DeviceAnswers::empty(&device, points.len()).expect("fits");
@@ -142,13 +146,13 @@ fn contacts_are_those_of_the_host() {
         let (asset, diagonal) = (encoded(&solid), solid.mesh().diagonal());
         let mut scene = Scene::new();
         let shape = scene.add_shape(asset).expect("a mesh is a shape");
-        // Of the same body, as both surface and field are then degenerate.
+        // The same body is surface and field, so both are degenerate.
         let rotation = DQuat::from_axis_angle(random.direction(), random.between(0.0, 2.0));
         let translation = 0.4 * diagonal * random.in_cube();
         for pose in [Pose::IDENTITY, Pose { translation, rotation }] {
             scene.add(Instance::new(shape, pose)).expect("a pose");
         }
-        // The exact mode takes long on the software driver.
+        // The exact mode is slow on the software driver.
         let modes = each_mode(diagonal);
         for options in &modes[..if k % 4 == 0 { 4 } else { 3 }] {
             let one = hold(&scene, options, diagonal);
@@ -168,12 +172,12 @@ fn contacts_are_those_of_the_host() {
         );
     }
     sure.is_good(200);
-    // Its steps go another way at ties, of which these shapes are full.
+    // Frank–Wolfe may step in another direction at ties, and these shapes have many ties.
     assert!(frank_wolfe.touching > 500 && frank_wolfe.others * 20 < frank_wolfe.touching, "{frank_wolfe:?}");
     assert!(frank_wolfe.differing * 50 < frank_wolfe.cells, "{frank_wolfe:?}");
 }
 
-/// Vertices that move on the device until faces and tetrahedra are points and segments.
+/// Moves vertices on the device until faces and tetrahedra are points and segments.
 #[test]
 fn what_collapses_on_the_device() {
     let device = device();
@@ -185,7 +189,8 @@ fn what_collapses_on_the_device() {
         let shape = Shape::from(rest);
         let (bounds, diagonal) = (shape.bounds(), shape.diagonal());
         let middle = bounds.center();
-        // One end to a point, all to a plane, to a line, to a needle's width.
+        // Collapses one end to a point, and all to a plane, to a line, and to the width of a
+        // needle.
         let collapses: [&dyn Fn(DVec3) -> DVec3; 4] = [
             &|p| if p.x > middle.x { bounds.max } else { p },
             &|p| p.with_z(middle.z),
@@ -208,7 +213,7 @@ fn what_collapses_on_the_device() {
                 .iter()
                 .map(|f| Triangle::new([0, 1, 2].map(|k| corner(&f[k]))))
                 .collect();
-            // Far enough out that no tetrahedron holds them: there the face tree answers, exactly.
+            // These points are outside of all tetrahedra. There the face tree answers, exactly.
             let out = |random: &mut Random| middle + random.between(0.8, 1.5) * diagonal * random.direction();
             let points: Vec<DVec3> = (0..300).map(|_| out(&mut random)).collect();
             let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
@@ -217,7 +222,7 @@ fn what_collapses_on_the_device() {
                 let least = faces.iter().map(|t| t.closest(*p).distance).fold(f64::INFINITY, f64::min);
                 check_answer(&format!("collapse {k}"), *p, answer, least, 2.0 * diagonal);
             }
-            // On what has collapsed.
+            // Points on the collapsed faces.
             let points: Vec<DVec3> = faces.iter().map(|t| t.corners[0]).collect();
             let answers = on_device.signed_distances(&points, &[(id, at)]).expect("answers").remove(0);
             for (p, answer) in points.iter().zip(&answers) {
@@ -228,7 +233,7 @@ fn what_collapses_on_the_device() {
     }
 }
 
-/// All vertices of a domain as the device takes them.
+/// All vertices of a domain, as the device takes them.
 fn positions(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<f32> {
     domain.vertices().iter().flat_map(|&p| to(p).as_vec3().to_array()).collect()
 }

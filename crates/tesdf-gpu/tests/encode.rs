@@ -1,4 +1,4 @@
-//! Algorithm 1 on the device against the processor's.
+//! Compares Algorithm 1 on the device with Algorithm 1 on the processor.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
@@ -27,7 +27,8 @@ fn solid(name: &str) -> SolidMesh {
     row.solid().expect("a solid")
 }
 
-/// A mesh in its local frame, with cells of several sizes: some deep ones that a face passes through, and some of the way down to them.
+/// A mesh in its local frame, with cells of several sizes: some deep cells that a face passes
+/// through, and some of their ancestors.
 struct Case {
     surface: Surface,
     tree: AabbTree,
@@ -81,7 +82,8 @@ fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
             let cells = case.sampled(&sampling);
             let found = sampler.sample(&case.surface, &cells, &sampling, &progress).expect("samples");
             let least = Processor.sample(&case.surface, &cells, &sampling, &progress).expect("samples");
-            // As far as rounding may reach: at no sample is the surface farther than from the centroid and the radius.
+            // Largest effect of rounding. At each sample, the distance to the surface is at most
+            // the distance from the centroid plus the radius.
             let slack = |c: &SampledCell| {
                 let center = c.cell.centroid();
                 let away = case.surface.triangles.iter().map(|t| t.closest(center).distance);
@@ -97,7 +99,8 @@ fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
                     let (found, least, most) = (found[at][k], least[at][k], most[at][k]);
                     let what =
                         || format!("{name}, {sampling:?}, cell {at}, face {face}: {most} {found} {least}");
-                    // Of the processor's at most as far, which is also: there at all.
+                    // Each face that the processor lists is listed here too, at no greater
+                    // distance.
                     assert!(found <= least, "{}", what());
                     assert!(found >= most - slack, "{}", what());
                     assert!(found.is_finite() || most.is_infinite() || least.is_infinite(), "{}", what());
@@ -109,9 +112,9 @@ fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
             }
         }
     }
-    // Groups look at 1024 in one go.
+    // A group processes 1024 candidates at a time, so this needs several turns.
     assert!(most_candidates > 2048, "{most_candidates} candidates at most");
-    // Ties: of faces that are equally near, rounding picks some in `f64`, too.
+    // Ties: among faces at equal distances, rounding selects some in `f64`, too.
     println!("{listed} entries, {besides} besides");
     assert!(listed > 1000 && besides < listed, "{listed} entries, {besides} besides");
 }
@@ -125,7 +128,7 @@ fn sampled(sampling: Sampling, refinement: Refinement) -> EncodeOptions {
     }
 }
 
-/// An L of cubes in a grid with an outer layer.
+/// Cubes in the form of an L, in a grid with an outer layer.
 fn block() -> (SolidMesh, ConformingMesh) {
     let l = |x, y, z| z == 1 && (1..3).contains(&x) && (y == 1 || (x < 2 && y == 2));
     let (solid, tetrahedra) = grid(4, 0.15, l);
@@ -172,7 +175,7 @@ fn a_whole_asset_in_both_domains() {
             Encoder::new().options(cut).domain(domain).sampler(&sampler).encode(&solid).expect("encodes");
         let certificate = cut.about().certificate();
         assert!(certificate.truncated() && certificate.exactness_distance() > Some(0.0), "{certificate:?}");
-        // Faces that pass through a cell of the bisection domain are never dropped.
+        // Faces that pass through a cell of the bisection domain are always listed.
         if let Domain::Conforming(_) = domain {
             assert_eq!(cut.about().statistics.longest_list, 6);
         }

@@ -1,4 +1,4 @@
-//! Overlaps that no contact shows: the device tells those that the host tells.
+//! Overlaps that no contact shows: the device reports the overlaps that the host reports.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
@@ -31,7 +31,7 @@ fn moved(body: &Arc<Body>, to: DVec3) -> Placed {
     Placed { body: body.clone(), at: Placement { pose: Pose::at(to), scale: 1.0 } }
 }
 
-/// What the device and the host tell of a scene.
+/// The overlaps of a scene that the device and the host report.
 fn both(scene: &Scene, mode: Mode) -> [Vec<HiddenOverlap>; 2] {
     let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode) };
     let mut detector = Detector::new(&device(), scene, DetectorOptions::default()).expect("fits");
@@ -86,7 +86,8 @@ fn bars_that_cross_and_bodies_that_touch() {
     }
 }
 
-/// Both tell what is certain to be found; what only a few looks find may differ.
+/// Both report the overlaps that are certain to be found. They may differ in overlaps so shallow
+/// that finding them depends on the search.
 #[test]
 fn relations_of_meshes_are_told_as_by_the_host() {
     let names = ["cube", "tetra", "l_bracket", "beam", "torus_quads", "spoon"];

@@ -1,4 +1,4 @@
-//! Signed distances on the device against those of the host.
+//! Compares signed distances of the device with those of the host.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
@@ -8,7 +8,8 @@ use tesdf::collide::{Placement, Pose, Shape};
 use tesdf::glam::DVec3;
 use tesdf_gpu::{Device, GpuShapeId, GpuShapes};
 
-/// What a distance may be off by, as a share of the diagonal: twice what `f32` queries of the host promise.
+/// Largest error of a distance, relative to the diagonal: twice the documented error of the host's
+/// `f32` queries.
 const DISTANCE: f64 = 2e-6;
 
 #[test]
@@ -22,13 +23,13 @@ fn distances_are_those_of_the_host() {
     for ((number, shape), id) in shapes.iter().enumerate().zip(uploaded.ids()) {
         let Shape::Mesh(asset) = shape else { unreachable!("all are meshes") };
         let (bounds, diagonal) = (asset.bounds(), shape.diagonal());
-        // A scale that is no power of two, and far from the origin.
+        // A scale that is not a power of two, and a pose far from the origin.
         let pose =
             Pose { translation: 100.0 * diagonal * random.direction(), rotation: rotation(&mut random) };
         let at = Placement { pose, scale: 1.7 };
         let mut points: Vec<DVec3> =
             (0..600).map(|_| bounds.center() + 0.8 * bounds.extent() * random.in_cube()).collect();
-        // Near the surface, on it, and far away.
+        // Points near the surface, on it and far away.
         for k in 0..300 {
             let corners = asset.face_corners(k * 7 % asset.face_count());
             let on = corners.iter().sum::<DVec3>() / 3.0;
@@ -40,7 +41,7 @@ fn distances_are_those_of_the_host() {
         let mut off: f64 = 0.0;
         for (p, answer) in points.iter().zip(&answers) {
             let expected = at.scale * asset.signed_distance(*p);
-            // Far away `f32` is relative to the distance.
+            // Far away, the error of `f32` is relative to the distance.
             let size = (at.scale * diagonal).max(expected.abs());
             let error = (answer.signed_distance - expected).abs() / size;
             assert!(
@@ -51,7 +52,8 @@ fn distances_are_those_of_the_host() {
             );
             off = off.max(error);
             assert!((answer.gradient.length() - 1.0).abs() < 1e-5);
-            // The way to the surface is along the gradient: of faces that are as near any may be named.
+            // The gradient points away from the nearest surface. Among faces at equal distances,
+            // the answer may name any.
             for on in [answer.closest_point, at.to_world(*p) - answer.signed_distance * answer.gradient] {
                 let distance = at.scale * asset.signed_distance(at.to_shape(on));
                 assert!(
@@ -86,7 +88,7 @@ fn points_times_instances() {
     let mut points: Vec<DVec3> = (0..100).map(|_| 2.0 * random.in_cube()).collect();
     points.push(DVec3::new(f64::NAN, 0.0, 0.0));
     let answers = uploaded.signed_distances(&points, &instances).expect("answers");
-    // Without the point that is no number, which equals nothing.
+    // Leave out the point with NaN, because NaN is not equal to itself.
     let again = uploaded.signed_distances(&points[..100], &instances).expect("answers");
     let same = answers.iter().zip(&again).all(|(x, y)| x[..100] == y[..]);
     assert!(same, "two runs differ");
@@ -112,7 +114,7 @@ fn points_times_instances() {
                 }
             };
             assert!((answer.signed_distance - at.scale * expected).abs() < 1e-5, "shape {shape} at {p}");
-            // A step along the gradient is a step of the distance.
+            // A step along the gradient changes the distance by the length of the step.
             let ahead = answer.closest_point + answer.signed_distance * answer.gradient;
             assert!(ahead.distance(*p) < 1e-5, "shape {shape}: {ahead} instead of {p}");
         }

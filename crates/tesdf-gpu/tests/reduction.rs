@@ -1,4 +1,5 @@
-//! Contacts that the device reduces, against those that it finds, against what the host keeps of them, and against distances from the hull in `f64`.
+//! Compares contacts that the device reduces: with all contacts that it finds, with the contacts
+//! that the host keeps of these, and with distances from the hull in `f64`.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
@@ -13,12 +14,14 @@ use tesdf::collide::{
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_gpu::{Capacities, Detector, DetectorOptions, Device, GpuError, Memory};
 
-/// How far above the true error the reported one may be, as a share of it, and of a unit force: steps towards vertices end, or get slow, before the least.
+/// The reported error may exceed the true error by this factor, and by this share of a unit force.
+/// Steps toward vertices end, or become slow, before the minimum.
 const LOOSE: f64 = 1.25;
 const SLOW: f64 = 5e-4;
-/// What rounding adds, as a share of 1 + extent / length.
+/// Error by rounding, relative to 1 + extent / length.
 const ROUNDING: f64 = 2e-5;
-/// How much more may be lost than the host loses of the same contacts, and the error from which on it counts: 1.87 was found.
+/// The device may lose this many times the error of the host, where the error is above `LITTLE`.
+/// The largest ratio found was 1.87.
 const WORSE: f64 = 3.0;
 const LITTLE: f64 = 5e-3;
 
@@ -43,7 +46,8 @@ fn by_pair(contacts: &[Contact]) -> BTreeMap<Pair, Vec<Contact>> {
     pairs
 }
 
-/// Everything that a reduction promises, with each of several numbers per pair. How many pairs had contacts to lose.
+/// Checks all guarantees of a reduction for each number of contacts per pair. Returns the number of
+/// pairs that lost contacts.
 fn hold(scene: &Scene, options: &CollideOptions, numbers: &[u32]) -> usize {
     let mut pairs = 0;
     let (all, mut detector) = detected(scene, options, DetectorOptions::default());
@@ -61,7 +65,7 @@ fn hold(scene: &Scene, options: &CollideOptions, numbers: &[u32]) -> usize {
     pairs
 }
 
-/// By how much more is lost than the host would lose, at most.
+/// The largest ratio of the error on the device to the error on the host.
 fn is_good(scene: &Scene, all: &Contacts, reduced: &Contacts, per_pair: u32) -> f64 {
     let pairs = by_pair(all.as_slice());
     let kept = by_pair(reduced.as_slice());
@@ -89,7 +93,7 @@ fn is_good(scene: &Scene, all: &Contacts, reduced: &Contacts, per_pair: u32) -> 
             continue;
         }
         assert!(kept.len() <= per_pair as usize);
-        // In the same order, so one pass finds all.
+        // The kept contacts are in the order of all contacts, so one pass finds them.
         let mut rest = all.iter();
         assert!(kept.iter().all(|c| rest.any(|x| x == c)), "a contact that is none");
         let deepest =
@@ -141,7 +145,7 @@ fn pairs_of_bodies() {
     assert!(reduced >= 20, "{reduced} reductions");
 }
 
-/// Brackets and cubes in worlds of their own, all simple shapes in the last.
+/// Brackets and cubes in worlds of their own, and all simple shapes in the last world.
 fn worlds(count: u32, random: &mut Random) -> Scene {
     let (bracket, cube) = (body("l_bracket"), body("cube"));
     let mut scene = Scene::new();
@@ -182,7 +186,8 @@ fn many_worlds() {
     hold(&worlds(1, &mut random), &exact, &[6]);
 }
 
-/// As many launches as for one pair, the same contacts whatever buffers were at first, and the name of the one that is too small.
+/// The number of launches is that of one pair. The contacts do not depend on the initial
+/// capacities. The error names the buffer that is too small.
 #[test]
 fn buffers_grow_or_say_what_they_need() {
     let mut random = Random(4);
@@ -198,7 +203,7 @@ fn buffers_grow_or_say_what_they_need() {
     assert_eq!((grown.as_slice(), &grown.reductions), (expected.as_slice(), &expected.reductions));
     assert!(detector.report().passes > 1);
     assert_eq!(detector.report().launches, launches);
-    // Less comes back than without a reduction, from the same detector.
+    // The same detector reads fewer bytes back with a reduction than without.
     let read = detector.report().read;
     let whole = detector.detect(&scene, &all).expect("detects");
     assert!(whole.reductions.is_empty() && whole.len() > expected.len());
@@ -221,7 +226,8 @@ fn buffers_grow_or_say_what_they_need() {
     assert!(detector.detect(&scene, &all).is_ok());
 }
 
-/// A corner that several faces have, and a ball: contacts at one point, up to rounding, or one contact.
+/// A corner that several faces share, and a ball: the contacts are at one point up to rounding, or
+/// there is one contact.
 #[test]
 fn contacts_at_one_point() {
     let cube = body("cube");

@@ -1,4 +1,4 @@
-//! Contacts of the device against those of the host.
+//! Compares contacts of the device with those of the host.
 #![allow(dead_code, reason = "each test program uses its part")]
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,29 +7,30 @@ use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 use tesdf_gpu::{Detector, DetectorOptions, Device};
 
-/// What `f32` may be off by, as a share of the larger body: rounding of poses, faces and distances.
+/// Largest error of `f32`, relative to the larger body: rounding of poses, faces and distances.
 pub const ROUNDING: f64 = 2e-6;
-/// Frank–Wolfe goes another way where two vertices are equally far down: minima of one face that differ by more than this, as a share of the
-/// larger body, are counted.
+/// Frank–Wolfe may step to another vertex when two are equally deep. A face counts as different
+/// when its minima differ by more than this, relative to the larger body.
 pub const ANOTHER_WAY: f64 = 1e-5;
-/// Most faces, as a share, that may be found at another depth, or on the other side of a threshold.
+/// Largest share of faces that may have another depth, or be on the other side of a threshold.
 pub const MOST_OTHERS: f64 = 0.01;
-/// Most cells, as a share, in which one of both alone sees a part: slivers at borders, and faces that lie in them.
+/// Largest share of cells in which only the host or only the device finds a part: slivers at
+/// borders, and faces that lie in borders.
 pub const MOST_CELLS: f64 = 0.02;
 
-/// The device of `TESDF_DEVICE`, else the best there is.
+/// The device that `TESDF_DEVICE` names, or the best device.
 pub fn device() -> Device {
     Device::choose(None).expect("a device: `.ci/vulkan.sh` installs the software one")
 }
 
-/// Contacts of a scene, and the detector that found them.
+/// The contacts of a scene, and the detector that found them.
 pub fn found(scene: &Scene, options: &CollideOptions, with: DetectorOptions) -> (Contacts, Detector) {
     let mut detector = Detector::new(&device(), scene, with).expect("fits");
     let contacts = detector.detect(scene, options).expect("detects");
     (contacts, detector)
 }
 
-/// Signed distance and gradient of a shape, in its frame.
+/// Signed distance of a shape, in its frame.
 pub fn exact(shape: &Shape, p: DVec3) -> f64 {
     match shape {
         Shape::Mesh(asset) => asset.query_by_tree(p).signed_distance,
@@ -45,19 +46,20 @@ pub fn exact(shape: &Shape, p: DVec3) -> f64 {
     }
 }
 
-/// Of an instance, at a point of the world.
+/// Signed distance of an instance at a point of the world.
 pub fn field(scene: &Scene, id: InstanceId, p: DVec3) -> f64 {
     let instance = scene.instance(id).expect("it is there");
     let shape = scene.shape(instance.shape).expect("it is there");
     instance.scale * exact(shape, instance.placement().to_shape(p))
 }
 
-/// A contact says what the field says, whoever found it.
+/// Checks a contact against the exact field.
 pub fn is_true(scene: &Scene, c: &Contact, size: f64) {
     let (a, b) = (c.instance_a, c.instance_b);
     let instance = scene.instance(a).expect("it is there");
     let shape = scene.shape(instance.shape).expect("it is there");
-    // Of what is round the core was measured, which may be anywhere inside.
+    // For round shapes, the detection measures the core, and its nearest point may be anywhere
+    // inside.
     if matches!(shape, Shape::Sphere { .. } | Shape::Capsule { .. }) {
         return;
     }
@@ -76,7 +78,7 @@ pub fn is_true(scene: &Scene, c: &Contact, size: f64) {
     assert!(ahead.distance(c.point_a) < 3.0 * ROUNDING * size, "{c:?}: normal");
 }
 
-/// The least distance of each part of a direction.
+/// The least distance of each part of an ordered pair.
 pub fn least(contacts: &[Contact]) -> BTreeMap<(InstanceId, InstanceId, u32), f64> {
     let mut least = BTreeMap::new();
     for c in contacts {
@@ -86,14 +88,14 @@ pub fn least(contacts: &[Contact]) -> BTreeMap<(InstanceId, InstanceId, u32), f6
     least
 }
 
-/// Parts that touch, and those of them that were found otherwise.
+/// The number of touching parts, and of those with different results on device and host.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Compared {
     pub touching: usize,
     pub others: usize,
     /// Contacts by part and cell.
     pub cells: usize,
-    /// Of those, what one of both has alone.
+    /// Contacts by part and cell that only one side finds.
     pub differing: usize,
 }
 
@@ -105,7 +107,7 @@ impl Compared {
         self.differing += more.differing;
     }
 
-    /// Enough was compared, and few were otherwise.
+    /// Checks that at least `least` parts were compared, and that few differ.
     pub fn is_good(self, least: usize) {
         println!("{self:?}");
         assert!(self.touching >= least, "{self:?}; expected {least} that touch at least");
@@ -116,7 +118,7 @@ impl Compared {
     }
 }
 
-/// Compares all of a scene.
+/// Compares all contacts of a scene.
 pub fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
     let (device, _) = found(scene, options, DetectorOptions::default());
     let most = 1 + device.len() / 1000;
@@ -124,7 +126,7 @@ pub fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
     hold_against(scene, options, size, &device)
 }
 
-/// Compares contacts of a device with all of a scene.
+/// Compares the given contacts of a device with all contacts of a scene on the host.
 pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: &Contacts) -> Compared {
     let host = detect(scene, options).expect("a good scene");
     let (on_host, on_device) = (least(host.as_slice()), least(device.as_slice()));
@@ -139,7 +141,7 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
                 assert!((h - d).abs() < ROUNDING * size, "node {key:?}: {d} instead of {h}");
             }
             (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
-            // Without the filter only what is at the contact distance may be lost.
+            // Without the filter, only a part at the contact distance may be missing on one side.
             _ => {
                 assert!(
                     is_close || options.cos_theta.is_some(),
@@ -149,7 +151,7 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
             }
         }
     }
-    // Cells: those of one part may differ by slivers at their borders.
+    // The cells of a part may differ by slivers at their borders.
     let cells = |c: &Contacts| {
         c.iter().map(|c| (c.instance_a, c.instance_b, c.feature.a, c.tet_b)).collect::<BTreeSet<_>>()
     };
@@ -158,7 +160,7 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
     Compared { touching: keys.len(), others, cells: h.len(), differing }
 }
 
-/// All modes of detection, for bodies of a size.
+/// All modes of detection, for bodies of diagonal `size`.
 pub fn each_mode(size: f64) -> [CollideOptions; 4] {
     let face = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(Mode::Face) };
     [

@@ -1,8 +1,11 @@
-// The part of CUDA's driver and of NVRTC that this crate calls, on the CPU: what it does with them is tested without a GPU.
+// The functions of CUDA's driver and of NVRTC that this crate calls, on the processor. They test
+// the use of CUDA without a GPU. A CUDA device behaves differently in timing, parallelism and
+// memory.
 //
-// "Machine code" is the path of a shared library, which the C++ compiler makes of a kernel's text. Threads of a block are fibers, each run to its
-// next barrier; a barrier that some of them never reach ends the process. Buffers lie right before memory that nothing may touch, so a kernel
-// that reads or writes past one ends it, too.
+// The "machine code" of a kernel is the path of a shared library, which the C++ compiler makes from
+// the kernel's text. The threads of a block are fibers. Each fiber runs to its next barrier. When
+// some threads never reach a barrier, the process ends. Each buffer lies directly before protected
+// memory, so a read or write past its end also ends the process.
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -21,7 +24,7 @@
 
 struct uint3 { unsigned x, y, z; };
 
-// Any that are told apart from others.
+// Handles: any distinct values.
 static void *const CONTEXT = (void *)1, *const STREAM = (void *)2, *const POOL = (void *)3;
 static const int INVALID = 1, NO_CONTEXT = 201, NOT_FOUND = 500;
 
@@ -41,7 +44,7 @@ CUDA int cuDeviceGet(int *device, int index) { *device = index; return index == 
 CUDA int cuDeviceGetName(char *name, int size, int) { snprintf(name, size, "CUDA on the CPU"); return 0; }
 CUDA int cuDeviceTotalMem_v2(size_t *bytes, int) { *bytes = size_t(1) << 32; return 0; }
 CUDA int cuDeviceGetAttribute(int *value, int attribute, int) {
-    // Multiprocessors, compute capability 9.0, shared memory of a block, memory pools.
+    // Attributes: multiprocessors, compute capability 9.0, shared memory per block, memory pools.
     static const std::map<int, int> attributes = {{16, 3}, {75, 9}, {76, 0}, {97, 227 << 10}, {115, 1}};
     auto found = attributes.find(attribute);
     if (found == attributes.end()) return INVALID;
@@ -61,7 +64,7 @@ CUDA int cuMemAllocAsync(uint64_t *pointer, size_t bytes, void *stream) {
     const size_t page = sysconf(_SC_PAGESIZE), all = (bytes + page - 1) / page * page + 2 * page;
     char *begin = (char *)mmap(nullptr, all, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     if (begin == MAP_FAILED || mprotect(begin + page, all - 2 * page, PROT_READ | PROT_WRITE) != 0) return 2;
-    // Not zeros, so that what nobody wrote shows.
+    // Filled with a pattern other than zero, so that reads of unwritten memory are noticed.
     memset(begin + page, 0xCD, all - 2 * page);
     *pointer = (uint64_t)(begin + all - page - bytes) & ~uint64_t(15);
     taken[*pointer] = {begin, all};
@@ -130,7 +133,7 @@ CUDA int cuModuleGetFunction(void **function, void *module, const char *name) {
     return whole ? 0 : NOT_FOUND;
 }
 CUDA int cuFuncSetAttribute(void *, int, int) { return 0; }
-// Few, so that the loop of an indirect launch runs more than once.
+// A small number, so that the loop of an indirect launch runs more than once.
 CUDA int cuOccupancyMaxActiveBlocksPerMultiprocessor(int *blocks, void *, int, size_t) { *blocks = 2; return 0; }
 
 enum class Fiber { Ready, Done };
@@ -219,7 +222,8 @@ static void replace_all(std::string &text, const std::string &from, const std::s
         text.replace(at, end - at, with_from + inner + with_to);
     }
 }
-// The kernel as C++, and a function that calls it with CUDA's pointers to its arguments.
+// Converts a kernel to C++, and adds a function that calls it with CUDA's pointers to its
+// arguments.
 static std::string as_cpp(std::string text) {
     replace_all(text, "extern __shared__ __align__(4) char ", "[];", "char* const ", " = cuda_shared;");
     replace_all(text, "extern __shared__ __align__(16) char ", "[];", "char* const ", " = cuda_shared;");

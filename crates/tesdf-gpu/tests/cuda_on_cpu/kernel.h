@@ -1,11 +1,12 @@
-// What a kernel finds on a GPU. Put before the text of a kernel, which is then compiled as C++.
+// Definitions that a kernel finds on a GPU. They come before the text of a kernel, which is then
+// compiled as C++.
 typedef unsigned long size_t;
 struct uint3 { unsigned x, y, z; };
 extern "C" {
 uint3 threadIdx, blockIdx, gridDim, blockDim;
 char* cuda_shared;
 void (*cuda_sync)();
-// The word that the lane `other` of the same plane gives.
+// Returns the word of the lane `other` of the same subgroup.
 unsigned (*cuda_exchange)(unsigned word, unsigned other);
 }
 #define warpSize 32u
@@ -15,7 +16,7 @@ unsigned (*cuda_exchange)(unsigned word, unsigned other);
 #define __forceinline__ inline
 #define __launch_bounds__(...)
 #define __syncthreads() cuda_sync()
-// Groups run one after the other.
+// Blocks run one after the other.
 #define __threadfence()
 static inline int __clz(unsigned x) { return x ? __builtin_clz(x) : 32; }
 static inline unsigned __shfl_xor_sync(unsigned, unsigned word, unsigned mask) {
