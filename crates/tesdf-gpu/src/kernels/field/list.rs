@@ -1,20 +1,20 @@
-//! The faces that a cell lists: [`tesdf::asset::layout::List`] has the bytes.
+//! The faces that a cell lists. [`tesdf::asset::layout::List`] defines the bytes.
 use cubecl::prelude::*;
 use tesdf::asset::layout;
 
 use super::shapes::{Field, FieldExpand, LISTS, NONE, PALETTE_STARTS, PALETTES, PALETTES_HIGH};
 
-/// A list, ready to read faces from.
+/// A list from which faces can be read.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct List {
     /// Number of faces.
     pub count: u32,
-    /// Word where the bytes of the lists begin.
+    /// First word of the bytes of the lists.
     lists: u32,
-    /// Byte of the first slot or face.
+    /// Byte of the first palette slot, or of the first face.
     first: u32,
-    /// Where the palette begins among the palette faces; [`NONE`] when faces are written out.
+    /// Start of the palette among the palette faces; [`NONE`] when the list stores faces directly.
     palette: u32,
 }
 
@@ -22,7 +22,7 @@ const NO_PALETTE: u32 = layout::NO_PALETTE as u32;
 
 #[cube]
 impl Field<'_> {
-    /// The list at a byte.
+    /// Reads the header of the list at a byte.
     pub fn list(self, offset: u32) -> List {
         let lists = self.entry(LISTS);
         let number = self.half(lists, offset);
@@ -38,7 +38,7 @@ impl Field<'_> {
         List { count, lists, first, palette }
     }
 
-    /// Position of face `i` of a list.
+    /// Index of the `i`-th face of a list.
     pub fn listed(self, list: List, i: u32) -> u32 {
         let mut face = 0u32;
         if list.palette == NONE {

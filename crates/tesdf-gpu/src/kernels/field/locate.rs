@@ -1,15 +1,16 @@
-//! The cell that holds a point, by descending the bisection forest in barycentric coordinates, from a root of the cube or
-//! of a conforming domain.
+//! Finds the cell that holds a point. The search descends the bisection forest in barycentric
+//! coordinates, from a root of the cube or of a conforming domain.
 //!
-//! [`tesdf::domain::Cell`] has the rule. In `f32` a point is off by 2^-24 of the cube, which is far less than the margin
-//! of the lists: on a border a neighbour may be found instead, whose list is good there too.
+//! [`tesdf::domain::Cell`] defines the bisection rule. In `f32`, a point has an error of 2^-24 of
+//! the cube's side, which is far below the margin of the lists. At a border the search may find a
+//! neighbour instead. The list of the neighbour is valid there, too.
 use cubecl::prelude::*;
 use tesdf::asset::layout;
 
 use super::super::math::vector::{V3, v3};
 use super::shapes::{BOUND_UNIT, BOUNDS, Field, FieldExpand, INVERSE_SIDE, NODES, NONE};
 
-/// Barycentric coordinates in a cell.
+/// Barycentric coordinates of a point in a cell.
 #[derive(CubeType, CubeTypeMut, Clone, Copy, Debug, PartialEq)]
 #[expand(derive(Clone, Copy))]
 pub struct Lambda {
@@ -19,7 +20,7 @@ pub struct Lambda {
     pub l3: f32,
 }
 
-/// A cell of the forest: its word ([`tesdf::asset::layout::Node`]) and its number.
+/// A cell of the forest: its node word ([`tesdf::asset::layout::Node`]) and its number.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Cell {
@@ -28,7 +29,7 @@ pub struct Cell {
     pub number: u32,
 }
 
-/// The word of points outside of all roots.
+/// The node word for points outside of all roots.
 pub const NOT_OF_DOMAIN: u32 = layout::LEAF | layout::NOT_OF_DOMAIN << layout::CODE;
 const LEAF: u32 = layout::LEAF;
 const CODE: u32 = layout::CODE;
@@ -39,7 +40,7 @@ const LONG_CROSSING: u32 = layout::CROSSING + layout::LONG_WINDING;
 const FAR: u32 = layout::FAR;
 const OUT: u32 = layout::NOT_OF_DOMAIN;
 
-/// Whether a word is of a bisected cell; it then names the first child.
+/// Whether the cell of this node word is bisected. The word then has the number of the first child.
 #[cube]
 pub fn is_split(word: u32) -> bool {
     word & LEAF == 0u32
@@ -52,27 +53,28 @@ impl Cell {
         (self.word >> CODE) & 7u32
     }
 
-    /// The byte of the list; of a far cell 1 inside, 0 outside.
+    /// Byte at which the list begins. For a far cell: 1 inside, 0 outside.
     pub fn offset(self) -> u32 {
         self.word & OFFSET
     }
 
-    /// Whether all of the cell is inside, with a list or far from the surface.
+    /// Whether the whole cell is inside. It may have a list, or be a far cell.
     pub fn is_inside(self) -> bool {
         self.code() == INSIDE || (self.code() == FAR && self.offset() == 1u32)
     }
 
-    /// Whether the surface comes into the cell, or close to it.
+    /// Whether the surface passes through the cell or close to it.
     pub fn is_crossing(self) -> bool {
         self.code() >= CROSSING && self.code() <= LONG_CROSSING
     }
 
-    /// The winding number at the centroid of a crossing cell, unless it is written before the list.
+    /// The winding number at the centroid of a crossing cell. Valid when
+    /// [`has_long_winding`](Self::has_long_winding) is false.
     pub fn short_winding(self) -> u32 {
         self.code() - CROSSING
     }
 
-    /// Whether the winding number is written before the list.
+    /// Whether the winding number stands before the list.
     pub fn has_long_winding(self) -> bool {
         self.code() == LONG_CROSSING
     }
@@ -82,24 +84,24 @@ impl Cell {
         self.code() <= LONG_CROSSING
     }
 
-    /// Whether the point or cell is not of the domain.
+    /// Whether the point or cell is outside of the domain.
     pub fn is_out(self) -> bool {
         self.code() == OUT
     }
 
-    /// The number of a cell with a list, which contacts name; else [`NONE`].
+    /// The number by which contacts name the cell; [`NONE`] for a cell without a list.
     pub fn name(self) -> u32 {
         select(self.is_listed(), self.number, NONE)
     }
 }
 
-/// The cell of points outside of all roots.
+/// The cell for points outside of all roots.
 #[cube]
 pub fn no_cell() -> Cell {
     Cell { word: NOT_OF_DOMAIN.runtime(), number: NONE.runtime() }
 }
 
-/// The root that holds a point of the unit cube, by the order of its coordinates.
+/// The root that holds a point of the unit cube. It follows from the order of the coordinates.
 #[cube]
 pub fn root(u: V3) -> u32 {
     let xy = u.x >= u.y;
@@ -111,18 +113,18 @@ pub fn root(u: V3) -> u32 {
     select(xy && xz, x_first, select(yz && !xy, y_first, z_first))
 }
 
-/// The axes in the order in which a root walks them, as [`tesdf::domain::ROOTS`].
+/// The axes in the order of a root's edges, as in [`tesdf::domain::ROOTS`].
 #[cube]
 pub fn axes(root: u32) -> (u32, u32, u32) {
     let i = root / 2u32;
-    // The lower of the other two comes first in even roots.
+    // In even roots, the lower of the other two axes comes first.
     let low = select(i == 0u32, 1u32, 0u32);
     let high = select(i == 2u32, 1u32, 2u32);
     let even = root % 2u32 == 0u32;
     (i, select(even, low, high), select(even, high, low))
 }
 
-/// Coordinates in a root of the cube: root `r` walks the axes i, j, k.
+/// Coordinates of a point in a root of the cube. Root `r` follows the axes i, j, k.
 #[cube]
 pub fn in_root(u: V3, root: u32) -> Lambda {
     let (i, j, k) = axes(root);
@@ -132,7 +134,7 @@ pub fn in_root(u: V3, root: u32) -> Lambda {
 
 #[cube]
 impl Lambda {
-    /// Coordinate `k` (1 to 3).
+    /// Coordinate `k`, from 1 to 3.
     pub fn at(self, k: u32) -> f32 {
         select(k == 3u32, self.l3, select(k == 2u32, self.l2, self.l1))
     }
@@ -142,7 +144,8 @@ impl Lambda {
         self.l0 < self.at(k)
     }
 
-    /// Coordinates in child 0, or in child 1 when `second`, of a cell whose refinement edge ends at corner `k`.
+    /// Coordinates in child 0 (or in child 1 when `second` is true) of a cell whose refinement edge
+    /// ends at corner `k`.
     pub fn in_child(self, k: u32, second: bool) -> Lambda {
         let a = self.l0;
         let b = self.at(k);
@@ -150,7 +153,8 @@ impl Lambda {
         let middle = 2.0f32 * select(second, a, b);
         let is3 = k == 3u32;
         let is2 = k == 2u32;
-        // k = 3: kept 1 2 middle, or 1 2 kept middle; k = 2: kept 1 middle 3, or 1 kept middle 3; k = 1: kept middle 2 3.
+        // Order of the coordinates in child 0, and in child 1. k = 3: kept 1 2 middle, and 1 2 kept
+        // middle. k = 2: kept 1 middle 3, and 1 kept middle 3. k = 1: kept middle 2 3 in both.
         let shifted = second && k > 1u32;
         let l1_of_2 = select(second, kept, self.l1);
         let l1_of_3 = select(second, self.l2, self.l1);
@@ -163,7 +167,7 @@ impl Lambda {
         }
     }
 
-    /// The least coordinate.
+    /// The smallest coordinate.
     pub fn least(self) -> f32 {
         self.l0.min(self.l1).min(self.l2).min(self.l3)
     }
@@ -174,20 +178,20 @@ pub fn no_lambda() -> Lambda {
     Lambda { l0: 0.0f32, l1: 0.0f32, l2: 0.0f32, l3: 0.0f32 }
 }
 
-/// A point on its way down the forest.
+/// A point and its cell during the descent.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Descent {
     pub cell: Cell,
     /// Coordinates of the point in the cell.
     pub lambda: Lambda,
-    /// The corner that the cell's refinement edge ends at.
+    /// The corner at which the cell's refinement edge ends.
     pub k: u32,
 }
 
 #[cube]
 impl Descent {
-    /// To a child of a bisected cell.
+    /// Descends to a child of a bisected cell.
     pub fn descend(&mut self, field: Field<'_>, second: bool) {
         self.lambda = self.lambda.in_child(self.k, second);
         self.cell.number = self.cell.word + select(second, 1u32, 0u32);
@@ -196,7 +200,7 @@ impl Descent {
     }
 }
 
-/// The corner that the next refinement edge ends at.
+/// The corner at which the refinement edge of a child ends.
 #[cube]
 pub fn next_k(k: u32) -> u32 {
     select(k == 1u32, 3u32, k - 1u32)
@@ -204,17 +208,17 @@ pub fn next_k(k: u32) -> u32 {
 
 #[cube]
 impl Field<'_> {
-    /// Where a point lies in the cube, each coordinate from 0 to 1.
+    /// Coordinates of a point in the cube, from 0 to 1.
     pub fn in_cube(self, p: V3) -> V3 {
         p * self.number(INVERSE_SIDE) + v3(0.5f32, 0.5f32, 0.5f32)
     }
 
-    /// The word of a cell.
+    /// The node word of a cell.
     pub fn cell_word(self, number: u32) -> u32 {
         self.word(self.entry(NODES) + number)
     }
 
-    /// The cell of this number; outside of the domain for [`NONE`] and for simple shapes.
+    /// The cell with this number. For [`NONE`] and simple shapes: the cell outside of the domain.
     pub fn cell(self, number: u32) -> Cell {
         let mut word = NOT_OF_DOMAIN.runtime();
         if number != NONE && self.is_mesh() {
@@ -223,7 +227,7 @@ impl Field<'_> {
         Cell { word, number }
     }
 
-    /// The cell that holds a point, relative to the middle of the cube.
+    /// The cell that holds a point. The point is relative to the center of the cube.
     pub fn locate(self, p: V3) -> Cell {
         let mut at = Descent { cell: no_cell(), lambda: no_lambda(), k: 3u32 };
         if self.is_conforming() {
@@ -247,7 +251,7 @@ impl Field<'_> {
         at.cell
     }
 
-    /// No point of the cell has a signed distance below this; 0 where the solid may be.
+    /// Lower bound of the signed distance in a cell; 0 for a cell that may meet the solid.
     pub fn cell_bound(self, number: u32) -> f32 {
         let mut least = 0.0f32;
         if number != NONE {

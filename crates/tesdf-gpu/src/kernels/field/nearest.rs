@@ -1,4 +1,4 @@
-//! The nearest face to a point, of a list or of all faces.
+//! The nearest face to a point, among the faces of a list or all faces.
 use cubecl::prelude::*;
 use tesdf::asset::layout;
 
@@ -7,28 +7,28 @@ use super::list::List;
 use super::locate::Cell;
 use super::shapes::{BOXES, Bounds, CHILDREN, Field, FieldExpand, NONE};
 
-/// A face and how far it is.
+/// A face and its squared distance from a point.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Nearest {
-    /// Squared distance, with the part of the face in its low bits.
+    /// Squared distance. Its low bits name the nearest part of the face.
     pub squared: f32,
-    /// Position of the face; [`NONE`] without one.
+    /// Index of the face; [`NONE`] when there is none.
     pub face: u32,
 }
 
-/// Farther than anything.
+/// Larger than any squared distance.
 pub const FAR: f32 = 1e30;
 
-/// Levels that the stack of the face tree holds; an asset with a deeper tree is refused.
+/// Size of the stack for the face tree, in levels. An asset with a deeper tree cannot be uploaded.
 pub const TREE_DEPTH: usize = 48;
 
 const LEAF: u32 = layout::LEAF;
-/// Bits of the number of faces of a leaf.
+/// Bits for the number of faces of a leaf.
 const LEAF_COUNT: u32 = layout::TREE_LEAF as u32 - 1;
 const LEAF_COUNT_BITS: u32 = layout::TREE_LEAF.trailing_zeros();
 
-/// No face nearer than `squared`.
+/// The result before any face within the squared distance `squared` is found.
 #[cube]
 pub fn none_within(squared: f32) -> Nearest {
     Nearest { squared, face: NONE.runtime() }
@@ -36,7 +36,7 @@ pub fn none_within(squared: f32) -> Nearest {
 
 #[cube]
 impl Nearest {
-    /// The nearer of two, of equally near ones that of the lower position.
+    /// The nearer of two faces. At equal distances, the face with the lower index.
     pub fn or(self, other: Nearest) -> Nearest {
         let nearer =
             other.squared < self.squared || (other.squared == self.squared && other.face < self.face);
@@ -46,7 +46,7 @@ impl Nearest {
         }
     }
 
-    /// The same, but the first of equally near ones stays.
+    /// The nearer of two faces. At equal distances, the first.
     fn or_nearer(self, other: Nearest) -> Nearest {
         let nearer = other.squared < self.squared;
         Nearest {
@@ -56,7 +56,8 @@ impl Nearest {
     }
 }
 
-/// A child of a node of the face tree, [`tesdf::asset::layout::TreeChild`]: a node, or the faces of a leaf.
+/// A child of a node of the face tree ([`tesdf::asset::layout::TreeChild`]): a node, or the faces
+/// of a leaf.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct TreeChild {
@@ -80,7 +81,7 @@ impl TreeChild {
     }
 }
 
-/// Both boxes of a node of the face tree.
+/// The boxes of both children of a node of the face tree.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct NodeBoxes {
@@ -88,7 +89,7 @@ pub struct NodeBoxes {
     pub right: Bounds,
 }
 
-/// Squared distance to a box.
+/// Squared distance from a point to a box.
 #[cube]
 fn to_box(p: V3, bounds: Bounds) -> f32 {
     let outside = outside_box(p, bounds.low, bounds.high);
@@ -97,12 +98,13 @@ fn to_box(p: V3, bounds: Bounds) -> f32 {
 
 #[cube]
 impl Field<'_> {
-    /// The squared distance to a face.
+    /// Squared distance from a point to a face.
     fn to_face(self, position: u32, p: V3) -> Nearest {
         Nearest { squared: self.face(position).distance_squared(p), face: position }
     }
 
-    /// Of every `step`-th face of a list from `first` on; of equally near ones the lowest position.
+    /// The nearest face among every `step`-th face of a list, starting at `first`. At equal
+    /// distances, the face with the lowest index.
     pub fn nearest_in_list(self, list: List, first: u32, step: u32, p: V3) -> Nearest {
         let mut found = none_within(FAR.runtime());
         let mut i = first;
@@ -113,7 +115,7 @@ impl Field<'_> {
         found
     }
 
-    /// Both boxes of a node of the face tree.
+    /// The boxes of both children of a node of the face tree.
     pub fn node_boxes(self, node: u32) -> NodeBoxes {
         let at = self.entry(BOXES) + 3u32 * node;
         let (r, s, t) = (self.row(at), self.row(at + 1u32), self.row(at + 2u32));
@@ -129,7 +131,8 @@ impl Field<'_> {
         }
     }
 
-    /// Of all faces, by the face tree; faces farther than `limit` (squared) need not be found.
+    /// The nearest of all faces, by the face tree. The search may miss faces whose squared distance
+    /// is above `limit`.
     pub fn nearest_in_tree(self, p: V3, limit: f32) -> Nearest {
         let children = self.entry(CHILDREN);
         let mut words = Array::<u32>::new(TREE_DEPTH);
@@ -167,7 +170,7 @@ impl Field<'_> {
         found
     }
 
-    /// The nearest face to a point of a cell; none of a simple shape.
+    /// The nearest face to a point of a cell. A simple shape has no faces.
     pub fn nearest(self, cell: Cell, p: V3) -> Nearest {
         let mut found = none_within(FAR.runtime());
         if self.is_mesh() {

@@ -5,28 +5,29 @@ use super::super::math::pose::{FarPoint, pose};
 use super::super::math::vector::{Row, V3, from_bits, pick, row_of, to_bits, v3, xyz, zero};
 use super::shapes::Shapes;
 
-/// Rows of an answer: distance and gradient, closest point; in the field's frame.
+/// Rows of an answer in the field's frame: gradient and distance, closest point.
 pub const ANSWER_ROWS: u32 = 2;
 
-/// Instances that are queried.
+/// The instances of a query.
 #[derive(CubeType, CubeLaunch)]
 pub struct Instances {
-    /// Their poses.
+    /// The poses of the instances.
     pub poses: Box<[Row]>,
-    /// Their shapes.
+    /// The index of each instance's shape.
     pub shapes: Box<[u32]>,
 }
 
-/// Answers of one launch.
+/// The answers of a launch.
 #[derive(CubeType, CubeLaunch)]
 pub struct Answers {
-    /// [`ANSWER_ROWS`] each: gradient and distance, closest point.
+    /// [`ANSWER_ROWS`] rows for each answer: gradient and distance, closest point.
     pub rows: Box<[Row]>,
-    /// Positions of the nearest faces.
+    /// Index of the nearest face for each answer.
     pub faces: Box<[u32]>,
 }
 
-/// Pairs of an instance and a point, point by point, that a launch answers.
+/// The answers of a launch, as a range of all pairs of an instance and a point. The pairs are
+/// ordered by instance, then by point.
 #[derive(CubeType, CubeLaunch)]
 pub struct Batch {
     pub points: u32,
@@ -34,7 +35,8 @@ pub struct Batch {
     pub count: u32,
 }
 
-/// A thread for each point of each instance. `points` are two rows each: high, low.
+/// Computes one answer per thread. `points` has two rows for each point: the high and the low
+/// `f32`.
 #[cube(launch, create_dummy_kernel)]
 pub fn signed_distances(
     shapes: &Shapes,
@@ -58,7 +60,7 @@ pub fn signed_distances(
     }
 }
 
-/// Answers in the world, three numbers a vector.
+/// Answers in the world frame. A vector takes three numbers.
 #[derive(CubeType, CubeLaunch)]
 pub struct WorldAnswers {
     pub distances: Box<[f32]>,
@@ -67,7 +69,8 @@ pub struct WorldAnswers {
     pub faces: Box<[u32]>,
 }
 
-/// A thread for each point of each instance, in `f32` alone. `points` are three numbers each, in the world.
+/// Computes one answer per thread, in `f32`. `points` has three numbers for each point, in the
+/// world frame.
 #[cube(launch, create_dummy_kernel)]
 pub fn world_distances(
     shapes: &Shapes,
@@ -104,13 +107,13 @@ fn put(numbers: &mut [f32], index: u32, finite: bool, v: V3) {
 const EXPONENT: u32 = 0x7F80_0000;
 const NAN: u32 = 0x7FC0_0000;
 
-/// By bits: a shader may assume that all numbers are finite.
+/// Tests the bits, because a shader may assume that all numbers are finite.
 #[cube]
 fn is_finite(x: f32) -> bool {
     to_bits(x) & EXPONENT != EXPONENT
 }
 
-/// The number, or NaN.
+/// The number `x`, or NaN when `is_number` is false.
 #[cube]
 fn or_nan(is_number: bool, x: f32) -> f32 {
     from_bits(select(is_number, to_bits(x), NAN))

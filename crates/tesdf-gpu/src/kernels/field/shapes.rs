@@ -1,93 +1,97 @@
-//! The shapes of a scene in buffers, and the field of one of them. The table's layout is defined here, for the host that
-//! writes and the kernels that read.
+//! The shapes of a scene in buffers, and the field of a shape. This file defines the layout of the
+//! table for the host, which writes it, and for the kernels, which read it.
 use cubecl::prelude::*;
 
 use super::super::math::triangle::{Face, ROWS as FACE_ROWS, read_face};
 use super::super::math::vector::{Row, V3, from_bits, last, pick, v3, xyz};
 
-/// The shapes of a scene: three buffers, shared by all instances.
+/// The shapes of a scene in three buffers. All instances share them.
 #[derive(CubeType, CubeLaunch)]
 pub struct Shapes {
-    /// [`STRIDE`] words a shape: its kind and where its arrays begin.
+    /// [`STRIDE`] words for each shape: its kind, and the starts of its arrays.
     pub table: Box<[u32]>,
-    /// Arrays of words, of bytes and of half words.
+    /// Arrays of words, bytes and half words.
     pub words: Box<[u32]>,
     /// Arrays of rows.
     pub rows: Box<[Row]>,
 }
 
-/// Words of a shape in the table.
+/// Words in the table for each shape.
 pub const STRIDE: u32 = 40;
 
-/// [`MESH`], [`PLANE`], [`BOX`] or [`ROUND`].
+/// The kind: [`MESH`], [`PLANE`], [`BOX`] or [`ROUND`].
 pub const KIND: u32 = 0;
-/// Word of the forest's first root.
+/// Word of the node of the forest's first root.
 pub const NODES: u32 = 1;
-/// Word where the bytes of the lists begin.
+/// First word of the bytes of the lists.
 pub const LISTS: u32 = 2;
-/// Word of the first palette's start.
+/// Word with the start of the first palette.
 pub const PALETTE_STARTS: u32 = 3;
-/// Word where the low halves of the palette faces begin.
+/// First word of the low halves of the palette faces.
 pub const PALETTES: u32 = 4;
-/// Word where their high bytes begin; [`NONE`] without them.
+/// First word of the high bytes of the palette faces; [`NONE`] when there are none.
 pub const PALETTES_HIGH: u32 = 5;
-/// Word where the bytes of the cell bounds begin.
+/// First word of the bytes of the cell bounds.
 pub const BOUNDS: u32 = 6;
-/// Word of the face tree's first child.
+/// Word of the first child in the face tree.
 pub const CHILDREN: u32 = 7;
 /// Row of the first face.
 pub const RECORDS: u32 = 8;
-/// Row of the face tree's first boxes, three rows a node.
+/// Row of the first boxes of the face tree. A node has three rows.
 pub const BOXES: u32 = 9;
 /// Row of the first meshlet's ball: center and radius.
 pub const MESHLETS: u32 = 10;
-/// Word of the first meshlet's first face and number of faces.
+/// Word of the first meshlet's faces. A meshlet has two words: first face and number of faces.
 pub const MESHLET_FACES: u32 = 11;
 /// Number of meshlets.
 pub const MESHLET_COUNT: u32 = 12;
 /// Number of faces.
 pub const FACE_COUNT: u32 = 13;
-/// 1 when every list is exact.
+/// 1 when every list is exact, otherwise 0.
 pub const EXACT_LISTS: u32 = 14;
 /// Side of the cube.
 pub const SIDE: u32 = 15;
-/// Inverse of the side of the cube.
+/// Inverse of the cube's side.
 pub const INVERSE_SIDE: u32 = 16;
-/// The distance that a byte of the cell bounds is squared and multiplied with.
+/// Unit of the cell bounds: a bound is this distance times the square of the byte.
 pub const BOUND_UNIT: u32 = 17;
-/// How far around the solid the domain reaches at least.
+/// Least distance around the solid up to which the domain reaches.
 pub const BAND: u32 = 18;
-/// Least corner of the surface's bounds, relative to the middle of the cube: three words.
+/// Minimum corner of the surface's bounds, relative to the center of the cube: three words.
 pub const LOW: u32 = 19;
-/// Greatest corner, likewise.
+/// Maximum corner, in the same way.
 pub const HIGH: u32 = 22;
-/// Half extents of a box; half height and radius of a capsule, of which a sphere has no height: three words.
+/// Three words: half extents of a box; or half height and radius of a capsule. A sphere has half
+/// height 0.
 pub const SIZES: u32 = 25;
-/// Row of the first root, [`tetrahedra::ROWS`](super::tetrahedra::ROWS) each.
+/// Row of the first root. Each root has [`tetrahedra::ROWS`](super::tetrahedra::ROWS) rows.
 pub const TETRAHEDRA: u32 = 28;
-/// Row of the first box of the tree over the tetrahedra of a conforming domain: least corner, greatest corner.
+/// Row of the first box in the tree over the tetrahedra of a conforming domain: minimum corner,
+/// maximum corner.
 pub const TREE_BOXES: u32 = 29;
-/// Word of its first node: the node after all that is below, and the tetrahedron of a leaf, else [`NONE`].
+/// Word of the first node in this tree. The first word of a node is the index after its last
+/// descendant. The second is the tetrahedron of a leaf, otherwise [`NONE`].
 pub const TREE: u32 = 30;
-/// Number of its nodes; 0 for the bisection domain.
+/// Number of nodes in this tree; 0 for the bisection domain.
 pub const TREE_NODES: u32 = 31;
 
-// Of conforming domains, whose vertices may move.
+// The following entries belong to conforming domains, whose vertices may move.
 
-/// Word of the three vertices of the first face.
+/// Word of the first face's vertices. A face has three.
 pub const FACE_VERTICES: u32 = 32;
-/// Word of the four vertices of the first tetrahedron.
+/// Word of the first tetrahedron's vertices. A tetrahedron has four.
 pub const TET_VERTICES: u32 = 33;
-/// Word of the levels of the face tree: see [`refit`](super::super::deform::refit::refit).
+/// First word of the levels of the face tree: see [`refit`](super::super::deform::refit::refit).
 pub const FACE_LEVELS: u32 = 34;
-/// Word of the levels of the tree over tetrahedra, likewise.
+/// First word of the levels of the tree over tetrahedra, in the same layout.
 pub const TREE_LEVELS: u32 = 35;
-/// Number of vertices, of the mesh and of the domain.
+/// Number of vertices of the mesh and the domain.
 pub const VERTEX_COUNT: u32 = 36;
-/// The lowest vertex that was moved to a position that is not finite or too far away; [`NONE`] when there is none.
+/// The lowest vertex that was moved to a position that is not finite or too far away; [`NONE`] when
+/// there is none.
 pub const BAD_VERTEX: u32 = 37;
-/// Row of a ball inside of the shape: center and radius. The radius is 0 without a ball, and negative once vertices have
-/// moved, as the center then need not be inside.
+/// Row of a ball inside the shape: center and radius. The radius is 0 when there is no ball. It is
+/// negative after vertices have moved, because the center may then be outside.
 pub const INNER_BALL: u32 = 38;
 
 /// No such array, face, cell or vertex.
@@ -102,19 +106,21 @@ pub const BOX: u32 = 2;
 /// A sphere or a capsule.
 pub const ROUND: u32 = 3;
 
-/// First bit of a face's owned corners, above the bits of [`SignHints`](tesdf::asset::layout::SignHints): the corners
-/// that no face before it has.
+/// First bit of the owned corners of a face. These bits lie above those of
+/// [`SignHints`](tesdf::asset::layout::SignHints). A face owns the corners that no face before it
+/// has.
 pub const OWNED_CORNERS: u32 = 16;
 
-/// Bits above those, with which the hints are a number from 1 to 2: a shader may read tiny numbers as zero.
+/// Bits above the owned corners. They make the hints, read as `f32`, a number from 1 to 2, because
+/// a shader may flush tiny numbers to zero.
 pub const HINTS: u32 = 0x3F80_0000;
 
-/// One shape: where its arrays lie in the buffers.
+/// The field of a shape: gives access to its arrays.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Field<'a> {
     shapes: &'a Shapes,
-    /// First word in the table.
+    /// First word of the shape in the table.
     entry: u32,
 }
 
@@ -144,27 +150,27 @@ impl Shapes {
 
 #[cube]
 impl Field<'_> {
-    /// A word of the table.
+    /// Word `at` of the shape in the table.
     pub fn entry(self, #[comptime] at: u32) -> u32 {
         self.shapes.table[(self.entry + at) as usize]
     }
 
-    /// The same as a number.
+    /// Entry `at` of the table as an `f32`.
     pub fn number(self, #[comptime] at: u32) -> f32 {
         from_bits(self.entry(at))
     }
 
-    /// Three of them.
+    /// Three entries of the table, from `at` on, as a vector.
     pub fn vector(self, #[comptime] at: u32) -> V3 {
         v3(self.number(at), self.number(at + 1), self.number(at + 2))
     }
 
-    /// A word of the arrays.
+    /// Word `at` of the arrays.
     pub fn word(self, at: u32) -> u32 {
         self.shapes.words[at as usize]
     }
 
-    /// A row of the arrays.
+    /// Row `at` of the arrays.
     pub fn row(self, at: u32) -> Row {
         self.shapes.rows[at as usize]
     }
@@ -174,7 +180,7 @@ impl Field<'_> {
         (self.word(start + at / 4u32) >> (8u32 * (at % 4u32))) & 255u32
     }
 
-    /// The half word at byte `at`, at any alignment.
+    /// The half word at byte `at` of the bytes that begin at word `start`. It needs no alignment.
     pub fn half(self, start: u32, at: u32) -> u32 {
         self.byte(start, at) | (self.byte(start, at + 1u32) << 8u32)
     }
@@ -183,22 +189,23 @@ impl Field<'_> {
         self.entry(KIND) == MESH
     }
 
-    /// Whether the roots are the tetrahedra of a conforming domain, not the six of the cube.
+    /// Whether the roots are the tetrahedra of a conforming domain. Otherwise they are the six
+    /// roots of the cube.
     pub fn is_conforming(self) -> bool {
         self.entry(TREE_NODES) > 0u32
     }
 
-    /// Whether distances of lists are those of the surface.
+    /// Whether distances to listed faces are distances to the surface.
     pub fn has_exact_lists(self) -> bool {
         self.entry(EXACT_LISTS) == 1u32
     }
 
-    /// The face at a position.
+    /// The face with this index.
     pub fn face(self, position: u32) -> Face {
         read_face(&self.shapes.rows, self.entry(RECORDS) + position * FACE_ROWS)
     }
 
-    /// The bounds of a body that has an end: not of a plane.
+    /// The bounds of a bounded shape. A plane has none.
     pub fn bounds(self) -> Bounds {
         let kind = self.entry(KIND);
         let sizes = self.vector(SIZES);
@@ -222,7 +229,7 @@ impl Field<'_> {
         Ball { center: xyz(row), radius: last(row) }
     }
 
-    /// The first face of a meshlet; simple shapes have one meshlet.
+    /// The first face of a meshlet. A simple shape has one meshlet.
     pub fn first_face(self, meshlet: u32) -> u32 {
         let mut face = 0u32;
         if self.is_mesh() {

@@ -5,10 +5,10 @@ use super::super::math::vector::{V3, pick, v3};
 use super::shapes::{BOX, Field, FieldExpand, KIND, PLANE, SIZES};
 use super::value::Value;
 
-/// No division by less.
+/// Smallest divisor.
 const LEAST: f32 = 1e-30;
 
-/// Distance and gradient, and the side of a box that is nearest.
+/// Distance and gradient, and the nearest side of a box.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Simple {
@@ -87,7 +87,7 @@ mod tests {
 
     use super::*;
 
-    /// As the processor's shapes, on their symmetry planes too.
+    /// The fields equal those of the processor, also on the shapes' symmetry planes.
     #[test]
     fn simple_shapes_are_those_of_the_processor() {
         let mut random = fastrand::Rng::with_seed(3);

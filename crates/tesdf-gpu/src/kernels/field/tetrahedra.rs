@@ -1,4 +1,5 @@
-//! The roots of the forest: six tetrahedra of a cube, or those of a conforming domain, which a tree of boxes finds.
+//! The roots of the forest: the six tetrahedra of the cube, or the tetrahedra of a conforming
+//! domain with a tree of boxes over them.
 use cubecl::prelude::*;
 
 use super::super::math::triangle::normal_of;
@@ -6,10 +7,11 @@ use super::super::math::vector::{Row, V3, last, pick, row_of, xyz, zero};
 use super::locate::{Lambda, no_lambda};
 use super::shapes::{Bounds, Field, FieldExpand, NONE, TETRAHEDRA, TREE, TREE_BOXES, TREE_NODES};
 
-/// Rows of a tetrahedron: corner, then gradients 1, 2, 3 and 0, the first four with the heights 0 to 3.
+/// Rows of a tetrahedron: corner 0 and height 0; gradients 1, 2 and 3, each with its height;
+/// gradient 0.
 pub const ROWS: u32 = 5;
 
-/// A tetrahedron in the local frame, relative to the middle of the cube.
+/// A tetrahedron in the local frame, relative to the center of the cube.
 #[derive(CubeType, Clone, Copy, Debug)]
 #[expand(derive(Clone, Copy))]
 pub struct Tetrahedron {
@@ -20,27 +22,30 @@ pub struct Tetrahedron {
     pub g1: V3,
     pub g2: V3,
     pub g3: V3,
-    /// Heights of the corners over the opposite sides; the first one is −1 for a flat tetrahedron, which holds no point.
+    /// Heights of the corners over the opposite sides. In a flat tetrahedron, which holds no point,
+    /// the first height is −1.
     pub h0: f32,
     pub h1: f32,
     pub h2: f32,
     pub h3: f32,
 }
 
-/// Of less height than this (local frame) a tetrahedron is flat: rounding of its corners may have turned it inside out.
+/// A tetrahedron with a smaller height (local frame) is flat, because rounding of its corners may
+/// have turned it inside out.
 const FLAT: f32 = 4e-7;
 
-/// A triangle is thin when its height is less than this share of its longest edge.
+/// A triangle is thin when its height is below this fraction of its longest edge.
 const THIN: f32 = 1e-3;
 
-/// No division by less.
+/// Smallest divisor.
 const LEAST: f32 = 1e-30;
 
-/// A point may be out of a tetrahedron by this (local frame) and still belong to it, when no other holds it: more than
-/// rounding takes away between two, also where a flat one is left out.
+/// A point that no tetrahedron holds belongs to a tetrahedron from which it is at most this far
+/// (local frame). The gaps that rounding leaves between two tetrahedra are smaller, also where a
+/// flat tetrahedron is skipped.
 pub const OUT: f32 = 5e-7;
 
-/// The tetrahedron of four corners, in either orientation.
+/// The tetrahedron with four corners, in either orientation.
 #[cube]
 pub fn tetrahedron_of(a: V3, b: V3, c: V3, d: V3) -> Tetrahedron {
     let n0 = normal_of(b, c, d);
@@ -51,7 +56,7 @@ pub fn tetrahedron_of(a: V3, b: V3, c: V3, d: V3) -> Tetrahedron {
     let h1 = n1.dot(b - a);
     let h2 = n2.dot(c - a);
     let h3 = n3.dot(d - a);
-    // Without a normal the height is 0.
+    // A side without area has a normal of zero, which gives a height of 0.
     let flat = h0.abs().min(h1.abs()).min(h2.abs()).min(h3.abs()) <= FLAT;
     Tetrahedron {
         corner: a,
@@ -66,7 +71,7 @@ pub fn tetrahedron_of(a: V3, b: V3, c: V3, d: V3) -> Tetrahedron {
     }
 }
 
-/// Of a coordinate that is 0 in a side and 1 at `height` over it.
+/// The gradient of a barycentric coordinate that is 0 on a side and 1 at `height` above it.
 #[cube]
 fn gradient(normal: V3, height: f32, flat: bool) -> V3 {
     normal * select(flat, 0.0f32, 1.0f32 / select(flat, 1.0f32, height))
@@ -74,12 +79,13 @@ fn gradient(normal: V3, height: f32, flat: bool) -> V3 {
 
 #[cube]
 impl Tetrahedron {
-    /// Whether it holds no point.
+    /// Whether the tetrahedron is flat and so holds no point.
     pub fn is_flat(self) -> bool {
         self.h0 < 0.0f32
     }
 
-    /// Barycentric coordinates; the error of each times its height is rounding of the point.
+    /// Barycentric coordinates of a point. The error of a coordinate, times its height, is the
+    /// rounding error of the point.
     pub fn lambda(self, p: V3) -> Lambda {
         let from = p - self.corner;
         Lambda {
@@ -90,13 +96,13 @@ impl Tetrahedron {
         }
     }
 
-    /// How far a point is inside of the nearest side; negative outside.
+    /// Distance from a point inside to the nearest side; negative outside.
     fn inside_by(self, l: Lambda) -> f32 {
         (l.l0 * self.h0).min(l.l1 * self.h1).min(l.l2 * self.h2).min(l.l3 * self.h3)
     }
 }
 
-/// Writes a tetrahedron; `at` is its first row.
+/// Writes a tetrahedron from row `at` on.
 #[cube]
 pub fn write_tetrahedron(rows: &mut [Row], at: u32, t: Tetrahedron) {
     let at = at as usize;
@@ -107,15 +113,17 @@ pub fn write_tetrahedron(rows: &mut [Row], at: u32, t: Tetrahedron) {
     rows[at + 4] = row_of(t.g0, 0.0f32);
 }
 
-/// A point, or a triangle with its bounds and its plane, to compare with boxes.
+/// A point or a triangle, with its bounds and its plane, for tests against boxes.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Around {
     pub bounds: Bounds,
-    /// Unit normal, and how high over the origin; zero without a plane.
+    /// Unit normal of the plane, and the plane's height above the origin; zero when there is no
+    /// plane.
     pub normal: V3,
     pub height: f32,
-    /// The possible error of the normal: what rounding moves corners by, over the height of the triangle.
+    /// Largest error of the normal: the rounding error of the corners, divided by the height of the
+    /// triangle.
     pub slope: f32,
 }
 
@@ -132,7 +140,7 @@ pub fn around_of(a: V3, b: V3, c: V3) -> Around {
     let size = across.length();
     let normal = across * select(size > 0.0f32, 1.0f32 / size.max(LEAST), 0.0f32);
     let longest = (b - a).length().max((c - a).length()).max((c - b).length());
-    // The plane of a thin triangle excludes nothing.
+    // The plane of a thin triangle is too inexact to exclude boxes.
     let is_thin = size <= THIN * longest * longest;
     let normal = pick(is_thin, zero(), normal);
     let slope = longest * (4e-7f32 * longest + OUT) / size.max(LEAST);
@@ -141,12 +149,13 @@ pub fn around_of(a: V3, b: V3, c: V3) -> Around {
 
 #[cube]
 impl Around {
-    /// A part of the triangle, with three corners of its own. Its plane is that of the whole: the larger, the surer.
+    /// A part of the triangle, with its own corners. It takes the plane of the whole triangle,
+    /// whose normal is more precise.
     pub fn part(self, a: V3, b: V3, c: V3) -> Around {
         Around { bounds: bounds_of(a, b, c), normal: self.normal, height: self.height, slope: self.slope }
     }
 
-    /// Whether a box may hold some of it.
+    /// Whether the box may hold a part of the triangle or point.
     fn may_meet(self, low: V3, high: V3) -> bool {
         let middle = (low + high) * 0.5f32;
         let reach = 0.5f32 * (high - low).dot(self.normal.abs());
@@ -161,29 +170,29 @@ impl Around {
     }
 }
 
-/// A step of a walk over the tree of a conforming domain, which visits nodes in order and leaves out the nodes below
-/// boxes that are elsewhere.
+/// A step of a walk over the tree of a conforming domain. The walk visits the nodes in order. It
+/// skips the descendants of a node whose box does not meet the search region.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Step {
-    /// The node that comes after this one.
+    /// The node to visit next.
     pub next: u32,
-    /// The tetrahedron when this is a leaf whose box is near, else [`NONE`].
+    /// The tetrahedron of a leaf whose box meets the search region; otherwise [`NONE`].
     pub tetrahedron: u32,
 }
 
-/// A root, and coordinates in it.
+/// A root, and the coordinates of a point in it.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Held {
-    /// [`NONE`] when none holds the point.
+    /// [`NONE`] when no root holds the point.
     pub root: u32,
     pub lambda: Lambda,
 }
 
 #[cube]
 impl Field<'_> {
-    /// Root `root` of the forest.
+    /// Reads root `root` of the forest.
     pub fn tetrahedron(self, root: u32) -> Tetrahedron {
         let at = self.entry(TETRAHEDRA) + root * ROWS;
         let (p, q, r, s) = (self.row(at), self.row(at + 1u32), self.row(at + 2u32), self.row(at + 3u32));
@@ -212,8 +221,8 @@ impl Field<'_> {
         }
     }
 
-    /// The tetrahedron of a conforming domain that holds a point: the first one found, or the one that the point is
-    /// least out of.
+    /// The tetrahedron of a conforming domain that holds a point: the first one found. When none
+    /// holds the point, the nearest one that [`OUT`] allows.
     pub fn root_holding(self, p: V3) -> Held {
         // A point has no plane.
         let around =
@@ -247,8 +256,8 @@ mod tests {
     use super::super::super::math::vector::v3;
     use super::*;
 
-    /// Coordinates times heights are the distances from the sides, in and around tetrahedra of any shape and orientation. (The coordinates alone are as
-    /// rough as a tetrahedron is thin.)
+    /// Coordinates times heights are the distances from the sides, in and around tetrahedra of any
+    /// shape and orientation. The coordinates alone lose precision in thin tetrahedra.
     #[test]
     fn heights_over_the_sides_are_right() {
         let mut random = fastrand::Rng::with_seed(9);
@@ -259,7 +268,7 @@ mod tests {
             let middle = in_cube();
             let thin = 10f64.powf(-f64::from(k / 4 % 5));
             let mut corners = [(); 4].map(|()| middle + size * in_cube());
-            // The last corner close to the plane of the others.
+            // The last corner is close to the plane of the others.
             let foot = (corners[0] + corners[1] + corners[2]) / 3.0;
             corners[3] = foot + thin * (corners[3] - foot);
             let corners: [Vec3; 4] = corners.map(|p| p.as_vec3());

@@ -1,7 +1,7 @@
 //! Eq. (4): the signed distance of a shape at a point, with its gradient.
 //!
-//! Points are in the frame of the field: for a mesh its local frame relative to the middle of the cube, for a simple
-//! shape its own.
+//! Points are in the frame of the field. For a mesh this is the local frame, moved to the center of
+//! the cube. For a simple shape it is the shape's frame.
 use cubecl::prelude::*;
 use tesdf::asset::layout::SignHint;
 
@@ -15,26 +15,27 @@ use super::shapes::{Field, FieldExpand};
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Value {
-    /// Signed distance.
+    /// Signed distance in the unit of the field.
     pub distance: f32,
-    /// Its gradient, unit.
+    /// Unit gradient of the signed distance.
     pub gradient: V3,
     /// The nearest point of the surface.
     pub point: V3,
-    /// Position of the nearest face; of a box the number of its side.
+    /// Index of the nearest face; for a box the number of the side.
     pub face: u32,
-    /// 0 that face, 1–3 its edges, 4–6 its corners.
+    /// The nearest feature of this face: 0 the face, 1–3 its edges, 4–6 its corners.
     pub feature: u32,
 }
 
-/// Below this distance the gradient is the normal of the nearest face.
+/// Below this distance, the gradient is the normal of the nearest face.
 const ON_SURFACE: f32 = 1e-6;
-/// Below this distance from a flat face no direction is left: its square is next to nothing in `f32`.
+/// Below this distance from a flat face, the direction to the point is unknown, because the square
+/// of the distance is nearly zero in `f32`.
 const ON_EDGE: f32 = 1e-15;
 
 #[cube]
 impl Field<'_> {
-    /// The value at a point of a mesh whose nearest face is known.
+    /// The value at a point of a mesh, when the nearest face is known.
     pub fn mesh_value(self, cell: Cell, p: V3, nearest: Nearest) -> Value {
         let f = self.face(nearest.face);
         let c = f.closest(p, part_of(nearest.squared));
@@ -44,7 +45,7 @@ impl Field<'_> {
         if cell.is_crossing() {
             let hint = (f.hints >> (2u32 * c.feature)) & 3u32;
             inside = hint == INSIDE || (hint == BY_PLANE && c.height < 0.0f32);
-            // A flat face has no height that could decide.
+            // A flat face has no plane from which the side could follow.
             if hint == BY_WINDING || (hint == BY_PLANE && flat) {
                 inside = self.winding(p) >= 1i32;
             }
@@ -52,7 +53,8 @@ impl Field<'_> {
         let sign = select(inside, -1.0f32, 1.0f32);
         let away = distance > ON_EDGE;
         let along = pick(away, c.outward * (sign / select(away, distance, 1.0f32)), f.across());
-        // In the plane of a face the height gives the direction better than the difference of two points.
+        // Over the interior of a face, the sign of the height gives the direction more precisely
+        // than the difference of two points.
         let by_height = select(c.feature == 0u32 && !same(c.height < 0.0f32, inside), -1.0f32, 1.0f32);
         let by_normal = !flat && (distance < ON_SURFACE || c.feature == 0u32);
         let normal = pick(distance < ON_SURFACE, f.normal, f.normal * by_height);
@@ -65,17 +67,17 @@ impl Field<'_> {
         }
     }
 
-    /// The value at a point of a cell, of any shape, when the nearest face is known.
+    /// The value at a point of a cell, when the nearest face is known. For any shape.
     pub fn value_near(self, cell: Cell, p: V3, nearest: Nearest) -> Value {
         if self.is_mesh() { self.mesh_value(cell, p, nearest) } else { self.simple_value(p) }
     }
 
-    /// The value at a point of a cell, of any shape.
+    /// The value at a point of a cell. For any shape.
     pub fn value_in_cell(self, cell: Cell, p: V3) -> Value {
         self.value_near(cell, p, self.nearest(cell, p))
     }
 
-    /// The value at any point of any shape.
+    /// The value at any point. For any shape.
     pub fn value(self, p: V3) -> Value {
         let mut cell = no_cell();
         if self.is_mesh() {
@@ -84,7 +86,7 @@ impl Field<'_> {
         self.value_in_cell(cell, p)
     }
 
-    /// Signed distance to the surface, also where lists are not exact.
+    /// Signed distance to the surface, exact up to rounding even when lists are truncated.
     pub fn exact_distance(self, p: V3) -> f32 {
         if self.is_mesh() {
             let cell = self.locate(p);

@@ -1,4 +1,5 @@
-//! The winding number of a point: that at the centroid of its cell, and the faces that the segment to there crosses.
+//! The winding number of a point: the winding number at the centroid of its cell, plus the signed
+//! crossings of the segment to the centroid with the listed faces.
 use cubecl::prelude::*;
 
 use super::super::math::vector::{V3, pick, same, v3};
@@ -13,7 +14,7 @@ struct Centered {
     centroid: V3,
 }
 
-/// One coordinate of the four corners of a cell.
+/// One coordinate of each of the four corners of a cell.
 #[derive(CubeType, Clone, Copy, Debug, PartialEq)]
 #[expand(derive(Clone, Copy))]
 pub struct Corners {
@@ -23,7 +24,8 @@ pub struct Corners {
     pub c3: f32,
 }
 
-/// Coordinate `axis` of the corners of a root of the unit cube that walks the axes i, j, k: 0, e_i, e_i + e_j, (1, 1, 1).
+/// Coordinate `axis` of the corners of a root of the unit cube. A root that follows the axes i, j,
+/// k has the corners 0, e_i, e_i + e_j and (1, 1, 1).
 #[cube]
 pub fn corners_of_root(root: u32, axis: u32) -> Corners {
     let (i, j, _k) = axes(root);
@@ -37,8 +39,9 @@ pub fn corners_of_root(root: u32, axis: u32) -> Corners {
 
 #[cube]
 impl Corners {
-    /// The corners of child 0, or of child 1 when `second`, of a cell whose refinement edge ends at corner `k`, in the
-    /// order of [`Cell::child_corners`](tesdf::domain::Cell::child_corners).
+    /// The corners of child 0 (or of child 1 when `second` is true) of a cell whose refinement edge
+    /// ends at corner `k`, in the order of
+    /// [`Cell::child_corners`](tesdf::domain::Cell::child_corners).
     pub fn of_child(self, k: u32, second: bool) -> Corners {
         let end = select(k == 3u32, self.c3, select(k == 2u32, self.c2, self.c1));
         let middle = 0.5f32 * (self.c0 + end);
@@ -56,7 +59,8 @@ impl Corners {
     }
 }
 
-/// The corners of a cell, in memory rather than in registers: in most evaluations no winding number is asked for.
+/// The corners of a cell, stored in memory to save registers: most evaluations need no winding
+/// number.
 #[derive(CubeType)]
 struct CellCorners {
     coordinates: Array<f32>,
@@ -104,8 +108,8 @@ impl CellCorners {
 impl Field<'_> {
     /// The winding number of a point.
     ///
-    /// The cell is the one that [`locate`](Self::locate) finds. On a border that may be another one than the caller's, with
-    /// another label and another centroid.
+    /// This uses the cell that [`locate`](Self::locate) finds. At a border, the caller may have
+    /// another cell, with another label and another centroid.
     pub fn winding(self, p: V3) -> i32 {
         let held = self.centered(p);
         let cell = held.cell;
@@ -134,8 +138,8 @@ impl Field<'_> {
         sum
     }
 
-    /// The cell that holds a point, found as [`locate`](Self::locate) finds it, and its centroid. A point that rounding
-    /// puts out of the cube is moved into it.
+    /// The cell that [`locate`](Self::locate) finds for a point, with its centroid. A point that
+    /// rounding has moved out of the cube is moved back into it.
     fn centered(self, p: V3) -> Centered {
         let free = self.in_cube(p);
         let u = v3(free.x.clamp(0.0f32, 1.0f32), free.y.clamp(0.0f32, 1.0f32), free.z.clamp(0.0f32, 1.0f32));
@@ -156,7 +160,8 @@ impl Field<'_> {
     }
 }
 
-/// 1 where the segment from `p` to `q` leaves the solid through the triangle, −1 where it enters, else 0.
+/// 1 when the segment from `p` to `q` leaves the solid through the triangle, −1 when it enters the
+/// solid there, otherwise 0.
 #[cube]
 pub fn crossing(p: V3, q: V3, a: V3, b: V3, c: V3) -> i32 {
     let normal = (b - a).cross(c - a);
@@ -171,12 +176,12 @@ pub fn crossing(p: V3, q: V3, a: V3, b: V3, c: V3) -> i32 {
     select(through, select(p_over, -1i32, 1i32), 0i32)
 }
 
-/// Whether the origin is on the left of the segment from `a` to `b`, seen along `along`; of a segment and its reverse
-/// exactly one is true.
+/// Whether the origin is to the left of the segment from `a` to `b`, seen along `along`. For a
+/// segment and its reverse, exactly one answer is true.
 ///
-/// Two faces at an edge ask for either: the same number has to answer both, or a segment through the edge would meet
-/// none of them, or both. Where the number is 0, as in symmetric bodies, the segment counts as moved a little in a fixed
-/// direction.
+/// Two faces at a common edge ask for both directions. The same number must decide both answers.
+/// Otherwise a segment through the edge could cross none of the faces, or both. When the number is
+/// 0, as happens in symmetric bodies, the segment counts as shifted slightly in a fixed direction.
 #[cube]
 fn is_left(along: V3, a: V3, b: V3) -> bool {
     let swapped = b.x < a.x || (b.x == a.x && (b.y < a.y || (b.y == a.y && b.z < a.z)));
@@ -191,7 +196,8 @@ fn is_left(along: V3, a: V3, b: V3) -> bool {
 mod tests {
     use super::*;
 
-    /// Segments through edges and corners of a cube, as its symmetry makes them, enter it once, and leave it once.
+    /// Segments through edges and corners of a cube, as symmetry produces them, enter it once and
+    /// leave it once.
     #[test]
     fn a_segment_through_an_edge_or_a_corner_crosses_once() {
         let corner = |k: u32| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit as f32 * 2.0 - 1.0);

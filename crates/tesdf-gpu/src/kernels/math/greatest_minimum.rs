@@ -1,10 +1,11 @@
-//! The greatest minimum of four linear functions over a triangle, each given by its values at the corners: a bound on
-//! the depth of a piece.
+//! The greatest minimum of four linear functions over a triangle: the largest value that the
+//! smallest function reaches. Each function is given by its values at the corners. The result
+//! bounds the depth of a piece.
 use cubecl::prelude::*;
 
 use super::vector::{V3, v3};
 
-/// Four linear functions.
+/// Four linear functions over a triangle.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Functions {
@@ -16,12 +17,13 @@ pub struct Functions {
 
 #[cube]
 impl Functions {
-    /// The least of the four at barycentric weights.
+    /// The smallest of the four values at barycentric weights.
     fn least_at(self, w: V3) -> f32 {
         self.f.dot(w).min(self.g.dot(w)).min(self.h.dot(w).min(self.k.dot(w)))
     }
 
-    /// The greater of `least` and the least of all four where two of them, with difference `d`, are equal on an edge.
+    /// Returns `least`, or the smallest of the four functions where two of them are equal on an
+    /// edge, whichever is greater. `d` is the difference of these two.
     fn on_edges(self, least: f32, d: V3) -> f32 {
         let mut greatest = least;
         if d.x * d.y < 0.0f32 {
@@ -39,7 +41,8 @@ impl Functions {
         greatest
     }
 
-    /// The same where three are equal inside, given two of their differences.
+    /// The same where three functions are equal inside the triangle. `d` and `e` are two of their
+    /// differences.
     fn inside(self, least: f32, d: V3, e: V3) -> f32 {
         let w = d.cross(e);
         let sum = w.x + w.y + w.z;
@@ -52,8 +55,9 @@ impl Functions {
         greatest
     }
 
-    /// The greatest minimum: at a corner, where two functions are equal on an edge, or three inside. Written out, as a
-    /// loop over pairs and triples would be most of the iterations of a search.
+    /// The greatest minimum. It is at a corner, where two functions are equal on an edge, or where
+    /// three are equal inside. The cases are written out, because loops over pairs and triples
+    /// would take most of the iterations of a search.
     pub fn greatest_minimum(self) -> f32 {
         let (fg, fh, fk) = (self.f - self.g, self.f - self.h, self.f - self.k);
         let (gh, gk, hk) = (self.g - self.h, self.g - self.k, self.h - self.k);

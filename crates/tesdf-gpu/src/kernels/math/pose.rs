@@ -1,12 +1,12 @@
-//! The frames of instances in the world.
+//! Poses of instances in the world.
 use cubecl::prelude::*;
 
 use super::vector::{Row, V3, last, xyz};
 
-/// Rows of a pose, as [`Placed::rows`](crate::collide::scene::placed::Placed::rows) writes them.
+/// Rows of a pose, in the layout of [`Placed::rows`](crate::collide::scene::placed::Placed::rows).
 pub const ROWS: u32 = 3;
 
-/// A rotation, as a quaternion.
+/// A rotation as a unit quaternion.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Rotation {
@@ -28,7 +28,7 @@ impl Rotation {
     }
 }
 
-/// A point as high + low `f32`, which keeps precision far from zero.
+/// A point as the sum of a high and a low `f32`, which keeps precision far from zero.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct FarPoint {
@@ -38,7 +38,7 @@ pub struct FarPoint {
 
 #[cube]
 impl FarPoint {
-    /// The vector to this point from another one.
+    /// The vector from `origin` to this point.
     pub fn from(self, origin: FarPoint) -> V3 {
         (self.high - origin.high) + (self.low - origin.low)
     }
@@ -50,7 +50,7 @@ impl FarPoint {
 pub struct Pose {
     pub origin: FarPoint,
     pub rotation: Rotation,
-    /// World units per unit of the frame.
+    /// Length of one unit of the frame, in world units.
     pub unit: f32,
 }
 
@@ -68,12 +68,12 @@ pub fn pose(rows: &[Row], number: u32) -> Pose {
 
 #[cube]
 impl Pose {
-    /// From the world to the frame.
+    /// Transforms a point from the world to the frame.
     pub fn to_local(self, p: FarPoint) -> V3 {
         self.rotation.rotate_back(p.from(self.origin)) * (1.0f32 / self.unit)
     }
 
-    /// From the frame to the world, rounded to `f32`.
+    /// Transforms a point from the frame to the world, rounded to `f32`.
     pub fn to_world(self, p: V3) -> V3 {
         (self.rotation.rotate(p * self.unit) + self.origin.low) + self.origin.high
     }
@@ -95,7 +95,8 @@ mod tests {
         Vec3::new(p.x, p.y, p.z).as_dvec3()
     }
 
-    /// As the processor's poses, also where `f32` alone would be off by whole bodies.
+    /// Points agree with those of the processor, also where `f32` alone would have errors as large
+    /// as bodies.
     #[test]
     fn poses_far_from_zero_keep_their_precision() {
         let mut random = fastrand::Rng::with_seed(2);
@@ -117,7 +118,7 @@ mod tests {
             let local = point();
             let world = origin + rotation * (unit * local);
             let found = f64_of(pose.to_local(far(world)));
-            // 2^-48 of the distance from zero is what two `f32` leave.
+            // Two `f32` leave an error of 2^-48 of the distance from zero.
             let bound = 2e-6 + 1e-13 * origin.length() / unit;
             assert!(found.distance(local) < bound, "{found} instead of {local}, {origin} away");
             let back = f64_of(pose.to_world(of(local.as_vec3())));

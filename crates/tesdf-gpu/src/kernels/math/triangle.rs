@@ -1,18 +1,20 @@
-//! The distance from a point to a face, by the record and the formulas of the `f32` kernel of `tesdf`.
+//! The distance from a point to a face, with the face record and the formulas of `tesdf`'s `f32`
+//! kernel.
 use cubecl::prelude::*;
 use tesdf::asset::FaceRecord;
 
 use super::vector::{Row, V3, from_bits, last, pick, row, to_bits, v3, xyz};
 
-/// Rows of a face: corner a, b − a, c − a, unit normal (zero for a flat face), inverse squared lengths of b − a,
-/// c − a and c − b, and the bits of its hints. `GpuShapes` writes them.
+/// Rows of a face, as `GpuShapes` writes them. They hold 16 numbers, one after the other: corner a,
+/// b − a, c − a, unit normal (zero for a flat face), inverse squared lengths of b − a, c − a and c
+/// − b, and the bits of the hints.
 pub const ROWS: u32 = 4;
 
-/// The low bits of a squared distance name the part of the face that is nearest: 0 the plane, 1 the edge a–b, 2 b–c,
-/// 3 c–a.
+/// The low bits of a squared distance that name the nearest part of the face: 0 the plane, 1 the
+/// edge a–b, 2 the edge b–c, 3 the edge c–a.
 pub const PART: u32 = 3;
 
-/// A face in the local frame, relative to the middle of the cube.
+/// A face in the local frame, relative to the center of the cube.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Face {
@@ -26,34 +28,36 @@ pub struct Face {
     pub hints: u32,
 }
 
-/// Faces of less height than this (local frame) are flat, as in `tesdf`.
+/// A face with a smaller height (local frame) is flat, as in `tesdf`.
 const FLAT: f32 = FaceRecord::LEAST_HEIGHT as f32;
-/// No division by less.
+/// Smallest divisor.
 const LEAST: f32 = 1e-30;
 
-/// The unit normal of a face; zero for a flat one.
+/// The unit normal of a face; zero for a flat face.
 ///
-/// It is the cross product of the two shorter edges, where rounding is least, made perpendicular to the longest edge,
-/// along which an error would count most.
+/// The cross product of the two shorter edges has the least rounding error. The result is made
+/// perpendicular to the longest edge, because an error along this edge would have the largest
+/// effect.
 #[cube]
 pub fn normal_of(a: V3, b: V3, c: V3) -> V3 {
     let (ab, ac, bc) = (b - a, c - a, c - b);
     let (u, v, w) = (ab.dot(ab), ac.dot(ac), bc.dot(bc));
     let ab_longest = u >= v && u >= w;
     let ac_longest = v >= w;
-    // All three are (b − a) × (c − a).
+    // Each of the three equals (b − a) × (c − a).
     let across = pick(ab_longest, ac.cross(bc), pick(ac_longest, ab.cross(bc), ab.cross(ac)));
     let along = pick(ab_longest, ab, pick(ac_longest, ac, bc));
     let longest = u.max(v).max(w);
     let off = across.dot(along) / longest.max(LEAST);
     let square = across + along * -off;
     let size = square.length();
-    // Not "less": corners that coincide have neither size nor length.
+    // `>` and not `>=`: when all corners coincide, both sides are 0, and the face must be flat.
     let spans = size > FLAT * longest.sqrt();
     square * select(spans, 1.0f32 / size.max(LEAST), 0.0f32)
 }
 
-/// The face of three corners, as [`FaceRecord`] makes it, without hints; in `f32` alone.
+/// The face with three corners, as [`FaceRecord`] makes it, but computed in `f32` and without
+/// hints.
 #[cube]
 pub fn face_of(a: V3, b: V3, c: V3) -> Face {
     let (ab, ac, bc) = (b - a, c - a, c - b);
@@ -66,7 +70,7 @@ fn inverse_of(squared: f32) -> f32 {
     select(squared > LEAST, 1.0f32 / squared.max(LEAST), 0.0f32)
 }
 
-/// Reads the face whose first row is `at`.
+/// Reads the face that begins at row `at`.
 #[cube]
 pub fn read_face(rows: &[Row], at: u32) -> Face {
     let at = at as usize;
@@ -81,7 +85,7 @@ pub fn read_face(rows: &[Row], at: u32) -> Face {
     }
 }
 
-/// Writes a face over the one whose first row is `at`, which keeps its hints.
+/// Overwrites the face that begins at row `at`. The hints stay.
 #[cube]
 pub fn rewrite_face(rows: &mut [Row], at: u32, f: Face) {
     let at = at as usize;
@@ -92,15 +96,17 @@ pub fn rewrite_face(rows: &mut [Row], at: u32, f: Face) {
     rows[at + 3] = row(f.inverse.x, f.inverse.y, f.inverse.z, hints);
 }
 
-/// Squared distance from a point to the segment from the origin to `along`; `foot` is where its foot is along that.
+/// Squared distance from a point to the segment from the origin to `along`. `foot` is the position
+/// of the point's projection, as a fraction of `along`.
 #[cube]
 fn to_edge(point: V3, along: V3, foot: f32) -> f32 {
     let outward = point + along * -foot.clamp(0.0f32, 1.0f32);
     outward.dot(outward)
 }
 
-/// Added to squared distances of flat faces, so that of a flat face and its neighbour, which are equally near, the one
-/// with a normal is the nearest. It is the square of 1e-7 (local frame), and only decides which face is named.
+/// Added to squared distances of flat faces. When a flat face and its neighbour are equally near,
+/// the neighbour, which has a normal, then counts as the nearest. The value is the square of 1e-7
+/// (local frame), and only affects which face is named.
 const AFTER: f32 = 1e-14;
 
 #[cube]
@@ -108,17 +114,17 @@ fn with_part(squared: f32, part: u32) -> f32 {
     from_bits((to_bits(squared) & comptime!(!PART)) | part)
 }
 
-/// The part of a face that a squared distance names.
+/// The part of a face that the low bits of a squared distance name.
 #[cube]
 pub fn part_of(squared: f32) -> u32 {
     to_bits(squared) & PART
 }
 
-/// Squared distances to the parts of a face.
+/// Squared distances from a point to the parts of a face.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Parts {
-    /// Whether the point is over the face, so that the plane is nearest.
+    /// Whether the projection of the point lies in the face, so that the plane is the nearest part.
     pub inside: bool,
     pub to_plane: f32,
     pub to_ab: f32,
@@ -126,17 +132,17 @@ pub struct Parts {
     pub to_ca: f32,
 }
 
-/// Where a face is nearest to a point.
+/// The nearest point of a face.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Closest {
-    /// The nearest point.
+    /// The nearest point, in the frame of the face.
     pub point: V3,
-    /// From it to the query point.
+    /// The vector from the nearest point to the query point.
     pub outward: V3,
-    /// 0 the face, 1–3 its edges, 4–6 its corners.
+    /// The nearest feature: 0 the face, 1–3 its edges, 4–6 its corners.
     pub feature: u32,
-    /// Height of the query point over the plane of the face.
+    /// Height of the query point above the plane of the face.
     pub height: f32,
 }
 
@@ -156,11 +162,13 @@ impl Face {
         let ap = p - self.a;
         let bp = ap - self.ab;
         let bc = self.ac - self.ab;
-        // Where the foot of the point is along each edge: 0 at the first corner, 1 at the second.
+        // Position of the point's projection along each edge: 0 at the first corner, 1 at the
+        // second.
         let on_ab = self.ab.dot(ap) * self.inverse.x;
         let on_ac = self.ac.dot(ap) * self.inverse.y;
         let on_bc = bc.dot(bp) * self.inverse.z;
-        // Beyond the tip of a needle both long sides are within rounding of the point: there the longest edge decides.
+        // Beyond the tip of a needle, rounding cannot tell on which side of the two long edges the
+        // point lies. There the longest edge decides.
         let ab_longest = self.inverse.x <= self.inverse.y && self.inverse.x <= self.inverse.z;
         let on_longest = select(ab_longest, on_ab, select(self.inverse.y <= self.inverse.z, on_ac, on_bc));
         let flat = self.is_flat();
@@ -182,7 +190,7 @@ impl Face {
         }
     }
 
-    /// The squared distance to a point, with the nearest part of the face in its low bits.
+    /// The squared distance to a point. The low bits name the nearest part of the face.
     pub fn distance_squared(self, p: V3) -> f32 {
         let to = self.parts(p);
         let to_edges =
@@ -190,11 +198,11 @@ impl Face {
         select(to.inside, with_part(to.to_plane, 0u32), to_edges)
     }
 
-    /// The nearest point of the part that [`distance_squared`](Self::distance_squared) named.
+    /// The nearest point of the part that [`distance_squared`](Self::distance_squared) has named.
     pub fn closest(self, p: V3, part: u32) -> Closest {
         let ap = p - self.a;
         let height = self.normal.dot(ap);
-        // Edge c–a runs from c, as its name says.
+        // Edge c–a starts at c.
         let from = pick(part == 2u32, ap - self.ab, pick(part == 3u32, ap - self.ac, ap));
         let along = pick(part == 2u32, self.ac - self.ab, pick(part == 3u32, self.ac.negated(), self.ab));
         let inverse =
@@ -212,11 +220,12 @@ impl Face {
         self.closest(p, part_of(self.distance_squared(p))).outward.length()
     }
 
-    /// A unit vector across a flat face, more or less: the gradient at a point on it.
+    /// A unit vector roughly perpendicular to a flat face: the gradient at a point on the face.
     pub fn across(self) -> V3 {
         let along = pick(self.inverse.x > 0.0f32, self.ab, self.ac);
         let flat_part = along.x * along.x + along.y * along.y;
-        // Squares of less are no longer exact; a point has no direction to be perpendicular to.
+        // Below this, squares lose precision. A point has no direction, so any vector is
+        // perpendicular to it.
         let is_steep = flat_part <= (0.01f32 * along.z * along.z).max(LEAST);
         let inverse = 1.0f32 / select(is_steep, 1.0f32, flat_part).sqrt();
         pick(is_steep, v3(1.0f32, 0.0f32, 0.0f32), v3(-inverse * along.y, inverse * along.x, 0.0f32))
@@ -234,10 +243,11 @@ mod tests {
     use crate::collide::scene::pack::without_nan;
     use crate::testing::{degenerate, exact};
 
-    /// What `f32` promises of a body with a diagonal of 0.5, the least that there is: 1e-6 of it.
+    /// Documented error of `f32` for a body with a diagonal of 0.5, the smallest diagonal in a
+    /// local frame: 1e-6 of it.
     const PROMISE: f64 = 5e-7;
 
-    /// The face as an image of an asset has it, and as moved vertices make it.
+    /// The face as the record of an asset gives it, and as moved vertices give it.
     fn faces(corners: [DVec3; 3]) -> [Face; 2] {
         let record = FaceRecord::new(&Triangle::new(corners), DVec3::ZERO, SignHints::default());
         let r = without_nan(*record.as_array());
@@ -247,7 +257,7 @@ mod tests {
         [image, face_of(a, b, c)]
     }
 
-    /// The distance and the closest point are those of a triangle, a segment or a point.
+    /// The distance and the closest point are those of the triangle, segment or point.
     fn assert_exact(corners: [DVec3; 3], p: DVec3) -> Result<(), TestCaseError> {
         let squared = exact::squared_distance(p, corners);
         let at = v3(p.x as f32, p.y as f32, p.z as f32);
@@ -267,7 +277,7 @@ mod tests {
         Ok(())
     }
 
-    // Within a ball of a diameter of about 1, as bodies are.
+    // The points lie in a ball with a diameter of about 1, as bodies do.
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
         #[test]
@@ -303,7 +313,8 @@ mod tests {
         Vec3::new(v.x, v.y, v.z).as_dvec3()
     }
 
-    /// The plane goes through all corners, needles and caps included, and looks the way that `tesdf` says.
+    /// The plane passes through all corners, also for needles and caps, and the normal has the
+    /// direction of `tesdf`'s normal.
     #[test]
     fn planes_of_faces_hold_their_corners() {
         let mut random = fastrand::Rng::with_seed(5);
@@ -311,7 +322,8 @@ mod tests {
         let (mut faces, mut greatest) = (0, 0.0f64);
         for k in 0..20_000 {
             let [a, b, c] = [(); 3].map(|()| in_cube());
-            // From well-shaped triangles to those a millionth as high as long: needles, then caps.
+            // From well-shaped triangles to triangles with a height of a millionth of their length:
+            // needles, then caps.
             let thin = 10f64.powf(-f64::from(k % 7));
             let c = if k % 2 == 0 { a + thin * (c - a) } else { 0.5 * (a + b) + thin * (c - a) };
             let [a, b, c] = [a, b, c].map(|p: DVec3| v3(p.x as f32, p.y as f32, p.z as f32));

@@ -3,7 +3,7 @@ use std::ops::{Add, Mul, Sub};
 
 use cubecl::prelude::*;
 
-/// Four `f32`: what a kernel reads and writes at once.
+/// Four `f32`, which a kernel reads and writes together.
 pub type Row = Vector<f32, Const<4>>;
 
 /// A point or a direction.
@@ -26,7 +26,7 @@ pub fn zero() -> V3 {
     v3(0.0f32, 0.0f32, 0.0f32)
 }
 
-/// The operators `+`, `-` and `*` of kernels expand to the first three methods.
+/// The operators `+`, `-` and `*` in kernels expand to the first three methods.
 #[cube]
 impl V3 {
     pub fn add(self, other: V3) -> V3 {
@@ -73,12 +73,12 @@ impl V3 {
         v3(self.x.abs(), self.y.abs(), self.z.abs())
     }
 
-    /// The least coordinate.
+    /// The smallest coordinate.
     pub fn least(self) -> f32 {
         self.x.min(self.y).min(self.z)
     }
 
-    /// The greatest coordinate.
+    /// The largest coordinate.
     pub fn greatest(self) -> f32 {
         self.x.max(self.y).max(self.z)
     }
@@ -118,7 +118,7 @@ impl Mul<f32> for V3 {
     }
 }
 
-/// `first` where the condition holds, else `second`, without a branch.
+/// Returns `first` when the condition is true, otherwise `second`. This needs no branch.
 #[cube]
 pub fn pick(condition: bool, first: V3, second: V3) -> V3 {
     v3(
@@ -128,13 +128,13 @@ pub fn pick(condition: bool, first: V3, second: V3) -> V3 {
     )
 }
 
-/// Whether both conditions hold or neither does: CubeCL's CUDA C++ cannot compare truth values.
+/// Whether both conditions are equal. CubeCL's CUDA C++ cannot compare truth values.
 #[cube]
 pub fn same(a: bool, b: bool) -> bool {
     (a && b) || (!a && !b)
 }
 
-/// How far a point lies outside of a box along each axis.
+/// Distance of a point from a box along each axis; 0 where the point is within.
 #[cube]
 pub fn outside_box(p: V3, low: V3, high: V3) -> V3 {
     (low - p).max(p - high).max(zero())
@@ -169,12 +169,12 @@ pub fn last(row: Row) -> f32 {
     row.extract(3usize)
 }
 
-/// The bits of a number. CubeCL's `u32::reinterpret` has no value on the host.
+/// The bits of a number. CubeCL's `u32::reinterpret` has no implementation on the host.
 pub fn to_bits(x: f32) -> u32 {
     x.to_bits()
 }
 
-/// On the device.
+/// The implementation on the device.
 pub mod to_bits {
     use super::*;
 
@@ -188,7 +188,7 @@ pub fn from_bits(bits: u32) -> f32 {
     f32::from_bits(bits)
 }
 
-/// On the device.
+/// The implementation on the device.
 pub mod from_bits {
     use super::*;
 

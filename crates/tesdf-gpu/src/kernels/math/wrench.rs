@@ -1,13 +1,15 @@
-//! Wrenches of unit forces, and their residuals from a convex hull: the difference of a wrench and a point of the hull.
+//! Wrenches of unit forces, and their residuals. A residual is the vector from a point of the
+//! convex hull to a wrench.
 //!
-//! A step shortens a residual to the shortest one from a triangle: of its point and two vertices of the hull. With
-//! segments to one vertex alone (Frank–Wolfe) steps go to and fro between the vertices of a face: eight of them left
-//! bounds three times as far from the distances where 64 contacts of a curved patch are kept.
+//! A step replaces a residual by the shortest residual from a triangle: the triangle of the current
+//! hull point and two vertices of the hull. With segments to a single vertex (Frank–Wolfe), steps
+//! alternate between the vertices of a face. Where 64 contacts of a curved patch were kept, eight
+//! such steps left a gap to the distances that was three times as large.
 use cubecl::prelude::*;
 
 use super::vector::{V3, pick};
 
-/// Force, and torque over a length; or the difference of two such.
+/// Force, and torque divided by a length; or the difference of two wrenches.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Wrench {
@@ -15,7 +17,7 @@ pub struct Wrench {
     pub torque: V3,
 }
 
-/// A residual, and what rounding may have added to its length or taken away.
+/// A residual, and the largest rounding error of its length.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Residual {
@@ -23,11 +25,12 @@ pub struct Residual {
     pub rounding: f32,
 }
 
-/// Rounding of a step, as a share of the lengths that it adds: six operations on each coordinate, 6e-8 each.
+/// Rounding error of a step, relative to the lengths that it adds: six operations for each
+/// coordinate, with 6e-8 each.
 const STEP_ROUNDING: f32 = 4e-7;
-/// Two directions count as one below this share of the product of their squares.
+/// Two directions count as parallel when the sine squared of their angle is below this.
 const PARALLEL: f32 = 1e-6;
-/// No division by less.
+/// Smallest divisor.
 const LEAST: f32 = 1e-30;
 
 #[cube]
@@ -73,7 +76,7 @@ impl std::ops::Mul<f32> for Wrench {
     }
 }
 
-/// `first` where the condition holds, else `second`, without a branch.
+/// Returns `first` when the condition is true, otherwise `second`. This needs no branch.
 #[cube]
 pub fn pick_wrench(condition: bool, first: Wrench, second: Wrench) -> Wrench {
     Wrench {
@@ -84,8 +87,8 @@ pub fn pick_wrench(condition: bool, first: Wrench, second: Wrench) -> Wrench {
 
 #[cube]
 impl Residual {
-    /// The residual from the nearest point of the triangle of this one's point and the vertices from which `to_f` and
-    /// `to_g` come; itself where that is no shorter.
+    /// The shortest residual from the triangle of the current hull point and the two vertices that
+    /// `to_f` and `to_g` start from. Returns the current residual when that is not longer.
     pub fn shortened(self, to_f: Wrench, to_g: Wrench) -> Residual {
         let x = self.wrench;
         let along_f = x - to_f;
@@ -103,10 +106,10 @@ impl Residual {
             && inside_f >= 0.0f32
             && inside_g >= 0.0f32
             && inside_f + inside_g <= 1.0f32;
-        // On the side from x to f.
+        // The nearest point on the side from x to f.
         let of_f = (xf / ff.max(LEAST)).max(0.0f32).min(1.0f32);
         let of_f_square = square - 2.0f32 * of_f * xf + of_f * of_f * ff;
-        // On the side from g to f.
+        // The nearest point on the side from g to f.
         let side = to_g - to_f;
         let side_square = side.dot(side);
         let of_g = to_g.dot(side);
