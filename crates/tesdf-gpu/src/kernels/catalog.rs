@@ -1,6 +1,7 @@
 //! The list of all kernels, in each variant that the host launches.
 //!
-//! Checks of all kernels, such as compiling them for CUDA, go over this list. A test fails for a kernel that is not on it.
+//! Checks of all kernels, such as compiling them for CUDA, iterate over this list. A test fails
+//! when a kernel is missing from it.
 use std::sync::Arc;
 
 use cubecl::ir::{DeviceProperties, TargetProperties};
@@ -26,17 +27,17 @@ use super::reduce::members::{MembersLaunch, TouchingLaunch};
 use super::{broad, deform, encode, field, middle, narrow, reduce};
 use crate::cuda::Count;
 
-/// A kernel that can be compiled.
+/// A kernel in one variant, ready to be compiled.
 pub struct Named {
-    /// Its name, with the comptime arguments of the variant.
+    /// Name of the kernel, with the comptime arguments of the variant.
     pub name: String,
-    /// How the host launches it.
+    /// Source of the number of groups when the host launches it.
     pub count: Count,
     pub kernel: Box<dyn CubeKernel>,
 }
 
-/// Adds kernels to a list: how each is launched, the kernel, threads of a group, arguments as in the Rust function;
-/// variants are told apart by the text after `;`.
+/// Adds kernels to a list. For each kernel: the source of the number of groups, the function, the
+/// threads per group, and the arguments of the Rust function. The text after `;` names the variant.
 macro_rules! kernels {
     ($all:ident, $device:ident, $target:ident;
      $($count:ident $($path:ident)::+, $threads:expr, ($($argument:expr),* $(,)?) $(; $variant:expr)?;;)*) => {
@@ -57,7 +58,7 @@ macro_rules! kernels {
 type Device = Arc<DeviceProperties>;
 type Target = Arc<TargetProperties>;
 
-/// All kernels.
+/// All kernels in all variants.
 pub fn kernels(device: &Device, target: &Target) -> Vec<Named> {
     let mut all = Vec::new();
     add_shapes(&mut all, device, target);
@@ -68,7 +69,7 @@ pub fn kernels(device: &Device, target: &Target) -> Vec<Named> {
     all
 }
 
-/// Queries, deformation and encoding.
+/// Adds the kernels of queries, deformation and encoding.
 fn add_shapes(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let instances = || query::InstancesLaunch::new(rows(), words());
     let answers = || query::AnswersLaunch::new(rows(), words());
@@ -86,7 +87,7 @@ fn add_shapes(all: &mut Vec<Named>, device: &Device, target: &Target) {
     );
 }
 
-/// Instance pairs and meshlets; groups of launches.
+/// Adds the kernels of the broad phase, and those that compute the number of groups of a launch.
 fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let instances = || InstancesLaunch::new(rows(), words(), 1, 0.0);
     let some = || PairsLaunch::new(words(), 0);
@@ -106,7 +107,7 @@ fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
     }
 }
 
-/// Nodes, polygons and hidden overlaps.
+/// Adds the kernels of the middle phase: nodes, polygons and hidden overlaps.
 fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
     kernels!(all, device, target;
         Indirect middle::nodes::nodes, LANES, (shapes(), pairs(), blocks(), counters(), items(), 1);;
@@ -118,7 +119,7 @@ fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
     );
 }
 
-/// Contacts.
+/// Adds the kernels of the narrow phase.
 fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let exact = || AskedExactLaunch::new(words(), 0.0);
     kernels!(all, device, target;
@@ -142,7 +143,7 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     }
 }
 
-/// Reduced contacts.
+/// Adds the kernels of the reduction.
 fn add_reduce(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let group = reduce::members::GROUP;
     let touching = || TouchingLaunch::new(words(), 1);
@@ -185,7 +186,7 @@ fn contacts() -> ContactsLaunch {
     ContactsLaunch::new(words(), rows(), 1)
 }
 
-/// A buffer of words or `f32`.
+/// A buffer of `u32` or `f32`.
 fn words() -> BufferArg {
     buffer(4)
 }
@@ -195,10 +196,10 @@ fn rows() -> BufferArg {
     buffer(1)
 }
 
-/// A buffer of 16 bytes that is nowhere: a kernel's text does not depend on it.
+/// A buffer of 16 bytes without memory. The text of a kernel does not depend on its buffers.
 fn buffer(elements: usize) -> BufferArg {
     let nowhere = ServiceId::of::<Named>(DeviceId::new(0, 0));
     let handle = Handle::new(nowhere, StreamId::current(), 16);
-    // SAFETY: nothing is launched with it.
+    // SAFETY: no launch uses this buffer.
     unsafe { BufferArg::from_raw_parts(handle, elements) }
 }

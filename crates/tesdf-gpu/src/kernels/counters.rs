@@ -1,45 +1,48 @@
-//! How many elements each stage of a detection hands on.
+//! Counters of the elements that each stage of a detection passes to the next.
 //!
-//! Threads append in any order. A counter counts what was wanted, also beyond the room of the buffer; then the pass is
-//! redone with larger buffers. Contacts carry the names that they are sorted by, so no order of threads reaches the user.
+//! Threads append elements in any order. A counter also counts elements for which the buffer has no
+//! room; the pass is then repeated with larger buffers. Contacts carry the names by which they are
+//! sorted, so the order of threads does not affect the result.
 use cubecl::prelude::*;
 
-/// Ordered pairs of instances: one body's surface against another's field.
+/// Ordered pairs of instances: the surface of the first is tested in the field of the second.
 pub const ORDERED_PAIRS: u32 = 0;
-/// Runs of 32 meshlets of an ordered pair.
+/// Blocks: groups of up to 32 meshlets, of all ordered pairs.
 pub const BLOCKS: u32 = 1;
 /// Meshlets that can touch.
 pub const MESHLETS: u32 = 2;
-/// Faces that can touch, clipped by cells; or nodes, with their cells.
+/// Polygons (faces clipped by cells), or in Node-TES nodes with their cells.
 pub const POLYGONS: u32 = 3;
 /// Contacts.
 pub const CONTACTS: u32 = 4;
 /// Contacts that the cosine filter dropped.
 pub const FILTERED: u32 = 5;
-/// Faces or nodes that the broad phase left.
+/// Faces or nodes that the broad phase kept.
 pub const CANDIDATES: u32 = 6;
-/// Threads whose loops a driver has broken off: see [`Counters::tell_if_broken_off`].
+/// Threads whose loops the driver stopped early: see [`Counters::tell_if_broken_off`].
 pub const BROKEN_OFF: u32 = 7;
-/// Evaluations of the field by the narrow phase of faces, when they are counted.
+/// Evaluations of the field by Face-TES. Counted on request.
 pub const EVALUATIONS: u32 = 8;
-/// Point–triangle distances of their lists.
+/// Point–triangle distances of these evaluations.
 pub const DISTANCES: u32 = 9;
-/// Instances of shapes with a vertex that was moved to an impossible position.
+/// Instances of shapes with a vertex that was moved to an invalid position.
 pub const BADLY_MOVED: u32 = 10;
-/// Contacts that did not converge, when contacts are reduced: those that are read back are not all.
+/// Contacts that did not converge. Counted only in a reduction, because the host then reads only
+/// the kept contacts.
 pub const UNCONVERGED: u32 = 11;
-/// Pairs of instances that touch, when contacts are reduced.
+/// Pairs of instances with contacts. Counted only in a reduction.
 pub const TOUCHING: u32 = 12;
-/// Members of pairs, then.
+/// Contacts that belong to these pairs.
 pub const MEMBERS: u32 = 13;
 /// Contacts that the reduction keeps.
 pub const KEPT: u32 = 14;
-/// Threads that found an overlap that contacts need not show: see [`hidden`](super::middle::hidden).
+/// Threads that found an overlap that contacts need not show: see
+/// [`hidden`](super::middle::hidden).
 pub const HIDDEN: u32 = 15;
 /// Number of counters.
 pub const COUNTERS: usize = 16;
 
-/// One atomic word for each of the above.
+/// The counters, one atomic word each.
 #[derive(CubeType, CubeLaunch)]
 pub struct Counters {
     pub words: Box<[Atomic<u32>]>,
@@ -47,24 +50,25 @@ pub struct Counters {
 
 #[cube]
 impl Counters {
-    /// Counts one, and returns the count before: where an appended element goes.
+    /// Adds 1 and returns the count before. This count is the index at which to append an element.
     pub fn append(&self, #[comptime] counter: u32) -> u32 {
         self.words[counter as usize].fetch_add(1u32)
     }
 
-    /// Counts some, and returns the count before.
+    /// Adds `some` and returns the count before.
     pub fn add(&self, #[comptime] counter: u32, some: u32) -> u32 {
         self.words[counter as usize].fetch_add(some)
     }
 
-    /// How many elements there are in a buffer with room for `room`.
+    /// Number of elements in a buffer with capacity `room`.
     pub fn within(&self, #[comptime] counter: u32, room: u32) -> u32 {
         self.words[counter as usize].load().min(room)
     }
 
-    /// Counts the thread when the driver breaks off its loops: Mesa's llvmpipe allows a thread 65,535 iterations of all
-    /// loops together, and goes on as if they had ended. From then on a loop has one iteration, so this one counts to one
-    /// instead of two. Called last; `elements` is at least 1, which no compiler may know.
+    /// Counts this thread when the driver stops its loops early. Mesa's llvmpipe allows 65,535
+    /// iterations of all loops of a thread together. After that it continues as if the loops had
+    /// ended, and each later loop runs once. So this loop then counts to one instead of two. Call
+    /// it last. `elements` must be at least 1, in a way that the compiler cannot know.
     pub fn tell_if_broken_off(&self, elements: u32) {
         let two = select(elements > 0u32, 2u32, 0u32);
         let mut count = 0u32;
@@ -77,7 +81,8 @@ impl Counters {
     }
 }
 
-/// Groups of a stage with `per` elements to a group, of a buffer with room for `room`: x, y and z.
+/// Computes the number of groups of a stage in x, y and z: `per` elements per group, from a buffer
+/// with capacity `room`.
 #[cube(launch, create_dummy_kernel)]
 pub fn groups_for(counters: &Counters, groups: &mut [u32], room: u32, per: u32, #[comptime] counter: u32) {
     if ABSOLUTE_POS == 0usize {

@@ -1,5 +1,6 @@
-//! Code of the device, by stage; `collide` has the host side of each. A function with `#[cube]` is also a function of the
-//! host, which tests compare with the processor's.
+//! The code that runs on the device, by stage. The module `collide` has the host side of each
+//! stage. A function with `#[cube]` is also a function of the host: tests compare such functions
+//! with those of the processor.
 #![allow(
     unused_assignments,
     clippy::manual_clamp,

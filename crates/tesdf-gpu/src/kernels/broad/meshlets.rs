@@ -1,5 +1,6 @@
-//! Broad phase: which meshlets, and then which faces, can come within reach of a field. Nothing within `r` of a point can
-//! have a lower signed distance than the point less `r`.
+//! Broad phase: finds the meshlets, and then the faces, that can come within reach of a field. A
+//! signed distance is 1-Lipschitz: within a radius `r` of a point it is at least the value at the
+//! point minus `r`.
 use cubecl::prelude::*;
 
 use super::super::counters::{self, Counters};
@@ -7,18 +8,18 @@ use super::super::field::shapes::{Field, FieldExpand, HIGH, LOW, MESHLET_COUNT, 
 use super::super::math::vector::{V3, outside_box};
 use super::ordered_pair::OrderedPairs;
 
-/// The possible error of a distance, in the frame of a mesh: twice what is promised for queries.
+/// Largest error of a distance in the frame of a mesh: twice the documented error of queries.
 pub const ROUNDING: f32 = 4e-6;
 
-/// Meshlets of a block: one for each thread of a group.
+/// Meshlets per block: one for each thread of a group.
 pub const MESHLETS_OF_BLOCK: u32 = 32;
 
-/// Runs of meshlets of ordered pairs.
+/// A list of blocks, or of meshlets, of ordered pairs.
 #[derive(CubeType, CubeLaunch)]
 pub struct Blocks {
-    /// Two words each: ordered pair, first meshlet.
+    /// Two words for each: ordered pair, first meshlet.
     pub words: Box<[u32]>,
-    /// Room for so many.
+    /// Capacity of the list.
     pub room: u32,
 }
 
@@ -27,7 +28,7 @@ pub const WORDS: u32 = 2;
 
 #[cube]
 impl Blocks {
-    /// Writes a block, or a meshlet, where there is room.
+    /// Writes a block or a meshlet, when there is room.
     pub fn put(&mut self, at: u32, pair: u32, meshlet: u32) {
         if at < self.room {
             self.words[(at * WORDS) as usize] = pair;
@@ -48,8 +49,8 @@ impl Blocks {
 
 #[cube]
 impl Field<'_> {
-    /// Whether no point within `radius` of `p` can have a signed distance up to `reach`. May be false where it is so:
-    /// with `prune` 0 only points out of the bounds are beyond.
+    /// Whether each point within `radius` of `p` has a signed distance above `reach`. The test may
+    /// miss such cases. With `prune` 0 it finds only points outside of the bounds.
     pub fn is_beyond(self, p: V3, radius: f32, reach: f32, prune: u32) -> bool {
         let limit = radius + reach;
         if self.is_mesh() {
@@ -70,7 +71,7 @@ impl Field<'_> {
             let out = cell.is_out();
             beyond = out && self.cell_bound(cell.number) > far;
             if !beyond {
-                // Distances of lists that are not exact rule nothing out: then the face tree answers.
+                // Distances to truncated lists rule nothing out. There the face tree answers.
                 let by_tree = out || (listed && !self.has_exact_lists());
                 let mut none = false;
                 if by_tree && !cell.is_inside() {
@@ -87,7 +88,7 @@ impl Field<'_> {
     }
 }
 
-/// A group for each block, a thread for each meshlet: those that can touch are written.
+/// Finds the meshlets that can touch. A group takes a block, and a thread takes a meshlet.
 #[cube(launch, create_dummy_kernel)]
 pub fn meshlets(
     shapes: &Shapes,

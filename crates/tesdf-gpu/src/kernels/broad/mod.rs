@@ -1,4 +1,4 @@
-//! Broad phase: instance pairs, then the meshlets that can touch.
+//! Broad phase: finds pairs of instances, then the meshlets that can touch.
 pub mod meshlets;
 pub mod ordered_pair;
 pub mod pairs;

@@ -1,4 +1,5 @@
-//! Ordered pairs of instances: the surface of the first as the field of the second sees it.
+//! Ordered pairs of instances: the surface of the first instance, seen in the frame of the second
+//! instance's field.
 use cubecl::prelude::*;
 
 use super::super::field::shapes::{
@@ -8,14 +9,15 @@ use super::super::field::tetrahedra::bounds_of;
 use super::super::math::vector::{Row, V3, last, pick, row_of, v3, xyz, zero};
 use super::super::middle::cut::Quarter;
 
-/// The ordered pairs of a scene. Those of a pair of instances are neighbours.
+/// The ordered pairs of a scene. The two ordered pairs of the same instances are neighbours.
 #[derive(CubeType, CubeLaunch)]
 pub struct OrderedPairs {
-    /// [`WORDS`] each: instances a and b, shapes of a and b.
+    /// [`WORDS`] words for each: instances a and b, shapes of a and b.
     pub words: Box<[u32]>,
-    /// [`ROWS`] each: the linear part of the map by rows, each with its shift; then scale, reach and radius.
+    /// [`ROWS`] rows for each: the three rows of the linear map, each with its coordinate of the
+    /// shift; then scale, reach and radius.
     pub rows: Box<[Row]>,
-    /// Room for so many.
+    /// Capacity of the list.
     pub room: u32,
 }
 
@@ -24,32 +26,33 @@ pub const WORDS: u32 = 4;
 /// Rows of an ordered pair.
 pub const ROWS: u32 = 4;
 
-/// An ordered pair of instances.
+/// An ordered pair: instance a has the surface, instance b has the field.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct OrderedPair {
-    /// Its number; the pair with both instances swapped is its neighbour.
+    /// Its index. The pair with both instances exchanged is its neighbour.
     pub number: u32,
     pub a: u32,
     pub b: u32,
     pub shape_a: u32,
     pub shape_b: u32,
-    /// Rows of the linear part of the map from the frame of a to the field's.
+    /// Rows of the linear map from the frame of a to the frame of the field.
     pub x: V3,
     pub y: V3,
     pub z: V3,
     pub shift: V3,
-    /// Field units per unit of a.
+    /// Length of one unit of a, in units of the field.
     pub scale: f32,
-    /// Signed distances up to this are contacts.
+    /// Contact distance in the frame of the field: smaller signed distances are contacts.
     pub reach: f32,
-    /// The surface is all within this of its parts: the radius of what is round.
+    /// Radius of a sphere or capsule: its surface is at most this far from its core (a point or a
+    /// segment). Otherwise 0.
     pub radius: f32,
 }
 
 #[cube]
 impl OrderedPairs {
-    /// Reads ordered pair `number`.
+    /// Reads the ordered pair with this number.
     pub fn get(&self, number: u32) -> OrderedPair {
         let word = (number * WORDS) as usize;
         let row = (number * ROWS) as usize;
@@ -70,7 +73,7 @@ impl OrderedPairs {
         }
     }
 
-    /// Writes an ordered pair; its number is its place.
+    /// Writes an ordered pair. Its number is its index.
     pub fn put(&mut self, pair: OrderedPair) {
         let word = (pair.number * WORDS) as usize;
         self.words[word] = pair.a;
@@ -87,7 +90,7 @@ impl OrderedPairs {
 
 #[cube]
 impl OrderedPair {
-    /// Distances of parts of the surface up to this are contacts.
+    /// Contact distance for parts of the surface: the reach plus the radius.
     pub fn part_reach(self) -> f32 {
         self.reach + self.radius
     }
@@ -96,17 +99,17 @@ impl OrderedPair {
         v3(self.x.dot(p), self.y.dot(p), self.z.dot(p))
     }
 
-    /// From the frame of a to the field's.
+    /// Transforms a point from the frame of a to the frame of the field.
     pub fn to_field(self, p: V3) -> V3 {
         self.linear(p) + self.shift
     }
 
-    /// A unit vector, likewise.
+    /// Rotates a unit vector from the frame of a to the frame of the field.
     pub fn rotate(self, v: V3) -> V3 {
         self.linear(v) * (1.0f32 / self.scale)
     }
 
-    /// From the field's frame to that of a: the map is a similarity.
+    /// Transforms a point from the frame of the field to the frame of a. The map is a similarity.
     pub fn to_surface(self, p: V3) -> V3 {
         let q = p - self.shift;
         let back = (self.x * q.x + self.y * q.y) + self.z * q.z;
@@ -114,16 +117,16 @@ impl OrderedPair {
     }
 }
 
-/// A face, or a part of a simple shape, in the field's frame.
+/// A face, or a part of a simple shape, in the frame of the field.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Part {
     pub a: V3,
     pub b: V3,
     pub c: V3,
-    /// Corners: 3, or 2 and 1 for the segments and points of capsules and spheres.
+    /// Number of corners: 3, or 2 for the segment of a capsule, or 1 for the point of a sphere.
     pub count: u32,
-    /// Corners that no part before has, as bits.
+    /// Corners that no earlier part has, as bits.
     pub owned: u32,
 }
 
@@ -134,12 +137,12 @@ impl Part {
         pick(k == 1u32, self.b, pick(k == 2u32, self.c, self.a))
     }
 
-    /// The point with weights `s` of the second and `t` of the third corner.
+    /// The point with the weights `s` of the second corner and `t` of the third corner.
     pub fn at(self, s: f32, t: f32) -> V3 {
         (self.a + (self.b - self.a) * s) + (self.c - self.a) * t
     }
 
-    /// A part of it.
+    /// The piece `q` of this part.
     pub fn quarter(self, q: Quarter) -> Part {
         Part {
             a: self.at(q.a_s, q.a_t),
@@ -150,13 +153,13 @@ impl Part {
         }
     }
 
-    /// The middle of the box around the part.
+    /// The center of the box around the part.
     pub fn center(self) -> V3 {
         let bounds = bounds_of(self.a, self.b, self.c);
         (bounds.low + bounds.high) * 0.5f32
     }
 
-    /// The greatest distance of a corner from a point.
+    /// The greatest distance of a corner from `p`.
     pub fn radius_around(self, p: V3) -> f32 {
         (self.a - p).length().max((self.b - p).length()).max((self.c - p).length())
     }
@@ -164,13 +167,13 @@ impl Part {
 
 #[cube]
 impl Field<'_> {
-    /// The middle of a body that has an end.
+    /// The center of a bounded shape.
     fn body_center(self) -> V3 {
         let middle = (self.vector(LOW) + self.vector(HIGH)) * 0.5f32;
         pick(self.is_mesh(), middle, zero())
     }
 
-    /// The greatest distance of a point of a body from there.
+    /// The greatest distance of a point of a bounded shape from this center.
     fn body_radius(self) -> f32 {
         let kind = self.entry(KIND);
         let sizes = self.vector(SIZES);
@@ -179,7 +182,8 @@ impl Field<'_> {
         select(kind == MESH, 0.5f32 * extent.length(), round)
     }
 
-    /// One of the two triangles of a plane, in its own frame: a square that covers the field's body.
+    /// One of the two triangles of a plane, in the plane's frame. Together they are a square that
+    /// covers the body of the field.
     fn plane_part(self, pair: OrderedPair, number: u32) -> Triangle {
         let center = pair.to_surface(self.body_center());
         let half = (self.body_radius() + pair.reach) / pair.scale;
@@ -204,7 +208,7 @@ struct Triangle {
 
 #[cube]
 impl Shapes {
-    /// Part `number` of the surface of an ordered pair, in the field's frame.
+    /// Part `number` of the surface of an ordered pair, in the frame of the field.
     pub fn part(&self, pair: OrderedPair, number: u32) -> Part {
         let surface = self.field(pair.shape_a);
         let kind = surface.entry(KIND);
@@ -226,8 +230,9 @@ impl Shapes {
         Part { a, b, c, count, owned }
     }
 
-    /// Unit normal of part `number`, in the field's frame; zero for what is round and for flat faces. It is that of the
-    /// face: the corners of a needle in another frame would give any.
+    /// Unit normal of part `number` in the frame of the field; zero for spheres, capsules and flat
+    /// faces. The normal comes from the face, because the corners of a needle, transformed and
+    /// rounded, would give an arbitrary normal.
     pub fn part_normal(&self, pair: OrderedPair, number: u32) -> V3 {
         let surface = self.field(pair.shape_a);
         let mut normal = v3(0.0f32, 0.0f32, 1.0f32);

@@ -1,4 +1,5 @@
-//! Instance pairs: those of one world whose bounds meet, as `tesdf::collide::instance_pairs` finds them.
+//! Pairs of instances of one world whose bounds meet, as `tesdf::collide::instance_pairs` finds
+//! them.
 use cubecl::prelude::*;
 
 use super::super::counters::{BADLY_MOVED, BLOCKS, Counters, ORDERED_PAIRS};
@@ -8,12 +9,12 @@ use super::super::math::vector::{Row, V3, last, row_of, v3, xyz};
 use super::meshlets::{Blocks, MESHLETS_OF_BLOCK};
 use super::ordered_pair::{OrderedPair, OrderedPairs};
 
-/// The instances of a scene, those of a world side by side.
+/// The instances of a scene. The instances of a world are consecutive.
 #[derive(CubeType, CubeLaunch)]
 pub struct Instances {
-    /// A pose each, with the motion ahead behind the second row.
+    /// A pose for each instance. The last number of its second row is the motion ahead.
     pub poses: Box<[Row]>,
-    /// [`INSTANCE_WORDS`] each: shape, end of the world, memberships, filter.
+    /// [`INSTANCE_WORDS`] words for each: shape, end of the world, memberships, filter.
     pub words: Box<[u32]>,
     pub count: u32,
     pub contact_distance: f32,
@@ -23,7 +24,7 @@ pub struct Instances {
 pub const INSTANCE_ROWS: u32 = POSE_ROWS;
 /// Words of an instance.
 pub const INSTANCE_WORDS: u32 = 4;
-/// Rows of an instance's bounds: their center as high and low, half their extent.
+/// Rows of an instance's bounds: center as high and low `f32`, half extents.
 pub const BOUNDS_ROWS: u32 = 3;
 
 /// Pairs of instances, two words each, sorted.
@@ -33,14 +34,14 @@ pub struct Pairs {
     pub count: u32,
 }
 
-/// The buffers that instance pairs are written to.
+/// The buffers for pairs of instances and their blocks.
 #[derive(CubeType, CubeLaunch)]
 pub struct Found {
     pub pairs: OrderedPairs,
     pub blocks: Blocks,
 }
 
-/// The groups of an instance.
+/// The collision groups of an instance.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Groups {
@@ -61,7 +62,7 @@ impl Instances {
         self.words[(instance * INSTANCE_WORDS) as usize]
     }
 
-    /// The instance after the last one of its world.
+    /// The index after the last instance of this instance's world.
     fn end_of_world(&self, instance: u32) -> u32 {
         self.words[(instance * INSTANCE_WORDS + 1u32) as usize]
     }
@@ -75,7 +76,7 @@ impl Instances {
         pose(&self.poses, instance)
     }
 
-    /// How far the velocity can take a point of an instance.
+    /// The greatest distance that the velocity can move a point of an instance.
     fn motion(&self, instance: u32) -> f32 {
         last(self.poses[(instance * INSTANCE_ROWS + 1u32) as usize])
     }
@@ -83,7 +84,7 @@ impl Instances {
 
 #[cube]
 impl Pairs {
-    /// Whether a pair is among them.
+    /// Whether the list has this pair.
     fn contain(&self, a: u32, b: u32) -> bool {
         let mut low = 0u32;
         let mut high = self.count;
@@ -101,15 +102,16 @@ impl Pairs {
     }
 }
 
-/// Half the extent of a plane.
+/// Half extent of a plane.
 const ENDLESS: f32 = 1e30;
 
-/// What half an extent is grown by, relative to it and to the vector from the field's origin to the center: more than
-/// rounding takes away.
+/// Bounds grow by this fraction, relative to their half extents and to the vector from the origin
+/// of the field to the center. This is more than the rounding error.
 const GROWN: f32 = 2e-6;
 
-/// A thread for each instance: its bounds in the world, grown by its motion ahead and half the contact distance. Counts
-/// those of shapes with a vertex that was moved to an impossible position.
+/// Computes the bounds of an instance per thread, in the world. They include the motion ahead and
+/// half the contact distance. Counts the instances of shapes with a vertex that was moved to an
+/// invalid position.
 #[cube(launch, create_dummy_kernel)]
 pub fn instance_bounds(shapes: &Shapes, instances: &Instances, counters: &Counters, bounds: &mut [Row]) {
     let i = ABSOLUTE_POS as u32;
@@ -141,7 +143,7 @@ pub fn instance_bounds(shapes: &Shapes, instances: &Instances, counters: &Counte
     }
 }
 
-/// Bounds in the world.
+/// Bounds in the world frame.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct WorldBounds {
@@ -155,7 +157,7 @@ fn world_bounds(rows: &[Row], instance: u32) -> WorldBounds {
     WorldBounds { center: FarPoint { high: xyz(rows[at]), low: xyz(rows[at + 1]) }, half: xyz(rows[at + 2]) }
 }
 
-/// A thread for each instance meets all later ones of its world.
+/// Tests the bounds of one instance per thread against all later instances of its world.
 #[cube(launch, create_dummy_kernel)]
 pub fn instance_pairs(
     shapes: &Shapes,
@@ -186,7 +188,7 @@ pub fn instance_pairs(
     }
 }
 
-/// A thread for each pair of instances that the processor found.
+/// Takes over one pair of instances per thread from the list that the processor found.
 #[cube(launch, create_dummy_kernel)]
 pub fn given_pairs(
     shapes: &Shapes,
@@ -203,7 +205,7 @@ pub fn given_pairs(
     }
 }
 
-/// Both ordered pairs of two instances, and their blocks.
+/// Writes both ordered pairs of two instances, with their blocks.
 #[cube]
 fn write_pair(
     shapes: &Shapes,
@@ -237,7 +239,8 @@ fn write_blocks(shapes: &Shapes, counters: &Counters, blocks: &mut Blocks, pair:
     }
 }
 
-/// Surface of `a` against the field of `b`: field = linear · p + shift. Distances up to `distance` are contacts.
+/// The ordered pair of the surface of `a` and the field of `b`: point in the field = linear · p +
+/// shift. Signed distances up to `distance` are contacts.
 #[cube]
 fn ordered_pair(
     shapes: &Shapes,
@@ -270,7 +273,7 @@ fn ordered_pair(
     }
 }
 
-/// Where the map takes a unit vector of the frame of `from`.
+/// Transforms a unit vector from the frame of `from` to the frame of `to`.
 #[cube]
 fn column(from: Pose, to: Pose, scale: f32, axis: V3) -> V3 {
     to.rotation.rotate_back(from.rotation.rotate(axis)) * scale

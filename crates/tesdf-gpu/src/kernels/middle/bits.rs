@@ -1,12 +1,13 @@
-//! Bits by level of the forest, on the way of a walk.
+//! One bit for each level of the forest, along the path of a walk.
 use cubecl::prelude::*;
 
-/// Levels of the forest: the deepest cell, as in `tesdf::domain::MAX_DEPTH`, and the roots.
+/// Levels of the forest: those of the deepest cell, as in `tesdf::domain::MAX_DEPTH`, and the level
+/// of the roots.
 pub const LEVELS: usize = tesdf::domain::MAX_DEPTH as usize + 1;
-/// Words of bits; read three levels at a time.
+/// Words for the bits.
 const WORDS: usize = LEVELS.div_ceil(32);
 
-/// A bit for each level.
+/// One bit for each level.
 #[derive(CubeType)]
 pub struct Bits {
     words: Array<u32>,
@@ -36,7 +37,7 @@ impl Bits {
         self.words[at] = select(value, cleared | mask, cleared);
     }
 
-    /// One more than the highest level whose bit is set; 0 without one.
+    /// One more than the highest level whose bit is set; 0 when no bit is set.
     pub fn last(&self) -> u32 {
         let (low, middle, high) = (self.words[0], self.words[1], self.words[2]);
         let of_low = 32u32 - low.leading_zeros();

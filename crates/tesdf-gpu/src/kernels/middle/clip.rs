@@ -1,9 +1,10 @@
-//! Middle phase: which cells a face meets, and the polygon in each of them.
+//! Middle phase: finds the cells that a face meets, and the polygon of the face in each cell.
 //!
-//! A thread walks the bisection forest, from the roots of the cube or from the tetrahedra of a conforming domain, with
-//! the barycentric coordinates of the three corners. It goes down one child and comes back for the other: for that it
-//! keeps its path, a bit a level, and the words of the first children. A polygon is kept as weights of the face's
-//! corners, in which the coordinates of all cells are linear.
+//! A thread walks the bisection forest with the barycentric coordinates of the face's three
+//! corners. It starts from the roots of the cube, or from the tetrahedra of a conforming domain. It
+//! descends into one child and returns later for the other. For this it stores its path, one bit
+//! per level, and the node words of the first children. A polygon is stored as weights of the
+//! face's corners, because the coordinates in each cell are linear in these weights.
 use cubecl::prelude::*;
 
 use super::super::broad::meshlets::Blocks;
@@ -19,17 +20,18 @@ use super::corners::{Corners, corners_in};
 use super::cut::{Cut, no_polygon, whole};
 use super::items::{Polygons, Subject};
 
-/// How the threads of a group share a face.
+/// The share of a thread in a face that several threads work on.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Share {
-    /// This one's number.
+    /// Number of this thread.
     pub mine: u32,
-    /// Number of threads: a power of two.
+    /// Number of threads per face: a power of two.
     pub threads: u32,
 }
 
-/// How many threads share a face of a meshlet of few faces, which may be large.
+/// Number of threads that share a face. It is more than one in a meshlet with few faces, because
+/// these may be large.
 #[cube]
 fn threads_per_face(faces: u32) -> u32 {
     let mut threads = 1u32;
@@ -39,7 +41,8 @@ fn threads_per_face(faces: u32) -> u32 {
     threads
 }
 
-/// A group for each meshlet, a thread for each face, or several where there are few.
+/// Clips faces. A group takes a meshlet. A face has one thread, or several where the meshlet has
+/// few faces.
 #[cube(launch, create_dummy_kernel)]
 pub fn clip_polygons(
     shapes: &Shapes,
@@ -81,20 +84,20 @@ pub fn clip_polygons(
     }
 }
 
-/// A face, and the cells that it may have polygons in.
+/// A face, and the cells in which it may have polygons.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Search {
     subject: Subject,
-    /// Distances up to this are contacts.
+    /// Contact distance for the part: smaller distances are contacts.
     reach: f32,
-    /// Whether points beyond the cells of the domain can be contacts.
+    /// Whether points outside of the cells can be contacts.
     beyond: bool,
-    /// 1 when cells are left out by their bounds.
+    /// 1 when cells may be skipped by their bounds, otherwise 0.
     prune: u32,
 }
 
-/// Clips a face by all cells that it meets: this thread's share of them.
+/// Clips a face by this thread's share of all cells that it meets.
 #[cube]
 fn clip(
     field: Field<'_>,
@@ -107,7 +110,7 @@ fn clip(
 ) {
     let reach = subject.pair.part_reach();
     let conforming = field.is_conforming();
-    // Around a conforming domain `outside::outside_polygons` searches.
+    // Around a conforming domain, `outside::outside_polygons` finds the parts of the face.
     let beyond = (conforming && reach > 0.0f32) || (!conforming && reach >= field.number(BAND));
     if beyond && !conforming && share.mine == 0u32 {
         outside_cube(field, subject, counters, polygons, polygon);
@@ -124,16 +127,17 @@ fn clip(
     }
 }
 
-/// Where a thread's walks start: at the six roots, or where several threads share a face at the cells three levels below;
-/// in a conforming domain they take turns at the tetrahedra, and the number is a node of the tree that finds those.
+/// The starting cell of a thread's next walk. In the bisection domain it is one of the six roots.
+/// When several threads share a face, it is a cell three levels below. In a conforming domain, the
+/// threads take the tetrahedra in turns, and `number` is a node of the tree over tetrahedra.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Start {
     number: u32,
     end: u32,
-    /// Levels below the root.
+    /// Levels of the starting cells below the roots.
     levels: u32,
-    /// Tetrahedra before this one.
+    /// Number of tetrahedra before this one.
     turn: u32,
 }
 
@@ -144,7 +148,7 @@ struct Begin {
     root: u32,
     cell: u32,
     depth: u32,
-    /// Whether the cell is this thread's.
+    /// Whether this thread has to walk the cell.
     open: bool,
 }
 
@@ -162,7 +166,7 @@ fn start_of(field: Field<'_>, share: Share) -> Start {
 
 #[cube]
 impl Start {
-    /// The next cell at which a walk starts; its path goes to `path`.
+    /// The next starting cell. Its path is written to `path`.
     fn next(&mut self, field: Field<'_>, around: Around, share: Share, path: &mut Bits) -> Begin {
         let number = self.number;
         let mut root = number >> self.levels;
@@ -190,7 +194,8 @@ impl Start {
                 depth += 1u32;
             }
         }
-        // A cell above stands for all cells below it, once.
+        // A cell above the starting level stands for all starting cells below it, and is walked
+        // once.
         let below = (1u32 << (self.levels - depth)) - 1u32;
         let repeated = depth < self.levels && (number & below) != 0u32;
         self.number = next;
@@ -198,7 +203,7 @@ impl Start {
     }
 }
 
-/// Walks the cells below one, and writes the polygons of a face in them.
+/// Walks the descendants of a cell, and writes the polygons of a face in them.
 #[cube]
 fn walk(
     field: Field<'_>,
@@ -212,7 +217,7 @@ fn walk(
     let part = search.subject.part;
     let root = corners_in(field.tetrahedron(begin.root), part);
     let mut held = path.follow(root, begin.depth);
-    // The first child at each level, and whether its sibling is still to be visited.
+    // The first child at each level, and whether its sibling still has to be visited.
     let mut children = Array::<u32>::new(LEVELS);
     let mut waiting = no_bits();
     waiting.clear();
@@ -250,7 +255,7 @@ fn walk(
             cell = word + select(side, 1u32, 0u32);
             depth += 1u32;
         } else {
-            // Up to the last level whose sibling waits.
+            // Return to the last level with a sibling to visit.
             depth = waiting.last();
             open = depth > 0u32;
             if open {
@@ -264,7 +269,7 @@ fn walk(
     }
 }
 
-/// The parts of a face outside of the cube, at most six.
+/// Writes the parts of a face outside of the cube, at most six.
 #[cube]
 fn outside_cube(
     field: Field<'_>,
@@ -276,7 +281,7 @@ fn outside_cube(
     let a = field.in_cube(subject.part.a);
     let b = field.in_cube(subject.part.b);
     let c = field.in_cube(subject.part.c);
-    // The part behind the side, of the part before all sides that were before it.
+    // The part outside of this side, cut from the rest that lies inside all earlier sides.
     let mut side = 0u32;
     while side < 6u32 {
         polygon.start(whole(), subject.part.count);

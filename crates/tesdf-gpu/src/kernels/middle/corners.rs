@@ -1,4 +1,4 @@
-//! Barycentric coordinates of the three corners of a face.
+//! Barycentric coordinates of a face's three corners.
 use cubecl::prelude::*;
 
 use super::super::broad::ordered_pair::Part;
@@ -8,7 +8,7 @@ use super::super::math::vector::{V3, v3};
 use super::bits::{Bits, BitsExpand};
 use super::cut::Cut;
 
-/// Coordinates of the corners of a face in a cell.
+/// Coordinates of a face's corners in a cell.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Corners {
@@ -17,14 +17,14 @@ pub struct Corners {
     pub c: Lambda,
 }
 
-/// Below in all corners, or touching from below.
+/// Whether no corner is above the plane, and at least one is below it.
 #[cube]
 fn is_out(heights: V3) -> bool {
     let greatest = heights.greatest();
     greatest < 0.0f32 || (greatest <= 0.0f32 && heights.least() < 0.0f32)
 }
 
-/// Of the levels that are left one, two, or three and more.
+/// Picks by the number of levels that are left: one, two, or three and more.
 #[cube]
 fn pick_lambda(left: u32, one: Lambda, two: Lambda, three: Lambda) -> Lambda {
     Lambda {
@@ -35,7 +35,7 @@ fn pick_lambda(left: u32, one: Lambda, two: Lambda, three: Lambda) -> Lambda {
     }
 }
 
-/// The corners of a part in a root.
+/// The coordinates of a part's corners in a root.
 #[cube]
 pub fn corners_in(root: Tetrahedron, part: Part) -> Corners {
     Corners { a: root.lambda(part.a), b: root.lambda(part.b), c: root.lambda(part.c) }
@@ -43,12 +43,13 @@ pub fn corners_in(root: Tetrahedron, part: Part) -> Corners {
 
 #[cube]
 impl Corners {
-    /// Heights of the corners over side `side` of the cell, over that of the opposite corner.
+    /// Heights of the corners above a side of the cell, relative to the height of the opposite
+    /// corner.
     pub fn over(self, side: u32) -> V3 {
         v3(over(self.a, side), over(self.b, side), over(self.c, side))
     }
 
-    /// Whether the face is all on the outer side of a side of the cell.
+    /// Whether the face lies entirely outside of one side of the cell.
     pub fn is_separate(self) -> bool {
         is_out(v3(self.a.l0, self.b.l0, self.c.l0))
             || is_out(v3(self.a.l1, self.b.l1, self.c.l1))
@@ -56,12 +57,13 @@ impl Corners {
             || is_out(v3(self.a.l3, self.b.l3, self.c.l3))
     }
 
-    /// Whether the face is all in the cell.
+    /// Whether the face lies entirely in the cell.
     pub fn is_within(self) -> bool {
         self.a.least().min(self.b.least()).min(self.c.least()) >= 0.0f32
     }
 
-    /// In child 0, or in child 1 when `second`, of a cell whose refinement edge ends at corner `k`.
+    /// Coordinates in child 0 (or in child 1 when `second` is true) of a cell whose refinement edge
+    /// ends at corner `k`.
     pub fn in_child(self, k: u32, second: bool) -> Corners {
         Corners {
             a: self.a.in_child(k, second),
@@ -70,12 +72,12 @@ impl Corners {
         }
     }
 
-    /// Heights over the plane that bisects the cell: above it is child 0.
+    /// Heights above the plane that bisects the cell. Child 0 is above the plane.
     pub fn over_bisection(self, k: u32) -> V3 {
         v3(self.a.l0 - self.a.at(k), self.b.l0 - self.b.at(k), self.c.l0 - self.c.at(k))
     }
 
-    /// Cuts the face's polygon to the part that the cell holds.
+    /// Cuts the polygon of the face to the part in the cell.
     pub fn clip(self, polygon: &mut Cut) {
         polygon.cut(v3(self.a.l0, self.b.l0, self.c.l0), 1.0f32);
         polygon.cut(v3(self.a.l1, self.b.l1, self.c.l1), 1.0f32);
@@ -83,7 +85,7 @@ impl Corners {
         polygon.cut(v3(self.a.l3, self.b.l3, self.c.l3), 1.0f32);
     }
 
-    /// The corners of one of two faces, without a branch.
+    /// Picks one of two values without a branch.
     pub fn pick(condition: bool, first: Corners, second: Corners) -> Corners {
         Corners {
             a: pick_lambda(select(condition, 1u32, 2u32), first.a, second.a, second.a),
@@ -100,10 +102,11 @@ fn over(l: Lambda, side: u32) -> f32 {
 
 #[cube]
 impl Bits {
-    /// The corners in the cell that the first `depth` bits of a path lead to, from those in a root.
+    /// Coordinates in a cell, from those in its root. The first `depth` bits of the path lead to
+    /// the cell.
     pub fn follow(&self, root: Corners, depth: u32) -> Corners {
         let mut held = root;
-        // Three levels a turn, each with its refinement edge.
+        // Each turn descends three levels, each with its own refinement edge.
         let mut level = 0u32;
         while level < depth {
             let one = held.in_child(3u32, self.get(level));

@@ -1,12 +1,13 @@
-//! A polygon in the weights of a face's corners, cut by linear functions.
+//! A polygon in weights of a face's corners, cut by linear functions.
 use cubecl::prelude::*;
 
 use super::super::math::vector::V3;
 
-/// Room for the vertices of a polygon while it is cut.
+/// Capacity for the vertices of a polygon while it is cut.
 pub const ROOM: usize = 12;
 
-/// A polygon while it is cut: each vertex as the weights of the second and the third corner of a face.
+/// A polygon while it is cut. Each vertex is given by its weights of the second and the third
+/// corner of a face.
 #[derive(CubeType)]
 pub struct Cut {
     pub s: Array<f32>,
@@ -15,7 +16,7 @@ pub struct Cut {
     pub count: u32,
 }
 
-/// A part of a face: its corners as weights of the second and the third corner of the face.
+/// A piece of a face: its corners as weights of the second and the third corner of the face.
 #[derive(CubeType, CubeTypeMut, Clone, Copy, Debug, PartialEq)]
 #[expand(derive(Clone, Copy))]
 pub struct Quarter {
@@ -35,7 +36,7 @@ pub fn whole() -> Quarter {
 
 #[cube]
 impl Quarter {
-    /// A quarter of it: 0 to 2 at that corner, 3 in the middle.
+    /// A quarter of this piece: 0 to 2 at the corner with this number, 3 in the center.
     pub fn quarter(self, which: u32) -> Quarter {
         let (ab_s, ab_t) = (0.5f32 * (self.a_s + self.b_s), 0.5f32 * (self.a_t + self.b_t));
         let (bc_s, bc_t) = (0.5f32 * (self.b_s + self.c_s), 0.5f32 * (self.b_t + self.c_t));
@@ -53,13 +54,14 @@ impl Quarter {
         }
     }
 
-    /// Twice its area, in weights.
+    /// Twice the area of the piece, in weights.
     pub fn area(self) -> f32 {
         ((self.b_s - self.a_s) * (self.c_t - self.a_t) - (self.b_t - self.a_t) * (self.c_s - self.a_s)).abs()
     }
 }
 
-/// The quarter of a quarter of … a face that a path names: two bits a level, the last level lowest.
+/// The piece at the end of a path of quarters. A path has two bits per level, with the last level
+/// in the lowest bits.
 #[cube]
 pub fn quarter_at(path: u32, levels: u32) -> Quarter {
     let mut found = whole();
@@ -71,7 +73,7 @@ pub fn quarter_at(path: u32, levels: u32) -> Quarter {
     found
 }
 
-/// Room for a polygon.
+/// An empty polygon.
 #[cube]
 pub fn no_polygon() -> Cut {
     Cut { s: Array::<f32>::new(ROOM), t: Array::<f32>::new(ROOM), count: 0u32 }
@@ -79,7 +81,7 @@ pub fn no_polygon() -> Cut {
 
 #[cube]
 impl Cut {
-    /// Begins with a part of a face that has `count` corners.
+    /// Starts with a piece of a face that has `count` corners.
     pub fn start(&mut self, part: Quarter, count: u32) {
         self.put(0u32, part.a_s, part.a_t);
         self.put(1u32, part.b_s, part.b_t);
@@ -93,10 +95,10 @@ impl Cut {
         self.t[at as usize] = t;
     }
 
-    /// Cuts by a linear function, given by its values at the corners of the face; keeps the side above when `keep` is 1,
-    /// the side below when it is −1.
+    /// Cuts by a linear function, given by its values at the corners of the face. `keep` 1 keeps
+    /// the part above zero, and −1 the part below.
     pub fn cut(&mut self, heights: V3, keep: f32) {
-        // Most faces are all on the inner side.
+        // Skip the cut when the whole face is on the kept side, as most faces are.
         if (heights * keep).least() < 0.0f32 || keep < 0.0f32 {
             self.cut_across(heights, keep);
         }
@@ -120,7 +122,7 @@ impl Cut {
             below = below || h < 0.0f32;
             i += 1u32;
         }
-        // A polygon that only touches the plane is not cut, and belongs above.
+        // A polygon that only touches the plane is not cut. It belongs to the part above.
         let mut count = select(below && !above, 0u32, n);
         if keep < 0.0f32 && !above {
             count = 0u32;
@@ -136,7 +138,7 @@ impl Cut {
                     self.put(count, old_s[i as usize], old_t[i as usize]);
                     count += 1u32;
                 }
-                // A segment has no edge back.
+                // A segment has no edge from its end back to its start.
                 let is_edge = n > 2u32 || i == 0u32;
                 let crosses = (h > 0.0f32 && next < 0.0f32) || (h < 0.0f32 && next > 0.0f32);
                 if is_edge && crosses && count < comptime!(ROOM as u32) {
@@ -152,7 +154,7 @@ impl Cut {
         self.count = count;
     }
 
-    /// Twice the area, in weights, of the polygon if it is convex.
+    /// Twice the area of a convex polygon, in weights.
     pub fn area(&self) -> f32 {
         let mut area = 0.0f32;
         let mut k = 2u32;
@@ -170,7 +172,7 @@ impl Cut {
 mod tests {
     use super::*;
 
-    /// Four quarters cover a face, and each keeps its corner.
+    /// Four quarters cover a face, and each of the first three has its corner.
     #[test]
     fn quarters_cover_a_face() {
         for path in 0..64 {

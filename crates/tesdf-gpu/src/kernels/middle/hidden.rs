@@ -1,8 +1,8 @@
-//! Overlaps that no contact shows: `tesdf::collide::hidden_overlaps` has the rules.
+//! Overlaps that no contact shows. `tesdf::collide::hidden_overlaps` defines the rules.
 //!
-//! In the mode `node` a thread measures its face in the field of the other body, and quarters of it as long as they can be
-//! deep. In every mode the center of a ball inside of the body is measured. The greatest depth of each ordered pair is
-//! kept.
+//! In the mode `node`, a thread measures the depth of its face in the field of the other body. It
+//! goes on with quarters of the face as long as they can be deep enough. In every mode, the center
+//! of a ball inside the body is measured. The result is the greatest depth of each ordered pair.
 use cubecl::prelude::*;
 use tesdf::collide::HiddenOverlap;
 
@@ -17,16 +17,17 @@ use super::cut::quarter_at;
 const SURE: f32 = HiddenOverlap::SURE as f32;
 const FINE: f32 = HiddenOverlap::FINE as f32;
 const FINE_LOOKS: u32 = HiddenOverlap::FINE_LOOKS;
-/// Pieces of a face after which its search gives up. Four times as many are more than Mesa's llvmpipe lets a thread take.
+/// Pieces of a face after which the search stops. Four times this number exceeds the loop
+/// iterations that Mesa's llvmpipe allows a thread.
 const MAX_LOOKS: u32 = 1 << 8;
-/// Quarters of quarters, at most: what a path of 32 bits holds.
+/// Largest number of quarterings: a path of 32 bits holds no more.
 const LEVELS: u32 = 12;
-/// No division by less.
+/// Smallest divisor.
 const LEAST: f32 = 1e-30;
 
 #[cube]
 impl Field<'_> {
-    /// The possible error of distances, in the frame of a field, at points of it.
+    /// Largest error of distances at points near the shape, in the frame of the field.
     fn rounding(self) -> f32 {
         select(self.is_mesh(), ROUNDING, ROUNDING * self.vector(SIZES).greatest())
     }
@@ -49,13 +50,14 @@ impl Part {
         let c = u.min(v).min(w);
         let b = u.max(v).min(u.max(w)).min(v.max(w));
         let acute = a * b * c / (2.0f32 * ab.cross(ca).length()).max(LEAST);
-        // On the longest side, as far from its end as from another corner.
+        // Obtuse triangle: this point is on the longest side, equally far from its end and from
+        // another corner.
         let by_b = a * b * b / (a * a + b * b - c * c).max(LEAST);
         let by_c = a * c * c / (a * a + c * c - b * b).max(LEAST);
         select(a * a < b * b + c * c, acute, by_b.max(by_c)).min(0.577_350_3f32 * a)
     }
 
-    /// A ball around a triangle: its center is the middle of the longest side or the centroid.
+    /// A ball around a triangle. Its center is the midpoint of the longest side, or the centroid.
     fn ball(self) -> Ball {
         let (u, v, w) = ((self.b - self.a).length(), (self.c - self.b).length(), (self.a - self.c).length());
         let is_ab = u >= v && u >= w;
@@ -67,7 +69,7 @@ impl Part {
     }
 }
 
-/// How deep a face is in the field, at least; 0 when nothing deep enough was found.
+/// Lower bound of the depth of a face in the field; 0 when no deep point was found.
 #[cube]
 fn depth_of(field: Field<'_>, pair: OrderedPair, part: Part, thickness: f32) -> f32 {
     let mut deepest = 0.0f32;
@@ -88,14 +90,15 @@ fn depth_of(field: Field<'_>, pair: OrderedPair, part: Part, thickness: f32) -> 
             looks += 1u32;
             let share = select(looks <= FINE_LOOKS, FINE, SURE);
             let wanted = (share * thickness).max(1.25f32 * deepest);
-            // A piece this small is as deep as its center, but for a quarter.
+            // The search divides a piece only while points may be deeper than its center by more
+            // than a quarter of the wanted depth.
             down = depth + ball.radius > wanted && ball.radius > 0.25f32 * wanted && level < LEVELS;
         }
         if down {
             path *= 4u32;
             level += 1u32;
         } else {
-            // On to the next quarter, of the last level that has one.
+            // Go to the next quarter on the last level that has one.
             while level > 0u32 && path % 4u32 == 3u32 {
                 path /= 4u32;
                 level -= 1u32;
@@ -107,7 +110,8 @@ fn depth_of(field: Field<'_>, pair: OrderedPair, part: Part, thickness: f32) -> 
     deepest
 }
 
-/// A group for each meshlet, a thread for each face. `depths` are bits of numbers, one for each ordered pair.
+/// Finds hidden overlaps. A group takes a meshlet, and a thread takes a face. `depths` has the bits
+/// of an `f32` for each ordered pair.
 #[cube(launch, create_dummy_kernel)]
 pub fn hidden(
     shapes: &Shapes,
@@ -156,7 +160,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2000))]
-        /// All of a face is within the reach of its corners, and in its ball.
+        /// All points of a face are within the reach of its corners, and in its ball.
         #[test]
         fn all_of_a_face_is_within_reach(corners in degenerate::face()) {
             let corners = corners.map(|p| p.as_vec3());

@@ -1,4 +1,4 @@
-//! What the middle phase hands to the narrow phase: nodes with their cells, and polygons.
+//! The output of the middle phase for the narrow phase: nodes with their cells, and polygons.
 use cubecl::prelude::*;
 
 use super::super::broad::ordered_pair::{OrderedPair, Part};
@@ -6,12 +6,12 @@ use super::super::counters::{Counters, POLYGONS};
 use super::super::math::vector::{Row, row};
 use super::cut::{Cut, CutExpand};
 
-/// Nodes, or polygons without their vertices.
+/// A list of nodes, or of polygons without their vertices.
 #[derive(CubeType, CubeLaunch)]
 pub struct Items {
-    /// [`WORDS`] each: ordered pair, face of a, cell, number.
+    /// [`WORDS`] words for each: ordered pair, face of a, cell, number.
     pub words: Box<[u32]>,
-    /// Room for so many.
+    /// Capacity of the list.
     pub room: u32,
 }
 
@@ -19,7 +19,8 @@ pub struct Items {
 #[derive(CubeType, CubeLaunch)]
 pub struct Polygons {
     pub items: Items,
-    /// [`ROWS`] each: the vertices, two to a row, as weights of the second and the third corner of the face.
+    /// [`ROWS`] rows for each: the vertices, two per row, as weights of the second and the third
+    /// corner of the face.
     pub weights: Box<[Row]>,
 }
 
@@ -27,7 +28,8 @@ pub struct Polygons {
 pub const WORDS: u32 = 4;
 /// Rows of a polygon.
 pub const ROWS: usize = 4;
-/// Most vertices of a polygon: a triangle clipped by a tetrahedron has seven.
+/// Capacity for the vertices of a polygon. A triangle that is clipped by a tetrahedron has at most
+/// seven.
 pub const MAX_VERTICES: usize = 8;
 
 /// A node or a polygon.
@@ -36,15 +38,16 @@ pub const MAX_VERTICES: usize = 8;
 pub struct Item {
     /// The ordered pair.
     pub pair: u32,
-    /// The face of its first instance.
+    /// The face of the first instance.
     pub face: u32,
-    /// The cell in the field of the second one; [`NONE`](super::super::field::shapes::NONE) outside of the domain.
+    /// The cell in the field of the second instance; [`NONE`](super::super::field::shapes::NONE)
+    /// outside of the domain.
     pub cell: u32,
-    /// Of a node the corner of the face, of a polygon the number of vertices.
+    /// For a node the corner of the face, for a polygon the number of vertices.
     pub number: u32,
 }
 
-/// A face in the field's frame.
+/// A face in the frame of the field.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Subject {
@@ -53,7 +56,7 @@ pub struct Subject {
     pub part: Part,
 }
 
-/// A point of a face: weights of its second and third corner.
+/// A point of a face: the weights of its second and third corner.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Weights {
@@ -84,7 +87,7 @@ impl Items {
 
 #[cube]
 impl Polygons {
-    /// Vertex `i` of a polygon.
+    /// Vertex `i` of polygon `item`.
     pub fn vertex(&self, item: u32, i: u32) -> Weights {
         let row = self.weights[(item * comptime!(ROWS as u32) + i / 2u32) as usize];
         let is_first = i % 2u32 == 0u32;
@@ -101,7 +104,8 @@ impl Cut {
     pub fn write(&self, polygons: &mut Polygons, counters: &Counters, subject: Subject, cell: u32) {
         let at = counters.append(POLYGONS);
         if at < polygons.items.room {
-            // Rounding may leave more than eight, all but on a line: the first ones cover the polygon.
+            // Rounding may leave more than eight vertices. The additional ones lie almost on a line
+            // with their neighbours, so the first eight cover the polygon.
             let number = self.count.min(comptime!(MAX_VERTICES as u32));
             polygons.items.put(at, Item { pair: subject.pair.number, face: subject.face, cell, number });
             let first = at as usize * ROWS;

@@ -1,4 +1,4 @@
-//! Middle phase: the cells of nodes and the polygons of faces; hidden overlaps.
+//! Middle phase: finds the cells of nodes, the polygons of faces, and hidden overlaps.
 pub mod bits;
 pub mod clip;
 pub mod corners;

@@ -1,4 +1,4 @@
-//! Middle phase of the mode `node`: the cells of nodes.
+//! Middle phase of the mode `node`: finds the cells of nodes.
 use cubecl::prelude::*;
 
 use super::super::broad::meshlets::Blocks;
@@ -30,8 +30,8 @@ impl Field<'_> {
     }
 }
 
-/// A group for each meshlet, a thread for each face with the corners that no face before has. Nodes that can touch are
-/// written with their cells.
+/// Writes the nodes that can touch, with their cells. A group takes a meshlet. A thread takes a
+/// face, with the corners that no earlier face has.
 #[cube(launch, create_dummy_kernel)]
 pub fn nodes(
     shapes: &Shapes,

@@ -1,9 +1,10 @@
-//! Middle phase around conforming domains: the parts of a face that no tetrahedron holds, whose points the face tree
-//! answers.
+//! Middle phase around conforming domains: finds the parts of a face outside of all tetrahedra. The
+//! face tree answers queries at their points.
 //!
-//! A tetrahedron leaves up to four convex parts of a polygon outside. A thread walks through the choices of parts, one
-//! tetrahedron after the other, and makes each polygon again from the face: it remembers a number for each tetrahedron.
-//! A face near too many tetrahedra is searched in quarters.
+//! Outside of a tetrahedron, a polygon has up to four convex parts. A thread walks through all
+//! choices of parts, one tetrahedron after the other, and cuts each polygon from the face anew. So
+//! it only stores one number per tetrahedron. A face near too many tetrahedra is divided into
+//! quarters.
 use cubecl::prelude::*;
 
 use super::super::broad::meshlets::{Blocks, ROUNDING};
@@ -17,21 +18,23 @@ use super::corners::corners_in;
 use super::cut::{Cut, CutExpand, Quarter, no_polygon, quarter_at};
 use super::items::{MAX_VERTICES, Polygons, Subject};
 
-/// Most tetrahedra that parts are chosen of.
+/// Largest number of tetrahedra that a piece is cut by.
 const MAX_NEAR: usize = 48;
-/// A face near more tetrahedra than this is quartered: choices cost the square of their number.
+/// A face near more tetrahedra than this is quartered, because the cost of cutting grows with the
+/// square of the number.
 const MANY: u32 = 8;
-/// A face counts as covered when its uncovered area is below this fraction. A part that is left out has a cell beside
-/// it, where the face is as near up to the part's width, 1e-5 of the face.
+/// A face counts as covered when its uncovered area is below this fraction. Next to an omitted part
+/// there is a cell. There the face is equally near, up to the width of the part, 1e-5 of the face.
 const UNCOVERED: f32 = 1e-5;
-/// Most quarterings. A piece that then still has more than [`MAX_NEAR`] near, 2^-12 of the face, is not cut: a contact too
-/// many, with the distance to the surface, rather than one too few.
+/// Largest number of quarterings. The pieces are then 2^-12 of the face. A piece that still has
+/// more than [`MAX_NEAR`] tetrahedra near it is not cut. This may give an additional contact, with
+/// the correct distance to the surface, but misses none.
 const QUARTERINGS: u32 = 12;
-/// A part of a face that is thinner than this (local frame) is what rounding has left along the side that two tetrahedra
-/// share; it would go on along the plane of that side, out of the domain. A true part so thin has others beside it, where
-/// the face is as near up to that.
+/// A part thinner than this (local frame) comes from rounding along the side that two tetrahedra
+/// share. Such a part would extend along the plane of this side, out of the domain. A true part
+/// that is equally thin has neighbours, in which the face is equally near up to this width.
 const SLIVER: f32 = 2.0 * OUT;
-/// Levels of quarters that a group shares out, and their number.
+/// Number of quartering levels that a group divides among its threads, and the number of quarters.
 const SHARED_LEVELS: u32 = 3;
 const SHARED: u32 = 64;
 
@@ -39,17 +42,17 @@ const SHARED: u32 = 64;
 #[derive(CubeType)]
 struct Near {
     roots: Array<u32>,
-    /// Their number, also beyond the room.
+    /// Number of tetrahedra, also above the capacity.
     count: u32,
-    /// Whether one of them holds all of the piece.
+    /// Whether one tetrahedron holds the whole piece.
     held: bool,
-    /// The part that was chosen of each: see [`Cut::keep`].
+    /// The part that was chosen for each tetrahedron: see [`Cut::keep`].
     choices: Array<u32>,
 }
 
 #[cube]
 impl Near {
-    /// Whether there are more than there is room for.
+    /// Whether there are more tetrahedra than the capacity.
     fn is_full(&self) -> bool {
         self.count > comptime!(MAX_NEAR as u32)
     }
@@ -78,7 +81,8 @@ impl Near {
         }
     }
 
-    /// Whether the tetrahedra hold all of a quarter: no two hold the same part, so areas add up.
+    /// Whether the tetrahedra hold a quarter completely. Tetrahedra do not overlap, so their areas
+    /// add up.
     fn cover(&self, field: Field<'_>, subject: Subject, quarter: Quarter, polygon: &mut Cut) -> bool {
         let whole = quarter.area();
         let mut covered = 0.0f32;
@@ -89,14 +93,16 @@ impl Near {
             covered += polygon.area();
             i += 1u32;
         }
-        // More than all: some are inside out, and an area that counts twice may hide a gap.
+        // A covered area above the whole shows tetrahedra that are inside out. An area that counts
+        // twice may hide a gap.
         covered >= (1.0f32 - UNCOVERED) * whole && covered <= (1.0f32 + UNCOVERED) * whole
     }
 }
 
 #[cube]
 impl Cut {
-    /// Cuts by a tetrahedron: `choice` 0 keeps what it holds, 1 to 4 what is out of that side and within those before.
+    /// Cuts by a tetrahedron. `choice` 0 keeps the part inside. 1 to 4 keep the part that is
+    /// outside of this side and inside all earlier sides.
     fn keep(&mut self, field: Field<'_>, root: u32, part: Part, choice: u32) {
         let held = corners_in(field.tetrahedron(root), part);
         let sides = select(choice == 0u32, 4u32, choice);
@@ -110,8 +116,8 @@ impl Cut {
 
 #[cube]
 impl Field<'_> {
-    /// Whether no point of a piece that is out of all tetrahedra can have a distance up to `reach`: it is far out, or deep
-    /// inside.
+    /// Whether no point of a piece that is outside of all tetrahedra can have a signed distance up
+    /// to `reach`. This holds when the piece is farther away, or deep inside the solid.
     fn is_far(self, center: V3, radius: f32, reach: f32) -> bool {
         let inside = self.locate(center).is_inside();
         let limit = radius + select(inside, 0.0f32, reach) + ROUNDING;
@@ -119,8 +125,9 @@ impl Field<'_> {
     }
 }
 
-/// A group for each meshlet, a thread for each face: the parts of it around the domain of the field are written, with
-/// [`NONE`] for a cell. Faces that are to be quartered wait for the whole group.
+/// Writes the parts of faces around the domain of the field, with [`NONE`] as their cell. A group
+/// takes a meshlet, and a thread takes a face. Faces that need quartering wait, and the whole group
+/// then works on each.
 #[cube(launch, create_dummy_kernel)]
 pub fn outside_polygons(
     shapes: &Shapes,
@@ -140,7 +147,8 @@ pub fn outside_polygons(
         let field = shapes.field(pair.shape_b);
         let is_around = field.is_mesh() && field.is_conforming() && pair.part_reach() > 0.0f32;
         let faces = select(is_around, surface.faces_of(meshlet), 0u32);
-        // First each thread its own face, then all together those that wait.
+        // First each thread works on its own face. Then all threads work together on each waiting
+        // face.
         let mut turn = 0u32;
         while turn <= faces {
             sync_cube();
@@ -169,7 +177,7 @@ pub fn outside_polygons(
     }
 }
 
-/// A walk over quarters of quarters: of a whole face, or of a thread's share of the group's quarters.
+/// A walk over the quarters of a face, or over a thread's share of the group's quarters.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Walk {
@@ -187,7 +195,7 @@ impl Walk {
         self.level += 1u32;
     }
 
-    /// On to the next quarter, of the last level that has one.
+    /// Goes to the next quarter on the last level that has one.
     fn on(&mut self) {
         while self.level > self.top && self.path % 4u32 == 3u32 {
             self.path /= 4u32;
@@ -209,8 +217,9 @@ fn walk_of(alone: bool) -> Walk {
     }
 }
 
-/// The parts of one face, quarter by quarter: of all of it `alone`, or of the thread's share of the group's quarters. 1
-/// when nothing was written because the face is to be quartered and the thread is alone.
+/// Writes the parts of a face, quarter by quarter. With `alone`, the thread takes the whole face,
+/// and otherwise its share of the group's quarters. Returns 1 when the thread is alone and the face
+/// needs quartering; then nothing is written.
 #[cube]
 fn around(
     field: Field<'_>,
@@ -263,7 +272,7 @@ fn around(
     waits
 }
 
-/// The parts of a quarter that are out of all tetrahedra near it.
+/// Writes the parts of a quarter outside of all tetrahedra near it.
 #[cube]
 fn parts(
     field: Field<'_>,
@@ -301,7 +310,7 @@ fn parts(
             }
             back = true;
         } else if choice == 0u32 && some {
-            // It holds something: the parts out of it, side by side.
+            // The tetrahedron holds a part: continue with the parts outside, side by side.
             choice = 1u32;
         } else if choice == 0u32 || some {
             near.choices[depth as usize] = choice;
@@ -323,15 +332,15 @@ fn parts(
     }
 }
 
-/// The shape of a polygon.
+/// The size of a polygon.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Measure {
-    /// The mean of its vertices.
+    /// The mean of the vertices.
     center: V3,
-    /// Twice its area.
+    /// Twice the area.
     area: f32,
-    /// The greatest distance of a vertex from the first one.
+    /// The greatest distance of a vertex from the first vertex.
     longest: f32,
 }
 
@@ -359,7 +368,7 @@ impl Cut {
     }
 }
 
-/// Appends a part, unless it is a sliver between two of the tetrahedra that have `cuts` it.
+/// Appends a part, unless it is a sliver between two of the `cuts` tetrahedra that have cut it.
 #[cube]
 fn write_part(
     field: Field<'_>,
@@ -370,11 +379,12 @@ fn write_part(
     polygons: &mut Polygons,
 ) {
     let shape = polygon.measure(subject.part);
-    // A part that no tetrahedron has cut is as thin as the face itself.
+    // A part that no tetrahedron has cut is as thin as the face itself, and is kept.
     let is_sliver = cuts > 0u32 && subject.part.count == 3u32 && shape.area < SLIVER * shape.longest;
     if !is_sliver && field.locate(shape.center).number == NONE {
         polygon.write(polygons, counters, subject, NONE);
-        // Beyond the room of a polygon: the first vertex, the last one written, and the rest.
+        // With more vertices than the capacity, a second polygon has the first vertex, the last one
+        // written, and the others.
         let last = comptime!(MAX_VERTICES as u32 - 1).runtime();
         if polygon.count > last + 1u32 {
             let n = polygon.count;
