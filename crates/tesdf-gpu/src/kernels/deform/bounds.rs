@@ -1,25 +1,26 @@
-//! A shape whose vertices move, and bounds of them.
+//! A shape whose vertices move, and the bounds of these vertices.
 use cubecl::prelude::*;
 
 use super::super::field::nearest::{NodeBoxes, TreeChild};
 use super::super::field::shapes::{BOXES, Bounds, BoundsExpand, FACE_VERTICES, STRIDE};
 use super::super::math::vector::{Row, V3, last, row, v3, xyz};
 
-/// The buffers of all shapes, to be written, with the new positions of one.
+/// The buffers of all shapes, and the new positions for one shape.
 #[derive(CubeType, CubeLaunch)]
 pub struct Moving {
     pub table: Box<[u32]>,
     pub words: Box<[u32]>,
     pub rows: Box<[Row]>,
-    /// Three numbers a vertex, in the shape's unit.
+    /// Three numbers for each vertex, in the shape's frame and unit.
     pub positions: Box<[f32]>,
-    /// The middle of the cube in the shape's unit as high and low `f32`, and the scale of the local frame.
+    /// Center of the cube in the shape's unit as high and low `f32`, and the scale of the local
+    /// frame.
     pub frame: Box<[Row]>,
-    /// The shape.
+    /// Index of the shape.
     pub shape: u32,
 }
 
-/// No points: the least corner is above the greatest.
+/// Empty bounds: the minimum is above the maximum.
 #[cube]
 pub fn no_bounds() -> Bounds {
     Bounds { low: v3(1e30f32, 1e30f32, 1e30f32), high: v3(-1e30f32, -1e30f32, -1e30f32) }
@@ -27,7 +28,7 @@ pub fn no_bounds() -> Bounds {
 
 #[cube]
 impl Bounds {
-    /// Around both.
+    /// The bounds of both.
     pub fn with(self, other: Bounds) -> Bounds {
         Bounds { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
@@ -39,7 +40,7 @@ impl Bounds {
 
 #[cube]
 impl Moving {
-    /// A word of the shape's table.
+    /// Word `at` of the shape in the table.
     pub fn entry(&self, #[comptime] at: u32) -> u32 {
         self.table[(self.shape * STRIDE + at) as usize]
     }
@@ -48,12 +49,12 @@ impl Moving {
         self.table[(self.shape * STRIDE + at) as usize] = value;
     }
 
-    /// A word of the arrays.
+    /// Word `at` of the arrays.
     pub fn word(&self, at: u32) -> u32 {
         self.words[at as usize]
     }
 
-    /// A vertex in the local frame, relative to the middle of the cube.
+    /// A vertex in the local frame, relative to the center of the cube.
     pub fn vertex(&self, number: u32) -> V3 {
         let at = (3u32 * number) as usize;
         let p = v3(self.positions[at], self.positions[at + 1], self.positions[at + 2]);
@@ -61,7 +62,7 @@ impl Moving {
         ((p - xyz(high)) - xyz(low)) * last(high)
     }
 
-    /// Around `count` vertices that are named from word `first` on.
+    /// The bounds of `count` vertices, whose indices begin at word `first`.
     pub fn around(&self, first: u32, count: u32) -> Bounds {
         let mut bounds = no_bounds();
         let mut k = 0u32;
@@ -72,7 +73,7 @@ impl Moving {
         bounds
     }
 
-    /// Both boxes of a node of the face tree.
+    /// The boxes of both children of a node of the face tree.
     fn boxes(&self, node: u32) -> NodeBoxes {
         let at = (self.entry(BOXES) + 3u32 * node) as usize;
         let (r, s, t) = (self.rows[at], self.rows[at + 1], self.rows[at + 2]);
@@ -93,13 +94,14 @@ impl Moving {
         self.rows[at + 2] = row(right.low.z, right.high.x, right.high.y, right.high.z);
     }
 
-    /// Around both boxes of a node of the face tree.
+    /// The bounds of both boxes of a node of the face tree.
     pub fn node_bounds(&self, node: u32) -> Bounds {
         let boxes = self.boxes(node);
         boxes.left.with(boxes.right)
     }
 
-    /// Around the faces or boxes below one side of a node of the face tree.
+    /// The bounds of a child of a face-tree node: of the faces of a leaf, or of the boxes of a
+    /// node.
     pub fn child_bounds(&self, child: TreeChild) -> Bounds {
         if child.is_leaf() {
             self.around(self.entry(FACE_VERTICES) + 3u32 * child.start(), 3u32 * child.count())

@@ -1,4 +1,4 @@
-//! Faces and tetrahedra follow their vertices, a thread each.
+//! Updates faces and tetrahedra after their vertices have moved.
 use cubecl::prelude::*;
 
 use super::super::field::shapes::{
@@ -34,7 +34,8 @@ impl Moving {
     }
 }
 
-/// A thread for each face, then one for each node of the tree over tetrahedra, of which leaves have work.
+/// Updates a face per thread, then a node of the tree over tetrahedra per thread. Only leaves have
+/// a tetrahedron to update.
 #[cube(launch, create_dummy_kernel)]
 pub fn follow(moving: &mut Moving) {
     let item = ABSOLUTE_POS as u32;

@@ -1,4 +1,5 @@
-//! Deformation (Sec. V-D): the arrays of a shape follow its vertices. Connectivity, lists and labels stay.
+//! Deformation (Sec. V-D of the paper): updates the arrays of a shape after vertices have moved.
+//! Connectivity, lists and labels stay.
 pub mod bounds;
 pub mod follow;
 pub mod refit;

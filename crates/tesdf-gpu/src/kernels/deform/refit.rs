@@ -1,5 +1,6 @@
-//! Boxes, balls and bounds are fitted to moved faces and tetrahedra, from the leaves of the trees upwards: by one group for
-//! a shape, as nothing orders writes between groups but the end of a launch.
+//! Refits boxes, balls and bounds to moved faces and tetrahedra, from the leaves of the trees to
+//! their roots. One group does this for a shape, because only the end of a launch orders the writes
+//! of different groups.
 use cubecl::prelude::*;
 
 use super::super::field::nearest::{NodeBoxes, TreeChild};
@@ -13,11 +14,12 @@ use super::bounds::{Moving, MovingExpand, no_bounds};
 /// Threads of the group.
 pub const GROUP: u32 = 256;
 
-/// What a ball is grown by, of its radius and of the cube: more than rounding to `f32` takes away.
+/// A ball grows by this fraction of its radius and of the cube's side. This is more than the
+/// rounding error of `f32`.
 pub const GROWN: f32 = 1e-6;
 
-/// The inner nodes of a tree by level. As words: the number of levels, where each begins and the last ends, then the inner
-/// nodes, those over leaves first.
+/// The inner nodes of a tree by level. The words are: the number of levels; the start of each
+/// level, and the end of the last; the inner nodes, level by level, with parents of leaves first.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Levels {
@@ -32,17 +34,17 @@ impl Moving {
         Levels { at, count: self.word(at) }
     }
 
-    /// The place of the first node of a level; that of the level after the last is the end.
+    /// Index of the first node of a level. For the level after the last: the end.
     fn level_start(&self, levels: Levels, level: u32) -> u32 {
         self.word(levels.at + 1u32 + level)
     }
 
-    /// The node at a place.
+    /// The node at an index.
     fn level_node(&self, levels: Levels, i: u32) -> u32 {
         self.word(levels.at + 2u32 + levels.count + i)
     }
 
-    /// Fits the boxes of a node of the face tree.
+    /// Refits the boxes of a node of the face tree.
     fn refit_faces(&mut self, node: u32) {
         let children = self.entry(CHILDREN) + 2u32 * node;
         let left = TreeChild { word: self.word(children) };
@@ -51,7 +53,7 @@ impl Moving {
         self.put_boxes(node, boxes);
     }
 
-    /// Fits the box of a node of the tree over tetrahedra.
+    /// Refits the box of a node of the tree over tetrahedra.
     fn refit_tetrahedra(&mut self, node: u32) {
         let tree = self.entry(TREE);
         let boxes = self.entry(TREE_BOXES);
@@ -68,7 +70,7 @@ impl Moving {
         self.rows[to + 1] = row_of(bounds.high, 0.0f32);
     }
 
-    /// Fits the ball of a meshlet.
+    /// Refits the ball of a meshlet.
     fn refit_meshlet(&mut self, meshlet: u32) {
         let range = self.entry(MESHLET_FACES) + 2u32 * meshlet;
         let first = self.entry(FACE_VERTICES) + 3u32 * self.word(range);
@@ -86,7 +88,8 @@ impl Moving {
         self.rows[to] = row_of(center, radius);
     }
 
-    /// The lowest vertex of this thread that is not finite, or farther out than `f32` can tell faces apart.
+    /// The lowest of this thread's vertices with an invalid position: one that is not finite, or so
+    /// far away that `f32` cannot separate faces there.
     fn bad_vertex(&self) -> u32 {
         let side = 2.0f32 * from_bits(self.entry(SIDE));
         let limit = v3(side, side, side);
@@ -100,12 +103,12 @@ impl Moving {
         lowest
     }
 
-    /// What of the table depends on vertices.
+    /// Updates the entries of the table that depend on vertices.
     fn refit_table(&mut self) {
-        // Of moved lists and cells nothing is proved.
+        // Exactness of lists and bounds of cells are not proved after a move.
         self.set_entry(EXACT_LISTS, 0u32);
         self.set_entry(BOUND_UNIT, 0u32);
-        // The thickness is about that before, but not at the same place.
+        // The thickness is about the same after a move, but the center of the ball is unknown.
         let inner = self.entry(INNER_BALL) as usize;
         let thickness = last(self.rows[inner]).abs();
         self.rows[inner] = row_of(zero(), -thickness);
@@ -121,7 +124,7 @@ impl Moving {
     }
 }
 
-/// One group of [`GROUP`] threads.
+/// Refits a shape with one group of [`GROUP`] threads.
 #[cube(launch, create_dummy_kernel)]
 pub fn refit(moving: &mut Moving) {
     let levels = moving.levels(FACE_LEVELS);

@@ -1,46 +1,49 @@
-//! Algorithm 1: which faces are closest at the samples of a cell, by brute force.
+//! Algorithm 1: finds the faces that are closest at the samples of a cell, by brute force.
 //!
-//! A group takes a block of 8 × 8 × 4 neighbouring samples of one cell, a thread a sample. Lemma 1 is applied again to the
-//! block, whose ball is small: of hundreds of candidates some ten are left, and only they are measured from each sample.
+//! A group takes a block of 8 × 8 × 4 neighbouring samples of one cell, with one sample per thread.
+//! Lemma 1 is applied again to the block, whose ball is small. Of hundreds of candidates, about ten
+//! are left, and only these are measured from each sample.
 //!
-//! Everything is relative to the cell's centroid, and a face is its plane and its three edges, each from its point nearest
-//! to the centroid. So rounding is relative to the size of the cell and its distance from the face, however large the
-//! face is.
+//! All coordinates are relative to the centroid of the cell. A face is given by its plane and its
+//! three edges, each from the point of its line nearest to the centroid. So the rounding error is
+//! relative to the size of the cell and its distance from the face, however large the face is.
 use cubecl::prelude::*;
 
 use super::super::math::vector::{Row, V3, last, to_bits, xyz};
 
-/// Rows of a candidate: the plane (unit normal, height); the three planes through the edges (inward, height); for each
-/// edge, the longest first, its point nearest to the centroid and where the edge begins from there; its direction and
-/// where it ends.
+/// Rows of a candidate: the plane (unit normal, height); the planes through the three edges (inward
+/// normal, height); and two rows for each edge, the longest first. An edge's first row has the
+/// point of its line nearest to the centroid, and the position of the start along the line. The
+/// second row has the direction, and the position of the end.
 pub const FACE_ROWS: usize = 10;
-/// Rows of a cell: four corners, shrunk; beside them ε, the radius R, twice the radius of a block, and nothing.
+/// Rows of a cell: its four shrunk corners. The last column has ε, the radius R, twice the radius
+/// of a block, and 0.
 pub const CELL_ROWS: usize = 4;
-/// Samples of a block.
+/// Size of a block, in samples.
 pub const BLOCK: [u32; 3] = [8, 8, 4];
 /// Threads of a group.
 pub const GROUP: usize = 256;
-/// Candidates that a group measures in one go.
+/// Candidates that a group measures at a time.
 pub const TILE: usize = 1024;
-/// What rounding may make of the difference of two distances, as a share of R + d: docs/math.md.
+/// Rounding error of the difference of two distances, relative to R + d: section 3 of docs/math.md.
 pub const ROUNDING: f32 = 3.814_697_3e-6;
-/// Farther than any candidate.
+/// Larger than any distance or its square.
 const FAR: f32 = 3.0e38;
 
 /// The cells of a launch and their candidates.
 #[derive(CubeType, CubeLaunch)]
 pub struct Samples {
-    /// [`FACE_ROWS`] a candidate.
+    /// [`FACE_ROWS`] rows for each candidate.
     pub faces: Box<[Row]>,
-    /// [`CELL_ROWS`] a cell.
+    /// [`CELL_ROWS`] rows for each cell.
     pub cells: Box<[Row]>,
-    /// First candidate and number of candidates of each cell.
+    /// First candidate and number of candidates for each cell.
     pub ranges: Box<[u32]>,
-    /// Where each block of a cell is, in blocks, ten bits for each index.
+    /// Position of each block in a cell, counted in blocks, with ten bits for each index.
     pub blocks: Box<[u32]>,
-    /// Number of blocks of a cell.
+    /// Number of blocks per cell.
     pub block_count: u32,
-    /// Steps along an edge of a cell.
+    /// Number of sample intervals along an edge of a cell.
     pub resolution: u32,
 }
 
@@ -60,13 +63,13 @@ fn entry(rows: &[Row], at: usize) -> Entry {
 
 #[cube]
 impl Entry {
-    /// Height of a point over a plane.
+    /// Height of a point above a plane.
     fn above(self, p: V3) -> f32 {
         self.vector.dot(p) - self.number
     }
 }
 
-/// An edge: its point nearest to the centroid and where it begins from there; its direction and where it ends.
+/// An edge, in the layout of two rows of [`FACE_ROWS`].
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Edge {
@@ -76,12 +79,12 @@ pub struct Edge {
 
 #[cube]
 impl Edge {
-    /// Where along the edge the foot of a point is.
+    /// Position of a point's projection along the edge.
     fn foot(self, p: V3) -> f32 {
         self.end.vector.dot(p - self.begin.vector)
     }
 
-    /// Squared distance to a point whose foot is known.
+    /// Squared distance to a point with the projection `foot`.
     fn squared_distance(self, foot: f32, p: V3) -> f32 {
         let along = self.end.vector * -foot.clamp(self.begin.number, self.end.number);
         let off = (p - self.begin.vector) + along;
@@ -89,7 +92,7 @@ impl Edge {
     }
 }
 
-/// A face as [`FACE_ROWS`] has it.
+/// A face in the layout of [`FACE_ROWS`].
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Candidate {
@@ -127,7 +130,8 @@ impl Candidate {
     pub fn squared_distance(self, p: V3) -> f32 {
         let height = self.plane.above(p);
         let t = self.edge_0.foot(p);
-        // The tip of a needle is found by its longest edge: two sides that are nearly parallel find it badly.
+        // Beyond the tip of a needle the longest edge decides, because two nearly parallel sides
+        // give an imprecise answer there.
         let inside = self.side_0.above(p) >= 0.0f32
             && self.side_1.above(p) >= 0.0f32
             && self.side_2.above(p) >= 0.0f32
@@ -140,35 +144,37 @@ impl Candidate {
     }
 }
 
-/// How far from a sample a face may be that is within ε of the `nearest` there.
+/// Limit on the distance from a sample to a face that is within ε of the nearest face, which is at
+/// `nearest`.
 #[cube]
 fn sample_limit(nearest: f32, threshold: f32, radius: f32) -> f32 {
     let limit = nearest + threshold;
     limit + ROUNDING * (radius + limit)
 }
 
-/// How far from the middle of a block a face may be that is so at one of its samples: Lemma 1, with ε.
+/// Limit on the distance from the center of a block to a face that is within ε of the nearest face
+/// at a sample of the block: Lemma 1 with ε.
 #[cube]
 pub fn block_limit(nearest: f32, threshold: f32, radius: f32, reach: f32) -> f32 {
     let limit = nearest + reach + threshold;
     limit + ROUNDING * (radius + reach + limit)
 }
 
-/// The candidates of a cell, and the limits of its samples.
+/// The candidates of a cell, and the parameters of its limits.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Limits {
     first: usize,
     count: usize,
-    /// ε.
+    /// The threshold ε.
     threshold: f32,
-    /// R.
+    /// The radius R of the cell.
     radius: f32,
     /// Twice the radius of a block.
     reach: f32,
 }
 
-/// Where a sample is, in steps along the edges of a cell.
+/// The position of a sample, in steps along the edges of a cell.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Steps {
@@ -194,7 +200,7 @@ impl Samples {
         }
     }
 
-    /// The point of a cell with these barycentric coordinates, counted in steps.
+    /// The point of a cell with these barycentric coordinates, in steps.
     fn point(&self, cell: usize, i: f32, j: f32, k: f32) -> V3 {
         let q = self.resolution as f32;
         let at = cell * comptime!(CELL_ROWS);
@@ -215,7 +221,8 @@ impl Samples {
         }
     }
 
-    /// The least squared distance from a point to the candidates, over the group. All threads call it.
+    /// The smallest squared distance from a point to the candidates. All threads of the group must
+    /// call it.
     fn least(&self, limits: Limits, p: V3, nearest_of: &mut Shared<[f32]>) -> f32 {
         let unit = UNIT_POS as usize;
         let mut nearest = FAR.runtime();
@@ -238,7 +245,8 @@ impl Samples {
         nearest_of[0]
     }
 
-    /// Gathers the candidates of a tile that are within a limit of the middle of the block. All threads call it.
+    /// Collects the candidates of a tile that are within a limit of the block's center. All threads
+    /// of the group must call it.
     fn gather(&self, limits: Limits, tile: usize, near: Near, list: &mut List) {
         let first = limits.first + tile * comptime!(TILE);
         let count = (limits.count - tile * comptime!(TILE)).min(TILE);
@@ -259,7 +267,7 @@ impl Samples {
     }
 }
 
-/// The middle of a block, and the squared limit of its candidates.
+/// The center of a block, and the squared limit for its candidates.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Near {
@@ -274,14 +282,16 @@ struct List {
     length: Shared<[Atomic<u32>]>,
 }
 
-/// A group for each block of each cell: d_f², as bits, of the candidates that are within ε at a sample, into `least`.
+/// Writes d_f² as bits into `least`, for each candidate that is within ε at a sample. A group takes
+/// a block of a cell.
 #[cube(launch, create_dummy_kernel)]
 pub fn sample(samples: &Samples, least: &[Atomic<u32>], first_group: u32, groups: u32) {
     let mut nearest_of = Shared::<[f32]>::new_slice(GROUP);
     let mut list =
         List { faces: Shared::<[u32]>::new_slice(TILE), length: Shared::<[Atomic<u32>]>::new_slice(1usize) };
 
-    // Groups beyond the last do the last one's work again, which changes nothing, so that all threads meet at barriers.
+    // Surplus groups repeat the work of the last group, which changes nothing. So all threads reach
+    // each barrier.
     let group = first_group + (CUBE_POS as u32).min(groups - 1u32);
     let cell = (group / samples.block_count) as usize;
     let block = samples.block(group);
@@ -297,8 +307,8 @@ pub fn sample(samples: &Samples, least: &[Atomic<u32>], first_group: u32, groups
     let limit = block_limit(nearest.sqrt(), limits.threshold, limits.radius, limits.reach);
     let near = Near { center, squared: limit * limit };
 
-    // Candidates within the limit, a tile at a time: first for the least distance of each sample, then for those that are
-    // as near.
+    // The tiles are processed twice: first for the smallest distance of each sample, then for the
+    // candidates within ε of it.
     let tiles = limits.count.div_ceil(TILE);
     let mut nearest = FAR.runtime();
     for tile in 0..tiles {

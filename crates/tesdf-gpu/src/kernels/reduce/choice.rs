@@ -1,5 +1,5 @@
-//! The member of a pair with the greatest key; of equal ones that with the lowest name, so that the order of members does
-//! not matter.
+//! Chooses the member of a pair with the greatest key. Among equal keys, the member with the lowest
+//! name wins, so the result does not depend on the order of members.
 use cubecl::prelude::*;
 
 use super::super::field::nearest::FAR;
@@ -8,7 +8,7 @@ use super::super::math::vector::to_bits;
 use super::super::narrow::contacts::Contacts;
 use super::members::{Members, MembersExpand};
 
-/// Threads that choose together.
+/// Threads per group, which choose together.
 pub const GROUP: u32 = 256;
 
 /// A member and its key.
@@ -16,11 +16,11 @@ pub const GROUP: u32 = 256;
 #[expand(derive(Clone, Copy))]
 pub struct Chosen {
     pub key: f32,
-    /// [`NONE`] without one.
+    /// Index of the member; [`NONE`] when there is none.
     pub member: u32,
 }
 
-/// Memory for a choice, shared by a group.
+/// Shared memory of a group for a choice.
 #[derive(CubeType)]
 pub struct Chooser {
     keys: Shared<[f32]>,
@@ -40,7 +40,7 @@ pub fn nothing_chosen() -> Chosen {
     Chosen { key: -FAR.runtime(), member: NONE.runtime() }
 }
 
-/// 0 undecided, 1 the first is before, 2 after.
+/// Result of a comparison: 0 undecided, 1 the first comes before, 2 it comes after.
 #[cube]
 fn compare(order: u32, a: u32, b: u32) -> u32 {
     select(order == 0u32, select(a < b, 1u32, select(a > b, 2u32, 0u32)), order)
@@ -48,8 +48,8 @@ fn compare(order: u32, a: u32, b: u32) -> u32 {
 
 #[cube]
 impl Members {
-    /// Whether the name of one contact is before that of the other of its pair: ordered pair, face, cell, corner, bits of
-    /// the point.
+    /// Whether the name of a contact comes before the name of another contact of its pair. A name
+    /// has the ordered pair, face, cell, corner, and the bits of the point.
     fn is_before(&self, contacts: &Contacts, member: u32, other: u32) -> bool {
         let (x, y) = (self.contacts[member as usize], self.contacts[other as usize]);
         let (a, b) = (contacts.name(x), contacts.name(y));
@@ -64,7 +64,7 @@ impl Members {
         order == 1u32
     }
 
-    /// Whether a member has the greater key, or an equal one and the lower name.
+    /// Whether `a` has the greater key, or an equal key and the lower name.
     pub fn wins(&self, contacts: &Contacts, a: Chosen, b: Chosen) -> bool {
         let is_greater = a.key > b.key;
         let mut better = false;
@@ -74,9 +74,9 @@ impl Members {
         is_greater || better
     }
 
-    /// The best of all threads. All threads call it.
+    /// The best choice of all threads. All threads of the group must call it.
     pub fn best(&self, contacts: &Contacts, chooser: &mut Chooser, mine: Chosen) -> Chosen {
-        // Nobody writes while another still reads the last result.
+        // Wait until all threads have read the last result.
         sync_cube();
         let unit = UNIT_POS as usize;
         chooser.keys[unit] = mine.key;

@@ -1,5 +1,5 @@
-//! The points of a pair's members: their box, their radius, and the contacts that a reduction keeps first, which are the
-//! deepest contact and the extremes along three axes.
+//! The points of a pair's members: their box, their radius, and the contacts that a reduction keeps
+//! first. These are the deepest contact, and the extremes along three axes.
 use cubecl::prelude::*;
 
 use super::super::field::shapes::NONE;
@@ -8,11 +8,12 @@ use super::super::narrow::contacts::Contacts;
 use super::choice::{Chooser, Chosen, GROUP, nothing_chosen};
 use super::members::{Members, MembersExpand, Run};
 
-/// An axis along which the points reach less than this share of their radius has no extremes, as in `tesdf`.
+/// An axis has no extremes when the points extend along it by less than this fraction of their
+/// radius, as in `tesdf`.
 const FLAT: f32 = 1e-3;
 
-// The scans over all members, by what they look for: the box of the points, the greatest rounding, the deepest contact,
-// and the extremes.
+// The scans over all members, in order: six for the box of the points, then one each for the
+// largest rounded number and the deepest contact, then three for each axis.
 const BOX_END: u32 = 6;
 const SIZE: u32 = 6;
 const DEEPEST: u32 = 7;
@@ -20,7 +21,7 @@ const FIRST_AXIS: u32 = 8;
 const SECOND_AXIS: u32 = 11;
 const THIRD_AXIS: u32 = 14;
 const SCANS: u32 = 17;
-/// The deepest contact, and two for each axis.
+/// The deepest contact, and two extremes for each axis.
 pub const SEEDS: u32 = 7;
 
 /// The points of a pair's members.
@@ -29,18 +30,18 @@ pub const SEEDS: u32 = 7;
 pub struct Frame {
     low: V3,
     high: V3,
-    /// The middle of the box.
+    /// Center of the box.
     pub center: V3,
-    /// The axis along which points are compared.
+    /// The axis along which the current scan compares points.
     along: V3,
-    /// The axes before it.
+    /// The earlier axes.
     first: V3,
     second: V3,
-    /// The greatest size of the numbers that were rounded.
+    /// The largest magnitude of the numbers that were rounded.
     pub size: f32,
     /// The greatest distance of a point from the center.
     pub radius: f32,
-    /// Number of seeds.
+    /// Number of seeds: the contacts that are kept first.
     pub seeds: u32,
 }
 
@@ -61,13 +62,13 @@ fn begin() -> Frame {
 
 #[cube]
 impl Frame {
-    /// The part of `p` that is perpendicular to the axes before; an axis of zeros takes nothing.
+    /// The component of `p` perpendicular to the earlier axes. An axis of zeros removes nothing.
     fn rest(self, p: V3) -> V3 {
         let once = p + self.first * -p.dot(self.first);
         once + self.second * -p.dot(self.second)
     }
 
-    /// Takes a scan of the box; the six scans go along x, against it, and so on.
+    /// Takes the result of a scan for the box. The six scans go along x, against x, and so on.
     fn take_box(&mut self, scan: u32, key: f32) {
         self.high = v3(
             select(scan == 0u32, key, self.high.x),
@@ -92,7 +93,7 @@ impl Frame {
         }
     }
 
-    /// Takes a seed, if it is a new one, and turns to the other end of the axis.
+    /// Adds a seed if it is new, and turns to the other end of the axis.
     fn take_seed(&mut self, member: u32, seeds: &mut Shared<[u32]>) {
         let mut is_new = true;
         let mut k = 0u32;
@@ -109,8 +110,8 @@ impl Frame {
         self.along = self.along.negated();
     }
 
-    /// Takes the axis through the point that is farthest off the axes before, `reach` from the center. Whether the points
-    /// reach far enough along it.
+    /// Takes the axis through the point that is farthest from the earlier axes. `reach` is the
+    /// vector to it from the center. Returns whether the points extend far enough along the axis.
     fn take_axis(&mut self, scan: u32, reach: V3) -> bool {
         let long = reach.length();
         let is_first = scan == FIRST_AXIS;
@@ -128,7 +129,7 @@ impl Frame {
 
 #[cube]
 impl Members {
-    /// The member of this thread with the greatest key of a scan.
+    /// The member of this thread with the greatest key in a scan.
     fn greatest(&self, contacts: &Contacts, run: Run, frame: Frame, scan: u32, is_axis: bool) -> Chosen {
         let mut found = nothing_chosen();
         let mut i = run.first + UNIT_POS;
@@ -148,7 +149,7 @@ impl Members {
         found
     }
 
-    /// The frame of a run of members, and its seeds. All threads call it.
+    /// The frame of a run of members, and its seeds. All threads of the group must call it.
     pub fn frame(
         &self,
         contacts: &Contacts,

@@ -1,21 +1,22 @@
-//! The convex hull of the wrenches that are kept, as a list of vertices that a group shares, and the residual of another
-//! wrench from it.
+//! The convex hull of the kept wrenches, as a list of vertices that a group shares, and the
+//! residual of another wrench from this hull.
 use cubecl::prelude::*;
 
 use super::super::math::vector::v3;
 use super::super::math::wrench::{Residual, Wrench};
 
-/// Vertices of the hull that residuals are shortened towards, in shared memory; a vertex beyond shortens them once, when
-/// it is new.
+/// Vertices of the hull in shared memory; residuals are shortened toward them repeatedly. A vertex
+/// beyond this number shortens residuals once, when it is new.
 pub const VERTICES: u32 = 256;
-/// Vertices that one turn of a loop compares. The list is filled up with copies of its last.
+/// Vertices that one iteration of a loop compares. Copies of the last vertex fill the list to a
+/// multiple.
 const BLOCK: u32 = 8;
-/// A residual whose square may be this share above the least is short enough.
+/// A residual is short enough when the square of its length is within this fraction of the minimum.
 const SLACK: f32 = 0.02;
-/// Steps of a residual in a round.
+/// Steps per round for a residual.
 const STEPS: u32 = 8;
 
-/// Wrenches, six numbers each; the newest one also behind the others.
+/// Wrenches of six numbers each. The newest wrench also stands behind the others.
 #[derive(CubeType)]
 pub struct Hull {
     vertices: Shared<[f32]>,
@@ -52,7 +53,7 @@ fn write(list: &mut Shared<[f32]>, at: u32, w: Wrench) {
 
 #[cube]
 impl Hull {
-    /// Adds a vertex to the `count` that there are. One thread calls it.
+    /// Adds a vertex to the first `count` vertices. Only one thread may call it.
     pub fn add(&mut self, count: u32, w: Wrench) {
         write(&mut self.newest, 0u32, w);
         let mut k = count;
@@ -70,7 +71,7 @@ impl Hull {
         read(&self.vertices, at)
     }
 
-    /// The vertex, of the first `count`, that lies farthest along a residual.
+    /// The vertex, among the first `count`, that is farthest along a residual.
     fn farthest_along(&self, count: u32, x: Wrench) -> u32 {
         let mut reach = self.vertex(0u32).dot(x);
         let mut farthest = 0u32;
@@ -88,9 +89,10 @@ impl Hull {
         farthest
     }
 
-    /// A residual of `w`, shortened towards any of the first `count` vertices, of which `to_newest` comes from the last.
-    /// Each step goes to the vertex farthest along it, from triangles with the two before it: with one before it steps got
-    /// slow at a third above the least.
+    /// Shortens a residual of `w` toward the first `count` vertices. `to_newest` is the vector from
+    /// the newest vertex to `w`. Each step takes the vertex farthest along the residual, and tests
+    /// the triangles with the two vertices before it. With only one earlier vertex, steps became
+    /// slow at a third above the minimum.
     pub fn shortened(&self, from: Residual, w: Wrench, to_newest: Wrench, count: u32) -> Residual {
         let mut x = from;
         let mut to_g = to_newest;
@@ -99,7 +101,7 @@ impl Hull {
         while step < STEPS {
             let to_f = w - self.vertex(self.farthest_along(count, x.wrench));
             let square = x.wrench.dot(x.wrench);
-            // No point of the hull is closer than this tells.
+            // A lower bound of the distance to the hull shows that this residual is short enough.
             let is_short = square - x.wrench.dot(to_f) <= SLACK * square;
             let new = x.shortened(to_f, to_g).shortened(to_f, to_h).shortened(to_g, to_h);
             let is_least = new.wrench.dot(new.wrench) >= square;

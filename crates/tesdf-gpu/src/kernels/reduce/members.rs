@@ -1,8 +1,8 @@
-//! The contacts of each pair of instances, of both ordered pairs: count, allot, fill.
+//! Collects the contacts of each pair of instances, from both ordered pairs: count, allot, fill.
 //!
-//! In: contacts in any order. Out: a run of members for each pair that touches, its contacts in any order, with points
-//! and forces in one frame: that of the field in the first ordered pair. Nothing that follows depends on the order of
-//! pairs or of members.
+//! In: contacts in any order. Out: for each touching pair a run of members, which are its contacts
+//! in any order. Points and forces of a run are in one frame, the frame of the field in the first
+//! ordered pair. The later stages do not depend on the order of pairs or members.
 use cubecl::prelude::*;
 
 use super::super::broad::ordered_pair::{OrderedPairs, WORDS as PAIR_WORDS};
@@ -17,10 +17,11 @@ pub const GROUP: u32 = 64;
 /// Contacts as members of their pairs.
 #[derive(CubeType, CubeLaunch)]
 pub struct Members {
-    /// The contact that each one is.
+    /// Index of the contact for each member.
     pub contacts: Box<[u32]>,
-    /// [`ROWS`] each. First point and distance, force on the first instance and size of the numbers that were rounded;
-    /// later the wrench, whether it is kept, and the residual from the hull of those kept.
+    /// [`ROWS`] rows for each. At first: point and distance; force on the first instance, and size
+    /// of the rounded numbers. Later: the wrench, whether it is kept, and the residual from the
+    /// hull of the kept wrenches.
     pub rows: Box<[Row]>,
 }
 
@@ -30,16 +31,17 @@ pub const ROWS: u32 = 4;
 /// Pairs of instances that touch.
 #[derive(CubeType, CubeLaunch)]
 pub struct Touching {
-    /// [`TOUCHING_WORDS`] each: instances of the first ordered pair, contacts, first member, contacts that are kept.
+    /// [`TOUCHING_WORDS`] words for each: instances of the first ordered pair, number of contacts,
+    /// first member, number of kept contacts.
     pub words: Box<[u32]>,
-    /// Room for so many.
+    /// Capacity of the list.
     pub room: u32,
 }
 
-/// Words of a pair that touches.
+/// Words of a touching pair.
 pub const TOUCHING_WORDS: u32 = 5;
 
-/// Where the members of a pair that touches are.
+/// The range of a touching pair's members.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Run {
@@ -48,14 +50,14 @@ pub struct Run {
     pub end: u32,
 }
 
-/// A point, and what it was rounded with.
+/// A point with its force, and the size of the numbers that were rounded to get them.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Placed {
     pub point: V3,
     pub distance: f32,
     pub force: V3,
-    /// Size of the numbers that were rounded.
+    /// Magnitude of the numbers that were rounded.
     pub size: f32,
 }
 
@@ -90,7 +92,7 @@ impl Members {
         self.rows[at + 1] = row_of(placed.force, placed.size);
     }
 
-    /// Puts a wrench, not kept, where the point and the force were.
+    /// Replaces point and force by the wrench, and marks the member as not kept.
     pub fn put_wrench(&mut self, member: u32, w: Wrench) {
         let at = (member * ROWS) as usize;
         self.rows[at] = row_of(w.force, w.torque.x);
@@ -119,14 +121,14 @@ impl Members {
         self.rows[at + 3] = row_of(v3(x.torque.y, x.torque.z, rounding), 0.0f32);
     }
 
-    /// The first six coordinates of two rows.
+    /// The wrench in the first six numbers of two rows.
     fn wrench_at(&self, member: u32, row: u32) -> Wrench {
         let at = (member * ROWS + row) as usize;
         let (p, q) = (self.rows[at], self.rows[at + 1]);
         Wrench { force: xyz(p), torque: v3(last(p), q.extract(0usize), q.extract(1usize)) }
     }
 
-    /// Keeps a member.
+    /// Marks a member as kept.
     pub fn keep(&mut self, member: u32) {
         let at = (member * ROWS + 1u32) as usize;
         let row = self.rows[at];
@@ -138,7 +140,7 @@ impl Members {
     }
 }
 
-/// A thread for each word.
+/// Sets one word per thread to zero.
 #[cube(launch, create_dummy_kernel)]
 pub fn clear(words: &mut [u32], count: u32) {
     let word = ABSOLUTE_POS as u32;
@@ -147,7 +149,7 @@ pub fn clear(words: &mut [u32], count: u32) {
     }
 }
 
-/// A thread for each contact: the number of contacts of each pair, in tallies.
+/// Counts the contacts of each pair in `tallies`. A thread takes a contact.
 #[cube(launch, create_dummy_kernel)]
 pub fn count(contacts: &Contacts, counters: &Counters, tallies: &[Atomic<u32>]) {
     let contact = ABSOLUTE_POS as u32;
@@ -159,8 +161,8 @@ pub fn count(contacts: &Contacts, counters: &Counters, tallies: &[Atomic<u32>]) 
     }
 }
 
-/// A thread for each pair: one that touches is listed and allotted places for its members, of which the first is left in
-/// its tally.
+/// Lists the touching pairs and allots a range of members to each. A thread takes a pair. The tally
+/// of the pair becomes the index of its first member.
 #[cube(launch, create_dummy_kernel)]
 pub fn allot(pairs: &OrderedPairs, counters: &Counters, tallies: &mut [u32], touching: &mut Touching) {
     let pair = ABSOLUTE_POS as u32;
@@ -180,7 +182,7 @@ pub fn allot(pairs: &OrderedPairs, counters: &Counters, tallies: &mut [u32], tou
     }
 }
 
-/// A thread for each contact: its member.
+/// Writes the member of a contact. A thread takes a contact.
 #[cube(launch, create_dummy_kernel)]
 pub fn fill(
     pairs: &OrderedPairs,
@@ -197,7 +199,8 @@ pub fn fill(
         let row = contacts.point_and_distance(contact);
         let (point, distance) = (xyz(row), last(row));
         let gradient = contacts.gradient(contact);
-        // The field of the second ordered pair is that of the surface of the first.
+        // The field of the second ordered pair belongs to the instance that has the surface in the
+        // first.
         let there = first.to_field(point);
         let far = (there - first.shift).length() + first.shift.length();
         let member = tallies[pair as usize].fetch_add(1u32);

@@ -1,4 +1,5 @@
-//! Reduction: of all contacts of a pair of instances the few that can apply nearly the same wrenches.
+//! Reduction: keeps a few contacts of each pair of instances that can apply nearly the same
+//! wrenches as all.
 pub mod choice;
 pub mod frame;
 pub mod hull;

@@ -1,13 +1,16 @@
-//! Keeps, of all contacts of a pair of instances, a few that can apply nearly the same wrenches: a group of threads for
-//! each pair that touches.
+//! Keeps a few contacts of each pair of instances that can apply nearly the same wrenches as all
+//! contacts. A group takes a touching pair.
 //!
-//! In: the members of pairs. Out: the contacts kept, in any order, and per pair a bound on what is lost. The rules are
-//! those of `tesdf::collide`: the deepest contact, the extremes along three axes, then one by one that whose wrench is
-//! farthest from the hull of those kept. Here every thread shortens the residuals of its own members in parallel, and
-//! lengths of residuals stand for distances: the greatest of them were shortened last.
+//! In: the members of pairs. Out: the kept contacts in any order, and for each pair a bound on the
+//! lost wrench. The rules are those of `tesdf::collide`: keep the deepest contact and the extremes
+//! along three axes; then repeatedly add the contact whose wrench is farthest from the hull of the
+//! kept wrenches. Here each thread shortens the residuals of its own members. Lengths of residuals,
+//! which bound the distances from above, replace the distances. The longest residuals are shortened
+//! again before they count.
 //!
-//! Nothing depends on the order of members: of equal ones that with the lowest name is taken, and what happens to a member
-//! depends on itself, on the members that are kept, and on the greatest of all lengths.
+//! The result does not depend on the order of members. Among equal members, the one with the lowest
+//! name is taken. The computation for a member depends on this member, on the kept members, and on
+//! the greatest length of all.
 use cubecl::prelude::*;
 
 use super::super::counters::{self, Counters};
@@ -20,22 +23,24 @@ use super::frame::{Frame, SEEDS};
 use super::hull::{Hull, VERTICES, empty_hull};
 use super::members::{Members, MembersExpand, Run, Touching};
 
-/// Points closer to their center than this share of the numbers that were rounded give no length for torques.
+/// When all points are closer to their center than this fraction of the rounded numbers, there is
+/// no length for torques.
 const LEAST_LENGTH: f32 = 1e-4;
-/// What the rounding of poses and points may do to a wrench, as a share of 1 + size / length.
+/// Error of a wrench by the rounding of poses and points, relative to 1 + size / length.
 const POINT_ROUNDING: f32 = 4e-6;
-/// A distance below this is rounding.
+/// A distance below this may be a rounding error.
 const ROUNDING: f32 = 2e-6;
-/// Residuals that are at least this share of the longest are shortened before the longest is believed.
+/// Residuals of at least this fraction of the longest are shortened before the longest is used.
 const NEARLY_LONGEST: f32 = 0.8;
-/// Rounds for each contact that is kept.
+/// Largest number of rounds for each kept contact.
 const ROUNDS: u32 = 4;
-/// Rounds at the end, as long as each takes more than this share of the longest square.
+/// Largest number of rounds at the end. They stop early when the square of the longest residual
+/// stays above `SETTLED` times its previous value.
 const LAST_ROUNDS: u32 = 16;
 const SETTLED: f32 = 0.95;
 
-// The scans over all members: the newest vertex shortens all residuals; the longest residuals are shortened towards any
-// vertex; the error is taken.
+// The scans over all members. `ADD`: shorten all residuals toward the newest vertex. `SHORTEN`:
+// shorten the longest residuals toward all vertices. `MEASURE`: compute the error.
 const ADD: u32 = 0;
 const SHORTEN: u32 = 1;
 const MEASURE: u32 = 2;
@@ -44,37 +49,37 @@ const END: u32 = 3;
 /// Rows of a report: center and length, in the frame of the members; then the error.
 pub const REPORT_ROWS: u32 = 2;
 
-/// How far the choice of the contacts of a pair is.
+/// The state of the reduction of a pair.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Progress {
     /// [`ADD`], [`SHORTEN`], [`MEASURE`] or [`END`].
     stage: u32,
-    /// The member that is added next.
+    /// The member to add next.
     next: u32,
-    /// Seeds that were added.
+    /// Number of seeds that were added.
     seeds: u32,
     rounds: u32,
-    /// Members that are kept.
+    /// Number of kept members.
     kept: u32,
-    /// The square of the longest residual before.
+    /// The square of the longest residual in the previous scan.
     longest: f32,
     error: f32,
 }
 
 #[cube]
 impl Progress {
-    /// Residuals whose square is less are not shortened.
+    /// Residuals with a smaller square are not shortened.
     fn threshold(self) -> f32 {
         NEARLY_LONGEST * NEARLY_LONGEST * self.longest
     }
 
-    /// Goes on from the longest residual that a scan found.
+    /// Selects the next stage from the longest residual that a scan has found.
     fn follow(&mut self, found: Chosen, frame: Frame, seeds: &Shared<[u32]>, per_pair: u32) {
         let has_room = self.kept < per_pair;
         let is_seed = self.stage == ADD && self.seeds < frame.seeds && has_room;
         let is_whole = found.member == NONE || found.key <= ROUNDING * ROUNDING;
-        // Residuals below the threshold were not shortened, so one of those may be the longest now.
+        // Residuals below the threshold were not shortened, so one of them may now be the longest.
         let least = select(has_room, self.threshold(), SETTLED * self.longest);
         let is_last = self.rounds == select(has_room, ROUNDS, LAST_ROUNDS);
         let is_sure = self.stage == SHORTEN && (found.key >= least || is_last);
@@ -97,11 +102,11 @@ impl Progress {
 
 #[cube]
 impl Members {
-    /// Writes wrenches where points and forces were; `length` is that over which torques are taken.
+    /// Replaces points and forces by wrenches. Torques are divided by `length`.
     fn write_wrenches(&mut self, run: Run, frame: Frame, length: f32) {
-        // Points that are all one need no length: their torques are 0.
+        // When all points coincide, there is no length, and the torques are 0.
         let inverse = select(length > 0.0f32, 1.0f32 / length.max(1e-30f32), 0.0f32);
-        // Nobody writes wrenches while another still reads a point.
+        // Wait until all threads have read the points.
         sync_cube();
         let mut i = run.first + UNIT_POS;
         while i < run.end {
@@ -112,9 +117,9 @@ impl Members {
         }
     }
 
-    /// Keeps a member and makes its wrench a vertex.
+    /// Keeps a member, and makes its wrench a vertex of the hull.
     fn add(&mut self, run: Run, member: u32, kept: u32, hull: &mut Hull) {
-        // The thread whose member it is has written its rows.
+        // The thread of this member has written its rows.
         if (member - run.first) % GROUP == UNIT_POS {
             self.keep(member);
             hull.add(kept, self.wrench(member));
@@ -154,7 +159,7 @@ impl Members {
         found
     }
 
-    /// Copies the contacts of the kept members, or of all when `all`.
+    /// Copies the contacts of the kept members, or of all members when `all` is true.
     fn write_kept(&self, contacts: &Contacts, run: Run, all: bool, counters: &Counters, kept: &mut Contacts) {
         let mut i = run.first + UNIT_POS;
         while i < run.end {
@@ -169,7 +174,8 @@ impl Members {
     }
 }
 
-/// A group for each pair that touches. Pairs of `per_pair` contacts at most stay whole.
+/// Reduces the contacts of a touching pair per group. A pair with at most `per_pair` contacts keeps
+/// all of them.
 #[cube(launch, create_dummy_kernel)]
 pub fn reduce(
     contacts: &Contacts,
