@@ -50,7 +50,7 @@ pub enum GpuError {
         /// Elements that the scene needs.
         needed: u32,
     },
-    /// An array on a device is too short, or its length is not a multiple of the element size.
+    /// An array on a device has the wrong length.
     #[error("array {array:?} has {found} elements; expected {expected}")]
     Length {
         /// Name of the array.

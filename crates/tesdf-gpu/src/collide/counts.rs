@@ -28,8 +28,8 @@ pub struct Counts {
     /// Point–triangle distances of these evaluations; 0 without
     /// [`Counting::Operations`](crate::Counting::Operations).
     pub distances: u32,
-    /// Contacts whose narrow phase did not converge. Counted only in a reduction; otherwise each
-    /// contact tells.
+    /// Contacts whose narrow phase did not converge. Counted only in a reduction. Without a
+    /// reduction, each contact says whether it converged.
     pub unconverged: u32,
     /// Pairs of instances with contacts. Counted only in a reduction.
     pub touching: u32,

@@ -113,9 +113,14 @@ impl Detector {
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors
-    /// [`GpuError::Collide`] for invalid options; [`GpuError::Full`] when a buffer of fixed size is
-    /// too small; [`GpuError::Unavailable`] when vertices have moved on the device and the scene
-    /// now has other shapes; [`GpuError::Device`] when the device fails.
+    /// - [`GpuError::Collide`] for invalid options.
+    /// - [`GpuError::Full`] when a buffer of fixed size is too small, [`GpuError::TooLarge`] when a
+    ///   growing buffer exceeds the limit of the device.
+    /// - [`GpuError::Shape`] when a shape cannot be uploaded, or a vertex was moved to an invalid
+    ///   position.
+    /// - [`GpuError::Unavailable`] when vertices have moved on the device and the scene now has
+    ///   other shapes.
+    /// - [`GpuError::Device`] when the device fails, or a driver stops the loops of a kernel early.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::Off)
     }

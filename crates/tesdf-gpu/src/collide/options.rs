@@ -126,17 +126,18 @@ impl Default for DetectorOptions {
 /// The report of a detection.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DeviceReport {
-    /// Launches per pass. The number depends on the options, but not on the size of the scene.
+    /// Launches of the last pass. Their number depends on the options and on the kinds of shapes,
+    /// but not on the number of bodies, worlds or contacts.
     pub launches: usize,
-    /// Passes. There is more than one when a buffer was too small.
+    /// Number of passes. There is more than one when a buffer was too small.
     pub passes: usize,
-    /// Bytes that were sent to the device.
+    /// Bytes that were sent to the device, in all passes.
     pub sent: usize,
-    /// Bytes that were read from the device.
+    /// Bytes that were read from the device, in all passes.
     pub read: usize,
     /// Counts of the last pass.
     pub counts: Counts,
-    /// Device time of each stage in launch order. Empty except after
+    /// Name and device time of each launch of the last pass, in order. Empty except after
     /// [`Detector::detect_timed`](super::Detector::detect_timed).
     pub stages: Vec<(&'static str, Duration)>,
 }

@@ -44,9 +44,9 @@ impl<T: Word> DeviceArray<T> {
     /// default. Work in other streams must be synchronized with the default stream by the caller.
     ///
     /// # Safety
-    /// The memory is on this device and begins at a multiple of 4 bytes. It stays allocated until
-    /// the array is dropped, and until a read or [`Device::wait`] has completed all launches that
-    /// use it.
+    /// The memory is on this device and begins at a multiple of 4 bytes. It must stay allocated
+    /// until the array has been dropped and, after the last launch with it, a read or
+    /// [`Device::wait`] has returned.
     ///
     /// # Errors
     /// [`GpuError::Unavailable`] when the device is not a CUDA device.

@@ -59,7 +59,7 @@ impl GpuShapes {
     /// # Errors
     /// [`GpuError::Instance`] for an instance of a shape that was not uploaded here;
     /// [`GpuError::Length`] when the length of `points` is not a multiple of 3, or an array of
-    /// answers is too short.
+    /// answers is too short; [`GpuError::TooLarge`] for more instances than a buffer holds.
     pub fn signed_distances_into(
         &self,
         points: &DeviceArray<f32>,
