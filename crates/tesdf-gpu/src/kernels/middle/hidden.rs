@@ -90,8 +90,8 @@ fn depth_of(field: Field<'_>, pair: OrderedPair, part: Part, thickness: f32) -> 
             looks += 1u32;
             let share = select(looks <= FINE_LOOKS, FINE, SURE);
             let wanted = (share * thickness).max(1.25f32 * deepest);
-            // The search divides a piece only while points may be deeper than its center by more
-            // than a quarter of the wanted depth.
+            // A piece with a radius of at most a quarter of the wanted depth is not divided: its
+            // points are deeper than its center by at most this quarter.
             down = depth + ball.radius > wanted && ball.radius > 0.25f32 * wanted && level < LEVELS;
         }
         if down {
