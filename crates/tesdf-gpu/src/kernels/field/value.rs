@@ -41,6 +41,14 @@ impl Field<'_> {
         let c = f.closest(p, part_of(nearest.squared));
         let distance = c.outward.length();
         let flat = f.is_flat();
+        let on_surface = distance < ON_SURFACE;
+        let over_face = c.feature == 0u32;
+        let away = distance > ON_EDGE;
+        // The gradient without its sign. It is computed before the winding number, which needs
+        // the registers.
+        let outward = pick(away, c.outward * (1.0f32 / select(away, distance, 1.0f32)), f.across());
+        let by_normal = !flat && (on_surface || over_face);
+        let direction = pick(by_normal, f.normal, outward);
         let mut inside = cell.is_inside();
         if cell.is_crossing() {
             let hint = (f.hints >> (2u32 * c.feature)) & 3u32;
@@ -51,16 +59,14 @@ impl Field<'_> {
             }
         }
         let sign = select(inside, -1.0f32, 1.0f32);
-        let away = distance > ON_EDGE;
-        let along = pick(away, c.outward * (sign / select(away, distance, 1.0f32)), f.across());
         // Over the interior of a face, the sign of the height gives the direction more precisely
         // than the difference of two points.
-        let by_height = select(c.feature == 0u32 && !same(c.height < 0.0f32, inside), -1.0f32, 1.0f32);
-        let by_normal = !flat && (distance < ON_SURFACE || c.feature == 0u32);
-        let normal = pick(distance < ON_SURFACE, f.normal, f.normal * by_height);
+        let turned = !on_surface && over_face && !same(c.height < 0.0f32, inside);
+        let sign_of_normal = select(turned, -1.0f32, 1.0f32);
+        let sign_of_outward = select(away, sign, 1.0f32);
         Value {
             distance: sign * distance,
-            gradient: pick(by_normal, normal, along),
+            gradient: direction * select(by_normal, sign_of_normal, sign_of_outward),
             point: c.point,
             face: nearest.face,
             feature: c.feature,

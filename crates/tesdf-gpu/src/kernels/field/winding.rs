@@ -162,18 +162,26 @@ impl Field<'_> {
 
 /// 1 when the segment from `p` to `q` leaves the solid through the triangle, −1 when it enters the
 /// solid there, otherwise 0.
+///
+/// When both ends are on one side of the plane, a branch leaves out the edges. It also saves
+/// registers: those of the plane are free for the edges.
 #[cube]
 pub fn crossing(p: V3, q: V3, a: V3, b: V3, c: V3) -> i32 {
     let normal = (b - a).cross(c - a);
     let p_over = normal.dot(p - a) >= 0.0f32;
     let q_over = normal.dot(q - a) >= 0.0f32;
-    let along = q - p;
-    let (pa, pb, pc) = (a - p, b - p, c - p);
-    let ab = is_left(along, pa, pb);
-    let bc = is_left(along, pb, pc);
-    let ca = is_left(along, pc, pa);
-    let through = !same(p_over, q_over) && same(ab, bc) && same(bc, ca);
-    select(through, select(p_over, -1i32, 1i32), 0i32)
+    let mut sum = 0i32;
+    if !same(p_over, q_over) && is_through(q - p, a - p, b - p, c - p) {
+        sum = select(p_over, -1i32, 1i32);
+    }
+    sum
+}
+
+/// Whether the origin is on the same side of all three edges of a triangle, seen along `along`.
+#[cube]
+fn is_through(along: V3, a: V3, b: V3, c: V3) -> bool {
+    let bc = is_left(along, b, c);
+    same(is_left(along, a, b), bc) && same(bc, is_left(along, c, a))
 }
 
 /// Whether the origin is to the left of the segment from `a` to `b`, seen along `along`. For a
