@@ -6,7 +6,7 @@ if ! command -v cargo >/dev/null && [ -f "${CARGO_HOME:-$HOME/.cargo}/env" ]; th
 fi
 if ! command -v cargo >/dev/null; then
     echo "error: cargo was not found" >&2
-    echo "hint: install Rust 1.89 or newer: curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y" >&2
+    echo "hint: install Rust 1.95 or newer: curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y" >&2
     exit 2
 fi
 if ! command -v cc >/dev/null; then
