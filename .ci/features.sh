@@ -5,8 +5,8 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
 
-for features in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf vtu gmsh gltf,collide encode,collide,parallel,gltf,vtu,gmsh; do
-    RUSTFLAGS="-D warnings" step cargo check --quiet --lib -p tesdf --no-default-features --features "$features" --target-dir target/features
+for set in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf vtu gmsh gltf,collide encode,collide,parallel,gltf,vtu,gmsh; do
+    RUSTFLAGS="-D warnings" step cargo check --quiet --lib -p tesdf --no-default-features --features "$set" --target-dir target/features
 done
 # Not optimised: one test of an error message.
 CARGO_PROFILE_TEST_OPT_LEVEL=0 step cargo test --quiet --lib -p tesdf-terminal device --target-dir target/features

@@ -15,6 +15,9 @@ if ! command -v cc >/dev/null; then
     exit 2
 fi
 
+# The features that are off by default and that tests need.
+features="--features tesdf-cli/gpu,tesdf-bench/peers"
+
 # Prints a command, then runs it. Adds its seconds to the file STEP_TIMES, where that is set.
 step() {
     echo "+ $*"

@@ -40,17 +40,16 @@ pub fn open(mesh: &Mesh, data: &Path, domain: DomainName) -> Result<Subject, Fai
         return Err(Failure::new(format!("there is no mesh {}", path.display()))
             .hint("give the folder `data` of the repository to --data"));
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     if path.extension().is_some_and(|e| e == "ele") {
         let tetrahedra = read_tetrahedra(&path).map_err(|e| at(&e))?;
         let surface = tetrahedra.surface().map_err(|e| at(&e))?;
         let solid = SolidMesh::new(surface).map_err(|e| at(&e))?;
         let conforming = ConformingMesh::new(&solid, &tetrahedra).map_err(|e| at(&e))?;
-        let source = Source { name, ..Source::default() };
+        let source = Source::of_file(&path, String::new());
         return Ok(Subject { solid, source, name: "file".into(), conforming: Some(conforming) });
     }
     let loaded = mesh_file::read(&path)?;
-    let source = Source { name, blake3: loaded.report.source_blake3.clone() };
+    let source = Source::of_file(&path, loaded.report.source_blake3);
     let solid = SolidMesh::new(loaded.mesh).map_err(|e| at(&e))?;
     if domain == DomainName::Bisection {
         return Ok(Subject { solid, source, name: "bisection".into(), conforming: None });
