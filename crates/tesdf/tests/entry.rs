@@ -78,8 +78,8 @@ fn errors_name_the_file_once_and_carry_the_cause() {
     for (path, kind) in [(&garbage, "read"), (&missing, "read"), (&unknown, "read"), (&open, "not solid")] {
         let error = encoder.encode_file(path).unwrap_err();
         let found = match &error {
-            EncodeFileError::Read { .. } => "read",
-            EncodeFileError::NotSolid { .. } => "not solid",
+            EncodeFileError::Solid(ReadSolidError::Read { .. }) => "read",
+            EncodeFileError::Solid(ReadSolidError::NotSolid { .. }) => "not solid",
             EncodeFileError::Encode { .. } => "encode",
         };
         assert_eq!((found, error.path()), (kind, path.as_path()));
@@ -87,7 +87,7 @@ fn errors_name_the_file_once_and_carry_the_cause() {
         assert_eq!(text.matches(&path.display().to_string()).count(), 1, "{text}");
         assert!(error.source().is_some_and(|cause| text.ends_with(&cause.to_string())), "{text}");
         let of_solid = SolidMesh::read(path).unwrap_err();
-        assert_eq!(of_solid.to_string(), text);
+        assert_eq!((of_solid.to_string(), of_solid.path()), (text, path.as_path()));
         assert_eq!(matches!(of_solid, ReadSolidError::NotSolid { .. }), kind == "not solid");
     }
     let error = encoder.band(Length::Absolute(-1.0)).encode_file(cube()).unwrap_err();

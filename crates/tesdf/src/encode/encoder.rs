@@ -6,7 +6,7 @@ use super::sampled::Processor;
 use super::{Domain, EncodeError, EncodeOptions, Preset, Sampler, Source};
 use crate::asset::TeSdf;
 use crate::base::{Length, Progress};
-use crate::mesh::{NotSolid, ReadError, ReadSolidError, SolidMesh};
+use crate::mesh::{ReadSolidError, SolidMesh};
 
 /// Encodes solids.
 ///
@@ -236,22 +236,9 @@ impl TeSdf {
 /// Why a mesh file cannot be encoded. The message names the file.
 #[derive(Debug, thiserror::Error)]
 pub enum EncodeFileError {
-    /// No mesh can be read from the file.
-    #[error("{}", source.in_file(path))]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// The error of the reader.
-        source: ReadError,
-    },
-    /// The mesh has no well-defined inside.
-    #[error("{}: {source}", path.display())]
-    NotSolid {
-        /// The file.
-        path: PathBuf,
-        /// All defects of the mesh.
-        source: NotSolid,
-    },
+    /// The file gives no solid.
+    #[error(transparent)]
+    Solid(#[from] ReadSolidError),
     /// The solid cannot be encoded.
     #[error("{}: {source}", path.display())]
     Encode {
@@ -266,16 +253,8 @@ impl EncodeFileError {
     /// The file.
     pub fn path(&self) -> &Path {
         match self {
-            Self::Read { path, .. } | Self::NotSolid { path, .. } | Self::Encode { path, .. } => path,
-        }
-    }
-}
-
-impl From<ReadSolidError> for EncodeFileError {
-    fn from(error: ReadSolidError) -> Self {
-        match error {
-            ReadSolidError::Read { path, source } => Self::Read { path, source },
-            ReadSolidError::NotSolid { path, source } => Self::NotSolid { path, source },
+            Self::Solid(error) => error.path(),
+            Self::Encode { path, .. } => path,
         }
     }
 }

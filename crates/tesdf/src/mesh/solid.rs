@@ -138,6 +138,15 @@ pub enum ReadSolidError {
     },
 }
 
+impl ReadSolidError {
+    /// The file.
+    pub fn path(&self) -> &Path {
+        match self {
+            Self::Read { path, .. } | Self::NotSolid { path, .. } => path,
+        }
+    }
+}
+
 /// Why a mesh is not a [`SolidMesh`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct NotSolid {
