@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use memmap2::Mmap;
 
-use super::header::{self, DIGITS, Line, SECTION_CHECKSUM, Shape};
+use super::header::{self, SECTION_CHECKSUM, Shape};
 use super::{AssetError, Presence, Section, SectionSpec};
 use crate::input;
 
@@ -18,58 +18,8 @@ compile_error!("sections are read in place and are little-endian; this target is
 /// Number of bytes by which data from a pipe is recognised as a `.tesdf` file.
 const PREFIX: u64 = 512;
 
-/// Writes sections and metadata as the bytes of a `.tesdf` file. The same input gives the same
-/// bytes.
-///
-/// `metadata` has the keys of the caller. This function adds `format`, `version`, `checksum` and
-/// `checksum.*`.
-///
-/// # Errors
-/// A section is given twice or does not have whole rows, a metadata key is reserved, or the header
-/// has more than 1 MiB.
-#[cfg(feature = "encode")]
-pub fn write_container(
-    sections: &[Section<'_>],
-    metadata: &BTreeMap<String, String>,
-) -> Result<Vec<u8>, AssetError> {
-    if let Some(key) = metadata.keys().find(|key| header::is_reserved(key)) {
-        return Err(AssetError::header(format!("the metadata key {key} is reserved; use another")));
-    }
-    // The widest elements come first. safetensors forbids gaps, and only this order keeps every
-    // section aligned.
-    let mut ordered: Vec<_> = sections.iter().collect();
-    ordered.sort_by_key(|s| std::cmp::Reverse(s.spec.element.size()));
-    let mut metadata = metadata.clone();
-    let mut lines = Vec::with_capacity(ordered.len());
-    let mut begin = 0;
-    for Section { spec, bytes } in &ordered {
-        let row = spec.row_size();
-        if row == 0 || !bytes.len().is_multiple_of(row) {
-            return Err(AssetError::section(
-                spec.name,
-                format!("{} bytes are not whole rows of {row} bytes", bytes.len()),
-            ));
-        }
-        let digest = blake3::hash(bytes).to_hex().to_string();
-        if metadata.insert(format!("{SECTION_CHECKSUM}{}", spec.name), digest).is_some() {
-            return Err(AssetError::section(spec.name, "given twice"));
-        }
-        let end = begin + bytes.len() as u64;
-        lines.push(Line {
-            name: spec.name,
-            dtype: spec.element.name(),
-            shape: shape_of(spec, (bytes.len() / row) as u64),
-            data_offsets: [begin, end],
-        });
-        begin = end;
-    }
-    let mut file = header::write_header(&metadata, &lines)?;
-    file.reserve_exact(ordered.iter().map(|s| s.bytes.len()).sum());
-    ordered.iter().for_each(|s| file.extend_from_slice(s.bytes));
-    Ok(file)
-}
-
-fn shape_of(spec: &SectionSpec, rows: u64) -> Shape {
+/// The shape of a section in the header.
+pub(super) fn shape_of(spec: &SectionSpec, rows: u64) -> Shape {
     Shape { rows, columns: (spec.columns != 1).then_some(spec.columns as u64) }
 }
 
@@ -86,10 +36,10 @@ fn shape_of(spec: &SectionSpec, rows: u64) -> Shape {
 pub struct Container {
     storage: Arc<Storage>,
     metadata: BTreeMap<String, String>,
-    sections: Vec<Placed>,
+    pub(super) sections: Vec<Placed>,
     header_end: usize,
     /// Position of the digits of the header's checksum.
-    digits: usize,
+    pub(super) digits: usize,
 }
 
 #[derive(Debug)]
@@ -111,11 +61,12 @@ impl Storage {
     }
 }
 
+/// A section's place in the file and its checksum, in hex.
 #[derive(Clone, Debug)]
-struct Placed {
-    spec: SectionSpec,
-    range: Range<usize>,
-    checksum: String,
+pub(super) struct Placed {
+    pub spec: SectionSpec,
+    pub range: Range<usize>,
+    pub checksum: String,
 }
 
 impl Container {
@@ -246,7 +197,7 @@ impl Container {
         Ok(Self { storage: Arc::new(storage), metadata, sections, header_end, digits })
     }
 
-    /// The metadata of the caller, as given to [`write_container`].
+    /// The metadata of the caller, as given to [`write_container`](super::write_container).
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.metadata
     }
@@ -302,29 +253,6 @@ impl Container {
         let slice: &[T] = self.section(name)?.ok_or_else(|| AssetError::section(name, "it is missing"))?;
         let (start, length) = (slice.as_ptr(), slice.len());
         Ok(SharedSection { storage: Arc::clone(&self.storage), start, length, element: PhantomData })
-    }
-
-    /// Reads every byte of the file and compares it with the checksums.
-    ///
-    /// # Errors
-    /// [`AssetError::Checksum`] names the header or the first damaged section.
-    #[cfg(feature = "encode")]
-    pub fn verify_checksums(&self) -> Result<(), AssetError> {
-        let bytes = self.as_bytes();
-        let compare = |part: String, found: String, expected: &[u8]| {
-            if found.as_bytes() == expected {
-                return Ok(());
-            }
-            let expected = super::error::shown(&String::from_utf8_lossy(expected));
-            Err(AssetError::Checksum { part, found, expected })
-        };
-        let found = header::header_checksum(&bytes[..self.header_end], self.digits);
-        compare("header".into(), found, &bytes[self.digits..self.digits + DIGITS])?;
-        for Placed { spec, range, checksum } in &self.sections {
-            let found = blake3::hash(&bytes[range.clone()]).to_hex().to_string();
-            compare(format!("section {}", spec.name), found, checksum.as_bytes())?;
-        }
-        Ok(())
     }
 }
 

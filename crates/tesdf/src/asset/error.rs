@@ -1,16 +1,13 @@
 use std::io;
 use std::path::PathBuf;
 
-#[cfg(feature = "encode")]
-use crate::save::SaveError;
-
 /// Why a `.tesdf` file cannot be written, opened or trusted.
 #[derive(Debug, thiserror::Error)]
 pub enum AssetError {
     /// The file cannot be written.
     #[cfg(feature = "encode")]
     #[error(transparent)]
-    Save(#[from] SaveError),
+    Save(#[from] crate::save::SaveError),
     /// The operating system refused an action.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {

@@ -19,8 +19,8 @@ pub(super) const LENGTH_FIELD: usize = 8;
 pub(super) const MAX_HEADER: usize = 1 << 20;
 const MAX_ENTRIES: usize = 1 << 10;
 /// The start of every header. The version follows.
-const MAGIC: &str = r#"{"__metadata__":{"format":"tesdf","version":""#;
-const BEFORE_CHECKSUM: &str = r#"","checksum":""#;
+pub(super) const MAGIC: &str = r#"{"__metadata__":{"format":"tesdf","version":""#;
+pub(super) const BEFORE_CHECKSUM: &str = r#"","checksum":""#;
 pub(super) const DIGITS: usize = 64;
 /// Metadata keys with this prefix hold the checksums of sections.
 pub(super) const SECTION_CHECKSUM: &str = "checksum.";
@@ -54,65 +54,6 @@ impl fmt::Display for Shape {
             Some(columns) => write!(f, "[{},{columns}]", self.rows),
         }
     }
-}
-
-/// One section, ready to be written into a header.
-pub(super) struct Line<'a> {
-    pub name: &'a str,
-    pub dtype: &'a str,
-    pub shape: Shape,
-    pub data_offsets: [u64; 2],
-}
-
-/// Whether a caller may use `key` for its own metadata.
-pub(super) fn is_reserved(key: &str) -> bool {
-    matches!(key, "format" | "version" | "checksum") || key.starts_with(SECTION_CHECKSUM)
-}
-
-/// Makes the length field, the JSON and the padding, with the checksum of the header in place.
-#[cfg(feature = "encode")]
-pub(super) fn write_header(
-    metadata: &BTreeMap<String, String>,
-    lines: &[Line<'_>],
-) -> Result<Vec<u8>, AssetError> {
-    let quoted = |s: &str| serde_json::Value::from(s).to_string();
-    let mut json = format!("{MAGIC}{FORMAT_VERSION}{BEFORE_CHECKSUM}{}\"", "0".repeat(DIGITS));
-    for (key, value) in metadata {
-        json += &format!(",{}:{}", quoted(key), quoted(value));
-    }
-    json.push('}');
-    for Line { name, dtype, shape, data_offsets: [begin, end] } in lines {
-        json += &format!(
-            ",{}:{{\"dtype\":\"{dtype}\",\"shape\":{shape},\"data_offsets\":[{begin},{end}]}}",
-            quoted(name)
-        );
-    }
-    json.push('}');
-    while !json.len().is_multiple_of(LENGTH_FIELD) {
-        json.push(' ');
-    }
-    if json.len() > MAX_HEADER {
-        return Err(AssetError::header(format!(
-            "{} bytes of JSON are more than the {MAX_HEADER} allowed; shorten the metadata",
-            json.len()
-        )));
-    }
-    let mut bytes = (json.len() as u64).to_le_bytes().to_vec();
-    bytes.extend_from_slice(json.as_bytes());
-    let at = LENGTH_FIELD + MAGIC.len() + FORMAT_VERSION.to_string().len() + BEFORE_CHECKSUM.len();
-    let digest = header_checksum(&bytes, at);
-    bytes[at..at + DIGITS].copy_from_slice(digest.as_bytes());
-    Ok(bytes)
-}
-
-/// BLAKE3 of the header with the `DIGITS` bytes at `at` set to `0`, in hex.
-#[cfg(feature = "encode")]
-pub(super) fn header_checksum(header: &[u8], at: usize) -> String {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&header[..at]);
-    hasher.update("0".repeat(DIGITS).as_bytes());
-    hasher.update(&header[at + DIGITS..]);
-    hasher.finalize().to_hex().to_string()
 }
 
 /// Checks magic and version. Returns the place of the checksum's digits and the end of the header.

@@ -10,7 +10,8 @@
 //!      8   {"__metadata__":{"format":"tesdf","version":"1","checksum":"<64 hex digits>",…},
 //!           "name":{"dtype":"F32","shape":[1000,3],"data_offsets":[0,12000]},…}
 //!          padded with spaces to n bytes
-//!  8 + n   the sections, back to back, widest element first, so that each is aligned to its element
+//!  8 + n   the sections, back to back, widest element first, so that each is aligned
+//!          to its element
 //! ```
 //!
 //! `checksum` is BLAKE3 of the first 8 + n bytes, with its own 64 digits set to `0`.
@@ -32,14 +33,12 @@ pub(crate) mod options;
 mod roots;
 mod section;
 mod te_sdf;
-
 #[cfg(feature = "encode")]
-pub use crate::save::save_atomic;
+mod write;
+
 pub(crate) use cell_bounds::CellBounds;
 pub use cells::{CellKind, CellView};
 pub(crate) use conforming::Conforming;
-#[cfg(feature = "encode")]
-pub use container::write_container;
 pub use container::{Container, SharedSection};
 pub use error::AssetError;
 pub use face_record::FaceRecord;
@@ -48,6 +47,8 @@ pub(crate) use inner_ball::InnerBall;
 pub(crate) use motion::Motion;
 pub use section::{Element, Presence, Section, SectionSpec};
 pub use te_sdf::TeSdf;
+#[cfg(feature = "encode")]
+pub use write::{save_atomic, write_container};
 
 /// The version of the file format that this build writes. It reads only this version.
 pub const FORMAT_VERSION: u32 = 1;

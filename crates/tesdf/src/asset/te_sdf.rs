@@ -1,4 +1,3 @@
-use std::borrow::Cow;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -13,8 +12,6 @@ use super::inner_ball::InnerBall;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
 use super::motion::Motion;
 use super::{AssetError, Container, Section, SharedSection};
-#[cfg(feature = "encode")]
-use super::{save_atomic, write_container};
 use crate::base::Isa;
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
@@ -211,29 +208,6 @@ impl TeSdf {
         &self.container
     }
 
-    /// Writes the file, with the current vertices and lists. A file at `path` is replaced
-    /// atomically.
-    ///
-    /// # Errors
-    /// The same as for [`save_atomic`]. No half file is left.
-    #[cfg(feature = "encode")]
-    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), AssetError> {
-        Ok(save_atomic(path, &self.to_bytes()?)?)
-    }
-
-    /// The whole file, with the current vertices and lists. It does not say which lists are stale.
-    ///
-    /// # Errors
-    /// The same as for [`write_container`].
-    #[cfg(feature = "encode")]
-    pub fn to_bytes(&self) -> Result<Cow<'_, [u8]>, AssetError> {
-        if self.motion.is_none() {
-            return Ok(Cow::Borrowed(self.as_bytes()));
-        }
-        let sections: Vec<Section> = self.sections().collect();
-        Ok(Cow::Owned(write_container(&sections, &self.about.to_metadata())?))
-    }
-
     /// The current sections, in the order of the file. They stay at the same place in memory until
     /// vertices move or lists are made anew.
     pub fn sections(&self) -> impl Iterator<Item = Section<'_>> {
@@ -251,15 +225,6 @@ impl TeSdf {
             };
             Section { spec, bytes }
         })
-    }
-
-    /// Compares every byte with the checksums.
-    ///
-    /// # Errors
-    /// Names the header or the first damaged section.
-    #[cfg(feature = "encode")]
-    pub fn verify_checksums(&self) -> Result<(), AssetError> {
-        self.container.verify_checksums()
     }
 
     /// Number of faces.
