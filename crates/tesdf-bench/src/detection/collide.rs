@@ -6,7 +6,6 @@ use tesdf::collide::{CollideOptions, Mode, Reduction, detect};
 use super::arguments::{Args, ModeName};
 use super::frames::Frames;
 use super::report::{Counts, PHASES, Report, Spread, ms, text};
-use tesdf_terminal::device::Device;
 use tesdf_terminal::report::{self as output, Failure, Outcome};
 
 /// Measures a detection and prints the result.
@@ -54,8 +53,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         cpu_over_device: None,
     };
     match device {
+        // Without the GPU no value of `Device` exists.
+        #[cfg(feature = "gpu")]
         Some(device) => {
-            measure_device(&mut report, args, device, &mut frames, &options)?;
+            super::on_device::fill(&mut report, args, &device.0, &mut frames, &options)?;
             if args.against_cpu {
                 let (cpu, _) = on_processor(&mut frames, &options, report.repeat)?;
                 report.cpu_over_device = Some(cpu.mean / report.wall_ms.mean);
@@ -70,28 +71,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         output::text(&text(&report))?;
     }
     Ok(Outcome::Good)
-}
-
-#[cfg(feature = "gpu")]
-fn measure_device(
-    report: &mut Report,
-    args: &Args,
-    device: Device,
-    frames: &mut Frames,
-    options: &CollideOptions,
-) -> Result<(), Failure> {
-    super::on_device::fill(report, args, &device.0, frames, options)
-}
-
-#[cfg(not(feature = "gpu"))]
-fn measure_device(
-    _: &mut Report,
-    _: &Args,
-    device: Device,
-    _: &mut Frames,
-    _: &CollideOptions,
-) -> Result<(), Failure> {
-    match device {}
 }
 
 fn on_processor(
