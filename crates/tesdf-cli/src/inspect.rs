@@ -67,9 +67,10 @@ fn rows(report: &Report) -> Vec<(String, String)> {
     let unit = report.unit.map_or(String::new(), |unit| format!(" {unit}"));
     let percent = |share: f64| format!("{:.2} %", 100.0 * share);
     let yes_no = |b: bool| if b { "yes" } else { "no" };
+    let length = |length: f64| format!("{}{unit}", Length::Absolute(length));
     let band = match options.band {
-        Length::OfDiagonal(share) => format!("{} of the diagonal", percent(share)),
-        Length::Absolute(length) => format!("{length}{unit}"),
+        Length::OfDiagonal(_) => options.band.to_string(),
+        Length::Absolute(band) => length(band),
     };
     let list_sizes = format!(
         "half up to {}, 9 of 10 up to {}, 99 of 100 up to {}, longest {}",
@@ -82,7 +83,7 @@ fn rows(report: &Report) -> Vec<(String, String)> {
         ("unit", report.unit.unwrap_or("not given").into()),
         ("", String::new()),
         ("mesh", format!("{}, {}", count(counts.faces, "face"), count(counts.vertices, "vertex"))),
-        ("diagonal", format!("{}{unit}", statistics.diagonal)),
+        ("diagonal", length(statistics.diagonal)),
         (
             "cells with a list",
             format!("{}, {} of them at the surface", counts.listed_cells, counts.crossing_cells),
@@ -137,7 +138,7 @@ fn rows(report: &Report) -> Vec<(String, String)> {
     rows.append(&mut bytes);
     let exact = match certificate.exactness_distance() {
         None => "in the whole domain".into(),
-        Some(distance) => format!("up to {distance}{unit} from the surface"),
+        Some(distance) => format!("up to {} from the surface", length(distance)),
     };
     rows.extend([
         ("", String::new()),

@@ -1,4 +1,5 @@
 //! Parsers for the values of options.
+use tesdf::Length;
 use tesdf::collide::{Motion, Pose, Velocity};
 use tesdf::geometry::Aabb;
 use tesdf::glam::{DQuat, DVec3};
@@ -22,7 +23,7 @@ pub fn number(text: &str) -> Result<f64, String> {
 pub fn length(text: &str) -> Result<f64, String> {
     number(text).and_then(|value| match value >= 0.0 {
         true => Ok(value),
-        false => Err(format!("{value} is negative; expected a length")),
+        false => Err(format!("{} is negative; expected a length", Length::Absolute(value))),
     })
 }
 
@@ -48,6 +49,7 @@ pub fn region(text: &str) -> Result<Aabb, String> {
     for (axis, (low, high)) in ["x", "y", "z"].into_iter().zip(min.to_array().into_iter().zip(max.to_array()))
     {
         if low >= high {
+            let [low, high] = [low, high].map(Length::Absolute);
             return Err(format!("{axis}0 = {low} is not below {axis}1 = {high}"));
         }
     }

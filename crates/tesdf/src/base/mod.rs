@@ -14,5 +14,6 @@ pub(crate) use certificate::{Proved, Written};
 pub(crate) use chains::Chains;
 pub use isa::Isa;
 pub use length::Length;
+pub(crate) use length::four_digits;
 pub use progress::{Progress, Stage};
 pub use side::Side;

@@ -12,7 +12,7 @@ use super::surface::{Surface, Touching};
 use super::{Deformation, EncodeOptions, Method, Refinement, Source, Threshold};
 use crate::asset::layout::{self, TREE_LEAF, TreeChild};
 use crate::asset::{Section, TeSdf, about, write_container};
-use crate::base::{Certificate, Progress, Proved, Stage};
+use crate::base::{Certificate, Length, Progress, Proved, Stage};
 use crate::domain::{Cell, DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, Child, LocalFrame};
 use crate::mesh::{MeshError, SolidMesh, TriangleMesh, WindingNumber};
@@ -185,7 +185,11 @@ fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<
     let band = options.band.resolve(diagonal);
     let wrong = |option, found: String, expected| Err(EncodeError::Option { option, found, expected });
     if !(0.0..=MAX_SIZE * diagonal).contains(&band) {
-        return wrong("band", format!("{band}"), "a length from 0 to 8 times the diagonal of the mesh");
+        return wrong(
+            "band",
+            options.band.to_string(),
+            "a length from 0 to 8 times the diagonal of the mesh",
+        );
     }
     if !(options.byte_worth > 0.0 && options.byte_worth.is_finite()) {
         return wrong("byte_worth", format!("{}", options.byte_worth), "a positive number");
@@ -215,7 +219,7 @@ fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<
         if let Threshold::Absolute(e) = sampling.threshold
             && !(e >= 0.0 && e.is_finite())
         {
-            return wrong("threshold", format!("{e}"), "a length of 0 or more");
+            return wrong("threshold", Length::Absolute(e).to_string(), "a length of 0 or more");
         }
     }
     if let Domain::Bisection = domain {

@@ -2,7 +2,7 @@
 use glam::DVec3;
 
 use super::error::EncodeError;
-use crate::base::Side;
+use crate::base::{Side, four_digits};
 use crate::domain::{Cell, ConformingMesh, DomainCube};
 use crate::geometry::{Aabb, AabbTree, LocalFrame};
 
@@ -72,7 +72,7 @@ impl Roots {
         if size > MAX_SIZE {
             return Err(EncodeError::Option {
                 option: "band or region",
-                found: format!("a domain {size:.1} times as wide as the mesh's diagonal"),
+                found: format!("a domain {} times as wide as the mesh's diagonal", four_digits(size)),
                 expected: "at most 8 times; points beyond the domain are answered exactly without",
             });
         }
