@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Compiles the library with each set of features that makes sense, and the tool without the GPU; counts the crates of a library that only
-# queries.
+# Compiles the library with each useful set of features, and tests the error message of a tool that
+# was built without the GPU. Counts the crates that a library with queries alone depends on.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh

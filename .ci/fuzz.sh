@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Builds all fuzz targets with the compiler of the project and runs each for the given number of
-# seconds (default 13), as many at a time as there are cores, from the inputs in fuzz/corpus. A failing
-# input is written to fuzz/artifacts. libFuzzer needs a C++ compiler.
+# Builds all fuzz targets with the compiler of the project, and runs each target for the given
+# number of seconds (default 13) on the inputs in fuzz/corpus. One target runs on each core at a
+# time. A failing input is written to fuzz/artifacts. libFuzzer needs a C++ compiler.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Compiles everything but the GPU's crate with the oldest Rust that is supported (`rust-version` in Cargo.toml), which rustup installs where it is
-# missing. Where neither rustup nor its server is there, a warning says so; clippy still checks the versions of the standard library's
-# items.
+# Compiles all crates except the GPU's with the oldest supported Rust (`rust-version` in
+# Cargo.toml). Rustup installs this version if it is missing. Without rustup or its server, a
+# warning says so; clippy still checks since which version each item of the standard library exists.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh

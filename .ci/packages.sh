@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Packages each crate that can be published, and builds the packages of the library and of dynamics from their own files. The other
-# packages are not built: they need the GPU's or Rapier's crates, which would be compiled once more, for minutes, and ./test compiles
-# the same files.
+# Packages each crate that can be published. Builds the packages of the library and of dynamics
+# from the packaged files. The other packages are not built: they need the GPU's or Rapier's crates,
+# which would be compiled again for minutes, and ./test compiles the same files.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
 
-# Not optimised: nothing of it runs.
+# Not optimised: the compiled code never runs.
 export CARGO_PROFILE_DEV_OPT_LEVEL=0
 step cargo package --quiet --allow-dirty -p tesdf -p tesdf-sim
 step cargo package --quiet --allow-dirty --no-verify --workspace --exclude tesdf-python

@@ -1,12 +1,12 @@
 """Exact signed distances of triangle meshes, in numpy.
 
-    asset = tesdf.encode("part.stl")                    # a path, (vertices, faces), or a mesh object
+    asset = tesdf.encode("part.stl")                    # a path, (vertices, faces), or a mesh
     answers = asset.query(points)                       # points [N, 3]
     answers.signed_distance, answers.gradient, answers.closest_point, answers.face
     asset.save("part.tesdf")
     asset = tesdf.Asset.open("part.tesdf")              # maps the file; asset.faces is a view of it
 
-    report = tesdf.check("part.stl")                    # defects and their positions; report.encodable
+    report = tesdf.check("part.stl")                    # defects, positions; report.encodable
     vertices, faces, report = tesdf.repair("part.stl")  # reports every change
     tesdf.encode((vertices, faces))
 

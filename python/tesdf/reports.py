@@ -131,8 +131,8 @@ class Certificate:
     """distance from the surface up to which every cell is exact; None if every cell is exact
     everywhere"""
     chains: Optional[int]
-    """largest weight of a chain of shared features (rule C) in the proof of a list, at most 400; None
-    if nothing is proved"""
+    """largest weight of a chain of shared features (rule C) in the proof of a list, at most 400;
+    None if nothing is proved"""
 
 
 @dataclass(frozen=True)

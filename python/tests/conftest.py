@@ -51,7 +51,8 @@ def beam(tmp_path_factory):
     beam's mesh, and the tetrahedra's file"""
     shape = np.array([6, 4, 4])
     cubes = np.stack(np.meshgrid(*map(range, shape), indexing="ij"), -1).reshape(-1, 3)
-    # Paths from a corner to the opposite corner along the axes, in each order; the order decides the orientation.
+    # Paths from a corner to the opposite corner along the axes, in each order. The order decides
+    # the orientation.
     walks = np.array([np.cumsum(np.vstack([np.zeros(3, int), np.eye(3, dtype=int)[list(axes)]]), 0) for axes in permutations(range(3))])
     walks[[1, 2, 5], 2:] = walks[[1, 2, 5], :1:-1]
     tetrahedra = ((cubes[:, None, None] + walks) @ [25, 5, 1]).reshape(-1, 4)

@@ -118,7 +118,7 @@ SAYING = [
 def ended_by_ctrl_c(body, *arguments, environment=None):
     """Runs `body` in another process, which prints "started". Sends SIGINT to this process only,
     and checks how it ends."""
-    # If the parent process ignores SIGINT, as for background jobs, the child would ignore it as well.
+    # If the parent process ignores SIGINT, as for background jobs, the child would ignore it, too.
     heeding = "signal.signal(signal.SIGINT, signal.default_int_handler)"
     lines = ["import signal, sys, time, tesdf", heeding, "try:", *("    " + line for line in body), "except KeyboardInterrupt:"]
     program = "\n".join([*lines, "    print('interrupted', flush=True)", "    sys.exit(3)"])

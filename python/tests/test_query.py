@@ -27,7 +27,8 @@ def test_answers_are_those_of_brute_force(asset, torus, points, truth, precision
     far = np.abs(distances) > tolerance
     assert np.abs(np.abs(answers.signed_distance) - np.abs(distances)).max() <= tolerance
     assert (np.sign(answers.signed_distance) == np.sign(distances))[far].all()
-    # The closest point has that distance and lies on the named face, and the gradient points away from it.
+    # The closest point has that distance and lies on the named face. The gradient points away from
+    # the closest point.
     offset = points - answers.closest_point
     assert np.abs(np.linalg.norm(offset, axis=1) - np.abs(distances)).max() <= tolerance
     vertices, faces = torus
@@ -110,7 +111,8 @@ def test_rays(asset):
     hits = asset.ray_cast([[-3, 0, 0.01], [0, 0, 3], [1, 0, 3], [0, 0, 0]], [[1, 0, 0], [0, 0, -1], [0, 0, -2], [0, 0, 0]])
     assert np.isfinite(hits.t).tolist() == [True, False, True, False]
     assert (hits.face == tesdf.NO_FACE).tolist() == [False, True, False, True]
-    # Chords of a torus of 25 x 12 quadrangles lie inside by up to 0.4 (1 - cos 15 degrees) and 1.4 (1 - cos 7.2 degrees).
+    # The quadrangles (25 x 12) of the mesh lie inside of the torus by up to
+    # 0.4 (1 - cos 15 degrees) and 1.4 (1 - cos 7.2 degrees).
     assert hits.t[0] == pytest.approx(1.6, abs=0.02)
     assert 2 * hits.t[2] == pytest.approx(2.6, abs=0.02)
     assert np.allclose(hits.point[2], [1, 0, 3 - 2 * hits.t[2]])

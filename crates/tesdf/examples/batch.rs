@@ -1,4 +1,5 @@
-//! Many points at once, on all processors: the mean distance over a grid, and the volume by counting.
+//! Many points at once, on all processors: the mean distance over a grid, and the volume from the
+//! number of grid points inside.
 //!
 //! `cargo run --release --example batch -- [MESH]`; the default is a torus of 1.924 28e-5 m³.
 use std::error::Error;
@@ -7,7 +8,7 @@ use std::time::Instant;
 use tesdf::glam::DVec3;
 use tesdf::{Encoder, Preset, SolidMesh};
 
-/// Points a side.
+/// Number of points along each axis.
 const GRID: usize = 64;
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -1,6 +1,7 @@
-//! How far two bodies are apart, or how deep they are in each other: a cube that goes down on another.
+//! How far apart two bodies are, or how deep they overlap: a cube moves down onto another cube.
 //!
-//! `cargo run --release --example clearance -- [MESH]`; the default is a cube with an edge of 20 mm about the origin.
+//! `cargo run --release --example clearance -- [MESH]`; the default is a cube with an edge of
+//! 20 mm about the origin.
 use std::error::Error;
 
 use tesdf::glam::DVec3;

@@ -1,4 +1,5 @@
-//! A beam that bends over a ball: its vertices move, lists that no longer hold are made anew, contacts follow.
+//! A beam that bends over a ball: its vertices move, stale lists are encoded again, and contacts
+//! follow the new shape.
 //!
 //! `cargo run --release --example deformable`
 use std::error::Error;

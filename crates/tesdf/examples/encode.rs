@@ -15,7 +15,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // Step by step what `TeSdf::encode_file` does, with warnings and progress.
     let loaded = read(&mesh)?;
-    // A mesh without a well-defined inside stops here, with the first defects and what to do about them.
+    // A mesh without a well-defined inside is an error here. The error names the first defects and
+    // says how to repair them.
     let solid = SolidMesh::new(loaded.mesh)?;
     solid.warnings().iter().for_each(|w| eprintln!("warning: {}", w.message));
 

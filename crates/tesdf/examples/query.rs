@@ -1,6 +1,8 @@
-//! All that an asset answers at a point: distance, gradient, closest point and face, inside or outside, rays.
+//! All queries of an asset at a point: distance, gradient, closest point and face, inside or
+//! outside, and rays.
 //!
-//! `cargo run --release --example query -- [MESH]`; the default is a cube with an edge of 20 mm about the origin.
+//! `cargo run --release --example query -- [MESH]`; the default is a cube with an edge of
+//! 20 mm about the origin.
 use std::error::Error;
 
 use tesdf::TeSdf;
@@ -13,7 +15,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let bounds = asset.bounds();
     let diagonal = bounds.extent().length();
 
-    // `query` is exact up to rounding; `query_f32` is faster and within 1e-6 × diagonal. Lengths are in the mesh's unit.
+    // `query` is exact up to rounding. `query_f32` is faster, with errors below 1e-6 × diagonal.
+    // Lengths are in the mesh's unit.
     let above = bounds.center() + DVec3::new(0.1, 0.2, 0.6) * bounds.extent();
     let exact = asset.query(above);
     let fast = asset.query_f32(above);
@@ -23,7 +26,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let along = exact.closest_point + exact.signed_distance * exact.gradient;
     assert!(along.distance(above) <= 1e-12 * diagonal, "the gradient leads from the closest point back");
 
-    // Outside of the domain the answer is exact too, from all faces; a narrow-band user asks for `None` instead.
+    // Outside of the domain the answer comes from all faces and is exact, too. `query_in_domain`
+    // returns `None` there, for uses that need a narrow band only.
     let far = bounds.max + 10.0 * diagonal;
     assert!(asset.query_in_domain(far).is_none());
     assert!(asset.signed_distance(far) > 9.0 * diagonal);

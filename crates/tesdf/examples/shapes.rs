@@ -1,4 +1,5 @@
-//! A mesh against the simple shapes: a floor, a box, a sphere and a capsule, each as field and as surface.
+//! Contacts of a mesh with the simple shapes: a floor, a box, a sphere and a capsule, each as field
+//! and as surface.
 //!
 //! `cargo run --release --example shapes`
 use std::error::Error;
@@ -11,7 +12,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../data/procedural/cube.obj");
     let cube = Arc::new(Encoder::new().preset(Preset::Fast).encode_file(path)?);
 
-    // A cube of 20 mm around the origin. Each shape overlaps its side x = 10 mm, or its bottom, by 1 mm.
+    // A cube of 20 mm around the origin. Each shape overlaps the cube's side x = 10 mm, or its
+    // bottom, by 1 mm.
     let half_extents = DVec3::new(0.005, 0.003, 0.003);
     let shapes = [
         ("plane", Shape::Plane, DVec3::new(0.0, 0.0, -0.009)),

@@ -1,6 +1,7 @@
 //! When two moving bodies first touch: a cube thrown at the floor, spinning.
 //!
-//! `cargo run --release --example time_of_impact -- [MESH]`; the default is a cube with an edge of 20 mm about the origin.
+//! `cargo run --release --example time_of_impact -- [MESH]`; the default is a cube with an edge of
+//! 20 mm about the origin.
 use std::error::Error;
 
 use tesdf::glam::DVec3;

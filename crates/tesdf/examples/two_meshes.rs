@@ -16,7 +16,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut scene = Scene::new();
     let nut = scene.add_shape(load("iso_m16_nut_c100")?)?;
     let bolt = scene.add_shape(load("iso_m16_bolt_6k")?)?;
-    // Two pitches up the thread, and sunk by 0.08 mm: the flanks, 0.05 mm apart before, now overlap.
+    // The nut is two pitches up the thread and lowered by 0.08 mm. The flanks were 0.05 mm apart;
+    // now they overlap.
     let nut = scene.add(Instance::new(nut, Pose::at(DVec3::new(0.0, 0.0, 0.00992))))?;
     let bolt = scene.add(Instance::new(bolt, Pose::IDENTITY))?;
 

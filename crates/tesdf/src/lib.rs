@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! mesh file ──mesh──▶ SolidMesh ──domain, encode──▶ TeSdf ──asset──▶ model.tesdf
-//!                                                     └──query──▶ signed distance, gradient, closest point, face
+//!                                                     └──query──▶ signed distance, gradient,
+//!                                                                 closest point, face
 //! ```
 //!
 //! Each module uses only modules to its left: `base`, `input`, `save` ← `geometry` ← `mesh` ←
@@ -20,7 +21,8 @@
 //! # let path = folder.path().join("part.obj");
 //! # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
 //! let asset = TeSdf::encode_file(&path)?; // or Encoder::new()…encode(&solid), with options
-//! let answer = asset.query(DVec3::new(0.1, 0.3, 0.3)); // or query_f32, query_batch, signed_distance
+//! // Or query_f32, query_batch, signed_distance.
+//! let answer = asset.query(DVec3::new(0.1, 0.3, 0.3));
 //! assert!((answer.signed_distance + 0.1).abs() < 1e-12); // 0.1 inside of the side x = 0
 //! assert!(answer.gradient.distance(DVec3::NEG_X) < 1e-12);
 //! assert!(answer.closest_point.distance(DVec3::new(0.0, 0.3, 0.3)) < 1e-12);

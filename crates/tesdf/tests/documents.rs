@@ -1,4 +1,5 @@
-//! What the documents of the repository name exists: the targets of relative links, their headings, and source files.
+//! Everything that the documents of the repository name exists: the targets of relative links,
+//! their headings, and source files.
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf};

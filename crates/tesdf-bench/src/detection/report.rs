@@ -29,7 +29,8 @@ impl Spread {
 #[derive(Serialize)]
 pub struct Stage {
     pub name: &'static str,
-    /// `BP`, `MP` or `NP` for the paper's broad, middle and narrow phase, `hidden overlaps` or `reduction`.
+    /// `BP`, `MP` or `NP` for the paper's broad, middle and narrow phase; `hidden overlaps` or
+    /// `reduction`.
     pub phase: &'static str,
     pub ms: Spread,
 }

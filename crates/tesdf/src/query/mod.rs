@@ -6,14 +6,33 @@
 //!
 //! | | exact | `f32` storage | chosen at run time |
 //! |---|---|---|---|
-//! | a point | [`query`](TeSdf::query) | [`query_f32`](TeSdf::query_f32) | [`query_with`](TeSdf::query_with) |
-//! | its signed distance | [`signed_distance`](TeSdf::signed_distance) | [`signed_distance_f32`](TeSdf::signed_distance_f32) | |
-//! | a point of the domain | [`query_in_domain`](TeSdf::query_in_domain) | [`query_in_domain_f32`](TeSdf::query_in_domain_f32) | [`query_in_domain_with`](TeSdf::query_in_domain_with) |
-//! | many points | [`query_batch`](TeSdf::query_batch) | [`query_batch_f32`](TeSdf::query_batch_f32) | [`query_batch_with`](TeSdf::query_batch_with) |
-//! | many points, into arrays | | | [`query_batch_into`](TeSdf::query_batch_into), [`signed_distances_into`](TeSdf::signed_distances_into) |
-//! | a point, without lists | [`query_by_tree`](TeSdf::query_by_tree) | [`query_by_tree_f32`](TeSdf::query_by_tree_f32) | [`query_by_tree_with`](TeSdf::query_by_tree_with) |
+//! | point | [`query`] | [`query_f32`] | [`query_with`] |
+//! | only its signed distance | [`signed_distance`] | [`signed_distance_f32`] | |
+//! | in the domain | [`query_in_domain`] | [`query_in_domain_f32`] | [`query_in_domain_with`] |
+//! | many points | [`query_batch`] | [`query_batch_f32`] | [`query_batch_with`] |
+//! | many points, into arrays | | | [`query_batch_into`], [`signed_distances_into`] |
+//! | point, without lists | [`query_by_tree`] | [`query_by_tree_f32`] | [`query_by_tree_with`] |
 //!
-//! [`is_inside`](TeSdf::is_inside) and [`ray_cast`](TeSdf::ray_cast) are exact.
+//! [`is_inside`] and [`ray_cast`] are exact.
+//!
+//! [`is_inside`]: TeSdf::is_inside
+//! [`query`]: TeSdf::query
+//! [`query_batch`]: TeSdf::query_batch
+//! [`query_batch_f32`]: TeSdf::query_batch_f32
+//! [`query_batch_into`]: TeSdf::query_batch_into
+//! [`query_batch_with`]: TeSdf::query_batch_with
+//! [`query_by_tree`]: TeSdf::query_by_tree
+//! [`query_by_tree_f32`]: TeSdf::query_by_tree_f32
+//! [`query_by_tree_with`]: TeSdf::query_by_tree_with
+//! [`query_f32`]: TeSdf::query_f32
+//! [`query_in_domain`]: TeSdf::query_in_domain
+//! [`query_in_domain_f32`]: TeSdf::query_in_domain_f32
+//! [`query_in_domain_with`]: TeSdf::query_in_domain_with
+//! [`query_with`]: TeSdf::query_with
+//! [`ray_cast`]: TeSdf::ray_cast
+//! [`signed_distance`]: TeSdf::signed_distance
+//! [`signed_distance_f32`]: TeSdf::signed_distance_f32
+//! [`signed_distances_into`]: TeSdf::signed_distances_into
 mod arrays;
 mod batch;
 mod by_tree;
