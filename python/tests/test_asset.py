@@ -17,7 +17,7 @@ def file(asset, tmp_path):
     return path
 
 
-def test_saved_and_opened(asset, file, points):
+def test_save_and_open(asset, file, points):
     opened = tesdf.Asset.open(file)
     assert opened.to_bytes() == asset.to_bytes() == file.read_bytes()
     for a, b in zip(opened.query(points), asset.query(points)):
@@ -68,7 +68,7 @@ def test_views_cannot_be_written_to(asset):
             array.setflags(write=True)
 
 
-def test_what_it_says_of_itself(asset, torus):
+def test_metadata(asset, torus):
     vertices, faces = torus
     assert asset.unit == "m"
     assert asset.source.name == "" and repr(asset).startswith("<tesdf.Asset made in memory: 600 faces, ")
@@ -94,7 +94,7 @@ def test_verify(asset, file):
         tesdf.Asset.from_bytes(bytes(data)).verify(samples=8)
 
 
-def test_files_that_are_none(tmp_path):
+def test_invalid_files_are_errors(tmp_path):
     with pytest.raises(FileNotFoundError, match="cannot open .*none.tesdf"):
         tesdf.Asset.open(tmp_path / "none.tesdf")
     picture = tmp_path / "picture.tesdf"
@@ -105,11 +105,11 @@ def test_files_that_are_none(tmp_path):
         tesdf.Asset.from_bytes(b"")
 
 
-def test_folder_that_is_none(asset, tmp_path):
+def test_a_missing_folder_is_an_error(asset, tmp_path):
     with pytest.raises(FileNotFoundError, match="none"):
         asset.save(tmp_path / "none" / "a.tesdf")
 
 
-def test_an_asset_is_not_made_by_hand():
+def test_an_asset_has_no_constructor():
     with pytest.raises(TypeError):
         tesdf.Asset()

@@ -72,6 +72,6 @@ def test_a_mesh_out_of_range():
     assert np.isnan(report.diagonal)
 
 
-def test_all_the_data_has_reports():
+def test_procedural_meshes_are_encodable():
     for path in sorted((DATA / "procedural").glob("*_c100.obj")):
         assert tesdf.check(path).encodable

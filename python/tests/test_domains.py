@@ -93,7 +93,7 @@ def test_options_that_exclude_each_other(options, text):
     (dict(domain="none.msh"), FileNotFoundError, "cannot read none.msh"),
     (dict(domain="voxels"), tesdf.MeshError, "voxels: the extension names no format of tetrahedra"),
 ])
-def test_what_is_no_option(options, error, text):
+def test_invalid_options_are_errors(options, error, text):
     with pytest.raises(error, match=text):
         tesdf.encode(TETRAHEDRON, **options)
 
@@ -108,7 +108,7 @@ def test_tetrahedra_of_another_mesh(beam, tmp_path):
         tesdf.encode(CUBE, domain=broken)
 
 
-def test_vertices_that_move(beam, deformable, tmp_path):
+def test_moved_vertices(beam, deformable, tmp_path):
     (vertices, faces), _ = beam
     before = deformable.to_bytes()
     # The end of the beam, and the vertices of the domain around it.
@@ -144,7 +144,7 @@ def test_vertices_that_move(beam, deformable, tmp_path):
             assert np.array_equal(array, again.asset.sections[name]), name
 
 
-def test_vertices_that_cannot_move(asset, deformable):
+def test_invalid_moves_are_errors(asset, deformable):
     with pytest.raises(tesdf.DeformError, match="bisection domain"):
         asset.move_vertices([0], [[0, 0, 0]])
     for ids, positions, error, text in [

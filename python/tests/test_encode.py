@@ -15,7 +15,7 @@ from conftest import DATA, TETRAHEDRON
 CUBE = DATA / "procedural" / "cube.obj"
 
 
-def test_a_file(tmp_path):
+def test_encode_a_file(tmp_path):
     asset = tesdf.encode(CUBE)
     assert asset.source.name == "cube.obj" and len(asset.source.blake3) == 64
     assert asset.to_bytes() == tesdf.encode(str(CUBE), "default").to_bytes()
@@ -64,13 +64,13 @@ def test_threads_change_nothing(torus):
     ("none.stl", FileNotFoundError, "cannot read none.stl"),
     ("mesh.txt", tesdf.MeshError, "mesh.txt: the extension names no mesh format"),
 ])
-def test_what_is_no_mesh(mesh, error, text):
+def test_invalid_meshes_are_errors(mesh, error, text):
     for function in (tesdf.encode, tesdf.check, tesdf.repair):
         with pytest.raises(error, match=text):
             function(mesh)
 
 
-def test_what_has_no_inside():
+def test_meshes_without_an_inside_are_errors():
     vertices, faces = TETRAHEDRON
     with pytest.raises(tesdf.NotSolidError, match="no well-defined inside.*open edge") as caught:
         tesdf.encode((vertices, faces[:3]))
@@ -79,7 +79,7 @@ def test_what_has_no_inside():
     assert report == tesdf.check((vertices, faces[:3]))
 
 
-def test_options_without_meaning(torus):
+def test_invalid_options_are_errors(torus):
     with pytest.raises(tesdf.EncodeError, match="band"):
         tesdf.encode(torus, band=-1.0)
     with pytest.raises(ValueError, match="preset: 'best'; expected 'default', 'fast', 'compact', 'paper' or"):
@@ -96,7 +96,7 @@ def test_progress(torus):
     assert sorted(seen, key=lambda s: stages.index(s[0])) == seen
 
 
-def test_progress_ends_it():
+def test_an_exception_of_progress_ends_encode():
     seen = []
 
     def stop(stage, share):

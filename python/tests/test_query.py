@@ -21,7 +21,7 @@ def truth(torus, points):
 
 
 @pytest.mark.parametrize("precision", ["f64", "f32"])
-def test_answers_are_those_of_brute_force(asset, torus, points, truth, precision):
+def test_answers_equal_brute_force(asset, torus, points, truth, precision):
     distances, tolerance = truth, TOLERANCE[precision]
     answers = asset.query(points, precision)
     far = np.abs(distances) > tolerance
@@ -48,7 +48,7 @@ def test_shapes_and_types(asset, points):
     assert [x.shape for x in asset.query(np.empty((0, 3)))] == [(0,), (0, 3), (0, 3), (0,)]
 
 
-def test_every_way_to_ask_gives_the_same(asset, points, truth):
+def test_all_queries_agree(asset, points, truth):
     answers = asset.query(points)
     assert np.array_equal(asset.signed_distance(points), answers.signed_distance)
     one_by_one = [asset.query([p]) for p in points[:50]]
@@ -97,12 +97,12 @@ def test_points_that_are_not_finite(asset):
     (np.zeros((2, 4, 3)), r"points: an array of shape \(2, 4, 3\)"),
     ([["a", "b", "c"]], "could not convert"),
 ])
-def test_points_that_are_none(asset, bad, text):
+def test_invalid_points_are_errors(asset, bad, text):
     with pytest.raises(ValueError, match=text):
         asset.query(bad)
 
 
-def test_precision_is_named(asset):
+def test_an_unknown_precision_is_an_error(asset):
     with pytest.raises(ValueError, match="precision: 'f16'; expected 'f64' or 'f32'"):
         asset.query([[0, 0, 0]], "f16")
 
@@ -135,7 +135,7 @@ def test_threads_share_an_asset(asset, points):
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 @pytest.mark.parametrize("method", ["fork", "spawn"])
-def test_other_processes(asset, points, method):
+def test_assets_work_in_other_processes(asset, points, method):
     # A forked child has none of the threads that answered in the parent.
     expected = asset.query(points).signed_distance
     with multiprocessing.get_context(method).Pool(1) as pool:

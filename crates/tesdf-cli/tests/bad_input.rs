@@ -108,7 +108,7 @@ fn each_bad_file_is_encoded_or_refused_as_the_table_says() {
 }
 
 #[test]
-fn each_file_to_be_repaired_is() {
+fn each_file_marked_for_repair_is_repaired() {
     for [file, expect] in expected() {
         if expect != "repair" {
             continue;

@@ -9,7 +9,7 @@ const VERTICES: &str = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 2\nv 2 0 2\nv 
 const FACES: &str = "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
 #[test]
-fn a_good_mesh_is_0() {
+fn a_good_mesh_exits_with_0() {
     let folder = Folder::new();
     folder.write("cube.obj", format!("{VERTICES}{FACES}"));
     let (code, out, err) = folder.tesdf(&["check", "cube.obj"]);
@@ -26,7 +26,7 @@ fn a_good_mesh_is_0() {
 }
 
 #[test]
-fn a_hole_is_1_and_names_its_edges() {
+fn a_hole_exits_with_1_and_names_its_edges() {
     let folder = Folder::new();
     folder.write("open.obj", format!("{VERTICES}{}", &FACES[10..]));
     let (code, out, err) = folder.tesdf(&["check", "open.obj"]);

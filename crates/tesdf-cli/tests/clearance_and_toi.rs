@@ -96,7 +96,7 @@ fn a_hidden_overlap_is_reported() {
 }
 
 #[test]
-fn why_contacts_are_or_are_not_there() {
+fn why_explains_found_and_missing_contacts() {
     let folder = cube();
     let why = |more: &[&str]| {
         let args = ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0.5 0.25 1.75 0 0 0 1", "--json"];

@@ -37,7 +37,7 @@ fn help_and_version_go_to_stdout() {
 }
 
 #[test]
-fn bad_usage_is_2_and_says_why_on_stderr() {
+fn bad_usage_exits_with_2_and_a_reason_on_stderr() {
     for (args, expected) in [
         (&[][..], "Usage: tesdf <COMMAND>"),
         (&["frobnicate"], "error: unrecognized subcommand 'frobnicate'"),
@@ -71,7 +71,7 @@ fn bad_usage_is_2_and_says_why_on_stderr() {
 }
 
 #[test]
-fn negative_values_are_values() {
+fn negative_numbers_are_values_and_not_options() {
     let Parsed::Encode(args) = parse(&[
         "encode",
         "m.stl",

@@ -70,7 +70,7 @@ mode = "face"
 "#;
 
 #[test]
-fn a_run_comes_out_as_on_the_processor() {
+fn a_run_on_a_device_agrees_with_the_processor() {
     let folder = Folder::new();
     folder.write("drop.toml", DROP.replace("CUBE", &data("cube.obj")));
     let run = |device: &str| {
@@ -88,7 +88,7 @@ fn a_run_comes_out_as_on_the_processor() {
 }
 
 #[test]
-fn a_benchmark_says_what_it_did() {
+fn a_benchmark_reports_its_worlds_frames_and_stages() {
     let folder = Folder::new();
     let poses = format!(
         r#"{{"tesdf_poses": 1, "contact_distance": 1e-3, "bodies": ["{0}", "{0}"], "instances": [[0, 0], [1, 0]],

@@ -55,7 +55,7 @@ fn every_preset_and_number_of_threads_is_encoded_and_verified() {
 }
 
 #[test]
-fn the_summary_and_inspect_say_the_same() {
+fn the_summary_and_inspect_agree() {
     let folder = Folder::new();
     folder.write("torus.obj", torus(24, 12));
     let args = ["encode", "torus.obj", "-o", "t.tesdf", "--band", "0.5", "--region", "-5 -5 -5 5 5 5"];

@@ -78,7 +78,7 @@ fn table_4_gets_better_with_longer_lists() {
 }
 
 #[test]
-fn forms_of_a_table() {
+fn tables_are_printed_as_csv_and_markdown() {
     let options = ["table1", "--meshes", "beam", "--grid", "20", "--resolution", "2"];
     let csv = evaluated(&[&options[..], &["--format", "csv"]].concat());
     let mut reader = csv::Reader::from_reader(csv.as_bytes());
@@ -95,7 +95,7 @@ fn forms_of_a_table() {
 }
 
 #[test]
-fn what_is_not_there_is_an_error() {
+fn missing_meshes_are_errors() {
     let folder = Folder::new();
     let (code, _, err) = folder.tesdf(&["evaluate", "table1", "--quick"]);
     assert_eq!(code, Some(2));

@@ -87,7 +87,7 @@ fn a_picture_that_does_not_fit_the_memory_is_refused() {
 
 /// The memory grows with the content of the file, and no single allocation is too large.
 #[test]
-fn where_the_memory_ends_the_exit_code_is_2() {
+fn lack_of_memory_exits_with_2() {
     let folder = Folder::new();
     folder.write("s.toml", format!("{DROP}\nx = [{}]\n", "[],".repeat(15_000_000)));
     let (code, out, err) = within(1 << 20, &folder, &["simulate", "s.toml", "-o", "run"]);

@@ -93,7 +93,7 @@ fn a_row_of_decimal_commas_is_an_error() {
 }
 
 #[test]
-fn a_body_and_itself_in_one_place_overlap() {
+fn a_body_overlaps_its_copy_in_the_same_pose() {
     let folder = cubes(&[]);
     let clearance = |pose: &str| {
         let args = ["clearance", "none.tesdf", "none.tesdf", "--pose-b", pose];
@@ -136,7 +136,7 @@ fn units_that_differ_are_not_mixed() {
 }
 
 #[test]
-fn a_run_or_a_file_of_poses_that_is_refused_says_where_others_come_from() {
+fn refused_runs_and_poses_name_the_command_that_writes_them() {
     let folder = Folder::new();
     for (file, expected) in [
         ("r.tesrun", "`tesdf simulate` writes runs"),

@@ -234,7 +234,7 @@ fn as_a_user(folder: &Folder, args: &[&str]) -> (Option<i32>, String, String) {
 /// The mesh cannot be encoded, so an error about the output shows that the output was checked
 /// first.
 #[test]
-fn a_folder_that_takes_no_file_is_noticed_before_the_work() {
+fn an_unwritable_folder_is_reported_before_the_work() {
     let folder = Folder::new();
     folder.write("open.obj", CUBE.replace("f 4 1 5 8\n", ""));
     let locked = folder.path("locked");
@@ -352,7 +352,7 @@ fn a_full_disk_leaves_the_old_file_and_a_run_its_steps() {
 }
 
 #[test]
-fn a_closed_or_full_stdout_takes_no_file_away() {
+fn a_closed_or_full_stdout_keeps_the_output_file() {
     let folder = Folder::new();
     folder.write("cube.obj", CUBE);
     let run = |redirection: &str, output: &str| {

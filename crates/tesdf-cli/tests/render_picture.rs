@@ -104,7 +104,7 @@ fn contacts_are_drawn_on_top_and_fainter_behind_a_body() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_an_error() {
+fn empty_pictures_and_invalid_sizes_are_errors() {
     let cut = Cut::default();
     let floor = [drawn(&Shape::Plane, DVec3::ZERO, RED, Exposure::Whole)];
     let fails = |bodies: &[Drawn], size| {
@@ -244,7 +244,7 @@ fn contacts_of_a_run_are_drawn_where_they_are() {
 }
 
 #[test]
-fn bad_arguments_are_2_and_leave_no_file() {
+fn bad_arguments_exit_with_2_and_leave_no_file() {
     let folder = Folder::new();
     folder.write("bad.tesdf", "no asset");
     for (args, expected) in [

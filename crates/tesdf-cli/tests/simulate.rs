@@ -31,7 +31,7 @@ backlash = 1e-5
 "#;
 
 #[test]
-fn a_run_is_written_and_summed_up() {
+fn a_run_is_written_and_summarised() {
     let folder = Folder::new();
     folder.write("drop.toml", DROP);
     let text = folder.good(&["simulate", "drop.toml", "-o", "run.safetensors"]);
@@ -51,7 +51,7 @@ fn a_run_is_written_and_summed_up() {
 }
 
 #[test]
-fn a_criterion_that_does_not_hold_is_not_good() {
+fn an_unmet_criterion_exits_with_1() {
     let folder = Folder::new();
     folder.write("drop.toml", DROP.to_string() + SCREW);
     let (code, out, err) = folder.tesdf(&["simulate", "drop.toml", "-o", "run", "--mode", "off"]);

@@ -99,7 +99,7 @@ fn long_cuts_and_every_axis_and_size_are_drawn() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_an_error() {
+fn invalid_sizes_and_views_are_errors() {
     let draw = |view: &View, size| draw(view, &Overlay::default(), size, torus).map_err(|e| e.to_string());
     let good = view(Axis::Z);
     assert_eq!(draw(&good, 10).unwrap_err(), "a picture of 10 pixels; expected 256 to 8192");

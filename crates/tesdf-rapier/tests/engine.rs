@@ -107,7 +107,7 @@ fn a_nut_turns_down_its_bolt() {
 }
 
 #[test]
-fn groups_worlds_and_exclusions_are_heeded() {
+fn groups_worlds_and_exclusions_are_respected() {
     let ball = Shape::Sphere { radius: 0.01 };
     let mass = Mass::Free(steel(&ball));
     let mut system = System::new(GRAVITY);
@@ -161,7 +161,7 @@ fn free_motion_keeps_momentum() {
 }
 
 #[test]
-fn a_state_set_between_steps_is_the_next_steps_beginning() {
+fn a_state_set_between_steps_starts_the_next_step() {
     let shape = Shape::Mesh(Arc::new(cube(0.01)));
     let mut engine = engine(over_plane(shape, DQuat::IDENTITY), collide(Mode::Node));
     for _ in 0..20 {

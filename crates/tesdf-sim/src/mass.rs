@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_of_a_box_is_the_box() {
+    fn a_box_mesh_has_the_mass_properties_of_the_box() {
         let half = DVec3::new(0.5, 1.0, 2.5);
         let formula = MassProperties::of_shape(&Shape::Box { half_extents: half }, 1.0, 1.0).unwrap();
         let triangles = box_triangles(half);
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn spheres_and_capsules_are_their_slices() {
+    fn masses_of_spheres_and_capsules_equal_sums_over_slices() {
         let (half_height, radius): (f64, f64) = (1.3, 0.7);
         let capsule = MassProperties::of_shape(&Shape::Capsule { half_height, radius }, 1.0, 1.0).unwrap();
         let profile = |z: f64| (radius.powi(2) - (z.abs() - half_height).max(0.0).powi(2)).sqrt();
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn density_scale_and_mass() {
+    fn mass_properties_scale_with_density_size_and_mass() {
         let shape = Shape::Box { half_extents: DVec3::new(0.5, 1.0, 1.5) };
         let large = Shape::Box { half_extents: DVec3::new(1.0, 2.0, 3.0) };
         let scaled = MassProperties::of_shape(&shape, 2.0, 7.0).unwrap();

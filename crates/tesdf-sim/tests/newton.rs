@@ -52,7 +52,7 @@ fn free_fall_is_symplectic_euler() {
 /// Without torque, the implicit gyroscopic term conserves momentum and energy to first order in the
 /// time step: half the step gives half the drift.
 #[test]
-fn torque_free_rotation_drifts_by_its_order() {
+fn torque_free_rotation_drifts_to_first_order() {
     let drift = |h: f64| {
         let mut system = System::new(DVec3::ZERO);
         let angular = DVec3::new(2.0, 3.0, 1.0);
@@ -248,7 +248,7 @@ fn values_out_of_range_are_refused() {
 /// A brick that slides along the edges of its twin has no vertex inside of it, so it falls through.
 /// The engine must report the hidden overlap at every step.
 #[test]
-fn a_fall_through_a_twin_is_reported() {
+fn a_hidden_overlap_of_equal_bricks_is_reported() {
     let mut system = System::new(GRAVITY);
     let shape = system.add_shape(BRICK).unwrap();
     system.add("fixed", Instance::new(shape, Pose::IDENTITY), Mass::Fixed).unwrap();

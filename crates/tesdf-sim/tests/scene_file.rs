@@ -42,7 +42,7 @@ fn refusal(text: &str) -> String {
 }
 
 #[test]
-fn a_scene_is_what_it_says() {
+fn a_scene_file_gives_its_system() {
     let loaded = load(DROP).unwrap();
     assert_eq!(loaded.scene.detector.mode, DetectorMode::Exact);
     assert_eq!(loaded.scene.gravity, [0.0, 0.0, -9.81]);
@@ -54,7 +54,7 @@ fn a_scene_is_what_it_says() {
 }
 
 #[test]
-fn errors_say_where() {
+fn errors_name_the_line_and_the_body() {
     let change = |from: &str, to: &str| {
         assert!(DROP.contains(from));
         refusal(&DROP.replacen(from, to, 1))
@@ -94,7 +94,7 @@ fn errors_say_where() {
 }
 
 #[test]
-fn a_run_survives_its_file() {
+fn a_run_round_trips_through_its_file() {
     let run = || {
         let loaded = load(DROP).unwrap();
         let system = loaded.system().unwrap();

@@ -172,7 +172,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_checked() {
+    fn values_of_options_are_checked() {
         assert_eq!(number(" -1e-3"), Ok(-1e-3));
         assert_eq!(number("inf"), Err("inf is not a finite number".into()));
         assert_eq!(length("-1"), Err("-1 is negative; expected a length".into()));

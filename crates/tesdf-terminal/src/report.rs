@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn long_lines_lose_their_middle() {
+    fn long_lines_are_cut_in_their_middle() {
         let long = format!("field {} is unknown\nexpected another", "é".repeat(100_000));
         let cut = message(&long);
         assert!(
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_their_words() {
+    fn counted_nouns_are_singular_or_plural() {
         assert_eq!(
             [count(1, "vertex"), count(2, "vertex"), count(0, "face")],
             ["1 vertex", "2 vertices", "0 faces"]

@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_are_read_whole_and_text_has_to_be_text() {
+    fn text_that_is_not_utf8_is_an_error_with_its_line() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("text");
         std::fs::write(&path, "a\nµ").unwrap();

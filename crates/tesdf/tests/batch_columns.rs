@@ -51,7 +51,7 @@ fn asset() -> TeSdf {
 }
 
 #[test]
-fn columns_are_the_answers() {
+fn columns_equal_the_answers() {
     let asset = asset();
     let bounds = asset.bounds();
     let mut random = Random(1);
@@ -88,7 +88,7 @@ fn columns_are_the_answers() {
 
 /// Arrays of a wrong length are an error that names the array, and no row is written.
 #[test]
-fn lengths_that_differ_are_an_error() {
+fn columns_of_different_lengths_are_an_error() {
     let asset = asset();
     let points = [DVec3::ZERO; 20];
     for (column, rows) in [("signed_distance", 19), ("gradient", 21), ("closest_point", 0), ("face", 17)] {

@@ -46,7 +46,7 @@ fn check_member(family: Family, seed: u64, options: &EncodeOptions) -> Result<()
 }
 
 #[test]
-fn one_of_each_family_with_each_preset() {
+fn cells_of_each_mesh_family_are_right_with_each_preset() {
     for family in FAMILIES {
         for (preset, band) in [(Preset::Default, 0.05), (Preset::Fast, 0.0), (Preset::Compact, 0.5)] {
             if let Err(e) = check_member(family, 1, &options(preset, band)) {
@@ -81,7 +81,7 @@ proptest! {
 
 /// Shows that the checks can fail.
 #[test]
-fn missing_faces_are_noticed() {
+fn missing_faces_are_found() {
     let solid = Shape::default().add_sphere(DVec3::ZERO, 1, || 1.0).solid();
     let asset = Encoder::new().options(options(Preset::Fast, 0.05)).encode(&solid).expect("valid options");
     let reference = Reference::new(solid.mesh());

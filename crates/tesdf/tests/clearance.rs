@@ -83,7 +83,7 @@ fn all_pairs(a: &[[DVec3; 3]], b: &[[DVec3; 3]]) -> f64 {
 }
 
 #[test]
-fn apart_it_is_the_least_distance_of_all_pairs_of_faces() {
+fn clearance_of_separate_bodies_equals_brute_force() {
     let assets =
         [bumpy(1), bumpy(2), boxed(DVec3::new(0.5, 0.8, 0.3), 4), asset(&named("procedural/tetra.obj"))];
     let mut random = Random(7);
@@ -141,7 +141,7 @@ fn by_samples(surface: &[[DVec3; 3]], field: &TeSdf, pose: Pose, scale: f64) -> 
 }
 
 #[test]
-fn in_each_other_it_is_as_deep_as_dense_samples_find() {
+fn penetration_depth_equals_that_of_dense_samples() {
     let assets = [bumpy(3), boxed(DVec3::new(0.5, 0.8, 0.3), 3), asset(&named("procedural/tetra.obj"))];
     let mut random = Random(11);
     let mut cut_short = 0;
@@ -176,7 +176,7 @@ fn in_each_other_it_is_as_deep_as_dense_samples_find() {
 }
 
 #[test]
-fn simple_shapes_have_their_formulas() {
+fn clearance_of_simple_shapes_equals_closed_forms() {
     let sphere = |radius| Shape::Sphere { radius };
     let capsule = Shape::Capsule { half_height: 1.0, radius: 0.25 };
     let cube = Shape::Box { half_extents: DVec3::ONE };
@@ -217,7 +217,7 @@ fn simple_shapes_have_their_formulas() {
 }
 
 #[test]
-fn a_mesh_of_a_box_is_a_box() {
+fn a_box_mesh_has_the_clearance_of_a_box() {
     let half = DVec3::new(0.5, 0.25, 1.0);
     let mesh = boxed(half, 2);
     let simple = Shape::Box { half_extents: half };
@@ -239,7 +239,7 @@ fn a_mesh_of_a_box_is_a_box() {
 }
 
 #[test]
-fn one_inside_of_the_other_penetrates() {
+fn a_body_inside_another_penetrates_it() {
     let (room, small) = (boxed(DVec3::ONE, 2), boxed(DVec3::splat(0.1), 2));
     // The deepest point of the small box is 0.8 from the nearest wall.
     for found in [
@@ -271,7 +271,7 @@ fn between_two_walls_the_depth_is_found_to_the_tolerance() {
 }
 
 #[test]
-fn one_and_the_same_pose_is_touching() {
+fn equal_bodies_in_one_pose_touch() {
     for asset in [bumpy(5), boxed(DVec3::ONE, 3)] {
         let pose = random_pose(&mut Random(3), 2.0);
         let found = between(placed(asset.clone(), pose, 1.0), placed(asset, pose, 1.0));
@@ -304,7 +304,7 @@ fn a_nut_on_its_bolt_has_its_gap() {
 }
 
 #[test]
-fn what_has_no_clearance_is_an_error() {
+fn pairs_without_a_clearance_are_errors() {
     let (mut scene, [a, b]) =
         scene([placed(Shape::Plane, Pose::IDENTITY, 1.0), placed(Shape::Plane, at(0., 0., 1.), 1.0)]);
     let options = ClearanceOptions::default();
@@ -328,7 +328,7 @@ fn boxes(at: &[f64]) -> Arc<TeSdf> {
 }
 
 #[test]
-fn surfaces_on_each_other_overlap_where_the_bodies_are_on_one_side() {
+fn touching_faces_overlap_if_both_bodies_are_on_the_same_side() {
     let at = |x: f64| Pose { translation: x * DVec3::X, ..Pose::IDENTITY };
     let overlap = |a: (Shape, Pose, f64), b: (Shape, Pose, f64)| {
         let (found, back) = (between(a.clone(), b.clone()), between(b, a));

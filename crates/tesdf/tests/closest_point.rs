@@ -67,7 +67,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 20_000, ..ProptestConfig::default() })]
 
     #[test]
-    fn needles(width in -18.0..-2.0f64, seed in any::<u64>()) {
+    fn closest_points_on_needles_are_exact(width in -18.0..-2.0f64, seed in any::<u64>()) {
         let mut random = Random(seed);
         let t = Triangle::new(needle(&mut random, 10f64.powf(width)));
         for _ in 0..8 {

@@ -165,7 +165,7 @@ fn a_cavity_is_outside() {
 }
 
 #[test]
-fn range() {
+fn coordinates_out_of_range_are_refused() {
     let mut vertices = cube_vertices();
     vertices[3].z = 1e-95;
     let error = conform(&cube(), vertices, CUBE.to_vec()).unwrap_err();
@@ -173,7 +173,7 @@ fn range() {
 }
 
 #[test]
-fn surface_vertices() {
+fn a_missing_surface_vertex_is_refused() {
     let mut vertices = cube_vertices();
     vertices[6].y += 1e-9;
     let error = conform(&cube(), vertices, CUBE.to_vec()).unwrap_err();
@@ -185,7 +185,7 @@ fn surface_vertices() {
 }
 
 #[test]
-fn orientation() {
+fn flat_tetrahedra_are_refused() {
     let mut tetrahedra = CUBE.to_vec();
     tetrahedra.insert(2, [0, 1, 3, 2]);
     let error = conform(&cube(), cube_vertices(), tetrahedra).unwrap_err();
@@ -195,7 +195,7 @@ fn orientation() {
 }
 
 #[test]
-fn sharing() {
+fn triangles_of_too_many_tetrahedra_are_refused() {
     let mut vertices = cube_vertices();
     let mut tetrahedra = CUBE.to_vec();
     tetrahedra.push(CUBE[4]);
@@ -218,7 +218,7 @@ fn sharing() {
 }
 
 #[test]
-fn faces() {
+fn missing_surface_faces_are_refused() {
     // The cube with the centre of its side z = 0 as an additional vertex. Four tetrahedra around it
     // form a fan to vertex 7.
     let mut vertices = cube_vertices();
@@ -268,7 +268,7 @@ fn a_face_without_area() {
 }
 
 #[test]
-fn labels() {
+fn holes_and_an_empty_inside_are_refused() {
     // A solid cube made of tetrahedra around a vertex at its centre conforms.
     let mut vertices = cube_vertices();
     vertices.push(DVec3::splat(0.5));
@@ -291,7 +291,7 @@ fn labels() {
 /// Of two connected outer tetrahedra, the larger lies in the cube. So the smaller one, which lies
 /// on a face, is labelled inside too.
 #[test]
-fn labels_across_a_face() {
+fn equal_labels_on_both_sides_of_a_face_are_refused() {
     let mut vertices = cube_vertices();
     vertices.extend([DVec3::new(-0.1, 0.5, -0.2), DVec3::new(3.0, 0.5, 1.0)]);
     let mut tetrahedra = CUBE.to_vec();
@@ -301,7 +301,7 @@ fn labels_across_a_face() {
 }
 
 #[test]
-fn a_part_without_a_point_inside() {
+fn a_tetrahedron_without_an_inner_point_is_refused() {
     let mut vertices = cube_vertices();
     let (at, next) = (5.0, 5f64.next_up());
     vertices.extend([(at, at, at), (next, at, at), (at, next, at), (at, at, next)].map(DVec3::from));
@@ -314,7 +314,7 @@ fn a_part_without_a_point_inside() {
 /// Two tetrahedra that touch no face of the surface and do not share a face, but lie in the same
 /// place.
 #[test]
-fn overlap() {
+fn overlapping_tetrahedra_are_refused() {
     let far = |shift: f64| {
         [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|p| p + DVec3::splat(5.0) + shift * DVec3::ONE)
     };
@@ -356,7 +356,7 @@ fn overlap() {
 }
 
 #[test]
-fn messages_say_check_place_and_next_step() {
+fn messages_name_the_failed_check_its_place_and_the_next_step() {
     let mut vertices = cube_vertices();
     vertices[6].y += 1e-9;
     let error = conform(&cube(), vertices, CUBE.to_vec()).unwrap_err().to_string();

@@ -124,7 +124,7 @@ fn no_sample_of_deep_overlaps_is_deeper() {
 }
 
 #[test]
-fn within_the_tolerance_of_certified_bounds() {
+fn distances_are_within_the_tolerance_of_certified_bounds() {
     let mut random = Random(3);
     let (mut certain, mut open) = (0, 0);
     for relation in [Relation::Deep, Relation::Deep, Relation::Inside] {
@@ -203,7 +203,7 @@ fn boxes_against_meshes() {
 }
 
 #[test]
-fn a_box_on_a_floor_of_other_triangles() {
+fn coplanar_faces_of_different_triangulations_touch() {
     // The lower side of the box lies in the floor and extends over several of its triangles. All
     // distances are 0.
     let floor = Body::new(

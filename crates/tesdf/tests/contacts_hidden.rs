@@ -155,7 +155,7 @@ fn bodies_that_touch_or_are_apart_have_no_hidden_overlap() {
 }
 
 #[test]
-fn nodes_that_show_an_overlap_hide_none() {
+fn overlaps_with_a_penetrating_node_are_not_hidden() {
     // A corner in a face, an edge in a face, and a small cube inside a large cube.
     let corner = Placement {
         pose: Pose {

@@ -138,7 +138,7 @@ fn every_flipped_bit_is_found() {
 }
 
 #[test]
-fn damage_is_named() {
+fn errors_name_the_damaged_part() {
     let mut bytes = sample();
     let last = bytes.len() - 1;
     bytes[last] ^= 1; // the narrowest section comes last
@@ -149,7 +149,7 @@ fn damage_is_named() {
 }
 
 #[test]
-fn lying_headers_name_the_section() {
+fn wrong_sizes_in_the_header_name_the_section() {
     let huge = u64::MAX.to_string();
     let cases = [
         ("\"shape\":[3,3]", "\"shape\":[4,3]", "section points: data_offsets [0,72]"),
@@ -235,7 +235,7 @@ fn other_formats_are_recognised() {
 }
 
 #[test]
-fn writing_refuses_what_it_could_not_read() {
+fn unreadable_files_are_never_written() {
     let reserved = BTreeMap::from([("checksum.x".to_string(), String::new())]);
     let e = write_container(&[], &reserved).unwrap_err().to_string();
     assert_eq!(e, "header: the metadata key checksum.x is reserved; use another");
@@ -250,7 +250,7 @@ fn writing_refuses_what_it_could_not_read() {
 }
 
 #[test]
-fn types_cross_threads() {
+fn types_are_send_and_sync() {
     fn check<T: Send + Sync>() {}
     check::<Container>();
     check::<tesdf::asset::SharedSection<f64>>();

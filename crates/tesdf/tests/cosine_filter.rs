@@ -102,7 +102,7 @@ fn gradients_that_face_away_are_dropped() {
 }
 
 #[test]
-fn the_extremes_keep_all_and_the_opposite_only() {
+fn a_threshold_of_minus_one_keeps_all_contacts_and_one_only_opposite_gradients() {
     let figure = Figure::new();
     let (all, _) = figure.contacts(Mode::Exact, None);
     // ∇φ · n > 1 is never true, except for the rounding of two unit vectors.

@@ -83,7 +83,7 @@ fn lists_hold_again_after_re_encoding() {
 }
 
 #[test]
-fn near_the_surface_faces_around_vertices_help() {
+fn lists_for_deformation_have_fewer_errors_near_the_surface() {
     let (solid, domain) = beam();
     let twist = |p: DVec3| {
         let axis = DVec3::new(p.x, 4.0, 4.0);
@@ -110,7 +110,7 @@ fn near_the_surface_faces_around_vertices_help() {
 }
 
 #[test]
-fn only_what_moved_is_looked_at() {
+fn only_cells_near_moved_vertices_are_checked() {
     let (solid, domain) = beam();
     let mut asset = encoded(&solid, &domain, &options());
     let dent = |p: DVec3| if p.distance(DVec3::new(7.0, 5.0, 5.0)) < 0.5 { p - 0.1 } else { p };
@@ -136,7 +136,7 @@ fn only_what_moved_is_looked_at() {
 }
 
 #[test]
-fn what_turns_inside_out_is_reported() {
+fn inverted_tetrahedra_are_reported() {
     let (solid, domain) = beam();
     let mut asset = encoded(&solid, &domain, &options());
     let vertex = (0..domain.vertices().len() as u32)
@@ -156,7 +156,7 @@ fn what_turns_inside_out_is_reported() {
 }
 
 #[test]
-fn bad_moves_change_nothing() {
+fn refused_moves_change_nothing() {
     let (solid, domain) = beam();
     let mut asset = encoded(&solid, &domain, &options());
     let count = domain.vertices().len();
@@ -238,7 +238,7 @@ fn contacts_of_a_conforming_domain_are_those_of_the_bisection_domain() {
 }
 
 #[test]
-fn nothing_is_lost_where_lists_are_cut() {
+fn no_contact_is_lost_with_truncated_lists() {
     // A ball inside a block: deep inside, truncated lists overestimate distances, so no bounding
     // ball may be ruled out by them.
     let block = Shape::default().add_box(DVec3::splat(-2.0), DVec3::splat(2.0), 6).solid();

@@ -185,7 +185,7 @@ fn vertices_far_away_and_thin_plates() {
 /// Face 7 has a height of 5e-60, so it is a segment after rounding. Its normal used to decide the
 /// sign of points nearest to that segment.
 #[test]
-fn a_segment_between_two_faces_tells_no_side() {
+fn a_face_that_is_a_segment_does_not_decide_the_sign() {
     let mut vertices: Vec<DVec3> =
         (0..8).map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2))).collect();
     vertices[1] = DVec3::new(1.2731877562933331, 0.15, 8.500000000000001e-10);
@@ -202,7 +202,7 @@ fn a_segment_between_two_faces_tells_no_side() {
 }
 
 #[test]
-fn clearance_sees_no_planes_of_points() {
+fn clearance_is_right_with_faces_of_one_vertex() {
     let (vertices, mut faces) = cube();
     faces.push([1, 1, 1]);
     faces.push([6, 6, 6]);

@@ -62,7 +62,7 @@ fn a_cancelled_encode_stops_soon() {
 }
 
 #[test]
-fn progress_ends_at_the_end() {
+fn progress_ends_in_the_last_stage() {
     let progress = Progress::default();
     assert_eq!(progress.state(), (Stage::Refine, 0.0));
     Encoder::new().progress(&progress).encode(&ball()).expect("valid options");
@@ -71,7 +71,7 @@ fn progress_ends_at_the_end() {
 }
 
 #[test]
-fn options_without_meaning_are_refused_by_name() {
+fn invalid_options_are_refused_by_name() {
     let d = EncodeOptions::default;
     let (nan, inf) = (f64::NAN, f64::INFINITY);
     let cases: Vec<(&str, EncodeOptions)> = vec![
@@ -98,7 +98,7 @@ fn options_without_meaning_are_refused_by_name() {
 }
 
 #[test]
-fn every_option_is_used() {
+fn every_option_changes_the_result() {
     let solid = named("procedural/tetra.obj");
     let bytes = |options: &EncodeOptions| encode_on(1, &solid, options).as_bytes().to_vec();
     let cells = |options: &EncodeOptions| encode_on(1, &solid, options).about().statistics.clone();
@@ -123,7 +123,7 @@ fn every_option_is_used() {
 
 /// A region without extent and a region far away belong to the domain too.
 #[test]
-fn odd_regions() {
+fn empty_and_distant_regions_belong_to_the_domain() {
     let solid = ball();
     for (at, size) in [(DVec3::new(1.7, 0.0, 0.3), 0.0), (DVec3::new(-20.0, 3.0, 8.0), 1.0)] {
         let (a, b) = (at, at + size);

@@ -122,7 +122,7 @@ impl Sampler for OneFace {
 }
 
 #[test]
-fn what_a_sampler_says_is_no_proof() {
+fn sampled_lists_are_never_certified() {
     let (solid, conforming) = block();
     for most in [None, Some(3)] {
         for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
@@ -214,7 +214,7 @@ fn lists_for_deformation_name_all_faces_around_surface_vertices() {
 }
 
 #[test]
-fn options_that_mean_nothing_are_errors() {
+fn invalid_combinations_of_options_are_errors() {
     let (solid, conforming) = block();
     let refused = |domain, options: EncodeOptions| match Encoder::new()
         .options(options)

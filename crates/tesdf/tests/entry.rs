@@ -15,7 +15,7 @@ fn cube() -> PathBuf {
 }
 
 #[test]
-fn a_file_is_encoded_as_its_solid_and_recorded() {
+fn encoding_a_file_equals_encoding_its_solid_and_records_the_file() {
     let loaded = read(cube()).unwrap();
     let source = Source::of_file(cube(), loaded.report.source_blake3);
     let solid = SolidMesh::new(loaded.mesh).unwrap();
@@ -31,7 +31,7 @@ fn a_file_is_encoded_as_its_solid_and_recorded() {
 }
 
 #[test]
-fn band_and_unit_count_in_any_order() {
+fn the_order_of_encoder_methods_does_not_matter() {
     let solid = SolidMesh::read(cube()).unwrap();
     let (band, unit) = (Length::Absolute(0.003), "m");
     let options = EncodeOptions { band, unit: Some(unit.into()), ..EncodeOptions::preset(Preset::Compact) };
@@ -46,7 +46,7 @@ fn band_and_unit_count_in_any_order() {
 }
 
 #[test]
-fn the_names_in_files_stay() {
+fn names_of_options_in_files_are_stable() {
     let of = |options: EncodeOptions| serde_json::to_value(options).unwrap()["encoder"].clone();
     assert_eq!(of(EncodeOptions::default()), "certified");
     let sampled = of(EncodeOptions::SAMPLED_SAFE);

@@ -72,7 +72,7 @@ fn agrees(report: &BandReport, solid: &SolidMesh, asset: &TeSdf, grid: &Grid) {
 }
 
 #[test]
-fn full_lists_have_no_error_and_truncated_ones_that_of_a_direct_loop() {
+fn errors_of_full_and_truncated_lists_equal_a_direct_loop() {
     let solid = solid("l_bracket.obj");
     let options = EncodeOptions { byte_worth: 2.0, tighten_levels: 2, ..EncodeOptions::default() };
     let cut = EncodeOptions { max_entries: Some(3), ..options.clone() };
@@ -95,7 +95,7 @@ fn full_lists_have_no_error_and_truncated_ones_that_of_a_direct_loop() {
 }
 
 #[test]
-fn a_sampled_encoder_in_a_conforming_domain_misses_what_a_direct_loop_finds() {
+fn errors_of_sampled_lists_in_a_conforming_domain_equal_a_direct_loop() {
     let (solid, domain) = block();
     let coarse = Sampling { resolution: 1, shrink: 0.5, threshold: Threshold::Absolute(0.0) };
     let sampled = EncodeOptions { method: Method::Sampled(coarse), ..EncodeOptions::PAPER };
@@ -117,7 +117,7 @@ fn a_sampled_encoder_in_a_conforming_domain_misses_what_a_direct_loop_finds() {
 }
 
 #[test]
-fn what_cannot_be_evaluated_is_an_error() {
+fn invalid_inputs_are_errors() {
     let options = EvaluateOptions { fineness: 10, ..EvaluateOptions::default() };
     assert_eq!(evaluate(&[], &options, |_| {}), Err(EvaluateError::Empty));
     let [a, b] = ["cube.obj", "tetra.obj"]

@@ -50,7 +50,7 @@ fn length(v: DVec3) -> f64 {
 }
 
 #[test]
-fn points_have_right_answers_however_far_out_they_are() {
+fn answers_are_right_at_any_distance() {
     for asset in [&*KEY, &scaled(&KEY, 1e30, DVec3::ZERO), &scaled(&KEY, 1.0, DVec3::splat(1e3))] {
         let corners: Vec<DVec3> = (0..asset.face_count()).flat_map(|f| asset.face_corners(f)).collect();
         let middle = asset.bounds().center();
@@ -93,7 +93,7 @@ fn points_have_right_answers_however_far_out_they_are() {
 /// A distance too large for `f64` is answered with the largest `f64`. Points that are not finite
 /// have no answer.
 #[test]
-fn the_ends_of_the_range() {
+fn the_largest_and_non_finite_coordinates() {
     for precision in [Precision::F32, Precision::F64] {
         let answer = KEY.query_with(DVec3::splat(-f64::MAX), precision);
         assert_eq!(answer.signed_distance, f64::MAX);
@@ -246,7 +246,7 @@ fn poses_far_out_have_no_contacts_or_are_refused() {
 }
 
 #[test]
-fn scales_beyond_all_sizes_are_refused() {
+fn scales_out_of_range_are_refused() {
     let mut scene = Scene::new();
     let ball = scene.add_shape(Shape::Sphere { radius: 1.0 }).unwrap();
     for scale in [1e51, 1e200, f64::MAX, 1e-51, 1e-300] {

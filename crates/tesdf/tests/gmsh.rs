@@ -48,7 +48,7 @@ fn the_inside_is_filled() {
 }
 
 #[test]
-fn a_band_fills_the_bounds_grown() {
+fn a_band_fills_the_grown_bounds() {
     let options = GmshOptions { band: Some(Length::OfDiagonal(0.1)), ..GmshOptions::default() };
     let (solid, mesh) = fill("procedural/iso_m16_nut_c50.obj", &options);
     let all = solid.mesh().bounds().grown(0.1 * solid.mesh().diagonal()).extent().element_product();
@@ -68,7 +68,7 @@ fn a_band_fills_the_bounds_grown() {
 
 /// The domain contains all that meets the region, and nothing else.
 #[test]
-fn a_region_is_filled_and_nothing_else() {
+fn only_the_region_is_filled() {
     let region = [0.09, -0.005, -0.005, 0.12, 0.025, 0.025];
     let options = GmshOptions { regions: vec![region], ..GmshOptions::default() };
     let (solid, mesh) = fill("procedural/beam.obj", &options);
@@ -165,7 +165,7 @@ fn unit_cube() -> SolidMesh {
 
 #[cfg(unix)]
 #[test]
-fn the_next_settings_are_tried_when_the_gate_refuses() {
+fn the_next_settings_are_tried_if_the_tetrahedra_do_not_conform() {
     let folder = tempfile::tempdir().unwrap();
     let mut flat = CUBE.to_vec();
     flat.push([0, 1, 2, 3]);
@@ -204,7 +204,7 @@ fn the_next_settings_are_tried_when_the_gate_refuses() {
 
 #[cfg(unix)]
 #[test]
-fn a_program_that_fails_is_told_apart() {
+fn missing_libraries_refusals_and_timeouts_are_different_errors() {
     let folder = tempfile::tempdir().unwrap();
     let run = |script: &str| tetrahedralise(&unit_cube(), &stand_in(folder.path(), script)).unwrap_err();
     let error = run("echo 'ImportError: libGLU.so.1: cannot open shared object file' >&2; exit 1");
@@ -224,7 +224,7 @@ fn a_program_that_fails_is_told_apart() {
 
 #[cfg(unix)]
 #[test]
-fn a_run_that_is_no_longer_wanted_is_ended() {
+fn cancelling_ends_gmsh() {
     let folder = tempfile::tempdir().unwrap();
     let started = folder.path().join("started");
     let options = stand_in(folder.path(), &format!("touch {}; exec sleep 60", started.display()));

@@ -71,7 +71,7 @@ fn counts(defects: &[Defect]) -> BTreeMap<DefectKind, usize> {
 }
 
 #[test]
-fn every_defect_is_found_and_nothing_else() {
+fn exactly_the_expected_defects_are_found() {
     let names = readable();
     assert!(FOUND.iter().all(|(name, _)| names.iter().any(|n| n == name)));
     for name in names {
@@ -82,7 +82,7 @@ fn every_defect_is_found_and_nothing_else() {
 }
 
 #[test]
-fn the_encoder_takes_what_has_an_inside() {
+fn meshes_with_an_inside_are_solids_and_others_are_refused() {
     for name in readable() {
         let refused = REFUSED.iter().find(|(n, ..)| *n == name);
         match (SolidMesh::new(load(&name)), refused) {
@@ -102,7 +102,7 @@ fn the_encoder_takes_what_has_an_inside() {
 }
 
 #[test]
-fn rows_to_accept_are_accepted_and_those_to_reject_are_not() {
+fn meshes_are_accepted_or_refused_as_the_table_says() {
     let table = std::fs::read_to_string(bad("expected.tsv")).unwrap();
     // Rows marked for repair whose mesh is a solid already.
     let solid_as_is = ["zero_area_repeated_index.obj", "cavity_inverted.obj", "nan_unused_vertex.obj"];

@@ -16,7 +16,7 @@ fn volume6(loaded: &LoadedMesh) -> f64 {
 }
 
 #[test]
-fn buffers_inside_and_outside_agree() {
+fn embedded_and_external_buffers_agree() {
     let embedded = load(&json(DATA_URI, NODE));
     assert_eq!(embedded.mesh.vertices(), [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z]);
     assert_eq!(embedded.mesh.faces(), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]);
@@ -36,7 +36,7 @@ fn buffers_inside_and_outside_agree() {
 }
 
 #[test]
-fn transforms_compose_and_mirrors_keep_outward_outward() {
+fn transforms_compose_and_mirrored_faces_still_point_outward() {
     // A scale of 0.001 means the decimal number, although the JSON is read in f32.
     let nodes = r#"{"translation":[1,2,3],"children":[1]},{"mesh":0,"scale":[0.001,0.001,0.001]}"#;
     let loaded = load(&json(DATA_URI, nodes));
@@ -76,7 +76,7 @@ fn strips_fans_lists_and_sparse_positions() {
 }
 
 #[test]
-fn what_does_not_shape_the_mesh_does_not_matter() {
+fn materials_textures_and_bounds_are_ignored() {
     let text = json(DATA_URI, NODE).replace(r#","min":[0,0,0],"max":[1,1,1]"#, "").replace(
         r#""scene":0"#,
         r#""extensionsRequired":["KHR_materials_unlit"],"textures":[{"source":3}],"scene":0"#,
@@ -85,7 +85,7 @@ fn what_does_not_shape_the_mesh_does_not_matter() {
 }
 
 #[test]
-fn faults_name_the_element() {
+fn errors_name_the_json_element() {
     let whole = json(DATA_URI, NODE);
     let cases = [
         (whole.replace(r#""indices":1"#, r#""indices":7"#), "meshes[0].primitives[0].indices"),
@@ -132,7 +132,7 @@ fn faults_name_the_element() {
 }
 
 #[test]
-fn a_mesh_that_is_shown_too_often_is_refused() {
+fn a_mesh_with_too_many_instances_is_refused() {
     // 8192 faces that all use one vertex. A file of some kilobytes would expand to 10 GB.
     let shows = |times: usize| {
         let text = json("", &vec![NODE; times].join(",")).replace(r#""count":12"#, r#""count":24576"#);

@@ -153,7 +153,7 @@ fn assert_survives(name: &str, bytes: &[u8], format: MeshFormat) -> bool {
 }
 
 #[test]
-fn mutated_files_never_panic_nor_take_memory() {
+fn mutated_files_neither_panic_nor_allocate_much() {
     let mut random = Random(7);
     let (mut read, mut refused) = (0, 0);
     for (name, format, bytes) in samples() {
@@ -168,7 +168,7 @@ fn mutated_files_never_panic_nor_take_memory() {
 }
 
 #[test]
-fn each_format_survives_the_files_of_all_others() {
+fn each_reader_survives_files_of_all_other_formats() {
     for (name, _, bytes) in samples() {
         for format in MeshFormat::ALL {
             assert_survives(&name, &bytes, format);

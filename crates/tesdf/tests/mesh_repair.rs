@@ -105,7 +105,7 @@ fn a_shell_inside_another_becomes_a_cavity() {
 }
 
 #[test]
-fn what_needs_a_tolerance_waits_for_one() {
+fn near_vertices_merge_only_with_a_weld_tolerance() {
     let soup = load("bad/soup_jitter.obj");
     assert!(!repaired(&soup).report.encodable);
     let fixed = repair(&soup, &welding(1e-8)).unwrap();
@@ -123,7 +123,7 @@ fn what_needs_a_tolerance_waits_for_one() {
 }
 
 #[test]
-fn what_cannot_be_repaired_is_left_and_named() {
+fn unrepairable_meshes_are_unchanged_and_reported() {
     for name in ["open_holes", "open_half", "duplicate_face_reversed", "internal_fin"] {
         let mesh = load(&format!("bad/{name}.obj"));
         let left = repaired(&mesh);
@@ -137,7 +137,7 @@ fn what_cannot_be_repaired_is_left_and_named() {
 }
 
 #[test]
-fn good_meshes_are_left_alone() {
+fn good_meshes_are_unchanged() {
     for name in
         ["cavity", "three_components", "polygon_concave", "nonmanifold_edge", "nonmanifold_vertex", "quads"]
     {
@@ -345,7 +345,7 @@ proptest! {
 
     /// For any faces, nothing panics, and an encodable result is a solid.
     #[test]
-    fn any_faces_are_survived(
+    fn random_faces_never_panic(
         corners in prop::collection::vec(prop::array::uniform3(0i8..4), 3..10),
         faces in prop::collection::vec(prop::array::uniform3(0u32..10), 1..40),
         tolerance in prop::option::of(0.1f64..1.5),

@@ -115,7 +115,7 @@ fn assert_exact(mesh: &TriangleMesh, asset: &TeSdf) {
 
 /// Places with a negative winding number are outside, and their distance is that of brute force.
 #[test]
-fn what_is_inside_out_is_outside() {
+fn regions_of_negative_winding_number_are_outside() {
     let folded = {
         // A cube whose lid is a fan around a vertex beyond one side of it, below the lid.
         let cube = Shells::default().cube(DVec3::ZERO, 1.0);
@@ -149,7 +149,7 @@ fn a_mesh_that_is_all_inside_out_stays_an_error() {
 
 /// The same tetrahedron once or twice on the same faces: the jumps of coinciding faces add up.
 #[test]
-fn faces_on_each_other_count_together() {
+fn coincident_faces_count_together() {
     let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
     let inside_out = OUTWARD.map(|[a, b, c]| [a, c, b]);
     let twice = Shells::default().add(&corners, OUTWARD.into_iter().chain(OUTWARD)).mesh();
@@ -187,7 +187,7 @@ proptest! {
     /// Boundaries of random tetrahedra of either orientation. `check` finds at least the range that
     /// a grid of points finds, and where it reports a negative winding number there is one.
     #[test]
-    fn no_less_than_a_grid_finds(
+    fn every_winding_number_of_a_grid_is_in_the_range(
         tetrahedra in prop::collection::vec(prop::array::uniform4(prop::array::uniform3(0i32..7)), 1..5),
         shift in prop::bool::ANY,
     ) {

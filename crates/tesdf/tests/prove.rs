@@ -200,7 +200,7 @@ fn verdicts_agree_with_a_lattice_of_points() {
 }
 
 #[test]
-fn a_duplicate_stands_for_its_twin_in_distances_and_not_in_signs() {
+fn a_duplicate_face_replaces_its_twin_in_distances_but_not_in_signs() {
     let shape = one_box().add_box(DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0), 1);
     let solid = shape.solid();
     let asset = encoded(&solid);
@@ -267,7 +267,7 @@ fn a_face_tree_that_misses_a_face_is_refuted() {
 }
 
 #[test]
-fn cut_lists_are_proved_near_the_surface() {
+fn truncated_lists_are_proved_near_the_surface() {
     let solid = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid();
     let options = EncodeOptions { max_entries: Some(16), ..fast() };
     let asset = encoded_with(&solid, Domain::Bisection, &options);
@@ -278,7 +278,7 @@ fn cut_lists_are_proved_near_the_surface() {
 }
 
 #[test]
-fn lists_of_samples_are_held_to_the_same_delta() {
+fn sampled_lists_are_tested_with_the_delta_of_the_certified_encoder() {
     let solid = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.0).solid();
     let sampling = Sampling { resolution: 1, shrink: 1.0, threshold: Threshold::Absolute(0.0) };
     let options =
@@ -321,7 +321,7 @@ fn a_budget_leaves_cells_undecided() {
 }
 
 #[test]
-fn a_proof_can_be_broken_off_and_open_meshes_are_refused() {
+fn a_proof_can_be_cancelled_and_open_meshes_are_refused() {
     let asset = hollow();
     let stop = prove(&asset, &ProveOptions::default(), |_| ControlFlow::Break(()));
     assert_eq!(stop, Err(ProveError::Cancelled));

@@ -7,7 +7,7 @@ use tesdf::encode::{Encoder, Preset};
 use tesdf::query::Precision;
 
 #[test]
-fn tree_and_lists_agree() {
+fn queries_by_tree_and_by_lists_agree() {
     for file in ["procedural/cube.obj", "procedural/shaft_keyway.obj", "procedural/lobed_peg.obj"] {
         let solid = named(file);
         let (bounds, diagonal) = (solid.mesh().bounds(), solid.mesh().diagonal());

@@ -139,7 +139,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(128))]
 
     #[test]
-    fn any_forces_can_be_replaced(contacts in any_patch(), n in 1..24u32, seed in any::<u64>()) {
+    fn kept_contacts_replace_the_wrench_of_any_forces(contacts in any_patch(), n in 1..24u32, seed in any::<u64>()) {
         let (kept, report) = reduce(&contacts, n);
         prop_assert!(kept.len() <= n as usize && (kept.len(), contacts.len()) == (report.kept, report.contacts));
         let wrenches = |contacts: &[Contact]| contacts.iter().map(|c| wrench(c, &report)).collect::<Vec<_>>();
@@ -193,7 +193,7 @@ proptest! {
 
     /// The reported loss equals the one computed on its own.
     #[test]
-    fn reports_tell_the_error(contacts in any_patch(), n in 1..40u32) {
+    fn reports_have_the_wrench_error(contacts in any_patch(), n in 1..40u32) {
         let (kept, report) = reduce(&contacts, n);
         let error = wrench_error(&contacts, &kept, report.center, report.length);
         prop_assert!((error - report.wrench_error).abs() <= 1e-6 * error + 1e-9, "{error} {report:?}");
@@ -218,7 +218,7 @@ proptest! {
     /// The contacts of a pair are reduced in order, whatever else touches and for any number of
     /// threads.
     #[test]
-    fn pairs_are_reduced_on_their_own(patches in prop::collection::vec(any_patch(), 1..6), n in 1..12u32) {
+    fn pairs_are_reduced_independently(patches in prop::collection::vec(any_patch(), 1..6), n in 1..12u32) {
         let alone: Vec<_> = patches.iter().map(|contacts| reduce(contacts, n)).collect();
         // Pair k is (k, 100 - k): in the scene's order, the two orders of a pair are far apart.
         let renamed = |contacts: &[Contact], k: usize| -> Vec<Contact> {
@@ -270,7 +270,7 @@ fn a_flat_patch_keeps_its_corners() {
 
 /// Equal contacts, from either body, are merged.
 #[test]
-fn equal_contacts_are_one() {
+fn equal_contacts_are_merged() {
     let (point, normal) = (DVec3::new(3.0, -2.0, 1.0), DVec3::Y);
     let both =
         |face| [contact([2, 5], point, normal, -0.1, face), contact([5, 2], point, -normal, -0.1, face)];
@@ -286,7 +286,7 @@ fn equal_contacts_are_one() {
 /// A ring of contacts that push outwards, as around a shaft. The loss falls with the square of the
 /// number of kept contacts.
 #[test]
-fn a_ring_is_lost_by_the_square() {
+fn the_error_of_a_ring_falls_with_the_square_of_the_kept_contacts() {
     let contacts = patch(5000, 1, |random| {
         let (sin, cos) = (std::f64::consts::TAU * random.unit()).sin_cos();
         (DVec3::new(cos, sin, 0.0), DVec3::new(cos, sin, 0.0))

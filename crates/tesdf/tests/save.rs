@@ -24,7 +24,7 @@ fn destination(path: &Path) -> Result<Destination, SaveError> {
 }
 
 #[test]
-fn saving_replaces_whole_files_and_leaves_no_other() {
+fn saving_replaces_whole_files_and_leaves_no_part_files() {
     let folder = folder();
     let path = folder.path().join("a.tesdf");
     fs::write(&path, b"old").unwrap();
@@ -71,7 +71,7 @@ fn an_output_that_is_an_input_is_refused() {
 
 /// Part files as a killed process leaves them, and as a living process holds them.
 #[test]
-fn abandoned_part_files_are_removed_and_those_of_the_living_are_not() {
+fn part_files_of_ended_processes_are_removed_and_others_stay() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     for name in [".tesdf-abc.part", ".tesdf-abc.parts", ".other.part", "tesdf-abc.part"] {
@@ -180,7 +180,7 @@ mod unix {
     }
 
     #[test]
-    fn links_are_followed_to_files_that_are_there_and_that_are_not() {
+    fn links_to_existing_and_missing_files_are_followed() {
         let folder = folder();
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("sub")).unwrap();
@@ -218,7 +218,7 @@ mod unix {
 
     #[cfg(target_os = "linux")]
     #[test]
-    fn what_linux_refuses_is_an_error() {
+    fn full_devices_and_closed_folders_are_errors() {
         let full = destination(Path::new("/dev/full")).unwrap();
         let found = full.write(b"x").unwrap_err().to_string();
         assert!(found.starts_with("cannot write /dev/full: No space left"), "{found}");

@@ -34,7 +34,7 @@ fn touching(scene: &Scene) -> Vec<(u32, u32)> {
 }
 
 #[test]
-fn poses_that_are_none() {
+fn invalid_poses_are_refused() {
     let (mut scene, ids) = row(&[0.0]);
     let shape = scene.instance(ids[0]).expect("it is there").shape;
     let good = Instance::new(shape, Pose::IDENTITY);
@@ -69,7 +69,7 @@ fn poses_that_are_none() {
 }
 
 #[test]
-fn shapes_that_are_none() {
+fn invalid_shapes_are_refused() {
     let mut scene = Scene::new();
     for shape in [
         Shape::Sphere { radius: 0.0 },
@@ -84,7 +84,7 @@ fn shapes_that_are_none() {
 }
 
 #[test]
-fn options_that_make_no_sense() {
+fn invalid_options_are_refused() {
     let (scene, _) = row(&[0.0, 1.0]);
     let good = CollideOptions::default();
     for (name, options) in [
@@ -107,7 +107,7 @@ fn options_that_make_no_sense() {
 }
 
 #[test]
-fn scenes_of_little() {
+fn empty_scenes_single_bodies_and_two_planes_have_no_contacts() {
     let none = detect(&Scene::new(), &CollideOptions::default()).expect("nothing is no error");
     assert_eq!((none.len(), none.statistics.instance_pairs), (0, 0));
     assert_eq!(touching(&row(&[0.0]).0), []);
@@ -138,7 +138,7 @@ fn contact_distance_of_zero() {
 }
 
 #[test]
-fn bounds_that_touch_only_after_rounding() {
+fn cubes_that_share_a_side_touch_in_any_pose() {
     // Two cubes that share a side, rotated together, still have contacts at a contact distance of a
     // thousandth of a picometre.
     let cube = body("cube");
@@ -158,7 +158,7 @@ fn bounds_that_touch_only_after_rounding() {
 }
 
 #[test]
-fn what_never_meets() {
+fn excluded_pairs_have_no_contacts() {
     let places = [0.0, 0.5, 1.0];
     let (mut scene, ids) = row(&places);
     assert_eq!(touching(&scene).len(), 6);
@@ -184,7 +184,7 @@ fn what_never_meets() {
 }
 
 #[test]
-fn ids_stay_when_others_go() {
+fn ids_stay_when_other_instances_are_removed() {
     let (mut scene, ids) = row(&[0.0, 0.5, 1.0, 1.5]);
     scene.remove(&[ids[1]]).expect("it is there");
     assert_eq!(scene.remove(&[ids[0], ids[1]]), Err(CollideError::NoInstance(ids[1])));
@@ -200,7 +200,7 @@ fn ids_stay_when_others_go() {
 }
 
 #[test]
-fn shapes_that_are_gone() {
+fn shapes_in_use_stay_and_removed_shapes_are_errors() {
     let (mut scene, ids) = row(&[0.0, 0.5]);
     let shape = scene.instance(ids[0]).expect("it is there").shape;
     scene.remove(&[ids[0]]).expect("it is there");
@@ -217,7 +217,7 @@ fn shapes_that_are_gone() {
 }
 
 #[test]
-fn many_worlds_are_many_times_one() {
+fn many_worlds_have_the_contacts_of_one_world_each() {
     let (one, _) = row(&[0.0, 1.5, 5.0]);
     let mut scene = Scene::new();
     let shape = sphere(&mut scene, 1.0);
@@ -269,7 +269,7 @@ fn a_hundred_thousand_instances() {
 }
 
 #[test]
-fn a_scaled_instance_is_a_scaled_shape() {
+fn a_scaled_instance_equals_a_scaled_shape() {
     let mut scene = Scene::new();
     let (small, large) = (sphere(&mut scene, 0.5), sphere(&mut scene, 1.5));
     let pairs = [

@@ -128,7 +128,7 @@ fn tree_of<'a>(text: &'a str, from: &Names) -> (Vec<Names>, &'a str) {
 }
 
 #[test]
-fn modules_use_those_before_them_alone() {
+fn modules_use_only_earlier_modules() {
     let source = Source::read();
     let place = |name: &str| ORDER.iter().position(|&other| other == name);
     let mut arrows = 0;
@@ -143,7 +143,7 @@ fn modules_use_those_before_them_alone() {
 }
 
 #[test]
-fn no_files_use_each_other_in_a_circle() {
+fn no_files_use_each_other_in_a_cycle() {
     let source = Source::read();
     let mut open: BTreeMap<Names, BTreeSet<Names>> =
         source.files.keys().map(|module| (module.clone(), source.used(module))).collect();

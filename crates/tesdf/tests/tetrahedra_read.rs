@@ -133,7 +133,7 @@ fn error_of(name: &str, bytes: &[u8]) -> String {
 }
 
 #[test]
-fn second_order_is_an_error() {
+fn second_order_elements_are_an_error() {
     let error = read_tetrahedra(golden("second_order.msh")).unwrap_err();
     let ReadTetrahedraError::Element { element: 77, ref kind, .. } = error else { panic!("{error}") };
     assert_eq!(kind, "a second-order tetrahedron");
@@ -231,7 +231,7 @@ fn vtu_of_points(points: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn bytes_that_unpack_to_gigabytes_are_refused_before() {
+fn compressed_data_that_would_fill_gigabytes_is_refused() {
     const BLOCK: u32 = 1 << 25;
     let mut packer = ZlibEncoder::new(Vec::new(), Compression::best());
     packer.write_all(&vec![0; BLOCK as usize]).unwrap();

@@ -121,7 +121,7 @@ fn falling_bodies_meet_the_floor_when_they_should() {
 }
 
 #[test]
-fn what_moves_alike_or_away_never_meets() {
+fn bodies_that_move_together_or_apart_never_meet() {
     let ball = Shape::Sphere { radius: 0.5 };
     let cube = boxed(DVec3::splat(0.5));
     let alike = linear([7.0, -2.0, 1.0], [0.0; 3]);
@@ -141,7 +141,7 @@ fn what_moves_alike_or_away_never_meets() {
 }
 
 #[test]
-fn nothing_thin_and_fast_is_passed_through() {
+fn fast_bodies_do_not_tunnel_through_thin_bodies() {
     // A sheet that passes through a sheet of the same thickness in 2e-10 of the time.
     let sheet = boxed(DVec3::new(1.0, 1.0, 1e-4));
     let fast = linear([0.0, 0.0, -1e6], [0.0; 3]);
@@ -151,7 +151,7 @@ fn nothing_thin_and_fast_is_passed_through() {
 }
 
 #[test]
-fn a_turning_bar_hits_what_is_in_its_way() {
+fn a_rotating_bar_hits_obstacles_in_its_path() {
     // The bar's side is at y = 0.1 in its frame. A ball of radius 0.2 lies on the y axis at y = 2.
     // They meet at the angle where the ball's centre is 0.3 from the bar's axis.
     let bar = boxed(DVec3::new(3.0, 0.1, 0.1));
@@ -215,7 +215,7 @@ fn random_motions_are_free_before_the_impact_and_touch_at_it() {
 }
 
 #[test]
-fn what_touches_or_penetrates_at_the_start_has_time_0() {
+fn bodies_in_contact_at_the_start_have_time_0() {
     let cube = boxed(DVec3::ONE);
     for (height, distance) in [(1.5, -0.5), (2.0, 0.0), (2.0 + 5e-7, 5e-7)] {
         let case = Case::new(
@@ -233,7 +233,7 @@ fn what_touches_or_penetrates_at_the_start_has_time_0() {
 }
 
 #[test]
-fn steps_that_are_used_up_are_said_to_be() {
+fn exhausted_iterations_are_reported() {
     // Sliding along a wall at a distance of 0.01 needs a very large number of steps.
     let (cube, slide) = (boxed(DVec3::ONE), linear([1.0, 0.0, 0.0], [0.0; 3]));
     let case = Case::new(cube.clone(), at(0.0, 0.0, 2.01), slide, cube, Pose::IDENTITY, Motion::Rest);
@@ -269,7 +269,7 @@ fn a_nut_turns_freely_down_its_pitch_and_jams_otherwise() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn invalid_motions_and_options_are_refused() {
     let ball = Shape::Sphere { radius: 1.0 };
     let case = |motion_a, motion_b, options: TimeOfImpactOptions| {
         let case =

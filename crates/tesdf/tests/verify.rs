@@ -71,7 +71,7 @@ fn a_good_asset_passes_the_same_way_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_comparison_can_be_broken_off() {
+fn a_comparison_can_be_cancelled() {
     let asset = hollow();
     let chunks = std::sync::atomic::AtomicUsize::new(0);
     let found = verify(&asset, &VerifyOptions { samples: 100_000, seed: 1 }, |_| {
@@ -146,7 +146,7 @@ fn a_mesh_without_an_inside_is_refused() {
 }
 
 #[test]
-fn cells_fill_the_cube_and_lie_where_they_say() {
+fn cells_fill_the_cube_and_lie_on_the_side_of_their_kind() {
     let asset = hollow();
     let (mut volume, mut inside, mut listed) = (0.0, 0, 0);
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -177,7 +177,7 @@ fn cells_fill_the_cube_and_lie_where_they_say() {
 }
 
 #[test]
-fn reads_by_volume_are_those_of_random_points() {
+fn reads_weighted_by_volume_equal_those_of_random_points() {
     let asset = hollow();
     let options = InspectOptions { samples: 2000, seed: 5 };
     let found = inspect(&asset, &options);

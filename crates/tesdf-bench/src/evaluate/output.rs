@@ -126,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_are_short() {
+    fn figures_have_three_significant_digits() {
         let texts = [0.0, 1.0, 0.105, 35.71, 123.0, 0.007, 1.23456e-9, 8.9].map(short);
         assert_eq!([0.9999, 1.0, 0.1059].map(band), ["0.999", "1", "0.105"]);
         assert_eq!(texts, ["0", "1", "0.105", "35.7", "123", "0.007", "1.2e-9", "8.9"]);

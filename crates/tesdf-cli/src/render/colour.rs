@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn light_and_srgb_are_inverse() {
+    fn linear_colours_and_srgb_are_inverse() {
         for c in 0..=255 {
             assert_eq!(srgb(linear([c, 255 - c, 7])), [c, 255 - c, 7]);
         }

@@ -67,7 +67,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wedge_is_the_common_part_of_its_half_spaces() {
+    fn a_wedge_is_the_intersection_of_its_half_spaces() {
         let half = |x, y, offset| HalfSpace::new(DVec3::new(x, y, 0.0), offset).unwrap();
         let cut = Cut(vec![half(2.0, 0.0, 2.0), half(0.0, 1.0, 0.0)]);
         assert_eq!(cut.0[0].offset, 1.0);

@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_keep_their_promise() {
+    fn coordinates_along_and_across_an_axis_give_the_point() {
         let p = DVec3::new(1.0, 2.0, 3.0);
         for (axis, along, across) in
             [(Axis::X, 1., [2., 3.]), (Axis::Y, 2., [1., 3.]), (Axis::Z, 3., [1., 2.])]

@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turn_about_the_centre_of_mass_leaves_it_in_place() {
+    fn rotation_keeps_the_centre_of_mass_in_place() {
         let center = DVec3::new(0.1, 0.2, 0.3);
         let mass = MassProperties { mass: 1.0, center, inertia: DMat3::IDENTITY };
         let pose = Pose::at(DVec3::new(1.0, 2.0, 3.0));

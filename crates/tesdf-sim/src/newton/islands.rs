@@ -64,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn fixed_bodies_do_not_connect() {
+    fn fixed_bodies_do_not_connect_islands() {
         let rows = [
             row(Some(4), None),
             row(Some(0), None),

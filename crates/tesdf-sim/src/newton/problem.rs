@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_minimum_has_no_gradient_dense_and_iterative() {
+    fn the_gradient_vanishes_at_the_minimum_dense_and_iterative() {
         let mass = MassProperties {
             mass: 2.0,
             center: DVec3::ZERO,

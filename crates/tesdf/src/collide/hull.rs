@@ -191,7 +191,7 @@ mod tests {
         /// x is the point of a convex set closest to the origin exactly when no point v of the set
         /// has v·x < |x|².
         #[test]
-        fn nothing_is_closer(points in points(), target in wrench(1.5), inside in any::<bool>()) {
+        fn no_point_of_the_hull_is_closer(points in points(), target in wrench(1.5), inside in any::<bool>()) {
             let mean = std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f64>() / points.len() as f64);
             let target = if inside { mean } else { target };
             let x = residual(&points, &target);
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn not_a_number_ends() {
+    fn nan_terminates() {
         let points = [[f64::NAN; 6], [1.0; 6]];
         assert!(residual(&points, &[f64::NAN; 6])[0].is_nan());
         residual(&points, &[0.0; 6]);

@@ -183,7 +183,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_screw_comes_back_after_a_turn_one_pitch_on() {
+    fn a_screw_advances_one_pitch_per_turn() {
         let start = Pose::new(DVec3::new(3.0, -1.0, 2.0), DQuat::from_rotation_x(0.3)).expect("a pose");
         let screw = Motion::Screw {
             point: DVec3::new(1.0, 1.0, 0.0),

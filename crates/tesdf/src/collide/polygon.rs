@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_cover_the_whole() {
+    fn the_parts_of_a_cut_cover_the_polygon() {
         let square = Polygon::new(&[DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y]);
         let area = |p: &Polygon| {
             let points: Vec<DVec3> = p.points().collect();
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_only_touches_the_line_is_not_cut() {
+    fn polygons_that_touch_the_plane_are_not_cut() {
         let segment = Polygon::new(&[DVec3::ZERO, DVec3::X]);
         assert!(matches!(segment.cut(|v| v.point.y), Parts::Above));
         assert!(matches!(segment.cut(|v| -v.point.x), Parts::Below));

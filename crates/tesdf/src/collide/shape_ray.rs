@@ -115,7 +115,7 @@ mod tests {
     use crate::sampling::Random;
 
     #[test]
-    fn rays_end_where_marching_through_the_distance_does() {
+    fn ray_hits_equal_those_of_ray_marching() {
         let mut random = Random::new(7, 0);
         let mut hits = 0;
         for shape in [

@@ -145,7 +145,7 @@ mod tests {
     use crate::geometry::Triangle;
 
     #[test]
-    fn a_box_is_its_triangles() {
+    fn the_distance_to_a_box_equals_that_to_its_triangles() {
         let half = DVec3::new(1.0, 2.0, 3.0);
         let simple = Simple::Box(half);
         let triangles: Vec<Triangle> =

@@ -228,7 +228,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn descent_follows_the_geometry(x in 0.0..=1.0f64, y in 0.0..=1.0f64, z in 0.0..=1.0f64) {
+        fn descent_keeps_the_barycentric_coordinates_of_the_cell(x in 0.0..=1.0f64, y in 0.0..=1.0f64, z in 0.0..=1.0f64) {
             let p = DVec3::new(x, y, z);
             let (root, mut lambda) = Barycentric::in_unit_cube(p).unwrap();
             let mut cell = Cell::root(DVec3::ZERO, 1.0, root);
@@ -247,7 +247,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_grid_is_a_shortcut(x in 0.0..=1.0f64, y in 0.0..=1.0f64, z in 0.0..=1.0f64, level in 0u32..6) {
+        fn the_grid_equals_the_descent_from_the_root(x in 0.0..=1.0f64, y in 0.0..=1.0f64, z in 0.0..=1.0f64, level in 0u32..6) {
             let p = DVec3::new(x, y, z);
             let (_, mut stepped) = Barycentric::in_unit_cube(p).unwrap();
             (0..3 * level).for_each(|depth| { stepped.descend(depth); });
@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn ties_and_corners_have_a_root() {
+    fn points_on_shared_faces_and_corners_have_a_root() {
         for i in 0..27 {
             let p = DVec3::new((i % 3) as f64, (i / 3 % 3) as f64, (i / 9) as f64) / 2.0;
             let (root, _) = Barycentric::in_unit_cube(p).unwrap();

@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn holds_its_bounds() {
+    fn the_cube_contains_its_bounds() {
         for size in [0.3, 0.57735, 1.0] {
             let bounds = Aabb { min: DVec3::splat(-0.1), max: DVec3::new(0.1, size, 0.01) };
             let cube = DomainCube::around(bounds);

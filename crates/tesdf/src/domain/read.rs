@@ -243,7 +243,7 @@ mod tests {
 
     /// Checks that any count may have any value: no memory is allocated by it.
     #[test]
-    fn counts_allocate_nothing() {
+    fn counts_in_files_allocate_no_memory() {
         for (name, bytes, parse) in samples() {
             for huge in ["4294967295", "18446744073709551615", "-1"] {
                 // Changes every whole number of a text, one at a time.

@@ -152,7 +152,7 @@ mod tests {
 
     /// Two tetrahedra, one of them in negative order, have six outer sides.
     #[test]
-    fn the_surface_is_outward() {
+    fn faces_of_the_surface_point_outward() {
         let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::splat(9.0), DVec3::Y, DVec3::Z, DVec3::ONE];
         let mesh = TetMesh::new(vertices, vec![[0, 1, 3, 4], [1, 3, 5, 4]]).unwrap();
         let surface = mesh.surface().unwrap();
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_what_is_at_fault() {
+    fn errors_name_the_tetrahedron_or_vertex() {
         let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         assert!(TetMesh::new(vertices.clone(), vec![[0, 1, 2, 3]]).is_ok());
         assert_eq!(TetMesh::new(vertices.clone(), vec![]), Err(TetMeshError::Empty));

@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_of_many_long_faces_are_left_as_they_are_before_a_mesh_is_refused() {
+    fn cells_of_many_long_faces_stay_large_before_a_mesh_is_refused() {
         let mesh = cone(400);
         let size = |trees: &[Tree]| {
             fn leaves(tree: &Tree) -> usize {

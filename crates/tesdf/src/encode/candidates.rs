@@ -393,7 +393,7 @@ mod tests {
     proptest! {
         /// Checks degenerate faces: the bits are those of the scalar code, which is exact.
         #[test]
-        fn looks_at_degenerate_faces_like_the_scalar_code(
+        fn degenerate_faces_equal_the_scalar_code(
             corners in prop::collection::vec(degenerate::face(), 1..20),
             p in degenerate::face().prop_map(|corners| corners[0]),
         ) {
@@ -403,7 +403,7 @@ mod tests {
 
         /// Checks that every instruction set gives the bits of the scalar code.
         #[test]
-        fn looks_like_the_scalar_code(
+        fn every_instruction_set_equals_the_scalar_code(
             corners in prop::collection::vec([coordinate(), coordinate(), coordinate()], 9..40),
             p in [coordinate(), coordinate(), coordinate()],
         ) {

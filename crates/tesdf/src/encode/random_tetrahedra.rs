@@ -93,7 +93,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
 
     #[test]
-    fn random_tetrahedra(kind in prop::sample::select(SOUPS.to_vec()), seed in any::<u64>(), levels in 0u32..9) {
+    fn lists_of_random_tetrahedra_keep_the_least_distance(kind in prop::sample::select(SOUPS.to_vec()), seed in any::<u64>(), levels in 0u32..9) {
         let mut random = Random::new(seed, 0);
         let mut surface = Surface::new(&soup(kind, &mut random), 1.0, Touching::Kept);
         let cell = tetrahedron(&mut random);

@@ -86,7 +86,7 @@ mod tests {
     use crate::mesh::{MeshFormat, read_bytes};
 
     #[test]
-    fn a_walk_gives_what_all_faces_give() {
+    fn the_tree_walk_equals_brute_force() {
         let obj = include_bytes!("../../../../data/procedural/l_bracket.obj");
         let mesh = read_bytes(obj, MeshFormat::Obj).unwrap().mesh;
         let (reference, all) = (Reference::new(&mesh).unwrap(), BruteForce::new(&mesh, mesh.diagonal()));

@@ -173,7 +173,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_front_knows_the_least_distance_for_every_bound(
+        fn the_front_has_the_least_distance_for_every_error_bound(
             points in proptest::collection::vec((0u8..20, 0u8..20), 0..60),
             split in 0usize..60,
         ) {

@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn no_items() {
+    fn a_tree_may_be_empty() {
         let tree = AabbTree::build(&[], 4);
         assert_eq!(tree.nearest(DVec3::ZERO, |_| 0.0), None);
     }

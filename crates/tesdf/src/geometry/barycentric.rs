@@ -24,7 +24,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn names_the_point(base in [point(), point(), point()], up in -1.0..1.0f64, height in -5i32..0, p in point()) {
+        fn barycentric_coordinates_reproduce_the_point(base in [point(), point(), point()], up in -1.0..1.0f64, height in -5i32..0, p in point()) {
             let [a, b, c] = base;
             let normal = (b - a).cross(c - a);
             prop_assume!(normal.length() > 0.1 && up.abs() > 0.1);

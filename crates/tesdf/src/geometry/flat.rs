@@ -24,7 +24,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_has_no_height_is_flat() {
+    fn faces_without_height_are_flat() {
         assert!(!is_flat(1.0, 1.0, 0.5));
         assert!(is_flat(0.5, 1.0, 0.5), "as high as the least height");
         assert!(is_flat(0.0, 0.0, 1e-6), "a point");

@@ -126,7 +126,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(600))]
         #[test]
-        fn agrees_with_the_distance(
+        fn triangles_meet_where_their_distance_is_zero(
             t in prop::array::uniform3(prop::array::uniform3(0i32..4)),
             u in prop::array::uniform3(prop::array::uniform3(0i32..4)),
             flat in 0u8..3,

@@ -201,7 +201,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_sample_is_nearer(t in [point(), point(), point()], o in point(), u in point(), v in point()) {
+        fn no_sampled_pair_is_nearer(t in [point(), point(), point()], o in point(), u in point(), v in point()) {
             let triangle = Triangle::new(t);
             // A parallelogram.
             let points = [o, o + 0.5 * u, o + 0.5 * (u + v), o + 0.5 * v];

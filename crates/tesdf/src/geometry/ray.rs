@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn powers_of_two() {
+    fn power_of_two_below_is_the_largest() {
         for (x, expected) in [(1.0, 1.0), (1.99, 1.0), (0.75, 0.5), (1e300, 2f64.powi(996)), (5e-324, 5e-324)]
         {
             assert_eq!(power_of_two_below(x), expected, "{x}");
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_along_an_axis_lose_nothing_across_it() {
+    fn rays_along_an_axis_keep_the_other_coordinates() {
         for distance in [5.0, 1e3, 1e20, 1e200, 1e308] {
             for unit in [1.0, 3.0, 1e-200, 1e200] {
                 let origin = DVec3::new(0.3, distance, -0.7);
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn rays_that_begin_near_stay_as_they_are() {
+    fn rays_with_a_near_origin_are_unchanged() {
         let (origin, direction) = (DVec3::new(0.1, 3.0, -0.3), DVec3::new(1e-3, 7e-3, -2e-3));
         let ray = NearRay::new(origin, direction, DVec3::ZERO, 1.0).unwrap();
         assert_eq!((ray.origin, ray.skipped, ray.direction * ray.unit), (origin, 0.0, direction));

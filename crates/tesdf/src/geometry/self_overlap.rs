@@ -59,7 +59,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn equals_brute_force(
+        fn overlaps_equal_brute_force(
             corners in prop::collection::vec(prop::array::uniform6(0i8..20), 0..80), leaf in 1usize..5
         ) {
             let boxes: Vec<Aabb> = corners

@@ -53,7 +53,7 @@ mod tests {
     proptest! {
         /// Finds every triangle of which a sample lies in the tetrahedron.
         #[test]
-        fn never_no_in_error(t in [point(), point(), point(), point()], tri in [point(), point(), point()]) {
+        fn every_intersection_is_found(t in [point(), point(), point(), point()], tri in [point(), point(), point()]) {
             let volume = |q: DVec3, k: usize| { let mut s = t; s[k] = q; tetrahedron_volume(&s) };
             let whole = tetrahedron_volume(&t);
             prop_assume!(whole > 1e-3);

@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_on_a_side_that_rounding_sees_differently_from_its_ends_is_in_a_region() {
+    fn rounding_leaves_no_point_without_a_region() {
         let a = DVec3::new(0.5, -2.4999999999999997e-34, 0.0);
         let (b, c) = (DVec3::new(0.75, 1e-19, 5e-36), DVec3::new(-0.5, -0.25, -2.5e-19));
         assert_ne!(Triangle::new([a, b, c]).regions(DVec3::new(0.0, -0.15, -0.9)).0, 0);
@@ -301,7 +301,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
         #[test]
-        fn tips_are_exact((corners, p) in degenerate::beyond_a_tip()) {
+        fn points_beyond_a_tip_are_exact((corners, p) in degenerate::beyond_a_tip()) {
             let found = Triangle::new(corners).closest(p);
             let squared = exact::squared_distance(p, corners);
             prop_assert!(exact::is_root(found.distance, &squared, 2e-15), "{found:?} {:?}", corners);

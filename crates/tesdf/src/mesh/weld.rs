@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn equal_bits_merge_and_one_ulp_does_not() {
+    fn equal_positions_merge_and_neighbouring_floats_do_not() {
         let p = DVec3::new(0.0, 0.1, 1e-30);
         let near = DVec3::new(0.0, 0.1f64.next_up(), 1e-30);
         let minus = DVec3::new(-0.0, 0.1, 1e-30);

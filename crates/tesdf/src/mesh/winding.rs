@@ -268,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn cubes_on_a_lattice() {
+    fn winding_numbers_of_touching_cubes() {
         // Cells that touch in faces, edges and corners. Their inner faces are kept twice.
         for solid in
             [|_, _, _| true, |x: i32, y: i32, z: i32| (x + y + z) % 2 == 0, |x, y, z| x == y && y == z]
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn overlaps_cavities_and_inverted_boxes() {
+    fn winding_numbers_of_overlaps_cavities_and_inverted_boxes() {
         let mut mesh = (Vec::new(), Vec::new());
         add_box(&mut mesh, DVec3::ZERO, DVec3::splat(4.0));
         add_box(&mut mesh, DVec3::splat(1.0), DVec3::splat(5.0));
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn far_from_the_origin_and_flat() {
+    fn winding_numbers_far_from_the_origin_and_of_a_flat_mesh() {
         let mut mesh = (Vec::new(), Vec::new());
         let at = DVec3::new(1e16, -3e15, 7.0);
         add_box(&mut mesh, at, at + 8.0);

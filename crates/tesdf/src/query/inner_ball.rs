@@ -108,7 +108,7 @@ mod tests {
     proptest! {
         /// Well-shaped triangles, needles, caps and segments.
         #[test]
-        fn no_point_is_farther_from_the_corners_and_one_is_as_far(
+        fn corner_reach_bounds_the_distance_to_the_nearest_corner(
             (a, b, c) in (point(), point(), point()), along in 0.0f64..1.0, thin in proptest::sample::select(vec![1.0, 0.3, 1e-2, 1e-9, 0.0]),
         ) {
             let corners = [a, b, a.lerp(b, along) + thin * (c - a)];
@@ -126,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn points_and_segments_have_a_reach() {
+    fn corner_reach_of_points_and_segments() {
         assert_eq!(corner_reach([DVec3::ONE; 3]), 0.0);
         assert_eq!(corner_reach([DVec3::ZERO, DVec3::X, DVec3::X]), 0.5);
         assert_eq!(corner_reach([DVec3::ZERO, 1e-100 * DVec3::X, DVec3::ZERO]), 0.5e-100);

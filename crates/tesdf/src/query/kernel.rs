@@ -258,7 +258,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
         #[test]
-        fn degenerate_faces_are_edges((corners, p) in degenerate::face_and_point()) {
+        fn degenerate_faces_are_exact((corners, p) in degenerate::face_and_point()) {
             assert_exact(corners.map(|c| 0.25 * c), 0.25 * p)?;
         }
     }
@@ -266,7 +266,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
         #[test]
-        fn tips_are_no_planes((corners, p) in degenerate::beyond_a_tip()) {
+        fn points_beyond_a_tip_are_exact((corners, p) in degenerate::beyond_a_tip()) {
             assert_exact(corners.map(|c| 0.5 * c), 0.5 * p)?;
         }
     }

@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn needles_keep_their_plane() {
+    fn heights_over_needles_are_accurate() {
         // Height 1e-7 of the length, in no special position; the points are over the far end.
         let (u, v) = (DVec3::new(0.3, 0.5, 0.7).normalize(), DVec3::new(0.1, -0.9, 0.2));
         let n = accurate_cross(u, v).normalize();

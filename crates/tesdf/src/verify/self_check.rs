@@ -80,7 +80,7 @@ mod tests {
     use crate::mesh::{MeshFormat, SolidMesh, read_bytes};
 
     #[test]
-    fn cells_with_a_wrong_side_are_noticed() {
+    fn cells_with_a_wrong_side_are_found() {
         // An octahedron.
         let obj = "v 1 0 0\nv 0 1 0\nv -1 0 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\nf 2 1 6\nf 3 2 6\n\
                    f 4 3 6\nf 1 4 6\n";

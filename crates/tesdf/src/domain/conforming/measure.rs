@@ -125,7 +125,7 @@ mod tests {
     /// The labels guarantee the volume, so only the sum itself can be tested. It counts each
     /// tetrahedron by its winding number.
     #[test]
-    fn volumes_are_weighted() {
+    fn volumes_are_weighted_by_winding_numbers() {
         let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         let faces = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
         let solid = SolidMesh::new(TriangleMesh::new(vertices.clone(), faces).unwrap()).unwrap();
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn sums_keep_what_rounding_drops() {
+    fn sums_compensate_rounding_errors() {
         let mut sum = Sum::default();
         [1e16, 1.0, -1e16].into_iter().for_each(|x| sum.add(x));
         assert_eq!((sum.value(), sum.absolute), (1.0, 2e16 + 1.0));

@@ -235,7 +235,7 @@ mod tests {
         /// Fans that fold and cross themselves and each other, with faces without area, surrounded
         /// by loose faces.
         #[test]
-        fn all_that_meet_are_found(seed in prop::collection::vec(-1.0..1.0_f64, 90), flat in any::<bool>(), shared in any::<bool>()) {
+        fn all_intersecting_faces_are_found(seed in prop::collection::vec(-1.0..1.0_f64, 90), flat in any::<bool>(), shared in any::<bool>()) {
             let mut numbers = seed.iter().copied().cycle().enumerate().map(|(k, x)| (x * (k as f64 + 1.0) * 17.3).fract());
             let mut point = || {
                 let mut next = || numbers.next().unwrap_or(0.0);

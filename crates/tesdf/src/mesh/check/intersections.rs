@@ -133,7 +133,7 @@ mod tests {
         /// Two faces meet beyond what they share exactly when they still meet after thin strips
         /// along the shared part are removed.
         #[test]
-        fn equals_all_pairs_trimmed(faces in prop::collection::vec(prop::array::uniform3(0u32..27), 2..16)) {
+        fn intersections_equal_brute_force(faces in prop::collection::vec(prop::array::uniform3(0u32..27), 2..16)) {
             let vertices = (0..27).map(|v| DVec3::new((v % 3).into(), (v / 3 % 3).into(), (v / 9).into())).collect();
             let mesh = TriangleMesh::new(vertices, faces).unwrap();
             let n = mesh.faces().len() as u32;

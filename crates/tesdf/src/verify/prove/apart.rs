@@ -97,7 +97,7 @@ mod tests {
     const CELL: [DVec3; 4] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
 
     #[test]
-    fn gaps_are_seen_and_common_points_found() {
+    fn gaps_and_common_points_are_found() {
         let above = [0.1, 0.2, 0.3].map(|x| DVec3::new(x, 1.0 - x, 0.5 + x * x));
         let over = above.map(|p| p + DVec3::splat(0.2));
         assert!(are_apart(&CELL, &over, 0.1, 1e-15) && common_point(&CELL, &over).is_none());

@@ -69,7 +69,7 @@ mod tests {
 
     /// A needle in no special position, with exact coordinates. Its normal is known from integers.
     #[test]
-    fn normals_of_needles_keep_their_digits() {
+    fn normals_of_needles_are_accurate() {
         // a, b, c = a + (b - a) / 2 + e with e = (0, 0, 2^-40): all exact.
         let a = DVec3::new(0.3125, -0.71875, 0.15625);
         let b = DVec3::new(0.8125, 0.28125, -0.09375);
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn differences_lose_nothing() {
+    fn differences_include_their_rounding_error() {
         let (rounded, lost) = difference(1.0, 2f64.powi(-60));
         assert_eq!((rounded, lost), (1.0, -2f64.powi(-60)));
     }

@@ -225,7 +225,7 @@ mod tests {
         }
 
         #[test]
-        fn bounds_hold_beyond_tips((corners, p) in beyond_a_tip()) {
+        fn bounds_hold_for_points_beyond_a_tip((corners, p) in beyond_a_tip()) {
             bounds_hold(corners, p, 0.0)?;
         }
     }

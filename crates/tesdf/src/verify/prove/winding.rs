@@ -124,7 +124,7 @@ mod tests {
     /// Two overlapping boxes on a lattice. Rays run along edges, through corners and in the planes
     /// of faces.
     #[test]
-    fn agrees_with_the_other_way_on_a_lattice() {
+    fn winding_numbers_by_rays_equal_those_of_the_tree() {
         let mut vertices = Vec::new();
         let mut faces = Vec::new();
         for (low, size) in [(0.0, 2.0), (1.0, 2.0)] {
