@@ -64,11 +64,15 @@ const COLUMNS: [&str; 11] = [
 pub fn run(args: &Args) -> Result<(), Failure> {
     heading::print()?;
     output::line(&format!(
-        "Counted, not timed. Q = {}. *Candidates*: the faces that Lemma 1 keeps. *Sample × candidate*: the number of \
-         distances in Algorithm 1. Its lines 12 and 14 both compute them, so the seconds are for twice this number. \
-         *Left to a block*: the candidates that remain when Lemma 1 is applied again to a block of 8 × 8 × 4 samples, on \
-         average over {} blocks of every {}th cell. *Distances*: the number that the device then computes, including those \
-         for Lemma 1. Seconds: {OPERATIONS} operations per distance at {:.1e} per second.\n",
+        "Counted, not timed. Q = {}.\n\n\
+         - *Candidates*: the faces that Lemma 1 keeps.\n\
+         - *Sample × candidate*: the number of distances in Algorithm 1. Its lines 12 and 14 both compute them, so the \
+         seconds are for twice this number.\n\
+         - *Left to a block*: the candidates that remain when Lemma 1 is applied again to a block of 8 × 8 × 4 samples, \
+         on average over {} blocks of every {}th cell.\n\
+         - *Distances*: the number that the device then computes, including those for Lemma 1 and those of idle \
+         threads.\n\
+         - *Seconds*: {OPERATIONS} operations per distance at {:.1e} per second.\n",
         args.resolution, args.blocks, args.every, args.speed
     ))?;
     output::head(&COLUMNS, 2)?;

@@ -55,11 +55,13 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         ids.push(scene.add(Instance::new(shape, Pose::IDENTITY))?);
     }
     output::line(&format!(
-        "{} on {}, preset `{}`: {} poses, offset by up to {} in each coordinate and rotated by up to 0.01 rad, contact distance {}, seed \
-         {}. A polygon is the part of a face in a cell. For every polygon that the exact mode reports, the table has the excess \
-         of the smallest signed distance after K iterations over the exact one, as a fraction of the diagonal of the body with \
-         the field. *Inside*: the exact distance is negative. *Beyond*: polygons that are not reported, because their distance \
-         after K iterations is above the contact distance; the other columns leave them out.\n",
+        "{} on {}, preset `{}`: {} poses, offset by up to {} in each coordinate and rotated by up to 0.01 rad, contact \
+         distance {}, seed {}. A polygon is the part of a face in a cell. The table covers every polygon that the exact \
+         mode reports. It shows by how much the least signed distance of K iterations exceeds the exact one, as a \
+         fraction of the diagonal of the body with the field.\n\n\
+         - *Inside*: the exact distance is negative.\n\
+         - *Beyond the contact distance*: polygons whose distance after K iterations is above the contact distance, so \
+         that they are not reported. The other columns leave them out.\n",
         inputs[1].name,
         inputs[0].name,
         args.preset.name(),

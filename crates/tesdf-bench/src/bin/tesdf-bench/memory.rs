@@ -50,12 +50,17 @@ const COLUMNS: [&str; 16] = [
 pub fn run(args: &Args) -> Result<(), Failure> {
     heading::print()?;
     output::line(&format!(
-        "*Lists and tree*: sections `domain.*` and `lists.*` and the table of entries that opening derives from them. *Paper \
-         account*: 4 bytes for each list entry and 16 for each cell with a list. *Read*: list entries, or faces and \
-         nodes of the tree where the fallback answers, per query; mean over {n} points each, *near* the surface (±{near} % \
-         of the diagonal) and uniform *in the domain*. *Fallback near*: points within {near} % of the diagonal from the \
-         surface, of both kinds, that the face tree answers. *Nearest fallback*: least distance from the surface of the \
-         corners, edge middles and centroids of the cells without a list. MB is 10^6 bytes. Seed {seed}.\n",
+        "- *Lists and tree*: sections `domain.*` and `lists.*`, and the table of entries that opening derives from \
+         them.\n\
+         - *Paper account*: 4 bytes for each list entry and 16 for each cell with a list.\n\
+         - *Fallback*: the face tree, which answers points in cells without a list.\n\
+         - *Read*: list entries, or faces and nodes of the tree where the fallback answers, per query; mean over {n} \
+         points each, *near* the surface (±{near} % of the diagonal) and uniform *in the domain*.\n\
+         - *Fallback near*: points within {near} % of the diagonal from the surface, of both kinds, that the face \
+         tree answers.\n\
+         - *Nearest fallback*: least distance from the surface of the corners, edge middles and centroids of the \
+         cells without a list.\n\n\
+         MB is 10^6 bytes. Seed {seed}.\n",
         n = args.points,
         near = points::NEAR * 100.0,
         seed = args.seed

@@ -28,13 +28,16 @@ const COLUMNS: [&str; 9] = [
 pub fn run(args: &MeshesAndPoints) -> Result<(), Failure> {
     heading::print()?;
     output::line(&format!(
-        "One thread, preset `{}`, {} points of each kind, seed {}; the best of {PASSES} passes after a warm-up pass. All contenders \
-         return the signed distance, closest point and gradient. tesdf also returns the face, and its time includes locating \
-         the cell of the point. *Near*: uniform on the surface, then moved by up to ±{} % of the diagonal along the normal. \
-         *Box*: uniform in the mesh's bounds. *Face tree*: the tree over all faces of the same asset in f32, without the \
-         lists, with eight faces per leaf, SIMD over faces, and signs from the closest feature. *Read*: list entries, or faces \
-         and nodes of the tree. Errors are relative to an f64 tree over the mesh as read, and signs to winding numbers, where \
-         the distance is at least 1e-6 (f64: 1e-12) of the diagonal.\n",
+        "One thread, preset `{}`, {} points of each kind, seed {}; the best of {PASSES} passes after a warm-up pass. \
+         All contenders return the signed distance, closest point and gradient. tesdf also returns the face, and its \
+         time includes locating the cell of the point.\n\n\
+         - *Near*: points uniform on the surface, then moved by up to ±{} % of the diagonal along the normal. \
+         *Box*: uniform in the mesh's bounds.\n\
+         - *Face tree*: the tree over all faces of the same asset in f32, without the lists; eight faces per leaf, \
+         SIMD over faces, signs from the closest feature.\n\
+         - *Read*: list entries, or faces and nodes of the tree.\n\
+         - *Errors* are relative to an f64 tree over the mesh as read. *Sign mistakes* are relative to winding \
+         numbers, where the distance is at least 1e-6 (f64: 1e-12) of the diagonal.\n",
         args.preset.name(),
         args.points,
         args.seed,

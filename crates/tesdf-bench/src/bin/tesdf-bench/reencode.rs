@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     heading::print()?;
     output::line(&format!(
         "{}: {} tetrahedra as Gmsh made them, {} cells with a list. One end is bent about a transverse axis, by {} degrees per \
-         length, the rest stays. All threads.\n",
+         length; the rest stays. All threads.\n",
         input.name,
         domain.tetrahedra().len(),
         rest.about().statistics.listed_cells,

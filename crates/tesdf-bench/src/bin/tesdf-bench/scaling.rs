@@ -33,7 +33,7 @@ const COLUMNS: [&str; 7] = [
     "ms",
     "µs per contact",
     "time per contact, against the smallest scene",
-    "instances, products and contacts, MB",
+    "instances, pipeline buffers and contacts, MB",
 ];
 
 /// Numbers of instances in a row.
@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     heading::print()?;
     output::line(
         "*Row*: instances of one mesh in a row, each overlapping the next by a fiftieth of its length. *Worlds*: a nut on \
-         its bolt in each world. Nodes and exact minima; the quickest of the repeats.\n",
+         its bolt in each world. Nodes and exact minima are measured; the time is that of the fastest repetition.\n",
     )?;
     output::head(&COLUMNS, 1)?;
     let modes = [("node", Mode::Node), ("exact", Mode::Exact)];

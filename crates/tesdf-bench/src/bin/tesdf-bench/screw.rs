@@ -69,9 +69,11 @@ const COLUMNS: [&str; 15] = [
 pub fn run(args: &Args) -> Result<(), Failure> {
     heading::print()?;
     output::line(
-        "*Penetration*: by the exact clearance of the bodies (to 10 nm) at times spread over the run, not by \
-         the detector under test. *From pitch*: largest difference of travel and \
-         turns × pitch. *Ideal*: the frictionless screw without play.\n",
+        "- *Penetration*: by the exact clearance of the bodies (to 10 nm) at times spread over the run, not by the detector \
+         under test.\n\
+         - *From pitch*: the largest difference between travel and turns × pitch.\n\
+         - *Ideal*: the frictionless screw without play, with a = g / (1 + (k_z / (p / 2π))²). k_z is the nut's radius \
+         of gyration, p the pitch.\n",
     )?;
     output::head(&COLUMNS, 1)?;
     let mut loaded = LoadedScene::read(&args.scene)?;
