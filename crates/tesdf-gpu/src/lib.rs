@@ -1,4 +1,4 @@
-//! Signed distances, contacts and encoding on the GPU.
+//! Signed distances, contacts and encoding by samples on the GPU.
 //!
 //! ```text
 //! Shape ──GpuShapes::upload──▶ buffers ──signed_distances──▶ answers of many points

@@ -16,8 +16,8 @@
 //! - [`criterion`]: what makes a run a success.
 //! - [`record`]: run files.
 //!
-//! Units are SI: metres, kilograms, seconds, radians. Everything is deterministic: the same input
-//! gives the same bits on any number of threads.
+//! Units are SI: metres, kilograms, seconds, radians. Everything is deterministic: on one kind of
+//! processor, the same input gives the same bits on any number of threads.
 #![warn(missing_docs)]
 
 pub mod criterion;

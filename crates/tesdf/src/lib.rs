@@ -1,10 +1,16 @@
-//! Exact, memory-lean signed distances of arbitrary triangle meshes.
+//! Exact, memory-lean signed distances to closed triangle meshes, and the contacts between them.
 //!
 //! ```text
 //! mesh file ──mesh──▶ SolidMesh ──domain, encode──▶ TeSdf ──asset──▶ model.tesdf
 //!                                                     └──query──▶ signed distance, gradient,
 //!                                                                 closest point, face
 //! ```
+//!
+//! A [`SolidMesh`] is a triangle mesh without gaps; its triangles are called *faces*. The *domain*
+//! is a set of tetrahedra, the *cells*, in and around the solid. A [`TeSdf`], the *asset*, holds a
+//! *list* for each cell: the faces that can be nearest to a point of the cell. The distance at a
+//! point is the least distance to the faces on its cell's list. The [`Certificate`] says what the
+//! encoder has proved about the lists.
 //!
 //! Each module uses only modules to its left: `base`, `input`, `save` ← `geometry` ← `mesh` ←
 //! `domain` ← `asset` ← `query` ← `verify` ← `encode` ← `deform`. Besides, `collide` comes after
@@ -19,7 +25,8 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("part.obj");
-//! # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+//! # let faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+//! # std::fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n{faces}"))?;
 //! let asset = TeSdf::encode_file(&path)?; // or Encoder::new()…encode(&solid), with options
 //! // Or query_f32, query_batch, signed_distance.
 //! let answer = asset.query(DVec3::new(0.1, 0.3, 0.3));
@@ -37,6 +44,10 @@
 //!
 //! # Contacts
 //!
+//! A [`Scene`] holds shapes, and *instances* of them: bodies that share a shape, each with its own
+//! pose. [`CollideOptions`] choose the [`Mode`]: the exact minimum over each face (the default), an
+//! upper bound of it by the Frank–Wolfe method, or vertices alone.
+//!
 //! ```
 //! use tesdf::glam::DVec3;
 //! use tesdf::{CollideOptions, Instance, Pose, Scene, TeSdf, detect};
@@ -44,7 +55,8 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("part.obj");
-//! # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+//! # let faces = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+//! # std::fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n{faces}"))?;
 //! let mut scene = Scene::new();
 //! let part = scene.add_shape(TeSdf::encode_file(&path)?)?;
 //! scene.add(Instance::new(part, Pose::IDENTITY))?;
