@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use std::process::Command;
 
 #[test]
-fn the_outlines_are_those_of_the_font() {
+fn the_kept_outlines_equal_those_of_the_font() {
     let test = std::env::current_exe().expect("a test is a program");
     let folder = test.parent().and_then(|deps| deps.parent()).expect("it lies in target/PROFILE/deps");
     let program = folder.join("examples").join("outlines").with_extension(std::env::consts::EXE_EXTENSION);

@@ -192,7 +192,7 @@ fn bolt_in_a_nut() {
 }
 
 #[test]
-fn nodes_are_those_of_all_vertices() {
+fn node_contacts_equal_brute_force_over_vertices() {
     let mut random = Random(4);
     for relation in [Relation::Deep, Relation::Touching, Relation::Inside] {
         let bodies = relation.place(["l_bracket", "torus_quads"], &mut random);

@@ -205,7 +205,7 @@ fn as_exact(placed: &[Placed], same_place: bool) -> (usize, usize) {
 }
 
 #[test]
-fn hidden_overlaps_are_those_of_the_exact_clearance() {
+fn hidden_overlaps_agree_with_the_exact_clearance() {
     let names = ["cube", "tetra", "l_bracket", "beam", "torus_quads", "iso_m16_bolt_6k", "spoon"];
     let mut random = Random(11);
     let (mut told, mut deep) = (0, 0);

@@ -202,7 +202,7 @@ fn assert_same(
 }
 
 #[test]
-fn contacts_of_a_conforming_domain_are_those_of_the_bisection_domain() {
+fn contacts_in_conforming_and_bisection_domains_agree() {
     for (solid, domain) in [beam(), bare_beam()] {
         let ball = Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid();
         let bisected =

@@ -117,7 +117,7 @@ fn volume6(loaded: &LoadedMesh) -> f64 {
 }
 
 #[test]
-fn reports_name_what_was_changed() {
+fn reports_name_each_change() {
     let soup = read(bad("soup_unwelded.obj")).unwrap();
     assert_eq!((soup.report.welded_vertices, soup.report.unused_vertices), (798, 0));
     let jitter = read(bad("soup_jitter.obj")).unwrap();

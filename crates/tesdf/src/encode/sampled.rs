@@ -160,7 +160,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn candidates_are_those_of_the_loop_over_all_faces(
+        fn candidates_equal_those_of_a_loop_over_all_faces(
             vertices in proptest::collection::vec(point(), 12..60),
             corners in [point(), point(), point(), point()],
         ) {
