@@ -17,7 +17,7 @@ fn phase(stages: &[(&str, Duration)], stage: usize) -> &'static str {
         "instance bounds" | "instance pairs" | "meshlets" => "BP",
         "polygons" | "outside of domains" | "nodes" => "MP",
         "face narrow phase" | "node narrow phase" | "exact narrow phase" => "NP",
-        "no depths" | "hidden overlaps" => "hidden overlaps",
+        "clear depths" | "hidden overlaps" => "hidden overlaps",
         _ => "reduction",
     }
 }

@@ -27,7 +27,7 @@ impl Pass<'_> {
         let by_faces = u32::from(self.options.mode == Mode::Node);
         launch!(
             self.stages,
-            "no depths",
+            "clear depths",
             spread(count.div_ceil(members::GROUP)),
             members::GROUP,
             members::clear(depths.words(), count)

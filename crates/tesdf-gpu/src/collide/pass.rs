@@ -11,8 +11,7 @@ use crate::GpuError;
 use crate::device::Buffer;
 use crate::kernels::counters::{self, COUNTERS, CountersLaunch};
 
-/// Threads per group in kernels where each thread works alone.
-pub const GROUP: u32 = 64;
+pub use crate::kernels::GROUP;
 
 /// The data that all launches of a pass share.
 pub struct Pass<'a> {

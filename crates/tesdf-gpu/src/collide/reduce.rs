@@ -23,7 +23,7 @@ impl Pass<'_> {
         let per_pair_of_instances = spread(pairs.div_ceil(members::GROUP));
         launch!(
             self.stages,
-            "no members",
+            "clear tallies",
             per_pair_of_instances.clone(),
             members::GROUP,
             members::clear(own.tallies.words(), pairs)

@@ -2,10 +2,13 @@
 use cubecl::prelude::*;
 use cubecl::server::Handle;
 
-/// The number of groups of a launch. A dimension of a launch is limited, so more than 32,768 groups
-/// are spread over two dimensions, and there may then be a few groups too many.
+use crate::kernels::counters::MAX_GROUPS;
+
+/// The number of groups of a launch. A dimension of a launch is limited, so more than
+/// [`MAX_GROUPS`] groups are spread over two dimensions, and there may then be a few groups too
+/// many.
 pub(crate) fn spread(groups: u32) -> CubeCount {
-    let wide = groups.clamp(1, 32768);
+    let wide = groups.clamp(1, MAX_GROUPS);
     CubeCount::Static(wide, groups.div_ceil(wide).max(1), 1)
 }
 

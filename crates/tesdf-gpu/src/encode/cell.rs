@@ -2,15 +2,15 @@ use bytemuck::{Pod, Zeroable};
 use tesdf::encode::{SampledCell, Sampling};
 use tesdf::glam::DVec3;
 
-use crate::kernels::encode::sample::{BLOCK, CELL_ROWS, block_limit};
+use crate::kernels::encode::sample::{BLOCK, CELL_ROWS, INDEX, INDEX_BITS, block_limit, middle};
 use crate::kernels::math::vector::V3;
 
 /// The sample grid of a cell, divided into blocks.
 pub struct Grid {
     pub resolution: u32,
     shrink: f64,
-    /// Position of each block in the grid, counted in blocks, with ten bits for each of the three
-    /// indices.
+    /// Position of each block in the grid, counted in blocks, with [`INDEX_BITS`] bits for each
+    /// index.
     pub blocks: Vec<u32>,
 }
 
@@ -22,7 +22,7 @@ impl Grid {
         for k in 0..=q / deep {
             for j in 0..=(q - k * deep) / high {
                 let row = 0..=(q - k * deep - j * high) / wide;
-                blocks.extend(row.map(|i| i | j << 10 | k << 20));
+                blocks.extend(row.map(|i| i | j << INDEX_BITS | k << (2 * INDEX_BITS)));
             }
         }
         Self { resolution: q, shrink: sampling.shrink, blocks }
@@ -48,9 +48,8 @@ impl CellRows {
 
     /// Center of a block relative to the centroid, computed as the kernel computes it.
     pub fn middle(&self, block: u32, resolution: u32) -> V3 {
-        let first = [block & 1023, (block >> 10) & 1023, block >> 20];
-        let [i, j, k] =
-            std::array::from_fn(|k| BLOCK[k] as f32 * first[k] as f32 + 0.5 * (BLOCK[k] - 1) as f32);
+        let first = [block & INDEX, (block >> INDEX_BITS) & INDEX, block >> (2 * INDEX_BITS)];
+        let [i, j, k] = std::array::from_fn(|k| BLOCK[k] as f32 * first[k] as f32 + middle(k));
         let weights = [i, j, k, resolution as f32 - i - j - k];
         let along = |axis: usize| -> f32 {
             self.0.iter().zip(weights).map(|(row, weight)| weight * row[axis]).sum::<f32>()

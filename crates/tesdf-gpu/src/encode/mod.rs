@@ -14,6 +14,7 @@ use face::CandidateFace;
 
 use crate::GpuError;
 use crate::device::Device;
+use crate::kernels::counters;
 use crate::kernels::encode::sample::{self as kernel, FACE_ROWS, GROUP, SamplesLaunch, sample};
 
 /// Rounding error that is allowed for the difference of two distances, relative to the sum of the
@@ -178,8 +179,8 @@ impl DeviceSampler {
 
 /// The result for a candidate that no sample needs. As an `f32` these bits are NaN.
 const NOT_FOUND: u32 = u32::MAX;
-/// Groups of a launch in each dimension. Every device allows this number.
-const MAX_GROUPS: usize = 32_768;
+/// Groups of a launch in each dimension.
+const MAX_GROUPS: usize = counters::MAX_GROUPS as usize;
 /// Number of faces that a block of samples is assumed to need. It serves to estimate the work of a
 /// launch.
 const SURVIVORS: usize = 32;
@@ -242,7 +243,7 @@ mod tests {
     use tesdf::mesh::TriangleMesh;
 
     #[test]
-    fn what_no_buffer_holds_is_left_to_the_processor() {
+    fn cells_that_fit_no_buffer_are_sampled_on_the_processor() {
         let vertices = vec![DVec3::ZERO, 0.5 * DVec3::X, 0.5 * DVec3::Y, 0.5 * DVec3::Z];
         let mesh = TriangleMesh::new(vertices.clone(), vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
             .expect("valid");

@@ -24,7 +24,7 @@ use super::narrow::exact::AskedExactLaunch;
 use super::narrow::exchange::{LANES, Variant};
 use super::narrow::faces::AskedLaunch;
 use super::reduce::members::{MembersLaunch, TouchingLaunch};
-use super::{broad, deform, encode, field, middle, narrow, reduce};
+use super::{GROUP, broad, deform, encode, field, middle, narrow, reduce};
 use crate::cuda::Count;
 
 /// A kernel in one variant, ready to be compiled.
@@ -79,9 +79,9 @@ fn add_shapes(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let batch = query::BatchLaunch::new(1, 0, 1);
     let group = encode::sample::GROUP as u32;
     kernels!(all, device, target;
-        Direct field::query::signed_distances, 64, (shapes(), instances(), rows(), answers(), batch);;
-        Direct field::query::world_distances, 64, (shapes(), instances(), words(), world(), 1, 1);;
-        Direct deform::follow::follow, 64, (moving());;
+        Direct field::query::signed_distances, GROUP, (shapes(), instances(), rows(), answers(), batch);;
+        Direct field::query::world_distances, GROUP, (shapes(), instances(), words(), world(), 1, 1);;
+        Direct deform::follow::follow, GROUP, (moving());;
         Direct deform::refit::refit, deform::refit::GROUP, (moving());;
         Direct encode::sample::sample, group, (samples(), words(), 0, 1);;
     );
@@ -93,9 +93,9 @@ fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let some = || PairsLaunch::new(words(), 0);
     let found = || FoundLaunch::new(pairs(), blocks());
     kernels!(all, device, target;
-        Direct broad::pairs::instance_bounds, 64, (shapes(), instances(), counters(), rows());;
-        Direct broad::pairs::instance_pairs, 64, (shapes(), instances(), rows(), some(), counters(), found());;
-        Direct broad::pairs::given_pairs, 64, (shapes(), instances(), some(), counters(), found());;
+        Direct broad::pairs::instance_bounds, GROUP, (shapes(), instances(), counters(), rows());;
+        Direct broad::pairs::instance_pairs, GROUP, (shapes(), instances(), rows(), some(), counters(), found());;
+        Direct broad::pairs::given_pairs, GROUP, (shapes(), instances(), some(), counters(), found());;
         Indirect broad::meshlets::meshlets, LANES, (shapes(), pairs(), blocks(), counters(), blocks(), 1);;
     );
     for counter in
@@ -123,7 +123,7 @@ fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
 fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let exact = || AskedExactLaunch::new(words(), 0.0);
     kernels!(all, device, target;
-        Indirect narrow::nodes::narrow_nodes, 64, (shapes(), pairs(), items(), counters(), contacts());;
+        Indirect narrow::nodes::narrow_nodes, GROUP, (shapes(), pairs(), items(), counters(), contacts());;
         Indirect narrow::exact::narrow_exact, LANES,
             (shapes(), pairs(), polygons(), counters(), contacts(), exact());;
     );

@@ -81,13 +81,16 @@ impl Counters {
     }
 }
 
+/// Largest number of groups of a launch in one dimension. Every device allows it.
+pub const MAX_GROUPS: u32 = 32_768;
+
 /// Computes the number of groups of a stage in x, y and z: `per` elements per group, from a buffer
 /// with capacity `room`.
 #[cube(launch, create_dummy_kernel)]
 pub fn groups_for(counters: &Counters, groups: &mut [u32], room: u32, per: u32, #[comptime] counter: u32) {
     if ABSOLUTE_POS == 0usize {
         let needed = (counters.within(counter, room) + per - 1u32) / per;
-        let wide = needed.min(32768u32).max(1u32);
+        let wide = needed.min(MAX_GROUPS).max(1u32);
         groups[0] = wide;
         groups[1] = ((needed + wide - 1u32) / wide).max(1u32);
         groups[2] = 1u32;

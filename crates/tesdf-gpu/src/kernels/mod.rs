@@ -19,3 +19,6 @@ pub mod math;
 pub mod middle;
 pub mod narrow;
 pub mod reduce;
+
+/// Threads per group in kernels where each thread works alone.
+pub const GROUP: u32 = 64;

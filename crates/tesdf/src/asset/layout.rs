@@ -1,4 +1,5 @@
-//! The sections of an asset and the words in them. Only this module knows the byte layout.
+//! The sections of an asset and the words in them. This module defines the byte layout. The kernels
+//! of `tesdf-gpu` read the same words and bytes with the constants of this module.
 
 use super::{Element, SectionSpec};
 use crate::base::Side;
@@ -58,6 +59,8 @@ pub const SECTIONS: [SectionSpec; 14] = [
 pub const MAX_FACES: usize = 1 << 24;
 /// Largest number of faces in a leaf of the face tree.
 pub const TREE_LEAF: usize = 8;
+/// Bits of a leaf's word for the number of faces, minus one.
+pub const TREE_LEAF_BITS: u32 = TREE_LEAF.trailing_zeros();
 
 /// Where a cell lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -98,6 +101,8 @@ pub enum Node {
 pub const LEAF: u32 = 1 << 31;
 /// The lowest bit of a cell's code.
 pub const CODE: u32 = 28;
+/// The bits of a cell's code, after a shift by [`CODE`].
+pub const CODES: u32 = 7;
 /// Code of a cell outside, with a list.
 pub const OUTSIDE: u32 = 0;
 /// Code of a cell inside, with a list.
@@ -112,7 +117,10 @@ pub const NOT_OF_DOMAIN: u32 = 7;
 pub const MAX_LIST_OFFSET: u32 = 1 << CODE;
 /// From this winding number on, the number is written before the list.
 pub const LONG_WINDING: u32 = 3;
-const LONG_CROSSING: u32 = CROSSING + LONG_WINDING;
+/// Bytes of this number.
+pub const WINDING_BYTES: u32 = 4;
+/// Code of a crossing cell with such a number.
+pub const LONG_CROSSING: u32 = CROSSING + LONG_WINDING;
 
 impl Node {
     /// Whether the word is that of a bisected cell. The word is then the place of its children.
@@ -128,13 +136,13 @@ impl Node {
             return Self::Split(word);
         }
         let offset = word & (MAX_LIST_OFFSET - 1);
-        match (word >> CODE) & 7 {
+        match (word >> CODE) & CODES {
             OUTSIDE => Self::Listed(Label::Outside, offset),
             INSIDE => Self::Listed(Label::Inside, offset),
             code @ CROSSING..LONG_CROSSING => Self::Listed(Label::Crossing(code - CROSSING), offset),
             LONG_CROSSING => {
-                let at = (offset as usize).checked_sub(4);
-                let bytes = at.and_then(|at| lists.get(at..)?.first_chunk::<4>());
+                let at = offset.checked_sub(WINDING_BYTES);
+                let bytes = at.and_then(|at| lists.get(at as usize..)?.first_chunk::<4>());
                 Self::Listed(Label::Crossing(bytes.map_or(0, |b| u32::from_le_bytes(*b))), offset)
             }
             FAR if offset == 1 => Self::Far(Side::Inside),
@@ -165,6 +173,14 @@ impl Node {
 pub const NO_PALETTE: u16 = u16::MAX;
 /// Largest number of faces in a palette, so that one byte names each face.
 pub const PALETTE_SIZE: usize = 256;
+/// Bytes of a list before its count: the number of the palette.
+pub const PALETTE_BYTES: u32 = 2;
+/// Bytes of a list before its slots.
+pub const SLOTS: u32 = PALETTE_BYTES + 1;
+/// Bytes of a list without a palette before its faces.
+pub const LISTED_FACES: u32 = PALETTE_BYTES + 4;
+/// Bytes of a face in such a list.
+pub const FACE_BYTES: u32 = 4;
 
 /// The list of a cell, little-endian and unaligned. It is `palette u16, count u8, count × u8` with
 /// slots of the palette, or `NO_PALETTE u16, count u32, count × u32` with faces.
@@ -235,14 +251,19 @@ impl TreeChild {
     /// Reads a word.
     #[inline]
     pub fn decode(word: u32) -> Self {
-        if word & LEAF == 0 { Self::Node(word) } else { Self::Leaf((word & !LEAF) >> 3, (word & 7) + 1) }
+        const COUNT: u32 = TREE_LEAF as u32 - 1;
+        if word & LEAF == 0 {
+            Self::Node(word)
+        } else {
+            Self::Leaf((word & !LEAF) >> TREE_LEAF_BITS, (word & COUNT) + 1)
+        }
     }
 
     /// Writes a word.
     pub fn encode(self) -> u32 {
         match self {
             Self::Node(node) => node,
-            Self::Leaf(start, count) => LEAF | start << 3 | (count - 1),
+            Self::Leaf(start, count) => LEAF | start << TREE_LEAF_BITS | (count - 1),
         }
     }
 }
@@ -267,10 +288,13 @@ pub enum SignHint {
 }
 
 impl SignHints {
+    /// Bits of a hint.
+    pub const BITS: u32 = 2;
+
     /// The hint of feature `k`: 0 is the face, 1–3 are the edges, 4–6 are the corners.
     #[inline]
     pub fn get(self, k: usize) -> SignHint {
-        match (self.0 >> (2 * k)) & 3 {
+        match (self.0 >> (Self::BITS as usize * k)) & 3 {
             0 => SignHint::Winding,
             1 => SignHint::Plane,
             2 => SignHint::Outside,
@@ -280,7 +304,8 @@ impl SignHints {
 
     /// Sets the hint of feature `k`.
     pub fn set(&mut self, k: usize, hint: SignHint) {
-        self.0 = self.0 & !(3 << (2 * k)) | (hint as u16) << (2 * k);
+        let at = Self::BITS as usize * k;
+        self.0 = self.0 & !(3 << at) | (hint as u16) << at;
     }
 }
 

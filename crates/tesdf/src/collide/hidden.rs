@@ -21,6 +21,16 @@ use crate::asset::layout::TreeChild;
 use crate::geometry::Aabb;
 use crate::query::corner_reach;
 
+/// A place deeper than the deepest place so far is searched for only where it can be this many
+/// times as deep.
+pub const DEEPER: f64 = 1.25;
+/// A piece of a face with a radius of at most this fraction of the wanted depth is not divided: no
+/// point of it is deeper than its center by more than this fraction.
+pub const SETTLED: f64 = 0.25;
+/// A body is searched only when the least depth of a hidden overlap is more than this many times
+/// the rounding error of distances.
+pub const THICK: f64 = 2.0;
+
 impl HiddenOverlap {
     /// The overlaps that the contacts do not show.
     pub fn not_shown(overlaps: Vec<Self>, contacts: &[Contact]) -> Vec<Self> {
@@ -75,7 +85,7 @@ fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode) -> f64 {
         return 0.0;
     }
     let (at_center, slack) = field.rough(center);
-    if HiddenOverlap::FINE * thickness <= 2.0 * slack {
+    if HiddenOverlap::FINE * thickness <= THICK * slack {
         // The body is too thin relative to rounding.
         return 0.0;
     }
@@ -100,7 +110,7 @@ struct Looks<'a> {
 impl Looks<'_> {
     /// The search ignores depths up to this value.
     fn wanted(&self, share: f64) -> f64 {
-        (share * self.thickness).max(1.25 * self.deepest)
+        (share * self.thickness).max(DEEPER * self.deepest)
     }
 
     /// Depth of a point in the field.
@@ -157,9 +167,7 @@ impl Looks<'_> {
             } else {
                 HiddenOverlap::SURE
             });
-            // In a piece this small, no point is deeper than its middle by more than a quarter of
-            // the wanted depth.
-            if depth + reach > wanted && reach > 0.25 * wanted {
+            if depth + reach > wanted && reach > SETTLED * wanted {
                 stack.extend(quarters(corners));
             }
         }

@@ -5,7 +5,7 @@
 //! length of the output is an upper bound of the distance.
 
 /// Coordinates of a wrench: force, then torque divided by a length.
-pub(super) type Wrench = [f64; 6];
+pub type Wrench = [f64; 6];
 
 /// Largest number of points in the combination; seven points span the space.
 const ACTIVE: usize = 7;
@@ -39,7 +39,7 @@ struct Combination {
 /// affine span is inside it.
 ///
 /// `points` must not be empty.
-pub(super) fn residual(points: &[Wrench], target: &Wrench) -> Wrench {
+pub fn residual(points: &[Wrench], target: &Wrench) -> Wrench {
     let shifted = |p: &Wrench| plus(p, -1.0, target);
     let nearest = least(points, |p| dot(&shifted(p), &shifted(p)));
     let mut x = shifted(&points[nearest]);

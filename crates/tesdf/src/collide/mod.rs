@@ -51,6 +51,18 @@ mod surface;
 mod time_of_impact;
 mod why;
 
+/// Constants and functions that the kernels of `tesdf-gpu` and their tests share with this crate.
+/// Not part of the API.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::field::ROUNDING;
+    pub use super::hidden::{DEEPER, SETTLED, THICK};
+    pub use super::hull::{Wrench, residual};
+    pub use super::narrow::greatest_minimum;
+    pub use super::polygon::{MAX_VERTICES, Parts, Polygon};
+    pub use super::reduce::FLAT;
+}
+
 pub use candidates::{Candidate, candidates};
 pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};

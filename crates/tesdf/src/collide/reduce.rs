@@ -29,7 +29,7 @@ use super::{Contact, InstanceId, PairReduction, Reduction};
 
 /// An axis along which the points extend less than this fraction of `L` gets no extremes. So a flat
 /// patch has two axes, whatever the rounding of its points (1e-7 in `f32`).
-const FLAT: f64 = 1e-3;
+pub const FLAT: f64 = 1e-3;
 /// Number of contacts per block. For each block the maximum is kept up to date.
 const BLOCK: usize = 512;
 /// Limit, per contact, of the closest points on the hull that the selection computes. Beyond the

@@ -6,5 +6,7 @@
 mod move_vertices;
 mod stale;
 
+#[doc(hidden)]
+pub use move_vertices::FARTHEST;
 pub use move_vertices::{DeformError, Moved};
 pub use stale::Reencoded;

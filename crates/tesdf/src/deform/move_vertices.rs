@@ -7,6 +7,11 @@ use crate::asset::layout::{SignHints, TreeChild};
 use crate::asset::{Conforming, FaceRecord, Incidence, Motion, SharedSection};
 use crate::geometry::{Aabb, orientation};
 
+/// Largest distance of a moved vertex from the middle of the cube along each axis, in sides of the
+/// cube. Farther out, `f32` cannot tell faces apart.
+#[doc(hidden)]
+pub const FARTHEST: f64 = 2.0;
+
 /// Why vertices cannot be moved. Nothing has moved.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DeformError {
@@ -72,7 +77,7 @@ impl TeSdf {
 
     fn checked(&self, moves: &[(u32, DVec3)], domain: &Conforming) -> Result<(), DeformError> {
         let count = self.vertices.len() + domain.vertices().len();
-        let reach = 2.0 * self.cube.side();
+        let reach = FARTHEST * self.cube.side();
         for &(vertex, position) in moves {
             if vertex as usize >= count {
                 return Err(DeformError::Vertex { vertex, count });

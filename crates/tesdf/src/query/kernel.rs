@@ -13,7 +13,7 @@ use crate::base::Isa;
 
 /// The low bits of a squared distance say which part of the face is nearest. They change the
 /// squared distance by a factor of 2^-22, the distance by half of that, and need no register.
-const PART: u32 = 3;
+pub const PART: u32 = 3;
 
 /// The nearest face so far.
 #[derive(Clone, Copy, Debug)]

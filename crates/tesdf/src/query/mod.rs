@@ -46,6 +46,14 @@ mod nearest;
 mod ray;
 mod sign;
 
+/// Constants that the kernels of `tesdf-gpu` share with this crate. Not part of the API.
+#[doc(hidden)]
+pub mod internal {
+    pub use super::kernel::PART;
+    /// Below this distance, the gradient is the normal of the nearest face.
+    pub const ON_SURFACE: f64 = super::ON_SURFACE_F32;
+}
+
 use std::cell::RefCell;
 
 use glam::DVec3;

@@ -42,8 +42,8 @@ impl WorldAnswer {
     };
 }
 
-/// Threads per group.
-const GROUP: u32 = 64;
+pub use crate::kernels::GROUP;
+
 /// Answers per launch; they take 4 MiB.
 const LAUNCH: usize = 1 << 17;
 

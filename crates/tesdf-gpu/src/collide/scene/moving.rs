@@ -7,9 +7,10 @@ use super::placed::split;
 use super::{GpuShapeId, GpuShapes};
 use crate::GpuError;
 use crate::device::{DeviceArray, spread};
+use crate::kernels::GROUP;
 use crate::kernels::deform::bounds::MovingLaunch;
 use crate::kernels::deform::follow::follow;
-use crate::kernels::deform::refit::{self, GROUP};
+use crate::kernels::deform::refit;
 use crate::kernels::field::shapes::{BAD_VERTEX, NONE, STRIDE, TREE_NODES};
 
 /// The host's data for moving the vertices of a shape.
@@ -79,9 +80,9 @@ impl GpuShapes {
             let (table, words, rows) = (table.words(), words.words(), rows.rows());
             MovingLaunch::new(table, words, rows, positions.words(), frame.rows(), shape.0)
         };
-        let (client, groups) = (self.device.client(), spread(threads.div_ceil(64)));
-        follow::launch(client, groups, CubeDim::new_1d(64), argument());
-        refit::refit::launch(client, CubeCount::Static(1, 1, 1), CubeDim::new_1d(GROUP), argument());
+        let (client, groups) = (self.device.client(), spread(threads.div_ceil(GROUP)));
+        follow::launch(client, groups, CubeDim::new_1d(GROUP), argument());
+        refit::refit::launch(client, CubeCount::Static(1, 1, 1), CubeDim::new_1d(refit::GROUP), argument());
         self.moved = true;
         Ok(())
     }

@@ -8,13 +8,10 @@ use tesdf::query::Arrays;
 
 use super::moving::{face_levels, tree_levels};
 use super::roots::Roots;
-use crate::kernels::broad::meshlets::MESHLETS_OF_BLOCK;
+use crate::kernels::broad::meshlets::FACES_OF_MESHLET;
 use crate::kernels::deform::refit::GROWN;
 use crate::kernels::field::nearest::TREE_DEPTH;
 use crate::kernels::field::shapes::{self, STRIDE};
-
-/// Largest number of faces of a meshlet: one face for each thread of a group.
-const MESHLET: u32 = MESHLETS_OF_BLOCK;
 
 /// The contents of the buffers of [`Shapes`](crate::kernels::field::shapes::Shapes).
 #[derive(Default)]
@@ -218,7 +215,7 @@ fn depth(mesh: &Arrays) -> usize {
 }
 
 /// First face and number of faces of each meshlet, in order. The meshlets are the largest subtrees
-/// of the face tree with at most [`MESHLET`] faces.
+/// of the face tree with at most [`FACES_OF_MESHLET`] faces.
 fn meshlets(mesh: &Arrays) -> Vec<(u32, u32)> {
     let mut ranges = vec![(u32::MAX, 0u32); mesh.tree_children.len()];
     let range = |ranges: &[(u32, u32)], word| match TreeChild::decode(word) {
@@ -234,7 +231,9 @@ fn meshlets(mesh: &Arrays) -> Vec<(u32, u32)> {
     while let Some(word) = stack.pop() {
         let (start, count) = range(&ranges, word);
         match TreeChild::decode(word) {
-            TreeChild::Node(node) if count > MESHLET => stack.extend(mesh.tree_children[node as usize]),
+            TreeChild::Node(node) if count > FACES_OF_MESHLET => {
+                stack.extend(mesh.tree_children[node as usize])
+            }
             _ => meshlets.push((start, count)),
         }
     }

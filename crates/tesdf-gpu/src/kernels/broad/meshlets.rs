@@ -2,17 +2,26 @@
 //! signed distance is 1-Lipschitz: within a radius `r` of a point it is at least the value at the
 //! point minus `r`.
 use cubecl::prelude::*;
+use tesdf::collide::internal;
 
 use super::super::counters::{self, Counters};
 use super::super::field::shapes::{Field, FieldExpand, HIGH, LOW, MESHLET_COUNT, NONE, Shapes};
 use super::super::math::vector::{V3, outside_box};
-use super::ordered_pair::OrderedPairs;
+use super::super::narrow::exchange::LANES;
+use super::ordered_pair::{OrderedPair, OrderedPairs};
 
-/// Largest error of a distance in the frame of a mesh: twice the documented error of queries.
-pub const ROUNDING: f32 = 4e-6;
+/// Largest error of a distance in the frame of a mesh. It is twice the error on the processor,
+/// because poses and points are in `f32`, too.
+pub const ROUNDING: f32 = 2.0 * internal::ROUNDING as f32;
+
+/// Error of a distance to a simple shape, relative to the numbers that it is computed from. On the
+/// processor it is 1e-12 (`FAR` in `tesdf::collide::field`), because simple shapes are in `f64`.
+const SIMPLE_ROUNDING: f32 = 1e-6;
 
 /// Meshlets per block: one for each thread of a group.
-pub const MESHLETS_OF_BLOCK: u32 = 32;
+pub const MESHLETS_OF_BLOCK: u32 = LANES;
+/// Largest number of faces of a meshlet: one for each thread of a group.
+pub const FACES_OF_MESHLET: u32 = LANES;
 
 /// A list of blocks, or of meshlets, of ordered pairs.
 #[derive(CubeType, CubeLaunch)]
@@ -47,6 +56,49 @@ impl Blocks {
     }
 }
 
+/// The work of a group after the broad phase: the faces of a meshlet, in the field of the other
+/// instance. Each thread takes a face.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct MeshletWork<'a> {
+    pub pair: OrderedPair,
+    pub meshlet: u32,
+    /// The shape that has the meshlet.
+    pub surface: Field<'a>,
+    /// The shape in whose field the faces are tested.
+    pub field: Field<'a>,
+}
+
+/// Reads the meshlet at index `item` of a list.
+#[cube]
+pub fn meshlet_work<'a>(
+    shapes: &'a Shapes,
+    pairs: &OrderedPairs,
+    meshlets: &Blocks,
+    item: u32,
+) -> MeshletWork<'a> {
+    let pair = pairs.get(meshlets.pair(item));
+    MeshletWork::<'a> {
+        pair,
+        meshlet: meshlets.meshlet(item),
+        surface: shapes.field(pair.shape_a),
+        field: shapes.field(pair.shape_b),
+    }
+}
+
+#[cube]
+impl MeshletWork<'_> {
+    /// Number of faces of the meshlet.
+    pub fn faces(self) -> u32 {
+        self.surface.faces_of(self.meshlet)
+    }
+
+    /// Face `number` of the meshlet.
+    pub fn face(self, number: u32) -> u32 {
+        self.surface.first_face(self.meshlet) + number
+    }
+}
+
 #[cube]
 impl Field<'_> {
     /// Whether each point within `radius` of `p` has a signed distance above `reach`. The test may
@@ -57,7 +109,7 @@ impl Field<'_> {
             self.mesh_is_beyond(p, limit, prune)
         } else {
             let distance = self.simple_value(p).distance;
-            distance > limit + 1e-6f32 * (p.abs().greatest() + distance.abs())
+            distance > limit + SIMPLE_ROUNDING * (p.abs().greatest() + distance.abs())
         }
     }
 

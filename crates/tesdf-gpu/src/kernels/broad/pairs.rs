@@ -3,6 +3,7 @@
 use cubecl::prelude::*;
 
 use super::super::counters::{BADLY_MOVED, BLOCKS, Counters, ORDERED_PAIRS};
+use super::super::field::nearest::FAR;
 use super::super::field::shapes::{BAD_VERTEX, KIND, MESHLET_COUNT, NONE, PLANE, ROUND, SIZES, Shapes};
 use super::super::math::pose::{FarPoint, Pose, ROWS as POSE_ROWS, pose};
 use super::super::math::vector::{Row, V3, last, row_of, v3, xyz};
@@ -103,10 +104,11 @@ impl Pairs {
 }
 
 /// Half extent of a plane.
-const ENDLESS: f32 = 1e30;
+const ENDLESS: f32 = FAR;
 
 /// Bounds grow by this fraction, relative to their half extents and to the vector from the origin
-/// of the field to the center. This is more than the rounding error.
+/// of the field to the center. This is more than the rounding error in `f32`. The processor grows
+/// its bounds by 8 ulps of `f64` (`ULPS` in `tesdf::collide::instance_pairs`).
 const GROWN: f32 = 2e-6;
 
 /// Computes the bounds of an instance per thread, in the world. They include the motion ahead and

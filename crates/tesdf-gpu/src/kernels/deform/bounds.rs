@@ -1,7 +1,7 @@
 //! A shape whose vertices move, and the bounds of these vertices.
 use cubecl::prelude::*;
 
-use super::super::field::nearest::{NodeBoxes, TreeChild};
+use super::super::field::nearest::{FAR, NodeBoxes, TreeChild};
 use super::super::field::shapes::{BOXES, Bounds, BoundsExpand, FACE_VERTICES, STRIDE};
 use super::super::math::vector::{Row, V3, last, row, v3, xyz};
 
@@ -23,7 +23,7 @@ pub struct Moving {
 /// Empty bounds: the minimum is above the maximum.
 #[cube]
 pub fn no_bounds() -> Bounds {
-    Bounds { low: v3(1e30f32, 1e30f32, 1e30f32), high: v3(-1e30f32, -1e30f32, -1e30f32) }
+    Bounds { low: v3(FAR, FAR, FAR), high: v3(-FAR, -FAR, -FAR) }
 }
 
 #[cube]

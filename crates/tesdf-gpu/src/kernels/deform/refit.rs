@@ -18,6 +18,8 @@ pub const GROUP: u32 = 256;
 /// rounding error of `f32`.
 pub const GROWN: f32 = 1e-6;
 
+const FARTHEST: f32 = tesdf::deform::FARTHEST as f32;
+
 /// The inner nodes of a tree by level. The words are: the number of levels; the start of each
 /// level, and the end of the last; the inner nodes, level by level, with parents of leaves first.
 #[derive(CubeType, Clone, Copy)]
@@ -91,7 +93,7 @@ impl Moving {
     /// The lowest of this thread's vertices with an invalid position: one that is not finite, or so
     /// far away that `f32` cannot separate faces there.
     fn bad_vertex(&self) -> u32 {
-        let side = 2.0f32 * from_bits(self.entry(SIDE));
+        let side = FARTHEST * from_bits(self.entry(SIDE));
         let limit = v3(side, side, side);
         let mut lowest = NONE.runtime();
         let mut v = UNIT_POS;

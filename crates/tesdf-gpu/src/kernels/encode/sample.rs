@@ -21,8 +21,11 @@ pub const FACE_ROWS: usize = 10;
 pub const CELL_ROWS: usize = 4;
 /// Size of a block, in samples.
 pub const BLOCK: [u32; 3] = [8, 8, 4];
-/// Threads of a group.
-pub const GROUP: usize = 256;
+/// Threads of a group: one for each sample of a block.
+pub const GROUP: usize = (BLOCK[0] * BLOCK[1] * BLOCK[2]) as usize;
+/// Bits of each of the three indices in the position of a block.
+pub const INDEX_BITS: u32 = 10;
+pub const INDEX: u32 = (1 << INDEX_BITS) - 1;
 /// Candidates that a group measures at a time.
 pub const TILE: usize = 1024;
 /// Rounding error of the difference of two distances, relative to R + d: section 3 of docs/math.md.
@@ -39,7 +42,8 @@ pub struct Samples {
     pub cells: Box<[Row]>,
     /// First candidate and number of candidates for each cell.
     pub ranges: Box<[u32]>,
-    /// Position of each block in a cell, counted in blocks, with ten bits for each index.
+    /// Position of each block in a cell, counted in blocks, with [`INDEX_BITS`] bits for each
+    /// index.
     pub blocks: Box<[u32]>,
     /// Number of blocks per cell.
     pub block_count: u32,
@@ -215,9 +219,9 @@ impl Samples {
     fn block(&self, number: u32) -> Steps {
         let block = self.blocks[(number % self.block_count) as usize];
         Steps {
-            i: 8u32 * (block & 1023u32),
-            j: 8u32 * ((block >> 10u32) & 1023u32),
-            k: 4u32 * (block >> 20u32),
+            i: comptime!(BLOCK[0]) * (block & INDEX),
+            j: comptime!(BLOCK[1]) * ((block >> INDEX_BITS) & INDEX),
+            k: comptime!(BLOCK[2]) * (block >> comptime!(2 * INDEX_BITS)),
         }
     }
 
@@ -235,8 +239,8 @@ impl Samples {
         nearest_of[unit] = nearest;
         sync_cube();
         #[unroll]
-        for half in 0..8usize {
-            let apart = comptime!(128usize >> half);
+        for half in 0..comptime!(GROUP.trailing_zeros() as usize) {
+            let apart = comptime!((GROUP / 2) >> half);
             if unit < apart {
                 nearest_of[unit] = nearest_of[unit].min(nearest_of[unit + apart]);
             }
@@ -275,6 +279,11 @@ struct Near {
     squared: f32,
 }
 
+/// The middle of a block along an axis, in steps from its first sample.
+pub const fn middle(axis: usize) -> f32 {
+    0.5 * (BLOCK[axis] - 1) as f32
+}
+
 /// Candidates that a group shares.
 #[derive(CubeType)]
 struct List {
@@ -295,11 +304,15 @@ pub fn sample(samples: &Samples, least: &[Atomic<u32>], first_group: u32, groups
     let group = first_group + (CUBE_POS as u32).min(groups - 1u32);
     let cell = (group / samples.block_count) as usize;
     let block = samples.block(group);
-    let center =
-        samples.point(cell, block.i as f32 + 3.5f32, block.j as f32 + 3.5f32, block.k as f32 + 1.5f32);
-    let i = block.i + (UNIT_POS & 7u32);
-    let j = block.j + ((UNIT_POS >> 3u32) & 7u32);
-    let k = block.k + (UNIT_POS >> 6u32);
+    let center = samples.point(
+        cell,
+        block.i as f32 + comptime!(middle(0)),
+        block.j as f32 + comptime!(middle(1)),
+        block.k as f32 + comptime!(middle(2)),
+    );
+    let i = block.i + UNIT_POS % comptime!(BLOCK[0]);
+    let j = block.j + UNIT_POS / comptime!(BLOCK[0]) % comptime!(BLOCK[1]);
+    let k = block.k + UNIT_POS / comptime!(BLOCK[0] * BLOCK[1]);
     let is_sample = i + j + k <= samples.resolution;
     let p = samples.point(cell, i as f32, j as f32, k as f32);
     let limits = samples.limits(cell);

@@ -19,6 +19,10 @@ pub struct List {
 }
 
 const NO_PALETTE: u32 = layout::NO_PALETTE as u32;
+const PALETTE_BYTES: u32 = layout::PALETTE_BYTES;
+const SLOTS: u32 = layout::SLOTS;
+const LISTED_FACES: u32 = layout::LISTED_FACES;
+const FACE_BYTES: u32 = layout::FACE_BYTES;
 
 #[cube]
 impl Field<'_> {
@@ -26,12 +30,13 @@ impl Field<'_> {
     pub fn list(self, offset: u32) -> List {
         let lists = self.entry(LISTS);
         let number = self.half(lists, offset);
-        let mut count = self.byte(lists, offset + 2u32);
-        let mut first = offset + 3u32;
+        let mut count = self.byte(lists, offset + PALETTE_BYTES);
+        let mut first = offset + SLOTS;
         let mut palette = NONE.runtime();
         if number == NO_PALETTE {
-            count |= (self.byte(lists, offset + 3u32) << 8u32) | (self.half(lists, offset + 4u32) << 16u32);
-            first = offset + 6u32;
+            count |= (self.byte(lists, offset + comptime!(PALETTE_BYTES + 1)) << 8u32)
+                | (self.half(lists, offset + comptime!(PALETTE_BYTES + 2)) << 16u32);
+            first = offset + LISTED_FACES;
         } else {
             palette = self.word(self.entry(PALETTE_STARTS) + number);
         }
@@ -42,7 +47,7 @@ impl Field<'_> {
     pub fn listed(self, list: List, i: u32) -> u32 {
         let mut face = 0u32;
         if list.palette == NONE {
-            let at = list.first + 4u32 * i;
+            let at = list.first + FACE_BYTES * i;
             face = self.half(list.lists, at) | (self.half(list.lists, at + 2u32) << 16u32);
         } else {
             let at = list.palette + self.byte(list.lists, list.first + i);

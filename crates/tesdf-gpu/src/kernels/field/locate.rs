@@ -33,10 +33,11 @@ pub struct Cell {
 pub const NOT_OF_DOMAIN: u32 = layout::LEAF | layout::NOT_OF_DOMAIN << layout::CODE;
 const LEAF: u32 = layout::LEAF;
 const CODE: u32 = layout::CODE;
+const CODES: u32 = layout::CODES;
 const OFFSET: u32 = layout::MAX_LIST_OFFSET - 1;
 const INSIDE: u32 = layout::INSIDE;
 const CROSSING: u32 = layout::CROSSING;
-const LONG_CROSSING: u32 = layout::CROSSING + layout::LONG_WINDING;
+const LONG_CROSSING: u32 = layout::LONG_CROSSING;
 const FAR: u32 = layout::FAR;
 const OUT: u32 = layout::NOT_OF_DOMAIN;
 
@@ -50,7 +51,7 @@ pub fn is_split(word: u32) -> bool {
 impl Cell {
     /// The code of the label.
     pub fn code(self) -> u32 {
-        (self.word >> CODE) & 7u32
+        (self.word >> CODE) & CODES
     }
 
     /// Byte at which the list begins. For a far cell: 1 inside, 0 outside.
@@ -259,5 +260,54 @@ impl Field<'_> {
             least = step * step * self.number(BOUND_UNIT);
         }
         least
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tesdf::domain::{Barycentric, Cell as DomainCell};
+    use tesdf::glam::DVec3;
+
+    use super::super::winding::corners_of_root;
+    use super::*;
+
+    fn lambda_of([l0, l1, l2, l3]: [f32; 4]) -> Lambda {
+        Lambda { l0, l1, l2, l3 }
+    }
+
+    /// The root, the children and their corners are those of the processor. Points are whole
+    /// multiples of 2^-12 of the side, where `f32` is exact, so that many lie on borders of cells,
+    /// in edges and in corners.
+    #[test]
+    fn descents_are_those_of_the_processor() {
+        let mut random = fastrand::Rng::with_seed(8);
+        for case in 0..20_000u32 {
+            let steps = 1u32 << [1, 2, 4, 12][case as usize % 4];
+            let mut coordinate = || random.u32(0..=steps) as f32 / steps as f32;
+            let u = v3(coordinate(), coordinate(), coordinate());
+            let p = DVec3::new(u.x.into(), u.y.into(), u.z.into());
+            let (expected_root, mut fixed) = Barycentric::in_unit_cube(p).expect("in the cube");
+            let found = root(u);
+            assert_eq!(found as usize, expected_root, "{p}");
+            let mut cell = DomainCell::root(DVec3::ZERO, 1.0, expected_root);
+            let mut corners = [0, 1, 2].map(|axis| corners_of_root(found, axis));
+            let (mut lambda, mut k) = (in_root(u, found), 3);
+            for depth in 0..24 {
+                let second = lambda.is_in_second(k);
+                let values = [lambda.l0, lambda.l1, lambda.l2, lambda.l3];
+                let child =
+                    DomainCell::lambda_of_child(values.map(f64::from), k as usize, usize::from(second));
+                assert_eq!(usize::from(second), fixed.descend(depth), "{p} at depth {depth}");
+                lambda = lambda.in_child(k, second);
+                assert_eq!(lambda, lambda_of(child.map(|x| x as f32)), "{p} at depth {depth}");
+                cell = cell.child(usize::from(second));
+                corners = corners.map(|c| c.of_child(k, second));
+                k = next_k(k);
+            }
+            for (axis, c) in corners.into_iter().enumerate() {
+                let found = [c.c0, c.c1, c.c2, c.c3].map(f64::from);
+                assert_eq!(found, cell.corners.map(|corner| corner[axis]), "{p}");
+            }
+        }
     }
 }

@@ -21,12 +21,14 @@ pub struct Nearest {
 pub const FAR: f32 = 1e30;
 
 /// Size of the stack for the face tree, in levels. An asset with a deeper tree cannot be uploaded.
+/// The processor has room for [`AabbTree::MAX_DEPTH`](tesdf::geometry::AabbTree::MAX_DEPTH); here
+/// each thread would pay for levels that no mesh has needed.
 pub const TREE_DEPTH: usize = 48;
 
 const LEAF: u32 = layout::LEAF;
 /// Bits for the number of faces of a leaf.
 const LEAF_COUNT: u32 = layout::TREE_LEAF as u32 - 1;
-const LEAF_COUNT_BITS: u32 = layout::TREE_LEAF.trailing_zeros();
+const LEAF_COUNT_BITS: u32 = layout::TREE_LEAF_BITS;
 
 /// The result before any face within the squared distance `squared` is found.
 #[cube]

@@ -1,12 +1,9 @@
 //! The fields of planes, boxes, spheres and capsules, in closed form.
 use cubecl::prelude::*;
 
-use super::super::math::vector::{V3, pick, v3};
+use super::super::math::vector::{LEAST_DIVISOR, V3, pick, v3};
 use super::shapes::{BOX, Field, FieldExpand, KIND, PLANE, SIZES};
 use super::value::Value;
-
-/// Smallest divisor.
-const LEAST: f32 = 1e-30;
 
 /// Distance and gradient, and the nearest side of a box.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
@@ -23,7 +20,8 @@ fn round(p: V3, half_height: f32, radius: f32) -> Simple {
     let core = v3(0.0f32, 0.0f32, p.z.clamp(-half_height, half_height));
     let from_core = p - core;
     let reach = from_core.length();
-    let gradient = pick(reach <= 0.0f32, v3(1.0f32, 0.0f32, 0.0f32), from_core * (1.0f32 / reach.max(LEAST)));
+    let gradient =
+        pick(reach <= 0.0f32, v3(1.0f32, 0.0f32, 0.0f32), from_core * (1.0f32 / reach.max(LEAST_DIVISOR)));
     Simple { distance: reach - radius, gradient, side: 0u32 }
 }
 
@@ -52,7 +50,7 @@ fn block(p: V3, sizes: V3) -> Simple {
     );
     Simple {
         distance: select(is_out, out, -depth.at(axis)),
-        gradient: pick(is_out, outward * (1.0f32 / out.max(LEAST)), inward),
+        gradient: pick(is_out, outward * (1.0f32 / out.max(LEAST_DIVISOR)), inward),
         side: 2u32 * axis + select(sign > 0.0f32, 1u32, 0u32),
     }
 }
@@ -89,7 +87,7 @@ mod tests {
 
     /// The fields equal those of the processor, also on the shapes' symmetry planes.
     #[test]
-    fn simple_shapes_are_those_of_the_processor() {
+    fn fields_of_simple_shapes_are_those_of_the_processor() {
         let mut random = fastrand::Rng::with_seed(3);
         for k in 0..20_000 {
             let mut number = || random.f64() * 2.0 - 1.0;

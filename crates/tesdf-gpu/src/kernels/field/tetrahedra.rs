@@ -3,7 +3,7 @@
 use cubecl::prelude::*;
 
 use super::super::math::triangle::normal_of;
-use super::super::math::vector::{Row, V3, last, pick, row_of, xyz, zero};
+use super::super::math::vector::{LEAST_DIVISOR, Row, V3, last, pick, row_of, xyz, zero};
 use super::locate::{Lambda, no_lambda};
 use super::shapes::{Bounds, Field, FieldExpand, NONE, TETRAHEDRA, TREE, TREE_BOXES, TREE_NODES};
 
@@ -37,12 +37,10 @@ const FLAT: f32 = 4e-7;
 /// A triangle is thin when its height is below this fraction of its longest edge.
 const THIN: f32 = 1e-3;
 
-/// Smallest divisor.
-const LEAST: f32 = 1e-30;
-
 /// A point that no tetrahedron holds belongs to a tetrahedron from which it is at most this far
 /// (local frame). The gaps that rounding leaves between two tetrahedra are smaller, also where a
-/// flat tetrahedron is skipped.
+/// flat tetrahedron is skipped. The processor compares barycentric coordinates in `f64` and allows
+/// 1e-12 (`OUTSIDE` in `tesdf::asset::roots`).
 pub const OUT: f32 = 5e-7;
 
 /// The tetrahedron with four corners, in either orientation.
@@ -138,12 +136,12 @@ pub fn bounds_of(a: V3, b: V3, c: V3) -> Bounds {
 pub fn around_of(a: V3, b: V3, c: V3) -> Around {
     let across = (b - a).cross(c - a);
     let size = across.length();
-    let normal = across * select(size > 0.0f32, 1.0f32 / size.max(LEAST), 0.0f32);
+    let normal = across * select(size > 0.0f32, 1.0f32 / size.max(LEAST_DIVISOR), 0.0f32);
     let longest = (b - a).length().max((c - a).length()).max((c - b).length());
     // The plane of a thin triangle is too inexact to exclude boxes.
     let is_thin = size <= THIN * longest * longest;
     let normal = pick(is_thin, zero(), normal);
-    let slope = longest * (4e-7f32 * longest + OUT) / size.max(LEAST);
+    let slope = longest * (4e-7f32 * longest + OUT) / size.max(LEAST_DIVISOR);
     Around { bounds: bounds_of(a, b, c), normal, height: normal.dot(a), slope }
 }
 

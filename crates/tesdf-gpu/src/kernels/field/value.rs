@@ -3,7 +3,8 @@
 //! Points are in the frame of the field. For a mesh this is the local frame, moved to the center of
 //! the cube. For a simple shape it is the shape's frame.
 use cubecl::prelude::*;
-use tesdf::asset::layout::SignHint;
+use tesdf::asset::layout::{SignHint, SignHints};
+use tesdf::query::internal;
 
 use super::super::math::triangle::part_of;
 use super::super::math::vector::{V3, pick, same};
@@ -28,7 +29,7 @@ pub struct Value {
 }
 
 /// Below this distance, the gradient is the normal of the nearest face.
-const ON_SURFACE: f32 = 1e-6;
+const ON_SURFACE: f32 = internal::ON_SURFACE as f32;
 /// Below this distance from a flat face, the direction to the point is unknown, because the square
 /// of the distance is nearly zero in `f32`.
 const ON_EDGE: f32 = 1e-15;
@@ -51,7 +52,7 @@ impl Field<'_> {
         let direction = pick(by_normal, f.normal, outward);
         let mut inside = cell.is_inside();
         if cell.is_crossing() {
-            let hint = (f.hints >> (2u32 * c.feature)) & 3u32;
+            let hint = (f.hints >> (HINT_BITS * c.feature)) & HINT_MASK;
             inside = hint == INSIDE || (hint == BY_PLANE && c.height < 0.0f32);
             // A flat face has no plane from which the side could follow.
             if hint == BY_WINDING || (hint == BY_PLANE && flat) {
@@ -108,6 +109,8 @@ impl Field<'_> {
     }
 }
 
+const HINT_BITS: u32 = SignHints::BITS;
+const HINT_MASK: u32 = (1 << HINT_BITS) - 1;
 const BY_WINDING: u32 = SignHint::Winding as u32;
 const BY_PLANE: u32 = SignHint::Plane as u32;
 const INSIDE: u32 = SignHint::Inside as u32;

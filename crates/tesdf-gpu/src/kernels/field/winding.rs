@@ -1,10 +1,13 @@
 //! The winding number of a point: the winding number at the centroid of its cell, plus the signed
 //! crossings of the segment to the centroid with the listed faces.
 use cubecl::prelude::*;
+use tesdf::asset::layout;
 
 use super::super::math::vector::{V3, pick, same, v3};
 use super::locate::{Cell, Descent, axes, in_root, is_split, root};
 use super::shapes::{Field, FieldExpand, LISTS, SIDE};
+
+const WINDING_BYTES: u32 = layout::WINDING_BYTES;
 
 /// A cell and its centroid.
 #[derive(CubeType, Clone, Copy)]
@@ -132,7 +135,7 @@ impl Field<'_> {
         let mut sum = cell.short_winding() as i32;
         if cell.has_long_winding() {
             let lists = self.entry(LISTS);
-            let at = cell.offset() - 4u32;
+            let at = cell.offset() - WINDING_BYTES;
             sum = (self.half(lists, at) | (self.half(lists, at + 2u32) << 16u32)) as i32;
         }
         sum

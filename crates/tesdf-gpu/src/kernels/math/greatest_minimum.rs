@@ -3,7 +3,7 @@
 //! bounds the depth of a piece.
 use cubecl::prelude::*;
 
-use super::vector::{V3, v3};
+use super::vector::{LEAST_DIVISOR, V3, v3};
 
 /// Four linear functions over a triangle.
 #[derive(CubeType, Clone, Copy)]
@@ -46,7 +46,7 @@ impl Functions {
     fn inside(self, least: f32, d: V3, e: V3) -> f32 {
         let w = d.cross(e);
         let sum = w.x + w.y + w.z;
-        let some = sum != 0.0f32;
+        let some = sum.abs() > LEAST_DIVISOR;
         let at = w * select(some, 1.0f32 / select(some, sum, 1.0f32), 0.0f32);
         let mut greatest = least;
         if some && at.x >= 0.0f32 && at.y >= 0.0f32 && at.z >= 0.0f32 {
@@ -55,9 +55,11 @@ impl Functions {
         greatest
     }
 
-    /// The greatest minimum. It is at a corner, where two functions are equal on an edge, or where
-    /// three are equal inside. The cases are written out, because loops over pairs and triples
-    /// would take most of the iterations of a search.
+    /// The greatest minimum, as `greatest_minimum` of `tesdf` computes it for any number of
+    /// functions. The processor adds a margin for the rounding of `f64`. Here rounding is within
+    /// the smallest tolerance of the exact mode. It is at a corner, where two functions are equal
+    /// on an edge, or where three are equal inside. The cases are written out, because loops over
+    /// pairs and triples would take most of the iterations of a search.
     pub fn greatest_minimum(self) -> f32 {
         let (fg, fh, fk) = (self.f - self.g, self.f - self.h, self.f - self.k);
         let (gh, gk, hk) = (self.g - self.h, self.g - self.k, self.h - self.k);
@@ -75,5 +77,38 @@ impl Functions {
         greatest = self.inside(greatest, fg, fk);
         greatest = self.inside(greatest, fh, fk);
         self.inside(greatest, gh, gk)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use tesdf::collide::internal;
+
+    use super::*;
+
+    /// Values of one function: any, a plateau, nearly those of another function, or tiny.
+    fn values() -> impl Strategy<Value = [f32; 3]> {
+        let whole = prop::array::uniform3((0..4i8).prop_map(f32::from));
+        let any = prop::array::uniform3(0.0..4.0f32);
+        let plateau = (0.0..4.0f32).prop_map(|x| [x; 3]);
+        let tiny = prop::array::uniform3(0.0..1e-22f32);
+        prop_oneof![3 => any, 3 => whole, 1 => plateau, 1 => tiny]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        /// Also with equal functions, and with functions that differ by rounding.
+        #[test]
+        fn the_greatest_minimum_is_that_of_the_processor(
+            values in prop::array::uniform4(values()), same in 0..4usize, of in 0..4usize, off in -1e-6..1e-6f32,
+        ) {
+            let mut values = values;
+            values[same] = values[of].map(|x| x + if same == 0 { off } else { 0.0 });
+            let [f, g, h, k] = values.map(|[x, y, z]| v3(x, y, z));
+            let found = f64::from(Functions { f, g, h, k }.greatest_minimum());
+            let expected = internal::greatest_minimum(values.map(|v| v.map(f64::from)));
+            prop_assert!((found - expected).abs() < 2e-6 * 4.0, "{found} instead of {expected}");
+        }
     }
 }

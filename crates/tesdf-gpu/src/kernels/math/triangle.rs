@@ -2,8 +2,9 @@
 //! kernel.
 use cubecl::prelude::*;
 use tesdf::asset::FaceRecord;
+use tesdf::query::internal;
 
-use super::vector::{Row, V3, from_bits, last, pick, row, to_bits, v3, xyz};
+use super::vector::{LEAST_DIVISOR, Row, V3, from_bits, last, pick, row, to_bits, v3, xyz};
 
 /// Rows of a face, as `GpuShapes` writes them. They hold 16 numbers, one after the other: corner a,
 /// b − a, c − a, unit normal (zero for a flat face), inverse squared lengths of b − a, c − a and c
@@ -12,7 +13,7 @@ pub const ROWS: u32 = 4;
 
 /// The low bits of a squared distance that name the nearest part of the face: 0 the plane, 1 the
 /// edge a–b, 2 the edge b–c, 3 the edge c–a.
-pub const PART: u32 = 3;
+pub const PART: u32 = internal::PART;
 
 /// A face in the local frame, relative to the center of the cube.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
@@ -30,8 +31,6 @@ pub struct Face {
 
 /// A face with a smaller height (local frame) is flat, as in `tesdf`.
 const FLAT: f32 = FaceRecord::LEAST_HEIGHT as f32;
-/// Smallest divisor.
-const LEAST: f32 = 1e-30;
 
 /// The unit normal of a face; zero for a flat face.
 ///
@@ -48,12 +47,12 @@ pub fn normal_of(a: V3, b: V3, c: V3) -> V3 {
     let across = pick(ab_longest, ac.cross(bc), pick(ac_longest, ab.cross(bc), ab.cross(ac)));
     let along = pick(ab_longest, ab, pick(ac_longest, ac, bc));
     let longest = u.max(v).max(w);
-    let off = across.dot(along) / longest.max(LEAST);
+    let off = across.dot(along) / longest.max(LEAST_DIVISOR);
     let square = across + along * -off;
     let size = square.length();
     // `>` and not `>=`: when all corners coincide, both sides are 0, and the face must be flat.
     let spans = size > FLAT * longest.sqrt();
-    square * select(spans, 1.0f32 / size.max(LEAST), 0.0f32)
+    square * select(spans, 1.0f32 / size.max(LEAST_DIVISOR), 0.0f32)
 }
 
 /// The face with three corners, as [`FaceRecord`] makes it, but computed in `f32` and without
@@ -67,7 +66,7 @@ pub fn face_of(a: V3, b: V3, c: V3) -> Face {
 
 #[cube]
 fn inverse_of(squared: f32) -> f32 {
-    select(squared > LEAST, 1.0f32 / squared.max(LEAST), 0.0f32)
+    select(squared > LEAST_DIVISOR, 1.0f32 / squared.max(LEAST_DIVISOR), 0.0f32)
 }
 
 /// Reads the face that begins at row `at`.
@@ -226,7 +225,7 @@ impl Face {
         let flat_part = along.x * along.x + along.y * along.y;
         // Below this, squares lose precision. A point has no direction, so any vector is
         // perpendicular to it.
-        let is_steep = flat_part <= (0.01f32 * along.z * along.z).max(LEAST);
+        let is_steep = flat_part <= (0.01f32 * along.z * along.z).max(LEAST_DIVISOR);
         let inverse = 1.0f32 / select(is_steep, 1.0f32, flat_part).sqrt();
         pick(is_steep, v3(1.0f32, 0.0f32, 0.0f32), v3(-inverse * along.y, inverse * along.x, 0.0f32))
     }

@@ -6,6 +6,10 @@ use cubecl::prelude::*;
 /// Four `f32`, which a kernel reads and writes together.
 pub type Row = Vector<f32, Const<4>>;
 
+/// Smallest divisor. Smaller numbers count as zero, because a shader may flush tiny numbers to
+/// zero.
+pub const LEAST_DIVISOR: f32 = 1e-30;
+
 /// A point or a direction.
 #[derive(CubeType, CubeTypeMut, Clone, Copy, Debug, PartialEq)]
 #[expand(derive(Clone, Copy))]

@@ -7,7 +7,7 @@
 //! face's corners, because the coordinates in each cell are linear in these weights.
 use cubecl::prelude::*;
 
-use super::super::broad::meshlets::Blocks;
+use super::super::broad::meshlets::{Blocks, meshlet_work};
 use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, CANDIDATES, Counters};
 use super::super::field::locate::{Cell, is_split};
@@ -55,17 +55,16 @@ pub fn clip_polygons(
     let item = CUBE_POS as u32;
     let count = counters.within(counters::MESHLETS, meshlets.room);
     if item < count {
-        let pair = pairs.get(meshlets.pair(item));
-        let meshlet = meshlets.meshlet(item);
-        let surface = shapes.field(pair.shape_a);
-        let faces = surface.faces_of(meshlet);
+        let work = meshlet_work(shapes, pairs, meshlets, item);
+        let pair = work.pair;
+        let faces = work.faces();
         let threads = threads_per_face(faces);
         let share = Share { mine: UNIT_POS % threads, threads };
         if UNIT_POS / threads < faces {
-            let face = surface.first_face(meshlet) + UNIT_POS / threads;
+            let face = work.face(UNIT_POS / threads);
             let subject = Subject { pair, face, part: shapes.part(pair, face) };
             let center = subject.part.center();
-            let field = shapes.field(pair.shape_b);
+            let field = work.field;
             let radius = subject.part.radius_around(center);
             if !field.is_beyond(center, radius, pair.part_reach(), prune) {
                 if share.mine == 0u32 {

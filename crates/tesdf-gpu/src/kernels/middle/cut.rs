@@ -1,10 +1,11 @@
 //! A polygon in weights of a face's corners, cut by linear functions.
 use cubecl::prelude::*;
+use tesdf::collide::internal;
 
 use super::super::math::vector::V3;
 
 /// Capacity for the vertices of a polygon while it is cut.
-pub const ROOM: usize = 12;
+pub const ROOM: usize = internal::MAX_VERTICES;
 
 /// A polygon while it is cut. Each vertex is given by its weights of the second and the third
 /// corner of a face.

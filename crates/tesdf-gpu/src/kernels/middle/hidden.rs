@@ -4,26 +4,28 @@
 //! goes on with quarters of the face as long as they can be deep enough. In every mode, the center
 //! of a ball inside the body is measured. The result is the greatest depth of each ordered pair.
 use cubecl::prelude::*;
-use tesdf::collide::HiddenOverlap;
+use tesdf::collide::{HiddenOverlap, internal};
 
-use super::super::broad::meshlets::{Blocks, ROUNDING};
+use super::super::broad::meshlets::{Blocks, ROUNDING, meshlet_work};
 use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs, Part, PartExpand};
 use super::super::counters::{self, Counters};
 use super::super::field::shapes::{Ball, Bounds, Field, FieldExpand, SIZES, Shapes};
 use super::super::field::tetrahedra::bounds_of;
-use super::super::math::vector::{pick, to_bits, v3};
+use super::super::math::vector::{LEAST_DIVISOR, pick, to_bits, v3};
 use super::cut::quarter_at;
 
 const SURE: f32 = HiddenOverlap::SURE as f32;
 const FINE: f32 = HiddenOverlap::FINE as f32;
 const FINE_LOOKS: u32 = HiddenOverlap::FINE_LOOKS;
-/// Pieces of a face after which the search stops. Four times this number exceeds the loop
+const DEEPER: f32 = internal::DEEPER as f32;
+const SETTLED: f32 = internal::SETTLED as f32;
+const THICK: f32 = internal::THICK as f32;
+/// Pieces of a face after which the search stops. The processor stops after
+/// [`HiddenOverlap::MAX_LOOKS`] pieces of a body. Here four times that number would exceed the loop
 /// iterations that Mesa's llvmpipe allows a thread.
 const MAX_LOOKS: u32 = 1 << 8;
 /// Largest number of quarterings: a path of 32 bits holds no more.
 const LEVELS: u32 = 12;
-/// Smallest divisor.
-const LEAST: f32 = 1e-30;
 
 #[cube]
 impl Field<'_> {
@@ -49,11 +51,11 @@ impl Part {
         let a = u.max(v).max(w);
         let c = u.min(v).min(w);
         let b = u.max(v).min(u.max(w)).min(v.max(w));
-        let acute = a * b * c / (2.0f32 * ab.cross(ca).length()).max(LEAST);
+        let acute = a * b * c / (2.0f32 * ab.cross(ca).length()).max(LEAST_DIVISOR);
         // Obtuse triangle: this point is on the longest side, equally far from its end and from
         // another corner.
-        let by_b = a * b * b / (a * a + b * b - c * c).max(LEAST);
-        let by_c = a * c * c / (a * a + c * c - b * b).max(LEAST);
+        let by_b = a * b * b / (a * a + b * b - c * c).max(LEAST_DIVISOR);
+        let by_c = a * c * c / (a * a + c * c - b * b).max(LEAST_DIVISOR);
         select(a * a < b * b + c * c, acute, by_b.max(by_c)).min(0.577_350_3f32 * a)
     }
 
@@ -89,10 +91,8 @@ fn depth_of(field: Field<'_>, pair: OrderedPair, part: Part, thickness: f32) -> 
             deepest = deepest.max(depth);
             looks += 1u32;
             let share = select(looks <= FINE_LOOKS, FINE, SURE);
-            let wanted = (share * thickness).max(1.25f32 * deepest);
-            // A piece with a radius of at most a quarter of the wanted depth is not divided: its
-            // points are deeper than its center by at most this quarter.
-            down = depth + ball.radius > wanted && ball.radius > 0.25f32 * wanted && level < LEVELS;
+            let wanted = (share * thickness).max(DEEPER * deepest);
+            down = depth + ball.radius > wanted && ball.radius > SETTLED * wanted && level < LEVELS;
         }
         if down {
             path *= 4u32;
@@ -124,21 +124,18 @@ pub fn hidden(
     let item = CUBE_POS as u32;
     let count = counters.within(counters::MESHLETS, meshlets.room);
     if item < count {
-        let pair = pairs.get(meshlets.pair(item));
-        let meshlet = meshlets.meshlet(item);
-        let surface = shapes.field(pair.shape_a);
-        let field = shapes.field(pair.shape_b);
-        let own = surface.inner_ball();
+        let work = meshlet_work(shapes, pairs, meshlets, item);
+        let (pair, field) = (work.pair, work.field);
+        let own = work.surface.inner_ball();
         let thickness = (own.radius.abs() * pair.scale).min(field.inner_ball().radius.abs());
-        if FINE * thickness > 2.0f32 * field.rounding() {
+        if FINE * thickness > THICK * field.rounding() {
             let mut depth = 0.0f32;
-            if meshlet == 0u32 && UNIT_POS == 0u32 && own.radius > 0.0f32 {
+            if work.meshlet == 0u32 && UNIT_POS == 0u32 && own.radius > 0.0f32 {
                 let distance = field.exact_distance(pair.to_field(own.center));
                 depth = (own.radius * pair.scale).min(-distance);
             }
-            if by_faces == 1u32 && UNIT_POS < surface.faces_of(meshlet) {
-                let face = surface.first_face(meshlet) + UNIT_POS;
-                let part = shapes.part(pair, face);
+            if by_faces == 1u32 && UNIT_POS < work.faces() {
+                let part = shapes.part(pair, work.face(UNIT_POS));
                 depth = depth.max(depth_of(field, pair, part, thickness));
             }
             if depth > FINE * thickness {

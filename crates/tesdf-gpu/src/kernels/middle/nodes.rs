@@ -1,7 +1,7 @@
 //! Middle phase of the mode `node`: finds the cells of nodes.
 use cubecl::prelude::*;
 
-use super::super::broad::meshlets::Blocks;
+use super::super::broad::meshlets::{Blocks, meshlet_work};
 use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, CANDIDATES, Counters};
 use super::super::field::shapes::{BAND, Field, FieldExpand, NONE, Shapes};
@@ -43,18 +43,16 @@ pub fn nodes(
 ) {
     let item = CUBE_POS as u32;
     if item < counters.within(counters::MESHLETS, meshlets.room) {
-        let pair = pairs.get(meshlets.pair(item));
-        let meshlet = meshlets.meshlet(item);
-        let surface = shapes.field(pair.shape_a);
-        if UNIT_POS < surface.faces_of(meshlet) {
-            let face = surface.first_face(meshlet) + UNIT_POS;
+        let work = meshlet_work(shapes, pairs, meshlets, item);
+        let pair = work.pair;
+        if UNIT_POS < work.faces() {
+            let face = work.face(UNIT_POS);
             let part = shapes.part(pair, face);
-            let field = shapes.field(pair.shape_b);
             let mut k = 0u32;
             while k < 3u32 {
                 if (part.owned >> k) & 1u32 == 1u32 {
                     counters.append(CANDIDATES);
-                    let node = field.locate_node(part.corner(k), pair.part_reach(), prune);
+                    let node = work.field.locate_node(part.corner(k), pair.part_reach(), prune);
                     if node.kept {
                         let at = counters.append(counters::POLYGONS);
                         if at < nodes.room {

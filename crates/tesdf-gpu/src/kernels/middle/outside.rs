@@ -7,7 +7,7 @@
 //! quarters.
 use cubecl::prelude::*;
 
-use super::super::broad::meshlets::{Blocks, ROUNDING};
+use super::super::broad::meshlets::{Blocks, ROUNDING, meshlet_work};
 use super::super::broad::ordered_pair::{OrderedPairs, Part};
 use super::super::counters::{self, Counters};
 use super::super::field::shapes::{Field, FieldExpand, NONE, Shapes, TREE_NODES};
@@ -32,7 +32,9 @@ const UNCOVERED: f32 = 1e-5;
 const QUARTERINGS: u32 = 12;
 /// A part thinner than this (local frame) comes from rounding along the side that two tetrahedra
 /// share. Such a part would extend along the plane of this side, out of the domain. A true part
-/// that is equally thin has neighbours, in which the face is equally near up to this width.
+/// that is equally thin has neighbours, in which the face is equally near up to this width. The
+/// processor drops parts thinner than 1e-11 (`SLIVER` in `tesdf::collide::middle`), because it cuts
+/// in `f64`.
 const SLIVER: f32 = 2.0 * OUT;
 /// Number of quartering levels that a group divides among its threads, and the number of quarters.
 const SHARED_LEVELS: u32 = 3;
@@ -141,12 +143,10 @@ pub fn outside_polygons(
     let item = CUBE_POS as u32;
     let count = counters.within(counters::MESHLETS, meshlets.room);
     if item < count {
-        let pair = pairs.get(meshlets.pair(item));
-        let meshlet = meshlets.meshlet(item);
-        let surface = shapes.field(pair.shape_a);
-        let field = shapes.field(pair.shape_b);
+        let work = meshlet_work(shapes, pairs, meshlets, item);
+        let (pair, field) = (work.pair, work.field);
         let is_around = field.is_mesh() && field.is_conforming() && pair.part_reach() > 0.0f32;
-        let faces = select(is_around, surface.faces_of(meshlet), 0u32);
+        let faces = select(is_around, work.faces(), 0u32);
         // First each thread works on its own face. Then all threads work together on each waiting
         // face.
         let mut turn = 0u32;
@@ -160,7 +160,7 @@ pub fn outside_polygons(
             }
             let mut waits = 0u32;
             if active {
-                let face = surface.first_face(meshlet) + number;
+                let face = work.face(number);
                 let subject = Subject { pair, face, part: shapes.part(pair, face) };
                 let center = subject.part.center();
                 let radius = subject.part.radius_around(center);

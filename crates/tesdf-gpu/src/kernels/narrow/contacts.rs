@@ -6,15 +6,15 @@ use super::super::counters::{CONTACTS, Counters};
 use super::super::field::value::Value;
 use super::super::math::vector::{Row, V3, row_of, xyz};
 
-/// Contacts, or those of them that a reduction keeps.
+/// Contacts, or the contacts that a reduction keeps.
 #[derive(CubeType, CubeLaunch)]
 pub struct Contacts {
-    /// [`WORDS`] each: instances a and b, face of a, cell, face of b, its feature, corner of a with [`CONVERGED`] when the
-    /// minimum was found, ordered pair.
+    /// [`WORDS`] words for each: instances a and b, face of a, cell, face of b, feature of this
+    /// face, corner of a plus [`CONVERGED`], ordered pair.
     pub words: Box<[u32]>,
-    /// [`ROWS`] each: point of a and distance, gradient, point of b; in the field's frame.
+    /// [`ROWS`] rows for each, in the field's frame: point of a and distance; gradient; point of b.
     pub rows: Box<[Row]>,
-    /// Room for so many.
+    /// Capacity of the list.
     pub room: u32,
 }
 
@@ -22,26 +22,27 @@ pub struct Contacts {
 pub const WORDS: u32 = 8;
 /// Rows of a contact.
 pub const ROWS: u32 = 3;
-/// Added to the corner of a contact whose minimum was found.
+/// Added to the corner of a contact when the search for its minimum has converged.
 pub const CONVERGED: u32 = 4;
 
-/// A part of a surface in a cell, and where in it the least signed distance is.
+/// A part of a surface in a cell, and the point of the part with the least signed distance.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Touch {
     pub face: u32,
-    /// The number of the cell, when it has a list.
+    /// The number of the cell; [`NONE`](super::super::field::shapes::NONE) without a list.
     pub cell: u32,
-    /// The corner, plus [`CONVERGED`].
+    /// The corner in Node-TES, otherwise 0; plus [`CONVERGED`] when the search has converged.
     pub corner: u32,
     pub point: V3,
 }
 
-/// What a contact is sorted by within its pair of instances, besides the bits of its point.
+/// The key by which the contacts of a pair of instances are ordered. Contacts with equal keys are
+/// ordered by the bits of their points.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Name {
-    /// 1 for the second ordered pair of two instances.
+    /// 0 for the first ordered pair of two instances, 1 for the second.
     pub order: u32,
     pub face: u32,
     pub cell: u32,
@@ -90,7 +91,7 @@ impl Contacts {
         }
     }
 
-    /// Point of a, and the distance.
+    /// The point of a and the distance of a contact.
     pub fn point_and_distance(&self, contact: u32) -> Row {
         self.rows[(contact * ROWS) as usize]
     }
@@ -103,7 +104,7 @@ impl Contacts {
         xyz(self.rows[(contact * ROWS + 1u32) as usize])
     }
 
-    /// Copies a contact of `other` to place `at`.
+    /// Copies a contact of `other` to index `at`.
     pub fn copy(&mut self, at: u32, other: &Contacts, contact: u32) {
         let mut k = 0u32;
         while k < WORDS {

@@ -1,7 +1,8 @@
-//! The exact mode: the least signed distance over a polygon to a tolerance.
+//! The exact mode: finds the least signed distance over a polygon, within a tolerance.
 //!
-//! Outside of the solid it is the least distance between the polygon and a face of the list, in closed form, a face to
-//! each thread. Inside it is found by branch and bound, a piece of the polygon to each thread.
+//! Outside of the solid, it is the least distance between the polygon and a face of the list. It
+//! has a closed form, and each thread takes a face. Inside the solid, branch and bound finds it,
+//! and each thread takes a piece of the polygon.
 use cubecl::prelude::*;
 
 use super::super::broad::meshlets::ROUNDING;
@@ -16,12 +17,15 @@ use super::exchange::LANES;
 use super::piece::{Lowest, POOL, Piece, Pool, Region, empty_pool, region};
 use super::polygon_distance::{Disk, Polygon};
 
-/// Rounds after which a search gives up; up to 32 pieces are halved in each.
+/// Rounds after which a search gives up. In each round the group halves up to [`LANES`] pieces. The
+/// processor counts evaluations instead (`MAX_EVALUATIONS` in `tesdf::collide::narrow`).
 const ROUNDS: u32 = 96;
-/// Closer to the surface than this a polygon may cross it.
+/// Closer to the surface than this, a polygon may cross it. On the processor, which computes in
+/// `f64`, the limit is 1e-9 (`CLEAR` in `tesdf::collide::narrow`).
 const CLEAR: f32 = 1e-6;
 
-/// What a search looks for: distances up to `reach` that are lower than the best by more than `tolerance`.
+/// The goal of a search: distances up to `reach` that are lower than the best distance so far by
+/// more than `tolerance`.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Goal {
@@ -31,6 +35,7 @@ struct Goal {
 
 #[cube]
 impl Goal {
+    /// Whether a piece with this lower bound can still improve the result.
     fn is_open(self, bound: f32, best: Lowest) -> bool {
         bound < best.distance - self.tolerance && bound <= self.reach
     }
@@ -44,7 +49,8 @@ struct Searched {
     converged: bool,
 }
 
-/// The least distance between a polygon and the faces of the cell's list, a face to each thread.
+/// The least distance between a polygon and the faces of the cell's list. Each thread takes every
+/// [`LANES`]-th face.
 #[cube]
 fn nearest_listed(region: Region<'_>, polygon: Polygon<'_>, normal: V3, pool: &mut Pool) -> Lowest {
     let ball = polygon.ball();
@@ -62,8 +68,8 @@ fn nearest_listed(region: Region<'_>, polygon: Polygon<'_>, normal: V3, pool: &m
     pool.lowest(mine)
 }
 
-/// The pieces that a search starts with: a fan of triangles, one to each thread; a polygon without area is a triangle with
-/// equal corners. Their number, and the lowest value seen.
+/// Puts the first pieces of a search into the pool: a fan of triangles, one for each thread. A
+/// polygon without area is a triangle with equal corners. Returns the lowest value found.
 #[cube]
 fn fan(region: Region<'_>, polygon: Polygon<'_>, triangles: u32, pool: &mut Pool) -> Lowest {
     let mut lowest = Lowest { distance: FAR.runtime(), at: polygon.ball().center };
@@ -77,7 +83,7 @@ fn fan(region: Region<'_>, polygon: Polygon<'_>, triangles: u32, pool: &mut Pool
             face_c: 0u32,
             bound: FAR.runtime(),
         };
-        // One place evaluates the field, as its code is long.
+        // A loop, so that the long code of the field stands here once.
         let mut k = 0u32;
         while k < 3u32 {
             let at = piece.corner(k);
@@ -96,7 +102,7 @@ fn fan(region: Region<'_>, polygon: Polygon<'_>, triangles: u32, pool: &mut Pool
     pool.lowest(lowest)
 }
 
-/// Both halves of a piece, and which of them are open.
+/// Both halves of a piece, whether they are open, and the lowest value found.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Halves {
@@ -120,7 +126,7 @@ fn halve(region: Region<'_>, goal: Goal, whole: Piece, best: Lowest) -> Halves {
         second_open: false,
         lowest: Lowest { distance: at_middle.distance, at: middle },
     };
-    // One place bounds a half, as its code is long.
+    // A loop, so that the long code of the bound stands here once.
     let mut half = 0u32;
     while half < 2u32 {
         let is_first = half == 0u32;
@@ -148,7 +154,7 @@ fn search(region: Region<'_>, polygon: Polygon<'_>, goal: Goal, start: Lowest, p
     let mut round = 0u32;
     while waiting > 0u32 && round < ROUNDS {
         sync_cube();
-        // The youngest pieces, as many as their halves have room.
+        // Take the newest pieces, as many as the pool has room for their halves.
         let taken = waiting.min(LANES).min(POOL - waiting).max(1u32);
         let base = waiting - taken;
         let mut halves = no_halves(best);
@@ -179,7 +185,7 @@ fn search(region: Region<'_>, polygon: Polygon<'_>, goal: Goal, start: Lowest, p
     Searched { best, converged: waiting == 0u32 }
 }
 
-/// Those of a thread without a piece.
+/// The result of a thread without a piece.
 #[cube]
 fn no_halves(best: Lowest) -> Halves {
     let none =
@@ -193,7 +199,8 @@ fn no_halves(best: Lowest) -> Halves {
     }
 }
 
-/// The least signed distance over a polygon, given that at its center.
+/// Finds the least signed distance over a polygon. Evaluates the center first: most polygons are
+/// out of reach.
 #[cube]
 fn minimize(region: Region<'_>, polygon: Polygon<'_>, normal: V3, goal: Goal, pool: &mut Pool) -> Searched {
     let (field, cell) = (region.field, region.cell);
@@ -207,7 +214,7 @@ fn minimize(region: Region<'_>, polygon: Polygon<'_>, normal: V3, goal: Goal, po
         if field.is_mesh() && cell.is_listed() && !all_inside {
             let nearest = nearest_listed(region, polygon, normal, pool);
             found.best = Lowest { distance: region.value(nearest.at).distance, at: nearest.at };
-            // It may cross the surface, or be all inside.
+            // The polygon may cross the surface, or be inside the solid.
             searches = crossing && (nearest.distance <= CLEAR || found.best.distance < 0.0f32);
         }
         if searches {
@@ -219,16 +226,17 @@ fn minimize(region: Region<'_>, polygon: Polygon<'_>, normal: V3, goal: Goal, po
     found
 }
 
-/// What is asked of the exact mode.
+/// Parameters of the exact mode.
 #[derive(CubeType, CubeLaunch)]
 pub struct AskedExact {
-    /// By instance of the field, in its frame.
+    /// Tolerance for each instance that has the field, in its frame.
     pub tolerances: Box<[f32]>,
-    /// Contacts with a gradient less opposed to the face's normal are dropped.
+    /// A contact is dropped when the cosine between its gradient and the face's normal is above
+    /// minus this number.
     pub cos_theta: f32,
 }
 
-/// A group for each polygon.
+/// Finds the contact of a polygon per group.
 #[cube(launch, create_dummy_kernel)]
 pub fn narrow_exact(
     shapes: &Shapes,

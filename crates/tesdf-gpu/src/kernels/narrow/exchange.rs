@@ -1,5 +1,5 @@
-//! Values that the threads of a group exchange: by shuffles where 32 threads are a subgroup, else through shared memory.
-//! The result is the same bits.
+//! The threads of a group exchange values. They use shuffles where a subgroup has 32 threads, and
+//! otherwise shared memory. Both give the same bits.
 use cubecl::prelude::*;
 
 use super::super::field::nearest::Nearest;
@@ -7,14 +7,14 @@ use super::super::field::nearest::Nearest;
 /// Threads that work on one polygon.
 pub const LANES: u32 = 32;
 
-/// How a polygon is worked on.
+/// A variant of the kernel `narrow_faces`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// Threads that share a polygon: [`LANES`] or 1.
     pub lanes: u32,
-    /// Whether they exchange values by shuffles.
+    /// Whether the threads exchange values by shuffles.
     pub subgroups: bool,
-    /// Whether evaluations are counted.
+    /// Whether the kernel counts evaluations.
     pub counting: bool,
 }
 
@@ -38,7 +38,8 @@ pub fn exchange(#[comptime] variant: Variant) -> Exchange {
 
 #[cube]
 impl Exchange {
-    /// The nearest over `width` neighbouring threads of a group, a power of two; of equal ones the lowest face.
+    /// The nearest face of `width` neighbouring threads of a group. `width` is a power of two. At
+    /// equal distances, the face with the lowest index.
     pub fn least(&mut self, mine: Nearest, width: u32) -> Nearest {
         let mut found = mine;
         if comptime!(self.variant.lanes > 1) {
@@ -52,7 +53,7 @@ impl Exchange {
     }
 
     fn least_in_memory(&mut self, mine: Nearest, width: u32) -> Nearest {
-        // Nobody writes while another still reads the last result.
+        // Wait until all threads have read the last result.
         sync_cube();
         self.numbers[UNIT_POS as usize] = mine.squared;
         self.faces[UNIT_POS as usize] = mine.face;
@@ -84,7 +85,8 @@ impl Exchange {
     }
 }
 
-/// Unrolled, which CubeCL's minimum of a subgroup is not: a fifth of an evaluation's instructions were its loops.
+/// The same by shuffles. It is unrolled: with the loops of CubeCL's own minimum of a subgroup,
+/// these took a fifth of the instructions of an evaluation.
 #[cube]
 fn least_of_subgroup(mine: Nearest, width: u32) -> Nearest {
     let mut squared = mine.squared;
@@ -102,8 +104,8 @@ fn least_of_subgroup(mine: Nearest, width: u32) -> Nearest {
     Nearest { squared, face }
 }
 
-/// How many threads share a point: as many as its list has faces, at least as many as leave a part of the group for each
-/// of eight vertices.
+/// Number of threads that share a point: enough for one face of the list each, up to the whole
+/// group. At least four threads share a point, so that the group evaluates eight vertices at most.
 #[cube]
 pub fn width_for(count: u32) -> u32 {
     select(count <= 4u32, 4u32, select(count <= 8u32, 8u32, select(count <= 16u32, 16u32, LANES)))

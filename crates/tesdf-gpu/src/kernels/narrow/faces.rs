@@ -1,7 +1,9 @@
-//! Face-TES (Eq. 9): the least signed distance over a clipped polygon, and the cosine filter (Eq. 10).
+//! Face-TES (Eq. 9): finds the least signed distance over a clipped polygon, and applies the cosine
+//! filter (Eq. 10).
 //!
-//! Frank–Wolfe as `tesdf` does it: from the best of center and vertices, steps of 2 / (k + 2) towards the vertex that lies
-//! farthest down the gradient; the best point seen.
+//! The search is Frank–Wolfe, as in `tesdf`. It starts at the best of the center and the vertices,
+//! and makes steps of 2 / (k + 2) towards the vertex that is lowest along the gradient. The result
+//! is the best point seen.
 use cubecl::prelude::*;
 
 use super::super::broad::meshlets::ROUNDING;
@@ -19,12 +21,13 @@ use super::contacts::{CONVERGED, Contacts, Touch};
 use super::exchange::{Exchange, LANES, Variant, exchange, width_for};
 use super::polygon_distance::Polygon;
 
-/// What is asked of the narrow phase of faces.
+/// Parameters of Face-TES.
 #[derive(CubeType, CubeLaunch)]
 pub struct Asked {
-    /// Steps of Frank–Wolfe.
+    /// Largest number of steps of Frank–Wolfe.
     pub iterations: u32,
-    /// Contacts with a gradient less opposed to the face's normal are dropped.
+    /// A contact is dropped when the cosine between its gradient and the face's normal is above
+    /// minus this number.
     pub cos_theta: f32,
 }
 
@@ -34,12 +37,13 @@ pub struct Asked {
 struct SharedList {
     cell: Cell,
     faces: List,
-    /// The face that this thread keeps in registers, and its position, when it has one.
+    /// The face that this thread keeps in registers, and its index. A thread beyond the end of the
+    /// list has no face of its own.
     own: Face,
     position: u32,
-    /// Threads that share a point.
+    /// Number of threads that share a point.
     width: u32,
-    /// Points at a time.
+    /// Number of points that the group evaluates at the same time.
     points: u32,
 }
 
@@ -71,8 +75,8 @@ fn share_list(field: Field<'_>, cell: Cell, #[comptime] lanes: u32) -> SharedLis
 
 #[cube]
 impl SharedList {
-    /// The field at a point of the cell, by `width` threads of the group together: each part of the group may have a
-    /// point of its own.
+    /// The field at a point of the cell. `width` threads evaluate it together, and each such part
+    /// of the group may have its own point.
     fn value(
         self,
         field: Field<'_>,
@@ -97,7 +101,7 @@ impl SharedList {
     }
 }
 
-/// How the field falls along both edges of a face.
+/// The derivatives of the field along the two edges of a face that its weights follow.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Slope {
@@ -113,11 +117,12 @@ struct Iterate {
     slope: Slope,
 }
 
-/// The state of a search. One place evaluates the field, as its code is long: at the center, the vertices, then the steps.
+/// The state of a search. It evaluates the center, then the vertices, then the steps. One loop does
+/// all of this, so that the long code of the field stands in the kernel once.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 struct Search {
-    /// Number of the next evaluation, and their end.
+    /// Number of the next evaluation, and the number at which the search ends.
     evaluation: u32,
     end: u32,
     /// Number of vertices.
@@ -126,7 +131,7 @@ struct Search {
     /// The best point so far, and its distance.
     best: Weights,
     distance: f32,
-    /// Evaluations that were made, by the group and by point.
+    /// Evaluations by the group so far, and points of these evaluations.
     made: u32,
     made_points: u32,
 }
@@ -136,11 +141,11 @@ struct Search {
 #[expand(derive(Clone, Copy))]
 struct Next {
     at: Weights,
-    /// The vertex that this thread looks at, when it is one.
+    /// The vertex that this thread evaluates; valid when `is_vertex` is true.
     vertex: u32,
     is_vertex: bool,
     is_step: bool,
-    /// Whether the field is known there.
+    /// Whether the field is known at this point.
     is_known: bool,
     /// Whether the search ends.
     ends: bool,
@@ -160,7 +165,8 @@ impl Search {
         next
     }
 
-    /// The vertex that lies farthest down the gradient: the height of a corner over the first one, in weights.
+    /// The vertex that is lowest along the gradient. Heights are relative to the first corner of
+    /// the face.
     fn lowest(&self, polygon: Polygon<'_>) -> Target {
         let mut lowest = FAR.runtime();
         let mut to = Target { vertex: 0u32, at: Weights { s: 0.0f32, t: 0.0f32 } };
@@ -184,7 +190,8 @@ impl Search {
         let at = self.here.at;
         let step = 2.0f32 / ((self.evaluation - self.n - 1u32) as f32 + 2.0f32);
         next.at = Weights { s: at.s + step * (to.at.s - at.s), t: at.t + step * (to.at.t - at.t) };
-        // At a vertex that is the target itself every further step stays there: most minima are such.
+        // When the current vertex is the target itself, all further steps stay there. Most minima
+        // are of this kind.
         next.ends = to.at.s == at.s && to.at.t == at.t;
         next.is_known = next.ends;
     }
@@ -193,13 +200,13 @@ impl Search {
         self.evaluation == self.n + 1u32
     }
 
-    /// Takes an evaluation.
+    /// Takes the result of an evaluation.
     fn take(&mut self, next: Next, distance: f32, found: Iterate) {
         let lower = distance < self.distance;
         self.best =
             Weights { s: select(lower, found.at.s, self.best.s), t: select(lower, found.at.t, self.best.t) };
         self.distance = select(lower, distance, self.distance);
-        // The start is the best of center and vertices.
+        // The steps start at the best of the center and the vertices.
         let moves = next.is_step || lower;
         let here = self.here;
         self.here = Iterate {
@@ -211,7 +218,7 @@ impl Search {
         };
     }
 
-    /// On to the next evaluation.
+    /// Goes to the next evaluation.
     fn on(&mut self, next: Next, points: u32) {
         let after_vertices = (self.evaluation + points).min(self.n + 1u32);
         let following = select(next.is_vertex, after_vertices, self.evaluation + 1u32);
@@ -227,7 +234,8 @@ struct Target {
     at: Weights,
 }
 
-/// The field at the best point: only the contact needs it, so it is in shared memory; threads have too few registers.
+/// The field at the best point. Only the contact needs it, so it waits in shared memory and takes
+/// no registers.
 #[derive(CubeType)]
 struct Best {
     rows: Shared<[Row]>,
@@ -256,7 +264,8 @@ impl Best {
     }
 }
 
-/// The slopes of the field at the vertices, each with the threads that had it.
+/// The slopes of the field at the vertices. Each thread stores the slopes at the vertices that it
+/// has evaluated.
 #[derive(CubeType)]
 struct Slopes {
     numbers: Array<f32>,
@@ -270,7 +279,7 @@ impl Slopes {
         self.numbers[at + 1usize] = slope.t;
     }
 
-    /// At a vertex, from the thread that had it.
+    /// The slope at a vertex, from the thread that has evaluated it.
     fn get(&self, vertex: u32, list: SharedList, exchange: &mut Exchange) -> Slope {
         let at = (2u32 * (vertex / list.points)) as usize;
         let from = vertex % list.points * list.width;
@@ -290,7 +299,7 @@ struct Found {
     lane: u32,
 }
 
-/// Of the vertices of this turn the lowest.
+/// The lowest of the vertices that the group has just evaluated.
 #[cube]
 fn lowest_of(mine: Found, search: Search, vertex: u32, list: SharedList, exchange: &mut Exchange) -> Found {
     let first = exchange.least(Nearest { squared: mine.distance, face: vertex }, LANES.runtime());
@@ -311,7 +320,7 @@ fn lowest_of(mine: Found, search: Search, vertex: u32, list: SharedList, exchang
     }
 }
 
-/// Minimizes the field over a polygon; `best` gets the field at the best point, at place `held`.
+/// Minimizes the field over a polygon. `best` gets the field at the best point.
 #[cube]
 fn minimize(
     field: Field<'_>,
@@ -345,7 +354,7 @@ fn minimize(
             let to = search.lowest(polygon);
             search.step(&mut next, to);
             if search.is_first_step() {
-                // It goes all the way to a vertex, where the field is known.
+                // The first step ends at a vertex, where the field is known.
                 next.is_known = true;
                 search.here = Iterate { at: to.at, slope: slopes.get(to.vertex, list, exchange) };
             }
@@ -369,7 +378,7 @@ fn minimize(
                 best.put(held, here);
             }
             search.take(next, found.distance, found.iterate);
-            // From the center: can any point be within reach?
+            // The center shows whether any point of the polygon can be within reach.
             next.ends = search.evaluation == 0u32 && found.distance - ball.radius > reach + ROUNDING;
         }
         search.on(next, list.points);
@@ -377,9 +386,10 @@ fn minimize(
     search
 }
 
-/// Face-TES. With 32 lanes a group works on each polygon, each thread with a face of the list in registers and with every
-/// 32nd of the rest; a list of 16 faces or less leaves threads for more vertices at a time. With one lane a thread works
-/// on each polygon alone.
+/// Finds the contact of each polygon by Face-TES. With 32 lanes, a group takes a polygon. Each
+/// thread keeps a face of the list in registers, and reads every 32nd of the other faces. With a
+/// list of at most 16 faces, the group evaluates several vertices at the same time. With one lane,
+/// a thread takes a polygon.
 #[cube(launch, create_dummy_kernel)]
 pub fn narrow_faces(
     shapes: &Shapes,
@@ -407,7 +417,7 @@ pub fn narrow_faces(
         let reach = pair.part_reach();
         let search = minimize(field, list, polygon, reach, asked.iterations, &mut exchange, &mut best);
         if comptime!(lanes > 1) {
-            // The thread that writes the contact need not be the one that found it.
+            // Another thread than the one that writes the contact may have found it.
             sync_cube();
         }
         let lane = lane_of(lanes);

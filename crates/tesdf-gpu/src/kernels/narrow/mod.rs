@@ -1,4 +1,4 @@
-//! Narrow phase: the least signed distance over a node or a polygon.
+//! Narrow phase: finds the least signed distance over a node or a polygon.
 pub mod contacts;
 pub mod exact;
 pub mod exchange;

@@ -7,7 +7,7 @@ use super::super::field::shapes::Shapes;
 use super::super::middle::items::Items;
 use super::contacts::{CONVERGED, Contacts, Touch};
 
-/// A thread for each node and its cell.
+/// Writes the contact of a node per thread.
 #[cube(launch, create_dummy_kernel)]
 pub fn narrow_nodes(
     shapes: &Shapes,

@@ -10,11 +10,12 @@ use super::super::math::vector::{V3, v3};
 use super::super::middle::items::Weights;
 use super::exchange::LANES;
 
-/// Pieces that can wait.
+/// Capacity of the pool of waiting pieces.
 pub const POOL: u32 = 128;
 const THIRD: f32 = 0.333_333_34;
 
-/// A triangle of a polygon, the nearest face at each corner, and its bound: no point of it has a lower signed distance.
+/// A triangle of a polygon, with the nearest face at each corner. No point of the triangle has a
+/// signed distance below `bound`.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Piece {
@@ -27,7 +28,7 @@ pub struct Piece {
     pub bound: f32,
 }
 
-/// A signed distance, and where it was found.
+/// A signed distance, and the point that has it.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Lowest {
@@ -51,7 +52,7 @@ pub fn region<'a>(field: Field<'a>, cell: Cell, part: Part) -> Region<'a> {
 
 #[cube]
 impl Lowest {
-    /// The lower of two, of equal ones the first.
+    /// The lower of two distances. At equal distances, the first.
     pub fn or(self, distance: f32, at: Weights) -> Lowest {
         let lower = distance < self.distance;
         Lowest {
@@ -90,12 +91,12 @@ impl Piece {
         }
     }
 
-    /// The mean of its corners.
+    /// The mean of the corners.
     pub fn center(self) -> Weights {
         Weights { s: THIRD * (self.a.s + self.b.s + self.c.s), t: THIRD * (self.a.t + self.b.t + self.c.t) }
     }
 
-    /// The same piece with its longest edge from a to b.
+    /// The same piece, with its corners rotated so that the longest edge goes from a to b.
     pub fn turned(self, part: Part) -> Piece {
         let a = PieceCorner { at: self.a, face: self.face_a };
         let b = PieceCorner { at: self.b, face: self.face_b };
@@ -122,7 +123,8 @@ impl Piece {
         }
     }
 
-    /// The half with corner a, or with corner b; the bound is still that of the whole.
+    /// The half with corner a (or with corner b when `with_a` is false). Its bound is still the
+    /// bound of the whole piece.
     pub fn half(self, with_a: bool, middle: Weights, face: u32) -> Piece {
         let a = PieceCorner { at: self.a, face: self.face_a };
         let b = PieceCorner { at: self.b, face: self.face_b };
@@ -139,7 +141,7 @@ impl Piece {
     }
 }
 
-/// The signed distance at the middle of a piece, and its bound.
+/// The signed distance at the center of a piece, and the bound of the piece.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Bounded {
@@ -173,8 +175,10 @@ impl Region<'_> {
         )
     }
 
-    /// The bound of a piece. The distance to one face is convex: over a triangle it is at most the linear function
-    /// through its corners, so the field is at least minus the greatest minimum of those of some faces.
+    /// The bound of a piece. Inside the solid, the depth is at most the distance to any face. The
+    /// distance to one face is convex, so over a triangle it is at most the linear function with
+    /// the same values at the corners. So the depth is at most the greatest minimum of such
+    /// functions of several faces.
     pub fn bound(self, piece: Piece) -> Bounded {
         let points = Points {
             a: self.part.at(piece.a.s, piece.a.t),
@@ -199,18 +203,18 @@ impl Region<'_> {
     }
 }
 
-/// The pieces that wait, and memory for exchanges, shared by a group.
+/// The waiting pieces of a group, and shared memory for exchanges.
 #[derive(CubeType)]
 pub struct Pool {
     numbers: Shared<[f32]>,
     faces: Shared<[u32]>,
-    /// A value and two weights of each thread.
+    /// The lowest value of each thread, with the two weights of its point.
     found: Shared<[f32]>,
-    /// Pieces that each thread keeps.
+    /// Number of pieces that each thread keeps.
     kept: Shared<[u32]>,
 }
 
-/// How many pieces the threads before this one keep, and how many all of them keep.
+/// Number of pieces that the threads before this one keep, and that all threads keep.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Kept {
@@ -263,7 +267,8 @@ impl Pool {
         }
     }
 
-    /// The lowest value over the group; of equal ones that of the lowest thread. All threads call it.
+    /// The lowest value of all threads. At equal values, that of the first thread. All threads of
+    /// the group must call it.
     pub fn lowest(&mut self, mine: Lowest) -> Lowest {
         sync_cube();
         let own = (3u32 * UNIT_POS) as usize;
@@ -283,7 +288,7 @@ impl Pool {
         lowest
     }
 
-    /// How many pieces are kept. All threads call it.
+    /// Counts the pieces that the threads keep. All threads of the group must call it.
     pub fn count(&mut self, mine: u32) -> Kept {
         sync_cube();
         self.kept[UNIT_POS as usize] = mine;

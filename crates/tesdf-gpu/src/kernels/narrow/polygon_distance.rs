@@ -1,10 +1,11 @@
-//! The least distance between a polygon and a face, in closed form, as [`tesdf::geometry::polygon_to_triangle`] computes it.
+//! The least distance between a polygon and a face in closed form, as in
+//! [`tesdf::geometry::polygon_to_triangle`].
 use cubecl::prelude::*;
 
 use super::super::broad::ordered_pair::Part;
 use super::super::field::nearest::FAR;
 use super::super::math::triangle::{Face, FaceExpand};
-use super::super::math::vector::{V3, pick};
+use super::super::math::vector::{LEAST_DIVISOR, V3, pick};
 use super::super::middle::items::{Polygons, PolygonsExpand, Weights};
 
 /// A polygon that was cut from a part of a surface.
@@ -13,12 +14,12 @@ use super::super::middle::items::{Polygons, PolygonsExpand, Weights};
 pub struct Polygon<'a> {
     polygons: &'a Polygons,
     number: u32,
-    /// Number of vertices, which go around one way or the other.
+    /// Number of vertices. Their order may be either orientation.
     pub count: u32,
     pub part: Part,
 }
 
-/// A distance, and where on the polygon.
+/// A distance, and the nearest point of the polygon.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Apart {
@@ -38,17 +39,16 @@ pub struct PolygonBall {
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Disk {
-    /// Unit normal; zero without a plane.
+    /// Unit normal; zero when the polygon has no plane.
     pub normal: V3,
     pub center: V3,
     pub radius: f32,
 }
 
-/// Segments whose sine, squared, is at most this are parallel: any of their points is as near as any other, up to 1e-6 of
-/// their length.
+/// Two segments count as parallel when the squared sine of their angle is at most this. Then any
+/// pair of opposite points is nearest, up to 1e-6 of their length. `tesdf` computes in `f64` and
+/// needs no such limit.
 const PARALLEL: f32 = 1e-12;
-/// No division by less.
-const LEAST: f32 = 1e-30;
 
 #[cube]
 impl Polygons {
@@ -66,16 +66,16 @@ pub struct Segment {
     pub to: V3,
 }
 
-/// Where two segments are nearest.
+/// The distance of two segments, and the nearest point of the first.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Between {
     pub distance: f32,
-    /// The share of the first segment.
+    /// Position of the nearest point on the first segment, as a fraction of its length.
     pub share: f32,
 }
 
-/// Where two segments are nearest (Ericson 2005, 5.1.9).
+/// The distance of two segments (Ericson 2005, 5.1.9).
 #[cube]
 fn between_segments(first: Segment, second: Segment) -> Between {
     let u = first.to - first.from;
@@ -86,22 +86,27 @@ fn between_segments(first: Segment, second: Segment) -> Between {
     let f = v.dot(w);
     let b = u.dot(v);
     let c = u.dot(w);
-    // Cross products instead of a e − b b: that difference is rounding for segments that cross at less than 3e-4.
+    // Cross products replace a e − b b. For segments at an angle below 3e-4, that difference would
+    // be a rounding error.
     let across = u.cross(v);
     let denominator = across.dot(across);
     let parallel = denominator <= PARALLEL * a * e;
-    let start =
-        select(parallel, 0.0f32, (v.cross(w).dot(across) / denominator.max(LEAST)).clamp(0.0f32, 1.0f32));
-    let t = select(e > 0.0f32, ((b * start + f) / e.max(LEAST)).clamp(0.0f32, 1.0f32), 0.0f32);
-    let share = select(a > 0.0f32, ((b * t - c) / a.max(LEAST)).clamp(0.0f32, 1.0f32), 0.0f32);
+    let start = select(
+        parallel,
+        0.0f32,
+        (v.cross(w).dot(across) / denominator.max(LEAST_DIVISOR)).clamp(0.0f32, 1.0f32),
+    );
+    let t = select(e > 0.0f32, ((b * start + f) / e.max(LEAST_DIVISOR)).clamp(0.0f32, 1.0f32), 0.0f32);
+    let share = select(a > 0.0f32, ((b * t - c) / a.max(LEAST_DIVISOR)).clamp(0.0f32, 1.0f32), 0.0f32);
     let apart = (first.from + u * share) - (second.from + v * t);
     Between { distance: apart.length(), share }
 }
 
 /// Weights of a point of the part's plane.
 ///
-/// The height over the longest side is rounding for a needle, and then counts with the needle's height; where along the
-/// longest side the point is takes account of it.
+/// For a needle, the height over the longest side is a rounding error, and so is the weight of the
+/// third corner. The weight along the longest side is computed from it, so that both weights
+/// together lead back to the point.
 #[cube]
 fn weights_of(part: Part, normal: V3, x: V3) -> Weights {
     let (ab, bc, ca) = (part.b - part.a, part.c - part.b, part.a - part.c);
@@ -113,8 +118,8 @@ fn weights_of(part: Part, normal: V3, x: V3) -> Weights {
     let third = pick(by_ab, part.c, pick(by_bc, part.a, part.b)) - start;
     let to = x - start;
     let area = along.cross(third).dot(normal);
-    let third_weight = along.cross(to).dot(normal) / select(area.abs() > LEAST, area, 1.0f32);
-    let end_weight = (to.dot(along) - third_weight * third.dot(along)) / u.max(v).max(w).max(LEAST);
+    let third_weight = along.cross(to).dot(normal) / select(area.abs() > LEAST_DIVISOR, area, 1.0f32);
+    let end_weight = (to.dot(along) - third_weight * third.dot(along)) / u.max(v).max(w).max(LEAST_DIVISOR);
     let start_weight = 1.0f32 - end_weight - third_weight;
     Weights {
         s: select(by_ab, end_weight, select(by_bc, start_weight, third_weight)),
@@ -133,7 +138,7 @@ impl Face {
 
 #[cube]
 impl Apart {
-    /// The nearer of two distances, of equal ones the first.
+    /// The nearer of two distances. At equal distances, the first.
     fn or(self, distance: f32, s: f32, t: f32) -> Apart {
         let nearer = distance < self.distance;
         Apart {
@@ -159,6 +164,7 @@ impl Polygon<'_> {
         select(i + 1u32 == self.count, 0u32, i + 1u32)
     }
 
+    /// The ball around the polygon.
     pub fn ball(self) -> PolygonBall {
         let mut s = 0.0f32;
         let mut t = 0.0f32;
@@ -180,7 +186,9 @@ impl Polygon<'_> {
         PolygonBall { center, radius }
     }
 
-    /// Whether a point of the polygon's plane lies in it. Beyond the tip of a narrow polygon its sides alone cannot tell.
+    /// Whether a point of the polygon's plane lies in the polygon. Beyond the tip of a narrow
+    /// polygon, rounding decides on which side of the long edges the point lies, so it must be in
+    /// the ball.
     fn holds(self, disk: Disk, x: V3) -> bool {
         let mut left = true;
         let mut right = true;
@@ -196,7 +204,7 @@ impl Polygon<'_> {
         self.count > 2u32 && (left || right) && (x - disk.center).length() <= disk.radius
     }
 
-    /// The least distance to a face of the polygon's vertices and edges.
+    /// The least distance from the polygon's vertices and edges to a face.
     fn border_to(self, f: Face) -> Apart {
         let mut best = Apart { distance: FAR.runtime(), at: Weights { s: 0.0f32, t: 0.0f32 } };
         let mut i = 0u32;
@@ -205,14 +213,14 @@ impl Polygon<'_> {
             let (p, q) = (self.point(v), self.point(w));
             // A corner of the polygon.
             best = best.or(f.distance(p), v.s, v.t);
-            // An edge of it through the face.
+            // An edge of the polygon that passes through the plane of the face.
             let (h, k) = (f.normal.dot(p - f.a), f.normal.dot(q - f.a));
             if h * k < 0.0f32 {
                 let share = h / (h - k);
                 let x = p + (q - p) * share;
                 best = best.or(f.distance(x), v.s + share * (w.s - v.s), v.t + share * (w.t - v.t));
             }
-            // Two edges.
+            // An edge of the polygon and an edge of the face.
             let edge = Segment { from: p, to: q };
             let mut e = 0u32;
             while e < 3u32 {
@@ -233,7 +241,7 @@ impl Polygon<'_> {
         let has_plane = self.count > 2u32 && normal.dot(normal) > 0.5f32;
         let mut e = 0u32;
         while e < 3u32 && has_plane {
-            // A corner of the face over the polygon, or an edge of it through the polygon.
+            // A corner of the face over the polygon, or an edge of the face through the polygon.
             let edge = f.edge(e);
             let (r, s) = (edge.from, edge.to);
             let (h, k) = (normal.dot(r - self.part.a), normal.dot(s - self.part.a));
@@ -284,7 +292,7 @@ mod tests {
         p.distance(r + if t.is_nan() { 0.0 } else { t } * along)
     }
 
-    /// The least over the ends of both, and the crossing where there is one.
+    /// The least distance over the ends of both segments, and over the crossing of their lines.
     fn between([p, q]: [DVec3; 2], [r, s]: [DVec3; 2]) -> f64 {
         let ends =
             [to_segment(p, [r, s]), to_segment(q, [r, s]), to_segment(r, [p, q]), to_segment(s, [p, q])];
@@ -300,7 +308,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
         /// Points, tiny segments, and segments that cross at any angle.
         #[test]
-        fn segments_of_every_kind(
+        fn distances_of_segments_are_exact_within_rounding(
             (p, u, turn) in (point(), point(), point()), angle in -9.0..0.0f64, (size, other) in (-20.0..0.0f64, -20.0..0.0f64),
             (s, t) in (-0.5..1.5f64, -0.5..1.5f64), apart in -9.0..-0.5f64, kind in 0u8..4,
         ) {
@@ -325,7 +333,7 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(4000))]
-        /// Needles and caps as thin as a plane can be told.
+        /// Needles and caps, as thin as a face with a plane can be.
         #[test]
         fn weights_lead_back_to_the_point(
             (a, u, v) in (point(), point(), point()), thin in -6.0..0.0f64, (s, t) in (0.0..1.0f64, 0.0..1.0f64), along in 0.0..1.0f64,

@@ -1,16 +1,17 @@
 //! The points of a pair's members: their box, their radius, and the contacts that a reduction keeps
 //! first. These are the deepest contact, and the extremes along three axes.
 use cubecl::prelude::*;
+use tesdf::collide::internal;
 
 use super::super::field::shapes::NONE;
-use super::super::math::vector::{V3, v3, zero};
+use super::super::math::vector::{LEAST_DIVISOR, V3, v3, zero};
 use super::super::narrow::contacts::Contacts;
 use super::choice::{Chooser, Chosen, GROUP, nothing_chosen};
 use super::members::{Members, MembersExpand, Run};
 
 /// An axis has no extremes when the points extend along it by less than this fraction of their
-/// radius, as in `tesdf`.
-const FLAT: f32 = 1e-3;
+/// radius.
+const FLAT: f32 = internal::FLAT as f32;
 
 // The scans over all members, in order: six for the box of the points, then one each for the
 // largest rounded number and the deepest contact, then three for each axis.
@@ -116,7 +117,7 @@ impl Frame {
         let long = reach.length();
         let is_first = scan == FIRST_AXIS;
         self.radius = select(is_first, long, self.radius);
-        self.along = reach * (1.0f32 / long.max(1e-30f32));
+        self.along = reach * (1.0f32 / long.max(LEAST_DIVISOR));
         if is_first {
             self.first = self.along;
         }

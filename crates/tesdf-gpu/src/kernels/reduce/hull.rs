@@ -11,6 +11,8 @@ pub const VERTICES: u32 = 256;
 /// Vertices that one iteration of a loop compares. Copies of the last vertex fill the list to a
 /// multiple.
 const BLOCK: u32 = 8;
+// The processor uses 1e-7 and 64 (`SLACK` and `STEPS` in `tesdf::collide::hull`), because it
+// computes the nearest point of the hull. Here residuals are only shortened, all members at once.
 /// A residual is short enough when the square of its length is within this fraction of the minimum.
 const SLACK: f32 = 0.02;
 /// Steps per round for a residual.

@@ -15,7 +15,7 @@ use cubecl::prelude::*;
 
 use super::super::counters::{self, Counters};
 use super::super::field::shapes::NONE;
-use super::super::math::vector::{Row, row, row_of};
+use super::super::math::vector::{LEAST_DIVISOR, Row, row, row_of};
 use super::super::math::wrench::{Residual, Wrench, pick_wrench};
 use super::super::narrow::contacts::Contacts;
 use super::choice::{Chosen, GROUP, chooser, nothing_chosen};
@@ -28,7 +28,8 @@ use super::members::{Members, MembersExpand, Run, Touching};
 const LEAST_LENGTH: f32 = 1e-4;
 /// Error of a wrench by the rounding of poses and points, relative to 1 + size / length.
 const POINT_ROUNDING: f32 = 4e-6;
-/// A distance below this may be a rounding error.
+/// A distance below this may be a rounding error. The processor computes in `f64` and uses 1e-12
+/// (`ROUNDING` in `tesdf::collide::hull`).
 const ROUNDING: f32 = 2e-6;
 /// Residuals of at least this fraction of the longest are shortened before the longest is used.
 const NEARLY_LONGEST: f32 = 0.8;
@@ -105,7 +106,7 @@ impl Members {
     /// Replaces points and forces by wrenches. Torques are divided by `length`.
     fn write_wrenches(&mut self, run: Run, frame: Frame, length: f32) {
         // When all points coincide, there is no length, and the torques are 0.
-        let inverse = select(length > 0.0f32, 1.0f32 / length.max(1e-30f32), 0.0f32);
+        let inverse = select(length > 0.0f32, 1.0f32 / length.max(LEAST_DIVISOR), 0.0f32);
         // Wait until all threads have read the points.
         sync_cube();
         let mut i = run.first + UNIT_POS;
@@ -220,7 +221,7 @@ pub fn reduce(
                 progress.follow(found, frame, &seeds, per_pair);
             }
             number = progress.kept;
-            let rounding = POINT_ROUNDING * (1.0f32 + frame.size / length.max(1e-30f32));
+            let rounding = POINT_ROUNDING * (1.0f32 + frame.size / length.max(LEAST_DIVISOR));
             error = progress.error.max(0.0f32) * 1.000_001_f32 + rounding;
         }
         members.write_kept(contacts, run, !reduces, counters, kept);

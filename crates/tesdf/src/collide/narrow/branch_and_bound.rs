@@ -13,7 +13,8 @@ use crate::collide::polygon::Polygon;
 use crate::geometry::Triangle;
 use crate::query::Precision;
 
-/// Number of evaluations after which a search gives up.
+/// Number of evaluations after which a search gives up. The kernel `narrow_exact` counts rounds
+/// instead (`ROUNDS`), because its threads evaluate pieces together.
 const MAX_EVALUATIONS: usize = 20_000;
 
 /// A corner of a part of the polygon.
@@ -175,7 +176,7 @@ impl Branches<'_> {
 /// equal; all these points are tested. Near one face, or between two or three, the error is only
 /// the curvature of the distances. So a search converges even when the minimum extends along a
 /// whole line.
-fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
+pub fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
     let least = |weights: [f64; 3]| {
         let at = |u: &[f64; 3]| u[0] * weights[0] + u[1] * weights[1] + u[2] * weights[2];
         values.iter().map(at).fold(f64::INFINITY, f64::min)

@@ -3,6 +3,8 @@ mod branch_and_bound;
 mod exact;
 mod frank_wolfe;
 
+pub use branch_and_bound::greatest_minimum;
+
 use glam::DVec3;
 
 use super::field::{CellField, Field, FieldBody, ROUNDING};
