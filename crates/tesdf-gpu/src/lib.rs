@@ -20,6 +20,8 @@ pub mod cuda;
 mod device;
 mod encode;
 mod error;
+#[cfg(test)]
+mod kernel_tests;
 mod kernels;
 // Code of `tesdf` that unit tests compare the kernels with.
 #[cfg(test)]
