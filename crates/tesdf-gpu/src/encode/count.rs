@@ -35,25 +35,25 @@ pub struct SampleCounts {
     pub pairs: u64,
     /// Distances from block centers to candidates. The device measures them to select the
     /// candidates of each block.
-    pub looks: u64,
+    pub center_distances: u64,
     /// Thread groups: one for each block of each cell.
     pub groups: u64,
     /// Thread groups that were inspected.
-    pub seen_groups: u64,
+    pub inspected_groups: u64,
     /// Candidates that the inspected groups keep, in total.
-    pub seen_survivors: u64,
+    pub kept_candidates: u64,
 }
 
 impl SampleCounts {
     /// Candidates that a group keeps, as the mean over the inspected groups.
     pub fn survivors(&self) -> f64 {
-        self.seen_survivors as f64 / self.seen_groups.max(1) as f64
+        self.kept_candidates as f64 / self.inspected_groups.max(1) as f64
     }
 
     /// Distances that the device measures, as an estimate. It includes the threads of a block that
     /// have no sample.
     pub fn distances(&self) -> f64 {
-        self.looks as f64 + 2.0 * GROUP as f64 * self.groups as f64 * self.survivors()
+        self.center_distances as f64 + 2.0 * GROUP as f64 * self.groups as f64 * self.survivors()
     }
 }
 
@@ -97,7 +97,7 @@ impl Sampler for SampleCounter {
             counts.candidates += candidates;
             counts.max_candidates = counts.max_candidates.max(candidates);
             counts.pairs += samples * candidates;
-            counts.looks += times * blocks * candidates;
+            counts.center_distances += times * blocks * candidates;
         }
         counts.samples = samples;
         counts.cells += cells.len() as u64;
@@ -111,8 +111,8 @@ impl Sampler for SampleCounter {
         let seen: Vec<(u64, u64)> =
             chosen.par_iter().map(|cell| self.look_into(surface, cell, &grid)).collect();
         for (groups, survivors) in seen {
-            counts.seen_groups += groups;
-            counts.seen_survivors += survivors;
+            counts.inspected_groups += groups;
+            counts.kept_candidates += survivors;
         }
         // Lists of one face keep the layout of the asset small.
         let one = |cell: &SampledCell| {
