@@ -4,12 +4,12 @@ mod support;
 
 mod compare;
 
-use compare::{Compared, device, each_mode, hold, hold_against};
+use compare::{Compared, device, each_mode, found, hold, hold_against};
 use support::random::Random;
 use support::shapes;
 use support::tetrahedra::{bare_beam, beam, bend, moves};
 use tesdf::TeSdf;
-use tesdf::collide::{Instance, Placement, Pose, Scene, Shape};
+use tesdf::collide::{CollideOptions, Instance, Mode, Placement, Pose, Reduction, Scene, Shape};
 use tesdf::domain::ConformingMesh;
 use tesdf::encode::{Domain, EncodeOptions, Encoder, Preset, Refinement};
 use tesdf::glam::{DQuat, DVec3};
@@ -109,6 +109,30 @@ fn contacts_are_those_of_the_host() {
     compared.is_good(1000);
 }
 
+/// The numbers of launches that `docs/gpu/design.md` states: ten, one more for faces where a shape
+/// has a conforming domain, and seven more for a reduction.
+#[test]
+fn a_pass_takes_the_documented_number_of_launches() {
+    let (solid, domain) = beam();
+    let beam = Shape::from(encoded(&solid, &domain, &plain()));
+    let bodies = [(beam, 1), (Shape::Sphere { radius: 1.0 }, 0)];
+    for (body, for_domain) in bodies {
+        let mut scene = Scene::new();
+        for shape in [body, Shape::Plane] {
+            let shape = scene.add_shape(shape).expect("a shape");
+            scene.add(Instance::new(shape, Pose::IDENTITY)).expect("an instance");
+        }
+        for mode in [Mode::Node, Mode::Face, Mode::Exact] {
+            for (reduction, of_reduction) in [(Reduction::None, 0), (Reduction::PerPair(2), 7)] {
+                let options = CollideOptions { reduction, ..CollideOptions::with_mode(mode) };
+                let (_, detector) = found(&scene, &options, DetectorOptions::default());
+                let outside = if mode == Mode::Node { 0 } else { for_domain };
+                assert_eq!(detector.report().launches, 10 + outside + of_reduction, "{options:?}");
+            }
+        }
+    }
+}
+
 /// All vertices of a domain, as the device takes them.
 fn positions(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<f32> {
     domain.vertices().iter().flat_map(|&p| to(p).as_vec3().to_array()).collect()
@@ -120,7 +144,7 @@ fn rounded(p: DVec3) -> DVec3 {
 }
 
 #[test]
-fn what_moves_on_the_device_is_as_what_moves_on_the_host() {
+fn moved_vertices_give_the_results_of_the_host() {
     let device = device();
     let mut random = Random(4);
     let ball = shapes::Shape::default().add_sphere(DVec3::ZERO, 2, || 1.1).solid();

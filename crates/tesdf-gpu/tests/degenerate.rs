@@ -179,7 +179,7 @@ fn contacts_are_those_of_the_host() {
 
 /// Moves vertices on the device until faces and tetrahedra are points and segments.
 #[test]
-fn what_collapses_on_the_device() {
+fn faces_that_collapse_on_the_device_count_as_their_edges() {
     let device = device();
     let mut random = Random(7);
     for (solid, domain) in [beam(), bare_beam()] {

@@ -69,7 +69,7 @@ impl Case {
 }
 
 #[test]
-fn faces_of_the_processor_and_besides_only_what_rounding_cannot_tell() {
+fn lists_have_the_faces_of_the_processor_and_ties_within_rounding() {
     let sampler = DeviceSampler::new(device());
     println!("device: {}", sampler.name());
     let progress = Progress::default();
@@ -197,7 +197,7 @@ fn a_threshold_as_wide_as_the_grid_misses_nothing() {
 }
 
 #[test]
-fn it_can_be_stopped() {
+fn sampling_can_be_cancelled() {
     let case = Case::new("tetra");
     let sampling = Sampling { resolution: 3, ..Sampling::PAPER };
     let progress = Progress::default();

@@ -40,7 +40,7 @@ fn both(scene: &Scene, mode: Mode) -> [Vec<HiddenOverlap>; 2] {
 }
 
 #[test]
-fn cubes_that_pass_through_each_other_a_world_for_each_shift() {
+fn shifted_cubes_overlap_at_every_shift() {
     let mut scene = Scene::new();
     let mesh = scene.add_shape(Shape::Mesh(cube().asset.clone())).expect("a mesh is a shape");
     let simple = scene.add_shape(Shape::Box { half_extents: DVec3::splat(0.5) }).expect("a box");

@@ -122,7 +122,7 @@ fn points_times_instances() {
 }
 
 #[test]
-fn what_cannot_be_is_an_error() {
+fn invalid_queries_are_errors() {
     let device = Device::choose(None).expect("a device");
     let shapes = GpuShapes::upload(&device, &[Shape::Plane]).expect("fits");
     let others = GpuShapes::upload(&device, &[(); 4].map(|()| Shape::Plane)).expect("fits");

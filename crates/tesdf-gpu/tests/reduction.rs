@@ -257,7 +257,7 @@ fn contacts_at_one_point() {
 }
 
 #[test]
-fn nothing_touches() {
+fn scenes_without_contacts_have_no_reductions() {
     let mut random = Random(1);
     let bodies: [Placed; 2] = Relation::Apart.place(["l_bracket", "cube"], &mut random);
     let options =
