@@ -297,6 +297,7 @@ fn a_slice_is_a_png_of_the_size_asked_for() {
     }
 }
 
+#[cfg(feature = "gpu")]
 #[test]
 fn samples_on_a_device_are_in_32_bits_and_the_file_says_so() {
     let folder = Folder::new();
