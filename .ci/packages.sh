@@ -8,5 +8,5 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 # Not optimised: the compiled code never runs.
 export CARGO_PROFILE_DEV_OPT_LEVEL=0
-step cargo package --quiet --allow-dirty -p tesdf -p tesdf-sim
-step cargo package --quiet --allow-dirty --no-verify --workspace --exclude tesdf-python
+step cargo package --quiet --allow-dirty --target-dir target/packages -p tesdf -p tesdf-sim
+step cargo package --quiet --allow-dirty --target-dir target/packages --no-verify --workspace --exclude tesdf-python
