@@ -6,8 +6,8 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use serde::Serialize;
 use tesdf::collide::{
-    CollideOptions, Contact, Contacts, HiddenOverlap, Instance, InstanceId, Mode, PairReduction, Pose,
-    Reduction, Scene, Statistics, detect,
+    CollideOptions, Contact, Contacts, ContactsPer, HiddenOverlap, Instance, InstanceId, Mode, PairReduction,
+    Pose, Reduction, Scene, Statistics, detect,
 };
 use tesdf::{Length, TeSdf};
 
@@ -73,6 +73,10 @@ pub struct Args {
     /// Features that are tested against the distance field of the other body
     #[arg(long, value_enum, default_value_t = ModeName::Exact)]
     pub mode: ModeName,
+    /// In the modes `face` and `exact`: one contact for each cell of the other body that a face
+    /// meets, or for each face, with the extremes of flat contact
+    #[arg(long, value_name = "cell|face", value_parser = parse::contacts_per, default_value = "cell")]
+    pub contacts_per: ContactsPer,
     /// Report contacts up to this signed distance, in the meshes' unit
     #[arg(long, value_name = "D", value_parser = parse::length, default_value_t = 0.0, allow_hyphen_values = true)]
     pub contact_distance: f64,
@@ -149,6 +153,7 @@ impl Args {
         };
         CollideOptions {
             mode,
+            contacts_per: self.contacts_per,
             iterations: self.iterations,
             tolerance,
             contact_distance: self.contact_distance,
@@ -220,7 +225,7 @@ fn text(found: &Contacts) -> String {
         let _ = writeln!(text, "{} dropped by the cosine filter, {} by the reduction", s.filtered, s.reduced);
     }
     if s.unconverged > 0 {
-        let _ = writeln!(text, "{} not within the tolerance", count(s.unconverged, "contact"));
+        let _ = writeln!(text, "{} not proved to be within the tolerance", count(s.unconverged, "contact"));
     }
     let mut deepest: Vec<&Contact> = found.iter().collect();
     deepest.sort_by(|x, y| x.distance.total_cmp(&y.distance));

@@ -96,6 +96,21 @@ fn a_hidden_overlap_is_reported() {
 }
 
 #[test]
+fn contacts_per_face_are_the_corners_of_a_cube_on_a_cube() {
+    let folder = cube();
+    let on_top =
+        ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0 0 2 0 0 0 1", "--cos-theta", "0.5", "--json"];
+    let found = json(&folder, &[&on_top[..], &["--contacts-per", "face"]].concat());
+    let faces = found.as_array().unwrap();
+    for [x, y] in [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]] {
+        let is_here = |c: &Value| c["point_a"][0] == x && c["point_a"][1] == y;
+        assert!(faces.iter().any(is_here), "no contact at {x} {y}: {found}");
+    }
+    let (code, _, error) = folder.tesdf(&[&on_top[..], &["--contacts-per", "body"]].concat());
+    assert!(code == Some(2) && error.contains("expected cell or face"), "{error}");
+}
+
+#[test]
 fn why_explains_found_and_missing_contacts() {
     let folder = cube();
     let why = |more: &[&str]| {

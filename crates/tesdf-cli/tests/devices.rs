@@ -39,6 +39,8 @@ fn devices_are_listed_and_chosen() {
         };
         assert!(deepest(&host) < 0.0 && (deepest(&host) - deepest(&device)).abs() < 1e-7, "{mode}");
     }
+    let (code, _, err) = folder.tesdf(&["collide", &a, &b, "--device", "0", "--contacts-per", "face"]);
+    assert!(code == Some(2) && err.contains("one contact per face is not available on a device"), "{err}");
     let (code, _, err) = folder.tesdf(&["collide", &a, &b, "--device", "no such device"]);
     assert_eq!(code, Some(2));
     assert!(err.contains("no device is named \"no such device\"") && err.contains(name), "{err}");

@@ -78,6 +78,7 @@ fn errors_name_the_line_and_the_body() {
         (change("[record]", "[solver]\nredetections = 3\n[record]"), vec!["solver", "redetections"]),
         (change("[record]", "[detector]\ntolerance = 0\n[record]"), vec!["detector", "tolerance"]),
         (change("[record]", "[detector]\nmode = \"edge\"\n[record]"), vec!["line 6", "edge"]),
+        (change("[record]", "[detector]\ncontacts_per = \"body\"\n[record]"), vec!["line 6", "body"]),
         (
             DROP.to_string()
                 + "[criterion.screw]\nbody = \"nut\"\naxis = [0,0,1]\npitch = 1\nmin_turns = 1\nbacklash = 1",
@@ -85,7 +86,7 @@ fn errors_name_the_line_and_the_body() {
         ),
     ];
     for (k, (text, expected)) in cases.into_iter().enumerate() {
-        let text = if k == 18 { refusal(&text) } else { text };
+        let text = if k == 19 { refusal(&text) } else { text };
         assert!(text.starts_with("drop.toml"), "case {k}: {text}");
         for part in expected {
             assert!(text.contains(part), "case {k}: no {part:?} in {text}");

@@ -1,6 +1,6 @@
 //! Parsers for the values of options.
 use tesdf::Length;
-use tesdf::collide::{Motion, Pose, Velocity};
+use tesdf::collide::{ContactsPer, Motion, Pose, Velocity};
 use tesdf::geometry::Aabb;
 use tesdf::glam::{DQuat, DVec3};
 
@@ -25,6 +25,18 @@ pub fn length(text: &str) -> Result<f64, String> {
         true => Ok(value),
         false => Err(format!("{} is negative; expected a length", Length::Absolute(value))),
     })
+}
+
+/// Parses what a contact of a face stands for.
+///
+/// # Errors
+/// The message says what was found.
+pub fn contacts_per(text: &str) -> Result<ContactsPer, String> {
+    match text {
+        "cell" => Ok(ContactsPer::Cell),
+        "face" => Ok(ContactsPer::Face),
+        _ => Err("expected cell or face".into()),
+    }
 }
 
 /// Parses a number from 0 to 1.

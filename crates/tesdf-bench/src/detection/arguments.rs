@@ -3,6 +3,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use serde::Serialize;
+use tesdf::collide::ContactsPer;
 use tesdf_terminal::device::{self, Choice};
 use tesdf_terminal::parse;
 
@@ -18,6 +19,10 @@ pub struct Args {
     /// Features that are tested against the distance field of the other body
     #[arg(long, value_enum, default_value_t = ModeName::Face)]
     pub mode: ModeName,
+    /// In the modes `face` and `exact`: one contact for each cell of the other body that a face
+    /// meets, or for each face, with the extremes of flat contact
+    #[arg(long, value_name = "cell|face", value_parser = parse::contacts_per, default_value = "cell")]
+    pub contacts_per: ContactsPer,
     /// Number of Frank-Wolfe iterations in the mode `face`
     #[arg(long, value_name = "K", default_value_t = 16)]
     pub iterations: u32,

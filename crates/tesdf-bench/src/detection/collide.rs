@@ -23,6 +23,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     };
     let options = CollideOptions {
         contact_distance,
+        contacts_per: args.contacts_per,
         iterations: args.iterations,
         cos_theta: Some(args.cos_theta),
         reduction: args.reduce.map_or(Reduction::None, Reduction::PerPair),
@@ -33,6 +34,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         source: args.source.display().to_string(),
         device: "cpu".into(),
         mode: args.mode,
+        contacts_per: args.contacts_per,
         iterations: args.iterations,
         cos_theta: args.cos_theta,
         contact_distance,

@@ -3,6 +3,7 @@ use std::fmt::Write as _;
 use std::time::Duration;
 
 use serde::Serialize;
+use tesdf::collide::ContactsPer;
 use tesdf_terminal::report::size;
 
 use super::arguments::{LanesName, ModeName};
@@ -71,6 +72,7 @@ pub struct Report {
     pub source: String,
     pub device: String,
     pub mode: ModeName,
+    pub contacts_per: ContactsPer,
     pub iterations: u32,
     pub cos_theta: f64,
     pub contact_distance: f64,

@@ -17,7 +17,8 @@ use std::collections::BTreeMap;
 
 use tesdf::Length;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, HiddenOverlap, Reduction, Scene, Shape, ShapeId, Statistics,
+    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, Mode, Reduction, Scene, Shape,
+    ShapeId, Statistics,
 };
 
 use buffers::{PipelineBuffers, ROW, WORD};
@@ -156,6 +157,12 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         options.validate()?;
+        if options.contacts_per == ContactsPer::Face && options.mode != Mode::Node {
+            return Err(GpuError::Unavailable {
+                what: "one contact per face".into(),
+                instead: "detect contacts per cell, or detect on the processor",
+            });
+        }
         if shape_ids(scene) != self.shape_ids {
             if self.shapes.have_moved() {
                 return Err(GpuError::Unavailable {

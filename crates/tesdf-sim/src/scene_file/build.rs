@@ -125,6 +125,7 @@ fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions
         section.contact_distance.unwrap_or_else(|| CONTACT_DISTANCE * smallest_free_body(system));
     CollideOptions {
         mode,
+        contacts_per: section.contacts_per,
         iterations: section.iterations,
         tolerance: Length::OfDiagonal(section.tolerance),
         contact_distance,

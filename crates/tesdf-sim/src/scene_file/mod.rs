@@ -33,6 +33,7 @@ mod units;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use tesdf::collide::ContactsPer;
 use toml::Spanned;
 
 pub use error::SceneError;
@@ -167,6 +168,9 @@ pub enum DetectorMode {
 pub struct DetectorSection {
     /// Which features are tested.
     pub mode: DetectorMode,
+    /// What a contact of the modes `face` and `exact` stands for: a face in one cell of the other
+    /// body, or a face.
+    pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations in the mode `face`.
     pub iterations: u32,
     /// Tolerance in the mode `exact`, as a fraction of the diagonal of the body with the field.
@@ -182,6 +186,7 @@ impl Default for DetectorSection {
     fn default() -> Self {
         Self {
             mode: DetectorMode::Exact,
+            contacts_per: ContactsPer::Cell,
             iterations: 16,
             tolerance: 1e-7,
             cos_theta: None,

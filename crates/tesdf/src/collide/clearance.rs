@@ -263,7 +263,7 @@ impl<'a> Pair<'a> {
         let half = 0.5 * tolerance;
         let exact =
             CollideOptions { tolerance: Length::Absolute(half), ..CollideOptions::with_mode(Mode::Exact) };
-        let search = Search::new(&exact, 0.0, &field, 0.0);
+        let search = Search::new(&exact, 0.0, &field, [0.0; 2]);
         let found = least(&surface, &field, &search, half / field.unit(), limit / field.unit())?;
         let Least { distance, face, part, minimum, converged } = found;
         let gradient = minimum.value.gradient;

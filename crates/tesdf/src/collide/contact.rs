@@ -32,8 +32,9 @@ pub struct Contact {
     pub instance_b: InstanceId,
     /// The touching features. It stays the same from step to step while the same features touch.
     pub feature: FeatureId,
-    /// Whether the minimum over the face is within the tolerance. False when its search was cut
-    /// short.
+    /// Whether it is proved that no point of the face is deeper by more than the tolerance. False
+    /// when a search was cut short, and where no bound proves a result of the mode
+    /// [`Face`](super::Mode::Face). A GPU does not compute that bound.
     pub converged: bool,
 }
 
@@ -65,7 +66,8 @@ pub struct Statistics {
     pub instance_pairs: usize,
     /// Faces or nodes of a that remain after the broad phase, over all pairs.
     pub candidates: usize,
-    /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell.
+    /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell. With
+    /// one contact per face: faces.
     pub polygons: usize,
     /// Contacts within the contact distance.
     pub touching: usize,
@@ -73,7 +75,7 @@ pub struct Statistics {
     pub filtered: usize,
     /// Contacts that the reduction dropped.
     pub reduced: usize,
-    /// Contacts whose minimum is not within the tolerance.
+    /// Contacts whose minimum is not proved to be within the tolerance.
     pub unconverged: usize,
     /// Bytes of all contacts and intermediate products.
     pub bytes: usize,

@@ -140,7 +140,8 @@ impl<'a> FieldBody<'a> {
     }
 }
 
-/// The field within one cell, where all points are answered in the same way.
+/// The field for the points of one polygon: within one cell, where all points are answered in the
+/// same way, or everywhere.
 #[derive(Clone, Copy, Debug)]
 pub enum CellField<'a> {
     /// A cell of a mesh's domain, with the faces of its list, if it has one.
@@ -152,17 +153,96 @@ pub enum CellField<'a> {
         /// The faces of its list; empty without a list.
         faces: &'a Faces,
     },
+    /// The complete field of a mesh.
+    Whole(&'a TeSdf),
     /// The complete field of a simple shape.
     Simple(Simple),
 }
 
 impl CellField<'_> {
-    /// The value at a point of the cell. The point must be finite.
+    /// The value at a point of the polygon. The point must be finite.
     #[inline]
     pub fn value(&self, p: DVec3, precision: Precision) -> FieldValue {
         match *self {
             Self::Mesh { asset, place, faces } => asset.find(p, place, faces, precision).into(),
+            Self::Whole(asset) => asset.found_at(p, asset.locate(p), precision).into(),
             Self::Simple(simple) => simple.value(p),
         }
     }
+
+    /// The `value` at `p`. Where several faces are equally near, with the gradient that most opposes
+    /// `normal`.
+    pub fn opposing(&self, p: DVec3, normal: DVec3, value: FieldValue, precision: Precision) -> FieldValue {
+        if normal == DVec3::ZERO || value.gradient.dot(normal) < OPPOSITE {
+            return value;
+        }
+        let tie = if precision == Precision::F32 { ROUNDING } else { TIE };
+        match *self {
+            Self::Mesh { asset, faces, .. } => asset.most_opposing(p, faces, normal, value, tie),
+            Self::Whole(asset) => match asset.locate(p) {
+                Place::Listed { offset, .. } => {
+                    asset.with_list(offset, |faces| asset.most_opposing(p, faces, normal, value, tie))
+                }
+                _ => asset.most_opposing(p, &Faces::default(), normal, value, tie),
+            },
+            Self::Simple(simple) => simple.most_opposing(p, normal, value),
+        }
+    }
 }
+
+/// Below this cosine a gradient opposes a normal so well that ties are not looked for.
+const OPPOSITE: f64 = -0.999;
+
+/// Faces whose distances differ by less (local frame) are equally near.
+const TIE: f64 = 1e-12;
+
+impl TeSdf {
+    /// The value at a point outside whose nearest face is known; `None` on the surface.
+    pub fn value_outside(&self, p: DVec3, face: u32) -> Option<FieldValue> {
+        let closest = self.local_triangle(face as usize).closest(p);
+        (closest.distance > ON_SURFACE).then(|| FieldValue {
+            distance: closest.distance,
+            gradient: (p - closest.point) / closest.distance,
+            closest_point: closest.point,
+            position: face,
+            feature: closest.feature,
+        })
+    }
+
+    /// Of the faces at the distance of `value`, the one whose gradient most opposes `normal`.
+    /// `faces` are those of the list that answers the point, if it has one.
+    fn most_opposing(
+        &self,
+        p: DVec3,
+        faces: &Faces,
+        normal: DVec3,
+        value: FieldValue,
+        tie: f64,
+    ) -> FieldValue {
+        let limit = value.distance.abs() + tie;
+        // On the surface the gradients are the normals of the faces.
+        let on_surface = value.distance.abs() <= tie.max(ON_SURFACE);
+        let (mut best, mut id) = (value, self.face_ids[value.position as usize]);
+        self.faces_within(p, faces, limit, &mut |face| {
+            if face == value.position && !on_surface {
+                return;
+            }
+            let triangle = self.local_triangle(face as usize);
+            let closest = triangle.closest(p);
+            let outward = if value.distance < 0.0 { closest.point - p } else { p - closest.point };
+            let gradient = if on_surface { triangle.normal } else { outward.normalize_or_zero() };
+            let (own, other) = (gradient.dot(normal), best.gradient.dot(normal));
+            let face_id = self.face_ids[face as usize];
+            let is_better = own < other - TIE || (own < other + TIE && face_id < id);
+            if closest.distance <= limit && gradient != DVec3::ZERO && is_better {
+                let (closest_point, feature) = (closest.point, closest.feature);
+                best = FieldValue { gradient, closest_point, position: face, feature, ..value };
+                id = face_id;
+            }
+        });
+        best
+    }
+}
+
+/// Nearer to the surface than this (local frame), points count as on it.
+const ON_SURFACE: f64 = 5e-10;

@@ -73,7 +73,7 @@ pub use hidden_overlap::HiddenOverlap;
 pub use ids::{InstanceId, ShapeId};
 pub use instance_pairs::{InstancePair, instance_pairs};
 pub use motion::Motion;
-pub use options::{CollideOptions, Mode, Reduction};
+pub use options::{CollideOptions, ContactsPer, Mode, Reduction};
 pub use pose::{Placement, Pose};
 pub use reduce::{reduce_pairs, wrench_error};
 pub use scene::{Groups, Instance, Scene, Velocity};

@@ -19,6 +19,20 @@ pub enum Mode {
     Exact,
 }
 
+/// What a contact of the modes [`Face`](Mode::Face) and [`Exact`](Mode::Exact) stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactsPer {
+    /// A face of body *a* in one cell of body *b*, as in the paper: the least signed distance over
+    /// the part of the face in that cell. A face has as many contacts as it meets cells.
+    Cell,
+    /// A face of body *a*: its least signed distance over all cells. Where the face lies flat on
+    /// body *b*, or is large, the extremes of the part that touches are contacts too, so that a box
+    /// stands on its corners. Of equally near faces of *b*, the one that opposes the face gives the
+    /// normal. Faces that have the same vertex as their contact share it.
+    Face,
+}
+
 /// Number of contacts kept per pair of instances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -35,11 +49,15 @@ pub enum Reduction {
 pub struct CollideOptions {
     /// Nodes or faces, and the method.
     pub mode: Mode,
+    /// One contact for each cell that a face meets, or for each face. Not used for nodes.
+    #[serde(default = "per_cell")]
+    pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations of the mode [`Face`](Mode::Face), at most
     /// [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). Each evaluates the field once. The paper uses 16.
     pub iterations: u32,
-    /// Bound of the error of the mode [`Exact`](Mode::Exact): a fraction of the diagonal of the
-    /// field's body, or a length in the world's unit.
+    /// Bound of the error of the mode [`Exact`](Mode::Exact), and of results of the mode
+    /// [`Face`](Mode::Face) that count as converged: a fraction of the diagonal of the field's body,
+    /// or a length in the world's unit.
     pub tolerance: Length,
     /// Contacts are reported up to this signed distance, in the world's unit. It may be wider than
     /// the band of an asset: outside the domain, the face tree answers, also exactly.
@@ -55,6 +73,10 @@ pub struct CollideOptions {
     /// Precision of the reported distances, normals and witness points.
     #[serde(skip, default = "exact")]
     pub precision: Precision,
+}
+
+fn per_cell() -> ContactsPer {
+    ContactsPer::Cell
 }
 
 fn exact() -> Precision {
@@ -89,7 +111,7 @@ impl CollideOptions {
         {
             return refuse("cos_theta", cos.to_string(), "-1 to 1");
         }
-        if self.mode == Mode::Exact {
+        if self.mode != Mode::Node {
             let (Length::OfDiagonal(value) | Length::Absolute(value)) = self.tolerance;
             if !(value > 0.0 && value.is_finite()) {
                 return refuse("tolerance", value.to_string(), "a finite number greater than 0");
@@ -110,11 +132,12 @@ impl CollideOptions {
 }
 
 impl Default for CollideOptions {
-    /// Exact mode with a tolerance of 1e-7 of the diagonal, contact distance 0, no filter and no
-    /// reduction.
+    /// Exact mode, contacts per cell, a tolerance of 1e-7 of the diagonal, contact distance 0, no
+    /// filter and no reduction.
     fn default() -> Self {
         Self {
             mode: Mode::Exact,
+            contacts_per: ContactsPer::Cell,
             iterations: 16,
             tolerance: Length::OfDiagonal(1e-7),
             contact_distance: 0.0,

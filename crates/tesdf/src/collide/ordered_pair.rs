@@ -4,7 +4,7 @@ use super::field::FieldBody;
 use super::instance_pairs::instance_pairs;
 use super::narrow::{Minimum, Search};
 use super::surface::{Candidates, Part, SurfaceBody};
-use super::{CollideError, CollideOptions, Contact, FeatureId, InstanceId, Mode, Scene};
+use super::{CollideError, CollideOptions, Contact, ContactsPer, FeatureId, InstanceId, Mode, Scene, Shape};
 
 /// The surface of one body and the field of another.
 pub struct OrderedPair<'a> {
@@ -41,9 +41,13 @@ impl<'a> OrderedPair<'a> {
         let (of_a, of_b) = (scene.instance(a)?, scene.instance(b)?);
         let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
         let field = FieldBody::new(shape_b, of_b.placement());
+        if let Shape::Mesh(asset) = shape_b {
+            asset.store_normals();
+        }
         let surface = SurfaceBody::new(shape_a, of_a.placement(), &field);
-        let diagonal = shape_b.diagonal().min(f64::MAX) * of_b.scale;
-        let search = Search::new(options, contact_distance, &field, diagonal);
+        let diagonals = [(shape_a, of_a), (shape_b, of_b)]
+            .map(|(shape, instance)| shape.diagonal().min(f64::MAX) * instance.scale);
+        let search = Search::new(options, contact_distance, &field, diagonals);
         Ok(Self { surface, field, search, options, a, b })
     }
 
@@ -51,6 +55,10 @@ impl<'a> OrderedPair<'a> {
     pub fn candidates(&self) -> Candidates {
         match self.options.mode {
             Mode::Node => self.surface.nodes(&self.field, self.search.reach),
+            // The search over a face begins with the test by which `faces` drops it.
+            Mode::Face | Mode::Exact if self.options.contacts_per == ContactsPer::Face => {
+                self.surface.faces_of_leaves(&self.field, self.search.reach)
+            }
             Mode::Face | Mode::Exact => self.surface.faces(&self.field, self.search.reach),
         }
     }
@@ -76,8 +84,16 @@ impl<'a> OrderedPair<'a> {
         }
     }
 
+    /// The vertex at which a minimum is, by its bits; `None` in the mode node, where each vertex has
+    /// one contact, and for contacts per cell.
+    pub fn vertex(&self, part: &Part, minimum: &Minimum) -> Option<[u64; 3]> {
+        let one_each = self.options.mode == Mode::Node || self.options.contacts_per == ContactsPer::Cell;
+        let corner = minimum.corner.filter(|_| !one_each)?;
+        Some(part.points()[usize::from(corner)].to_array().map(f64::to_bits))
+    }
+
     pub fn contact(&self, part: &Part, minimum: &Minimum, face_a: u32, feature: u32) -> Contact {
-        let Minimum { point, value, cell, converged } = *minimum;
+        let Minimum { point, value, cell, converged, .. } = *minimum;
         let (face_b, feature_b) = self.field.names(&value);
         Contact {
             point_a: self.field.to_world(point - part.radius * value.gradient),

@@ -2,10 +2,11 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use crate::geometry::Aabb;
+use crate::query::MAX_POINTS;
 
 /// Largest number of vertices of a polygon. A triangle clipped by a tetrahedron has up to seven;
 /// the others leave room for vertices that rounding adds on a line.
-pub const MAX_VERTICES: usize = 12;
+pub const MAX_VERTICES: usize = MAX_POINTS;
 
 /// A vertex of a polygon that is being clipped.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -40,6 +40,28 @@ impl Simple {
         FieldValue { distance, gradient, closest_point, position, feature: Feature::Face }
     }
 
+    /// As `value` at `p`. Inside a box, where several sides are equally near, the gradient is that
+    /// which most opposes `normal`.
+    pub fn most_opposing(&self, p: DVec3, normal: DVec3, value: FieldValue) -> FieldValue {
+        let Self::Box(half) = *self else { return value };
+        if value.distance > 0.0 {
+            return value;
+        }
+        let tie = 1e-12 * half.max_element();
+        let mut best = value;
+        for axis in 0..3 {
+            let depth = half[axis] - p[axis].abs();
+            let outward = DVec3::AXES[axis] * if p[axis] < 0.0 { -1.0 } else { 1.0 };
+            if depth <= tie - value.distance && outward.dot(normal) < best.gradient.dot(normal) {
+                let mut closest_point = p;
+                closest_point[axis] = half[axis].copysign(p[axis]);
+                let position = 2 * axis as u32 + u32::from(p[axis] >= 0.0);
+                best = FieldValue { gradient: outward, closest_point, position, ..value };
+            }
+        }
+        best
+    }
+
     /// Bounds; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         let half = match *self {

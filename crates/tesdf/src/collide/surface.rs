@@ -84,9 +84,9 @@ impl<'a> SurfaceBody<'a> {
         self.linear * p + self.shift
     }
 
-    /// Faces that can come within `reach` (field's frame) of the solid. For a simple shape, the
-    /// indices of its parts.
-    pub fn faces(&self, field: &FieldBody, reach: f64) -> Candidates {
+    /// Faces of the leaves that can come within `reach` (field's frame) of the solid. For a simple
+    /// shape, the indices of its parts.
+    pub fn faces_of_leaves(&self, field: &FieldBody, reach: f64) -> Candidates {
         let mut faces = Vec::new();
         match self.shape {
             Shape::Mesh(asset) => {
@@ -95,6 +95,13 @@ impl<'a> SurfaceBody<'a> {
             Shape::Plane => faces.extend(0..2),
             simple => faces.extend(0..Simple::from(simple).parts().0.len() as u32),
         }
+        faces
+    }
+
+    /// Faces that can come within `reach` (field's frame) of the solid. For a simple shape, the
+    /// indices of its parts.
+    pub fn faces(&self, field: &FieldBody, reach: f64) -> Candidates {
+        let mut faces = self.faces_of_leaves(field, reach);
         faces.retain(|&face| {
             let part = self.face(face, field, reach);
             let (center, ball) = part.ball();

@@ -132,7 +132,8 @@ pub struct WhyReport {
 
 /// Reports the result of each stage of [`detect`](super::detect()) for the faces (in node mode:
 /// nodes) of `a` in the field of `b`: for `part`, or for all candidates. The stages are those of
-/// the detection itself. What they drop is still computed for the report.
+/// the detection itself. What they drop is still computed for the report. With one contact per
+/// face, a contact that faces share at a vertex is reported for each of them.
 ///
 /// # Errors
 /// As [`detect`](super::detect()); also for an unknown instance, or a face or node that `a` does

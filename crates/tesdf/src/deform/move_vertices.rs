@@ -124,6 +124,8 @@ impl TeSdf {
             items.dedup();
         }
         self.vertices = SharedSection::of_rows(&own);
+        // The faces are refitted below.
+        self.forget_normals();
         domain.set_vertices(&others);
         faces.iter().for_each(|&f| motion.faces[f as usize] = true);
         tetrahedra.iter().for_each(|&t| motion.tetrahedra[t as usize] = true);

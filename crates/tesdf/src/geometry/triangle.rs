@@ -132,6 +132,13 @@ impl Triangle {
         Self { corners, normal, is_needle: true }
     }
 
+    /// The triangle that [`new`](Self::new) gives for these corners, from its normal and
+    /// [`is_needle`](Self::is_needle).
+    #[inline]
+    pub(crate) fn from_parts(corners: [DVec3; 3], normal: DVec3, is_needle: bool) -> Self {
+        Self { corners, normal, is_needle }
+    }
+
     /// Whether the triangle is so narrow that [`closest`](Self::closest) tests its sides twice.
     pub(crate) fn is_needle(&self) -> bool {
         self.is_needle

@@ -7,6 +7,7 @@
 use glam::Vec3;
 
 use super::lanes::Lanes;
+use super::polygon::PolygonAxes;
 
 use crate::asset::FaceRecord;
 use crate::base::Isa;
@@ -120,6 +121,61 @@ fn within_lanes<L: Lanes<N>, const N: usize>(
             }
         }
     }
+}
+
+/// Lower bounds of the distances between a polygon and faces, up to rounding: how far they are
+/// apart along the normals of both and out of the sides of the polygon.
+#[inline]
+pub fn apart(isa: Isa, records: &[FaceRecord], faces: &[u32; LANES], axes: &PolygonAxes) -> [f32; LANES] {
+    match isa {
+        Isa::Baseline => apart_lanes::<[f32; LANES], LANES>(records, faces, axes),
+        // SAFETY: `detect` found the features.
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx2 | Isa::Avx512 => unsafe { apart_avx2(records, faces, axes) },
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn apart_avx2(records: &[FaceRecord], faces: &[u32; LANES], axes: &PolygonAxes) -> [f32; LANES] {
+    apart_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, axes)
+}
+
+#[inline(always)]
+fn apart_lanes<L: Lanes<N>, const N: usize>(
+    records: &[FaceRecord],
+    faces: &[u32; N],
+    axes: &PolygonAxes,
+) -> [f32; N] {
+    let mut rows = [records[0].as_array(); N];
+    for l in 0..N {
+        rows[l] = records[faces[l] as usize].as_array();
+    }
+    let v = L::load(rows);
+    let (a, ab) = (V([v[0], v[1], v[2]]), V([v[3], v[4], v[5]]));
+    let (ac, n) = (V([v[6], v[7], v[8]]), V([v[9], v[10], v[11]]));
+    let zero = L::splat(0.0);
+    // Heights of the polygon's points over the faces. They are NaN for a face without a normal, and
+    // then do not count.
+    let (mut lowest, mut highest) = (L::splat(f32::INFINITY), L::splat(f32::NEG_INFINITY));
+    for p in axes.points() {
+        let height = V([L::splat(p.x), L::splat(p.y), L::splat(p.z)]).minus(a).dot(n);
+        (lowest, highest) = (lowest.min(height), highest.max(height));
+    }
+    let mut bound = zero.sub(highest).max(lowest.max(zero));
+    // Heights of the faces' corners over the polygon and over its sides.
+    for k in 0..4 {
+        let (u, height) = if k == 3 { (axes.normal, axes.height) } else { (axes.outward[k], axes.sides[k]) };
+        let u = V([L::splat(u.x), L::splat(u.y), L::splat(u.z)]);
+        let first = a.dot(u).sub(L::splat(height));
+        let (second, third) =
+            (first.mul_add(L::splat(1.0), ab.dot(u)), first.mul_add(L::splat(1.0), ac.dot(u)));
+        bound = first.min(second).min(third).max(bound);
+        if k == 3 {
+            bound = zero.sub(first.max(second).max(third)).max(bound);
+        }
+    }
+    bound.to_array()
 }
 
 #[inline(always)]

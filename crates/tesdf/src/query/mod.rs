@@ -43,6 +43,7 @@ mod kernel;
 mod lanes;
 mod locate;
 mod nearest;
+mod polygon;
 mod ray;
 mod sign;
 
@@ -63,6 +64,7 @@ pub use batch::{AnswerColumns, BatchError, Extent};
 pub(crate) use inner_ball::corner_reach;
 pub(crate) use locate::{Faces, Place};
 pub use nearest::Reads;
+pub(crate) use polygon::MAX_POINTS;
 pub use ray::RayHit;
 
 use crate::TeSdf;

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::kernel::{self, Nearest};
 use super::locate::Faces;
+use super::polygon::{self, MAX_POINTS, PolygonAxes};
 use crate::TeSdf;
 use crate::asset::layout::{TREE_LEAF, TreeChild};
 use crate::geometry::{AabbTree, Closest, Feature};
@@ -70,7 +71,7 @@ impl TeSdf {
     /// `leaf` receives the first face and the number of faces, and returns the new limit. Returns
     /// the number of nodes read.
     #[inline]
-    fn walk_tree<D: Copy + PartialOrd + Default>(
+    pub(super) fn walk_tree<D: Copy + PartialOrd + Default>(
         &self,
         bound: impl Fn(&[f32]) -> D,
         beyond: impl Fn(D, D) -> bool,
@@ -152,6 +153,57 @@ impl TeSdf {
         }
     }
 
+    /// Offers the faces that can come within a limit of a convex polygon, those in nearer boxes
+    /// first. `points` are those of the polygon, from one to [`MAX_POINTS`]; `normal` is that of its plane, or
+    /// zero (local frame). `limit` is the first limit, and `offer` returns the next one.
+    pub(crate) fn near_polygon(
+        &self,
+        points: &[DVec3],
+        normal: DVec3,
+        limit: f64,
+        offer: &mut impl FnMut(u32) -> f64,
+    ) {
+        let middle = self.cube.middle();
+        let mut relative = [DVec3::ZERO; MAX_POINTS];
+        relative.iter_mut().zip(points).for_each(|(to, &p)| *to = p - middle);
+        let axes = PolygonAxes::new(&relative[..points.len().min(MAX_POINTS)], normal);
+        // Rounded up, as the slack is more than a rounding of it.
+        let with_slack = |limit: f64| limit as f32 * (1.0 + polygon::ROUNDING) + axes.rounding;
+        let mut now = with_slack(limit);
+        self.walk_tree(
+            |b: &[f32]| axes.to_box(b),
+            |d: f32, limit: f32| d > limit,
+            now,
+            |start, count| {
+                let faces: [u32; TREE_LEAF] = std::array::from_fn(|l| start + (l as u32).min(count - 1));
+                let bounds = kernel::apart(self.isa, &self.records, &faces, &axes);
+                for l in 0..count as usize {
+                    if bounds[l] <= now {
+                        now = with_slack(offer(faces[l]));
+                    }
+                }
+                now
+            },
+        );
+    }
+
+    /// Offers the faces that can be within `limit` of a point. `faces` are those of the list that
+    /// answers the point, if it has one.
+    pub(crate) fn faces_within(&self, p: DVec3, faces: &Faces, limit: f64, offer: &mut impl FnMut(u32)) {
+        if faces.ids().is_empty() {
+            let mut offer = |face| {
+                offer(face);
+                limit
+            };
+            return self.near_polygon(&[p], DVec3::ZERO, limit, &mut offer);
+        }
+        let relative = (p - self.cube.middle()).as_vec3();
+        let limit = (limit as f32 * (1.0 + F32_RELATIVE) + F32_ABSOLUTE).powi(2);
+        let mut near = Vec::new();
+        kernel::within(self.isa, &self.records, faces.chunks(), relative, limit, &mut near);
+        near.into_iter().for_each(offer);
+    }
+
     /// As [`near_in_list`](Self::near_in_list) for all faces, from the face tree. `offer` returns
     /// the least distance so far, over the ball.
     pub(crate) fn near_in_tree(&self, center: DVec3, radius: f64, offer: &mut impl FnMut(u32) -> f64) {
@@ -209,6 +261,47 @@ impl Best {
         let tie = closest.distance == self.closest.distance && id < self.id;
         if closest.distance < self.closest.distance || tie {
             *self = Self { position, id, closest };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::asset::FaceRecord;
+    use crate::asset::layout::SignHints;
+    use crate::base::Isa;
+    use crate::geometry::Aabb;
+    use crate::geometry::{Triangle, polygon_to_triangle};
+    use crate::testing::degenerate;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        // The mesh is within a ball of diameter 1; the polygon may be a hundred times as large.
+        #[test]
+        fn bounds_are_below_the_distance(
+            shape in degenerate::face(),
+            face in degenerate::face(),
+            size in prop::sample::select(vec![0.25, 25.0]),
+            shift in prop::array::uniform3(-0.5..0.5f64),
+        ) {
+            let points = shape.map(|p| size * p + DVec3::from_array(shift));
+            let corners = face.map(|c| 0.25 * c);
+            let (whole, triangle) = (Triangle::new(points), Triangle::new(corners));
+            let distance = polygon_to_triangle(&points, whole.normal, &triangle, f64::INFINITY)
+                .map_or(f64::INFINITY, |found| found.0);
+            let axes = PolygonAxes::new(&points, whole.normal);
+            let limit = distance as f32 * (1.0 + polygon::ROUNDING) + axes.rounding;
+            let record = FaceRecord::new(&triangle, DVec3::ZERO, SignHints::default());
+            for isa in Isa::all_here() {
+                for bound in kernel::apart(isa, &[record], &[0; TREE_LEAF], &axes) {
+                    prop_assert!(bound <= limit, "{isa:?}: {bound} of {distance}");
+                }
+            }
+            let bound = axes.to_box(&Aabb::of(&corners).rounded_from(DVec3::ZERO));
+            prop_assert!(bound <= limit, "box: {bound} of {distance}");
         }
     }
 }

@@ -17,7 +17,7 @@ use super::super::field::value::Value;
 use super::super::math::triangle::Face;
 use super::super::math::vector::{Row, row_of, xyz};
 use super::super::middle::items::{MAX_VERTICES, Polygons, Weights};
-use super::contacts::{CONVERGED, Contacts, Touch};
+use super::contacts::{Contacts, Touch};
 use super::exchange::{Exchange, LANES, Variant, exchange, width_for};
 use super::polygon_distance::Polygon;
 
@@ -435,7 +435,8 @@ pub fn narrow_faces(
             if is_face && v.gradient.dot(shapes.part_normal(pair, item.face)) > -asked.cos_theta {
                 counters.append(counters::FILTERED);
             } else {
-                let touch = Touch { face: item.face, cell: cell.name(), corner: CONVERGED.runtime(), point };
+                // Nothing proves that no point is lower.
+                let touch = Touch { face: item.face, cell: cell.name(), corner: 0u32.runtime(), point };
                 contacts.append(counters, pair, touch, v);
             }
         }

@@ -60,19 +60,13 @@ pub fn branch_and_bound(
 ) -> Lowest {
     let best = (f64::INFINITY, polygon.center());
     let mut search = Branches { cell, precision, tolerance, reach, best, best_face: 0, evaluations: 0 };
-    let corners: Vec<Corner> = polygon.points().map(|p| search.corner(p)).collect();
-    let mut open = BinaryHeap::new();
-    for k in 2..corners.len().max(3) {
-        // A segment is a triangle with two equal corners.
-        let piece = search.piece([corners[0], corners[k - 1], corners[k.min(corners.len() - 1)]]);
-        open.push(piece);
-    }
+    let mut open = BinaryHeap::from(search.pieces(polygon));
     while let Some(piece) = open.pop() {
         if !search.is_open(piece.bound) {
             break;
         }
         if search.evaluations > MAX_EVALUATIONS {
-            return Lowest { point: search.best.1, converged: false };
+            return Lowest { point: search.best.1, converged: false, face: None };
         }
         for half in search.halves(piece.corners) {
             let piece = search.piece(half);
@@ -81,7 +75,15 @@ pub fn branch_and_bound(
             }
         }
     }
-    Lowest { point: search.best.1, converged: true }
+    Lowest { point: search.best.1, converged: true, face: None }
+}
+
+/// Lower bound of the signed distances over a polygon, without a search.
+pub fn lower_bound(cell: &CellField, polygon: &Polygon, tolerance: f64) -> f64 {
+    let best = (f64::INFINITY, polygon.center());
+    let (precision, reach) = (Precision::F64, f64::INFINITY);
+    let mut search = Branches { cell, precision, tolerance, reach, best, best_face: 0, evaluations: 0 };
+    search.pieces(polygon).iter().map(|piece| piece.bound).fold(f64::INFINITY, f64::min)
 }
 
 struct Branches<'a> {
@@ -108,6 +110,15 @@ impl Branches<'_> {
 
     fn corner(&mut self, point: DVec3) -> Corner {
         Corner { point, value: self.value(point) }
+    }
+
+    /// The triangles of a polygon. A segment is a triangle with two equal corners.
+    fn pieces(&mut self, polygon: &Polygon) -> Vec<Piece> {
+        let corners: Vec<Corner> = polygon.points().map(|p| self.corner(p)).collect();
+        let last = corners.len() - 1;
+        (2..corners.len().max(3))
+            .map(|k| self.piece([corners[0], corners[k - 1], corners[k.min(last)]]))
+            .collect()
     }
 
     /// Whether a part with this bound can still improve the result.
@@ -137,7 +148,7 @@ impl Branches<'_> {
         let radius = points.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max).sqrt();
         let mut bound = value.distance - radius;
         match *self.cell {
-            CellField::Mesh { asset, .. } => {
+            CellField::Mesh { asset, .. } | CellField::Whole(asset) => {
                 let triangle = |face: u32| asset.local_triangle(face as usize);
                 let distances = |t: &Triangle| points.map(|p| t.closest(p).distance);
                 // The distance to one face is convex, so over a triangle it is at most its greatest

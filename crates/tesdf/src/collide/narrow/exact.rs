@@ -1,11 +1,13 @@
+use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::Lowest;
-use super::branch_and_bound::branch_and_bound;
+use super::branch_and_bound::{branch_and_bound, lower_bound};
 use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
 use crate::collide::field::{CellField, ROUNDING};
+use crate::collide::middle;
 use crate::collide::polygon::{MAX_VERTICES, Parts, Polygon};
 use crate::geometry::polygon_to_triangle;
 use crate::query::{Faces, Place, Precision};
@@ -32,19 +34,27 @@ pub fn lowest(
 ) -> Option<Lowest> {
     let center = polygon.center();
     let radius = polygon.reach(center);
-    let first = cell.value(center, Precision::F32);
+    let first = match cell {
+        // Distances from lists that are not exact rule out nothing.
+        CellField::Whole(asset) => asset.found_exactly(center).into(),
+        _ => cell.value(center, Precision::F32),
+    };
     if first.distance - radius > reach + ROUNDING {
         return None;
     }
-    let CellField::Mesh { asset, place, faces } = *cell else {
-        return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
+    let none = Faces::default();
+    let (asset, place, faces) = match *cell {
+        CellField::Mesh { asset, place, faces } => (asset, place, faces),
+        CellField::Whole(asset) => (asset, Place::NotOfDomain, &none),
+        CellField::Simple(_) => return Some(branch_and_bound(cell, polygon, tolerance, reach, precision)),
     };
-    let crossing = matches!(place, Place::Listed { label: Label::Crossing(_), .. });
-    let inside = match place {
-        Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
-        // No point of the surface is nearer to the centre than this distance.
-        _ if crossing => first.distance < -radius - ROUNDING,
-        _ => false,
+    // No point of the surface is nearer to the centre than the first distance.
+    let clear = radius + ROUNDING;
+    let (inside, crossing) = match (cell, place) {
+        (CellField::Whole(_), _) => (first.distance < -clear, first.distance.abs() <= clear),
+        (_, Place::Listed { label: Label::Crossing(_), .. }) => (first.distance < -clear, true),
+        (_, Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside)) => (true, false),
+        _ => (false, false),
     };
     if inside {
         return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
@@ -52,16 +62,69 @@ pub fn lowest(
     if !crossing && reach < 0.0 {
         return None;
     }
-    let query = Query { asset, place, faces, polygon, normal, center, radius, tolerance, reach };
-    let (distance, point) = query.nearest_to_faces(first.position);
+    // Where the result names the face, its distance must be the least one.
+    let slack = if matches!(cell, CellField::Whole(_)) { 0.0 } else { tolerance };
+    let query = Query { asset, place, faces, polygon, normal, center, radius, tolerance, slack, reach };
+    let (distance, point, face) = query.nearest_to_faces(first.position);
     if crossing && distance <= CLEAR && !query.only_touches(cell, distance, point) {
-        return query.lowest_of_parts(cell, precision);
+        return match cell {
+            // A whole face may cross any number of faces; in a cell there are few.
+            CellField::Whole(_) => query.lowest_by_cells(precision),
+            _ => query.lowest_of_parts(cell, precision),
+        };
     }
     // A polygon that keeps clear of the surface is on one side of it.
     if crossing && distance > CLEAR && cell.value(point, Precision::F64).distance < 0.0 {
         return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     }
-    (distance <= reach).then_some(Lowest { point, converged: true })
+    (distance <= reach).then_some(Lowest { point, converged: true, face })
+}
+
+/// Whether `least`, the signed distance at a point of the polygon, is the least one of the polygon,
+/// up to `tolerance`; `false` when this is not clear. All in the field's frame.
+///
+/// Outside, the distance to a face is convex and lies above its tangent at the point; where that is
+/// too low, the polygon is compared with the face. Inside, the bound is that of branch and bound
+/// before the first branch.
+pub fn is_least(
+    cell: &CellField,
+    polygon: &Polygon,
+    normal: DVec3,
+    point: DVec3,
+    least: f64,
+    tolerance: f64,
+) -> bool {
+    let none = Faces::default();
+    let (asset, place, faces) = match *cell {
+        CellField::Mesh { asset, place, faces } => (asset, place, faces),
+        CellField::Whole(asset) => (asset, Place::NotOfDomain, &none),
+        CellField::Simple(simple) => {
+            // The field is convex.
+            let gradient = simple.value(point).gradient;
+            return polygon.points().all(|p| gradient.dot(p - point) >= -tolerance);
+        }
+    };
+    if least <= CLEAR {
+        return lower_bound(cell, polygon, tolerance) >= least - tolerance;
+    }
+    let center = polygon.center();
+    let radius = polygon.reach(center);
+    let query =
+        Query { asset, place, faces, polygon, normal, center, radius, tolerance, slack: 0.0, reach: least };
+    let points: ArrayVec<DVec3, MAX_VERTICES> = polygon.points().collect();
+    // A polygon that keeps clear of all faces is on one side of the surface.
+    let bound = (least - tolerance).max(0.5 * CLEAR);
+    let mut is_least = true;
+    query.near(least, &mut |face| {
+        let triangle = asset.local_triangle(face as usize);
+        let closest = triangle.closest(point);
+        let outward = (point - closest.point) / closest.distance;
+        let slope = polygon.points().map(|p| outward.dot(p - point)).fold(f64::INFINITY, f64::min);
+        is_least &= closest.distance + slope >= bound
+            || polygon_to_triangle(&points, normal, &triangle, bound).is_none();
+        if is_least { least } else { f64::NEG_INFINITY }
+    });
+    is_least
 }
 
 /// Number of cuts after which the rest of a polygon is searched without further cuts.
@@ -78,40 +141,74 @@ struct Query<'a> {
     center: DVec3,
     radius: f64,
     tolerance: f64,
+    /// Faces that are nearer by less than this are skipped.
+    slack: f64,
     reach: f64,
 }
 
 impl Query<'_> {
     /// The least distance between the polygon and a face, within the tolerance, with the nearest
-    /// point of the polygon. `likely` is tested first. Infinite, with the centre of the ball, when
-    /// all faces are out of reach.
-    fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3) {
+    /// point of the polygon and the face. `likely` is tested first. Infinite, with the centre of
+    /// the ball and no face, when all faces are out of reach.
+    fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3, Option<u32>) {
         let mut points = [DVec3::ZERO; MAX_VERTICES];
         points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
         let points = &points[..self.polygon.vertices().len()];
         // Keeps all polygons that may cross the surface.
         let farthest = self.reach.max(0.0) + 2.0 * CLEAR;
-        let mut best = (f64::INFINITY, self.center);
+        let mut best = (f64::INFINITY, self.center, None);
         let mut offer = |face: u32| {
-            // Improvements below the tolerance are skipped, unless the polygon may cross the face.
-            let limit = if best.0 > self.tolerance + CLEAR { best.0 - self.tolerance } else { best.0 };
+            // Improvements below the slack are skipped, unless the polygon may cross the face.
+            let limit = if best.0 > self.slack + CLEAR { best.0 - self.slack } else { best.0 };
             let limit = limit.min(farthest);
             if !self.plane_is_beyond(points, face, limit) {
                 let triangle = self.asset.local_triangle(face as usize);
-                if let Some(found) = polygon_to_triangle(points, self.normal, &triangle, limit) {
-                    best = found;
+                if let Some((distance, point)) = polygon_to_triangle(points, self.normal, &triangle, limit) {
+                    best = (distance, point, Some(face));
                 }
             }
             best.0.min(farthest)
         };
-        offer(likely);
-        match self.place {
-            Place::Listed { .. } => {
-                self.asset.near_in_list(self.faces, self.center, self.radius, &mut offer);
-            }
-            _ => self.asset.near_in_tree(self.center, self.radius, &mut offer),
-        }
+        let first = offer(likely);
+        self.near(first, &mut offer);
         best
+    }
+
+    /// Offers the faces that can be nearest to a point of the polygon. `offer` returns the least
+    /// distance so far between the polygon and a face; `first` is the first one.
+    fn near(&self, first: f64, offer: &mut impl FnMut(u32) -> f64) {
+        match self.place {
+            Place::Listed { .. } => self.asset.near_in_list(self.faces, self.center, self.radius, offer),
+            _ => {
+                let points: ArrayVec<DVec3, MAX_VERTICES> = self.polygon.points().collect();
+                self.asset.near_polygon(&points, self.normal, first, offer);
+            }
+        }
+    }
+
+    /// The lowest point of a polygon, cell by cell. What is found in one cell is the limit in the
+    /// next.
+    fn lowest_by_cells(&self, precision: Precision) -> Option<Lowest> {
+        let mut least: Option<(f64, Lowest)> = None;
+        let mut converged = true;
+        middle::clip(self.asset, self.polygon.clone(), self.reach.max(0.0), &mut |clipped| {
+            let mut look = |faces: &Faces| {
+                let cell = CellField::Mesh { asset: self.asset, place: clipped.place, faces };
+                let limit = least.as_ref().map_or(self.reach, |(distance, _)| distance - self.tolerance);
+                let found = lowest(&cell, &clipped.polygon, self.normal, self.tolerance, limit, precision);
+                let Some(found) = found else { return };
+                converged &= found.converged;
+                let distance = cell.value(found.point, Precision::F64).distance;
+                if distance <= limit {
+                    least = Some((distance, Lowest { face: None, ..found }));
+                }
+            };
+            match clipped.place {
+                Place::Listed { offset, .. } => self.asset.with_list(offset, look),
+                _ => look(&Faces::default()),
+            }
+        });
+        least.map(|(_, lowest)| Lowest { converged, ..lowest })
     }
 
     /// The lowest point of a polygon that crosses the surface. The polygon is cut along the faces
@@ -136,7 +233,7 @@ impl Query<'_> {
                 continue;
             }
             let value = cell.value(center, Precision::F64);
-            let (distance, point) = part.nearest_to_faces(value.position);
+            let (distance, point, _) = part.nearest_to_faces(value.position);
             let found = if value.distance > CLEAR || part.only_touches(cell, distance, point) {
                 (distance, point)
             } else {
@@ -148,7 +245,7 @@ impl Query<'_> {
                 least = found;
             }
         }
-        (least.0 <= self.reach).then_some(Lowest { point: least.1, converged })
+        (least.0 <= self.reach).then_some(Lowest { point: least.1, converged, face: None })
     }
 
     /// Cuts the polygon along the plane of the face that it crosses deepest; `None` when it crosses
@@ -158,7 +255,7 @@ impl Query<'_> {
         points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
         let points = &points[..self.polygon.vertices().len()];
         let mut deepest = (CLEAR, None);
-        self.asset.near_in_list(self.faces, self.center, self.radius, &mut |face| {
+        self.near(0.0, &mut |face| {
             let triangle = self.asset.local_triangle(face as usize);
             let height = |p: &DVec3| triangle.normal.dot(*p - triangle.corners[0]);
             let heights = points.iter().map(height);
@@ -171,7 +268,8 @@ impl Query<'_> {
             {
                 deepest = (depth, Some(triangle));
             }
-            f64::INFINITY
+            // Faces that cross the polygon are within the ball.
+            0.0
         });
         let triangle = deepest.1?;
         match self.polygon.cut(|v| triangle.normal.dot(v.point - triangle.corners[0])) {
@@ -190,7 +288,7 @@ impl Query<'_> {
             let (polygon, center) = (&Polygon::new(&moved), self.center + hair * outward);
             let moved = Query { polygon, center, reach: hair, ..*self };
             let face = cell.value(center, Precision::F32).position;
-            let (clear, at) = moved.nearest_to_faces(face);
+            let (clear, at, _) = moved.nearest_to_faces(face);
             clear > 0.1 * hair && cell.value(at, Precision::F64).distance > 0.0
         };
         distance <= hair && (is_free(cell.value(point, Precision::F64).gradient) || is_free(-self.normal))

@@ -1,6 +1,7 @@
 //! Narrow phase: the least signed distance over a node or a clipped polygon, and its point.
 mod branch_and_bound;
 mod exact;
+mod extremes;
 mod frank_wolfe;
 
 pub use branch_and_bound::greatest_minimum;
@@ -12,8 +13,10 @@ use super::field_value::FieldValue;
 use super::middle::{self, ClippedPolygon};
 use super::polygon::Polygon;
 use super::surface::Part;
-use super::{CollideOptions, Mode};
+use super::{CollideOptions, ContactsPer, Mode};
+use crate::TeSdf;
 use crate::query::{Faces, Place, Precision};
+use extremes::Patch;
 
 /// The least signed distance of a part in one cell, in the field's frame.
 #[derive(Clone, Copy, Debug)]
@@ -26,6 +29,8 @@ pub struct Minimum {
     pub cell: Option<u32>,
     /// Whether the error is within the tolerance.
     pub converged: bool,
+    /// The corner of the part that the point is, if it is one.
+    pub corner: Option<u8>,
 }
 
 /// Result of a search over one polygon: a point of it, and whether no other point is lower by more
@@ -33,13 +38,18 @@ pub struct Minimum {
 struct Lowest {
     point: DVec3,
     converged: bool,
+    /// The face that is nearest to the point, up to the tolerance, where the polygon is outside.
+    face: Option<u32>,
 }
 
 /// Parameters of the search for minima in one field. Lengths are in its frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Search {
     mode: Mode,
+    per: ContactsPer,
     iterations: u32,
+    /// A part with a longer edge is large against a body (field's frame).
+    large: f64,
     /// Signed distances above this are ignored.
     pub reach: f64,
     tolerance: f64,
@@ -50,17 +60,20 @@ pub struct Search {
 /// tolerance.
 const COARSE: f64 = 20.0 * ROUNDING;
 
+/// A face is large against a body when its longest edge exceeds this fraction of the body's
+/// diagonal. One contact for such a face would not hold the other body up. Smaller faces have
+/// neighbours whose contacts do.
+const LARGE: f64 = 1.0 / 16.0;
+
 impl Search {
-    /// `reach` is the contact distance and `diagonal` that of the field's body, both in the world's
-    /// unit.
-    pub fn new(options: &CollideOptions, reach: f64, field: &FieldBody, diagonal: f64) -> Self {
+    /// `reach` is the contact distance; `diagonals` are those of the surface's and the field's body.
+    /// All in the world's unit.
+    pub fn new(options: &CollideOptions, reach: f64, field: &FieldBody, diagonals: [f64; 2]) -> Self {
         let unit = field.unit();
-        let tolerance = match options.mode {
-            Mode::Exact => options.tolerance.resolve(diagonal) / unit,
-            Mode::Node | Mode::Face => 0.0,
-        };
-        let CollideOptions { mode, iterations, precision, .. } = *options;
-        Self { mode, iterations, reach: reach / unit, tolerance, precision }
+        let tolerance = options.tolerance.resolve(diagonals[1]) / unit;
+        let large = LARGE * diagonals[0].min(diagonals[1]) / unit;
+        let CollideOptions { mode, contacts_per: per, iterations, precision, .. } = *options;
+        Self { mode, per, iterations, large, reach: reach / unit, tolerance, precision }
     }
 
     /// The same search up to another signed distance (field's frame).
@@ -92,6 +105,9 @@ impl Search {
         polygon: &mut impl FnMut(&ClippedPolygon),
         found: &mut impl FnMut(&ClippedPolygon, Minimum),
     ) {
+        if self.per == ContactsPer::Face && self.mode != Mode::Node {
+            return self.of_face(field, part, polygon, found);
+        }
         let reach = self.reach + part.radius;
         self.polygons(field, part, &mut |clipped| {
             polygon(clipped);
@@ -112,6 +128,29 @@ impl Search {
         });
     }
 
+    /// The least signed distance over a whole part. Where the part is flat on the field's body, or
+    /// large, also the extremes of what touches.
+    fn of_face(
+        &self,
+        field: &FieldBody,
+        part: &Part,
+        polygon: &mut impl FnMut(&ClippedPolygon),
+        found: &mut impl FnMut(&ClippedPolygon, Minimum),
+    ) {
+        let whole =
+            ClippedPolygon { polygon: Polygon::new(part.points()), place: Place::NotOfDomain, cell: None };
+        polygon(&whole);
+        let everywhere = match field.field {
+            Field::Mesh(asset) => CellField::Whole(asset),
+            Field::Simple(simple) => CellField::Simple(simple),
+        };
+        let reach = self.reach + part.radius;
+        let Some(minimum) = self.in_cell(&everywhere, &whole, part, reach) else { return };
+        found(&whole, minimum);
+        let patch = Patch { field: &everywhere, part, minimum: &minimum, search: self };
+        patch.extremes().into_iter().for_each(|extreme| found(&whole, extreme));
+    }
+
     fn in_cell(
         &self,
         cell: &CellField,
@@ -122,22 +161,51 @@ impl Search {
         let polygon = &clipped.polygon;
         let lowest = match self.mode {
             _ if polygon.vertices().len() == 1 => {
-                Some(Lowest { point: polygon.vertices()[0].point, converged: true })
+                Some(Lowest { point: polygon.vertices()[0].point, converged: true, face: None })
             }
-            Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true }),
+            Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true, face: None }),
             Mode::Face => frank_wolfe::lowest(cell, polygon, self.iterations, reach),
             Mode::Exact => {
                 let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
                 exact::lowest(cell, polygon, part.normal, self.tolerance, reach, precision)
             }
         }?;
-        let value = cell.value(lowest.point, self.precision);
-        let listed = matches!(clipped.place, Place::Listed { .. });
-        (value.distance <= reach).then_some(Minimum {
-            point: lowest.point,
-            value,
-            cell: clipped.cell.filter(|_| listed),
-            converged: lowest.converged,
-        })
+        let Lowest { point, converged, face } = lowest;
+        let value = match (cell, face) {
+            (CellField::Whole(asset), Some(face)) if self.precision == Precision::F64 => {
+                asset.value_outside(point, face)
+            }
+            _ => None,
+        };
+        let value = value.unwrap_or_else(|| cell.value(point, self.precision));
+        let converged = match self.mode {
+            Mode::Face if polygon.vertices().len() > 1 => {
+                let least = match self.precision {
+                    Precision::F64 => value.distance,
+                    Precision::F32 => cell.value(point, Precision::F64).distance,
+                };
+                exact::is_least(cell, polygon, part.normal, point, least, self.tolerance)
+            }
+            _ => converged,
+        };
+        let value = match self.per {
+            ContactsPer::Cell => value,
+            ContactsPer::Face => cell.opposing(point, part.normal, value, self.precision),
+        };
+        let cell = match *cell {
+            CellField::Mesh { .. } => clipped.cell.filter(|_| matches!(clipped.place, Place::Listed { .. })),
+            CellField::Whole(asset) => cell_of(asset, point),
+            CellField::Simple(_) => None,
+        };
+        let corner = part.points().iter().position(|p| *p == point).map(|k| k as u8);
+        (value.distance <= reach).then_some(Minimum { point, value, cell, converged, corner })
+    }
+}
+
+/// The word of the cell whose list answers a point.
+fn cell_of(asset: &TeSdf, point: DVec3) -> Option<u32> {
+    match asset.locate_with_word(point) {
+        (Place::Listed { .. }, word) => u32::try_from(word).ok(),
+        _ => None,
     }
 }
