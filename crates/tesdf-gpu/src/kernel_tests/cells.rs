@@ -12,9 +12,8 @@ use tesdf::geometry::barycentric;
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 
-use super::{device, read, upload};
+use super::{device, groups_of, read, upload};
 use crate::GpuShapes;
-use crate::device::spread;
 use crate::kernels::GROUP;
 use crate::kernels::field::shapes::{NONE, Shapes};
 use crate::kernels::math::vector::{Row, xyz};
@@ -87,7 +86,7 @@ fn kernels_locate_points_in_cells_that_hold_them() {
     let (rows_there, cells) = (upload(&device, &rows), upload(&device, &vec![0u32; rows.len()]));
     locate_points::launch(
         device.client(),
-        spread((rows.len() as u32).div_ceil(GROUP)),
+        groups_of(rows.len()),
         CubeDim::new_1d(GROUP),
         shapes.argument(),
         rows_there.rows(),

@@ -4,8 +4,7 @@ use tesdf::collide::internal::{Parts, Polygon};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
-use super::{device, read, upload};
-use crate::device::spread;
+use super::{device, groups_of, read, upload};
 use crate::kernels::GROUP;
 use crate::kernels::math::vector::v3;
 use crate::kernels::middle::cut::{ROOM, no_polygon, whole};
@@ -114,7 +113,7 @@ fn kernels_cut_polygons_as_the_processor_does() {
     let vertices = upload(&device, &vec![0.0f32; 2 * ROOM * cases.len()]);
     cut_cases::launch(
         device.client(),
-        spread((cases.len() as u32).div_ceil(GROUP)),
+        groups_of(cases.len()),
         CubeDim::new_1d(GROUP),
         corners.words(),
         heights.words(),

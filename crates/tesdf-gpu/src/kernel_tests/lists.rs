@@ -2,8 +2,7 @@
 use cubecl::prelude::*;
 use tesdf::asset::layout::List;
 
-use super::{device, read, upload};
-use crate::device::spread;
+use super::{device, groups_of, read, upload};
 use crate::kernels::GROUP;
 use crate::kernels::field::shapes::{
     LISTS, NONE, PALETTE_STARTS, PALETTES, PALETTES_HIGH, STRIDE, Shapes, ShapesLaunch,
@@ -110,7 +109,7 @@ fn kernels_decode_lists_as_the_layout_defines_them() {
         let faces = upload(&device, &vec![0u32; count * ROOM as usize]);
         read_lists::launch(
             device.client(),
-            spread((count as u32).div_ceil(GROUP)),
+            groups_of(count),
             CubeDim::new_1d(GROUP),
             ShapesLaunch::new(table.words(), words.words(), rows.rows()),
             offsets.words(),

@@ -9,8 +9,10 @@ mod hull;
 mod lists;
 
 use bytemuck::Pod;
+use cubecl::prelude::CubeCount;
 
-use crate::device::{Buffer, Device};
+use crate::device::{Buffer, Device, spread};
+use crate::kernels::GROUP;
 
 /// The device of the tests.
 fn device() -> Device {
@@ -21,6 +23,11 @@ fn device() -> Device {
 fn upload<T: Pod>(device: &Device, data: &[T]) -> Buffer {
     let one = [T::zeroed()];
     device.upload("input of a test", if data.is_empty() { &one } else { data }).expect("fits")
+}
+
+/// The groups that a thread for each of `count` items needs.
+fn groups_of(count: usize) -> CubeCount {
+    spread((count as u32).div_ceil(GROUP))
 }
 
 /// Reads an array back.

@@ -15,7 +15,6 @@ use super::{AssetError, Container, Section, SharedSection};
 use crate::base::Isa;
 use crate::domain::{DomainCube, MAX_DEPTH};
 use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
-use crate::parallel::*;
 
 /// A Tetra-Encoded Signed Distance Field: an encoded mesh, immutable, shared by all its users.
 ///
@@ -315,13 +314,16 @@ impl TeSdf {
 
     /// Stores the normals of all faces, unless they are stored: 32 bytes each. Computing a normal
     /// takes as long as the rest of a distance to the face.
+    ///
+    /// On one thread: a thread that waits for parallel work may take up another detection, which
+    /// would wait for these normals forever.
     pub(crate) fn store_normals(&self) {
         self.face_normals.get_or_init(|| {
             let normal = |position| {
                 let triangle = Triangle::new(self.local_corners(position));
                 (triangle.normal, triangle.is_needle())
             };
-            (0..self.faces.len()).into_par_iter().map(normal).collect()
+            (0..self.faces.len()).map(normal).collect()
         });
     }
 

@@ -51,13 +51,16 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
         candidates: candidates.iter().map(Vec::len).sum(),
         ..Statistics::default()
     };
-    let mut touching = Vec::with_capacity(found.iter().map(|f| f.touching.len()).sum());
+    let mut contacts = Vec::with_capacity(found.iter().map(|f| f.contacts.len()).sum());
+    let mut at_vertices = Vec::new();
     for part in found {
         statistics.polygons += part.polygons;
         statistics.filtered += part.filtered;
-        touching.extend(part.touching);
+        let before = contacts.len();
+        at_vertices.extend(part.at_vertices.into_iter().map(|v| AtVertex { index: before + v.index, ..v }));
+        contacts.extend(part.contacts);
     }
-    let mut contacts = one_per_vertex(touching);
+    let mut contacts = one_per_vertex(contacts, &at_vertices);
     statistics.touching = contacts.len() + statistics.filtered;
     statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
     statistics.bytes = size_of_val(pairs.as_slice())
@@ -81,34 +84,40 @@ fn order(c: &Contact) -> (u32, u32, Option<u32>, [u64; 3]) {
     (c.face_a, c.feature.a, c.tet_b, c.point_a.to_array().map(f64::to_bits))
 }
 
-/// A contact, with what is needed to see that another one is the same.
-struct Touching {
-    contact: Contact,
-    /// The vertex of the face that it is, by its bits in the field's frame.
-    vertex: Option<[u64; 3]>,
+/// A contact at a vertex of its face.
+struct AtVertex {
+    /// The index of the contact.
+    index: usize,
+    /// The vertex, by its bits in the field's frame.
+    vertex: [u64; 3],
     /// Cosine between the gradient and the face's normal.
     cosine: f64,
 }
 
 /// Of the contacts of several faces at one vertex, keeps the one whose gradient most opposes its
 /// face; among equals, that of the lowest face.
-fn one_per_vertex(touching: Vec<Touching>) -> Vec<Contact> {
-    let pair = |t: &Touching| (t.contact.instance_a, t.contact.instance_b);
-    // Cosines that differ by rounding are equal.
-    let cosine = |t: &Touching| (t.cosine * 1e9).round() as i64;
-    let key = |(i, t): (usize, &Touching)| Some((pair(t), t.vertex?, cosine(t), t.contact.face_a, i));
-    let mut at_vertices: Vec<_> = touching.iter().enumerate().filter_map(key).collect();
-    at_vertices.par_sort_unstable();
-    let mut keep = vec![true; touching.len()];
-    for same in at_vertices.chunk_by(|x, y| (x.0, x.1) == (y.0, y.1)) {
-        same[1..].iter().for_each(|&(.., i)| keep[i] = false);
+fn one_per_vertex(contacts: Vec<Contact>, at_vertices: &[AtVertex]) -> Vec<Contact> {
+    if at_vertices.is_empty() {
+        return contacts;
     }
-    touching.into_iter().zip(keep).filter_map(|(t, keep)| keep.then_some(t.contact)).collect()
+    let key = |&AtVertex { index, vertex, cosine }: &AtVertex| {
+        let Contact { instance_a, instance_b, face_a, .. } = contacts[index];
+        // Cosines that differ by rounding are equal.
+        ((instance_a, instance_b, vertex), (cosine * 1e9).round() as i64, face_a, index)
+    };
+    let mut keys: Vec<_> = at_vertices.iter().map(key).collect();
+    keys.par_sort_unstable();
+    let mut keep = vec![true; contacts.len()];
+    for same in keys.chunk_by(|x, y| x.0 == y.0) {
+        same[1..].iter().for_each(|&(.., index)| keep[index] = false);
+    }
+    contacts.into_iter().zip(keep).filter_map(|(contact, keep)| keep.then_some(contact)).collect()
 }
 
 #[derive(Default)]
 struct Found {
-    touching: Vec<Touching>,
+    contacts: Vec<Contact>,
+    at_vertices: Vec<AtVertex>,
     polygons: usize,
     filtered: usize,
 }
@@ -116,18 +125,18 @@ struct Found {
 /// Middle phase, narrow phase and cosine filter.
 fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let mut found = Found::default();
-    let Found { touching, polygons, filtered } = &mut found;
+    let Found { contacts, at_vertices, polygons, filtered } = &mut found;
     for &candidate in candidates {
         let (part, face_a, feature) = pair.part(candidate);
         pair.search.minima(&pair.field, &part, &mut |_| *polygons += 1, &mut |_, minimum| {
             if pair.is_filtered(&part, &minimum) {
                 *filtered += 1;
             } else {
-                touching.push(Touching {
-                    contact: pair.contact(&part, &minimum, face_a, feature),
-                    vertex: pair.vertex(&part, &minimum),
-                    cosine: minimum.value.gradient.dot(part.normal),
-                });
+                if let Some(vertex) = pair.vertex(&part, &minimum) {
+                    let cosine = minimum.value.gradient.dot(part.normal);
+                    at_vertices.push(AtVertex { index: contacts.len(), vertex, cosine });
+                }
+                contacts.push(pair.contact(&part, &minimum, face_a, feature));
             }
         });
     }

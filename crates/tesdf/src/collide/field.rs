@@ -6,7 +6,7 @@ use super::simple::Simple;
 use super::{FeatureB, Placement, Shape};
 use crate::TeSdf;
 use crate::geometry::Feature;
-use crate::query::{Faces, Place, Precision};
+use crate::query::{Faces, ON_SURFACE_F64, Place, Precision};
 
 /// A field in the frame of its computations: the local frame of an asset, or the frame of a simple
 /// shape.
@@ -170,6 +170,16 @@ impl CellField<'_> {
         }
     }
 
+    /// The mesh, the part of it that answers points, and the faces of the list there. The whole field
+    /// of a mesh has `none`. `None` for a simple shape.
+    pub fn mesh<'b>(&'b self, none: &'b Faces) -> Option<(&'b TeSdf, Place, &'b Faces)> {
+        match *self {
+            Self::Mesh { asset, place, faces } => Some((asset, place, faces)),
+            Self::Whole(asset) => Some((asset, Place::NotOfDomain, none)),
+            Self::Simple(_) => None,
+        }
+    }
+
     /// The `value` at `p`. Where several faces are equally near, with the gradient that most opposes
     /// `normal`.
     pub fn opposing(&self, p: DVec3, normal: DVec3, value: FieldValue, precision: Precision) -> FieldValue {
@@ -200,7 +210,7 @@ impl TeSdf {
     /// The value at a point outside whose nearest face is known; `None` on the surface.
     pub fn value_outside(&self, p: DVec3, face: u32) -> Option<FieldValue> {
         let closest = self.local_triangle(face as usize).closest(p);
-        (closest.distance > ON_SURFACE).then(|| FieldValue {
+        (closest.distance > ON_SURFACE_F64).then(|| FieldValue {
             distance: closest.distance,
             gradient: (p - closest.point) / closest.distance,
             closest_point: closest.point,
@@ -221,7 +231,7 @@ impl TeSdf {
     ) -> FieldValue {
         let limit = value.distance.abs() + tie;
         // On the surface the gradients are the normals of the faces.
-        let on_surface = value.distance.abs() <= tie.max(ON_SURFACE);
+        let on_surface = value.distance.abs() <= tie.max(ON_SURFACE_F64);
         let (mut best, mut id) = (value, self.face_ids[value.position as usize]);
         self.faces_within(p, faces, limit, &mut |face| {
             if face == value.position && !on_surface {
@@ -243,6 +253,3 @@ impl TeSdf {
         best
     }
 }
-
-/// Nearer to the surface than this (local frame), points count as on it.
-const ON_SURFACE: f64 = 5e-10;

@@ -138,7 +138,7 @@ pub(crate) struct Found {
 ///
 /// The diagonal is 0.5 to 1 in this frame, so this is at most 1e-9 × diagonal. From there on the
 /// gradient belongs to the point.
-const ON_SURFACE_F64: f64 = 5e-10;
+pub(crate) const ON_SURFACE_F64: f64 = 5e-10;
 /// The same for `f32` storage: about ten times its rounding.
 const ON_SURFACE_F32: f64 = 1e-6;
 /// Faces that share an edge are at most this far from a point of the edge.

@@ -114,7 +114,7 @@ impl TeSdf {
         }
         let relative = (p - self.cube.middle()).as_vec3();
         let least = self.nearest_in_list_f32(faces, relative).distance_squared;
-        let limit = (least.sqrt() * (1.0 + F32_RELATIVE) + F32_ABSOLUTE).powi(2);
+        let limit = squared_limit(least.sqrt());
         let mut best = Best::NONE;
         NEAR.with_borrow_mut(|near| {
             near.clear();
@@ -139,23 +139,27 @@ impl TeSdf {
         let relative = (center - self.cube.middle()).as_vec3();
         let least = self.nearest_in_list_f32(faces, relative).distance_squared.sqrt();
         // The least distance over the ball is at most that at its centre.
-        let limit = ((least + radius as f32) * (1.0 + F32_RELATIVE) + F32_ABSOLUTE).powi(2);
+        self.each_in_list(faces, relative, least + radius as f32, &mut |face| {
+            offer(face);
+        });
+    }
+
+    /// Offers the faces of a list whose distance from a point, relative to the centre of the cube,
+    /// can be up to `distance`.
+    fn each_in_list(&self, faces: &Faces, relative: Vec3, distance: f32, offer: &mut impl FnMut(u32)) {
+        let limit = squared_limit(distance);
         if limit.is_finite() {
             let mut near = Vec::with_capacity(faces.ids().len());
             kernel::within(self.isa, &self.records, faces.chunks(), relative, limit, &mut near);
-            near.iter().for_each(|&face| {
-                offer(face);
-            });
+            near.into_iter().for_each(offer);
         } else {
-            faces.ids().iter().for_each(|&face| {
-                offer(face);
-            });
+            faces.ids().iter().copied().for_each(offer);
         }
     }
 
     /// Offers the faces that can come within a limit of a convex polygon, those in nearer boxes
-    /// first. `points` are those of the polygon, from one to [`MAX_POINTS`]; `normal` is that of its plane, or
-    /// zero (local frame). `limit` is the first limit, and `offer` returns the next one.
+    /// first. `points` are those of the polygon, from one to [`MAX_POINTS`]; `normal` is that of its
+    /// plane, or zero (local frame). `limit` is the first limit, and `offer` returns the next one.
     pub(crate) fn near_polygon(
         &self,
         points: &[DVec3],
@@ -198,10 +202,7 @@ impl TeSdf {
             return self.near_polygon(&[p], DVec3::ZERO, limit, &mut offer);
         }
         let relative = (p - self.cube.middle()).as_vec3();
-        let limit = (limit as f32 * (1.0 + F32_RELATIVE) + F32_ABSOLUTE).powi(2);
-        let mut near = Vec::new();
-        kernel::within(self.isa, &self.records, faces.chunks(), relative, limit, &mut near);
-        near.into_iter().for_each(offer);
+        self.each_in_list(faces, relative, limit as f32, offer);
     }
 
     /// As [`near_in_list`](Self::near_in_list) for all faces, from the face tree. `offer` returns
@@ -240,6 +241,11 @@ impl TeSdf {
         );
         (best.position, best.closest)
     }
+}
+
+/// The squared distance in `f32` up to which a face can be within `distance`.
+fn squared_limit(distance: f32) -> f32 {
+    (distance * (1.0 + F32_RELATIVE) + F32_ABSOLUTE).powi(2)
 }
 
 struct Best {

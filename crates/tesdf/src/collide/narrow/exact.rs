@@ -43,10 +43,8 @@ pub fn lowest(
         return None;
     }
     let none = Faces::default();
-    let (asset, place, faces) = match *cell {
-        CellField::Mesh { asset, place, faces } => (asset, place, faces),
-        CellField::Whole(asset) => (asset, Place::NotOfDomain, &none),
-        CellField::Simple(_) => return Some(branch_and_bound(cell, polygon, tolerance, reach, precision)),
+    let Some((asset, place, faces)) = cell.mesh(&none) else {
+        return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     };
     // No point of the surface is nearer to the centre than the first distance.
     let clear = radius + ROUNDING;
@@ -94,16 +92,13 @@ pub fn is_least(
     least: f64,
     tolerance: f64,
 ) -> bool {
+    if let CellField::Simple(simple) = cell {
+        // The field is convex.
+        let gradient = simple.value(point).gradient;
+        return polygon.points().all(|p| gradient.dot(p - point) >= -tolerance);
+    }
     let none = Faces::default();
-    let (asset, place, faces) = match *cell {
-        CellField::Mesh { asset, place, faces } => (asset, place, faces),
-        CellField::Whole(asset) => (asset, Place::NotOfDomain, &none),
-        CellField::Simple(simple) => {
-            // The field is convex.
-            let gradient = simple.value(point).gradient;
-            return polygon.points().all(|p| gradient.dot(p - point) >= -tolerance);
-        }
-    };
+    let Some((asset, place, faces)) = cell.mesh(&none) else { return false };
     if least <= CLEAR {
         return lower_bound(cell, polygon, tolerance) >= least - tolerance;
     }
@@ -111,7 +106,7 @@ pub fn is_least(
     let radius = polygon.reach(center);
     let query =
         Query { asset, place, faces, polygon, normal, center, radius, tolerance, slack: 0.0, reach: least };
-    let points: ArrayVec<DVec3, MAX_VERTICES> = polygon.points().collect();
+    let points = query.points();
     // A polygon that keeps clear of all faces is on one side of the surface.
     let bound = (least - tolerance).max(0.5 * CLEAR);
     let mut is_least = true;
@@ -147,13 +142,15 @@ struct Query<'a> {
 }
 
 impl Query<'_> {
+    fn points(&self) -> ArrayVec<DVec3, MAX_VERTICES> {
+        self.polygon.points().collect()
+    }
+
     /// The least distance between the polygon and a face, within the tolerance, with the nearest
     /// point of the polygon and the face. `likely` is tested first. Infinite, with the centre of
     /// the ball and no face, when all faces are out of reach.
     fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3, Option<u32>) {
-        let mut points = [DVec3::ZERO; MAX_VERTICES];
-        points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
-        let points = &points[..self.polygon.vertices().len()];
+        let points = &self.points();
         // Keeps all polygons that may cross the surface.
         let farthest = self.reach.max(0.0) + 2.0 * CLEAR;
         let mut best = (f64::INFINITY, self.center, None);
@@ -179,10 +176,7 @@ impl Query<'_> {
     fn near(&self, first: f64, offer: &mut impl FnMut(u32) -> f64) {
         match self.place {
             Place::Listed { .. } => self.asset.near_in_list(self.faces, self.center, self.radius, offer),
-            _ => {
-                let points: ArrayVec<DVec3, MAX_VERTICES> = self.polygon.points().collect();
-                self.asset.near_polygon(&points, self.normal, first, offer);
-            }
+            _ => self.asset.near_polygon(&self.points(), self.normal, first, offer),
         }
     }
 
@@ -251,9 +245,7 @@ impl Query<'_> {
     /// Cuts the polygon along the plane of the face that it crosses deepest; `None` when it crosses
     /// no face.
     fn cut(&self) -> Option<(Polygon, Polygon)> {
-        let mut points = [DVec3::ZERO; MAX_VERTICES];
-        points.iter_mut().zip(self.polygon.points()).for_each(|(to, p)| *to = p);
-        let points = &points[..self.polygon.vertices().len()];
+        let points = &self.points();
         let mut deepest = (CLEAR, None);
         self.near(0.0, &mut |face| {
             let triangle = self.asset.local_triangle(face as usize);

@@ -41,14 +41,14 @@ const HEIGHT: f64 = 1e-12;
 
 /// The part of a face that touches.
 pub struct Patch<'a> {
-    /// The field, in all cells.
-    pub field: &'a CellField<'a>,
-    /// The face, or the core of a capsule.
-    pub part: &'a Part,
-    /// The least signed distance over it.
-    pub minimum: &'a Minimum,
-    /// The search that found it.
-    pub search: &'a Search,
+    field: &'a CellField<'a>,
+    part: &'a Part,
+    minimum: &'a Minimum,
+    search: &'a Search,
+    /// The longest edge of the part; zero for a point.
+    longest: DVec3,
+    /// The greatest signed distance of the patch.
+    limit: f64,
 }
 
 /// A point of the part that may be a corner of the patch.
@@ -57,11 +57,24 @@ struct Candidate {
     point: DVec3,
     /// The corner of the part that it is, if it is one.
     corner: Option<u8>,
-    /// Its contact, once it is known: `Some(None)` when it has none.
-    taken: Option<Option<Minimum>>,
+    /// Its contact, once it is known.
+    taken: Option<Minimum>,
 }
 
-impl Patch<'_> {
+impl<'a> Patch<'a> {
+    /// `field` is that of all cells. `minimum` is the least signed distance over `part`, as `search`
+    /// found it.
+    pub fn new(field: &'a CellField<'a>, part: &'a Part, minimum: &'a Minimum, search: &'a Search) -> Self {
+        let points = part.points();
+        let edges = (0..points.len()).map(|i| points[(i + 1) % points.len()] - points[i]);
+        let longest =
+            edges.fold(DVec3::ZERO, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
+        let mut patch = Self { field, part, minimum, search, longest, limit: 0.0 };
+        let Search { tolerance, reach, .. } = *search;
+        patch.limit = if patch.is_large() { reach + part.radius } else { minimum.value.distance + tolerance };
+        patch
+    }
+
     /// Points of the patch other than the minimum, at most one for each direction.
     pub fn extremes(&self) -> ArrayVec<Minimum, DIRECTIONS> {
         let mut found = ArrayVec::<Minimum, DIRECTIONS>::new();
@@ -79,16 +92,8 @@ impl Patch<'_> {
         found
     }
 
-    /// The greatest signed distance of the patch.
-    fn limit(&self) -> f64 {
-        let Search { tolerance, reach, .. } = *self.search;
-        if self.is_large() { reach + self.part.radius } else { self.minimum.value.distance + tolerance }
-    }
-
     fn is_large(&self) -> bool {
-        let points = self.part.points();
-        let edge = |i: usize| points[i].distance_squared(points[(i + 1) % points.len()]);
-        (0..points.len()).map(edge).fold(0.0, f64::max) > self.search.large * self.search.large
+        self.longest.length_squared() > self.search.large * self.search.large
     }
 
     /// Whether the part is large, or the field is constant, to first order and up to the tolerance,
@@ -101,11 +106,7 @@ impl Patch<'_> {
     }
 
     fn directions(&self) -> ArrayVec<DVec3, DIRECTIONS> {
-        let points = self.part.points();
-        let edges = (0..points.len()).map(|i| points[(i + 1) % points.len()] - points[i]);
-        let longest =
-            edges.fold(DVec3::ZERO, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
-        let Some(along) = longest.try_normalize() else { return ArrayVec::new() };
+        let Some(along) = self.longest.try_normalize() else { return ArrayVec::new() };
         if self.part.normal == DVec3::ZERO {
             return [along, -along].into_iter().collect();
         }
@@ -116,24 +117,25 @@ impl Patch<'_> {
     }
 
     /// The contact of the candidate that is farthest along a direction among those that have one.
-    fn farthest(&self, direction: DVec3, candidates: &mut [Candidate]) -> Option<Minimum> {
+    /// Removes candidates that have none.
+    fn farthest(&self, direction: DVec3, candidates: &mut Vec<Candidate>) -> Option<Minimum> {
         let mut limit = f64::INFINITY;
         for _ in 0..TRIALS {
             let mut next: Option<(f64, usize)> = None;
             for (i, candidate) in candidates.iter().enumerate() {
                 let at = direction.dot(candidate.point);
-                let is_open = candidate.taken.is_none_or(|taken| taken.is_some());
-                if is_open && at < limit && next.is_none_or(|(best, _)| at > best) {
+                if at < limit && next.is_none_or(|(best, _)| at > best) {
                     next = Some((at, i));
                 }
             }
             let (at, i) = next?;
             let Candidate { point, corner, taken } = candidates[i];
-            let taken = taken.unwrap_or_else(|| self.take(point, corner));
-            candidates[i].taken = Some(taken);
+            let taken = taken.or_else(|| self.take(point, corner));
             if taken.is_some() {
+                candidates[i].taken = taken;
                 return taken;
             }
+            candidates.remove(i);
             limit = at;
         }
         None
@@ -142,22 +144,18 @@ impl Patch<'_> {
     /// The contact at a point, or near it, if the field there is within the limit and opposes the
     /// face.
     fn take(&self, point: DVec3, corner: Option<u8>) -> Option<Minimum> {
-        let limit = self.limit();
         let normal = self.part.normal;
         let value = |p: DVec3| {
             let precision = self.search.precision;
             self.field.opposing(p, normal, self.field.value(p, precision), precision)
         };
         let holds = |v: &FieldValue| {
-            v.distance <= limit && (normal == DVec3::ZERO || v.gradient.dot(normal) < OPPOSES)
+            v.distance <= self.limit && (normal == DVec3::ZERO || v.gradient.dot(normal) < OPPOSES)
         };
         let minimum = |point, value, corner| Minimum {
             point,
             value,
-            cell: match *self.field {
-                CellField::Mesh { asset, .. } | CellField::Whole(asset) => cell_of(asset, point),
-                CellField::Simple(_) => None,
-            },
+            cell: cell_of(self.field, point),
             converged: self.minimum.converged,
             corner,
         };
@@ -204,7 +202,7 @@ impl Patch<'_> {
         match *self.field {
             CellField::Mesh { asset, .. } | CellField::Whole(asset) => {
                 // Faces of the patch are as near as its points.
-                let limit = self.limit().abs().max(self.minimum.value.distance.abs());
+                let limit = self.limit.abs().max(self.minimum.value.distance.abs());
                 asset.near_polygon(self.part.points(), self.part.normal, limit, &mut |face| {
                     self.overlay(&asset.local_triangle(face as usize), limit + HEIGHT, &mut offer);
                     limit

@@ -14,7 +14,6 @@ use super::middle::{self, ClippedPolygon};
 use super::polygon::Polygon;
 use super::surface::Part;
 use super::{CollideOptions, ContactsPer, Mode};
-use crate::TeSdf;
 use crate::query::{Faces, Place, Precision};
 use extremes::Patch;
 
@@ -147,8 +146,10 @@ impl Search {
         let reach = self.reach + part.radius;
         let Some(minimum) = self.in_cell(&everywhere, &whole, part, reach) else { return };
         found(&whole, minimum);
-        let patch = Patch { field: &everywhere, part, minimum: &minimum, search: self };
-        patch.extremes().into_iter().for_each(|extreme| found(&whole, extreme));
+        Patch::new(&everywhere, part, &minimum, self)
+            .extremes()
+            .into_iter()
+            .for_each(|extreme| found(&whole, extreme));
     }
 
     fn in_cell(
@@ -178,6 +179,7 @@ impl Search {
             _ => None,
         };
         let value = value.unwrap_or_else(|| cell.value(point, self.precision));
+        let value = Some(value).filter(|value| value.distance <= reach)?;
         let converged = match self.mode {
             Mode::Face if polygon.vertices().len() > 1 => {
                 let least = match self.precision {
@@ -192,18 +194,16 @@ impl Search {
             ContactsPer::Cell => value,
             ContactsPer::Face => cell.opposing(point, part.normal, value, self.precision),
         };
-        let cell = match *cell {
-            CellField::Mesh { .. } => clipped.cell.filter(|_| matches!(clipped.place, Place::Listed { .. })),
-            CellField::Whole(asset) => cell_of(asset, point),
-            CellField::Simple(_) => None,
-        };
+        let listed = clipped.cell.filter(|_| matches!(clipped.place, Place::Listed { .. }));
+        let cell = listed.or_else(|| cell_of(cell, point));
         let corner = part.points().iter().position(|p| *p == point).map(|k| k as u8);
-        (value.distance <= reach).then_some(Minimum { point, value, cell, converged, corner })
+        Some(Minimum { point, value, cell, converged, corner })
     }
 }
 
-/// The word of the cell whose list answers a point.
-fn cell_of(asset: &TeSdf, point: DVec3) -> Option<u32> {
+/// The word of the cell whose list answers a point, in the whole field of a mesh.
+fn cell_of(field: &CellField, point: DVec3) -> Option<u32> {
+    let CellField::Whole(asset) = field else { return None };
     match asset.locate_with_word(point) {
         (Place::Listed { .. }, word) => u32::try_from(word).ok(),
         _ => None,
