@@ -308,7 +308,8 @@ impl TeSdf {
         }
     }
 
-    fn local_corners(&self, position: usize) -> [DVec3; 3] {
+    /// Corners of the face at `position`, in the local frame.
+    pub(crate) fn local_corners(&self, position: usize) -> [DVec3; 3] {
         self.face_corners(position).map(|p| self.frame.to_local(p))
     }
 

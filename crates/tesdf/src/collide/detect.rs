@@ -1,8 +1,11 @@
 use crate::parallel::*;
 
 use super::hidden;
+use super::narrow::Minimum;
 use super::ordered_pair::OrderedPair;
-use super::surface::Candidates;
+use super::surface::{Candidates, Part};
+use crate::geometry::Aabb;
+
 use super::{CollideError, CollideOptions, Contact, Contacts, Scene, Statistics, reduce_pairs};
 
 /// Number of faces or nodes per task.
@@ -126,19 +129,48 @@ struct Found {
 fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let mut found = Found::default();
     let Found { contacts, at_vertices, polygons, filtered } = &mut found;
-    for &candidate in candidates {
-        let (part, face_a, feature) = pair.part(candidate);
-        pair.search.minima(&pair.field, &part, &mut |_| *polygons += 1, &mut |_, minimum| {
-            if pair.is_filtered(&part, &minimum) {
-                *filtered += 1;
-            } else {
-                if let Some(vertex) = pair.vertex(&part, &minimum) {
+    let parts: Vec<(Part, u32, u32)> = candidates.iter().map(|&candidate| pair.part(candidate)).collect();
+    let mut rest = parts.as_slice();
+    while let Some((group, others)) = rest.split_at_checked(near_each_other(rest)).filter(|g| !g.0.is_empty())
+    {
+        rest = others;
+        let around = pair.search.surroundings(&pair.field, group.iter().map(|(part, ..)| part));
+        for (part, face_a, feature) in group {
+            let mut found = |minimum: Minimum| {
+                if pair.is_filtered(part, &minimum) {
+                    *filtered += 1;
+                    return;
+                }
+                if let Some(vertex) = pair.vertex(part, &minimum) {
                     let cosine = minimum.value.gradient.dot(part.normal);
                     at_vertices.push(AtVertex { index: contacts.len(), vertex, cosine });
                 }
-                contacts.push(pair.contact(&part, &minimum, face_a, feature));
-            }
-        });
+                contacts.push(pair.contact(part, &minimum, *face_a, *feature));
+            };
+            let mut polygon = |_: &_| *polygons += 1;
+            pair.search.minima(&pair.field, part, around.as_ref(), &mut polygon, &mut |_, m| found(m));
+        }
     }
     found
+}
+
+/// Largest number of parts whose surroundings are searched together, and the largest size of their
+/// bounds, relative to the largest part.
+const GROUP: usize = 16;
+const SPREAD: f64 = 4.0;
+
+/// The number of parts, from the first on, that lie near each other.
+fn near_each_other(parts: &[(Part, u32, u32)]) -> usize {
+    let (mut bounds, mut largest) = (Aabb::EMPTY, 0.0f64);
+    parts
+        .iter()
+        .take(GROUP)
+        .take_while(|(part, ..)| {
+            let own = Aabb::of(part.points());
+            bounds = bounds.union(own);
+            largest = largest.max(own.extent().max_element());
+            bounds.extent().max_element() <= SPREAD * largest
+        })
+        .count()
+        .max(usize::from(!parts.is_empty()))
 }

@@ -6,7 +6,7 @@ use super::simple::Simple;
 use super::{FeatureB, Placement, Shape};
 use crate::TeSdf;
 use crate::geometry::Feature;
-use crate::query::{Faces, ON_SURFACE_F64, Place, Precision};
+use crate::query::{Faces, ON_SURFACE_F64, Place, Precision, Surroundings};
 
 /// A field in the frame of its computations: the local frame of an asset, or the frame of a simple
 /// shape.
@@ -16,6 +16,24 @@ pub enum Field<'a> {
     Mesh(&'a TeSdf),
     /// The field of a plane, box, sphere or capsule.
     Simple(Simple),
+}
+
+impl Field<'_> {
+    /// The signed distance at `p` and a bound of its error.
+    pub fn rough(&self, p: DVec3) -> (f64, f64) {
+        match self {
+            Field::Mesh(asset) => {
+                // Uses exact distances: distances from inexact lists cannot rule out a ball.
+                let distance = asset.found_exactly(p).signed_distance;
+                (distance, ROUNDING + FAR * distance.abs())
+            }
+            // The formula's rounding is relative to the size of its numbers.
+            Field::Simple(simple) => {
+                let distance = simple.value(p).distance;
+                (distance, FAR * (distance.abs() + p.abs().max_element()))
+            }
+        }
+    }
 }
 
 /// A field placed in the world.
@@ -93,18 +111,7 @@ impl<'a> FieldBody<'a> {
 
     /// The signed distance at `p` and a bound of its error, in the field's frame.
     pub fn rough(&self, p: DVec3) -> (f64, f64) {
-        match self.field {
-            Field::Mesh(asset) => {
-                // Uses exact distances: distances from inexact lists cannot rule out a ball.
-                let distance = asset.found_exactly(p).signed_distance;
-                (distance, ROUNDING + FAR * distance.abs())
-            }
-            // The formula's rounding is relative to the size of its numbers.
-            Field::Simple(simple) => {
-                let distance = simple.value(p).distance;
-                (distance, FAR * (distance.abs() + p.abs().max_element()))
-            }
-        }
+        self.field.rough(p)
     }
 
     /// Lower bound of the signed distance within `radius` of `p`. All in the field's frame.
@@ -153,8 +160,8 @@ pub enum CellField<'a> {
         /// The faces of its list; empty without a list.
         faces: &'a Faces,
     },
-    /// The complete field of a mesh.
-    Whole(&'a TeSdf),
+    /// The complete field of a mesh around some polygons.
+    Whole(&'a Surroundings<'a>),
     /// The complete field of a simple shape.
     Simple(Simple),
 }
@@ -165,7 +172,7 @@ impl CellField<'_> {
     pub fn value(&self, p: DVec3, precision: Precision) -> FieldValue {
         match *self {
             Self::Mesh { asset, place, faces } => asset.find(p, place, faces, precision).into(),
-            Self::Whole(asset) => asset.found_at(p, asset.locate(p), precision).into(),
+            Self::Whole(Surroundings { asset, .. }) => asset.found_at(p, asset.locate(p), precision).into(),
             Self::Simple(simple) => simple.value(p),
         }
     }
@@ -175,8 +182,26 @@ impl CellField<'_> {
     pub fn mesh<'b>(&'b self, none: &'b Faces) -> Option<(&'b TeSdf, Place, &'b Faces)> {
         match *self {
             Self::Mesh { asset, place, faces } => Some((asset, place, faces)),
-            Self::Whole(asset) => Some((asset, Place::NotOfDomain, none)),
+            Self::Whole(around) => Some((around.asset, Place::NotOfDomain, none)),
             Self::Simple(_) => None,
+        }
+    }
+
+    /// As [`Field::rough`]; for a cell of a mesh, from all its faces.
+    pub fn rough(&self, p: DVec3) -> (f64, f64) {
+        match *self {
+            Self::Mesh { asset, .. } | Self::Whole(&Surroundings { asset, .. }) => {
+                Field::Mesh(asset).rough(p)
+            }
+            Self::Simple(simple) => Field::Simple(simple).rough(p),
+        }
+    }
+
+    /// The mesh around the polygons of the whole field.
+    pub fn surroundings(&self) -> Option<&Surroundings<'_>> {
+        match self {
+            Self::Whole(around) => Some(around),
+            _ => None,
         }
     }
 
@@ -189,7 +214,7 @@ impl CellField<'_> {
         let tie = if precision == Precision::F32 { ROUNDING } else { TIE };
         match *self {
             Self::Mesh { asset, faces, .. } => asset.most_opposing(p, faces, normal, value, tie),
-            Self::Whole(asset) => match asset.locate(p) {
+            Self::Whole(Surroundings { asset, .. }) => match asset.locate(p) {
                 Place::Listed { offset, .. } => {
                     asset.with_list(offset, |faces| asset.most_opposing(p, faces, normal, value, tie))
                 }

@@ -107,7 +107,7 @@ pub fn least(
             }
             Item::Face(face) => {
                 let part = surface.face(face, field, 0.0);
-                search.within(limit).minima(field, &part, &mut |_| (), &mut |_, minimum| {
+                search.within(limit).minima(field, &part, None, &mut |_| (), &mut |_, minimum| {
                     converged &= minimum.converged;
                     let distance = minimum.value.distance - part.radius;
                     if best.is_none_or(|b| distance < b.distance) {

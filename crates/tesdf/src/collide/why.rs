@@ -240,11 +240,11 @@ impl Stages<'_> {
         // First the limits of the detection, then no limit.
         let mut seen = Vec::new();
         let mut kept = Vec::new();
-        search.minima(field, &part, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
+        search.minima(field, &part, None, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
             kept.push((key(polygon), minimum))
         });
         let mut polygons = Vec::new();
-        search.within(f64::INFINITY).minima(field, &part, &mut |_| (), &mut |polygon, minimum| {
+        search.within(f64::INFINITY).minima(field, &part, None, &mut |_| (), &mut |polygon, minimum| {
             let key = key(polygon);
             let verdict = match kept.iter().find(|k| k.0 == key) {
                 Some((_, minimum)) if self.pair.is_filtered(&part, minimum) => {

@@ -325,20 +325,20 @@ fn look_at<L: Doubles>(shape: &[f64], stride: usize, p: Vector<L>, out: &mut [f6
 
     // The closest edge. Of equally close edges it is the first.
     let mut point = edge_point(corners[0], corners[1], along[0], start[0], end[0]);
-    let mut distance = length(p.minus(point));
+    let mut squared = length_squared(p.minus(point));
     let point_1 = edge_point(corners[1], corners[2], along[1], start[1], end[1]);
-    let distance_1 = length(p.minus(point_1));
-    let nearer = distance_1.less(distance);
-    distance = L::select(nearer, distance_1, distance);
+    let squared_1 = length_squared(p.minus(point_1));
+    let nearer = squared_1.less(squared);
+    squared = L::select(nearer, squared_1, squared);
     point = Vector::select(nearer, point_1, point);
     let point_2 = edge_point(corners[2], corners[0], along[2], start[2], end[2]);
-    let distance_2 = length(p.minus(point_2));
-    let nearer = distance_2.less(distance);
-    distance = L::select(nearer, distance_2, distance);
+    let squared_2 = length_squared(p.minus(point_2));
+    let nearer = squared_2.less(squared);
+    squared = L::select(nearer, squared_2, squared);
     point = Vector::select(nearer, point_2, point);
 
     let height = normal.dot(from[0]);
-    distance = L::select(inside, height.abs(), distance);
+    let distance = L::select(inside, height.abs(), squared.sqrt());
     point = Vector::select(inside, p.minus(normal.times(height)), point);
     let gradient = p.minus(point).over(distance);
 
@@ -372,8 +372,8 @@ fn bit<L: Doubles>(mask: L::Mask, value: f64) -> L {
 }
 
 #[inline(always)]
-fn length<L: Doubles>(v: Vector<L>) -> L {
-    v.dot(v).sqrt()
+fn length_squared<L: Doubles>(v: Vector<L>) -> L {
+    v.dot(v)
 }
 
 #[cfg(test)]

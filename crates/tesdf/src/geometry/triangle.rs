@@ -167,9 +167,17 @@ impl Triangle {
         if relative.over_face {
             return self.closest_in_plane(p);
         }
-        let [a, b, c] = [0, 1, 2].map(|k| self.closest_on_edge(k, p));
-        let nearer = |x: Closest, y: Closest| if y.distance < x.distance { y } else { x };
-        nearer(nearer(a, b), c)
+        // Squares are compared, so that there is one root.
+        let mut nearest = self.on_edge(0, relative.start(0), relative.end(0));
+        let mut least = p.distance_squared(nearest.0);
+        for k in 1..3 {
+            let edge = self.on_edge(k, relative.start(k), relative.end(k));
+            let squared = p.distance_squared(edge.0);
+            if squared < least {
+                (nearest, least) = (edge, squared);
+            }
+        }
+        Closest { distance: least.sqrt(), point: nearest.0, feature: nearest.1 }
     }
 
     /// The point of the triangle's plane closest to `p`.
@@ -185,14 +193,23 @@ impl Triangle {
         let next = (k + 1) % 3;
         let along = self.corners[next] - self.corners[k];
         let (start, end) = (along.dot(p - self.corners[k]), along.dot(p - self.corners[next]));
-        let (point, feature) = if start <= 0.0 {
+        let (point, feature) = self.on_edge(k, start, end);
+        Closest { distance: p.distance(point), point, feature }
+    }
+
+    /// The point of edge `k` that is closest to a point whose positions along the edge from its start
+    /// and from its end are known, and its feature.
+    #[inline]
+    fn on_edge(&self, k: usize, start: f64, end: f64) -> (DVec3, Feature) {
+        let next = (k + 1) % 3;
+        if start <= 0.0 {
             (self.corners[k], Feature::Vertex(k as u8))
         } else if end >= 0.0 {
             (self.corners[next], Feature::Vertex(next as u8))
         } else {
+            let along = self.corners[next] - self.corners[k];
             (self.corners[k] + start / (start - end) * along, Feature::Edge(k as u8))
-        };
-        Closest { distance: p.distance(point), point, feature }
+        }
     }
 
     /// The features whose closed regions contain `p`.

@@ -178,6 +178,54 @@ fn apart_lanes<L: Lanes<N>, const N: usize>(
     bound.to_array()
 }
 
+/// Lower bounds of the distances between a polygon and boxes, up to rounding: as
+/// [`PolygonAxes::to_box`]. `boxes` has the coordinates of the lowest corners, then of the highest.
+#[inline]
+pub fn boxes_apart(isa: Isa, boxes: &[[f32; LANES]; 6], axes: &PolygonAxes) -> [f32; LANES] {
+    match isa {
+        Isa::Baseline => boxes_apart_lanes::<[f32; LANES], LANES>(boxes, axes),
+        // SAFETY: `detect` found the features.
+        #[cfg(target_arch = "x86_64")]
+        Isa::Avx2 | Isa::Avx512 => unsafe { boxes_apart_avx2(boxes, axes) },
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn boxes_apart_avx2(boxes: &[[f32; LANES]; 6], axes: &PolygonAxes) -> [f32; LANES] {
+    boxes_apart_lanes::<std::arch::x86_64::__m256, LANES>(boxes, axes)
+}
+
+#[inline(always)]
+fn boxes_apart_lanes<L: Lanes<N>, const N: usize>(boxes: &[[f32; N]; 6], axes: &PolygonAxes) -> [f32; N] {
+    let row = |k: usize| L::from_bits(boxes[k].map(f32::to_bits));
+    let (zero, half) = (L::splat(0.0), L::splat(0.5));
+    let mut centers = [zero; 3];
+    let mut halves = [zero; 3];
+    let mut squared = zero;
+    for k in 0..3 {
+        let (low, high) = (row(k), row(3 + k));
+        // Halved before the sum, which then cannot overflow.
+        centers[k] = low.mul_add(half, high.mul(half));
+        halves[k] = high.mul_add(half, zero.sub(low.mul(half)));
+        let apart = low.sub(L::splat(axes.high[k])).max(L::splat(axes.low[k]).sub(high)).max(zero);
+        squared = apart.mul_add(apart, squared);
+    }
+    let mut bound = zero;
+    for k in 0..4 {
+        let (u, height) = if k == 3 { (axes.normal, axes.height) } else { (axes.outward[k], axes.sides[k]) };
+        let center = V(centers).dot(V([L::splat(u.x), L::splat(u.y), L::splat(u.z)])).sub(L::splat(height));
+        let u = u.abs();
+        let half = V(halves).dot(V([L::splat(u.x), L::splat(u.y), L::splat(u.z)]));
+        bound = center.sub(half).max(bound);
+        if k == 3 {
+            bound = zero.sub(center).sub(half).max(bound);
+        }
+    }
+    let (squared, bound) = (squared.to_array(), bound.to_array());
+    std::array::from_fn(|l| bound[l].max(squared[l].sqrt()))
+}
+
 #[inline(always)]
 fn nearest_lanes<L: Lanes<N>, const N: usize>(
     records: &[FaceRecord],

@@ -46,6 +46,7 @@ mod nearest;
 mod polygon;
 mod ray;
 mod sign;
+mod surroundings;
 
 /// Constants that the kernels of `tesdf-gpu` share with this crate. Not part of the API.
 #[doc(hidden)]
@@ -66,6 +67,8 @@ pub(crate) use locate::{Faces, Place};
 pub use nearest::Reads;
 pub(crate) use polygon::MAX_POINTS;
 pub use ray::RayHit;
+#[cfg(feature = "collide")]
+pub(crate) use surroundings::Surroundings;
 
 use crate::TeSdf;
 use crate::asset::layout::Label;

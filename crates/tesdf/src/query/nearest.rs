@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::kernel::{self, Nearest};
 use super::locate::Faces;
-use super::polygon::{self, MAX_POINTS, PolygonAxes};
+use super::polygon::{MAX_POINTS, PolygonAxes};
 use crate::TeSdf;
 use crate::asset::layout::{TREE_LEAF, TreeChild};
 use crate::geometry::{AabbTree, Closest, Feature};
@@ -167,28 +167,60 @@ impl TeSdf {
         limit: f64,
         offer: &mut impl FnMut(u32) -> f64,
     ) {
-        let middle = self.cube.middle();
-        let mut relative = [DVec3::ZERO; MAX_POINTS];
-        relative.iter_mut().zip(points).for_each(|(to, &p)| *to = p - middle);
-        let axes = PolygonAxes::new(&relative[..points.len().min(MAX_POINTS)], normal);
-        // Rounded up, as the slack is more than a rounding of it.
-        let with_slack = |limit: f64| limit as f32 * (1.0 + polygon::ROUNDING) + axes.rounding;
-        let mut now = with_slack(limit);
+        let axes = self.axes(points, normal);
+        let mut now = axes.with_slack(limit);
         self.walk_tree(
             |b: &[f32]| axes.to_box(b),
             |d: f32, limit: f32| d > limit,
             now,
             |start, count| {
-                let faces: [u32; TREE_LEAF] = std::array::from_fn(|l| start + (l as u32).min(count - 1));
-                let bounds = kernel::apart(self.isa, &self.records, &faces, &axes);
-                for l in 0..count as usize {
-                    if bounds[l] <= now {
-                        now = with_slack(offer(faces[l]));
-                    }
-                }
+                now = self.offer_leaf(start, count, &axes, now, offer);
                 now
             },
         );
+    }
+
+    /// The axes of a polygon in the local frame, with one to [`MAX_POINTS`] points.
+    pub(super) fn axes(&self, points: &[DVec3], normal: DVec3) -> PolygonAxes {
+        let middle = self.cube.middle();
+        let mut relative = [DVec3::ZERO; MAX_POINTS];
+        relative.iter_mut().zip(points).for_each(|(to, &p)| *to = p - middle);
+        PolygonAxes::new(&relative[..points.len().min(MAX_POINTS)], normal)
+    }
+
+    /// Offers the faces of a leaf that can come within a limit of a polygon, the nearer first, as
+    /// far as bounds tell. `now` is the limit with slack; returns the next one.
+    pub(super) fn offer_leaf(
+        &self,
+        start: u32,
+        count: u32,
+        axes: &PolygonAxes,
+        mut now: f32,
+        offer: &mut impl FnMut(u32) -> f64,
+    ) -> f32 {
+        let faces: [u32; TREE_LEAF] = std::array::from_fn(|l| start + (l as u32).min(count - 1));
+        let bounds = kernel::apart(self.isa, &self.records, &faces, axes);
+        // The lanes within the limit, the nearest last.
+        let mut near = [0; TREE_LEAF];
+        let mut waiting = 0;
+        for lane in 0..count as usize {
+            if bounds[lane] <= now {
+                let mut at = waiting;
+                while at > 0 && bounds[near[at - 1]] < bounds[lane] {
+                    near[at] = near[at - 1];
+                    at -= 1;
+                }
+                near[at] = lane;
+                waiting += 1;
+            }
+        }
+        for &lane in near[..waiting].iter().rev() {
+            if bounds[lane] > now {
+                break;
+            }
+            now = axes.with_slack(offer(faces[lane]));
+        }
+        now
     }
 
     /// Offers the faces that can be within `limit` of a point. `faces` are those of the list that
@@ -299,15 +331,20 @@ mod tests {
             let distance = polygon_to_triangle(&points, whole.normal, &triangle, f64::INFINITY)
                 .map_or(f64::INFINITY, |found| found.0);
             let axes = PolygonAxes::new(&points, whole.normal);
-            let limit = distance as f32 * (1.0 + polygon::ROUNDING) + axes.rounding;
+            let limit = axes.with_slack(distance);
             let record = FaceRecord::new(&triangle, DVec3::ZERO, SignHints::default());
             for isa in Isa::all_here() {
                 for bound in kernel::apart(isa, &[record], &[0; TREE_LEAF], &axes) {
                     prop_assert!(bound <= limit, "{isa:?}: {bound} of {distance}");
                 }
             }
-            let bound = axes.to_box(&Aabb::of(&corners).rounded_from(DVec3::ZERO));
-            prop_assert!(bound <= limit, "box: {bound} of {distance}");
+            let bounds = Aabb::of(&corners).rounded_from(DVec3::ZERO);
+            prop_assert!(axes.to_box(&bounds) <= limit, "box: {} of {distance}", axes.to_box(&bounds));
+            for isa in Isa::all_here() {
+                for bound in kernel::boxes_apart(isa, &bounds.map(|x| [x; TREE_LEAF]), &axes) {
+                    prop_assert!(bound <= limit, "box, {isa:?}: {bound} of {distance}");
+                }
+            }
         }
     }
 }

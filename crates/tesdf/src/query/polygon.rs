@@ -14,8 +14,10 @@ pub const MAX_POINTS: usize = 12;
 /// A convex polygon with the axes along which a face or a box may be apart from it. In `f32`,
 /// relative to the middle of the cube.
 pub struct PolygonAxes {
-    low: Vec3,
-    high: Vec3,
+    /// Lowest corner of the bounds.
+    pub low: Vec3,
+    /// Highest corner of the bounds.
+    pub high: Vec3,
     points: [Vec3; MAX_POINTS],
     count: usize,
     /// The normal of the plane, or zero.
@@ -58,6 +60,13 @@ impl PolygonAxes {
     #[inline]
     pub fn points(&self) -> &[Vec3] {
         &self.points[..self.count]
+    }
+
+    /// Bounds up to this value belong to distances up to `limit`. Rounded up, as the slack is more
+    /// than a rounding of it.
+    #[inline]
+    pub fn with_slack(&self, limit: f64) -> f32 {
+        limit as f32 * (1.0 + ROUNDING) + self.rounding
     }
 
     /// Lower bound of the distance to a box, up to `rounding`.

@@ -7,11 +7,11 @@ use glam::DVec3;
 
 use super::Lowest;
 use crate::TeSdf;
-use crate::collide::field::CellField;
+use crate::collide::field::{CellField, ROUNDING};
 use crate::collide::field_value::FieldValue;
 use crate::collide::polygon::Polygon;
 use crate::geometry::Triangle;
-use crate::query::Precision;
+use crate::query::{Precision, Surroundings};
 
 /// Number of evaluations after which a search gives up. The kernel `narrow_exact` counts rounds
 /// instead (`ROUNDS`), because its threads evaluate pieces together.
@@ -58,8 +58,7 @@ pub fn branch_and_bound(
     reach: f64,
     precision: Precision,
 ) -> Lowest {
-    let best = (f64::INFINITY, polygon.center());
-    let mut search = Branches { cell, precision, tolerance, reach, best, best_face: 0, evaluations: 0 };
+    let mut search = Branches::new(cell, polygon, precision, tolerance, reach);
     let mut open = BinaryHeap::from(search.pieces(polygon));
     while let Some(piece) = open.pop() {
         if !search.is_open(piece.bound) {
@@ -80,15 +79,17 @@ pub fn branch_and_bound(
 
 /// Lower bound of the signed distances over a polygon, without a search.
 pub fn lower_bound(cell: &CellField, polygon: &Polygon, tolerance: f64) -> f64 {
-    let best = (f64::INFINITY, polygon.center());
-    let (precision, reach) = (Precision::F64, f64::INFINITY);
-    let mut search = Branches { cell, precision, tolerance, reach, best, best_face: 0, evaluations: 0 };
+    let mut search = Branches::new(cell, polygon, Precision::F64, tolerance, f64::INFINITY);
+    search.slack = f64::INFINITY;
     search.pieces(polygon).iter().map(|piece| piece.bound).fold(f64::INFINITY, f64::min)
 }
 
 struct Branches<'a> {
     cell: &'a CellField<'a>,
     precision: Precision,
+    /// Error bound of the `f32` values that are tried before `f64`. Where it is infinite, all values
+    /// are in `f64`.
+    slack: f64,
     tolerance: f64,
     reach: f64,
     best: (f64, DVec3),
@@ -97,9 +98,32 @@ struct Branches<'a> {
     evaluations: usize,
 }
 
-impl Branches<'_> {
+impl<'a> Branches<'a> {
+    fn new(
+        cell: &'a CellField<'a>,
+        polygon: &Polygon,
+        precision: Precision,
+        tolerance: f64,
+        reach: f64,
+    ) -> Self {
+        let best = (f64::INFINITY, polygon.center());
+        Self { cell, precision, slack: ROUNDING, tolerance, reach, best, best_face: 0, evaluations: 0 }
+    }
+
+    /// The value at a point. Where `f32` shows that it is not the best, the distance is only a lower
+    /// bound.
     fn value(&mut self, p: DVec3) -> FieldValue {
         self.evaluations += 1;
+        if self.precision == Precision::F64
+            && self.slack.is_finite()
+            && !matches!(self.cell, CellField::Simple(_))
+        {
+            let rough = self.cell.value(p, Precision::F32);
+            let distance = rough.distance - self.slack;
+            if distance >= self.best.0 {
+                return FieldValue { distance, ..rough };
+            }
+        }
         let value = self.cell.value(p, self.precision);
         if value.distance < self.best.0 {
             self.best = (value.distance, p);
@@ -148,7 +172,7 @@ impl Branches<'_> {
         let radius = points.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max).sqrt();
         let mut bound = value.distance - radius;
         match *self.cell {
-            CellField::Mesh { asset, .. } | CellField::Whole(asset) => {
+            CellField::Mesh { asset, .. } | CellField::Whole(&Surroundings { asset, .. }) => {
                 let triangle = |face: u32| asset.local_triangle(face as usize);
                 let distances = |t: &Triangle| points.map(|p| t.closest(p).distance);
                 // The distance to one face is convex, so over a triangle it is at most its greatest

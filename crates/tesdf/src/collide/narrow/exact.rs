@@ -10,12 +10,16 @@ use crate::collide::field::{CellField, ROUNDING};
 use crate::collide::middle;
 use crate::collide::polygon::{MAX_VERTICES, Parts, Polygon};
 use crate::geometry::polygon_to_triangle;
-use crate::query::{Faces, Place, Precision};
+use crate::query::{Faces, Place, Precision, Surroundings};
 
 /// Nearer to the surface than this (local frame), a polygon may cross it. Where two faces cross,
 /// their computed distance is rarely 0 but about 1e-17, and the sign there may be either. This is
 /// far below any sensible tolerance.
 const CLEAR: f64 = 1e-9;
+
+/// Where a whole face is deeper than this fraction of its radius, branch and bound over it drops the
+/// parts near the surface at once, and finds the deepest point faster than a search of each cell.
+const SUNK: f64 = 1.0 / 16.0;
 
 /// The least signed distance over a polygon, within `tolerance`; both in the field's frame. `None`
 /// when it is above `reach`.
@@ -36,7 +40,7 @@ pub fn lowest(
     let radius = polygon.reach(center);
     let first = match cell {
         // Distances from lists that are not exact rule out nothing.
-        CellField::Whole(asset) => asset.found_exactly(center).into(),
+        CellField::Whole(around) => around.asset.found_exactly(center).into(),
         _ => cell.value(center, Precision::F32),
     };
     if first.distance - radius > reach + ROUNDING {
@@ -54,7 +58,8 @@ pub fn lowest(
         (_, Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside)) => (true, false),
         _ => (false, false),
     };
-    if inside {
+    let is_sunk = |depth: f64| matches!(cell, CellField::Whole(_)) && depth > SUNK * radius;
+    if inside || is_sunk(-first.distance) {
         return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     }
     if !crossing && reach < 0.0 {
@@ -62,17 +67,29 @@ pub fn lowest(
     }
     // Where the result names the face, its distance must be the least one.
     let slack = if matches!(cell, CellField::Whole(_)) { 0.0 } else { tolerance };
-    let query = Query { asset, place, faces, polygon, normal, center, radius, tolerance, slack, reach };
+    let around = cell.surroundings();
+    let query =
+        Query { asset, around, place, faces, polygon, normal, center, radius, tolerance, slack, reach };
     let (distance, point, face) = query.nearest_to_faces(first.position);
-    if crossing && distance <= CLEAR && !query.only_touches(cell, distance, point) {
-        return match cell {
-            // A whole face may cross any number of faces; in a cell there are few.
-            CellField::Whole(_) => query.lowest_by_cells(precision),
-            _ => query.lowest_of_parts(cell, precision),
-        };
+    if crossing && distance <= CLEAR {
+        let depth = -polygon.points().map(|p| cell.rough(p).0).fold(f64::INFINITY, f64::min);
+        if is_sunk(depth) {
+            return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
+        }
+        if depth > ROUNDING || !query.only_touches(cell, distance, point) {
+            return match cell {
+                // A whole face may cross any number of faces; in a cell there are few.
+                CellField::Whole(_) => query.lowest_by_cells(precision),
+                _ => query.lowest_of_parts(cell, precision),
+            };
+        }
     }
     // A polygon that keeps clear of the surface is on one side of it.
-    if crossing && distance > CLEAR && cell.value(point, Precision::F64).distance < 0.0 {
+    let is_inside = || match first.distance {
+        d if d.abs() > ROUNDING => d < 0.0,
+        _ => cell.value(point, Precision::F64).distance < 0.0,
+    };
+    if crossing && distance > CLEAR && is_inside() {
         return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
     }
     (distance <= reach).then_some(Lowest { point, converged: true, face })
@@ -104,8 +121,9 @@ pub fn is_least(
     }
     let center = polygon.center();
     let radius = polygon.reach(center);
+    let (around, slack, reach) = (cell.surroundings(), 0.0, least);
     let query =
-        Query { asset, place, faces, polygon, normal, center, radius, tolerance, slack: 0.0, reach: least };
+        Query { asset, around, place, faces, polygon, normal, center, radius, tolerance, slack, reach };
     let points = query.points();
     // A polygon that keeps clear of all faces is on one side of the surface.
     let bound = (least - tolerance).max(0.5 * CLEAR);
@@ -122,6 +140,32 @@ pub fn is_least(
     is_least
 }
 
+/// The direction from a face to the nearest point of the polygon. Most other faces are farther along
+/// it, in particular those that share the nearest point.
+struct Axis {
+    direction: DVec3,
+    /// The lowest point of the polygon along it.
+    lowest: f64,
+}
+
+impl Axis {
+    /// `None` where the polygon touches the face.
+    fn new(points: &[DVec3], way: DVec3) -> Option<Self> {
+        let direction = way.try_normalize()?;
+        let lowest = points.iter().map(|p| direction.dot(*p)).fold(f64::INFINITY, f64::min);
+        Some(Self { direction, lowest })
+    }
+
+    /// Whether a face is at least `limit` away along the axis, up to rounding.
+    fn separates(&self, corners: &[DVec3; 3], limit: f64) -> bool {
+        let highest = corners.iter().map(|c| self.direction.dot(*c)).fold(f64::NEG_INFINITY, f64::max);
+        self.lowest - highest >= limit - ALONG_AXIS
+    }
+}
+
+/// Rounding of a height along an axis (local frame).
+const ALONG_AXIS: f64 = 1e-14;
+
 /// Number of cuts after which the rest of a polygon is searched without further cuts.
 const MAX_CUTS: usize = 64;
 
@@ -129,6 +173,8 @@ const MAX_CUTS: usize = 64;
 #[derive(Clone, Copy)]
 struct Query<'a> {
     asset: &'a TeSdf,
+    /// For a polygon in the whole field.
+    around: Option<&'a Surroundings<'a>>,
     place: Place,
     faces: &'a Faces,
     polygon: &'a Polygon,
@@ -154,14 +200,18 @@ impl Query<'_> {
         // Keeps all polygons that may cross the surface.
         let farthest = self.reach.max(0.0) + 2.0 * CLEAR;
         let mut best = (f64::INFINITY, self.center, None);
+        let mut axis = None;
         let mut offer = |face: u32| {
             // Improvements below the slack are skipped, unless the polygon may cross the face.
             let limit = if best.0 > self.slack + CLEAR { best.0 - self.slack } else { best.0 };
             let limit = limit.min(farthest);
-            if !self.plane_is_beyond(points, face, limit) {
+            let corners = self.asset.local_corners(face as usize);
+            let is_apart = |axis: &Axis| axis.separates(&corners, limit);
+            if !axis.as_ref().is_some_and(is_apart) && !self.plane_is_beyond(points, face, limit) {
                 let triangle = self.asset.local_triangle(face as usize);
                 if let Some((distance, point)) = polygon_to_triangle(points, self.normal, &triangle, limit) {
                     best = (distance, point, Some(face));
+                    axis = Axis::new(points, point - triangle.closest(point).point);
                 }
             }
             best.0.min(farthest)
@@ -174,8 +224,11 @@ impl Query<'_> {
     /// Offers the faces that can be nearest to a point of the polygon. `offer` returns the least
     /// distance so far between the polygon and a face; `first` is the first one.
     fn near(&self, first: f64, offer: &mut impl FnMut(u32) -> f64) {
-        match self.place {
-            Place::Listed { .. } => self.asset.near_in_list(self.faces, self.center, self.radius, offer),
+        match (self.around, self.place) {
+            (Some(around), _) => around.near_polygon(&self.points(), self.normal, first, offer),
+            (None, Place::Listed { .. }) => {
+                self.asset.near_in_list(self.faces, self.center, self.radius, offer)
+            }
             _ => self.asset.near_polygon(&self.points(), self.normal, first, offer),
         }
     }
@@ -183,7 +236,14 @@ impl Query<'_> {
     /// The lowest point of a polygon, cell by cell. What is found in one cell is the limit in the
     /// next.
     fn lowest_by_cells(&self, precision: Precision) -> Option<Lowest> {
-        let mut least: Option<(f64, Lowest)> = None;
+        let everywhere =
+            |p: DVec3| self.asset.found_at(p, self.asset.locate(p), Precision::F64).signed_distance;
+        let mut least = self
+            .polygon
+            .points()
+            .map(|point| (everywhere(point), Lowest { point, converged: true, face: None }))
+            .filter(|(distance, _)| *distance <= self.reach)
+            .min_by(|x, y| x.0.total_cmp(&y.0));
         let mut converged = true;
         middle::clip(self.asset, self.polygon.clone(), self.reach.max(0.0), &mut |clipped| {
             let mut look = |faces: &Faces| {

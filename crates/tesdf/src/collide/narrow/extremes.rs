@@ -23,6 +23,13 @@ const DIRECTIONS: usize = 8;
 /// The field opposes a face when the cosine between gradient and normal is below this.
 const OPPOSES: f64 = -0.5;
 
+/// A patch along a line that ends nearer to the minimum than this fraction of the longest edge adds
+/// nothing. Two edges that cross are within the tolerance of each other on such a short piece.
+const SMALL: f64 = 1.0 / 16.0;
+
+/// A line whose sine of the angle to a side is smaller runs along the side.
+const ALONG: f64 = 1e-9;
+
 /// Number of times that a candidate beside the patch is moved inwards: once for each side at a
 /// corner, and once more.
 const MOVES: usize = 3;
@@ -49,6 +56,10 @@ pub struct Patch<'a> {
     longest: DVec3,
     /// The greatest signed distance of the patch.
     limit: f64,
+    /// Where the patch can be: the part, or a chord of it.
+    within: ArrayVec<DVec3, 3>,
+    /// The normal of `within`; zero for a chord.
+    normal: DVec3,
 }
 
 /// A point of the part that may be a corner of the patch.
@@ -69,19 +80,22 @@ impl<'a> Patch<'a> {
         let edges = (0..points.len()).map(|i| points[(i + 1) % points.len()] - points[i]);
         let longest =
             edges.fold(DVec3::ZERO, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
-        let mut patch = Self { field, part, minimum, search, longest, limit: 0.0 };
+        let within = points.iter().copied().collect();
+        let mut patch =
+            Self { field, part, minimum, search, longest, limit: 0.0, within, normal: part.normal };
         let Search { tolerance, reach, .. } = *search;
         patch.limit = if patch.is_large() { reach + part.radius } else { minimum.value.distance + tolerance };
         patch
     }
 
     /// Points of the patch other than the minimum, at most one for each direction.
-    pub fn extremes(&self) -> ArrayVec<Minimum, DIRECTIONS> {
+    pub fn extremes(mut self) -> ArrayVec<Minimum, DIRECTIONS> {
         let mut found = ArrayVec::<Minimum, DIRECTIONS>::new();
-        if self.part.points().len() < 2 || !self.may_be_flat() {
+        if self.part.points().len() < 2 || !(self.is_large() || self.may_be_flat()) {
             return found;
         }
         let mut candidates = self.candidates();
+        candidates.retain(|candidate| self.may_hold(candidate.point));
         for direction in self.directions() {
             let Some(extreme) = self.farthest(direction, &mut candidates) else { continue };
             let is_new = |other: &Minimum| other.point != extreme.point;
@@ -96,21 +110,81 @@ impl<'a> Patch<'a> {
         self.longest.length_squared() > self.search.large * self.search.large
     }
 
-    /// Whether the part is large, or the field is constant, to first order and up to the tolerance,
-    /// from the minimum to another corner of the part.
-    fn may_be_flat(&self) -> bool {
-        let Minimum { point, value, corner, .. } = self.minimum;
-        let is_level = |p: &&DVec3| value.gradient.dot(**p - *point).abs() <= self.search.tolerance;
-        let level = self.part.points().iter().filter(is_level).count();
-        self.is_large() || level > usize::from(corner.is_some())
+    /// Whether the field may be constant, up to the tolerance, from the minimum to other points of
+    /// the part. If it can be so along one line only, the patch is limited to this chord.
+    fn may_be_flat(&mut self) -> bool {
+        let gradient = self.minimum.value.gradient;
+        let length = self.longest.length();
+        let slope = if self.normal == DVec3::ZERO {
+            gradient.project_onto_normalized(self.longest / length)
+        } else {
+            gradient.reject_from_normalized(self.normal)
+        };
+        if slope.length() * SMALL * length <= self.search.tolerance {
+            return true;
+        }
+        let Some(level) = self.normal.cross(slope).try_normalize() else { return false };
+        let Some(ends) = self.chord(level) else { return false };
+        // Where the field rises soon on both sides, nothing else needs to be found.
+        let point = self.minimum.point;
+        let may_hold = |end: &DVec3| {
+            let way = *end - point;
+            let near = SMALL * length;
+            way.length_squared() > near * near && {
+                let (distance, slack) = self.field.rough(point + near * way.normalize());
+                distance <= self.limit + slack
+            }
+        };
+        if !ends.iter().any(may_hold) {
+            return false;
+        }
+        (self.within, self.normal) = (ends.into_iter().collect(), DVec3::ZERO);
+        true
+    }
+
+    /// The ends of the part along a line through the minimum.
+    fn chord(&self, direction: DVec3) -> Option<[DVec3; 2]> {
+        let (points, from) = (self.part.points(), self.minimum.point);
+        let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+        for i in 0..points.len() {
+            let (a, b) = (points[i], points[(i + 1) % points.len()]);
+            let inward = self.part.normal.cross(b - a).normalize_or_zero();
+            let (height, rise) = ((from - a).dot(inward), direction.dot(inward));
+            match rise {
+                // Along the side: the minimum may be on it.
+                _ if rise.abs() <= ALONG => {}
+                _ if rise > 0.0 => low = low.max(-height.max(0.0) / rise),
+                _ => high = high.min(-height.max(0.0) / rise),
+            }
+        }
+        let at = |t: f64| {
+            let p = from + t * direction;
+            let is_near = |corner: &&DVec3| corner.distance_squared(p) <= HEIGHT * HEIGHT;
+            points.iter().find(is_near).copied().unwrap_or(p)
+        };
+        (low.is_finite() && high.is_finite()).then(|| [at(low), at(high)])
+    }
+
+    /// Whether a candidate may be in the patch and matters beside the minimum.
+    fn may_hold(&self, p: DVec3) -> bool {
+        let from = p - self.minimum.point;
+        let beside = if self.normal == DVec3::ZERO { SMALL * self.longest.length() } else { 0.0 };
+        from.length_squared() > beside * beside && (self.is_large() || self.is_level(from))
+    }
+
+    /// Whether the field is constant, to first order and up to the tolerance, along a way from the
+    /// minimum.
+    fn is_level(&self, way: DVec3) -> bool {
+        self.minimum.value.gradient.dot(way).abs() <= self.search.tolerance
     }
 
     fn directions(&self) -> ArrayVec<DVec3, DIRECTIONS> {
-        let Some(along) = self.longest.try_normalize() else { return ArrayVec::new() };
-        if self.part.normal == DVec3::ZERO {
+        if self.normal == DVec3::ZERO {
+            let along = (self.within[1] - self.within[0]).normalize_or_zero();
             return [along, -along].into_iter().collect();
         }
-        let across = self.part.normal.cross(along);
+        let along = self.longest.normalize_or_zero();
+        let across = self.normal.cross(along);
         // Not along an edge, where all points of the edge would be extremes.
         let angle = |k: usize| (k as f64 + 0.5) * std::f64::consts::TAU / DIRECTIONS as f64;
         (0..DIRECTIONS).map(|k| angle(k).cos() * along + angle(k).sin() * across).collect()
@@ -196,18 +270,21 @@ impl<'a> Patch<'a> {
 
     /// Corners of the overlay of the part and the faces of the other body near it.
     fn candidates(&self) -> Vec<Candidate> {
-        let corner = |(k, &point): (usize, &DVec3)| Candidate { point, corner: Some(k as u8), taken: None };
-        let mut candidates: Vec<Candidate> = self.part.points().iter().enumerate().map(corner).collect();
+        let corner = |point: DVec3| self.part.points().iter().position(|p| *p == point).map(|k| k as u8);
+        let own = |&point: &DVec3| Candidate { point, corner: corner(point), taken: None };
+        let mut candidates: Vec<Candidate> = self.within.iter().map(own).collect();
         let mut offer = |point| candidates.push(Candidate { point, corner: None, taken: None });
         match *self.field {
-            CellField::Mesh { asset, .. } | CellField::Whole(asset) => {
+            CellField::Whole(around) => {
                 // Faces of the patch are as near as its points.
                 let limit = self.limit.abs().max(self.minimum.value.distance.abs());
-                asset.near_polygon(self.part.points(), self.part.normal, limit, &mut |face| {
-                    self.overlay(&asset.local_triangle(face as usize), limit + HEIGHT, &mut offer);
+                around.near_polygon(&self.within, self.normal, limit, &mut |face| {
+                    self.overlay(&around.asset.local_triangle(face as usize), limit + HEIGHT, &mut offer);
                     limit
                 });
             }
+            // A cell is not searched for extremes.
+            CellField::Mesh { .. } => {}
             CellField::Simple(simple) => {
                 for points in simple.parts().0 {
                     match points[..] {
@@ -225,8 +302,8 @@ impl<'a> Patch<'a> {
     /// Offers the corners of the overlay of the part and a face of the other body, as far as the
     /// face is within `limit` there.
     fn overlay(&self, face: &Triangle, limit: f64, offer: &mut impl FnMut(DVec3)) {
-        let (points, normal) = (self.part.points(), self.part.normal);
-        if face.normal == DVec3::ZERO || face.normal.dot(normal) > 0.0 {
+        let (points, normal) = (&self.within, self.normal);
+        if face.normal == DVec3::ZERO || face.normal.dot(self.part.normal) > 0.0 {
             return;
         }
         if normal != DVec3::ZERO {

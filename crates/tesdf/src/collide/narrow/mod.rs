@@ -14,7 +14,8 @@ use super::middle::{self, ClippedPolygon};
 use super::polygon::Polygon;
 use super::surface::Part;
 use super::{CollideOptions, ContactsPer, Mode};
-use crate::query::{Faces, Place, Precision};
+use crate::geometry::Aabb;
+use crate::query::{Faces, Place, Precision, Surroundings};
 use extremes::Patch;
 
 /// The least signed distance of a part in one cell, in the field's frame.
@@ -95,17 +96,51 @@ impl Search {
         }
     }
 
-    /// Finds the minima of a part, cell by cell, that are within reach. `polygon` receives every
-    /// polygon, `found` every minimum.
+    /// Whether parts are searched as a whole, not cell by cell.
+    fn is_of_faces(&self) -> bool {
+        self.per == ContactsPer::Face && self.mode != Mode::Node
+    }
+
+    /// The mesh around parts that lie near each other, for [`minima`](Self::minima). `None` where
+    /// parts are searched cell by cell, and for simple shapes.
+    pub fn surroundings<'a, 'p>(
+        &self,
+        field: &FieldBody<'a>,
+        parts: impl Iterator<Item = &'p Part>,
+    ) -> Option<Surroundings<'a>> {
+        let Field::Mesh(asset) = field.field else { return None };
+        let (mut bounds, mut radius) = (Aabb::EMPTY, 0.0f64);
+        if !self.is_of_faces() {
+            return None;
+        }
+        for part in parts {
+            (bounds, radius) = (bounds.union(Aabb::of(part.points())), radius.max(part.radius));
+        }
+        let limit = self.reach.max(0.0) + radius + self.tolerance + ROUNDING;
+        Some(Surroundings::new(asset, bounds, limit))
+    }
+
+    /// Finds the minima of a part that are within reach, cell by cell or over the whole part.
+    /// `around` is the mesh around it, where that is known. `polygon` receives every polygon,
+    /// `found` every minimum.
     pub fn minima(
         &self,
         field: &FieldBody,
         part: &Part,
+        around: Option<&Surroundings>,
         polygon: &mut impl FnMut(&ClippedPolygon),
         found: &mut impl FnMut(&ClippedPolygon, Minimum),
     ) {
-        if self.per == ContactsPer::Face && self.mode != Mode::Node {
-            return self.of_face(field, part, polygon, found);
+        if self.is_of_faces() {
+            return match (around, field.field) {
+                (Some(around), _) => self.of_face(&CellField::Whole(around), part, polygon, found),
+                (None, Field::Mesh(asset)) => {
+                    self.of_face(&CellField::Whole(&Surroundings::all(asset)), part, polygon, found)
+                }
+                (None, Field::Simple(simple)) => {
+                    self.of_face(&CellField::Simple(simple), part, polygon, found)
+                }
+            };
         }
         let reach = self.reach + part.radius;
         self.polygons(field, part, &mut |clipped| {
@@ -131,7 +166,7 @@ impl Search {
     /// large, also the extremes of what touches.
     fn of_face(
         &self,
-        field: &FieldBody,
+        everywhere: &CellField,
         part: &Part,
         polygon: &mut impl FnMut(&ClippedPolygon),
         found: &mut impl FnMut(&ClippedPolygon, Minimum),
@@ -139,14 +174,10 @@ impl Search {
         let whole =
             ClippedPolygon { polygon: Polygon::new(part.points()), place: Place::NotOfDomain, cell: None };
         polygon(&whole);
-        let everywhere = match field.field {
-            Field::Mesh(asset) => CellField::Whole(asset),
-            Field::Simple(simple) => CellField::Simple(simple),
-        };
         let reach = self.reach + part.radius;
-        let Some(minimum) = self.in_cell(&everywhere, &whole, part, reach) else { return };
+        let Some(minimum) = self.in_cell(everywhere, &whole, part, reach) else { return };
         found(&whole, minimum);
-        Patch::new(&everywhere, part, &minimum, self)
+        Patch::new(everywhere, part, &minimum, self)
             .extremes()
             .into_iter()
             .for_each(|extreme| found(&whole, extreme));
@@ -173,8 +204,8 @@ impl Search {
         }?;
         let Lowest { point, converged, face } = lowest;
         let value = match (cell, face) {
-            (CellField::Whole(asset), Some(face)) if self.precision == Precision::F64 => {
-                asset.value_outside(point, face)
+            (CellField::Whole(around), Some(face)) if self.precision == Precision::F64 => {
+                around.asset.value_outside(point, face)
             }
             _ => None,
         };
@@ -203,8 +234,8 @@ impl Search {
 
 /// The word of the cell whose list answers a point, in the whole field of a mesh.
 fn cell_of(field: &CellField, point: DVec3) -> Option<u32> {
-    let CellField::Whole(asset) = field else { return None };
-    match asset.locate_with_word(point) {
+    let CellField::Whole(around) = field else { return None };
+    match around.asset.locate_with_word(point) {
         (Place::Listed { .. }, word) => u32::try_from(word).ok(),
         _ => None,
     }

@@ -1,0 +1,120 @@
+//! The faces of a mesh near a group of polygons, found once for all of them.
+use std::cell::OnceCell;
+
+use glam::{DVec3, Vec3};
+
+use super::kernel::{self, LANES};
+use super::polygon;
+use crate::TeSdf;
+use crate::asset::layout::TreeChild;
+use crate::geometry::Aabb;
+
+/// Up to this number of leaves of the face tree, polygons are compared with the box of each leaf.
+/// With more, a walk down the tree costs less.
+const MOST: usize = 64;
+
+/// The mesh around a group of polygons. The leaves of its face tree near the group are found when
+/// they are first needed.
+#[derive(Debug)]
+pub(crate) struct Surroundings<'a> {
+    pub asset: &'a TeSdf,
+    /// Bounds of the group (local frame).
+    bounds: Aabb,
+    /// Leaves up to this distance from the bounds are near.
+    limit: f64,
+    /// `None` where there are too many.
+    leaves: OnceCell<Option<Leaves>>,
+}
+
+/// Leaves of a face tree.
+#[derive(Debug, Default)]
+struct Leaves {
+    /// First face and number of faces of each leaf.
+    faces: Vec<(u32, u32)>,
+    /// The boxes, for [`LANES`] leaves at a time: their lowest corners, then their highest.
+    boxes: Vec<[[f32; LANES]; 6]>,
+}
+
+impl<'a> Surroundings<'a> {
+    /// Those of polygons within `bounds` that are compared with faces up to `limit` away.
+    pub fn new(asset: &'a TeSdf, bounds: Aabb, limit: f64) -> Self {
+        Self { asset, bounds, limit, leaves: OnceCell::new() }
+    }
+
+    /// No group: the whole face tree is searched for every polygon.
+    pub fn all(asset: &'a TeSdf) -> Self {
+        Self::new(asset, Aabb::EMPTY, f64::NEG_INFINITY)
+    }
+
+    /// Offers the faces that can come within a limit of a polygon of the group, those in nearer
+    /// leaves first, as [`TeSdf::near_polygon`].
+    pub fn near_polygon(
+        &self,
+        points: &[DVec3],
+        normal: DVec3,
+        limit: f64,
+        offer: &mut impl FnMut(u32) -> f64,
+    ) {
+        let leaves =
+            (limit <= self.limit).then(|| self.leaves.get_or_init(|| self.find())).and_then(Option::as_ref);
+        let Some(leaves) = leaves else { return self.asset.near_polygon(points, normal, limit, offer) };
+        let axes = self.asset.axes(points, normal);
+        let mut now = axes.with_slack(limit);
+        let mut near = [(0.0, 0); MOST];
+        let mut count = 0;
+        for (first, boxes) in (0..).step_by(LANES).zip(&leaves.boxes) {
+            let bounds = kernel::boxes_apart(self.asset.isa, boxes, &axes);
+            for (leaf, bound) in (first..leaves.faces.len()).zip(bounds) {
+                if bound <= now {
+                    near[count] = (bound, leaf);
+                    count += 1;
+                }
+            }
+        }
+        let near = &mut near[..count];
+        near.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        for &mut (bound, leaf) in near {
+            if bound > now {
+                break;
+            }
+            let (start, count) = leaves.faces[leaf];
+            now = self.asset.offer_leaf(start, count, &axes, now, offer);
+        }
+    }
+
+    fn find(&self) -> Option<Leaves> {
+        let b = self.bounds.rounded_from(self.asset.cube.middle());
+        let (low, high) = (Vec3::from_slice(&b), Vec3::from_slice(&b[3..]));
+        let reach = low.abs().max(high.abs()).max_element();
+        let limit = self.limit as f32 * (1.0 + polygon::ROUNDING) + polygon::ROUNDING * (1.0 + reach);
+        let mut leaves = Leaves::default();
+        let mut stack = vec![0];
+        while let Some(node) = stack.pop() {
+            let (boxes, _) = self.asset.tree_boxes[node as usize].as_chunks::<6>();
+            let children = self.asset.tree_children[node as usize].map(TreeChild::decode);
+            for (b, child) in boxes.iter().zip(children) {
+                let apart = (Vec3::from_slice(b) - high).max(low - Vec3::from_slice(&b[3..])).max(Vec3::ZERO);
+                match child {
+                    _ if apart.length() > limit => {}
+                    TreeChild::Node(node) => stack.push(node),
+                    TreeChild::Leaf(..) if leaves.faces.len() == MOST => return None,
+                    TreeChild::Leaf(start, count) => leaves.push(start, count, b),
+                }
+            }
+        }
+        Some(leaves)
+    }
+}
+
+impl Leaves {
+    fn push(&mut self, start: u32, count: u32, bounds: &[f32; 6]) {
+        let lane = self.faces.len() % LANES;
+        if lane == 0 {
+            self.boxes.push([[0.0; LANES]; 6]);
+        }
+        self.faces.push((start, count));
+        if let Some(boxes) = self.boxes.last_mut() {
+            boxes.iter_mut().zip(bounds).for_each(|(row, &x)| row[lane] = x);
+        }
+    }
+}
