@@ -189,7 +189,12 @@ impl<'a> Branches<'a> {
                     // A face that matters at the deepest point may not be the nearest at any of
                     // these points.
                     let deepest = distances(&triangle(self.best_face));
-                    bound = bound.max(-greatest_minimum([near, u, v, w, deepest]));
+                    let (depth, at) = summit([near, u, v, w, deepest]);
+                    bound = bound.max(-depth);
+                    if self.is_open(bound) {
+                        // Where the faces that matter are among these, this is the deepest point.
+                        self.value(at[0] * points[0] + at[1] * points[1] + at[2] * points[2]);
+                    }
                 }
             }
             // A convex function lies above its tangents.
@@ -197,7 +202,11 @@ impl<'a> Branches<'a> {
                 let tangent =
                     |v: &FieldValue, from: DVec3| points.map(|p| -(v.distance + v.gradient.dot(p - from)));
                 let [u, v, w] = corners.map(|c| tangent(&c.value, c.point));
-                bound = bound.max(-greatest_minimum([tangent(&value, center), u, v, w]));
+                let (depth, at) = summit([tangent(&value, center), u, v, w]);
+                bound = bound.max(-depth);
+                if self.is_open(bound) {
+                    self.value(at[0] * points[0] + at[1] * points[1] + at[2] * points[2]);
+                }
             }
         }
         Piece { bound, corners }
@@ -212,11 +221,22 @@ impl<'a> Branches<'a> {
 /// the curvature of the distances. So a search converges even when the minimum extends along a
 /// whole line.
 pub fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
-    let least = |weights: [f64; 3]| {
+    summit(values).0
+}
+
+/// As [`greatest_minimum`], with the barycentric coordinates of the point where it is attained.
+fn summit<const N: usize>(values: [[f64; 3]; N]) -> (f64, [f64; 3]) {
+    let mut greatest = (f64::NEG_INFINITY, [1.0, 0.0, 0.0]);
+    let mut offer = |weights: [f64; 3]| {
         let at = |u: &[f64; 3]| u[0] * weights[0] + u[1] * weights[1] + u[2] * weights[2];
-        values.iter().map(at).fold(f64::INFINITY, f64::min)
+        let least = values.iter().map(at).fold(f64::INFINITY, f64::min);
+        if least > greatest.0 {
+            greatest = (least, weights);
+        }
     };
-    let mut greatest = least([1.0, 0.0, 0.0]).max(least([0.0, 1.0, 0.0])).max(least([0.0, 0.0, 1.0]));
+    offer([1.0, 0.0, 0.0]);
+    offer([0.0, 1.0, 0.0]);
+    offer([0.0, 0.0, 1.0]);
     for k in 0..N {
         for l in k + 1..N {
             let d: [f64; 3] = std::array::from_fn(|i| values[k][i] - values[l][i]);
@@ -226,7 +246,7 @@ pub fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
                 if (0.0..=1.0).contains(&t) {
                     let mut weights = [0.0; 3];
                     (weights[i], weights[j]) = (1.0 - t, t);
-                    greatest = greatest.max(least(weights));
+                    offer(weights);
                 }
             }
             for m in l + 1..N {
@@ -235,13 +255,14 @@ pub fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
                 let w = DVec3::from(d).cross(DVec3::from(e));
                 let weights = (w / (w.x + w.y + w.z)).to_array();
                 if weights.iter().all(|w| (0.0..=1.0).contains(w)) {
-                    greatest = greatest.max(least(weights));
+                    offer(weights);
                 }
             }
         }
     }
     // Margin for rounding.
-    greatest + 1e-15 * values.as_flattened().iter().fold(0.0, |m: f64, v| m.max(v.abs()))
+    let margin = 1e-15 * values.as_flattened().iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    (greatest.0 + margin, greatest.1)
 }
 
 /// Upper bound, over a triangle, of the distance to two coplanar faces that share an edge; infinite
