@@ -1,5 +1,6 @@
 //! `tesdf bench`: measures the cost of a detection on a device, stage by stage.
 mod arguments;
+mod clearance;
 mod collide;
 mod frames;
 #[cfg(feature = "gpu")]
@@ -20,6 +21,8 @@ pub struct Args {
 enum Benchmark {
     /// Detect the contacts of recorded or generated poses; print time, launches, bytes and queries
     Collide(arguments::Args),
+    /// Measure the clearance of random pairs of bodies that are deep in each other
+    Clearance(clearance::Args),
     /// Write a file of poses with overlapping bodies, from a seed
     Poses(poses::Args),
 }
@@ -31,6 +34,7 @@ enum Benchmark {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match &args.benchmark {
         Benchmark::Collide(args) => collide::run(args),
+        Benchmark::Clearance(args) => clearance::run(args),
         Benchmark::Poses(args) => poses::run(args),
     }
 }

@@ -138,13 +138,14 @@ fn pose(p: DVec3, q: DQuat) -> [f64; 7] {
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 }
 
-fn in_cube(random: &mut fastrand::Rng) -> DVec3 {
+/// A point that is uniform in the cube from -1 to 1.
+pub fn in_cube(random: &mut fastrand::Rng) -> DVec3 {
     let mut between = || 2.0 * random.f64() - 1.0;
     DVec3::new(between(), between(), between())
 }
 
 /// A rotation that is uniform over all rotations.
-fn rotation(random: &mut fastrand::Rng) -> DQuat {
+pub fn rotation(random: &mut fastrand::Rng) -> DQuat {
     loop {
         let v = in_cube(random);
         let q = DQuat::from_xyzw(v.x, v.y, v.z, 2.0 * random.f64() - 1.0);

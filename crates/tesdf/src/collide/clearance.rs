@@ -3,10 +3,9 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::field::FieldBody;
-use super::least::{Least, least};
-use super::narrow::Search;
+use super::least::{Least, Order, least};
 use super::surface::SurfaceBody;
-use super::{CollideError, CollideOptions, InstanceId, Mode, Placement, Scene, Shape};
+use super::{CollideError, InstanceId, Placement, Scene, Shape};
 use crate::base::Length;
 
 /// Required accuracy of a clearance.
@@ -34,6 +33,9 @@ pub struct Clearance {
     /// It is never below the true value by more than rounding. When `converged`, it is never above
     /// the true value by more than the tolerance.
     pub distance: f64,
+    /// The true value is between this and `distance`. When `converged`, it is `distance` minus the
+    /// tolerance. Otherwise it says how deep the bodies can be in each other at most.
+    pub lower_bound: f64,
     /// The witness point on *a*.
     pub point_a: DVec3,
     /// The witness point on *b*. Its distance from `point_a` is `|distance|`.
@@ -122,6 +124,15 @@ enum Surface {
     B,
 }
 
+impl Surface {
+    fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+}
+
 impl<'a> Pair<'a> {
     /// Two instances of a scene.
     ///
@@ -166,20 +177,10 @@ impl<'a> Pair<'a> {
     /// Positions are too far out.
     pub fn clearance(&self, tolerance: f64) -> Result<Clearance, CollideError> {
         let first = self.first();
-        let found = self.apart(tolerance)?;
         if matches!(self.a.shape, Shape::Plane) || matches!(self.b.shape, Shape::Plane) {
-            return Ok(Clearance { overlap: found.distance < -tolerance, ..found });
+            return self.least(&[first], tolerance);
         }
-        // When the bodies are apart by a distance, no surface comes nearer to the other than that.
-        // So the second order can only find a lower value at or below the negative of that
-        // distance.
-        let limit = if found.distance > 0.0 { tolerance - found.distance } else { found.distance };
-        let second = match first {
-            Surface::A => Surface::B,
-            Surface::B => Surface::A,
-        };
-        let other = self.one_way(second, tolerance, limit).filter(|o| o.distance < found.distance);
-        let found = other.unwrap_or(found);
+        let found = self.least(&[first, first.other()], tolerance)?;
         let overlap = match found.distance {
             d if d < -tolerance => true,
             d if d > tolerance => false,
@@ -234,11 +235,7 @@ impl<'a> Pair<'a> {
     /// # Errors
     /// Positions are too far out.
     pub fn apart(&self, tolerance: f64) -> Result<Clearance, CollideError> {
-        self.one_way(self.first(), tolerance, f64::INFINITY).ok_or(CollideError::NoClearance {
-            a: self.a.id,
-            b: self.b.id,
-            reason: "their positions are too far out for double precision; expected the bodies nearer to the origin",
-        })
+        self.least(&[self.first()], tolerance)
     }
 
     /// The body with fewer faces. A plane never comes first, because it has no finite surface.
@@ -251,33 +248,50 @@ impl<'a> Pair<'a> {
         if faces(&self.b) < faces(&self.a) { Surface::B } else { Surface::A }
     }
 
-    /// The least signed distance over one surface; `None` when it is above `limit`.
-    fn one_way(&self, of: Surface, tolerance: f64, limit: f64) -> Option<Clearance> {
-        let (of_surface, of_field) = match of {
+    /// The least signed distance over surfaces, each in the field of the other body.
+    fn least(&self, surfaces: &[Surface], tolerance: f64) -> Result<Clearance, CollideError> {
+        let orders: Vec<Order> = surfaces.iter().map(|of| self.order(*of)).collect();
+        let Some(Least { order, distance, lower_bound, lowest, converged }) = least(&orders, tolerance) else {
+            return Err(CollideError::NoClearance {
+                a: self.a.id,
+                b: self.b.id,
+                reason: "their positions are too far out for double precision; expected the bodies nearer to the origin",
+            });
+        };
+        let Order { surface, field } = &orders[order];
+        let gradient = lowest.value.gradient;
+        let on_surface = field.to_world(lowest.point - lowest.radius * gradient);
+        let on_field = field.to_world(lowest.value.closest_point);
+        let away = field.rotate(gradient);
+        let (face_surface, (face_field, _)) = (surface.face_id(lowest.face), field.names(&lowest.value));
+        let (point_a, point_b, normal, face_a, face_b, field) = match surfaces[order] {
+            Surface::A => (on_surface, on_field, away, face_surface, face_field, self.b.id),
+            Surface::B => (on_field, on_surface, -away, face_field, face_surface, self.a.id),
+        };
+        Ok(Clearance {
+            distance,
+            lower_bound,
+            point_a,
+            point_b,
+            normal,
+            face_a,
+            face_b,
+            field,
+            converged,
+            overlap: distance < -tolerance,
+        })
+    }
+
+    /// The surface of one body and the field of the other.
+    fn order(&self, of: Surface) -> Order<'a> {
+        let (surface, field) = match of {
             Surface::A => (&self.a, &self.b),
             Surface::B => (&self.b, &self.a),
         };
-        let field = FieldBody::new(of_field.shape, of_field.placement);
-        let surface = SurfaceBody::new(of_surface.shape, of_surface.placement, &field);
-        // Half of the tolerance for the search within a face, half for faces that are skipped.
-        let half = 0.5 * tolerance;
-        let exact =
-            CollideOptions { tolerance: Length::Absolute(half), ..CollideOptions::with_mode(Mode::Exact) };
-        let search = Search::new(&exact, 0.0, &field, [0.0; 2]);
-        let found = least(&surface, &field, &search, half / field.unit(), limit / field.unit())?;
-        let Least { distance, face, part, minimum, converged } = found;
-        let gradient = minimum.value.gradient;
-        let on_surface = field.to_world(minimum.point - part.radius * gradient);
-        let on_field = field.to_world(minimum.value.closest_point);
-        let away = field.rotate(gradient);
-        let (face_surface, (face_field, _)) = (surface.face_id(face), field.names(&minimum.value));
-        let (point_a, point_b, normal, face_a, face_b) = match of {
-            Surface::A => (on_surface, on_field, away, face_surface, face_field),
-            Surface::B => (on_field, on_surface, -away, face_field, face_surface),
-        };
-        let distance = distance * field.unit();
-        let field = of_field.id;
-        let overlap = distance < -tolerance;
-        Some(Clearance { distance, point_a, point_b, normal, face_a, face_b, field, converged, overlap })
+        if let Shape::Mesh(asset) = field.shape {
+            asset.store_normals();
+        }
+        let field = FieldBody::new(field.shape, field.placement);
+        Order { surface: SurfaceBody::new(surface.shape, surface.placement, &field), field }
     }
 }

@@ -5,6 +5,7 @@ use super::field_value::FieldValue;
 use super::simple::Simple;
 use super::{FeatureB, Placement, Shape};
 use crate::TeSdf;
+use crate::base::Side;
 use crate::geometry::Feature;
 use crate::query::{Faces, ON_SURFACE_F64, Place, Precision, Surroundings};
 
@@ -21,17 +22,38 @@ pub enum Field<'a> {
 impl Field<'_> {
     /// The signed distance at `p` and a bound of its error.
     pub fn rough(&self, p: DVec3) -> (f64, f64) {
+        let (value, slack) = self.rough_value(p);
+        (value.distance, slack)
+    }
+
+    /// As [`rough`](Self::rough), with the gradient and the nearest point.
+    pub fn rough_value(&self, p: DVec3) -> (FieldValue, f64) {
         match self {
             Field::Mesh(asset) => {
                 // Uses exact distances: distances from inexact lists cannot rule out a ball.
-                let distance = asset.found_exactly(p).signed_distance;
-                (distance, ROUNDING + FAR * distance.abs())
+                let found = asset.found_exactly(p);
+                (found.into(), ROUNDING + FAR * found.signed_distance.abs())
             }
             // The formula's rounding is relative to the size of its numbers.
             Field::Simple(simple) => {
-                let distance = simple.value(p).distance;
-                (distance, FAR * (distance.abs() + p.abs().max_element()))
+                let value = simple.value(p);
+                (value, FAR * (value.distance.abs() + p.abs().max_element()))
             }
+        }
+    }
+
+    /// The value at `p` in `f64`, with the exact distance also where lists are not proved exact.
+    pub fn exact_value(&self, p: DVec3) -> FieldValue {
+        match self {
+            Field::Mesh(asset) => match asset.locate(p) {
+                Place::Listed { .. } if !asset.has_exact_lists() => {
+                    let is_inside = asset.found_exactly(p).signed_distance < 0.0;
+                    let side = if is_inside { Side::Inside } else { Side::Outside };
+                    asset.found_at(p, Place::Far(side), Precision::F64).into()
+                }
+                place => asset.found_at(p, place, Precision::F64).into(),
+            },
+            Field::Simple(simple) => simple.value(p),
         }
     }
 }

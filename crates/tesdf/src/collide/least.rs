@@ -1,41 +1,50 @@
-//! The least signed distance over a whole surface, by best-first search over its face tree.
+//! The least signed distance over whole surfaces, by best-first search over their face trees.
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use glam::DVec3;
-
 use super::field::FieldBody;
-use super::narrow::{Minimum, Search};
-use super::surface::{Part, SurfaceBody};
+use super::piece::{Looks, Lowest, Piece, Rest};
+use super::surface::{Branch, SurfaceBody};
 use crate::asset::layout::TreeChild;
+use crate::parallel::*;
 
-/// The point of a surface that is deepest in a field or nearest to it, in the field's frame.
+/// A surface and the field in which its lowest point is wanted.
+pub struct Order<'a> {
+    /// The surface.
+    pub surface: SurfaceBody<'a>,
+    /// The field.
+    pub field: FieldBody<'a>,
+}
+
+/// The lowest point of several surfaces, each in its field. Lengths are in the world's unit, except
+/// for those of `lowest`.
 #[derive(Clone, Copy, Debug)]
 pub struct Least {
-    /// Signed distance of the surface point.
+    /// The order of the lowest point, by its index.
+    pub order: usize,
+    /// Its signed distance.
     pub distance: f64,
-    /// The face, by its index in the surface's asset.
-    pub face: u32,
-    /// The face itself.
-    pub part: Part,
-    /// The minimum over the core of the face.
-    pub minimum: Minimum,
-    /// Whether all required searches over faces reached their tolerance.
+    /// No point is lower than this.
+    pub lower_bound: f64,
+    /// The point, in the frame of the order's field.
+    pub lowest: Lowest,
+    /// Whether the error is within the tolerance.
     pub converged: bool,
 }
 
-/// A part of the surface that is still to be searched.
+/// A part of a surface that is still to be searched.
 struct Open {
-    /// Lower bound of the signed distances on it.
+    /// Lower bound of the signed distances on it, in the world's unit.
     bound: f64,
+    /// Among equal bounds, parts that were found first come first.
+    serial: u64,
+    order: usize,
     item: Item,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Item {
-    Face(u32),
-    Leaf(u32, u32),
-    Node(u32),
+    Tree(TreeChild),
+    Piece(Box<Piece>),
 }
 
 impl PartialEq for Open {
@@ -51,85 +60,194 @@ impl PartialOrd for Open {
 }
 impl Ord for Open {
     fn cmp(&self, other: &Self) -> Ordering {
-        // The heap returns the lowest bound first; among equal bounds, faces first.
-        other.bound.total_cmp(&self.bound).then_with(|| other.item.cmp(&self.item))
+        // The heap returns the lowest bound first.
+        other.bound.total_cmp(&self.bound).then(other.serial.cmp(&self.serial))
     }
 }
 
-/// The least signed distance over a surface, in the field's frame. The error is within the sum of
-/// the search's tolerance and `tolerance`. `None` when the value is above `limit`, or when
-/// positions are too far out for their numbers.
+/// Number of parts after which the search stops early.
+const MAX_PARTS: u64 = 1 << 21;
+/// Largest number of parts that are searched in parallel.
+const BATCH: usize = 64;
+/// One part in this number of open parts is searched at a time.
+const SHARE: usize = 8;
+
+/// The least signed distance over the surfaces. `None` when positions are too far out for their
+/// numbers.
 ///
-/// The field is 1-Lipschitz: over a ball it is at least the value at the centre minus the radius.
-/// Nodes and faces are visited in the order of this bound. A face is searched exactly, up to the
-/// least value so far. Before the first face is searched, the values at the centres of faces bound
-/// the result from above. Bounds are `f32` values with a margin for their rounding; the result is
-/// `f64`.
-pub fn least(
-    surface: &SurfaceBody,
-    field: &FieldBody,
-    search: &Search,
+/// The search goes best-first over nodes of the face trees, faces and parts of faces, of all orders
+/// together: the part that can be lowest is next. Several of the first parts are searched in
+/// parallel. Their number and order depend on the parts alone, so the result is the same for any
+/// number of threads.
+///
+/// When the bodies are apart by a distance, no surface comes nearer to the other than that. So as
+/// long as no overlap is known, only the first order is searched. Then the other orders are searched
+/// for points that are at least as deep as the distance.
+pub fn least(orders: &[Order], tolerance: f64) -> Option<Least> {
+    Search { orders, tolerance, best: None, open: BinaryHeap::new(), waiting: Vec::new(), serial: 0 }.run()
+}
+
+struct Search<'a> {
+    orders: &'a [Order<'a>],
     tolerance: f64,
-    limit: f64,
-) -> Option<Least> {
-    let mut best: Option<Least> = None;
-    let mut converged = true;
-    // Values above this are not needed.
-    let mut limit = limit;
-    let mut open = BinaryHeap::new();
-    open.push(Open { bound: f64::NEG_INFINITY, item: item(surface.whole()) });
-    while let Some(Open { bound, item: next }) = open.pop() {
-        if bound > limit {
-            break;
+    /// The lowest signed distance, in the world's unit, its order and its point.
+    best: Option<(f64, usize, Lowest)>,
+    open: BinaryHeap<Open>,
+    /// Roots of orders that are searched later.
+    waiting: Vec<usize>,
+    serial: u64,
+}
+
+impl Search<'_> {
+    fn run(mut self) -> Option<Least> {
+        for order in 0..self.orders.len() {
+            self.dive(order);
         }
-        match next {
-            Item::Node(node) => {
+        self.waiting = (1..self.orders.len()).collect();
+        self.push(f64::NEG_INFINITY, 0, Item::Tree(self.orders[0].surface.whole()));
+        let mut parts = 0;
+        let mut bound = f64::INFINITY;
+        loop {
+            let overlap = self.least() <= 0.0;
+            let is_done = self.open.peek().is_none_or(|open| open.bound >= self.least() - self.tolerance);
+            if overlap || is_done {
+                for order in std::mem::take(&mut self.waiting) {
+                    self.push(f64::NEG_INFINITY, order, Item::Tree(self.orders[order].surface.whole()));
+                }
+            }
+            let batch = self.batch();
+            if batch.is_empty() {
+                break;
+            }
+            parts += batch.len() as u64;
+            if parts > MAX_PARTS {
+                bound = batch.iter().map(|open| open.bound).fold(f64::INFINITY, f64::min);
+                break;
+            }
+            let found: Vec<Found> = match <[Open; 1]>::try_from(batch) {
+                Ok([one]) => vec![self.search(one)],
+                Err(many) => many.into_par_iter().map(|open| self.search(open)).collect(),
+            };
+            found.into_iter().for_each(|found| self.take(found));
+        }
+        let (distance, order, lowest) = self.best?;
+        let within = distance - self.tolerance;
+        Some(Least { order, distance, lower_bound: bound.min(within), lowest, converged: bound >= within })
+    }
+
+    fn least(&self) -> f64 {
+        self.best.map_or(f64::INFINITY, |(distance, ..)| distance)
+    }
+
+    /// Signed distances of an order above this are not wanted.
+    fn limit(&self, order: usize) -> f64 {
+        match self.least() {
+            least if order > 0 && least > 0.0 => self.tolerance - least,
+            least => least,
+        }
+    }
+
+    fn push(&mut self, bound: f64, order: usize, item: Item) {
+        self.serial += 1;
+        self.open.push(Open { bound, serial: self.serial, order, item });
+    }
+
+    /// The parts that are searched next.
+    fn batch(&mut self) -> Vec<Open> {
+        let size = (self.open.len() / SHARE).clamp(1, BATCH);
+        let mut batch = Vec::with_capacity(size);
+        while batch.len() < size
+            && let Some(open) = self.open.pop()
+        {
+            if open.bound < self.least() - self.tolerance && open.bound <= self.limit(open.order) {
+                batch.push(open);
+            }
+        }
+        batch
+    }
+
+    fn looks(&self, order: usize) -> Looks<'_> {
+        let field = &self.orders[order].field;
+        let to_field = 1.0 / field.unit();
+        Looks {
+            field,
+            tolerance: self.tolerance * to_field,
+            limit: self.limit(order) * to_field,
+            least: self.least() * to_field,
+            lowest: None,
+        }
+    }
+
+    /// Descends to a leaf where the surface is low, for a first upper bound.
+    fn dive(&mut self, order: usize) {
+        let Order { surface, field } = &self.orders[order];
+        let mut looks = self.looks(order);
+        let mut child = surface.whole();
+        while let TreeChild::Node(node) = child {
+            let bound = |branch: &Branch| field.least_within(branch.center, branch.radius);
+            let lower = |branches: [Branch; 2]| {
+                let [a, b] = [0, 1].map(|k| bound(&branches[k]));
+                branches[usize::from(b < a)].child
+            };
+            child = surface.halves(node).map_or(TreeChild::Leaf(0, 0), lower);
+        }
+        if let TreeChild::Leaf(start, count) = child {
+            for face in start..start + count {
+                let part = surface.face(face, field, 0.0);
+                looks.first(Piece::new(face, &part), f64::NEG_INFINITY);
+            }
+        }
+        let lowest = looks.lowest;
+        self.take(Found { order, lowest, open: Vec::new() });
+    }
+
+    /// Searches a part.
+    fn search(&self, open: Open) -> Found {
+        let Open { bound, order, item, .. } = open;
+        let Order { surface, field } = &self.orders[order];
+        let (mut looks, mut found) = (self.looks(order), Vec::new());
+        let bound = bound / field.unit();
+        let mut rest = |rest: Rest| {
+            if let Rest::Pieces(bound, pieces) = rest {
+                found.extend(pieces.into_iter().map(|piece| (bound, Item::Piece(Box::new(piece)))));
+            }
+        };
+        match item {
+            Item::Tree(TreeChild::Node(node)) => {
                 for branch in surface.halves(node).into_iter().flatten() {
-                    if field.is_beyond(branch.center, branch.radius, limit) {
+                    if field.is_beyond(branch.center, branch.radius, looks.limit) {
                         continue;
                     }
-                    let own = field.least_within(branch.center, branch.radius);
-                    open.push(Open { bound: own.max(bound), item: item(branch.child) });
+                    let own = field.least_within(branch.center, branch.radius).max(bound);
+                    found.push((own, Item::Tree(branch.child)));
                 }
             }
-            Item::Leaf(start, count) => {
+            Item::Tree(TreeChild::Leaf(start, count)) => {
                 for face in start..start + count {
                     let part = surface.face(face, field, 0.0);
-                    let (center, radius) = middle(&part);
-                    let (distance, slack) = field.rough(center);
-                    let distance = distance - part.radius;
-                    limit = limit.min(distance + slack);
-                    let own = (distance - slack - radius).max(bound);
-                    if own <= limit {
-                        open.push(Open { bound: own, item: Item::Face(face) });
-                    }
+                    rest(looks.first(Piece::new(face, &part), bound));
                 }
             }
-            Item::Face(face) => {
-                let part = surface.face(face, field, 0.0);
-                search.within(limit).minima(field, &part, None, &mut |_| (), &mut |_, minimum| {
-                    converged &= minimum.converged;
-                    let distance = minimum.value.distance - part.radius;
-                    if best.is_none_or(|b| distance < b.distance) {
-                        best = Some(Least { distance, face, part, minimum, converged });
-                        limit = limit.min(distance - tolerance);
-                    }
-                });
-            }
+            Item::Piece(piece) => rest(looks.look(*piece, bound)),
+        }
+        Found { order, lowest: looks.lowest, open: found }
+    }
+
+    fn take(&mut self, found: Found) {
+        let unit = self.orders[found.order].field.unit();
+        if let Some(lowest) = found.lowest.filter(|lowest| lowest.distance * unit < self.least()) {
+            self.best = Some((lowest.distance * unit, found.order, lowest));
+        }
+        for (bound, item) in found.open {
+            self.push(bound * unit, found.order, item);
         }
     }
-    best.map(|b| Least { converged, ..b })
 }
 
-fn item(child: TreeChild) -> Item {
-    match child {
-        TreeChild::Node(node) => Item::Node(node),
-        TreeChild::Leaf(start, count) => Item::Leaf(start, count),
-    }
-}
-
-/// Centre of a part's core, and the radius of a ball around it that contains the core.
-fn middle(part: &Part) -> (DVec3, f64) {
-    let center = part.points().iter().sum::<DVec3>() / part.points().len() as f64;
-    (center, part.points().iter().map(|p| p.distance(center)).fold(0.0, f64::max))
+/// The result of the search of one part.
+struct Found {
+    order: usize,
+    lowest: Option<Lowest>,
+    /// What remains to be searched, with lower bounds in the field's frame.
+    open: Vec<(f64, Item)>,
 }

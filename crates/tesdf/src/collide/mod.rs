@@ -24,6 +24,7 @@
 mod candidates;
 mod clearance;
 mod contact;
+mod depth_bounds;
 mod detect;
 mod error;
 mod field;
@@ -39,6 +40,7 @@ mod motion;
 mod narrow;
 mod options;
 mod ordered_pair;
+mod piece;
 mod polygon;
 mod pose;
 mod reduce;
