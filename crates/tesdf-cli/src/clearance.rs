@@ -56,7 +56,11 @@ pub fn rows(found: &Clearance, [a, b]: [InstanceId; 2]) -> Vec<(&'static str, St
         ("field", format!("instance {}", found.field)),
     ];
     if !found.converged {
-        rows.push(("accuracy", "not within the tolerance: the search stopped early".into()));
+        let at_least = found.lower_bound;
+        rows.push((
+            "accuracy",
+            format!("not within the tolerance, but the clearance is at least {at_least:e}"),
+        ));
     }
     rows
 }

@@ -35,6 +35,8 @@ fn clearance_of_two_cubes() {
     }
     let deep = at("-1.75");
     assert!((deep["distance"].as_f64().unwrap() + 0.25).abs() < 4e-8, "{deep}");
+    let lower_bound = deep["lower_bound"].as_f64().unwrap();
+    assert!((-4e-8..=0.0).contains(&(lower_bound + 0.25)), "{deep}");
     let text = folder.good(&["clearance", "c.tesdf", "c.tesdf", "--pose-b", "0 0 3 0 0 0 1"]);
     assert!(text.contains("1e0 (apart)"), "{text}");
     let (code, _, error) = folder.tesdf(&["clearance", "c.tesdf", "c.tesdf", "--tolerance", "-1"]);

@@ -8,7 +8,8 @@ use support::meshes::named;
 use support::random::Random;
 use support::shapes::Shape as Surface;
 use tesdf::collide::{
-    Clearance, ClearanceOptions, CollideError, Instance, InstanceId, Pose, Scene, Shape, clearance,
+    Clearance, ClearanceOptions, CollideError, CollideOptions, Instance, InstanceId, Pose, Scene, Shape,
+    clearance, detect,
 };
 use tesdf::encode::{Encoder, Preset};
 use tesdf::geometry::{Triangle, polygon_to_triangle};
@@ -42,20 +43,15 @@ fn scene(bodies: [(Shape, Pose, f64); 2]) -> (Scene, [InstanceId; 2]) {
     (scene, ids)
 }
 
+/// Measures both orders of the pair.
 fn between(a: (Shape, Pose, f64), b: (Shape, Pose, f64)) -> Clearance {
-    let found = measured(a, b);
-    assert!(found.converged, "{found:?}");
-    found
-}
-
-/// Measures both orders of the pair. The search may be cut short.
-fn measured(a: (Shape, Pose, f64), b: (Shape, Pose, f64)) -> Clearance {
     let (scene, [a, b]) = scene([a, b]);
     let options = ClearanceOptions::default();
     let (found, back) = (clearance(&scene, a, b, &options), clearance(&scene, b, a, &options));
     let (found, back) = (found.expect("a clearance"), back.expect("a clearance"));
     assert!((found.distance - back.distance).abs() <= 4e-8 * found.distance.abs().max(1.0));
     assert!((found.normal.length() - 1.0).abs() < 1e-12);
+    assert!(found.converged && found.lower_bound <= found.distance, "{found:?}");
     found
 }
 
@@ -144,7 +140,6 @@ fn by_samples(surface: &[[DVec3; 3]], field: &TeSdf, pose: Pose, scale: f64) -> 
 fn penetration_depth_equals_that_of_dense_samples() {
     let assets = [bumpy(3), boxed(DVec3::new(0.5, 0.8, 0.3), 3), asset(&named("procedural/tetra.obj"))];
     let mut random = Random(11);
-    let mut cut_short = 0;
     for round in 0..12 {
         let (a, b) = (&assets[round % 3], &assets[random.index(3)]);
         let size = |asset: &TeSdf| 2.0 / asset.bounds().extent().length();
@@ -152,13 +147,12 @@ fn penetration_depth_equals_that_of_dense_samples() {
         let middle = |asset: &TeSdf, scale: f64| scale * asset.bounds().center();
         let (pose_a, mut pose_b) = (random_pose(&mut random, 0.0), random_pose(&mut random, 0.5));
         pose_b.translation += pose_a.to_world(middle(a, scale_a)) - pose_b.rotation * middle(b, scale_b);
-        let found = measured(placed(a.clone(), pose_a, scale_a), placed(b.clone(), pose_b, scale_b));
+        let found = between(placed(a.clone(), pose_a, scale_a), placed(b.clone(), pose_b, scale_b));
         let (faces_a, faces_b) = (world_triangles(a, pose_a, scale_a), world_triangles(b, pose_b, scale_b));
         let (of_a, step_a) = by_samples(&faces_a, b, pose_b, scale_b);
         let (of_b, step_b) = by_samples(&faces_b, a, pose_a, scale_a);
         let brute = of_a.min(of_b);
         assert!(brute < 0.0, "the poses overlap");
-        cut_short += u32::from(!found.converged);
         assert!(found.distance <= brute + 4e-8, "{round}: a deeper point: {found:?} {brute}");
         assert!(found.distance >= brute - step_a.max(step_b), "{round}: {found:?} {brute}");
         // The witness is real: the field has this value at the reported point of the surface.
@@ -170,9 +164,66 @@ fn penetration_depth_equals_that_of_dense_samples() {
         assert!((value - found.distance).abs() < 1e-12, "{found:?} {value}");
         assert!((found.point_a.distance(found.point_b) + found.distance).abs() < 1e-12);
     }
-    // Deep in a bumpy body the search can be cut short. The depth found is still that of the
-    // samples.
-    assert!(cut_short <= 4, "{cut_short} of 12 searches cut short");
+}
+
+/// Two bodies of a similar size, deep in each other.
+fn deep(random: &mut Random, [a, b]: [&Arc<TeSdf>; 2]) -> [(Shape, Pose, f64); 2] {
+    let mut body = |asset: &Arc<TeSdf>, size: f64, at: DVec3| {
+        let scale = size / asset.bounds().extent().length();
+        let rotation = DQuat::from_axis_angle(random.direction(), random.between(0.0, 6.0));
+        let pose = Pose::new(at - rotation * (scale * asset.bounds().center()), rotation).expect("a pose");
+        placed(asset.clone(), pose, scale)
+    };
+    [body(a, 1.0, DVec3::ZERO), body(b, 0.9, DVec3::new(0.05, 0.1, -0.05))]
+}
+
+fn meshes() -> Vec<Arc<TeSdf>> {
+    let mut meshes: Vec<Arc<TeSdf>> = [
+        "procedural/tetra.obj",
+        "procedural/beam.obj",
+        "procedural/menger_2.obj",
+        "public/cube_cup_quad.obj",
+    ]
+    .iter()
+    .map(|name| asset(&named(name)))
+    .collect();
+    meshes.extend([bumpy(3), boxed(DVec3::new(0.5, 0.8, 0.3), 3)]);
+    meshes
+}
+
+#[test]
+fn the_depth_is_that_of_the_lowest_contact_of_all_faces() {
+    let (meshes, mut random) = (meshes(), Random(17));
+    for round in 0..18 {
+        let pair = [&meshes[round % meshes.len()], &meshes[random.index(meshes.len())]];
+        let (scene, [a, b]) = scene(deep(&mut random, pair));
+        let found = clearance(&scene, a, b, &ClearanceOptions::default()).expect("a clearance");
+        // The exact mode searches each face by itself, cell by cell.
+        let options = CollideOptions { tolerance: Length::Absolute(1e-8), ..CollideOptions::default() };
+        let contacts = detect(&scene, &options).expect("contacts");
+        let lowest = contacts.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
+        assert!(found.converged && lowest < 0.0, "{round}: {found:?}");
+        assert!(
+            found.distance <= lowest + 1e-8 && found.lower_bound <= lowest,
+            "{round}: {found:?} {lowest}"
+        );
+        let is_exact = contacts.statistics.unconverged == 0;
+        assert!(!is_exact || found.distance >= lowest - 1e-8, "{round}: {found:?} {lowest}");
+    }
+}
+
+#[test]
+fn clearance_is_the_same_for_any_number_of_threads() {
+    let (meshes, mut random) = (meshes(), Random(29));
+    for round in 0..6 {
+        let (scene, [a, b]) = scene(deep(&mut random, [&meshes[round], &meshes[(round + 2) % meshes.len()]]));
+        let on = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+            let found = pool.install(|| clearance(&scene, a, b, &ClearanceOptions::default()));
+            format!("{:?}", found.expect("a clearance"))
+        };
+        assert_eq!(on(1), on(3), "{round}");
+    }
 }
 
 #[test]

@@ -39,6 +39,8 @@ struct Measured {
     a: String,
     b: String,
     distance: f64,
+    /// No point is deeper than this.
+    lower_bound: f64,
     converged: bool,
     ms: f64,
 }
@@ -52,9 +54,8 @@ type Body = (Arc<TeSdf>, String);
 /// A file cannot be read, or its mesh cannot be encoded.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let interrupted = interrupt_flag()?;
-    let open = |path: &PathBuf| -> Result<Body, Failure> {
-        Ok((geometry(path, None, &interrupted)?, name(path)))
-    };
+    let open =
+        |path: &PathBuf| -> Result<Body, Failure> { Ok((geometry(path, None, &interrupted)?, name(path))) };
     let bodies = args.bodies.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let mut random = fastrand::Rng::with_seed(args.seed);
     let pair = |_| {
@@ -76,7 +77,11 @@ fn name(path: &Path) -> String {
 
 /// Body *a* has the diagonal 1, body *b* one of 0.5 to 1.5. The centres of a ball inside of each
 /// are close to each other.
-fn measure((a, name_a): &Body, (b, name_b): &Body, random: &mut fastrand::Rng) -> Result<Measured, CollideError> {
+fn measure(
+    (a, name_a): &Body,
+    (b, name_b): &Body,
+    random: &mut fastrand::Rng,
+) -> Result<Measured, CollideError> {
     let mut scene = Scene::new();
     let (size, at) = (0.5 + random.f64(), 0.1 * in_cube(random));
     let mut add = |asset: &Arc<TeSdf>, size: f64, at: DVec3| {
@@ -98,6 +103,7 @@ fn measure((a, name_a): &Body, (b, name_b): &Body, random: &mut fastrand::Rng) -
         a: name_a.clone(),
         b: name_b.clone(),
         distance: found.distance / smaller,
+        lower_bound: found.lower_bound / smaller,
         converged: found.converged,
         ms,
     })
@@ -110,9 +116,23 @@ fn text(mut pairs: Vec<Measured>) -> String {
     let share = |of: f64| pairs[((pairs.len() - 1) as f64 * (1.0 - of)) as usize].ms;
     let mut text = heading::lines();
     let total = pairs.iter().map(|p| p.ms).sum::<f64>();
-    let _ = writeln!(text, "- {} pairs, {} overlap, {} not converged", pairs.len(), count(&|p| p.distance < 0.0), count(&|p| !p.converged));
-    let _ = writeln!(text, "- ms per pair: mean {:.3}, median {:.3}, 90 % within {:.3}, 99 % within {:.3}\n", total / pairs.len() as f64, share(0.5), share(0.9), share(0.99));
-    let _ = writeln!(text, "| a | b | clearance / smaller diagonal | converged | ms |\n|---|---|---:|---|---:|");
+    let _ = writeln!(
+        text,
+        "- {} pairs, {} overlap, {} not converged",
+        pairs.len(),
+        count(&|p| p.distance < 0.0),
+        count(&|p| !p.converged)
+    );
+    let _ = writeln!(
+        text,
+        "- ms per pair: mean {:.3}, median {:.3}, 90 % within {:.3}, 99 % within {:.3}\n",
+        total / pairs.len() as f64,
+        share(0.5),
+        share(0.9),
+        share(0.99)
+    );
+    let _ =
+        writeln!(text, "| a | b | clearance / smaller diagonal | converged | ms |\n|---|---|---:|---|---:|");
     for p in pairs.iter().take(SLOWEST) {
         let _ = writeln!(text, "| {} | {} | {:.9} | {} | {:.2} |", p.a, p.b, p.distance, p.converged, p.ms);
     }

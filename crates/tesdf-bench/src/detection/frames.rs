@@ -161,7 +161,11 @@ impl Frames {
 }
 
 /// Opens a `.tesdf` file, or encodes a mesh.
-pub fn geometry(path: &Path, max_entries: Option<u32>, interrupted: &AtomicBool) -> Result<Arc<TeSdf>, Failure> {
+pub fn geometry(
+    path: &Path,
+    max_entries: Option<u32>,
+    interrupted: &AtomicBool,
+) -> Result<Arc<TeSdf>, Failure> {
     if path.extension().is_some_and(|e| e == "tesdf") {
         return asset_file::open(path).map(Arc::new);
     }

@@ -49,8 +49,8 @@ pub struct Clearance {
     /// The body whose field was used. The witness on the other body is the lowest point of a face
     /// in this field, and this body's witness is the surface point nearest to it.
     pub field: InstanceId,
-    /// Whether the error is within the tolerance. False when a difficult search deep inside was cut
-    /// short.
+    /// Whether the error is within the tolerance. False when a difficult search was cut short, for
+    /// example because the tolerance is below rounding.
     pub converged: bool,
     /// Whether the two solids share volume. They do where `distance` is negative (up to the
     /// tolerance). Where `distance` is 0 (up to the tolerance), they do when their surfaces
@@ -61,9 +61,10 @@ pub struct Clearance {
 
 /// The clearance of two instances, whatever their worlds, groups and exclusions.
 ///
-/// A best-first search over the face tree of the body with fewer faces, in the field of the other
-/// body. Then the same in the other order, for deeper points. When the bodies are apart, both
-/// orders would give the same result, so the second search only looks for parts inside.
+/// A best-first search over the face trees of both bodies, each in the field of the other body. When
+/// the bodies are apart, both orders would give the same result. Then only the surface with fewer
+/// faces is searched, and the other surface only for parts inside. The search runs on the current
+/// rayon pool. The result is the same for any number of threads.
 ///
 /// The signed distance of the surface of a sphere or capsule is that of its centre or segment minus
 /// its radius. This is exact while these are outside the other body. With them inside, it is at
@@ -251,7 +252,8 @@ impl<'a> Pair<'a> {
     /// The least signed distance over surfaces, each in the field of the other body.
     fn least(&self, surfaces: &[Surface], tolerance: f64) -> Result<Clearance, CollideError> {
         let orders: Vec<Order> = surfaces.iter().map(|of| self.order(*of)).collect();
-        let Some(Least { order, distance, lower_bound, lowest, converged }) = least(&orders, tolerance) else {
+        let Some(Least { order, distance, lower_bound, lowest, converged }) = least(&orders, tolerance)
+        else {
             return Err(CollideError::NoClearance {
                 a: self.a.id,
                 b: self.b.id,

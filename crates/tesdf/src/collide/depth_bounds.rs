@@ -16,14 +16,14 @@ pub struct Bound {
     pub at: [f64; 3],
 }
 
-/// The origin of a [`Bound`]. On a part of the triangle, each holds unchanged.
+/// The origin of a [`Bound`]. Each holds unchanged on a part of the triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The interpolated distances of the corners from a face. The distance from a face is convex,
     /// so the distances of other points are not greater. On a part of the triangle, the bound of
     /// that part is lower.
     Chord,
-    /// A linear function that bounds the depth everywhere on the triangle.
+    /// The interpolated heights over the plane of a face, or a tangent of a convex function.
     Plane,
 }
 
@@ -39,7 +39,8 @@ pub struct DepthBounds {
 
 impl DepthBounds {
     /// Without a bound, the depth can have any value.
-    pub const NONE: Self = Self { bounds: ArrayVec::new_const(), greatest: f64::INFINITY, at: [1.0 / 3.0; 3] };
+    pub const NONE: Self =
+        Self { bounds: ArrayVec::new_const(), greatest: f64::INFINITY, at: [1.0 / 3.0; 3] };
 
     /// The bounds.
     pub fn iter(&self) -> impl Iterator<Item = &Bound> {
@@ -142,8 +143,7 @@ mod tests {
                 bounds.add(Bound { face, kind: Kind::Plane, at });
             }
             const N: u32 = 60;
-            let least =
-                |w: [f64; 3]| bounds.iter().map(|b| value(&b.at, w)).fold(f64::INFINITY, f64::min);
+            let least = |w: [f64; 3]| bounds.iter().map(|b| value(&b.at, w)).fold(f64::INFINITY, f64::min);
             let mut sampled = f64::NEG_INFINITY;
             for i in 0..=N {
                 for j in 0..=N - i {

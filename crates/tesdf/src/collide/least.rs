@@ -65,10 +65,13 @@ impl Ord for Open {
     }
 }
 
-/// Number of parts after which the search stops early.
-const MAX_PARTS: u64 = 1 << 21;
+/// Number of parts after which the search stops early. Random deep pairs of the meshes of the data
+/// take up to some 60,000.
+const MAX_PARTS: u64 = 1 << 20;
 /// Largest number of parts that are searched in parallel.
-const BATCH: usize = 64;
+const BATCH: usize = 128;
+/// Fewer parts are searched on one thread: each takes some microseconds.
+const FEW: usize = 16;
 /// One part in this number of open parts is searched at a time.
 const SHARE: usize = 8;
 
@@ -84,7 +87,7 @@ const SHARE: usize = 8;
 /// long as no overlap is known, only the first order is searched. Then the other orders are searched
 /// for points that are at least as deep as the distance.
 pub fn least(orders: &[Order], tolerance: f64) -> Option<Least> {
-    Search { orders, tolerance, best: None, open: BinaryHeap::new(), waiting: Vec::new(), serial: 0 }.run()
+    Search::new(orders, tolerance).run(MAX_PARTS)
 }
 
 struct Search<'a> {
@@ -98,8 +101,13 @@ struct Search<'a> {
     serial: u64,
 }
 
-impl Search<'_> {
-    fn run(mut self) -> Option<Least> {
+impl<'a> Search<'a> {
+    fn new(orders: &'a [Order<'a>], tolerance: f64) -> Self {
+        Self { orders, tolerance, best: None, open: BinaryHeap::new(), waiting: Vec::new(), serial: 0 }
+    }
+
+    /// Searches at most this number of parts.
+    fn run(mut self, max_parts: u64) -> Option<Least> {
         for order in 0..self.orders.len() {
             self.dive(order);
         }
@@ -120,13 +128,13 @@ impl Search<'_> {
                 break;
             }
             parts += batch.len() as u64;
-            if parts > MAX_PARTS {
+            if parts > max_parts {
                 bound = batch.iter().map(|open| open.bound).fold(f64::INFINITY, f64::min);
                 break;
             }
-            let found: Vec<Found> = match <[Open; 1]>::try_from(batch) {
-                Ok([one]) => vec![self.search(one)],
-                Err(many) => many.into_par_iter().map(|open| self.search(open)).collect(),
+            let found: Vec<Found> = match batch.len() {
+                ..FEW => batch.into_iter().map(|open| self.search(open)).collect(),
+                _ => batch.into_par_iter().map(|open| self.search(open)).collect(),
             };
             found.into_iter().for_each(|found| self.take(found));
         }
@@ -250,4 +258,32 @@ struct Found {
     lowest: Option<Lowest>,
     /// What remains to be searched, with lower bounds in the field's frame.
     open: Vec<(f64, Item)>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collide::{Placement, Pose, Shape};
+    use glam::{DQuat, DVec3};
+
+    #[test]
+    fn a_search_that_stops_early_says_how_far_off_it_can_be() {
+        let capsule = Shape::Capsule { half_height: 1.0, radius: 0.25 };
+        let cube = Shape::Box { half_extents: DVec3::ONE };
+        let at = |translation, rotation| Placement { pose: Pose { translation, rotation }, scale: 1.0 };
+        let field = FieldBody::new(&capsule, at(DVec3::ZERO, DQuat::from_rotation_x(0.5)));
+        let beside = at(DVec3::new(0.3, 0.9, 1.1), DQuat::from_rotation_y(0.2));
+        let surface = SurfaceBody::new(&cube, beside, &field);
+        let orders = [Order { surface, field }];
+        let exact = least(&orders, 1e-9).expect("a value");
+        assert!(exact.converged && exact.distance < 0.0, "{exact:?}");
+        let mut early = 0;
+        for parts in 1..40 {
+            let found = Search::new(&orders, 1e-9).run(parts).expect("a value");
+            assert!(found.lower_bound <= exact.distance, "{parts}: {found:?} {exact:?}");
+            assert!(exact.lower_bound <= found.distance, "{parts}: {found:?} {exact:?}");
+            early += u32::from(!found.converged);
+        }
+        assert!(early > 1, "the search takes more than two parts");
+    }
 }

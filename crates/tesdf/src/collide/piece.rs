@@ -119,7 +119,7 @@ impl Piece {
     }
 
     /// The halves, divided in the middle of the longest edge.
-    fn halves(&self, field: &FieldBody) -> Vec<Self> {
+    fn halves(&self, field: &FieldBody, hair: f64) -> Vec<Self> {
         let edge = |i: usize, j: usize| self.corners[i].distance_squared(self.corners[j]);
         let (ab, bc, ca) = (edge(0, 1), edge(1, 2), edge(2, 0));
         let k = match () {
@@ -137,13 +137,13 @@ impl Piece {
             }
             for bound in self.bounds.iter() {
                 let mut bound = *bound;
-                let between = 0.5 * (bound.at[k] + bound.at[l]);
-                bound.at[moved] = match (bound.kind, field.field) {
-                    (Kind::Chord, Field::Mesh(asset)) => {
-                        asset.local_triangle(bound.face as usize).closest(middle).distance.min(between)
-                    }
-                    _ => between,
+                // Corners on both sides of a plane leave room between them.
+                let of_middle = match triangle(field, bound.face) {
+                    Some(triangle) if bound.kind == Kind::Chord => triangle.closest(middle).distance,
+                    Some(triangle) => triangle.normal.dot(middle - triangle.corners[0]).abs() + hair,
+                    None => f64::INFINITY,
                 };
+                bound.at[moved] = of_middle.min(0.5 * (bound.at[k] + bound.at[l]));
                 if self.count == 2 {
                     bound.at[2] = bound.at[1];
                 }
@@ -178,6 +178,14 @@ impl Piece {
             }
         }
         Some(parts)
+    }
+}
+
+/// A face of a mesh's field.
+fn triangle(field: &FieldBody, face: u32) -> Option<Triangle> {
+    match field.field {
+        Field::Mesh(asset) => Some(asset.local_triangle(face as usize)),
+        Field::Simple(_) => None,
     }
 }
 
@@ -246,6 +254,11 @@ impl Looks<'_> {
             if self.is_closed(bound) {
                 return Rest::Nothing;
             }
+            let is_better = self.add_bound(&mut piece, at, &value);
+            bound = bound.max(-piece.bounds.greatest - piece.radius);
+            if self.is_closed(bound) {
+                return Rest::Nothing;
+            }
             if value.distance > 0.0 && !self.is_inside(&piece) {
                 match self.side(&piece) {
                     Side::Outside => return Rest::Nothing,
@@ -255,7 +268,7 @@ impl Looks<'_> {
                     }
                 }
             }
-            if !self.add_bound(&mut piece, at, &value) {
+            if !is_better {
                 break;
             }
         }
@@ -269,7 +282,7 @@ impl Looks<'_> {
             }
             _ => None,
         };
-        let mut parts = cut.unwrap_or_else(|| piece.halves(self.field));
+        let mut parts = cut.unwrap_or_else(|| piece.halves(self.field, self.hair()));
         parts.retain(|part| !self.is_closed(bound.max(-part.bounds.greatest - part.radius)));
         if parts.is_empty() { Rest::Nothing } else { Rest::Pieces(bound, parts) }
     }
@@ -352,8 +365,7 @@ impl Looks<'_> {
             if is_clear { hair } else { f64::NEG_INFINITY }
         });
         let center = points.iter().sum::<DVec3>() / points.len() as f64;
-        (is_clear && self.field.field.exact_value(center).distance > 0.0)
-            .then(|| heights.map(|h| h.abs() + hair))
+        (is_clear && self.field.field.exact_value(center).distance > 0.0).then(|| heights.map(|h| h.abs() + hair))
     }
 
     /// The side of a piece of a mesh's field. Where it is outside, its nearest point is a candidate.
@@ -381,7 +393,8 @@ impl Looks<'_> {
                     }
                 }
             }
-            nearest.0.max(2.0 * clear)
+            // A piece that crosses many faces is halved, whichever they are.
+            if crossed > FEW { f64::NEG_INFINITY } else { nearest.0.max(2.0 * clear) }
         });
         if let (Some(at), true) = (nearest.1, self.least + piece.radius >= 0.0) {
             self.offer(piece, at, &self.field.field.exact_value(at));
