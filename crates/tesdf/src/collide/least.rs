@@ -129,7 +129,9 @@ impl<'a> Search<'a> {
             }
             parts += batch.len() as u64;
             if parts > max_parts {
-                bound = batch.iter().map(|open| open.bound).fold(f64::INFINITY, f64::min);
+                // Nothing is known about surfaces that wait.
+                let waiting = if self.waiting.is_empty() { f64::INFINITY } else { f64::NEG_INFINITY };
+                bound = batch.iter().map(|open| open.bound).fold(waiting, f64::min);
                 break;
             }
             let found: Vec<Found> = match batch.len() {

@@ -365,7 +365,8 @@ impl Looks<'_> {
             if is_clear { hair } else { f64::NEG_INFINITY }
         });
         let center = points.iter().sum::<DVec3>() / points.len() as f64;
-        (is_clear && self.field.field.exact_value(center).distance > 0.0).then(|| heights.map(|h| h.abs() + hair))
+        (is_clear && self.field.field.exact_value(center).distance > 0.0)
+            .then(|| heights.map(|h| h.abs() + hair))
     }
 
     /// The side of a piece of a mesh's field. Where it is outside, its nearest point is a candidate.
