@@ -246,3 +246,46 @@ fn a_vertex_of_several_faces_has_one_contact() {
         assert!(one[0].0 == lowest && (one[0].1 + 1e-3).abs() < 1e-9, "{one:?}");
     }
 }
+
+/// Two cubes whose edges are flush up to rounding, or up to less than the tolerance: at each corner
+/// there is a contact with a vertical normal and the distance between the planes. A distance to the
+/// side of a cube, or to its edge, would let it sink in there.
+#[test]
+fn the_corners_of_flush_faces_have_the_distance_of_the_planes() {
+    let half = DVec3::splat(0.05);
+    let lower = block(-half, half, 1);
+    let options = CollideOptions {
+        contacts_per: ContactsPer::Face,
+        contact_distance: 2e-4,
+        ..CollideOptions::default()
+    };
+    let mut random = Random(5);
+    let mut signed = |size: f64| size * (2.0 * random.unit() - 1.0);
+    for shift in [0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-9] {
+        for tilt in [0.0, 1e-14, 1e-12, 1e-10] {
+            for gap in [0.0, -1e-11, 1e-11] {
+                let translation = DVec3::new(signed(shift), signed(shift), 0.1 + gap + signed(0.1 * tilt));
+                let rotation =
+                    DQuat::from_scaled_axis(DVec3::new(signed(tilt), signed(tilt), signed(10.0 * shift)));
+                let mut upper = lower.clone();
+                upper.at.pose = Pose { translation, rotation };
+                let found = detect(&scene(&[lower.clone(), upper]), &options).expect("good");
+                let (down, bottom) =
+                    (rotation * DVec3::NEG_Z, translation + rotation * DVec3::new(0.0, 0.0, -0.05));
+                for corner in [(-0.05, -0.05), (-0.05, 0.05), (0.05, -0.05), (0.05, 0.05)] {
+                    let corner = DVec3::new(corner.0, corner.1, 0.05);
+                    let height = (bottom - corner).dot(down) / down.z;
+                    let error = |c: &Contact| {
+                        let near = c.point_a.distance(corner) < 1e-7 && c.normal.z.abs() > 1.0 - 1e-9;
+                        if near { (c.distance - height).abs() } else { f64::INFINITY }
+                    };
+                    let error = found.iter().map(error).fold(f64::INFINITY, f64::min);
+                    assert!(
+                        error < 1e-12,
+                        "shift {shift:e}, tilt {tilt:e}, gap {gap:e}: {error:e} at {corner}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -14,7 +14,7 @@ use super::{Minimum, Search, cell_of};
 use crate::collide::field::CellField;
 use crate::collide::field_value::FieldValue;
 use crate::collide::surface::Part;
-use crate::geometry::Triangle;
+use crate::geometry::{Feature, Triangle};
 
 /// Number of directions in the plane of a face. A polygon's corner with a right angle is an extreme
 /// of two of them.
@@ -233,39 +233,50 @@ impl<'a> Patch<'a> {
             converged: self.minimum.converged,
             corner,
         };
+        // From the nearest point of the other body, along the face.
+        let offset = |p: DVec3, v: &FieldValue| (p - v.closest_point).reject_from_normalized(normal);
+        let is_over = |p, v: &FieldValue| v.feature == Feature::Face || offset(p, v).length() < HEIGHT;
         let first = value(point);
-        if holds(&first) {
-            return Some(minimum(point, first, corner));
+        let taken = holds(&first).then(|| minimum(point, first, corner));
+        if normal == DVec3::ZERO || (taken.is_some() && is_over(point, &first)) {
+            return taken;
         }
         // At a border of the other body's face, a point is nearer to the side of the body than to
-        // this face. It is moved inwards until the side is as deep as the face.
-        let depth = -self.minimum.value.distance;
-        if depth <= 0.0 || normal == DVec3::ZERO || !holds(&self.minimum.value) {
-            return None;
-        }
+        // this face, or it lies beside the body. If only rounding or less than the tolerance puts it
+        // there, it is moved inwards until the side is as deep as the face.
+        let depth = self.search.tolerance.max(-self.minimum.value.distance);
         let (mut at, mut moved) = (first, point);
         for _ in 0..MOVES {
             let missing = at.distance + depth;
-            let sideways = at.gradient.reject_from_normalized(normal);
-            if missing > 2.0 * depth || sideways.length() < LEVEL {
-                return None;
+            let gradient = at.gradient.reject_from_normalized(normal);
+            let (outward, slope) = match at.distance < 0.0 {
+                true => (gradient, gradient.length()),
+                // The gradient on the surface does not say on which side of an edge the point lies.
+                false if gradient.length() < LEVEL => (offset(moved, &at), 1.0),
+                false => (gradient, 1.0),
+            };
+            if missing > 2.0 * depth || outward.length() < HEIGHT || slope < LEVEL {
+                break;
             }
-            moved -= sideways * (BEYOND * missing.max(0.0) + HEIGHT) / sideways.length_squared();
+            moved -= outward.normalize() * (BEYOND * missing.max(0.0) / slope + HEIGHT);
             if !self.holds(moved) {
-                return None;
+                break;
             }
             at = value(moved);
-            if holds(&at) {
+            if holds(&at) && is_over(moved, &at) {
                 return Some(minimum(moved, at, None));
             }
         }
-        None
+        taken
     }
 
     /// Whether a point lies over the face, or on it.
     fn holds(&self, p: DVec3) -> bool {
         let (points, normal) = (self.part.points(), self.part.normal);
-        (0..3).all(|i| normal.cross(points[(i + 1) % 3] - points[i]).dot(p - points[i]) >= 0.0)
+        (0..3).all(|i| {
+            let edge = points[(i + 1) % 3] - points[i];
+            normal.cross(edge).dot(p - points[i]) >= -HEIGHT * edge.length()
+        })
     }
 
     /// Corners of the overlay of the part and the faces of the other body near it.
