@@ -3,13 +3,14 @@ use std::time::Instant;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, Pose, Scene,
+    CollideError, CollideOptions, Contact, Contacts, ContactsPer, HiddenOverlap, InstanceId, Mode, Pose,
+    Scene,
 };
 
 use super::NewtonOptions;
 use super::integrate::{free_velocity, moved, unpack, velocity};
 use super::islands::{Island, islands};
-use super::problem::{Minimum, Problem};
+use super::problem::{Minimum, Problem, Resistance};
 use super::rows::{FreeBody, Row};
 use crate::{Dynamics, DynamicsError, Mass, State, StepReport, System};
 
@@ -54,6 +55,9 @@ struct Step {
     free_of: Vec<Option<usize>>,
     /// Velocities at the end of the step without contacts.
     target: Vec<Vector6<f64>>,
+    /// For each free body: whether a body of its island penetrates too deeply for a linear
+    /// prediction.
+    deep: Vec<bool>,
     report: StepReport,
 }
 
@@ -109,7 +113,8 @@ impl Newton {
         }
         let poses = states.iter().map(|state| state.pose).collect();
         let report = StepReport { converged: true, ..StepReport::default() };
-        Step { h, poses, free, free_of, target, report }
+        let deep = vec![false; free.len()];
+        Step { h, poses, free, free_of, target, deep, report }
     }
 
     /// The states after moving for one step at `velocities`. Their velocities are `velocities`.
@@ -170,7 +175,9 @@ impl Newton {
         let row = |contact: &Contact| {
             let mut row = self.row(step, contact, poses)?;
             let gap = contact.distance - step.h * row.rate(velocities);
-            let depth = if gap < 0.0 { depths.of(contact) } else { 0.0 };
+            // A face may have several contacts, and its deepest one is not at this place. The body
+            // must not sink in here by the depth there.
+            let depth = depths.of(contact).min(-gap).max(0.0);
             row.relaxed_gap = gap + depth;
             row.gap = row.relaxed_gap - self.correction(depth, step.h);
             Some(row)
@@ -178,8 +185,7 @@ impl Newton {
         contacts.iter().filter_map(row).collect()
     }
 
-    /// For each free body: whether a body of its island penetrates too deeply for a linear
-    /// prediction.
+    /// The bodies of islands that overlap deeply, as [`Step::deep`].
     fn deep(&self, step: &Step, contacts: &[Contact], rows: &[Row]) -> Vec<bool> {
         let mut deep = vec![false; step.free.len()];
         for contact in contacts.iter().filter(|c| c.distance < 0.0) {
@@ -195,6 +201,17 @@ impl Newton {
             }
         }
         deep
+    }
+
+    /// How the contacts of the detector may resist where bodies do not overlap deeply.
+    fn resistance(&self) -> Resistance {
+        match (self.collide.mode, self.collide.contacts_per) {
+            // A contact for each cell has the normal of an edge where the edge lies on a face. A nut
+            // that does not sink in at all locks itself on such normals: its thread climbs by 2.3°,
+            // and the facets at an edge differ by 3.75°.
+            (Mode::Face | Mode::Exact, ContactsPer::Cell) => Resistance::Springs,
+            _ => Resistance::Rigid,
+        }
     }
 
     /// Minimises the problem of every island from `start`. A body without rows keeps its target
@@ -237,10 +254,12 @@ impl Newton {
             };
             (row, gap)
         };
+        let is_deep = island.bodies.iter().any(|&k| step.deep[k]);
+        let resistance = if is_deep { Resistance::Springs } else { self.resistance() };
         let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
         let bodies = island.bodies.iter().map(|&k| &step.free[k]).collect();
         let rows = island.rows.iter().map(|&k| local(rows[k].clone()));
-        Problem::new(bodies, of(&step.target), rows, step.h).minimise(of(start), &self.options)
+        Problem::new(bodies, of(&step.target), rows, step.h).minimise(of(start), resistance, &self.options)
     }
 
     /// The velocities that move the poses, and the velocities that the next step starts from.
@@ -250,10 +269,11 @@ impl Newton {
         contacts: &[Contact],
     ) -> Result<[Vec<Vector6<f64>>; 2], DynamicsError> {
         let first = self.first_rows(step, contacts);
+        step.deep = self.deep(step, contacts, &first);
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut velocities = self.solve(step, &first, Gap::Position, &start);
         let mut rows = first.clone();
-        let deep = self.deep(step, contacts, &first);
+        let deep = step.deep.clone();
         let stays = |row: &Row| row.sides.iter().flatten().all(|(k, _)| deep[*k]);
         if first.iter().any(|row| !stays(row)) {
             let depths = Depths::of_contacts(contacts);

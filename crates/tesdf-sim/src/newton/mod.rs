@@ -10,6 +10,11 @@
 //! with              Kᵢ = κ / (wᵢ h²),   wᵢ = Jᵢ M⁻¹ Jᵢᵀ
 //! ```
 //!
+//! Springs give way. So the problem is solved again, with each spring compressed by its force, until
+//! no contact gives way (the method of multipliers, in `problem.rs`). Its solution is that of rigid
+//! contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Islands that overlap deeply keep
+//! the springs, and so do contacts for each cell.
+//!
 //! `v*` is the velocity without contacts, `gᵢ` the gap, `Jᵢ v` its rate and `h` the time step. The
 //! minimiser moves the poses. The velocity that the next step starts from is the result of a second
 //! minimisation, without the terms that push penetrating bodies apart.

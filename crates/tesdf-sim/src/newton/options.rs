@@ -8,7 +8,8 @@ use crate::DynamicsError;
 pub struct NewtonOptions {
     /// κ: stiffness of a contact, relative to the stiffness that the inertia of its two bodies
     /// gives within one step. Measured on a pile of 128 shafts: 10 is too soft, and 1000
-    /// overshoots. A nut on a bolt behaves the same from 1e2 to 1e6.
+    /// overshoots. Where bodies do not overlap deeply, contacts of nodes and of faces do not give way
+    /// whatever the stiffness; it is then that of the first minimisation.
     pub stiffness: f64,
     /// β: fraction of a penetration that one step removes.
     pub correction: f64,
@@ -27,10 +28,11 @@ pub struct NewtonOptions {
     /// Islands of at most this number of free bodies are solved by dense Cholesky factorisation,
     /// larger islands by conjugate gradients. At most 256.
     pub dense_bodies: usize,
-    /// A solve ends when the predicted decrease of the next iteration, relative to the energy, is
-    /// below the square of this value.
+    /// A minimisation ends when the predicted decrease of the next iteration, relative to the
+    /// energy, is below the square of this value. Forces are raised until contacts give way by less
+    /// than this fraction of what springs of the stiffness κ give way.
     pub tolerance: f64,
-    /// Maximum number of Newton iterations of a solve, 1 to 10000.
+    /// Maximum number of Newton iterations of a minimisation, 1 to 10000.
     pub max_iterations: u32,
 }
 
