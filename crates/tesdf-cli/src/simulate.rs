@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tesdf::Progress;
-use tesdf_sim::criterion::ScrewReport;
+use tesdf_sim::criterion::{RestReport, ScrewReport};
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{HiddenPair, InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
@@ -324,6 +324,9 @@ fn print(args: &Args, summary: &Summary) -> Result<(), Failure> {
     if let Some(screw) = &summary.screw {
         rows.extend(screw_rows(screw));
     }
+    if let Some(rest) = &summary.rest {
+        rows.extend(rest_rows(rest));
+    }
     report::table(&rows)
 }
 
@@ -348,7 +351,22 @@ fn screw_rows(screw: &ScrewReport) -> Vec<(&'static str, String)> {
             ),
         ),
     ];
-    rows.extend(screw.failures.iter().map(|failure| ("not met", failure.clone())));
-    rows.push(("criterion", if screw.failures.is_empty() { "passed" } else { "not passed" }.into()));
+    rows.extend(verdict_rows(&screw.failures));
     rows
+}
+
+fn rest_rows(rest: &RestReport) -> Vec<(&'static str, String)> {
+    let nanometres = rest.drift * 1e9;
+    let mut rows = vec![
+        ("rest", format!("{} moves most, by at most {nanometres:.3} nm", rest.body)),
+        ("energy gain", format!("{:.2e} J", rest.energy_gain)),
+    ];
+    rows.extend(verdict_rows(&rest.failures));
+    rows
+}
+
+fn verdict_rows(failures: &[String]) -> Vec<(&'static str, String)> {
+    let not_met = failures.iter().map(|failure| ("not met", failure.clone()));
+    let verdict = if failures.is_empty() { "passed" } else { "not passed" };
+    not_met.chain([("criterion", verdict.into())]).collect()
 }

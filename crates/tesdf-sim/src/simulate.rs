@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::criterion::{ScrewReport, ScrewTracker};
+use crate::criterion::{RestReport, ScrewReport, Trackers};
 use crate::scene_file::{LimitError, SceneFile};
 use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
 
@@ -56,6 +56,8 @@ pub struct Summary {
     pub hidden: Vec<HiddenPair>,
     /// Result of the screw criterion, if the scene has one.
     pub screw: Option<ScrewReport>,
+    /// Result of the rest criterion, if the scene has one.
+    pub rest: Option<RestReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
 }
@@ -142,7 +144,7 @@ pub fn simulate_from(
 ) -> Result<(RunRecord, Summary), SimulateError> {
     let h = scene.time_step;
     let steps = scene.steps()?;
-    let (mut tracker, energy) = replay(scene, engine.system(), &run.record)?;
+    let (mut trackers, energy) = replay(scene, engine.system(), &run.record)?;
     let PartialRun { mut record, mut totals } = run;
     record.reserve(steps).map_err(|_| LimitError::memory(steps, record.bodies.len()))?;
     record.plan(Some(steps));
@@ -154,9 +156,7 @@ pub fn simulate_from(
         if every > 0 && step % every == 0 {
             record.push_contacts(step, engine.contacts(), system);
         }
-        if let Some(tracker) = &mut tracker {
-            tracker.observe(system, h);
-        }
+        trackers.observe(system, h);
         totals.add(&report);
         record.push_hidden(step, engine.hidden(), system);
         let moment = Moment { step: step + 1, steps, time, report, system, record: &record };
@@ -166,19 +166,21 @@ pub fn simulate_from(
     }
     record.plan(None);
     let system = engine.system();
-    let mut screw = tracker.map(|tracker| tracker.report(system));
     let hidden = record.hidden_pairs();
-    if let Some(screw) = &mut screw {
-        screw.failures.extend(hidden.iter().map(HiddenPair::message));
-    }
+    let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
+    let (screw, rest) = trackers.report(system, &messages);
+    let failures = [screw.as_ref().map(|screw| &screw.failures), rest.as_ref().map(|rest| &rest.failures)];
+    let failures: Vec<_> = failures.into_iter().flatten().collect();
+    let passed = (!failures.is_empty()).then(|| failures.iter().all(|failures| failures.is_empty()));
     let sums = totals.summary();
     let depths = hidden.iter().map(|pair| pair.depth);
     let summary = Summary {
         seconds: steps as f64 * h,
         kinetic_energy: system.kinetic_energy(),
         released_energy: energy - system.potential_energy(),
-        passed: screw.as_ref().map(|screw| screw.failures.is_empty()),
+        passed,
         screw,
+        rest,
         deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
         hidden,
         ..sums
@@ -186,12 +188,8 @@ pub fn simulate_from(
     Ok((record, summary))
 }
 
-/// The screw tracker after the recorded steps, and the energy at the beginning, J.
-fn replay(
-    scene: &SceneFile,
-    system: &System,
-    record: &RunRecord,
-) -> Result<(Option<ScrewTracker>, f64), SimulateError> {
+/// The trackers after the recorded steps, and the energy at the beginning, J.
+fn replay(scene: &SceneFile, system: &System, record: &RunRecord) -> Result<(Trackers, f64), SimulateError> {
     let mut system = system.clone();
     let show = |system: &mut System, step: u64| {
         let states = record.states(step as usize).unwrap_or_default();
@@ -199,13 +197,12 @@ fn replay(
     };
     show(&mut system, 0)?;
     let energy = system.kinetic_energy() + system.potential_energy();
-    let Some(screw) = &scene.criterion.screw else { return Ok((None, energy)) };
-    let mut tracker = ScrewTracker::new(screw, &system).map_err(SimulateError::Criterion)?;
+    let mut trackers = Trackers::new(&scene.criterion, &system).map_err(SimulateError::Criterion)?;
     for step in 1..=record.steps() {
         show(&mut system, step)?;
-        tracker.observe(&system, scene.time_step);
+        trackers.observe(&system, scene.time_step);
     }
-    Ok((Some(tracker), energy))
+    Ok((trackers, energy))
 }
 
 /// Sums over the steps of a run.

@@ -84,9 +84,13 @@ fn errors_name_the_line_and_the_body() {
                 + "[criterion.screw]\nbody = \"nut\"\naxis = [0,0,1]\npitch = 1\nmin_turns = 1\nbacklash = 1",
             vec!["no body nut", "floor, brick"],
         ),
+        (
+            DROP.to_string() + "[criterion.rest]\nmax_drift = -1\nmax_energy_gain = 0",
+            vec!["line 18", "criterion.rest", "max_drift is -1", "0 or greater"],
+        ),
     ];
     for (k, (text, expected)) in cases.into_iter().enumerate() {
-        let text = if k == 19 { refusal(&text) } else { text };
+        let text = if k >= 19 { refusal(&text) } else { text };
         assert!(text.starts_with("drop.toml"), "case {k}: {text}");
         for part in expected {
             assert!(text.contains(part), "case {k}: no {part:?} in {text}");

@@ -61,6 +61,9 @@ impl LoadedScene {
         if let Some(screw) = &scene.criterion.screw {
             screw.validate(&system).map_err(|reason| self.value("criterion.screw", reason))?;
         }
+        if let Some(rest) = &scene.criterion.rest {
+            rest.validate().map_err(|reason| self.value("criterion.rest", reason))?;
+        }
         Ok(system)
     }
 

@@ -40,7 +40,7 @@ pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
 
-use crate::criterion::ScrewCriterion;
+use crate::criterion::{RestCriterion, ScrewCriterion};
 use crate::newton::NewtonOptions;
 
 /// The content of a scene file, in SI units.
@@ -210,4 +210,6 @@ pub struct RecordSection {
 pub struct CriterionSection {
     /// A body must move along a thread.
     pub screw: Option<ScrewCriterion>,
+    /// The bodies must stay where they are.
+    pub rest: Option<RestCriterion>,
 }

@@ -1,4 +1,4 @@
-//! Success criteria of a run, and the analytic screw that a run is compared with.
+//! A body moves along a thread; and the analytic screw that it is compared with.
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
