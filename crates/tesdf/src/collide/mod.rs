@@ -12,6 +12,7 @@
 //! - [`candidates`](candidates()): the result of the broad and the middle phase, for debug views.
 //! - [`reduce_pairs`]: fewer contacts per pair, with a bound of the loss; [`wrench_error`] computes
 //!   the loss.
+//! - [`PatchTracker`]: contacts grouped into patches, which keep their ids from step to step.
 //! - [`hidden_overlaps`]: pairs that overlap without a contact that shows it. Detections report
 //!   them beside the contacts.
 //! - [`clearance`](clearance()): the signed distance between two instances, with witness points.
@@ -40,6 +41,7 @@ mod motion;
 mod narrow;
 mod options;
 mod ordered_pair;
+mod patches;
 mod piece;
 mod polygon;
 mod pose;
@@ -76,6 +78,7 @@ pub use ids::{InstanceId, ShapeId};
 pub use instance_pairs::{InstancePair, instance_pairs};
 pub use motion::Motion;
 pub use options::{CollideOptions, ContactsPer, Mode, Reduction};
+pub use patches::{ContactPatch, ContactPatches, PatchOptions, PatchPoint, PatchTracker};
 pub use pose::{Placement, Pose};
 pub use reduce::{reduce_pairs, wrench_error};
 pub use scene::{Groups, Instance, Scene, Velocity};
