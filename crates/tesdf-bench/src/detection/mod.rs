@@ -3,6 +3,7 @@ mod arguments;
 mod clearance;
 mod collide;
 mod frames;
+mod heap;
 #[cfg(feature = "gpu")]
 mod on_device;
 mod poses;
@@ -23,6 +24,8 @@ enum Benchmark {
     Collide(arguments::Args),
     /// Measure the clearance of random pairs of bodies that are deep in each other
     Clearance(clearance::Args),
+    /// Measure the search for pairs in a heap of many bodies, anew in each step and kept
+    Heap(heap::Args),
     /// Write a file of poses with overlapping bodies, from a seed
     Poses(poses::Args),
 }
@@ -35,6 +38,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match &args.benchmark {
         Benchmark::Collide(args) => collide::run(args),
         Benchmark::Clearance(args) => clearance::run(args),
+        Benchmark::Heap(args) => heap::run(args),
         Benchmark::Poses(args) => poses::run(args),
     }
 }

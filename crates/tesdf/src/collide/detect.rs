@@ -6,7 +6,10 @@ use super::ordered_pair::OrderedPair;
 use super::surface::{Candidates, Part};
 use crate::geometry::Aabb;
 
-use super::{CollideError, CollideOptions, Contact, Contacts, Scene, Statistics, reduce_pairs};
+use super::{
+    CollideError, CollideOptions, Contact, Contacts, InstancePair, InstancePairs, Scene, Statistics,
+    reduce_pairs,
+};
 
 /// Number of faces or nodes per task.
 const TASK: usize = 64;
@@ -41,7 +44,39 @@ const TASK: usize = 64;
 /// # }
 /// ```
 pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-    let pairs = OrderedPair::all(scene, options)?;
+    Ok(of_pairs(&OrderedPair::all(scene, options)?, options))
+}
+
+/// The contacts that [`detect`] finds, for a scene whose instances move a little from step to step.
+/// `pairs` are updated first.
+///
+/// # Errors
+/// As [`detect`].
+pub fn detect_with(
+    pairs: &mut InstancePairs,
+    scene: &Scene,
+    options: &CollideOptions,
+) -> Result<Contacts, CollideError> {
+    options.validate()?;
+    pairs.update(scene, options)?;
+    detect_pairs(pairs.pairs(), scene, options)
+}
+
+/// The contacts that [`detect`] finds between these pairs of instances, in their order. The pairs
+/// are all different. [`InstancePairs::update_moved`] finds them where the caller knows which
+/// instances have moved.
+///
+/// # Errors
+/// As [`detect`], and [`CollideError::NoInstance`].
+pub fn detect_pairs(
+    pairs: &[InstancePair],
+    scene: &Scene,
+    options: &CollideOptions,
+) -> Result<Contacts, CollideError> {
+    Ok(of_pairs(&OrderedPair::of(pairs, scene, options)?, options))
+}
+
+fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions) -> Contacts {
     let candidates: Vec<Candidates> = pairs.par_iter().map(OrderedPair::candidates).collect();
     let tasks: Vec<(&OrderedPair, &[u32])> = pairs
         .iter()
@@ -66,7 +101,7 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
     let mut contacts = one_per_vertex(contacts, &at_vertices);
     statistics.touching = contacts.len() + statistics.filtered;
     statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
-    statistics.bytes = size_of_val(pairs.as_slice())
+    statistics.bytes = size_of_val(pairs)
         + statistics.candidates * size_of::<u32>()
         + size_of_val(tasks.as_slice())
         + size_of_val(contacts.as_slice());
@@ -77,8 +112,8 @@ pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, Colli
     let all = contacts.len();
     let (contacts, reductions) = reduce_pairs(contacts, options.reduction);
     statistics.reduced = all - contacts.len();
-    let hidden = hidden::among(&pairs, options.mode, &contacts);
-    Ok(Contacts::new(contacts, statistics, reductions, hidden))
+    let hidden = hidden::among(pairs, options.mode, &contacts);
+    Contacts::new(contacts, statistics, reductions, hidden)
 }
 
 /// Sort key within one ordered pair of instances. Without a cell, several pieces outside the cube

@@ -16,12 +16,17 @@ pub struct InstancePair {
     pub contact_distance: f64,
 }
 
-struct Entry {
-    id: InstanceId,
-    bounds: Aabb,
+/// An instance in the search for pairs.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// The instance.
+    pub id: InstanceId,
+    /// Its bounds, grown by half of the contact distance and by its motion.
+    pub bounds: Aabb,
     /// Distance that it can move within the speculative time.
-    motion: f64,
-    is_plane: bool,
+    pub motion: f64,
+    /// Whether it is a plane, whose bounds are infinite.
+    pub is_plane: bool,
 }
 
 /// Rounding error of the placement of a box, in ulps of its largest coordinate.
@@ -44,29 +49,21 @@ pub fn instance_pairs(
     contact_distance: f64,
     speculative_time: f64,
 ) -> Result<Vec<InstancePair>, CollideError> {
-    let mut worlds: BTreeMap<u32, Vec<Entry>> = BTreeMap::new();
+    let mut worlds: BTreeMap<u32, Vec<(Entry, &Instance)>> = BTreeMap::new();
     for (id, instance) in scene.instances() {
-        let shape = scene
-            .shape(instance.shape)
-            .map_err(|e| CollideError::Instance { instance: id.0, reason: e.to_string() })?;
-        let is_plane = matches!(shape, Shape::Plane);
-        let motion = instance.motion_ahead(shape, speculative_time);
-        let bounds = scene.bounds(id)?;
-        // Without this, rounding could separate bounds that touch.
-        let rounding = ULPS * f64::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
-        let bounds = bounds.grown(0.5 * contact_distance + motion + rounding);
-        worlds.entry(instance.world).or_default().push(Entry { id, bounds, motion, is_plane });
+        let entry = Entry::new(scene, id, instance, contact_distance, speculative_time)?;
+        worlds.entry(instance.world).or_default().push((entry, instance));
     }
     let mut pairs = Vec::new();
     for entries in worlds.values() {
         let first = pairs.len();
         let mut offer = |i: usize, j: usize| {
-            let (a, b) = (&entries[i.min(j)], &entries[i.max(j)]);
-            let meet = |id| scene.instance(id).map(|instance| (id, instance));
-            let (Ok(x), Ok(y)) = (meet(a.id), meet(b.id)) else { return pairs.len() };
-            if a.bounds.overlaps(b.bounds) && !(a.is_plane && b.is_plane) && scene.may_meet(x, y) {
-                let contact_distance = contact_distance + a.motion + b.motion;
-                pairs.push(InstancePair { first: a.id, second: b.id, contact_distance });
+            let ((a, x), (b, y)) = (&entries[i.min(j)], &entries[i.max(j)]);
+            if a.bounds.overlaps(b.bounds)
+                && !(a.is_plane && b.is_plane)
+                && scene.may_meet((a.id, x), (b.id, y))
+            {
+                pairs.push(Entry::pair(a, b, contact_distance));
             }
             pairs.len()
         };
@@ -74,8 +71,8 @@ pub fn instance_pairs(
             true => Ok(()),
             false => Err(CollideError::TooManyPairs { limit: MAX_PAIRS }),
         };
-        let planes: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].is_plane).collect();
-        let bodies: Vec<usize> = (0..entries.len()).filter(|&i| !entries[i].is_plane).collect();
+        let planes: Vec<usize> = (0..entries.len()).filter(|&i| entries[i].0.is_plane).collect();
+        let bodies: Vec<usize> = (0..entries.len()).filter(|&i| !entries[i].0.is_plane).collect();
         for &i in &planes {
             bodies.iter().try_for_each(|&j| within(offer(i, j)))?;
         }
@@ -84,7 +81,7 @@ pub fn instance_pairs(
                 bodies[k + 1..].iter().try_for_each(|&j| within(offer(i, j)))?;
             }
         } else {
-            let boxes: Vec<Aabb> = bodies.iter().map(|&i| entries[i].bounds).collect();
+            let boxes: Vec<Aabb> = bodies.iter().map(|&i| entries[i].0.bounds).collect();
             let tree = AabbTree::build(&boxes, 4);
             for (k, bounds) in boxes.iter().enumerate() {
                 let mut found = 0;
@@ -101,6 +98,41 @@ pub fn instance_pairs(
         pairs[first..].sort_unstable_by_key(|p| (p.first, p.second));
     }
     Ok(pairs)
+}
+
+impl Entry {
+    /// `instance` is that of the id.
+    pub fn new(
+        scene: &Scene,
+        id: InstanceId,
+        instance: &Instance,
+        contact_distance: f64,
+        speculative_time: f64,
+    ) -> Result<Self, CollideError> {
+        let shape = scene
+            .shape(instance.shape)
+            .map_err(|e| CollideError::Instance { instance: id.0, reason: e.to_string() })?;
+        let motion = instance.motion_ahead(shape, speculative_time);
+        let bounds = instance.bounds(shape);
+        // Without this, rounding could separate bounds that touch.
+        let rounding = ULPS * f64::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
+        let bounds = bounds.grown(0.5 * contact_distance + motion + rounding);
+        Ok(Self { id, bounds, motion, is_plane: matches!(shape, Shape::Plane) })
+    }
+
+    /// The bounds, grown by a share of their longest edge.
+    pub fn wider(&self, share: f64) -> Aabb {
+        match self.is_plane {
+            true => self.bounds,
+            false => self.bounds.grown(share * self.bounds.extent().max_element()),
+        }
+    }
+
+    /// The pair of two entries, the lower id first.
+    pub fn pair(a: &Self, b: &Self, contact_distance: f64) -> InstancePair {
+        let contact_distance = contact_distance + a.motion + b.motion;
+        InstancePair { first: a.id, second: b.id, contact_distance }
+    }
 }
 
 impl Instance {

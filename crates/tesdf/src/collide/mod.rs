@@ -9,6 +9,8 @@
 //!   An instance has a pose, a velocity, a scale and a world, and needs memory only for this state.
 //! - [`detect`](detect()): all contacts of a scene, sorted by ids. The same input gives the same
 //!   bytes for any number of threads.
+//! - [`InstancePairs`]: the pairs of instances that can touch, kept from step to step for
+//!   [`detect_with`], which finds the same contacts.
 //! - [`candidates`](candidates()): the result of the broad and the middle phase, for debug views.
 //! - [`reduce_pairs`]: fewer contacts per pair, with a bound of the loss; [`wrench_error`] computes
 //!   the loss.
@@ -35,6 +37,7 @@ mod hidden_overlap;
 mod hull;
 mod ids;
 mod instance_pairs;
+mod kept_pairs;
 mod least;
 mod middle;
 mod motion;
@@ -70,12 +73,13 @@ pub mod internal {
 pub use candidates::{Candidate, candidates};
 pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};
-pub use detect::detect;
+pub use detect::{detect, detect_pairs, detect_with};
 pub use error::CollideError;
 pub use hidden::hidden_overlaps;
 pub use hidden_overlap::HiddenOverlap;
 pub use ids::{InstanceId, ShapeId};
 pub use instance_pairs::{InstancePair, instance_pairs};
+pub use kept_pairs::InstancePairs;
 pub use motion::Motion;
 pub use options::{CollideOptions, ContactsPer, Mode, Reduction};
 pub use patches::{ContactPatch, ContactPatches, PatchOptions, PatchPoint, PatchTracker};

@@ -1,7 +1,7 @@
 //! Two instances in an order: the surface of the first against the signed distance field of the
 //! second.
 use super::field::FieldBody;
-use super::instance_pairs::instance_pairs;
+use super::instance_pairs::{InstancePair, instance_pairs};
 use super::narrow::{Minimum, Search};
 use super::surface::{Candidates, Part, SurfaceBody};
 use super::{CollideError, CollideOptions, Contact, ContactsPer, FeatureId, InstanceId, Mode, Scene, Shape};
@@ -23,7 +23,17 @@ impl<'a> OrderedPair<'a> {
     /// All pairs of instances that can touch, each in both orders.
     pub fn all(scene: &'a Scene, options: &'a CollideOptions) -> Result<Vec<Self>, CollideError> {
         options.validate()?;
-        instance_pairs(scene, options.contact_distance, options.speculative_time)?
+        Self::of(&instance_pairs(scene, options.contact_distance, options.speculative_time)?, scene, options)
+    }
+
+    /// These pairs of instances, each in both orders.
+    pub fn of(
+        pairs: &[InstancePair],
+        scene: &'a Scene,
+        options: &'a CollideOptions,
+    ) -> Result<Vec<Self>, CollideError> {
+        options.validate()?;
+        pairs
             .iter()
             .flat_map(|pair| [(pair.first, pair.second, pair), (pair.second, pair.first, pair)])
             .map(|(a, b, pair)| Self::new(scene, options, a, b, pair.contact_distance))

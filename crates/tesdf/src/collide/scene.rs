@@ -69,6 +69,15 @@ impl Instance {
     pub fn placement(&self) -> Placement {
         Placement { pose: self.pose, scale: self.scale }
     }
+
+    /// Bounds in the world; infinite for a plane. `shape` is its shape.
+    pub(super) fn bounds(&self, shape: &Shape) -> Aabb {
+        match shape {
+            // A rotated half-space has no useful box.
+            Shape::Plane => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
+            _ => self.placement().bounds(shape.bounds()),
+        }
+    }
 }
 
 /// Shapes and their instances.
@@ -265,6 +274,11 @@ impl Scene {
         self.shapes.get(&id).ok_or(CollideError::NoShape(id))
     }
 
+    /// All shapes, in the order of their ids.
+    pub fn shapes(&self) -> impl ExactSizeIterator<Item = (ShapeId, &Shape)> {
+        self.shapes.iter().map(|(id, shape)| (*id, shape))
+    }
+
     /// All instances, in the order of their ids.
     pub fn instances(&self) -> impl ExactSizeIterator<Item = (InstanceId, &Instance)> {
         self.ids.iter().copied().zip(&self.instances)
@@ -292,12 +306,7 @@ impl Scene {
     /// [`CollideError::NoInstance`].
     pub fn bounds(&self, id: InstanceId) -> Result<Aabb, CollideError> {
         let instance = self.instance(id)?;
-        let shape = self.shape(instance.shape)?;
-        Ok(match shape {
-            // A rotated half-space has no useful box.
-            Shape::Plane => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
-            _ => instance.placement().bounds(shape.bounds()),
-        })
+        Ok(instance.bounds(self.shape(instance.shape)?))
     }
 
     /// Memory of the instances and exclusions in bytes, without shapes.
