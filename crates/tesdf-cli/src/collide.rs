@@ -224,6 +224,18 @@ fn text(found: &Contacts) -> String {
     if s.filtered + s.reduced > 0 {
         let _ = writeln!(text, "{} dropped by the cosine filter, {} by the reduction", s.filtered, s.reduced);
     }
+    for r in &found.reductions {
+        let _ = writeln!(
+            text,
+            "wrench error {:.3e} of {} kept of {}: a unit force on any contact can be replaced by forces on the kept \
+             contacts whose force and torque differ by at most this; torques around ({}), divided by {:.6e}",
+            r.wrench_error,
+            r.kept,
+            count(r.contacts, "contact"),
+            report::point(r.center),
+            r.length
+        );
+    }
     if s.unconverged > 0 {
         let _ = writeln!(text, "{} not proved to be within the tolerance", count(s.unconverged, "contact"));
     }

@@ -113,6 +113,18 @@ fn contacts_per_face_are_the_corners_of_a_cube_on_a_cube() {
 }
 
 #[test]
+fn a_reduction_prints_its_wrench_error() {
+    let folder = cube();
+    let few = ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0 0 2 0 0 0 1", "--reduce", "3"];
+    let report = json(&folder, &[&few[..], &["--json", "--report"]].concat());
+    let error = report["reductions"][0]["wrench_error"].as_f64().unwrap();
+    assert!(error > 0.0, "{report}");
+    let text = folder.good(&few);
+    assert!(text.contains(&format!("wrench error {error:.3e} of 3 kept of")), "{text}");
+    assert!(!folder.good(&few[..5]).contains("wrench error"));
+}
+
+#[test]
 fn why_explains_found_and_missing_contacts() {
     let folder = cube();
     let why = |more: &[&str]| {

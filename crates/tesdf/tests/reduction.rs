@@ -10,6 +10,8 @@ use tesdf::collide::{
 use tesdf::glam::{DQuat, DVec3};
 
 type Wrench = [f64; 6];
+/// Gives a point and a normal.
+type Place = dyn Fn(&mut Random) -> (DVec3, DVec3);
 
 /// Rounding of sums of wrenches.
 const ROUNDING: f64 = 1e-9;
@@ -47,31 +49,43 @@ fn patch(count: usize, seed: u64, mut place: impl FnMut(&mut Random) -> (DVec3, 
     contacts
 }
 
+/// A point and a normal of a patch.
+fn place(kind: u32, random: &mut Random) -> (DVec3, DVec3) {
+    let p = random.in_cube();
+    match kind {
+        0 => (DVec3::new(p.x, 0.3 * p.y, 0.0), DVec3::Z),
+        1 => {
+            let (sin, cos) = (4.0 * p.x).sin_cos();
+            (DVec3::new(cos, sin, p.y), DVec3::new(cos, sin, 0.4).normalize())
+        }
+        2 => {
+            let axis = random.index(3);
+            let mut at = p;
+            at[axis] = -1.0;
+            (at, DVec3::AXES[axis])
+        }
+        3 => (p, random.direction()),
+        _ => ((2.0 * p).round(), (3.0 * random.in_cube()).round().try_normalize().unwrap_or(DVec3::X)),
+    }
+}
+
 /// Typical patches: flat, around a shaft, in the corner of a box, random, and few places with many
 /// contacts.
 fn any_patch() -> impl Strategy<Value = Vec<Contact>> {
-    (1..250usize, 0..5, any::<u64>()).prop_map(|(count, kind, seed)| {
+    patch_of(1..250)
+}
+
+/// Patches of so many contacts that only a few of them are candidates.
+fn many_contacts() -> impl Strategy<Value = Vec<Contact>> {
+    patch_of(2049..6000)
+}
+
+fn patch_of(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Contact>> {
+    (count, 0..5u32, any::<u64>()).prop_map(|(count, kind, seed)| {
         let turn = DQuat::from_rotation_arc(DVec3::Z, Random(seed).direction());
         let origin = 10.0 * Random(!seed).in_cube();
         patch(count, seed, |random| {
-            let p = random.in_cube();
-            let (point, normal) = match kind {
-                0 => (DVec3::new(p.x, 0.3 * p.y, 0.0), DVec3::Z),
-                1 => {
-                    let (sin, cos) = (4.0 * p.x).sin_cos();
-                    (DVec3::new(cos, sin, p.y), DVec3::new(cos, sin, 0.4).normalize())
-                }
-                2 => {
-                    let axis = random.index(3);
-                    let mut at = p;
-                    at[axis] = -1.0;
-                    (at, DVec3::AXES[axis])
-                }
-                3 => (p, random.direction()),
-                _ => {
-                    ((2.0 * p).round(), (3.0 * random.in_cube()).round().try_normalize().unwrap_or(DVec3::X))
-                }
-            };
+            let (point, normal) = place(kind, random);
             (origin + turn * point, turn * normal)
         })
     })
@@ -168,7 +182,7 @@ proptest! {
     }
 
     #[test]
-    fn the_deepest_and_the_extremes_stay(contacts in any_patch(), n in 1..24u32) {
+    fn the_deepest_and_the_extremes_stay(contacts in prop_oneof![any_patch(), many_contacts()], n in 1..24u32) {
         let (kept, report) = reduce(&contacts, n);
         let deepest = |contacts: &[Contact]| contacts.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
         prop_assert_eq!(deepest(&kept), deepest(&contacts));
@@ -191,10 +205,12 @@ proptest! {
         }
     }
 
-    /// The reported loss equals the one computed on its own.
+    /// The reported loss equals the one computed on its own, from all contacts.
     #[test]
-    fn reports_have_the_wrench_error(contacts in any_patch(), n in 1..40u32) {
+    fn reports_have_the_wrench_error(contacts in prop_oneof![any_patch(), many_contacts()], n in 1..70u32) {
         let (kept, report) = reduce(&contacts, n);
+        let mut rest = contacts.iter();
+        prop_assert!(kept.iter().all(|c| rest.any(|x| x == c)), "kept contacts are contacts, in order");
         let error = wrench_error(&contacts, &kept, report.center, report.length);
         prop_assert!((error - report.wrench_error).abs() <= 1e-6 * error + 1e-9, "{error} {report:?}");
         prop_assert_eq!(wrench_error(&[], &kept, report.center, report.length), 0.0);
@@ -218,7 +234,10 @@ proptest! {
     /// The contacts of a pair are reduced in order, whatever else touches and for any number of
     /// threads.
     #[test]
-    fn pairs_are_reduced_independently(patches in prop::collection::vec(any_patch(), 1..6), n in 1..12u32) {
+    fn pairs_are_reduced_independently(
+        patches in prop::collection::vec(prop_oneof![4 => any_patch(), 1 => many_contacts()], 1..6),
+        n in 1..12u32,
+    ) {
         let alone: Vec<_> = patches.iter().map(|contacts| reduce(contacts, n)).collect();
         // Pair k is (k, 100 - k): in the scene's order, the two orders of a pair are far apart.
         let renamed = |contacts: &[Contact], k: usize| -> Vec<Contact> {
@@ -297,5 +316,64 @@ fn the_error_of_a_ring_falls_with_the_square_of_the_kept_contacts() {
         let error = reduce(&contacts, n).1.wrench_error;
         let chord = |n: f64| 1.0 - (std::f64::consts::PI / n).cos();
         assert!((0.9 * chord(f64::from(n))..=chord(0.4 * f64::from(n))).contains(&error), "{n}: {error}");
+    }
+}
+
+/// With one contact more than the limit, only the contacts that represent their bins are candidates.
+/// The loss is nearly the same.
+#[test]
+fn bins_lose_little() {
+    let mut worst = 0.0f64;
+    for (kind, seed) in [(0, 1), (1, 2), (1, 3), (2, 4), (3, 5), (4, 6)] {
+        let contacts = patch(2049, seed, |random| place(kind, random));
+        for n in [12, 24, 64] {
+            let by_bins = reduce(&contacts, n).1.wrench_error;
+            let among_all = reduce(&contacts[..2048], n).1.wrench_error;
+            println!("kind {kind}, {n} kept: {by_bins} by bins, {among_all} among all");
+            worst = worst.max(by_bins / among_all.max(5e-3));
+        }
+    }
+    assert!(worst < 1.5, "{worst}");
+}
+
+/// Contacts without extent in some directions, of any size and anywhere, and numbers of contacts
+/// next to the limits.
+#[test]
+fn degenerate_sets_are_reduced() {
+    let line = |random: &mut Random| (DVec3::X * random.unit(), DVec3::Z);
+    let point = |random: &mut Random| (DVec3::ONE, random.direction());
+    let places = |random: &mut Random| (random.in_cube().round(), DVec3::AXES[random.index(3)]);
+    let huge = |random: &mut Random| (1e12 * random.in_cube() + 1e14, random.direction());
+    let tiny = |random: &mut Random| (1e-12 * random.in_cube(), random.direction());
+    let far = |random: &mut Random| (random.in_cube() + 1e9, DVec3::Y);
+    let outlier = |random: &mut Random| {
+        let size = if random.index(1000) == 0 { 1e6 } else { 1.0 };
+        (size * random.in_cube(), DVec3::Z)
+    };
+    let kinds: [&Place; 7] = [&line, &point, &places, &huge, &tiny, &far, &outlier];
+    for (kind, place) in kinds.into_iter().enumerate() {
+        for count in [8, 9, 2048, 2049, 5000] {
+            let contacts = patch(count, kind as u64, place);
+            let (kept, report) = reduce(&contacts, 8);
+            let error = wrench_error(&contacts, &kept, report.center, report.length);
+            assert!((error - report.wrench_error).abs() <= 1e-6 * error + 1e-9, "{kind}: {error} {report:?}");
+            assert_eq!((report.contacts, report.kept), (count, kept.len()));
+            assert!(kept.len() <= 8 && (count > 8 || kept.len() == count), "{kind}: {report:?}");
+            // A line has two ends.
+            assert!(kind != 0 || error < 1e-9, "{report:?}");
+        }
+    }
+}
+
+/// More kept contacts than bins have survivors by default.
+#[test]
+fn many_contacts_can_be_kept() {
+    let contacts = patch(30_000, 7, |random| (random.in_cube(), random.direction()));
+    let mut last = f64::INFINITY;
+    for n in [10, 100, 1000] {
+        let (kept, report) = reduce(&contacts, n);
+        assert_eq!(kept.len(), n as usize);
+        assert!(report.wrench_error < last, "{n}: {report:?}");
+        last = report.wrench_error;
     }
 }

@@ -3,13 +3,12 @@ use crate::parallel::*;
 use super::hidden;
 use super::narrow::Minimum;
 use super::ordered_pair::OrderedPair;
+use super::reduce::{Reduced, reduced};
 use super::surface::{Candidates, Part};
-use crate::geometry::Aabb;
-
 use super::{
     CollideError, CollideOptions, Contact, Contacts, InstancePair, InstancePairs, Scene, Statistics,
-    reduce_pairs,
 };
+use crate::geometry::Aabb;
 
 /// Number of faces or nodes per task.
 const TASK: usize = 64;
@@ -110,10 +109,11 @@ fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions) -> Contacts {
         .chunk_by_mut(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b))
         .for_each(|run| run.sort_unstable_by_key(order));
     let all = contacts.len();
-    let (contacts, reductions) = reduce_pairs(contacts, options.reduction);
+    let Reduced { contacts, reports, bytes } = reduced(contacts, options.reduction);
     statistics.reduced = all - contacts.len();
+    statistics.bytes += bytes;
     let hidden = hidden::among(pairs, options.mode, &contacts);
-    Contacts::new(contacts, statistics, reductions, hidden)
+    Contacts::new(contacts, statistics, reports, hidden)
 }
 
 /// Sort key within one ordered pair of instances. Without a cell, several pieces outside the cube
