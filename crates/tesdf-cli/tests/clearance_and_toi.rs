@@ -162,3 +162,19 @@ fn why_explains_found_and_missing_contacts() {
     let (code, _, error) = folder.tesdf(&[&apart[..], &["1:99"]].concat());
     assert!(code == Some(2) && error.contains("face is 99 (of 12)"), "{error}");
 }
+
+#[test]
+fn benchmarks_of_clearances_and_pairs_print_their_figures() {
+    let folder = cube();
+    let pairs = json(&folder, &["bench", "clearance", "c.tesdf", "c.obj", "--pairs", "3", "--json"]);
+    let pairs = pairs.as_array().unwrap();
+    assert_eq!(pairs.len(), 3);
+    for pair in pairs {
+        assert!(pair["distance"].as_f64() < Some(0.0) && pair["converged"] == true, "{pair}");
+        assert!(pair["lower_bound"].as_f64() <= pair["distance"].as_f64(), "{pair}");
+    }
+    let text = folder.good(&["bench", "clearance", "c.tesdf", "--pairs", "3"]);
+    assert!(text.contains("3 pairs, 3 overlap, 0 not converged"), "{text}");
+    let text = folder.good(&["bench", "heap", "--bodies", "20", "--steps", "2"]);
+    assert_eq!(text.lines().filter(|line| line.starts_with("| 20 |")).count(), 4, "{text}");
+}

@@ -37,8 +37,22 @@ pub enum Rest {
 enum Side {
     Outside,
     Inside,
-    /// It crosses this number of faces, this one deepest.
-    Across(usize, Triangle),
+    /// It crosses faces. Where these are few, the plane of the one that it crosses deepest.
+    Across(Option<Plane>),
+}
+
+/// A plane: one of its points, and its normal.
+#[derive(Clone, Copy)]
+struct Plane(DVec3, DVec3);
+
+/// What a bound has brought.
+enum Progress {
+    /// A lower greatest value.
+    Lower,
+    /// Nothing.
+    None,
+    /// Nothing, because the piece extends beyond a face. This plane cuts off a part over the face.
+    Beyond(Plane),
 }
 
 /// The lowest point of a surface so far, in the field's frame.
@@ -75,6 +89,8 @@ pub struct Looks<'a> {
 const ROUNDS: usize = 8;
 /// A piece that crosses up to this number of faces is cut along one of them. Others are halved.
 const FEW: usize = 4;
+/// A piece is cut along the side of a face where this share of its size is on both sides.
+const THIN: f64 = 1e-3;
 /// Values in `f32` are used while more than this is to be gained (local frame).
 const COARSE: f64 = 1e-4;
 /// Nearer to the surface than this (local frame), a piece may cross it. Where two faces cross, their
@@ -157,9 +173,20 @@ impl Piece {
         }
     }
 
-    /// The parts above and below the plane of a triangle, as triangles.
-    fn cut(&self, asset: &TeSdf, plane: &Triangle) -> Option<Vec<Self>> {
-        let height = |p: DVec3| plane.normal.dot(p - plane.corners[0]);
+    /// The greatest distance from a plane that the piece has on both sides of it.
+    fn depth_across(&self, Plane(point, normal): Plane) -> f64 {
+        let heights = self.points().iter().map(|p| normal.dot(*p - point));
+        let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+        high.min(-low)
+    }
+
+    /// The parts above and below a plane, as triangles. `None` unless the piece is a triangle that
+    /// the plane divides.
+    fn cut(&self, asset: &TeSdf, Plane(point, normal): Plane) -> Option<Vec<Self>> {
+        if self.count < 3 {
+            return None;
+        }
+        let height = |p: DVec3| normal.dot(p - point);
         let Parts::Across(above, below) = Polygon::new(self.points()).cut(|v| height(v.point)) else {
             return None;
         };
@@ -239,9 +266,10 @@ impl Looks<'_> {
             match self.side(&piece) {
                 Side::Outside => return Rest::Nothing,
                 Side::Inside => piece.is_inside = true,
-                Side::Across(count, deepest) => return self.divided(&piece, bound, Some((count, deepest))),
+                Side::Across(plane) => return self.divided(&piece, bound, plane),
             }
         }
+        let mut plane = None;
         for _ in 0..ROUNDS {
             bound = bound.max(-piece.bounds.greatest - piece.radius);
             if self.is_closed(bound) {
@@ -254,7 +282,7 @@ impl Looks<'_> {
             if self.is_closed(bound) {
                 return Rest::Nothing;
             }
-            let is_better = self.add_bound(&mut piece, at, &value);
+            let progress = self.add_bound(&mut piece, at, &value);
             bound = bound.max(-piece.bounds.greatest - piece.radius);
             if self.is_closed(bound) {
                 return Rest::Nothing;
@@ -263,23 +291,26 @@ impl Looks<'_> {
                 match self.side(&piece) {
                     Side::Outside => return Rest::Nothing,
                     Side::Inside => piece.is_inside = true,
-                    Side::Across(count, deepest) => {
-                        return self.divided(&piece, bound, Some((count, deepest)));
-                    }
+                    Side::Across(plane) => return self.divided(&piece, bound, plane),
                 }
             }
-            if !is_better {
-                break;
+            match progress {
+                Progress::Lower => {}
+                Progress::None => break,
+                Progress::Beyond(side) => {
+                    plane = Some(side);
+                    break;
+                }
             }
         }
-        self.divided(&piece, bound, None)
+        self.divided(&piece, bound, plane)
     }
 
-    fn divided(&self, piece: &Piece, bound: f64, crossing: Option<(usize, Triangle)>) -> Rest {
-        let cut = match (crossing, self.field.field) {
-            (Some((count, deepest)), Field::Mesh(asset)) if count <= FEW && piece.count == 3 => {
-                piece.cut(asset, &deepest)
-            }
+    /// The parts of a piece that can still be lower than all others. The piece is cut along a plane,
+    /// or halved.
+    fn divided(&self, piece: &Piece, bound: f64, plane: Option<Plane>) -> Rest {
+        let cut = match (plane, self.field.field) {
+            (Some(plane), Field::Mesh(asset)) => piece.cut(asset, plane),
             _ => None,
         };
         let mut parts = cut.unwrap_or_else(|| piece.halves(self.field, self.hair()));
@@ -311,9 +342,8 @@ impl Looks<'_> {
         }
     }
 
-    /// Adds the bound that the nearest face of a point gives. Returns whether the bounds have
-    /// improved there.
-    fn add_bound(&mut self, piece: &mut Piece, at: DVec3, value: &FieldValue) -> bool {
+    /// Adds the bound that the nearest face of a point gives.
+    fn add_bound(&self, piece: &mut Piece, at: DVec3, value: &FieldValue) -> Progress {
         let before = piece.bounds.greatest;
         match self.field.field {
             Field::Simple(_) => {
@@ -330,14 +360,35 @@ impl Looks<'_> {
                     Some((Bound { kind: Kind::Chord, .. }, here))
                         if value.feature == Feature::Face && here > value.distance.abs() + self.hair() =>
                     {
-                        let Some(heights) = self.plane(asset, piece, &triangle) else { return false };
+                        let Some(heights) = self.heights(asset, piece, &triangle) else {
+                            return self.beyond(piece, &triangle);
+                        };
                         piece.bounds.add(Bound { face, kind: Kind::Plane, at: heights });
                     }
-                    Some(_) => return false,
+                    Some(_) => return Progress::None,
                 }
             }
         }
-        piece.bounds.greatest < before
+        if piece.bounds.greatest < before { Progress::Lower } else { Progress::None }
+    }
+
+    /// The plane through a side of a face, perpendicular to the face, that the piece crosses deepest.
+    /// A piece that is large against the face is halved instead.
+    fn beyond(&self, piece: &Piece, triangle: &Triangle) -> Progress {
+        let [a, b, c] = triangle.corners;
+        let size = piece.reach(piece.center());
+        if size > a.distance(b).max(b.distance(c)).max(c.distance(a)) {
+            return Progress::None;
+        }
+        let mut deepest = (THIN * size, Progress::None);
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            let side = Plane(p, (q - p).cross(triangle.normal).normalize_or_zero());
+            let depth = piece.depth_across(side);
+            if depth > deepest.0 {
+                deepest = (depth, Progress::Beyond(side));
+            }
+        }
+        deepest.1
     }
 
     /// A length that is small relative to the tolerance, and large relative to rounding.
@@ -350,7 +401,7 @@ impl Looks<'_> {
     /// They do where the piece, moved into that plane, is not inside. On the way there a point that
     /// is inside comes to the surface. So it is with faces in one plane, and with faces beyond a
     /// convex edge.
-    fn plane(&self, asset: &TeSdf, piece: &Piece, triangle: &Triangle) -> Option<[f64; 3]> {
+    fn heights(&self, asset: &TeSdf, piece: &Piece, triangle: &Triangle) -> Option<[f64; 3]> {
         let hair = self.hair();
         let heights = piece.corners.map(|c| triangle.normal.dot(triangle.corners[0] - c));
         let points: [DVec3; 3] =
@@ -383,14 +434,12 @@ impl Looks<'_> {
                 if distance < nearest.0 {
                     nearest = (distance, Some(at));
                 }
-                let heights = points.iter().map(|p| triangle.normal.dot(*p - triangle.corners[0]));
-                let (low, high) =
-                    heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-                let depth = high.min(-low);
+                let plane = Plane(triangle.corners[0], triangle.normal);
+                let depth = piece.depth_across(plane);
                 if distance <= clear && depth > clear {
                     crossed += 1;
                     if depth > deepest.0 {
-                        deepest = (depth, Some(triangle));
+                        deepest = (depth, Some(plane));
                     }
                 }
             }
@@ -400,8 +449,8 @@ impl Looks<'_> {
         if let (Some(at), true) = (nearest.1, self.least + piece.radius >= 0.0) {
             self.offer(piece, at, &self.field.field.exact_value(at));
         }
-        if let Some(triangle) = deepest.1 {
-            return Side::Across(crossed, triangle);
+        if crossed > 0 {
+            return Side::Across(deepest.1.filter(|_| crossed <= FEW));
         }
         // It is on one side. Where its centre is on the surface, a corner shows the side.
         let center = piece.center();
