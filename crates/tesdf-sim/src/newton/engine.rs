@@ -10,8 +10,9 @@ use tesdf::collide::{
 use super::NewtonOptions;
 use super::integrate::{free_velocity, moved, unpack, velocity};
 use super::islands::{Island, islands};
-use super::problem::{Minimum, Problem, Resistance};
-use super::rows::{FreeBody, Row};
+use super::problem::{Minimum, Problem};
+use super::rigid::have_normal_of_face;
+use super::rows::{FreeBody, Resistance, Row};
 use crate::{Dynamics, DynamicsError, Mass, State, StepReport, System};
 
 /// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
@@ -149,17 +150,31 @@ impl Newton {
         Row::of_contact(contact, &self.system, poses, &step.free, &step.free_of, softness)
     }
 
+    /// How each contact resists where bodies do not overlap deeply.
+    fn resistances(&self, contacts: &[Contact]) -> Vec<Resistance> {
+        match (self.collide.mode, self.collide.contacts_per) {
+            (Mode::Node, _) => vec![Resistance::Rigid; contacts.len()],
+            // Each cell that an edge crosses has a contact there, with the normal of the edge.
+            (Mode::Face | Mode::Exact, ContactsPer::Cell) => vec![Resistance::Spring; contacts.len()],
+            (Mode::Face | Mode::Exact, ContactsPer::Face) => {
+                let resistance = |rigid| if rigid { Resistance::Rigid } else { Resistance::Spring };
+                have_normal_of_face(contacts).into_iter().map(resistance).collect()
+            }
+        }
+    }
+
     /// The rows of the contacts at the beginning of the step.
     fn first_rows(&self, step: &Step, contacts: &[Contact]) -> Vec<Row> {
-        let row = |contact: &Contact| {
+        let row = |(contact, resistance): (&Contact, Resistance)| {
             let mut row = self.row(step, contact, &step.poses)?;
+            row.resistance = resistance;
             if contact.distance < 0.0 {
                 row.gap = -self.correction(-contact.distance, step.h);
                 row.relaxed_gap = 0.0;
             }
             Some(row)
         };
-        contacts.iter().filter_map(row).collect()
+        contacts.iter().zip(self.resistances(contacts)).filter_map(row).collect()
     }
 
     /// The rows of the contacts at the poses that `velocities` predict. Each gap is the predicted
@@ -172,8 +187,9 @@ impl Newton {
         velocities: &[Vector6<f64>],
         depths: &Depths,
     ) -> Vec<Row> {
-        let row = |contact: &Contact| {
+        let row = |(contact, resistance): (&Contact, Resistance)| {
             let mut row = self.row(step, contact, poses)?;
+            row.resistance = resistance;
             let gap = contact.distance - step.h * row.rate(velocities);
             // A face may have several contacts, and its deepest one is not at this place. The body
             // must not sink in here by the depth there.
@@ -182,7 +198,7 @@ impl Newton {
             row.gap = row.relaxed_gap - self.correction(depth, step.h);
             Some(row)
         };
-        contacts.iter().filter_map(row).collect()
+        contacts.iter().zip(self.resistances(contacts)).filter_map(row).collect()
     }
 
     /// The bodies of islands that overlap deeply, as [`Step::deep`].
@@ -201,17 +217,6 @@ impl Newton {
             }
         }
         deep
-    }
-
-    /// How the contacts of the detector may resist where bodies do not overlap deeply.
-    fn resistance(&self) -> Resistance {
-        match (self.collide.mode, self.collide.contacts_per) {
-            // A contact for each cell has the normal of an edge where the edge lies on a face. A nut
-            // that does not sink in at all locks itself on such normals: its thread climbs by 2.3°,
-            // and the facets at an edge differ by 3.75°.
-            (Mode::Face | Mode::Exact, ContactsPer::Cell) => Resistance::Springs,
-            _ => Resistance::Rigid,
-        }
     }
 
     /// Minimises the problem of every island from `start`. A body without rows keeps its target
@@ -243,7 +248,11 @@ impl Newton {
         gap: Gap,
         start: &[Vector6<f64>],
     ) -> Minimum {
+        let is_deep = island.bodies.iter().any(|&k| step.deep[k]);
         let local = |mut row: Row| {
+            if is_deep {
+                row.resistance = Resistance::Spring;
+            }
             for (body, _) in row.sides.iter_mut().flatten() {
                 // Every free body of an island's rows is in `island.bodies`, which is sorted.
                 *body = island.bodies.partition_point(|b| b < body);
@@ -254,12 +263,10 @@ impl Newton {
             };
             (row, gap)
         };
-        let is_deep = island.bodies.iter().any(|&k| step.deep[k]);
-        let resistance = if is_deep { Resistance::Springs } else { self.resistance() };
         let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
         let bodies = island.bodies.iter().map(|&k| &step.free[k]).collect();
         let rows = island.rows.iter().map(|&k| local(rows[k].clone()));
-        Problem::new(bodies, of(&step.target), rows, step.h).minimise(of(start), resistance, &self.options)
+        Problem::new(bodies, of(&step.target), rows, step.h).minimise(of(start), &self.options)
     }
 
     /// The velocities that move the poses, and the velocities that the next step starts from.

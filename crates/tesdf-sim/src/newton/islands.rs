@@ -57,10 +57,17 @@ mod tests {
     use nalgebra::Vector6;
 
     use super::*;
+    use crate::newton::rows::Resistance;
 
     fn row(a: Option<usize>, b: Option<usize>) -> Row {
         let side = |k: Option<usize>| k.map(|k| (k, Vector6::zeros()));
-        Row { sides: [side(a), side(b)], gap: 0.0, relaxed_gap: 0.0, stiffness: 1.0 }
+        Row {
+            sides: [side(a), side(b)],
+            gap: 0.0,
+            relaxed_gap: 0.0,
+            stiffness: 1.0,
+            resistance: Resistance::Rigid,
+        }
     }
 
     #[test]

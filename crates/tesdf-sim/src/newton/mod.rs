@@ -12,8 +12,8 @@
 //!
 //! Springs give way. So the problem is solved again, with each spring compressed by its force, until
 //! no contact gives way (the method of multipliers, in `problem.rs`). Its solution is that of rigid
-//! contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Islands that overlap deeply keep
-//! the springs, and so do contacts for each cell.
+//! contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Contacts whose normal is not that
+//! of a face keep their springs (`rigid.rs`), and so do islands that overlap deeply.
 //!
 //! `v*` is the velocity without contacts, `gᵢ` the gap, `Jᵢ v` its rate and `h` the time step. The
 //! minimiser moves the poses. The velocity that the next step starts from is the result of a second
@@ -31,6 +31,7 @@ mod islands;
 mod linear;
 mod options;
 mod problem;
+mod rigid;
 mod rows;
 
 pub use engine::{Detect, Newton};

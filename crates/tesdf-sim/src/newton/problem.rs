@@ -9,7 +9,7 @@ use nalgebra::Vector6;
 
 use super::NewtonOptions;
 use super::linear::{BlockMatrix, Pattern, dot};
-use super::rows::{FreeBody, Row};
+use super::rows::{FreeBody, Resistance, Row};
 
 /// The function `½ |v − target|²_M + Σ ½ K min(0, gap + h J v)²` of the velocities `v`.
 #[derive(Debug)]
@@ -28,15 +28,7 @@ struct Spring {
     pair: Option<usize>,
     gap: f64,
     stiffness: f64,
-}
-
-/// How the contacts of an island resist.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resistance {
-    /// As springs, which give way under load. They push out of a deep overlap gently.
-    Springs,
-    /// With the forces under which no contact gives way.
-    Rigid,
+    resistance: Resistance,
 }
 
 /// Result of a minimisation.
@@ -58,7 +50,7 @@ struct Iterate {
     gaps: Vec<f64>,
     /// For each row: the compression of its spring when the gap is zero, m.
     compression: Vec<f64>,
-    /// Multiplies the stiffness of all springs.
+    /// Multiplies the stiffness of rigid rows.
     stiffening: f64,
 }
 
@@ -86,9 +78,11 @@ impl<'a> Problem<'a> {
         rows: impl Iterator<Item = (Row, f64)>,
         time_step: f64,
     ) -> Self {
-        let mut rows: Vec<Spring> = rows
-            .map(|(row, gap)| Spring { sides: row.sides, pair: None, gap, stiffness: row.stiffness })
-            .collect();
+        let spring = |(row, gap): (Row, f64)| {
+            let Row { sides, stiffness, resistance, .. } = row;
+            Spring { sides, pair: None, gap, stiffness, resistance }
+        };
+        let mut rows: Vec<Spring> = rows.map(spring).collect();
         let pair = |row: &Spring| match row.sides {
             [Some((a, _)), Some((b, _))] => Some((a.min(b), a.max(b))),
             _ => None,
@@ -102,18 +96,11 @@ impl<'a> Problem<'a> {
         Self { bodies, target, rows, pattern: Pattern { pairs }, time_step }
     }
 
-    /// Minimises from `start`.
-    pub fn minimise(
-        &self,
-        start: Vec<Vector6<f64>>,
-        resistance: Resistance,
-        options: &NewtonOptions,
-    ) -> Minimum {
+    /// Minimises from `start`. Where rows are rigid, raises their forces and minimises again, until
+    /// no rigid row gives way.
+    pub fn minimise(&self, start: Vec<Vector6<f64>>, options: &NewtonOptions) -> Minimum {
         let mut at = self.start(start);
-        let (iterations, converged) = match resistance {
-            Resistance::Springs => self.descend(&mut at, options),
-            Resistance::Rigid => self.raise_forces(&mut at, options),
-        };
+        let (iterations, converged) = self.raise_forces(&mut at, options);
         Minimum { velocity: at.velocity, iterations, converged }
     }
 
@@ -122,16 +109,15 @@ impl<'a> Problem<'a> {
         Iterate { velocity, gaps, compression: vec![0.0; self.rows.len()], stiffening: 1.0 }
     }
 
-    /// Minimises, raises the forces and minimises again until no contact gives way. Returns the
-    /// number of Newton iterations, and whether each minimisation reached the tolerance.
+    /// Returns the number of Newton iterations, and whether each minimisation reached the tolerance.
     fn raise_forces(&self, at: &mut Iterate, options: &NewtonOptions) -> (u32, bool) {
         let (mut iterations, mut converged) = self.descend(at, options);
         let most = at.gaps.iter().fold(0.0f64, |most, gap| most.max(-gap));
         for _ in 0..ROUNDS {
-            if !converged || at.error() <= options.tolerance * most {
+            if !converged || self.error(at) <= options.tolerance * most {
                 break;
             }
-            at.raise();
+            self.raise(at);
             let (more, good) = self.descend(at, options);
             (iterations, converged) = (iterations + more, good);
         }
@@ -165,6 +151,25 @@ impl<'a> Problem<'a> {
         (options.max_iterations, false)
     }
 
+    /// The greatest distance by which a rigid row gives way, or keeps a force across a gap, m.
+    fn error(&self, at: &Iterate) -> f64 {
+        let rows = self.rows.iter().zip(&at.gaps).zip(&at.compression);
+        let rigid = rows.filter(|((row, _), _)| row.resistance == Resistance::Rigid);
+        rigid.map(|((_, gap), c)| ((-gap).max(0.0) - c).abs()).fold(0.0, f64::max)
+    }
+
+    /// Gives each rigid row its present force as the force at gap zero, and stiffens it.
+    fn raise(&self, at: &mut Iterate) {
+        for ((row, gap), compression) in self.rows.iter().zip(&mut at.gaps).zip(&mut at.compression) {
+            if row.resistance == Resistance::Rigid {
+                let next = (-*gap).max(0.0) / STIFFENING;
+                *gap += *compression - next;
+                *compression = next;
+            }
+        }
+        at.stiffening *= STIFFENING;
+    }
+
     /// The energy that the tolerance is relative to: twice the kinetic energy of the motion without
     /// contacts, plus twice the energy of the springs that this motion would compress.
     fn energy(&self) -> f64 {
@@ -182,7 +187,7 @@ impl<'a> Problem<'a> {
             |((body, v), target): ((&&FreeBody, &Vector6<f64>), &Vector6<f64>)| body.inertia * (target - v);
         let mut force: Vec<_> = self.bodies.iter().zip(&at.velocity).zip(&self.target).map(of_body).collect();
         for (row, &gap) in self.rows.iter().zip(&at.gaps).filter(|&(_, &gap)| gap < 0.0) {
-            let push = -at.stiffening * row.stiffness * gap * self.time_step;
+            let push = -row.stiffness_at(at) * gap * self.time_step;
             row.sides.iter().flatten().for_each(|(body, j)| force[*body].axpy(push, j, 1.0));
         }
         force
@@ -196,9 +201,9 @@ impl<'a> Problem<'a> {
     ) -> Option<Vec<Vector6<f64>>> {
         let mut hessian =
             BlockMatrix::new(&self.pattern, self.bodies.iter().map(|body| body.inertia).collect());
-        let scale = at.stiffening * self.time_step * self.time_step;
+        let h2 = self.time_step * self.time_step;
         for (row, _) in self.rows.iter().zip(&at.gaps).filter(|&(_, &gap)| gap < 0.0) {
-            hessian.add(&row.sides, row.pair, row.stiffness * scale);
+            hessian.add(&row.sides, row.pair, row.stiffness_at(at) * h2);
         }
         match self.bodies.len() <= options.dense_bodies {
             true => hessian.solve_dense(force),
@@ -221,8 +226,8 @@ impl<'a> Problem<'a> {
             for ((row, gap), rate) in self.rows.iter().zip(&at.gaps).zip(rates) {
                 let gap = gap + step * rate;
                 if gap < 0.0 {
-                    value += at.stiffening * row.stiffness * gap * rate;
-                    slope += at.stiffening * row.stiffness * rate * rate;
+                    value += row.stiffness_at(at) * gap * rate;
+                    slope += row.stiffness_at(at) * rate * rate;
                 }
             }
             (value, slope)
@@ -251,25 +256,15 @@ impl<'a> Problem<'a> {
     }
 }
 
-impl Iterate {
-    /// The greatest distance by which a contact gives way, or keeps a force across a gap, m.
-    fn error(&self) -> f64 {
-        let errors = self.gaps.iter().zip(&self.compression).map(|(gap, c)| ((-gap).max(0.0) - c).abs());
-        errors.fold(0.0, f64::max)
-    }
-
-    /// Gives each spring its present force as the force at gap zero, and stiffens all springs.
-    fn raise(&mut self) {
-        for (gap, compression) in self.gaps.iter_mut().zip(&mut self.compression) {
-            let next = (-*gap).max(0.0) / STIFFENING;
-            *gap += *compression - next;
-            *compression = next;
-        }
-        self.stiffening *= STIFFENING;
-    }
-}
-
 impl Spring {
+    #[inline]
+    fn stiffness_at(&self, at: &Iterate) -> f64 {
+        match self.resistance {
+            Resistance::Spring => self.stiffness,
+            Resistance::Rigid => self.stiffness * at.stiffening,
+        }
+    }
+
     #[inline]
     fn rate(&self, velocity: &[Vector6<f64>]) -> f64 {
         self.sides.iter().flatten().map(|(body, j)| j.dot(&velocity[*body])).sum()
@@ -295,8 +290,9 @@ mod tests {
             let (a, b) = (k % free.len(), (k + 1) % free.len());
             let other = (k % 3 > 0 && a != b).then(|| (b, vector()));
             let gap = 0.1 * h * vector()[0];
-            let row =
-                Row { sides: [Some((a, vector())), other], gap, relaxed_gap: gap, stiffness: 30.0 / (h * h) };
+            let sides = [Some((a, vector())), other];
+            let (stiffness, resistance) = (30.0 / (h * h), Resistance::Spring);
+            let row = Row { sides, gap, relaxed_gap: gap, stiffness, resistance };
             rows.push((row, gap));
         }
         Problem::new(free.iter().collect(), target, rows.into_iter(), h)
@@ -314,7 +310,7 @@ mod tests {
             let problem = random_problem(&free, 1e-3, seed);
             for dense_bodies in [0, 12] {
                 let options = NewtonOptions { dense_bodies, ..NewtonOptions::default() };
-                let found = problem.minimise(problem.target.clone(), Resistance::Springs, &options);
+                let found = problem.minimise(problem.target.clone(), &options);
                 assert!(found.converged, "seed {seed}: {found:?}");
                 let force = problem.force(&problem.start(found.velocity));
                 let size: f64 = problem.energy().sqrt();
@@ -335,6 +331,7 @@ mod tests {
             let mut problem = random_problem(&free, 1e-3, seed);
             // Without motion no gap is negative, so the rows do not contradict each other.
             problem.rows.iter_mut().for_each(|row| row.gap = row.gap.abs());
+            problem.rows.iter_mut().for_each(|row| row.resistance = Resistance::Rigid);
             let mut at = problem.start(problem.target.clone());
             let (_, converged) = problem.raise_forces(&mut at, &NewtonOptions::default());
             assert!(converged, "seed {seed}");

@@ -47,6 +47,17 @@ pub struct Row {
     pub relaxed_gap: f64,
     /// Stiffness K, N/m.
     pub stiffness: f64,
+    /// How the contact resists in an island that does not overlap deeply.
+    pub resistance: Resistance,
+}
+
+/// How a contact resists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Resistance {
+    /// As a spring, which gives way under load.
+    Spring,
+    /// With the force under which it does not give way.
+    Rigid,
 }
 
 impl Row {
@@ -85,6 +96,7 @@ impl Row {
             gap: contact.distance,
             relaxed_gap: contact.distance,
             stiffness: 1.0 / (weight * softness),
+            resistance: Resistance::Spring,
         })
     }
 }
