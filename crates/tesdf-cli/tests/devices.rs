@@ -27,20 +27,24 @@ fn devices_are_listed_and_chosen() {
         folder.good(&["encode", &data(mesh), "-o", &file, "--unit", "m", "--preset", "fast"]);
         file
     });
-    let collide = |device: &str, mode: &str| {
+    let collide = |device: &str, mode: &str, per: &str| {
         let common = ["collide", &a, &b, "--mode", mode, "--contact-distance", "1e-3", "--json"];
-        json(&folder.good(&[&common[..], &["--device", device]].concat()))
+        json(&folder.good(&[&common[..], &["--contacts-per", per, "--device", device]].concat()))
     };
-    for mode in ["node", "face", "exact"] {
-        let (host, device) = (collide("cpu", mode), collide("0", mode));
+    for (mode, per) in [("node", "cell"), ("face", "cell"), ("exact", "cell"), ("exact", "face")] {
+        let (host, device) = (collide("cpu", mode, per), collide("0", mode, per));
         let deepest = |contacts: &Value| {
             let all = contacts.as_array().expect("contacts").iter();
             all.map(|c| c["distance"].as_f64().expect("a distance")).fold(f64::INFINITY, f64::min)
         };
-        assert!(deepest(&host) < 0.0 && (deepest(&host) - deepest(&device)).abs() < 1e-7, "{mode}");
+        assert!(deepest(&host) < 0.0 && (deepest(&host) - deepest(&device)).abs() < 1e-7, "{mode} per {per}");
     }
-    let (code, _, err) = folder.tesdf(&["collide", &a, &b, "--device", "0", "--contacts-per", "face"]);
-    assert!(code == Some(2) && err.contains("one contact per face is not available on a device"), "{err}");
+    let per_face = ["collide", &a, &b, "--device", "0", "--mode", "face", "--contacts-per", "face"];
+    let (code, _, err) = folder.tesdf(&per_face);
+    assert!(
+        code == Some(2) && err.contains("one contact per face in the mode face is not available"),
+        "{err}"
+    );
     let (code, _, err) = folder.tesdf(&["collide", &a, &b, "--device", "no such device"]);
     assert_eq!(code, Some(2));
     assert!(err.contains("no device is named \"no such device\"") && err.contains(name), "{err}");

@@ -5,7 +5,9 @@ use crate::device::{Buffer, Device};
 use crate::kernels::broad::meshlets::{BlocksLaunch, WORDS as BLOCK_WORDS};
 use crate::kernels::broad::ordered_pair::{OrderedPairsLaunch, ROWS as PAIR_ROWS, WORDS as PAIR_WORDS};
 use crate::kernels::broad::pairs::FoundLaunch;
-use crate::kernels::middle::items::{ItemsLaunch, PolygonsLaunch, ROWS as POLYGON_ROWS, WORDS as ITEM_WORDS};
+use crate::kernels::middle::items::{
+    ItemsLaunch, PolygonsLaunch, ROWS as POLYGON_ROWS, WHOLE, WORDS as ITEM_WORDS,
+};
 use crate::kernels::narrow::contacts::{ContactsLaunch, ROWS as CONTACT_ROWS, WORDS as CONTACT_WORDS};
 use crate::kernels::reduce::members::{MembersLaunch, ROWS as MEMBER_ROWS, TOUCHING_WORDS, TouchingLaunch};
 use crate::kernels::reduce::reduce::REPORT_ROWS;
@@ -23,8 +25,10 @@ pub struct PipelineBuffers {
     blocks: Buffer,
     meshlets: Buffer,
     items: Buffer,
-    /// Vertices of the polygons as weights. Allocated at the first detection of faces.
+    /// Vertices of the polygons as weights. Allocated at the first detection of faces by cells.
     weights: Option<Buffer>,
+    /// The weights of a whole face.
+    whole: Buffer,
     pub contact_words: Buffer,
     pub contact_rows: Buffer,
     /// For each ordered pair: the depth of an overlap that contacts need not show.
@@ -54,6 +58,7 @@ impl PipelineBuffers {
             meshlets: words("meshlets", room.meshlets, BLOCK_WORDS)?,
             items: words("polygons", room.polygons, ITEM_WORDS)?,
             weights: None,
+            whole: device.upload("weights of a whole face", &WHOLE)?,
             contact_words: words("contacts", room.contacts, CONTACT_WORDS)?,
             contact_rows: rows("rows of contacts", room.contacts, CONTACT_ROWS)?,
             depths: words("depths of ordered pairs", room.ordered_pairs, 1)?,
@@ -62,7 +67,7 @@ impl PipelineBuffers {
         })
     }
 
-    /// Allocates the buffer for the vertices of polygons. Nodes need none.
+    /// Allocates the buffer for the vertices of polygons. Nodes and whole faces need none.
     pub fn add_weights(&mut self, device: &Device) -> Result<(), GpuError> {
         if self.weights.is_none() {
             let weights = rows(device, "weights of polygons", self.room.polygons, POLYGON_ROWS as u32)?;
@@ -105,14 +110,21 @@ impl PipelineBuffers {
         PolygonsLaunch::new(self.items(), weights.rows())
     }
 
+    /// Whole faces as polygons.
+    pub fn whole_faces(&self) -> PolygonsLaunch {
+        PolygonsLaunch::new(self.items(), self.whole.rows())
+    }
+
     pub fn contacts(&self) -> ContactsLaunch {
         ContactsLaunch::new(self.contact_words.words(), self.contact_rows.rows(), self.room.contacts)
     }
 
     /// Name and size in bytes of each buffer.
     pub fn account(&self) -> Vec<(&'static str, usize)> {
-        let Self { pair_words, pair_rows, blocks, meshlets, items, contact_words, contact_rows, .. } = self;
-        let pairs = [pair_words, pair_rows, blocks, meshlets, items];
+        let Self {
+            pair_words, pair_rows, blocks, meshlets, items, whole, contact_words, contact_rows, ..
+        } = self;
+        let pairs = [pair_words, pair_rows, blocks, meshlets, items, whole];
         let own = pairs.into_iter().chain([contact_words, contact_rows, &self.depths, &self.groups]);
         let members = self.members.as_ref().map(MemberBuffers::buffers);
         let all = own.chain(&self.weights).chain(members.into_iter().flatten());

@@ -7,7 +7,7 @@ use tesdf::collide::{Contact, FeatureB, FeatureId, Mode, PairReduction, Shape};
 
 use super::scene::instances::Instances;
 use crate::kernels::field::shapes::NONE;
-use crate::kernels::narrow::contacts::{CONVERGED, ROWS, WORDS};
+use crate::kernels::narrow::contacts::{CONVERGED, NO_CORNER, ROWS, WORDS};
 use crate::kernels::reduce::members::TOUCHING_WORDS;
 use crate::kernels::reduce::reduce::REPORT_ROWS;
 
@@ -31,7 +31,9 @@ pub struct Words {
 pub struct Row {
     point_a: [f32; 3],
     distance: f32,
-    gradient: [f32; 4],
+    gradient: [f32; 3],
+    /// Cosine between the gradient and the face's normal.
+    cosine: f32,
     point_b: [f32; 4],
 }
 
@@ -100,6 +102,49 @@ pub fn contacts(
     found.into_iter().map(|(_, contact)| contact).collect()
 }
 
+/// Removes contacts of whole faces: of the contacts of several faces at one vertex, keeps the one
+/// whose gradient most opposes its face; among equals, that of the lowest face.
+pub fn one_per_vertex(shapes: &[&Shape], instances: &Instances, words: &mut Vec<Words>, rows: &mut Vec<Row>) {
+    let key = |(at, (words, row)): (usize, (&Words, &Row))| {
+        let shape = shapes[instances.shapes[words.a as usize]];
+        let vertex = vertex(shape, words)?;
+        let cosine = (f64::from(row.cosine) / COSINE_TIE).round() as i64;
+        let face = surface_names(shape, Mode::Exact, words).0;
+        Some(((words.a, words.b, vertex), cosine, face, at))
+    };
+    let mut keys: Vec<_> = words.iter().zip(&*rows).enumerate().filter_map(key).collect();
+    keys.par_sort_unstable();
+    let mut keep = vec![true; words.len()];
+    for same in keys.chunk_by(|x, y| x.0 == y.0) {
+        same[1..].iter().for_each(|&(.., at)| keep[at] = false);
+    }
+    let mut kept = keep.iter();
+    words.retain(|_| *kept.next().unwrap_or(&true));
+    let mut kept = keep.iter();
+    rows.retain(|_| *kept.next().unwrap_or(&true));
+}
+
+/// Cosines that differ by less are equal: the rounding of unit vectors in `f32`. On the processor it
+/// is 1e-9.
+const COSINE_TIE: f64 = 1e-6;
+
+/// The vertex at which a contact of a face is; `None` when it is at no vertex.
+fn vertex(shape: &Shape, words: &Words) -> Option<u32> {
+    let corner = words.corner % CONVERGED;
+    if corner == NO_CORNER {
+        return None;
+    }
+    match shape {
+        Shape::Mesh(asset) => Some(asset.face_vertices(words.face_a as usize)[corner as usize]),
+        // Far outside of what can touch.
+        Shape::Plane => None,
+        simple => {
+            let point = *simple.parts().0.get(words.face_a as usize)?.get(corner as usize)?;
+            simple.nodes().iter().position(|&(p, _)| p == point).map(|node| node as u32)
+        }
+    }
+}
+
 fn contact(shapes: &[&Shape], instances: &Instances, mode: Mode, words: &Words, row: &Row) -> Contact {
     let (a, b) = (words.a as usize, words.b as usize);
     let at = &instances.placed[b];
@@ -108,7 +153,7 @@ fn contact(shapes: &[&Shape], instances: &Instances, mode: Mode, words: &Words, 
     Contact {
         point_a: at.to_world(Vec3::from_array(row.point_a)),
         point_b: at.to_world(Vec3::from_slice(&row.point_b)),
-        normal: at.rotate(Vec3::from_slice(&row.gradient)),
+        normal: at.rotate(Vec3::from_array(row.gradient)),
         distance: f64::from(row.distance) * at.unit,
         face_a,
         face_b,

@@ -1,21 +1,23 @@
-//! Middle phase: finds hidden overlaps, then the nodes with their cells, or the polygons.
+//! Middle phase: finds hidden overlaps, then the nodes with their cells, the polygons, or the
+//! faces.
 use cubecl::prelude::*;
 use tesdf::collide::Mode;
 
-use super::pass::Pass;
+use super::pass::{Parts, Pass, parts};
 use super::stages::launch;
 use crate::GpuError;
 use crate::device::spread;
-use crate::kernels::middle::{clip, hidden, nodes, outside};
+use crate::kernels::middle::{clip, faces, hidden, nodes, outside};
 use crate::kernels::narrow::exchange::LANES;
 use crate::kernels::reduce::members;
 
 impl Pass<'_> {
     pub(super) fn middle(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
         self.hidden(per_meshlet)?;
-        match self.options.mode {
-            Mode::Node => self.nodes(per_meshlet),
-            Mode::Face | Mode::Exact => self.polygons(per_meshlet),
+        match parts(self.options) {
+            Parts::Nodes => self.nodes(per_meshlet),
+            Parts::Polygons => self.polygons(per_meshlet),
+            Parts::Faces => self.faces(per_meshlet),
         }
     }
 
@@ -52,6 +54,20 @@ impl Pass<'_> {
             per_meshlet.clone(),
             LANES,
             nodes::nodes(shapes.argument(), pairs, meshlets, counters, items, prune)
+        )
+    }
+
+    /// Finds the faces that can touch.
+    fn faces(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
+        let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
+        let (pairs, meshlets, items) = (buffers.ordered_pairs(), buffers.meshlets(), buffers.items());
+        let (counters, prune) = (self.counters(), self.prune());
+        launch!(
+            self.stages,
+            "faces",
+            per_meshlet.clone(),
+            LANES,
+            faces::whole_faces(shapes.argument(), pairs, meshlets, counters, items, prune)
         )
     }
 

@@ -17,16 +17,16 @@ use std::collections::BTreeMap;
 
 use tesdf::Length;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, Mode, Reduction, Scene, Shape,
-    ShapeId, Statistics,
+    CollideError, CollideOptions, Contacts, HiddenOverlap, Mode, Reduction, Scene, Shape, ShapeId, Statistics,
 };
 
 use buffers::{PipelineBuffers, ROW, WORD};
-use contacts::contacts;
+use contacts::{contacts, one_per_vertex};
 pub use counts::Counts;
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
+use pass::{Parts, parts};
 use scene::instances::Instances;
 use scene::placed::{FieldFrame, Placed};
 use scene::{GpuShapeId, GpuShapes};
@@ -110,7 +110,8 @@ impl Detector {
     ///
     /// - The tolerance of the exact mode is at least 1e-6 in the local frame.
     /// - A reduction follows the rules of the processor, but compares bounds of distances instead
-    ///   of distances. So it may keep other contacts.
+    ///   of distances. So it may keep other contacts. With contacts per face it also chooses among
+    ///   several contacts at one vertex, of which otherwise one remains.
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors
@@ -119,7 +120,7 @@ impl Detector {
     ///   growing buffer exceeds the limit of the device.
     /// - [`GpuError::Shape`] when a shape cannot be uploaded, or a vertex was moved to an invalid
     ///   position.
-    /// - [`GpuError::Unavailable`] when vertices have moved on the device and the scene now has
+    /// - [`GpuError::Unavailable`] for contacts per face in the mode face, and when vertices have moved on the device and the scene now has
     ///   other shapes.
     /// - [`GpuError::Device`] when the device fails, or a driver stops the loops of a kernel early.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
@@ -157,10 +158,10 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         options.validate()?;
-        if options.contacts_per == ContactsPer::Face && options.mode != Mode::Node {
+        if options.mode == Mode::Face && parts(options) == Parts::Faces {
             return Err(GpuError::Unavailable {
-                what: "one contact per face".into(),
-                instead: "detect contacts per cell, or detect on the processor",
+                what: "one contact per face in the mode face".into(),
+                instead: "use the mode exact, or contacts per cell, or detect on the processor",
             });
         }
         if shape_ids(scene) != self.shape_ids {
@@ -241,23 +242,26 @@ impl Detector {
             (Reduction::PerPair(_), Some(own)) => (&own.kept_words, &own.kept_rows, counts.kept),
             _ => (&buffers.contact_words, &buffers.contact_rows, counts.contacts),
         };
-        let words = self.device.read(words, count as usize)?;
-        let rows = self.device.read(rows, count as usize)?;
+        let mut words = self.device.read(words, count as usize)?;
+        let mut rows = self.device.read(rows, count as usize)?;
         self.report.read += size_of_val(words.as_slice()) + size_of_val(rows.as_slice());
+        if parts(options) == Parts::Faces && options.reduction == Reduction::None {
+            one_per_vertex(&shapes, instances, &mut words, &mut rows);
+        }
         let contacts = contacts(&shapes, instances, options.mode, &words, &rows);
         let reductions = self.reductions(instances, options.reduction)?;
-        let unconverged = match options.reduction {
-            Reduction::None => contacts.iter().filter(|c| !c.converged).count(),
-            Reduction::PerPair(_) => counts.unconverged as usize,
+        let (found, unconverged) = match options.reduction {
+            Reduction::None => (contacts.len(), contacts.iter().filter(|c| !c.converged).count()),
+            Reduction::PerPair(_) => (counts.contacts as usize, counts.unconverged as usize),
         };
         let pipeline: usize = self.buffers.account().iter().map(|(_, bytes)| bytes).sum();
         let statistics = Statistics {
             instance_pairs: counts.ordered_pairs as usize,
             candidates: counts.candidates as usize,
             polygons: counts.polygons as usize,
-            touching: (counts.contacts + counts.filtered) as usize,
+            touching: found + counts.filtered as usize,
             filtered: counts.filtered as usize,
-            reduced: counts.contacts as usize - contacts.len(),
+            reduced: found - contacts.len(),
             unconverged,
             bytes: pipeline + size_of_val(contacts.as_slice()),
         };

@@ -1,7 +1,7 @@
 //! Narrow phase: Node-TES, Face-TES or the exact minimum.
 use tesdf::collide::Mode;
 
-use super::pass::{GROUP, Pass};
+use super::pass::{GROUP, Parts, Pass, parts};
 use super::stages::launch;
 use super::{Counting, Exchange, Lanes};
 use crate::GpuError;
@@ -9,7 +9,7 @@ use crate::kernels::counters::POLYGONS;
 use crate::kernels::narrow::exact::AskedExactLaunch;
 use crate::kernels::narrow::exchange::{LANES, Variant};
 use crate::kernels::narrow::faces::AskedLaunch;
-use crate::kernels::narrow::{exact, faces, nodes};
+use crate::kernels::narrow::{exact, exact_faces, faces, nodes};
 
 impl Pass<'_> {
     pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
@@ -69,9 +69,20 @@ impl Pass<'_> {
         let tolerances = self.detector.tolerances(self.instances, self.options.tolerance);
         let tolerances = self.detector.device.upload("tolerances", &tolerances)?;
         self.sent += tolerances.bytes();
-        let (pairs, polygons, contacts) = (buffers.ordered_pairs(), buffers.polygons(), buffers.contacts());
+        let (pairs, contacts) = (buffers.ordered_pairs(), buffers.contacts());
         let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
         let counters = self.counters();
+        if parts(self.options) == Parts::Faces {
+            let faces = buffers.whole_faces();
+            return launch!(
+                self.stages,
+                "exact narrow phase",
+                per_polygon,
+                LANES,
+                exact_faces::narrow_exact_faces(shapes.argument(), pairs, faces, counters, contacts, asked)
+            );
+        }
+        let polygons = buffers.polygons();
         launch!(
             self.stages,
             "exact narrow phase",

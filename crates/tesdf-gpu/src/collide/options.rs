@@ -13,7 +13,8 @@ pub struct Capacities {
     pub blocks: u32,
     /// Meshlets that can touch.
     pub meshlets: u32,
-    /// Polygons (faces clipped by cells), or in Node-TES nodes with their cells.
+    /// Polygons (faces clipped by cells), with contacts per face the faces, or in Node-TES nodes with
+    /// their cells.
     pub polygons: u32,
     /// Contacts before a reduction.
     pub contacts: u32,
@@ -51,7 +52,7 @@ pub enum Lanes {
     /// 32 threads, which share the faces of the cell's list.
     #[default]
     Group,
-    /// One thread, for comparison (Fig. 4 of the paper).
+    /// One thread, for comparison (Fig. 4 of the paper). Used by Face-TES with contacts per cell.
     Single,
 }
 
@@ -82,8 +83,8 @@ pub enum Counting {
     /// No further counts.
     #[default]
     Elements,
-    /// Evaluations of the field and point–triangle distances of Face-TES. This costs two atomic
-    /// additions per polygon.
+    /// Evaluations of the field and point–triangle distances of Face-TES, in the search for minima.
+    /// This costs two atomic additions per polygon or face.
     Operations,
 }
 

@@ -1,6 +1,6 @@
 //! One pass: the launches of all stages.
 use cubecl::prelude::*;
-use tesdf::collide::{CollideOptions, Mode};
+use tesdf::collide::{CollideOptions, ContactsPer, Mode};
 
 use super::buffers::WORD;
 use super::counts::Counts;
@@ -12,6 +12,24 @@ use crate::device::Buffer;
 use crate::kernels::counters::{self, COUNTERS, CountersLaunch};
 
 pub use crate::kernels::GROUP;
+
+/// The parts of a surface that the narrow phase takes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Parts {
+    Nodes,
+    /// Faces clipped by cells.
+    Polygons,
+    Faces,
+}
+
+/// The parts of a surface that a detection takes.
+pub fn parts(options: &CollideOptions) -> Parts {
+    match (options.mode, options.contacts_per) {
+        (Mode::Node, _) => Parts::Nodes,
+        (Mode::Face | Mode::Exact, ContactsPer::Cell) => Parts::Polygons,
+        (Mode::Face | Mode::Exact, ContactsPer::Face) => Parts::Faces,
+    }
+}
 
 /// The data that all launches of a pass share.
 pub struct Pass<'a> {
@@ -33,7 +51,7 @@ impl Detector {
         timing: Timing,
     ) -> Result<Counts, GpuError> {
         let device = self.device.clone();
-        if options.mode != Mode::Node {
+        if parts(options) == Parts::Polygons {
             self.buffers.add_weights(&device)?;
         }
         let counters = device.upload("counters", &[0u32; COUNTERS])?;

@@ -111,6 +111,7 @@ fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
 fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
     kernels!(all, device, target;
         Indirect middle::nodes::nodes, LANES, (shapes(), pairs(), blocks(), counters(), items(), 1);;
+        Indirect middle::faces::whole_faces, LANES, (shapes(), pairs(), blocks(), counters(), items(), 1);;
         Indirect middle::clip::clip_polygons, LANES,
             (shapes(), pairs(), blocks(), counters(), polygons(), 1);;
         Indirect middle::outside::outside_polygons, LANES,
@@ -125,6 +126,8 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     kernels!(all, device, target;
         Indirect narrow::nodes::narrow_nodes, GROUP, (shapes(), pairs(), items(), counters(), contacts());;
         Indirect narrow::exact::narrow_exact, LANES,
+            (shapes(), pairs(), polygons(), counters(), contacts(), exact());;
+        Indirect narrow::exact_faces::narrow_exact_faces, LANES,
             (shapes(), pairs(), polygons(), counters(), contacts(), exact());;
     );
     for counting in [false, true] {

@@ -7,6 +7,7 @@ pub mod bodies;
 pub mod cells;
 pub mod lowest;
 pub mod meshes;
+pub mod per_face;
 pub mod points;
 pub mod random;
 pub mod reference;

@@ -153,6 +153,11 @@ impl Part {
         }
     }
 
+    /// The same part, moved.
+    pub fn moved(self, by: V3) -> Part {
+        Part { a: self.a + by, b: self.b + by, c: self.c + by, count: self.count, owned: self.owned }
+    }
+
     /// The center of the box around the part.
     pub fn center(self) -> V3 {
         let bounds = bounds_of(self.a, self.b, self.c);

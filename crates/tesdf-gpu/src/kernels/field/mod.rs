@@ -2,6 +2,7 @@
 pub mod list;
 pub mod locate;
 pub mod nearest;
+pub mod opposing;
 pub mod query;
 pub mod shapes;
 pub mod simple;

@@ -93,7 +93,7 @@ pub struct NodeBoxes {
 
 /// Squared distance from a point to a box.
 #[cube]
-fn to_box(p: V3, bounds: Bounds) -> f32 {
+pub fn to_box(p: V3, bounds: Bounds) -> f32 {
     let outside = outside_box(p, bounds.low, bounds.high);
     outside.dot(outside)
 }

@@ -93,19 +93,33 @@ impl Field<'_> {
         self.value_in_cell(cell, p)
     }
 
-    /// Signed distance to the surface, exact up to rounding even when lists are truncated.
-    pub fn exact_distance(self, p: V3) -> f32 {
+    /// The value at a point and its cell, exact up to rounding even when lists are truncated. For
+    /// any shape.
+    pub fn exact_value_in(self, cell: Cell, p: V3) -> Value {
         if self.is_mesh() {
-            let cell = self.locate(p);
             let nearest = if cell.is_listed() && self.has_exact_lists() {
                 self.nearest_in_list(self.list(cell.offset()), 0u32, 1u32, p)
             } else {
                 self.nearest_in_tree(p, FAR.runtime())
             };
-            self.mesh_value(cell, p, nearest).distance
+            self.mesh_value(cell, p, nearest)
         } else {
-            self.simple_value(p).distance
+            self.simple_value(p)
         }
+    }
+
+    /// The same at any point.
+    pub fn exact_value(self, p: V3) -> Value {
+        let mut cell = no_cell();
+        if self.is_mesh() {
+            cell = self.locate(p);
+        }
+        self.exact_value_in(cell, p)
+    }
+
+    /// Signed distance to the surface, exact up to rounding even when lists are truncated.
+    pub fn exact_distance(self, p: V3) -> f32 {
+        self.exact_value(p).distance
     }
 }
 

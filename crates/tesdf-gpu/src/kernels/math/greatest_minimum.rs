@@ -6,7 +6,7 @@ use cubecl::prelude::*;
 use super::vector::{LEAST_DIVISOR, V3, v3};
 
 /// Four linear functions over a triangle.
-#[derive(CubeType, Clone, Copy)]
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Functions {
     pub f: V3,

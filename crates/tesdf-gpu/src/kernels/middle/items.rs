@@ -32,7 +32,10 @@ pub const ROWS: usize = 4;
 /// seven.
 pub const MAX_VERTICES: usize = 8;
 
-/// A node or a polygon.
+/// The weights of a whole face. Where the items are whole faces, the buffer holds these alone.
+pub const WHOLE: [[f32; 4]; ROWS] = [[0.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0; 4], [0.0; 4]];
+
+/// A node, a polygon or a whole face.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Item {
@@ -43,7 +46,7 @@ pub struct Item {
     /// The cell in the field of the second instance; [`NONE`](super::super::field::shapes::NONE)
     /// outside of the domain.
     pub cell: u32,
-    /// For a node the corner of the face, for a polygon the number of vertices.
+    /// For a node the corner of the face, otherwise the number of vertices.
     pub number: u32,
 }
 

@@ -3,6 +3,7 @@ pub mod bits;
 pub mod clip;
 pub mod corners;
 pub mod cut;
+pub mod faces;
 pub mod hidden;
 pub mod items;
 pub mod nodes;

@@ -12,7 +12,8 @@ pub struct Contacts {
     /// [`WORDS`] words for each: instances a and b, face of a, cell, face of b, feature of this
     /// face, corner of a plus [`CONVERGED`], ordered pair.
     pub words: Box<[u32]>,
-    /// [`ROWS`] rows for each, in the field's frame: point of a and distance; gradient; point of b.
+    /// [`ROWS`] rows for each, in the field's frame: point of a and distance; gradient and its cosine with
+    /// the face's normal; point of b.
     pub rows: Box<[Row]>,
     /// Capacity of the list.
     pub room: u32,
@@ -22,6 +23,8 @@ pub struct Contacts {
 pub const WORDS: u32 = 8;
 /// Rows of a contact.
 pub const ROWS: u32 = 3;
+/// The corner of a contact that is at no corner of its face, or where this does not matter.
+pub const NO_CORNER: u32 = 3;
 /// Added to the corner of a contact when the search for its minimum has converged.
 pub const CONVERGED: u32 = 4;
 
@@ -32,9 +35,12 @@ pub struct Touch {
     pub face: u32,
     /// The number of the cell; [`NONE`](super::super::field::shapes::NONE) without a list.
     pub cell: u32,
-    /// The corner in Node-TES, otherwise 0; plus [`CONVERGED`] when the search has converged.
+    /// The corner of the part that the point is, or [`NO_CORNER`], plus [`CONVERGED`] when the search
+    /// has converged.
     pub corner: u32,
     pub point: V3,
+    /// Cosine between the gradient and the face's normal; 0 for nodes.
+    pub cosine: f32,
 }
 
 /// The key by which the contacts of a pair of instances are ordered. Contacts with equal keys are
@@ -67,7 +73,7 @@ impl Contacts {
             let row = (at * ROWS) as usize;
             let on_surface = touch.point + v.gradient * -pair.radius;
             self.rows[row] = row_of(on_surface, v.distance - pair.radius);
-            self.rows[row + 1] = row_of(v.gradient, 0.0f32);
+            self.rows[row + 1] = row_of(v.gradient, touch.cosine);
             self.rows[row + 2] = row_of(v.point, 0.0f32);
         }
     }

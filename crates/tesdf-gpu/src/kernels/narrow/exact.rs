@@ -12,7 +12,7 @@ use super::super::field::nearest::FAR;
 use super::super::field::shapes::Shapes;
 use super::super::math::vector::V3;
 use super::super::middle::items::{Polygons, Weights};
-use super::contacts::{CONVERGED, Contacts, Touch};
+use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
 use super::exchange::LANES;
 use super::piece::{Lowest, POOL, Piece, Pool, Region, empty_pool, region};
 use super::polygon_distance::{Disk, Polygon};
@@ -22,15 +22,15 @@ use super::polygon_distance::{Disk, Polygon};
 const ROUNDS: u32 = 96;
 /// Closer to the surface than this, a polygon may cross it. On the processor, which computes in
 /// `f64`, the limit is 1e-9 (`CLEAR` in `tesdf::collide::narrow`).
-const CLEAR: f32 = 1e-6;
+pub const CLEAR: f32 = 1e-6;
 
 /// The goal of a search: distances up to `reach` that are lower than the best distance so far by
 /// more than `tolerance`.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-struct Goal {
-    reach: f32,
-    tolerance: f32,
+pub struct Goal {
+    pub reach: f32,
+    pub tolerance: f32,
 }
 
 #[cube]
@@ -44,9 +44,9 @@ impl Goal {
 /// The result of a search.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-struct Searched {
-    best: Lowest,
-    converged: bool,
+pub struct Searched {
+    pub best: Lowest,
+    pub converged: bool,
 }
 
 /// The least distance between a polygon and the faces of the cell's list. Each thread takes every
@@ -69,37 +69,28 @@ fn nearest_listed(region: Region<'_>, polygon: Polygon<'_>, normal: V3, pool: &m
 }
 
 /// Puts the first pieces of a search into the pool: a fan of triangles, one for each thread. A
-/// polygon without area is a triangle with equal corners. Returns the lowest value found.
+/// polygon without area is a triangle with equal corners. Returns the lowest value at a vertex.
 #[cube]
 fn fan(region: Region<'_>, polygon: Polygon<'_>, triangles: u32, pool: &mut Pool) -> Lowest {
-    let mut lowest = Lowest { distance: FAR.runtime(), at: polygon.ball().center };
+    let at = polygon.vertex(UNIT_POS.min(polygon.count - 1u32));
+    let here = region.value(at);
+    pool.exchange(here.face);
     if UNIT_POS < triangles {
-        let mut piece = Piece {
+        let second = (UNIT_POS + 1u32).min(polygon.count - 1u32);
+        let third = (UNIT_POS + 2u32).min(polygon.count - 1u32);
+        let piece = Piece {
             a: polygon.vertex(0u32),
-            b: polygon.vertex((UNIT_POS + 1u32).min(polygon.count - 1u32)),
-            c: polygon.vertex((UNIT_POS + 2u32).min(polygon.count - 1u32)),
-            face_a: 0u32,
-            face_b: 0u32,
-            face_c: 0u32,
-            bound: FAR.runtime(),
+            b: polygon.vertex(second),
+            c: polygon.vertex(third),
+            face_a: pool.exchanged(0u32),
+            face_b: pool.exchanged(second),
+            face_c: pool.exchanged(third),
+            // Nothing is known yet.
+            bound: -FAR.runtime(),
         };
-        // A loop, so that the long code of the field stands here once.
-        let mut k = 0u32;
-        while k < 3u32 {
-            let at = piece.corner(k);
-            let v = region.value(at);
-            piece.face_a = select(k == 0u32, v.face, piece.face_a);
-            piece.face_b = select(k == 1u32, v.face, piece.face_b);
-            piece.face_c = select(k == 2u32, v.face, piece.face_c);
-            lowest = lowest.or(v.distance, at);
-            k += 1u32;
-        }
-        let found = region.bound(piece);
-        piece.bound = found.bound;
-        lowest = lowest.or(found.distance, piece.center());
         pool.put(UNIT_POS, piece);
     }
-    pool.lowest(lowest)
+    pool.lowest(Lowest { distance: here.distance, at })
 }
 
 /// Both halves of a piece, whether they are open, and the lowest value found.
@@ -118,34 +109,47 @@ struct Halves {
 fn halve(region: Region<'_>, goal: Goal, whole: Piece, best: Lowest) -> Halves {
     let piece = whole.turned(region.part);
     let middle = Weights { s: 0.5f32 * (piece.a.s + piece.b.s), t: 0.5f32 * (piece.a.t + piece.b.t) };
-    let at_middle = region.value(middle);
-    let mut halves = Halves {
-        first: piece.half(true, middle, at_middle.face),
-        second: piece.half(false, middle, at_middle.face),
-        first_open: false,
-        second_open: false,
-        lowest: Lowest { distance: at_middle.distance, at: middle },
-    };
-    // A loop, so that the long code of the bound stands here once.
-    let mut half = 0u32;
-    while half < 2u32 {
-        let is_first = half == 0u32;
-        let this = piece.half(is_first, middle, at_middle.face);
-        let found = region.bound(this);
-        halves.lowest = halves.lowest.or(found.distance, this.center());
-        let open = goal.is_open(found.bound, best);
-        halves.first_open = select(is_first, open, halves.first_open);
-        halves.second_open = select(is_first, halves.second_open, open);
-        halves.first.bound = select(is_first, found.bound, halves.first.bound);
-        halves.second.bound = select(is_first, halves.second.bound, found.bound);
-        half += 1u32;
+    let mut halves = no_halves(best);
+    let mut face = piece.face_a;
+    // The middle of the longest edge, then the centers of both halves. This is a loop, so that the
+    // long code of the field stands here once.
+    let mut turn = 0u32;
+    while turn < 3u32 {
+        let is_middle = turn == 0u32;
+        let is_first = turn == 1u32;
+        let mut half = piece.half(is_first, middle, face);
+        let center = half.center();
+        let at =
+            Weights { s: select(is_middle, middle.s, center.s), t: select(is_middle, middle.t, center.t) };
+        let here = region.value(at);
+        halves.lowest = halves.lowest.or(here.distance, at);
+        if is_middle {
+            face = here.face;
+        } else {
+            half.bound = region.bound(half, here);
+            let open = goal.is_open(half.bound, best);
+            if is_first {
+                halves.first = half;
+                halves.first_open = open;
+            } else {
+                halves.second = half;
+                halves.second_open = open;
+            }
+        }
+        turn += 1u32;
     }
     halves
 }
 
 /// Branch and bound over the pieces of a polygon.
 #[cube]
-fn search(region: Region<'_>, polygon: Polygon<'_>, goal: Goal, start: Lowest, pool: &mut Pool) -> Searched {
+pub fn search(
+    region: Region<'_>,
+    polygon: Polygon<'_>,
+    goal: Goal,
+    start: Lowest,
+    pool: &mut Pool,
+) -> Searched {
     let triangles = select(polygon.count > 2u32, polygon.count - 2u32, 1u32);
     let mut best = start;
     let found = fan(region, polygon, triangles, pool);
@@ -264,11 +268,12 @@ pub fn narrow_exact(
             let point = part.at(found.best.at.s, found.best.at.t);
             let v = field.value_in_cell(cell, point);
             if v.distance <= reach {
-                if part.count == 3u32 && v.gradient.dot(normal) > -asked.cos_theta {
+                let cosine = v.gradient.dot(normal);
+                if part.count == 3u32 && cosine > -asked.cos_theta {
                     counters.append(counters::FILTERED);
                 } else {
-                    let corner = select(found.converged, CONVERGED, 0u32);
-                    let touch = Touch { face: item.face, cell: cell.name(), corner, point };
+                    let corner = NO_CORNER + select(found.converged, CONVERGED, 0u32);
+                    let touch = Touch { face: item.face, cell: cell.name(), corner, point, cosine };
                     contacts.append(counters, pair, touch, v);
                 }
             }

@@ -17,7 +17,7 @@ use super::super::field::value::Value;
 use super::super::math::triangle::Face;
 use super::super::math::vector::{Row, row_of, xyz};
 use super::super::middle::items::{MAX_VERTICES, Polygons, Weights};
-use super::contacts::{Contacts, Touch};
+use super::contacts::{Contacts, NO_CORNER, Touch};
 use super::exchange::{Exchange, LANES, Variant, exchange, width_for};
 use super::polygon_distance::Polygon;
 
@@ -431,13 +431,18 @@ pub fn narrow_faces(
         if search.distance <= reach && lane == 0u32 {
             let v = best.get(select(lanes == 1u32, UNIT_POS, 0u32), search.distance);
             let point = part.at(search.best.s, search.best.t);
-            let is_face = part.count == 3u32;
-            if is_face && v.gradient.dot(shapes.part_normal(pair, item.face)) > -asked.cos_theta {
+            let cosine = v.gradient.dot(shapes.part_normal(pair, item.face));
+            if part.count == 3u32 && cosine > -asked.cos_theta {
                 counters.append(counters::FILTERED);
             } else {
                 // Nothing proves that no point is lower.
-                let touch = Touch { face: item.face, cell: cell.name(), corner: 0u32.runtime(), point };
-                contacts.append(counters, pair, touch, v);
+                let corner = NO_CORNER.runtime();
+                contacts.append(
+                    counters,
+                    pair,
+                    Touch { face: item.face, cell: cell.name(), corner, point, cosine },
+                    v,
+                );
             }
         }
         counters.tell_if_broken_off(count);

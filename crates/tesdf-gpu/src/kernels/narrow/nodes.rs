@@ -26,7 +26,8 @@ pub fn narrow_nodes(
         let v = field.value_in_cell(cell, point);
         if v.distance <= pair.part_reach() {
             let corner = item.number + CONVERGED;
-            contacts.append(counters, pair, Touch { face: item.face, cell: cell.name(), corner, point }, v);
+            let touch = Touch { face: item.face, cell: cell.name(), corner, point, cosine: 0.0f32.runtime() };
+            contacts.append(counters, pair, touch, v);
         }
     }
 }

@@ -1,8 +1,9 @@
 //! Pieces of a polygon that wait in the branch and bound of the exact mode.
 use cubecl::prelude::*;
+use tesdf::collide::ContactsPer;
 
 use super::super::broad::ordered_pair::Part;
-use super::super::field::locate::Cell;
+use super::super::field::locate::{Cell, no_cell};
 use super::super::field::shapes::Field;
 use super::super::field::value::Value;
 use super::super::math::greatest_minimum::Functions;
@@ -36,18 +37,28 @@ pub struct Lowest {
     pub at: Weights,
 }
 
-/// A cell of a field, and the part of a surface in it.
+/// A part of a surface in a cell of a field, or in all cells.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Region<'a> {
     pub field: Field<'a>,
+    /// Not used where the part is in all cells.
     pub cell: Cell,
     pub part: Part,
+    #[cube(comptime)]
+    per: ContactsPer,
 }
 
+/// A part of a surface in a cell.
 #[cube]
 pub fn region<'a>(field: Field<'a>, cell: Cell, part: Part) -> Region<'a> {
-    Region::<'a> { field, cell, part }
+    Region::<'a> { field, cell, part, per: comptime!(ContactsPer::Cell) }
+}
+
+/// A part of a surface in all cells.
+#[cube]
+pub fn everywhere<'a>(field: Field<'a>, part: Part) -> Region<'a> {
+    Region::<'a> { field, cell: no_cell(), part, per: comptime!(ContactsPer::Face) }
 }
 
 #[cube]
@@ -83,14 +94,6 @@ fn pick_corner(condition: bool, first: PieceCorner, second: PieceCorner) -> Piec
 
 #[cube]
 impl Piece {
-    /// Corner `k`.
-    pub fn corner(self, k: u32) -> Weights {
-        Weights {
-            s: select(k == 0u32, self.a.s, select(k == 1u32, self.b.s, self.c.s)),
-            t: select(k == 0u32, self.a.t, select(k == 1u32, self.b.t, self.c.t)),
-        }
-    }
-
     /// The mean of the corners.
     pub fn center(self) -> Weights {
         Weights { s: THIRD * (self.a.s + self.b.s + self.c.s), t: THIRD * (self.a.t + self.b.t + self.c.t) }
@@ -141,14 +144,6 @@ impl Piece {
     }
 }
 
-/// The signed distance at the center of a piece, and the bound of the piece.
-#[derive(CubeType, Clone, Copy)]
-#[expand(derive(Clone, Copy))]
-pub struct Bounded {
-    pub distance: f32,
-    pub bound: f32,
-}
-
 /// The corners of a piece in the field's frame.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
@@ -162,7 +157,12 @@ struct Points {
 impl Region<'_> {
     /// The field at a point of the part.
     pub fn value(self, at: Weights) -> Value {
-        self.field.value_in_cell(self.cell, self.part.at(at.s, at.t))
+        let p = self.part.at(at.s, at.t);
+        if comptime!(self.per == ContactsPer::Face) {
+            self.field.exact_value(p)
+        } else {
+            self.field.value_in_cell(self.cell, p)
+        }
     }
 
     /// Distances from three points to a face.
@@ -175,11 +175,41 @@ impl Region<'_> {
         )
     }
 
-    /// The bound of a piece. Inside the solid, the depth is at most the distance to any face. The
-    /// distance to one face is convex, so over a triangle it is at most the linear function with
-    /// the same values at the corners. So the depth is at most the greatest minimum of such
-    /// functions of several faces.
-    pub fn bound(self, piece: Piece) -> Bounded {
+    /// Functions that are linear over a piece of a mesh's field. Inside the solid, the depth is at
+    /// most the distance to any face. The distance to one face is convex, so over a triangle it is
+    /// at most the linear function with the same values at the corners.
+    fn distances_to_faces(self, piece: Piece, points: Points, face: u32) -> Functions {
+        Functions {
+            f: self.distances(face, points),
+            g: self.distances(piece.face_a, points),
+            h: self.distances(piece.face_b, points),
+            k: self.distances(piece.face_c, points),
+        }
+    }
+
+    /// The depths at three points by the tangent of the field at `p`.
+    fn tangent(self, p: V3, points: Points) -> V3 {
+        let v = self.field.simple_value(p);
+        v3(
+            -(v.distance + v.gradient.dot(points.a - p)),
+            -(v.distance + v.gradient.dot(points.b - p)),
+            -(v.distance + v.gradient.dot(points.c - p)),
+        )
+    }
+
+    /// The same for a simple shape. Its field is convex, so it lies above its tangents.
+    fn tangents(self, points: Points, middle: V3) -> Functions {
+        Functions {
+            f: self.tangent(middle, points),
+            g: self.tangent(points.a, points),
+            h: self.tangent(points.b, points),
+            k: self.tangent(points.c, points),
+        }
+    }
+
+    /// The bound of a piece, with the field at its center: the value there minus the radius, or minus
+    /// the greatest minimum of four functions that the depth does not exceed, whichever is greater.
+    pub fn bound(self, piece: Piece, here: Value) -> f32 {
         let points = Points {
             a: self.part.at(piece.a.s, piece.a.t),
             b: self.part.at(piece.b.s, piece.b.t),
@@ -188,18 +218,17 @@ impl Region<'_> {
         let middle = ((points.a + points.b) + points.c) * THIRD;
         let radius =
             (points.a - middle).length().max((points.b - middle).length()).max((points.c - middle).length());
-        let here = self.field.value_in_cell(self.cell, middle);
         let mut bound = here.distance - radius;
-        if self.field.is_mesh() && here.distance - radius < 0.0f32 {
-            let functions = Functions {
-                f: self.distances(here.face, points),
-                g: self.distances(piece.face_a, points),
-                h: self.distances(piece.face_b, points),
-                k: self.distances(piece.face_c, points),
+        let is_mesh = self.field.is_mesh();
+        if !is_mesh || bound < 0.0f32 {
+            let functions = if is_mesh {
+                self.distances_to_faces(piece, points, here.face)
+            } else {
+                self.tangents(points, middle)
             };
             bound = bound.max(-functions.greatest_minimum());
         }
-        Bounded { distance: here.distance, bound }
+        bound
     }
 }
 
@@ -210,7 +239,7 @@ pub struct Pool {
     faces: Shared<[u32]>,
     /// The lowest value of each thread, with the two weights of its point.
     found: Shared<[f32]>,
-    /// Number of pieces that each thread keeps.
+    /// A word of each thread, such as the number of pieces that it keeps.
     kept: Shared<[u32]>,
 }
 
@@ -270,29 +299,50 @@ impl Pool {
     /// The lowest value of all threads. At equal values, that of the first thread. All threads of
     /// the group must call it.
     pub fn lowest(&mut self, mine: Lowest) -> Lowest {
+        self.lowest_of_every(mine, 0u32, 1u32)
+    }
+
+    /// The same for every `step`-th thread from `first` on.
+    pub fn lowest_of_every(&mut self, mine: Lowest, first: u32, step: u32) -> Lowest {
         sync_cube();
         let own = (3u32 * UNIT_POS) as usize;
         self.found[own] = mine.distance;
         self.found[own + 1usize] = mine.at.s;
         self.found[own + 2usize] = mine.at.t;
         sync_cube();
-        let mut lowest =
-            Lowest { distance: self.found[0], at: Weights { s: self.found[1], t: self.found[2] } };
-        let mut lane = 1u32;
+        let mut lowest = self.found_by(first);
+        let mut lane = first + step;
         while lane < LANES {
-            let at = (3u32 * lane) as usize;
-            let there = Weights { s: self.found[at + 1usize], t: self.found[at + 2usize] };
-            lowest = lowest.or(self.found[at], there);
-            lane += 1u32;
+            let other = self.found_by(lane);
+            lowest = lowest.or(other.distance, other.at);
+            lane += step;
         }
         lowest
     }
 
-    /// Counts the pieces that the threads keep. All threads of the group must call it.
-    pub fn count(&mut self, mine: u32) -> Kept {
+    fn found_by(&self, lane: u32) -> Lowest {
+        let at = (3u32 * lane) as usize;
+        Lowest {
+            distance: self.found[at],
+            at: Weights { s: self.found[at + 1usize], t: self.found[at + 2usize] },
+        }
+    }
+
+    /// Shows a word of each thread to the others. All threads of the group must call it.
+    pub fn exchange(&mut self, mine: u32) {
         sync_cube();
         self.kept[UNIT_POS as usize] = mine;
         sync_cube();
+    }
+
+    /// The word that a thread has shown last.
+    pub fn exchanged(&self, lane: u32) -> u32 {
+        self.kept[lane as usize]
+    }
+
+    /// Counts the pieces that the threads keep. All threads of the group must call it.
+    pub fn count(&mut self, mine: u32) -> Kept {
+        self.exchange(mine);
         let mut before = 0u32;
         let mut all = 0u32;
         let mut lane = 0u32;

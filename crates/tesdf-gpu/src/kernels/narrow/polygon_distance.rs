@@ -56,6 +56,12 @@ impl Polygons {
     pub fn polygon<'a>(&'a self, number: u32, part: Part) -> Polygon<'a> {
         Polygon::<'a> { polygons: self, number, count: self.items.get(number).number, part }
     }
+
+    /// A whole part as a polygon. The weights of all whole parts are the first polygon of the
+    /// buffer: see [`WHOLE`](super::super::middle::items::WHOLE).
+    pub fn whole<'a>(&'a self, part: Part) -> Polygon<'a> {
+        Polygon::<'a> { polygons: self, number: 0u32.runtime(), count: part.count, part }
+    }
 }
 
 /// A segment.
@@ -108,7 +114,7 @@ fn between_segments(first: Segment, second: Segment) -> Between {
 /// third corner. The weight along the longest side is computed from it, so that both weights
 /// together lead back to the point.
 #[cube]
-fn weights_of(part: Part, normal: V3, x: V3) -> Weights {
+pub fn weights_of(part: Part, normal: V3, x: V3) -> Weights {
     let (ab, bc, ca) = (part.b - part.a, part.c - part.b, part.a - part.c);
     let (u, v, w) = (ab.dot(ab), bc.dot(bc), ca.dot(ca));
     let by_ab = u >= v && u >= w;

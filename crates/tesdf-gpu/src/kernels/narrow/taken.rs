@@ -1,0 +1,110 @@
+//! The points of a face that were taken as contacts, and the memory of the group that takes them.
+use cubecl::prelude::*;
+
+use super::super::field::nearest::FAR;
+use super::super::field::shapes::NONE;
+use super::super::field::value::Value;
+use super::super::math::vector::{V3, zero};
+use super::extremes::{DIRECTIONS, SAME};
+use super::near::Walk;
+use super::piece::Pool;
+
+/// One for each direction, and one for the minimum.
+const SLOTS: usize = DIRECTIONS as usize + 1;
+
+/// A point of a face that is a contact, if `is_taken`.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Taken {
+    pub point: V3,
+    pub value: Value,
+    pub cell: u32,
+    /// The corner of the face that the point is, or [`NO_CORNER`](super::contacts::NO_CORNER).
+    pub corner: u32,
+    pub is_taken: bool,
+}
+
+/// A point before its field is known.
+#[cube]
+pub fn nothing_at(point: V3, corner: u32) -> Taken {
+    let value = Value {
+        distance: FAR.runtime(),
+        gradient: zero(),
+        point: zero(),
+        face: 0u32.runtime(),
+        feature: 0u32.runtime(),
+    };
+    Taken { point, value, cell: NONE.runtime(), corner, is_taken: false }
+}
+
+/// The points that were taken.
+#[derive(CubeType)]
+pub struct Points {
+    numbers: Shared<[f32]>,
+    /// The round in which each was taken, from 1; 0 for none.
+    rounds: Shared<[u32]>,
+}
+
+/// The memory of a group for the contacts of a face.
+#[derive(CubeType)]
+pub struct Memory {
+    pub pool: Pool,
+    pub walk: Walk,
+    pub points: Points,
+}
+
+#[cube]
+pub fn memory_of(pool: Pool, walk: Walk) -> Memory {
+    Memory {
+        pool,
+        walk,
+        points: Points {
+            numbers: Shared::<[f32]>::new_slice(comptime!(3 * SLOTS)),
+            rounds: Shared::<[u32]>::new_slice(SLOTS),
+        },
+    }
+}
+
+#[cube]
+impl Points {
+    pub fn clear(&mut self) {
+        sync_cube();
+        if UNIT_POS <= DIRECTIONS {
+            self.rounds[UNIT_POS as usize] = 0u32;
+        }
+        sync_cube();
+    }
+
+    fn get(&self, slot: u32) -> V3 {
+        let at = (3u32 * slot) as usize;
+        V3 { x: self.numbers[at], y: self.numbers[at + 1usize], z: self.numbers[at + 2usize] }
+    }
+
+    /// Shows the point that this thread has taken, if any. All threads of the group must call it.
+    pub fn put(&mut self, slot: u32, round: u32, taken: Taken) {
+        sync_cube();
+        if taken.is_taken && UNIT_POS < DIRECTIONS {
+            let at = (3u32 * slot) as usize;
+            self.numbers[at] = taken.point.x;
+            self.numbers[at + 1usize] = taken.point.y;
+            self.numbers[at + 2usize] = taken.point.z;
+            self.rounds[slot as usize] = round;
+        }
+        sync_cube();
+    }
+
+    /// Whether no other point that was taken is the same: neither in an earlier round, nor for a
+    /// lower slot of this round.
+    pub fn is_new(&self, own: u32, round: u32, taken: Taken) -> bool {
+        let mut new = true;
+        let mut slot = 0u32;
+        while slot <= DIRECTIONS {
+            let when = self.rounds[slot as usize];
+            let is_before = when > 0u32 && (when < round || slot < own);
+            let away = (self.get(slot) - taken.point).length();
+            new = new && !(is_before && away <= SAME);
+            slot += 1u32;
+        }
+        new
+    }
+}

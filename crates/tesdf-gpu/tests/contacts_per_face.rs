@@ -1,0 +1,68 @@
+//! Contacts per face on the device: what holds on the processor holds here, within `f32`.
+#[path = "../../tesdf/tests/support/mod.rs"]
+mod support;
+
+mod compare;
+
+use compare::{ROUNDING, found};
+use support::bodies::{Placed, RELATIONS, Relation};
+use support::per_face::{Detection, Kept};
+use support::random::Random;
+use tesdf::collide::{CollideOptions, Contacts, Mode, Placement, Pose, Scene};
+use tesdf_gpu::DetectorOptions;
+
+fn on_device(scene: &Scene, options: &CollideOptions) -> Contacts {
+    found(scene, options, DetectorOptions::default()).0
+}
+
+/// Twice the rounding, and the finest tolerance of the exact mode on a device.
+const DEVICE: Detection = Detection {
+    detect: &on_device,
+    distance: 3.0 * ROUNDING,
+    point: ROUNDING,
+    level: 3.0 * ROUNDING * 0.1,
+    cosine: 1e-3,
+};
+
+#[test]
+fn each_face_keeps_its_least_distance() {
+    let mut random = Random(11);
+    let names = [["cube", "cube"], ["l_bracket", "cube"], ["torus_quads", "tetra"], ["beam", "l_bracket"]];
+    let mut all = Kept::default();
+    for names in names {
+        for relation in RELATIONS {
+            if relation == Relation::Same && names[0] != names[1] {
+                continue;
+            }
+            let bodies = relation.place(names, &mut random);
+            let kept = DEVICE.keeps_least_distances(&bodies, 1e-3 * bodies[0].diagonal());
+            all.faces += kept.faces;
+            all.unconverged += kept.unconverged;
+        }
+    }
+    assert!(all.faces > 2000 && all.unconverged * 200 < all.faces, "{all:?}");
+}
+
+#[test]
+fn each_face_of_bolt_and_nut_keeps_its_least_distance() {
+    let identity = Placement { pose: Pose::IDENTITY, scale: 1.0 };
+    let bodies = ["iso_m16_bolt_6k", "iso_m16_nut_c100"].map(|name| Placed::new(name, identity));
+    let kept = DEVICE.keeps_least_distances(&bodies, 2e-4);
+    assert!(kept.faces > 3000, "{kept:?}");
+}
+
+#[test]
+fn a_box_stands_on_the_corners_of_the_patch() {
+    let unconverged = DEVICE.box_stands_on_the_corners_of_the_patch();
+    assert_eq!(unconverged, 0);
+}
+
+#[test]
+fn a_box_stands_on_a_plane_and_on_four_pegs() {
+    DEVICE.box_stands_on_a_plane_and_on_four_pegs();
+}
+
+#[test]
+fn a_vertex_of_several_faces_has_one_contact() {
+    DEVICE.vertex_of_several_faces_has_one_contact(&[Mode::Exact]);
+}
