@@ -36,6 +36,8 @@ pub enum Scene {
     PegHole,
     /// 128 shafts in random poses, with deep overlaps
     Shafts,
+    /// The same shafts in a fifth of the space, like the start of a pile
+    Pile,
 }
 
 /// Arguments of `tesdf bench poses`.
@@ -56,7 +58,7 @@ pub struct Args {
     /// Seed of the random poses
     #[arg(long, value_name = "SEED", default_value_t = 1)]
     pub seed: u64,
-    /// Contacts are detected up to this signed distance [default: 0.2 mm, for shafts 0]
+    /// Contacts are detected up to this signed distance [default: 0.2 mm, for shafts and a pile 0]
     #[arg(long, value_name = "D", value_parser = parse::length)]
     pub contact_distance: Option<f64>,
     /// Folder of the meshes
@@ -119,10 +121,10 @@ impl Scene {
                 let frames = (0..frames).map(frame).collect();
                 file(&bodies, vec![(0, 0), (1, 0)], 2e-4, frames)
             }
-            Self::Shafts => {
-                let frame = |_| {
-                    (0..128).map(|_| pose(SHAFTS * in_cube(random), rotation(random))).collect::<Vec<_>>()
-                };
+            Self::Shafts | Self::Pile => {
+                let half = if self == Self::Pile { PILE } else { SHAFTS };
+                let frame =
+                    |_| (0..128).map(|_| pose(half * in_cube(random), rotation(random))).collect::<Vec<_>>();
                 let instances = vec![(0, 0); 128];
                 let frames = (0..frames).map(frame).collect();
                 file(&["shaft_keyway.obj"], instances, 0.0, frames)
@@ -133,6 +135,8 @@ impl Scene {
 
 /// Half of the side of the cube that contains the centres of the 128 shafts, m.
 const SHAFTS: f64 = 0.24;
+/// The same for a pile.
+const PILE: f64 = 0.144;
 
 fn pose(p: DVec3, q: DQuat) -> [f64; 7] {
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]

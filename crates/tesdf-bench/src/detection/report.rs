@@ -8,10 +8,13 @@ use tesdf_terminal::report::size;
 
 use super::arguments::{LanesName, ModeName};
 
-/// Mean, 99th percentile and maximum of a series.
+/// Mean, median, 99th percentile and maximum of a series.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Spread {
     pub mean: f64,
+    /// Unlike the mean, it leaves out the first detection of a pair, which makes data that later
+    /// ones use.
+    pub median: f64,
     pub p99: f64,
     pub max: f64,
 }
@@ -23,7 +26,7 @@ impl Spread {
         let last = values.len().saturating_sub(1);
         let at = |share: f64| values.get((share * last as f64).ceil() as usize).copied().unwrap_or(0.0);
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
-        Self { mean, p99: at(0.99), max: at(1.0) }
+        Self { mean, median: at(0.5), p99: at(0.99), max: at(1.0) }
     }
 }
 
@@ -112,7 +115,10 @@ pub fn text(r: &Report) -> String {
         let _ = writeln!(text, "{name:<28} {value}");
     };
     let spread = |s: &Spread| format!("{:.0} on average, {:.0} at most", s.mean, s.max);
-    let times = |s: &Spread| format!("{:.4} ms on average, p99 {:.4}, at most {:.4}", s.mean, s.p99, s.max);
+    let times = |s: &Spread| {
+        let Spread { mean, median, p99, max } = s;
+        format!("{mean:.4} ms on average, median {median:.4}, p99 {p99:.4}, at most {max:.4}")
+    };
     line("device", r.device.clone());
     line(
         "scene",
