@@ -6,8 +6,8 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use serde::Serialize;
 use tesdf::collide::{
-    CollideOptions, Contact, Contacts, ContactsPer, HiddenOverlap, Instance, InstanceId, Mode, PairReduction,
-    Pose, Reduction, Scene, Statistics, detect,
+    CoarseContact, CollideOptions, Contact, Contacts, ContactsPer, HiddenOverlap, Instance, InstanceId, Mode,
+    PairReduction, Pose, Reduction, Scene, Statistics, coarse_contacts, detect,
 };
 use tesdf::{Length, TeSdf};
 
@@ -181,6 +181,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     };
     let found = found.map_err(Failure::new)?;
     warn_of(&found.hidden, options.mode);
+    if options.mode == Mode::Node {
+        let coarse = coarse_contacts(&scene, &options).map_err(Failure::new)?;
+        warn_of_coarse(&coarse, |id| format!("instance {id}"), "use --mode exact --contacts-per face");
+    }
     if args.report {
         let Contacts { statistics, reductions, hidden, .. } = &found;
         report::json(&Report { contacts: found.as_slice(), statistics, reductions, hidden })?;
@@ -207,6 +211,21 @@ fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
                  overlap; move the bodies apart"
             }
         });
+    }
+}
+
+/// Warns of faces that touch where the mode `node` does not look. `name` names an instance, `instead`
+/// is the advice.
+pub fn warn_of_coarse(coarse: &[CoarseContact], name: impl Fn(InstanceId) -> String, instead: &str) {
+    for CoarseContact { instance_a, instance_b, face_a, corner_reach, .. } in coarse {
+        let (a, b) = (name(*instance_a), name(*instance_b));
+        report::warning(&format!(
+            "face {face_a} of {a} touches {b}, and has points {corner_reach:.3e} from its vertices: the mode `node` only tests \
+             vertices, and can miss where they touch"
+        ));
+    }
+    if !coarse.is_empty() {
+        report::hint(&format!("{instead}, or mesh the bodies more finely"));
     }
 }
 

@@ -13,6 +13,7 @@ use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{HiddenPair, InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
+use crate::collide::warn_of_coarse;
 use tesdf_terminal::device::{self, Choice, Device};
 use tesdf_terminal::output::{self, Consent};
 use tesdf_terminal::progress::{interrupt_flag, watched};
@@ -131,6 +132,13 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let device_name = device.as_ref().map_or("cpu", Device::name);
     let origin = RunOrigin::of(&system, device_name).map_err(Failure::new)?;
     let begun = begin(args, &loaded, earlier.as_ref(), &mut system, &origin)?;
+    let coarse = loaded.coarse_contacts(&system).map_err(Failure::new)?;
+    let name = |id| {
+        system
+            .body_of(id)
+            .map_or("a body".into(), |body| format!("`{}`", loaded.scene.bodies[body].get_ref().name))
+    };
+    warn_of_coarse(&coarse, name, "use mode = \"exact\" and contacts_per = \"face\" under [detector]");
     let engine = match device {
         Some(device) => loaded.newton_with(system, device.into_detector()),
         None => loaded.newton(system),

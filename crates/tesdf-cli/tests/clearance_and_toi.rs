@@ -108,6 +108,12 @@ fn contacts_per_face_are_the_corners_of_a_cube_on_a_cube() {
         let is_here = |c: &Value| c["point_a"][0] == x && c["point_a"][1] == y;
         assert!(faces.iter().any(is_here), "no contact at {x} {y}: {found}");
     }
+    let (_, _, error) = folder.tesdf(&[&on_top[..], &["--mode", "node"]].concat());
+    assert!(
+        error.contains("of instance 0 touches instance 1") && error.contains("only tests vertices"),
+        "{error}"
+    );
+    assert!(error.contains("hint: use --mode exact --contacts-per face"), "{error}");
     let (code, _, error) = folder.tesdf(&[&on_top[..], &["--contacts-per", "body"]].concat());
     assert!(code == Some(2) && error.contains("expected cell or face"), "{error}");
 }

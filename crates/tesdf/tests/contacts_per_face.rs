@@ -5,7 +5,9 @@ mod support;
 use support::bodies::{Placed, RELATIONS, Relation, scene};
 use support::per_face::{Detection, block};
 use support::random::Random;
-use tesdf::collide::{CollideOptions, Contact, Contacts, ContactsPer, Mode, Placement, Pose, Scene};
+use tesdf::collide::{
+    CollideOptions, Contact, Contacts, ContactsPer, Mode, Placement, Pose, Scene, coarse_contacts,
+};
 use tesdf::glam::{DQuat, DVec3};
 
 fn detect(scene: &Scene, options: &CollideOptions) -> Contacts {
@@ -103,4 +105,29 @@ fn the_corners_of_flush_faces_have_the_distance_of_the_planes() {
             }
         }
     }
+}
+
+/// Nodes do not see a box that is turned on another one: every vertex is beside the other box.
+#[test]
+fn faces_that_nodes_miss_are_named() {
+    let half = DVec3::splat(0.05);
+    let node = CollideOptions { contact_distance: 1e-4, ..CollideOptions::with_mode(Mode::Node) };
+    let on = |n: u32, height: f64| {
+        let rotation = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_6);
+        let mut upper = block(-half, half, n);
+        upper.at.pose = Pose { translation: DVec3::new(0.0, 0.0, height), rotation };
+        let scene = scene(&[block(-half, half, n), upper]);
+        (detect(&scene, &node).len(), coarse_contacts(&scene, &node).expect("good"))
+    };
+    let (contacts, coarse) = on(1, 0.1);
+    assert_eq!((contacts, coarse.len()), (0, 2), "{coarse:?}");
+    for contact in &coarse {
+        // The top and the bottom are two right triangles each, with legs of 0.1.
+        assert!((contact.corner_reach - 0.05 * 2f64.sqrt()).abs() < 1e-9, "{contact:?}");
+        assert!(contact.distance.abs() < 1e-9);
+    }
+    // Apart, or finely meshed: nothing is missed.
+    assert!(on(1, 0.101).1.is_empty());
+    let (contacts, coarse) = on(24, 0.1);
+    assert!(contacts > 0 && coarse.is_empty(), "{coarse:?}");
 }

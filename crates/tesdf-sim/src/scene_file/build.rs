@@ -3,7 +3,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, Instance, Mode, Pose, Scene, Shape, ShapeId, Velocity, detect,
+    CoarseContact, CollideError, CollideOptions, Contacts, Instance, Mode, Pose, Scene, Shape, ShapeId,
+    Velocity, coarse_contacts, detect,
 };
 use tesdf::encode::{EncodeError, EncodeFileError, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
@@ -100,6 +101,20 @@ impl LoadedScene {
             }
             e => self.value("solver", e),
         })
+    }
+
+    /// Faces that touch in the states of `system`, and that the scene's mode, where it is `node`, can
+    /// miss.
+    ///
+    /// # Errors
+    /// The scene's options are not valid.
+    pub fn coarse_contacts(&self, system: &System) -> Result<Vec<CoarseContact>, CollideError> {
+        match self.scene.detector.mode {
+            DetectorMode::Node => {
+                coarse_contacts(system.scene(), &collide_options(&self.scene.detector, system))
+            }
+            DetectorMode::Face | DetectorMode::Exact | DetectorMode::Off => Ok(Vec::new()),
+        }
     }
 
     fn body_error(&self, body: usize, reason: String) -> SceneError {

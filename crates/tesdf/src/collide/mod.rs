@@ -17,6 +17,7 @@
 //! - [`PatchTracker`]: contacts grouped into patches, which keep their ids from step to step.
 //! - [`hidden_overlaps`]: pairs that overlap without a contact that shows it. Detections report
 //!   them beside the contacts.
+//! - [`coarse_contacts`]: faces that touch between their vertices, where the mode node can miss it.
 //! - [`clearance`](clearance()): the signed distance between two instances, with witness points.
 //! - [`time_of_impact`](time_of_impact()): the time at which two moving instances first touch;
 //!   never too late.
@@ -26,6 +27,7 @@
 //! distance field is used. Both orders of a pair are evaluated.
 mod candidates;
 mod clearance;
+mod coarse;
 mod contact;
 mod depth_bounds;
 mod detect;
@@ -72,6 +74,7 @@ pub mod internal {
 
 pub use candidates::{Candidate, candidates};
 pub use clearance::{Clearance, ClearanceOptions, clearance};
+pub use coarse::{CoarseContact, coarse_contacts};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};
 pub use detect::{detect, detect_pairs, detect_with};
 pub use error::CollideError;

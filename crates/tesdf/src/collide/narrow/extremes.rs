@@ -107,7 +107,7 @@ impl<'a> Patch<'a> {
     }
 
     fn is_large(&self) -> bool {
-        self.longest.length_squared() > self.search.large * self.search.large
+        self.search.is_large(self.part)
     }
 
     /// Whether the field may be constant, up to the tolerance, from the minimum to other points of

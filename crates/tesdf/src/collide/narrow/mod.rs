@@ -96,6 +96,13 @@ impl Search {
         }
     }
 
+    /// Whether a part is so large against a body that its corners alone do not hold it up.
+    pub fn is_large(&self, part: &Part) -> bool {
+        let points = part.points();
+        let edges = (0..points.len()).map(|i| points[i].distance_squared(points[(i + 1) % points.len()]));
+        edges.fold(0.0, f64::max) > self.large * self.large
+    }
+
     /// Whether parts are searched as a whole, not cell by cell.
     fn is_of_faces(&self) -> bool {
         self.per == ContactsPer::Face && self.mode != Mode::Node
