@@ -31,7 +31,9 @@ fn devices_are_listed_and_chosen() {
         let common = ["collide", &a, &b, "--mode", mode, "--contact-distance", "1e-3", "--json"];
         json(&folder.good(&[&common[..], &["--contacts-per", per, "--device", device]].concat()))
     };
-    for (mode, per) in [("node", "cell"), ("face", "cell"), ("exact", "cell"), ("exact", "face")] {
+    for (mode, per) in
+        [("node", "cell"), ("face", "cell"), ("exact", "cell"), ("face", "face"), ("exact", "face")]
+    {
         let (host, device) = (collide("cpu", mode, per), collide("0", mode, per));
         let deepest = |contacts: &Value| {
             let all = contacts.as_array().expect("contacts").iter();
@@ -39,12 +41,6 @@ fn devices_are_listed_and_chosen() {
         };
         assert!(deepest(&host) < 0.0 && (deepest(&host) - deepest(&device)).abs() < 1e-7, "{mode} per {per}");
     }
-    let per_face = ["collide", &a, &b, "--device", "0", "--mode", "face", "--contacts-per", "face"];
-    let (code, _, err) = folder.tesdf(&per_face);
-    assert!(
-        code == Some(2) && err.contains("one contact per face in the mode face is not available"),
-        "{err}"
-    );
     let (code, _, err) = folder.tesdf(&["collide", &a, &b, "--device", "no such device"]);
     assert_eq!(code, Some(2));
     assert!(err.contains("no device is named \"no such device\"") && err.contains(name), "{err}");

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use tesdf::Length;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, HiddenOverlap, Mode, Reduction, Scene, Shape, ShapeId, Statistics,
+    CollideError, CollideOptions, Contacts, HiddenOverlap, Reduction, Scene, Shape, ShapeId, Statistics,
 };
 
 use buffers::{PipelineBuffers, ROW, WORD};
@@ -120,7 +120,7 @@ impl Detector {
     ///   growing buffer exceeds the limit of the device.
     /// - [`GpuError::Shape`] when a shape cannot be uploaded, or a vertex was moved to an invalid
     ///   position.
-    /// - [`GpuError::Unavailable`] for contacts per face in the mode face, and when vertices have moved on the device and the scene now has
+    /// - [`GpuError::Unavailable`] when vertices have moved on the device and the scene now has
     ///   other shapes.
     /// - [`GpuError::Device`] when the device fails, or a driver stops the loops of a kernel early.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
@@ -158,12 +158,6 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         options.validate()?;
-        if options.mode == Mode::Face && parts(options) == Parts::Faces {
-            return Err(GpuError::Unavailable {
-                what: "one contact per face in the mode face".into(),
-                instead: "use the mode exact, or contacts per cell, or detect on the processor",
-            });
-        }
         if shape_ids(scene) != self.shape_ids {
             if self.shapes.have_moved() {
                 return Err(GpuError::Unavailable {

@@ -5,11 +5,12 @@ use super::pass::{GROUP, Parts, Pass, parts};
 use super::stages::launch;
 use super::{Counting, Exchange, Lanes};
 use crate::GpuError;
+use crate::device::Buffer;
 use crate::kernels::counters::POLYGONS;
 use crate::kernels::narrow::exact::AskedExactLaunch;
 use crate::kernels::narrow::exchange::{LANES, Variant};
 use crate::kernels::narrow::faces::AskedLaunch;
-use crate::kernels::narrow::{exact, exact_faces, faces, nodes};
+use crate::kernels::narrow::{exact, exact_faces, faces, nodes, whole_faces};
 
 impl Pass<'_> {
     pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
@@ -39,21 +40,50 @@ impl Pass<'_> {
         self.options.cos_theta.map_or(-2.0, |cos| cos as f32)
     }
 
+    /// The tolerances of all instances on the device.
+    fn tolerances(&mut self) -> Result<Buffer, GpuError> {
+        let tolerances = self.detector.tolerances(self.instances, self.options.tolerance);
+        let tolerances = self.detector.device.upload("tolerances", &tolerances)?;
+        self.sent += tolerances.bytes();
+        Ok(tolerances)
+    }
+
     fn narrow_faces(&mut self) -> Result<(), GpuError> {
         let (shapes, buffers, with) = (&self.detector.shapes, &self.detector.buffers, &self.detector.options);
+        let whole = parts(self.options) == Parts::Faces;
         let (per, lanes) = match with.lanes {
-            Lanes::Single => (LANES, 1),
-            Lanes::Group => (1, LANES),
+            Lanes::Single if !whole => (LANES, 1),
+            _ => (1, LANES),
         };
         let variant = Variant {
             lanes,
             subgroups: with.exchange == Exchange::Device && self.detector.device.has_subgroups_of_32(),
             counting: with.counting == Counting::Operations,
+            whole,
         };
         let per_polygon = self.groups_for(buffers.room.polygons, per, POLYGONS)?;
-        let (pairs, polygons, contacts) = (buffers.ordered_pairs(), buffers.polygons(), buffers.contacts());
-        let (counters, asked) =
-            (self.counters(), AskedLaunch::new(self.options.iterations, self.cos_theta()));
+        let tolerances = self.tolerances()?;
+        let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
+        let asked = AskedLaunch::new(tolerances.words(), self.options.iterations, self.cos_theta());
+        if whole {
+            let faces = buffers.whole_faces();
+            return launch!(
+                self.stages,
+                "face narrow phase",
+                per_polygon,
+                LANES,
+                whole_faces::narrow_whole_faces(
+                    shapes.argument(),
+                    pairs,
+                    faces,
+                    counters,
+                    contacts,
+                    asked,
+                    variant
+                )
+            );
+        }
+        let polygons = buffers.polygons();
         launch!(
             self.stages,
             "face narrow phase",
@@ -66,12 +96,9 @@ impl Pass<'_> {
     fn narrow_exact(&mut self) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let per_polygon = self.groups_for(buffers.room.polygons, 1, POLYGONS)?;
-        let tolerances = self.detector.tolerances(self.instances, self.options.tolerance);
-        let tolerances = self.detector.device.upload("tolerances", &tolerances)?;
-        self.sent += tolerances.bytes();
-        let (pairs, contacts) = (buffers.ordered_pairs(), buffers.contacts());
+        let tolerances = self.tolerances()?;
+        let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
         let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
-        let counters = self.counters();
         if parts(self.options) == Parts::Faces {
             let faces = buffers.whole_faces();
             return launch!(

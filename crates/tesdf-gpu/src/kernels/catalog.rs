@@ -123,6 +123,7 @@ fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
 /// Adds the kernels of the narrow phase.
 fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let exact = || AskedExactLaunch::new(words(), 0.0);
+    let asked = || AskedLaunch::new(words(), 1, 0.0);
     kernels!(all, device, target;
         Indirect narrow::nodes::narrow_nodes, GROUP, (shapes(), pairs(), items(), counters(), contacts());;
         Indirect narrow::exact::narrow_exact, LANES,
@@ -133,14 +134,22 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     for counting in [false, true] {
         for lanes in [LANES, 1] {
             for subgroups in [true, false] {
-                let variant = Variant { lanes, subgroups, counting };
+                let variant = Variant { lanes, subgroups, counting, whole: false };
                 let exchange = if subgroups { "subgroups" } else { "shared memory" };
                 let counting = if counting { ", counting" } else { "" };
                 kernels!(all, device, target;
                     Indirect narrow::faces::narrow_faces, LANES,
-                        (shapes(), pairs(), polygons(), counters(), contacts(), AskedLaunch::new(1, 0.0), variant);
+                        (shapes(), pairs(), polygons(), counters(), contacts(), asked(), variant);
                         format!("{lanes} lanes, {exchange}{counting}");;
                 );
+                if lanes == LANES {
+                    let variant = Variant { whole: true, ..variant };
+                    kernels!(all, device, target;
+                        Indirect narrow::whole_faces::narrow_whole_faces, LANES,
+                            (shapes(), pairs(), polygons(), counters(), contacts(), asked(), variant);
+                            format!("{exchange}{counting}");;
+                    );
+                }
             }
         }
     }

@@ -2,7 +2,9 @@
 #![allow(dead_code, reason = "each test program uses its part")]
 use std::collections::{BTreeMap, BTreeSet};
 
-use tesdf::collide::{CollideOptions, Contact, Contacts, InstanceId, Mode, Scene, Shape, detect};
+use tesdf::collide::{
+    CollideOptions, Contact, Contacts, ContactsPer, InstanceId, Mode, Scene, Shape, detect,
+};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 use tesdf_gpu::{Detector, DetectorOptions, Device};
@@ -129,6 +131,9 @@ pub fn hold(scene: &Scene, options: &CollideOptions, size: f64) -> Compared {
 /// Compares the given contacts of a device with all contacts of a scene on the host.
 pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: &Contacts) -> Compared {
     let host = detect(scene, options).expect("a good scene");
+    if options.contacts_per == ContactsPer::Face && options.mode != Mode::Node {
+        return faces_hold(scene, options, size, [&host, device]);
+    }
     let (on_host, on_device) = (least(host.as_slice()), least(device.as_slice()));
     let keys: BTreeSet<_> = on_host.keys().chain(on_device.keys()).collect();
     let mut others = 0;
@@ -160,13 +165,82 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
     Compared { touching: keys.len(), others, cells: h.len(), differing }
 }
 
-/// All modes of detection, for bodies of diagonal `size`.
-pub fn each_mode(size: f64) -> [CollideOptions; 4] {
+/// Compares contacts per face. A face that shares its contact has it at a vertex, by the name of
+/// another face; host and device may choose another one of equals.
+fn faces_hold(scene: &Scene, options: &CollideOptions, size: f64, sides: [&Contacts; 2]) -> Compared {
+    let by_face = sides.map(|side| least(side.as_slice()));
+    let corners = Corners::new(scene);
+    let keys: BTreeSet<_> = by_face.iter().flat_map(BTreeMap::keys).collect();
+    let mut others = 0;
+    for key in &keys {
+        let [h, d] = [0, 1].map(|side: usize| {
+            let own = by_face[side].get(key).copied();
+            corners.shared(key, sides[side], size).chain(own).reduce(f64::min)
+        });
+        let deepest = h.into_iter().chain(d).fold(f64::INFINITY, f64::min);
+        let is_close = options.contact_distance - deepest < ROUNDING * size;
+        match (h, d) {
+            (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
+            _ => {
+                assert!(
+                    is_close || options.cos_theta.is_some(),
+                    "{key:?}: {h:?} on the host, {d:?} on the device"
+                );
+                others += 1;
+            }
+        }
+    }
+    Compared { touching: keys.len(), others, cells: 0, differing: 0 }
+}
+
+/// Corners of the faces of all instances of meshes and boxes, in the world.
+struct Corners(BTreeMap<(InstanceId, u32), Vec<DVec3>>);
+
+impl Corners {
+    fn new(scene: &Scene) -> Self {
+        let mut all = BTreeMap::new();
+        for (id, instance) in scene.instances() {
+            let at = instance.placement();
+            match scene.shape(instance.shape).expect("it is there") {
+                Shape::Mesh(asset) => all.extend((0..asset.face_count()).map(|face| {
+                    let corners = asset.face_corners(face).map(|p| at.to_world(p));
+                    ((id, asset.face_id(face)), corners.to_vec())
+                })),
+                shape => all.extend(shape.parts().0.iter().enumerate().map(|(part, points)| {
+                    ((id, part as u32), points.iter().map(|&p| at.to_world(p)).collect())
+                })),
+            }
+        }
+        Self(all)
+    }
+
+    /// Distances of contacts at the corners of a face.
+    fn shared<'a>(
+        &'a self,
+        &(a, b, face): &(InstanceId, InstanceId, u32),
+        contacts: &'a Contacts,
+        size: f64,
+    ) -> impl Iterator<Item = f64> + 'a {
+        let corners = self.0.get(&(a, face)).map_or(&[][..], Vec::as_slice);
+        contacts
+            .iter()
+            .filter(move |c| (c.instance_a, c.instance_b) == (a, b))
+            .filter(move |c| corners.iter().any(|p| p.distance(c.point_a) < ROUNDING * size))
+            .map(|c| c.distance)
+    }
+}
+
+/// All modes of detection, for bodies of diagonal `size`: with contacts per cell, then per face.
+pub fn each_mode(size: f64) -> [CollideOptions; 6] {
     let face = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(Mode::Face) };
+    let exact = CollideOptions { mode: Mode::Exact, ..face };
+    let per_face = |options| CollideOptions { contacts_per: ContactsPer::Face, ..options };
     [
         CollideOptions { mode: Mode::Node, ..face },
         CollideOptions { cos_theta: Some(0.3), ..face },
         face,
-        CollideOptions { mode: Mode::Exact, ..face },
+        exact,
+        per_face(face),
+        per_face(exact),
     ]
 }

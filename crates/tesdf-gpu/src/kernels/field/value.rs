@@ -108,13 +108,18 @@ impl Field<'_> {
         }
     }
 
-    /// The same at any point.
-    pub fn exact_value(self, p: V3) -> Value {
+    /// The cell of a point. Simple shapes have no cells.
+    pub fn cell_at(self, p: V3) -> Cell {
         let mut cell = no_cell();
         if self.is_mesh() {
             cell = self.locate(p);
         }
-        self.exact_value_in(cell, p)
+        cell
+    }
+
+    /// The same at any point.
+    pub fn exact_value(self, p: V3) -> Value {
+        self.exact_value_in(self.cell_at(p), p)
     }
 
     /// Signed distance to the surface, exact up to rounding even when lists are truncated.

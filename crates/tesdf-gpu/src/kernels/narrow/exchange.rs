@@ -7,7 +7,7 @@ use super::super::field::nearest::Nearest;
 /// Threads that work on one polygon.
 pub const LANES: u32 = 32;
 
-/// A variant of the kernel `narrow_faces`.
+/// A variant of the kernels of Face-TES.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Variant {
     /// Threads that share a polygon: [`LANES`] or 1.
@@ -16,6 +16,8 @@ pub struct Variant {
     pub subgroups: bool,
     /// Whether the kernel counts evaluations.
     pub counting: bool,
+    /// Whether it takes whole faces instead of polygons in cells.
+    pub whole: bool,
 }
 
 /// Shared memory for an exchange.

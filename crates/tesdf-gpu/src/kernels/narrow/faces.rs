@@ -7,7 +7,7 @@
 use cubecl::prelude::*;
 
 use super::super::broad::meshlets::ROUNDING;
-use super::super::broad::ordered_pair::{OrderedPairs, Part};
+use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, Counters};
 use super::super::field::list::List;
 use super::super::field::locate::Cell;
@@ -15,7 +15,7 @@ use super::super::field::nearest::{FAR, Nearest};
 use super::super::field::shapes::{Field, NONE, Shapes};
 use super::super::field::value::Value;
 use super::super::math::triangle::Face;
-use super::super::math::vector::{Row, row_of, xyz};
+use super::super::math::vector::{Row, V3, row_of, xyz};
 use super::super::middle::items::{MAX_VERTICES, Polygons, Weights};
 use super::contacts::{Contacts, NO_CORNER, Touch};
 use super::exchange::{Exchange, LANES, Variant, exchange, width_for};
@@ -24,6 +24,8 @@ use super::polygon_distance::Polygon;
 /// Parameters of Face-TES.
 #[derive(CubeType, CubeLaunch)]
 pub struct Asked {
+    /// Tolerance for each instance that has the field, in its frame. Used for whole faces.
+    pub tolerances: Box<[f32]>,
     /// Largest number of steps of Frank–Wolfe.
     pub iterations: u32,
     /// A contact is dropped when the cosine between its gradient and the face's normal is above
@@ -34,7 +36,7 @@ pub struct Asked {
 /// The list of a cell, shared by the threads of a group.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-struct SharedList {
+pub struct SharedList {
     cell: Cell,
     faces: List,
     /// The face that this thread keeps in registers, and its index. A thread beyond the end of the
@@ -54,50 +56,66 @@ fn lane_of(#[comptime] lanes: u32) -> u32 {
 }
 
 #[cube]
-fn share_list(field: Field<'_>, cell: Cell, #[comptime] lanes: u32) -> SharedList {
+pub fn share_list(field: Field<'_>, cell: Cell, #[comptime] variant: Variant) -> SharedList {
+    let lanes = comptime!(variant.lanes);
     let listed = cell.is_listed();
     let faces = field.list(select(listed, cell.offset(), 0u32));
-    let width = width_for(select(listed, faces.count, 0u32));
+    // Where each point has its own cell, the group evaluates one point at a time.
+    let shared = select(variant.whole, LANES, width_for(select(listed, faces.count, 0u32)));
     let lane = lane_of(lanes);
     let mut position = 0u32;
-    if listed && lane % width < faces.count {
-        position = field.listed(faces, lane % width);
+    if listed && lane % shared < faces.count {
+        position = field.listed(faces, lane % shared);
     }
     SharedList {
         cell,
         faces,
         own: field.face(position),
         position,
-        width,
-        points: select(lanes == 1u32, 1u32, LANES / width),
+        width: shared,
+        points: select(lanes == 1u32, 1u32, LANES / shared),
     }
+}
+
+/// The field at a point, and the number of faces that each point's list has.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct Evaluated {
+    value: Value,
+    distances: u32,
 }
 
 #[cube]
 impl SharedList {
     /// The field at a point of the cell. `width` threads evaluate it together, and each such part
-    /// of the group may have its own point.
-    fn value(
-        self,
-        field: Field<'_>,
-        surface: Part,
-        at: Weights,
-        exchange: &mut Exchange,
-        #[comptime] lanes: u32,
-    ) -> Value {
-        let p = surface.at(at.s, at.t);
+    /// of the group may have its own point. With a whole face, all threads evaluate one point, in
+    /// the cell that has it.
+    fn value(self, field: Field<'_>, p: V3, exchange: &mut Exchange) -> Evaluated {
+        let lanes = comptime!(exchange.variant.lanes);
+        let mut cell = self.cell;
+        if comptime!(exchange.variant.whole) {
+            cell = field.cell_at(p);
+        }
         let mut found = Nearest { squared: FAR.runtime(), face: NONE.runtime() };
-        if field.is_mesh() && self.cell.is_listed() {
+        let mut distances = 0u32;
+        if field.is_mesh() && cell.is_listed() {
             let first = select(lanes == 1u32, 0u32, UNIT_POS % self.width);
-            if first < self.faces.count {
-                found = Nearest { squared: self.own.distance_squared(p), face: self.position };
+            if comptime!(exchange.variant.whole) {
+                let faces = field.list(cell.offset());
+                distances = faces.count;
+                found = field.nearest_in_list(faces, first, lanes, p);
+            } else {
+                distances = self.faces.count;
+                if first < self.faces.count {
+                    found = Nearest { squared: self.own.distance_squared(p), face: self.position };
+                }
+                found = found.or(field.nearest_in_list(self.faces, first + lanes, lanes, p));
             }
-            found = found.or(field.nearest_in_list(self.faces, first + lanes, lanes, p));
             found = exchange.least(found, self.width);
         } else {
-            found = field.nearest(self.cell, p);
+            found = field.nearest(cell, p);
         }
-        field.value_near(self.cell, p, found)
+        Evaluated { value: field.value_near(cell, p, found), distances }
     }
 }
 
@@ -121,7 +139,7 @@ struct Iterate {
 /// all of this, so that the long code of the field stands in the kernel once.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-struct Search {
+pub struct Search {
     /// Number of the next evaluation, and the number at which the search ends.
     evaluation: u32,
     end: u32,
@@ -129,11 +147,11 @@ struct Search {
     n: u32,
     here: Iterate,
     /// The best point so far, and its distance.
-    best: Weights,
-    distance: f32,
-    /// Evaluations by the group so far, and points of these evaluations.
+    pub best: Weights,
+    pub distance: f32,
+    /// Evaluations by the group so far, and distances of points and faces in them.
     made: u32,
-    made_points: u32,
+    distances: u32,
 }
 
 /// The next evaluation.
@@ -196,6 +214,15 @@ impl Search {
         next.is_known = next.ends;
     }
 
+    /// Counts the evaluations, when the variant does.
+    pub fn count(&self, counters: &Counters, #[comptime] variant: Variant) {
+        let counting = comptime!(variant.counting);
+        if counting && lane_of(comptime!(variant.lanes)) == 0u32 {
+            counters.add(counters::EVALUATIONS, self.made);
+            counters.add(counters::DISTANCES, self.distances);
+        }
+    }
+
     fn is_first_step(&self) -> bool {
         self.evaluation == self.n + 1u32
     }
@@ -237,7 +264,7 @@ struct Target {
 /// The field at the best point. Only the contact needs it, so it waits in shared memory and takes
 /// no registers.
 #[derive(CubeType)]
-struct Best {
+pub struct Best {
     rows: Shared<[Row]>,
     words: Shared<[u32]>,
 }
@@ -322,7 +349,7 @@ fn lowest_of(mine: Found, search: Search, vertex: u32, list: SharedList, exchang
 
 /// Minimizes the field over a polygon. `best` gets the field at the best point.
 #[cube]
-fn minimize(
+pub fn minimize(
     field: Field<'_>,
     list: SharedList,
     polygon: Polygon<'_>,
@@ -346,7 +373,7 @@ fn minimize(
         best: ball.center,
         distance: FAR.runtime(),
         made: 0u32,
-        made_points: 0u32,
+        distances: 0u32,
     };
     while search.evaluation < search.end {
         let mut next = search.next(list, polygon, lane);
@@ -362,8 +389,9 @@ fn minimize(
         if !next.is_known {
             search.made += 1u32;
             let vertices = list.points.min(n + 1u32 - search.evaluation);
-            search.made_points += select(next.is_vertex, vertices, 1u32);
-            let here = list.value(field, part, next.at, exchange, lanes);
+            let evaluated = list.value(field, part.at(next.at.s, next.at.t), exchange);
+            let here = evaluated.value;
+            search.distances += select(next.is_vertex, vertices, 1u32) * evaluated.distances;
             let slope =
                 Slope { s: here.gradient.dot(part.b - part.a), t: here.gradient.dot(part.c - part.a) };
             let iterate = Iterate { at: next.at, slope };
@@ -386,6 +414,12 @@ fn minimize(
     search
 }
 
+#[cube]
+pub fn no_best(#[comptime] variant: Variant) -> Best {
+    let held = comptime!(2 * (LANES / variant.lanes) as usize);
+    Best { rows: Shared::<[Row]>::new_slice(held), words: Shared::<[u32]>::new_slice(held) }
+}
+
 /// Finds the contact of each polygon by Face-TES. With 32 lanes, a group takes a polygon. Each
 /// thread keeps a face of the list in registers, and reads every 32nd of the other faces. With a
 /// list of at most 16 faces, the group evaluates several vertices at the same time. With one lane,
@@ -402,8 +436,7 @@ pub fn narrow_faces(
 ) {
     let lanes = comptime!(variant.lanes);
     let mut exchange = exchange(variant);
-    let held = comptime!(2 * (LANES / lanes) as usize);
-    let mut best = Best { rows: Shared::<[Row]>::new_slice(held), words: Shared::<[u32]>::new_slice(held) };
+    let mut best = no_best(variant);
     let number = select(lanes == 1u32, ABSOLUTE_POS as u32, CUBE_POS as u32);
     let count = counters.within(counters::POLYGONS, polygons.items.room);
     if number < count {
@@ -412,7 +445,7 @@ pub fn narrow_faces(
         let part = shapes.part(pair, item.face);
         let field = shapes.field(pair.shape_b);
         let cell = field.cell(item.cell);
-        let list = share_list(field, cell, lanes);
+        let list = share_list(field, cell, variant);
         let polygon = polygons.polygon(number, part);
         let reach = pair.part_reach();
         let search = minimize(field, list, polygon, reach, asked.iterations, &mut exchange, &mut best);
@@ -421,13 +454,7 @@ pub fn narrow_faces(
             sync_cube();
         }
         let lane = lane_of(lanes);
-        let counting = comptime!(variant.counting);
-        if counting && lane == 0u32 {
-            counters.add(counters::EVALUATIONS, search.made);
-            if cell.is_listed() && field.is_mesh() {
-                counters.add(counters::DISTANCES, search.made_points * list.faces.count);
-            }
-        }
+        search.count(counters, variant);
         if search.distance <= reach && lane == 0u32 {
             let v = best.get(select(lanes == 1u32, UNIT_POS, 0u32), search.distance);
             let point = part.at(search.best.s, search.best.t);

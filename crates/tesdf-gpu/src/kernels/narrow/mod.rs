@@ -10,3 +10,4 @@ pub mod nodes;
 pub mod piece;
 pub mod polygon_distance;
 pub mod taken;
+pub mod whole_faces;
