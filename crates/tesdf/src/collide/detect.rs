@@ -166,8 +166,9 @@ fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let Found { contacts, at_vertices, polygons, filtered } = &mut found;
     let parts: Vec<(Part, u32, u32)> = candidates.iter().map(|&candidate| pair.part(candidate)).collect();
     let mut rest = parts.as_slice();
-    while let Some((group, others)) = rest.split_at_checked(near_each_other(rest)).filter(|g| !g.0.is_empty())
-    {
+    while !rest.is_empty() {
+        let count = if pair.search.is_of_faces() { near_each_other(rest) } else { rest.len() };
+        let (group, others) = rest.split_at(count);
         rest = others;
         let around = pair.search.surroundings(&pair.field, group.iter().map(|(part, ..)| part));
         for (part, face_a, feature) in group {
@@ -194,7 +195,7 @@ fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
 const GROUP: usize = 16;
 const SPREAD: f64 = 4.0;
 
-/// The number of parts, from the first on, that lie near each other.
+/// The number of parts, from the first on, that lie near each other; at least 1.
 fn near_each_other(parts: &[(Part, u32, u32)]) -> usize {
     let (mut bounds, mut largest) = (Aabb::EMPTY, 0.0f64);
     parts
@@ -207,5 +208,5 @@ fn near_each_other(parts: &[(Part, u32, u32)]) -> usize {
             bounds.extent().max_element() <= SPREAD * largest
         })
         .count()
-        .max(usize::from(!parts.is_empty()))
+        .max(1)
 }

@@ -104,7 +104,7 @@ impl Search {
     }
 
     /// Whether parts are searched as a whole, not cell by cell.
-    fn is_of_faces(&self) -> bool {
+    pub fn is_of_faces(&self) -> bool {
         self.per == ContactsPer::Face && self.mode != Mode::Node
     }
 
