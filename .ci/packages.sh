@@ -8,5 +8,10 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 # Not optimised: the compiled code never runs.
 export CARGO_PROFILE_DEV_OPT_LEVEL=0
-step cargo package --quiet --allow-dirty --target-dir target/packages -p tesdf -p tesdf-sim
-step cargo package --quiet --allow-dirty --target-dir target/packages --no-verify --workspace --exclude tesdf-python
+# A new folder each time: cargo unpacks the packages into its home, under a name made from this path,
+# and takes what an earlier run unpacked there, even where its files have changed since.
+mkdir -p target/packages
+target_dir=$(mktemp -d "$PWD/target/packages/XXXXXX")
+trap 'rm -rf "$target_dir"' EXIT
+step cargo package --quiet --allow-dirty --target-dir "$target_dir" -p tesdf -p tesdf-sim
+step cargo package --quiet --allow-dirty --target-dir "$target_dir" --no-verify --workspace --exclude tesdf-python
