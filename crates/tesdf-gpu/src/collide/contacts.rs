@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use tesdf::collide::internal::kept_at_vertices;
 use tesdf::collide::{Contact, FeatureB, FeatureId, Mode, PairReduction, Shape};
 
 use super::scene::instances::Instances;
@@ -112,12 +113,8 @@ pub fn one_per_vertex(shapes: &[&Shape], instances: &Instances, words: &mut Vec<
         let face = surface_names(shape, Mode::Exact, words).0;
         Some(((words.a, words.b, vertex), cosine, face, at))
     };
-    let mut keys: Vec<_> = words.iter().zip(&*rows).enumerate().filter_map(key).collect();
-    keys.par_sort_unstable();
-    let mut keep = vec![true; words.len()];
-    for same in keys.chunk_by(|x, y| x.0 == y.0) {
-        same[1..].iter().for_each(|&(.., at)| keep[at] = false);
-    }
+    let keys = words.iter().zip(&*rows).enumerate().filter_map(key).collect();
+    let keep = kept_at_vertices(keys, words.len());
     let mut kept = keep.iter();
     words.retain(|_| *kept.next().unwrap_or(&true));
     let mut kept = keep.iter();

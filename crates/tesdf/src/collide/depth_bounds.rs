@@ -1,6 +1,7 @@
 //! Upper bounds of the depth over a triangle, and the place where they leave room for the most.
 use arrayvec::ArrayVec;
-use glam::DVec3;
+
+use super::greatest_minimum::{CORNERS, difference, equal_inside, equal_on_edges, margin, value};
 
 /// Largest number of bounds of one triangle.
 const MOST: usize = 8;
@@ -94,37 +95,18 @@ impl DepthBounds {
                 }
             }
         };
-        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].into_iter().for_each(&mut offer);
+        CORNERS.into_iter().for_each(&mut offer);
         for (k, other) in others.iter().enumerate() {
-            let d: [f64; 3] = std::array::from_fn(|i| new[i] - other.at[i]);
-            for i in 0..3 {
-                let j = (i + 1) % 3;
-                if (d[i] < 0.0) != (d[j] < 0.0) {
-                    let t = d[i] / (d[i] - d[j]);
-                    let mut weights = [0.0; 3];
-                    (weights[i], weights[j]) = (1.0 - t, t);
-                    offer(weights);
-                }
-            }
+            let d = difference(new, other.at);
+            equal_on_edges(d).for_each(&mut offer);
             for third in &others[k + 1..] {
-                let e = DVec3::from_array(std::array::from_fn(|i| new[i] - third.at[i]));
-                // Weights of sum 1 at which both differences are 0.
-                let w = DVec3::from_array(d).cross(e);
-                let weights = (w / (w.x + w.y + w.z)).to_array();
-                if weights.iter().all(|w| (0.0..=1.0).contains(w)) {
-                    offer(weights);
-                }
+                equal_inside(d, difference(new, third.at)).into_iter().for_each(&mut offer);
             }
         }
-        // Margin for rounding.
-        let size = self.bounds.iter().flat_map(|b| b.at).fold(0.0, |m: f64, v| m.max(v.abs()));
-        self.greatest = self.greatest.min(best.0 + 1e-15 * size);
+        let margin = margin(self.bounds.iter().map(|b| &b.at));
+        self.greatest = self.greatest.min(best.0 + margin);
         self.at = best.1;
     }
-}
-
-fn value(at: &[f64; 3], weights: [f64; 3]) -> f64 {
-    at[0] * weights[0] + at[1] * weights[1] + at[2] * weights[2]
 }
 
 #[cfg(test)]

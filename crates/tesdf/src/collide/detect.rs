@@ -143,13 +143,20 @@ fn one_per_vertex(contacts: Vec<Contact>, at_vertices: &[AtVertex]) -> Vec<Conta
         // Cosines that differ by rounding are equal.
         ((instance_a, instance_b, vertex), (cosine * 1e9).round() as i64, face_a, index)
     };
-    let mut keys: Vec<_> = at_vertices.iter().map(key).collect();
+    let keep = kept_at_vertices(at_vertices.iter().map(key).collect(), contacts.len());
+    contacts.into_iter().zip(keep).filter_map(|(contact, keep)| keep.then_some(contact)).collect()
+}
+
+/// For each of `count` contacts: whether it is kept. Of those with the same vertex, the one with the
+/// least cosine is; among equals, that of the lowest face. `keys` are vertex, cosine, face and index
+/// of the contacts at vertices.
+pub fn kept_at_vertices<V: Ord + Send>(mut keys: Vec<(V, i64, u32, usize)>, count: usize) -> Vec<bool> {
     keys.par_sort_unstable();
-    let mut keep = vec![true; contacts.len()];
+    let mut keep = vec![true; count];
     for same in keys.chunk_by(|x, y| x.0 == y.0) {
         same[1..].iter().for_each(|&(.., index)| keep[index] = false);
     }
-    contacts.into_iter().zip(keep).filter_map(|(contact, keep)| keep.then_some(contact)).collect()
+    keep
 }
 
 #[derive(Default)]

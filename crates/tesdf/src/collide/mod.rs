@@ -34,6 +34,7 @@ mod detect;
 mod error;
 mod field;
 mod field_value;
+mod greatest_minimum;
 mod hidden;
 mod hidden_overlap;
 mod hull;
@@ -64,10 +65,13 @@ mod why;
 /// Not part of the API.
 #[doc(hidden)]
 pub mod internal {
+    pub use super::detect::kept_at_vertices;
     pub use super::field::ROUNDING;
+    pub use super::greatest_minimum::greatest_minimum;
     pub use super::hidden::{DEEPER, SETTLED, THICK};
     pub use super::hull::{Wrench, residual};
-    pub use super::narrow::greatest_minimum;
+    pub use super::narrow::LARGE;
+    pub use super::narrow::extremes::{BEYOND, DIRECTIONS, LEVEL, MOVES, OPPOSES, TRIALS};
     pub use super::polygon::{MAX_VERTICES, Parts, Polygon};
     pub use super::reduce::FLAT;
 }

@@ -52,6 +52,7 @@ mod surroundings;
 #[doc(hidden)]
 pub mod internal {
     pub use super::kernel::PART;
+    pub use super::polygon::ROUNDING as POLYGON_ROUNDING;
     /// Below this distance, the gradient is the normal of the nearest face.
     pub const ON_SURFACE: f64 = super::ON_SURFACE_F32;
 }

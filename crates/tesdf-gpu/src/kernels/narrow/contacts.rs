@@ -12,8 +12,8 @@ pub struct Contacts {
     /// [`WORDS`] words for each: instances a and b, face of a, cell, face of b, feature of this
     /// face, corner of a plus [`CONVERGED`], ordered pair.
     pub words: Box<[u32]>,
-    /// [`ROWS`] rows for each, in the field's frame: point of a and distance; gradient and its cosine with
-    /// the face's normal; point of b.
+    /// [`ROWS`] rows for each, in the field's frame: point of a and distance; gradient and its cosine
+    /// with the face's normal; point of b.
     pub rows: Box<[Row]>,
     /// Capacity of the list.
     pub room: u32,

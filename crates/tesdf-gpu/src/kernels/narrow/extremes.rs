@@ -5,6 +5,7 @@
 //! Eight directions are searched at once. Four threads share a direction: they look for the farthest
 //! candidate, each among a quarter of the faces nearby.
 use cubecl::prelude::*;
+use tesdf::collide::internal;
 
 use super::super::broad::ordered_pair::{OrderedPair, Part, PartExpand};
 use super::super::counters::{self, Counters};
@@ -21,19 +22,19 @@ use super::polygon_distance::weights_of;
 use super::taken::{Memory, Taken, nothing_at};
 
 /// Number of directions in the plane of a face.
-pub const DIRECTIONS: u32 = 8;
+pub const DIRECTIONS: u32 = internal::DIRECTIONS as u32;
 /// A face is large when its longest edge exceeds this fraction of the smaller body's diagonal.
-const LARGE: f32 = 1.0 / 16.0;
+const LARGE: f32 = internal::LARGE as f32;
 /// The field opposes a face when the cosine between gradient and normal is below this.
-const OPPOSES: f32 = -0.5;
+const OPPOSES: f32 = internal::OPPOSES as f32;
 /// Number of times that a candidate beside the patch is moved inwards.
-const MOVES: u32 = 3;
+const MOVES: u32 = internal::MOVES as u32;
 /// A candidate is moved by this multiple of what is missing.
-const BEYOND: f32 = 1.01;
+const BEYOND: f32 = internal::BEYOND as f32;
 /// A gradient whose part along the face is shorter does not lead inwards.
-const LEVEL: f32 = 0.1;
+const LEVEL: f32 = internal::LEVEL as f32;
 /// Number of candidates along one direction after which the search for its extreme ends.
-const TRIALS: u32 = 16;
+const TRIALS: u32 = internal::TRIALS as u32;
 /// Rounding of a height, in the local frame. On the processor, which computes in `f64`, it is 1e-12.
 const HEIGHT: f32 = 1e-6;
 /// Points that are nearer to each other (local frame) are the same. The processor compares bits.

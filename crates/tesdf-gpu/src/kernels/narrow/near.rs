@@ -2,6 +2,7 @@
 //! face tree together.
 use cubecl::prelude::*;
 use tesdf::asset::layout;
+use tesdf::query::internal;
 
 use super::super::broad::ordered_pair::Part;
 use super::super::field::nearest::{TREE_DEPTH, TreeChild};
@@ -13,8 +14,8 @@ use super::exchange::LANES;
 use super::piece::Pool;
 
 /// Error of a bound, relative to the largest coordinate of the part and of the field's mesh, which
-/// is 1: as `ROUNDING` in `tesdf::query::polygon`.
-const ROUNDING: f32 = 2e-6;
+/// is 1.
+const ROUNDING: f32 = internal::POLYGON_ROUNDING;
 
 /// The axes along which faces and boxes can be apart from a part: those of the frame, the normal to
 /// both sides, and the directions out of the sides of a triangle.

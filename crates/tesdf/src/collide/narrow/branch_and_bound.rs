@@ -9,6 +9,7 @@ use super::Lowest;
 use crate::TeSdf;
 use crate::collide::field::{CellField, ROUNDING};
 use crate::collide::field_value::FieldValue;
+use crate::collide::greatest_minimum::summit;
 use crate::collide::polygon::Polygon;
 use crate::geometry::Triangle;
 use crate::query::{Precision, Surroundings};
@@ -213,58 +214,6 @@ impl<'a> Branches<'a> {
     }
 }
 
-/// Upper bound, over a triangle, of the minimum of convex functions with these values at the
-/// corners: the greatest minimum of the linear functions with the same values.
-///
-/// It is attained at a corner, on an edge where two functions are equal, or inside where three are
-/// equal; all these points are tested. Near one face, or between two or three, the error is only
-/// the curvature of the distances. So a search converges even when the minimum extends along a
-/// whole line.
-pub fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
-    summit(values).0
-}
-
-/// As [`greatest_minimum`], with the barycentric coordinates of the point where it is attained.
-fn summit<const N: usize>(values: [[f64; 3]; N]) -> (f64, [f64; 3]) {
-    let mut greatest = (f64::NEG_INFINITY, [1.0, 0.0, 0.0]);
-    let mut offer = |weights: [f64; 3]| {
-        let at = |u: &[f64; 3]| u[0] * weights[0] + u[1] * weights[1] + u[2] * weights[2];
-        let least = values.iter().map(at).fold(f64::INFINITY, f64::min);
-        if least > greatest.0 {
-            greatest = (least, weights);
-        }
-    };
-    offer([1.0, 0.0, 0.0]);
-    offer([0.0, 1.0, 0.0]);
-    offer([0.0, 0.0, 1.0]);
-    for k in 0..N {
-        for l in k + 1..N {
-            let d: [f64; 3] = std::array::from_fn(|i| values[k][i] - values[l][i]);
-            for i in 0..3 {
-                let j = (i + 1) % 3;
-                let t = d[i] / (d[i] - d[j]);
-                if (0.0..=1.0).contains(&t) {
-                    let mut weights = [0.0; 3];
-                    (weights[i], weights[j]) = (1.0 - t, t);
-                    offer(weights);
-                }
-            }
-            for m in l + 1..N {
-                // Weights of sum 1 at which both differences are 0.
-                let e: [f64; 3] = std::array::from_fn(|i| values[k][i] - values[m][i]);
-                let w = DVec3::from(d).cross(DVec3::from(e));
-                let weights = (w / (w.x + w.y + w.z)).to_array();
-                if weights.iter().all(|w| (0.0..=1.0).contains(w)) {
-                    offer(weights);
-                }
-            }
-        }
-    }
-    // Margin for rounding.
-    let margin = 1e-15 * values.as_flattened().iter().fold(0.0, |m: f64, v| m.max(v.abs()));
-    (greatest.0 + margin, greatest.1)
-}
-
 /// Upper bound, over a triangle, of the distance to two coplanar faces that share an edge; infinite
 /// when the faces are not such a pair.
 ///
@@ -312,29 +261,3 @@ fn coplanar_pair(asset: &TeSdf, [f, g]: [u32; 2], points: [DVec3; 3]) -> f64 {
 /// Faces within this distance of one plane (local frame) count as coplanar. Their deviation is
 /// added to the bound.
 const COPLANAR: f64 = 1e-12;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_greatest_minimum_is_that_of_dense_samples() {
-        // Numbers without a pattern.
-        let number = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) >> 16) / 65536.0;
-        for case in 0..200u32 {
-            let values: [[f64; 3]; 4] =
-                std::array::from_fn(|k| std::array::from_fn(|i| number(case * 12 + 3 * k as u32 + i as u32)));
-            const N: u32 = 60;
-            let mut sampled = f64::NEG_INFINITY;
-            for i in 0..=N {
-                for j in 0..=N - i {
-                    let w = [i, j, N - i - j].map(|n| f64::from(n) / f64::from(N));
-                    let at = |u: &[f64; 3]| (0..3).map(|c| w[c] * u[c]).sum::<f64>();
-                    sampled = sampled.max(values.iter().map(at).fold(f64::INFINITY, f64::min));
-                }
-            }
-            let exact = greatest_minimum(values);
-            assert!(exact >= sampled && exact <= sampled + 2.0 / f64::from(N), "{exact} {sampled}");
-        }
-    }
-}

@@ -79,7 +79,7 @@ pub fn lowest(
         if depth > ROUNDING || !query.only_touches(cell, distance, point) {
             return match cell {
                 // A whole face may cross any number of faces; in a cell there are few.
-                CellField::Whole(_) => query.lowest_by_cells(precision),
+                CellField::Whole(_) => query.lowest_by_cells(cell, precision),
                 _ => query.lowest_of_parts(cell, precision),
             };
         }
@@ -234,14 +234,13 @@ impl Query<'_> {
     }
 
     /// The lowest point of a polygon, cell by cell. What is found in one cell is the limit in the
-    /// next.
-    fn lowest_by_cells(&self, precision: Precision) -> Option<Lowest> {
-        let everywhere =
-            |p: DVec3| self.asset.found_at(p, self.asset.locate(p), Precision::F64).signed_distance;
+    /// next. `everywhere` is the whole field.
+    fn lowest_by_cells(&self, everywhere: &CellField, precision: Precision) -> Option<Lowest> {
+        let value = |point: DVec3| everywhere.value(point, Precision::F64).distance;
         let mut least = self
             .polygon
             .points()
-            .map(|point| (everywhere(point), Lowest { point, converged: true, face: None }))
+            .map(|point| (value(point), Lowest { point, converged: true, face: None }))
             .filter(|(distance, _)| *distance <= self.reach)
             .min_by(|x, y| x.0.total_cmp(&y.0));
         let mut converged = true;

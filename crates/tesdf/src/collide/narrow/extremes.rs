@@ -18,10 +18,10 @@ use crate::geometry::{Feature, Triangle};
 
 /// Number of directions in the plane of a face. A polygon's corner with a right angle is an extreme
 /// of two of them.
-const DIRECTIONS: usize = 8;
+pub const DIRECTIONS: usize = 8;
 
 /// The field opposes a face when the cosine between gradient and normal is below this.
-const OPPOSES: f64 = -0.5;
+pub const OPPOSES: f64 = -0.5;
 
 /// A patch along a line that ends nearer to the minimum than this fraction of the longest edge adds
 /// nothing. Two edges that cross are within the tolerance of each other on such a short piece.
@@ -32,16 +32,16 @@ const ALONG: f64 = 1e-9;
 
 /// Number of times that a candidate beside the patch is moved inwards: once for each side at a
 /// corner, and once more.
-const MOVES: usize = 3;
+pub const MOVES: usize = 3;
 
 /// A candidate is moved by this multiple of what is missing, so that rounding does not decide.
-const BEYOND: f64 = 1.01;
+pub const BEYOND: f64 = 1.01;
 
 /// A gradient whose part along the face is shorter does not lead inwards.
-const LEVEL: f64 = 0.1;
+pub const LEVEL: f64 = 0.1;
 
 /// Number of candidates along one direction after which the search for its extreme ends.
-const TRIALS: usize = 16;
+pub const TRIALS: usize = 16;
 
 /// Rounding of a height, in the local frame.
 const HEIGHT: f64 = 1e-12;
@@ -54,6 +54,7 @@ pub struct Patch<'a> {
     search: &'a Search,
     /// The longest edge of the part; zero for a point.
     longest: DVec3,
+    is_large: bool,
     /// The greatest signed distance of the patch.
     limit: f64,
     /// Where the patch can be: the part, or a chord of it.
@@ -81,17 +82,16 @@ impl<'a> Patch<'a> {
         let longest =
             edges.fold(DVec3::ZERO, |l, e| if e.length_squared() > l.length_squared() { e } else { l });
         let within = points.iter().copied().collect();
-        let mut patch =
-            Self { field, part, minimum, search, longest, limit: 0.0, within, normal: part.normal };
+        let is_large = search.is_large(part);
         let Search { tolerance, reach, .. } = *search;
-        patch.limit = if patch.is_large() { reach + part.radius } else { minimum.value.distance + tolerance };
-        patch
+        let limit = if is_large { reach + part.radius } else { minimum.value.distance + tolerance };
+        Self { field, part, minimum, search, longest, is_large, limit, within, normal: part.normal }
     }
 
     /// Points of the patch other than the minimum, at most one for each direction.
     pub fn extremes(mut self) -> ArrayVec<Minimum, DIRECTIONS> {
         let mut found = ArrayVec::<Minimum, DIRECTIONS>::new();
-        if self.part.points().len() < 2 || !(self.is_large() || self.may_be_flat()) {
+        if self.part.points().len() < 2 || !(self.is_large || self.may_be_flat()) {
             return found;
         }
         let mut candidates = self.candidates();
@@ -104,10 +104,6 @@ impl<'a> Patch<'a> {
             }
         }
         found
-    }
-
-    fn is_large(&self) -> bool {
-        self.search.is_large(self.part)
     }
 
     /// Whether the field may be constant, up to the tolerance, from the minimum to other points of
@@ -169,7 +165,7 @@ impl<'a> Patch<'a> {
     fn may_hold(&self, p: DVec3) -> bool {
         let from = p - self.minimum.point;
         let beside = if self.normal == DVec3::ZERO { SMALL * self.longest.length() } else { 0.0 };
-        from.length_squared() > beside * beside && (self.is_large() || self.is_level(from))
+        from.length_squared() > beside * beside && (self.is_large || self.is_level(from))
     }
 
     /// Whether the field is constant, to first order and up to the tolerance, along a way from the

@@ -1,10 +1,8 @@
 //! Narrow phase: the least signed distance over a node or a clipped polygon, and its point.
 mod branch_and_bound;
 mod exact;
-mod extremes;
+pub mod extremes;
 mod frank_wolfe;
-
-pub use branch_and_bound::greatest_minimum;
 
 use glam::DVec3;
 
@@ -63,7 +61,7 @@ const COARSE: f64 = 20.0 * ROUNDING;
 /// A face is large against a body when its longest edge exceeds this fraction of the body's
 /// diagonal. One contact for such a face would not hold the other body up. Smaller faces have
 /// neighbours whose contacts do.
-const LARGE: f64 = 1.0 / 16.0;
+pub const LARGE: f64 = 1.0 / 16.0;
 
 impl Search {
     /// `reach` is the contact distance; `diagonals` are those of the surface's and the field's body.

@@ -8,10 +8,16 @@ use super::super::{Contact, InstanceId};
 /// left, and takes all contacts with a similar normal that are linked to it: up to `link` apart, or
 /// on one face. Members of a group are in ascending order; groups are in the order of their deepest
 /// contacts.
-pub fn groups(contacts: &[Contact], members: &[usize], link: f64, angle: f64) -> Vec<Vec<usize>> {
+///
+/// `lower` is the lower id of the pair.
+pub fn groups(
+    contacts: &[Contact],
+    members: &[usize],
+    lower: InstanceId,
+    link: f64,
+    angle: f64,
+) -> Vec<Vec<usize>> {
     let least_cos = angle.cos();
-    let lower = members.iter().map(|&i| contacts[i].instance_a.min(contacts[i].instance_b)).min();
-    let lower = lower.unwrap_or(InstanceId(0));
     let mut grid: BTreeMap<[i64; 3], Vec<usize>> = BTreeMap::new();
     let mut on_face: BTreeMap<(InstanceId, u32), Vec<usize>> = BTreeMap::new();
     for &i in members {

@@ -200,9 +200,11 @@ impl PatchTracker {
         let mut before = std::mem::take(&mut self.known);
         let mut found = ContactPatches::default();
         for (pair, members) in pairs {
-            let regions = groups(contacts, &members, pair.link, self.options.angle);
+            let groups = groups(contacts, &members, pair.ids.0, pair.link, self.options.angle);
+            let regions: Vec<Region> =
+                groups.into_iter().map(|members| Region::new(contacts, &pair, members)).collect();
             let mut old = before.remove(&pair.ids).unwrap_or_default();
-            let continued = continued(contacts, &pair, &regions, &mut old);
+            let continued = continued(&regions, &mut old);
             found.ended.extend(old.into_iter().map(|known| known.id));
             for (region, known) in regions.into_iter().zip(continued) {
                 let patch = self.patch(contacts, &pair, region, known);
@@ -229,10 +231,11 @@ impl PatchTracker {
         &mut self,
         contacts: &[Contact],
         pair: &Pair,
-        region: Vec<usize>,
+        region: Region,
         known: Option<Known>,
     ) -> ContactPatch {
-        let outline = Outline::new(contacts, &region, pair.ids.0);
+        let Region { members, faces } = region;
+        let outline = Outline::new(contacts, &members, pair.ids.0);
         let Known { id, age, points: before, .. } = known.unwrap_or_else(|| {
             self.next_patch += 1;
             Known { id: self.next_patch - 1, age: 0, faces: Vec::new(), points: Vec::new() }
@@ -242,7 +245,6 @@ impl PatchTracker {
         let ids = self.point_ids(&places, &before, SAME_PLACE * pair.link);
         let points: Vec<KnownPoint> =
             ids.iter().zip(places).map(|(&id, places)| KnownPoint { id, places }).collect();
-        let faces = faces(contacts, pair, &region);
         self.known.entry(pair.ids).or_default().push(Known { id, age: age + 1, faces, points });
         ContactPatch {
             id,
@@ -254,7 +256,7 @@ impl PatchTracker {
             area: outline.area,
             center: outline.center,
             points: chosen.iter().zip(ids).map(|(&contact, id)| PatchPoint { id, contact }).collect(),
-            contacts: region,
+            contacts: members,
         }
     }
 
@@ -300,34 +302,35 @@ impl Pair {
     }
 }
 
-/// The faces of a region, sorted.
-fn faces(contacts: &[Contact], pair: &Pair, region: &[usize]) -> Vec<(bool, u32)> {
-    let mut faces: Vec<(bool, u32)> = region
-        .iter()
-        .flat_map(|&i| {
+/// The contacts of a patch to be.
+struct Region {
+    /// Their indices, in ascending order.
+    members: Vec<usize>,
+    /// Their faces, as [`Known::faces`].
+    faces: Vec<(bool, u32)>,
+}
+
+impl Region {
+    fn new(contacts: &[Contact], pair: &Pair, members: Vec<usize>) -> Self {
+        let of_contact = |&i: &usize| {
             let c = &contacts[i];
             let is_second = c.instance_a != pair.ids.0;
             [(is_second, c.face_a), (!is_second, c.face_b)]
-        })
-        .collect();
-    faces.sort_unstable();
-    faces.dedup();
-    faces
+        };
+        let mut faces: Vec<(bool, u32)> = members.iter().flat_map(of_contact).collect();
+        faces.sort_unstable();
+        faces.dedup();
+        Self { members, faces }
+    }
 }
 
 /// For each region, the earlier patch that it continues: the one with which it shares the most
 /// faces. A patch is continued once. Removes these patches from `old`.
-fn continued(
-    contacts: &[Contact],
-    pair: &Pair,
-    regions: &[Vec<usize>],
-    old: &mut Vec<Known>,
-) -> Vec<Option<Known>> {
+fn continued(regions: &[Region], old: &mut Vec<Known>) -> Vec<Option<Known>> {
     let mut shared = Vec::new();
     for (r, region) in regions.iter().enumerate() {
-        let faces = faces(contacts, pair, region);
         for (k, known) in old.iter().enumerate() {
-            let count = faces.iter().filter(|face| known.faces.binary_search(face).is_ok()).count();
+            let count = region.faces.iter().filter(|face| known.faces.binary_search(face).is_ok()).count();
             if count > 0 {
                 shared.push((std::cmp::Reverse(count), known.id, k, r));
             }

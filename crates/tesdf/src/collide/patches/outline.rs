@@ -17,6 +17,8 @@ pub struct Outline<'a> {
     pub center: DVec3,
     /// Members on the hull, anticlockwise, without those between two others.
     hull: Vec<(DVec2, usize)>,
+    /// The largest distance of a corner of the hull from its first one.
+    extent: f64,
 }
 
 /// Distances that differ by less than this fraction of the largest extent are equal.
@@ -28,35 +30,36 @@ impl<'a> Outline<'a> {
         let sum: DVec3 = members.iter().map(|&i| force(&contacts[i], lower)).sum();
         let normal = sum.try_normalize().unwrap_or(DVec3::Z);
         let distance = members.iter().map(|&i| contacts[i].distance).fold(f64::INFINITY, f64::min);
-        let (u, v) = normal.any_orthonormal_pair();
-        let origin = members.first().map_or(DVec3::ZERO, |&i| contacts[i].point_a);
-        let flat = |&i: &usize| {
-            let p = contacts[i].point_a - origin;
-            (DVec2::new(p.dot(u), p.dot(v)), i)
-        };
-        let hull = convex_hull(members.iter().map(flat).collect());
-        let mut outline = Self { contacts, members, normal, distance, area: 0.0, center: origin, hull };
+        let (center, hull) = (contacts[members[0]].point_a, Vec::new());
+        let mut outline = Self { contacts, members, normal, distance, area: 0.0, center, hull, extent: 0.0 };
+        outline.hull = convex_hull(members.iter().map(|&i| (outline.flat(i), i)).collect());
+        let first = outline.hull[0].0;
+        outline.extent = outline.hull.iter().map(|(p, _)| p.distance(first)).fold(0.0, f64::max);
         outline.measure();
         outline
     }
 
-    /// The pressure at a point of the hull, up to a factor.
-    fn pressure(&self, i: usize) -> f64 {
-        let greatest =
-            self.members.iter().map(|&i| self.contacts[i].distance).fold(f64::NEG_INFINITY, f64::max);
-        let range = greatest - self.distance;
-        if range <= LEVEL * self.extent() { 1.0 } else { (greatest - self.contacts[i].distance) / range }
+    /// The place of a contact, seen along the normal, relative to the first member.
+    fn flat(&self, i: usize) -> DVec2 {
+        let (u, v) = self.normal.any_orthonormal_pair();
+        let p = self.contacts[i].point_a - self.contacts[self.members[0]].point_a;
+        DVec2::new(p.dot(u), p.dot(v))
     }
 
-    fn extent(&self) -> f64 {
-        let Some(&(first, _)) = self.hull.first() else { return 0.0 };
-        self.hull.iter().map(|(p, _)| p.distance(first)).fold(0.0, f64::max)
+    /// The pressures at the corners of the hull, up to a factor.
+    fn pressures(&self) -> Vec<f64> {
+        let distances = self.members.iter().map(|&i| self.contacts[i].distance);
+        let greatest = distances.fold(f64::NEG_INFINITY, f64::max);
+        let range = greatest - self.distance;
+        let is_level = range <= LEVEL * self.extent;
+        let pressure = |i: usize| if is_level { 1.0 } else { (greatest - self.contacts[i].distance) / range };
+        self.hull.iter().map(|&(_, i)| pressure(i)).collect()
     }
 
     /// Computes area and pressure centre, from the triangles of a fan. The pressure is linear in
     /// each.
     fn measure(&mut self) {
-        let pressures: Vec<f64> = self.hull.iter().map(|&(_, i)| self.pressure(i)).collect();
+        let pressures = self.pressures();
         let point = |k: usize| self.contacts[self.hull[k].1].point_a;
         let (mut area, mut force, mut moment) = (0.0, 0.0, DVec3::ZERO);
         let origin = point(0);
@@ -88,7 +91,7 @@ impl<'a> Outline<'a> {
     /// At most `count` members: the deepest, then those that make the polygon of the chosen ones
     /// largest.
     pub fn points(&self, count: usize) -> Vec<usize> {
-        let level = self.distance + LEVEL * self.extent();
+        let level = self.distance + LEVEL * self.extent;
         // Of equally deep contacts, a corner of the hull, and the first one of these.
         let on_hull = self.hull.iter().map(|&(_, i)| i).filter(|&i| self.contacts[i].distance <= level).min();
         let deepest = on_hull.or_else(|| {
@@ -98,12 +101,7 @@ impl<'a> Outline<'a> {
         let mut chosen: Vec<usize> = deepest.into_iter().collect();
         let mut rest: Vec<(DVec2, usize)> =
             self.hull.iter().copied().filter(|(_, i)| deepest != Some(*i)).collect();
-        let flat = |i: usize| {
-            let (u, v) = self.normal.any_orthonormal_pair();
-            let p = self.contacts[i].point_a - self.contacts[self.members[0]].point_a;
-            DVec2::new(p.dot(u), p.dot(v))
-        };
-        let mut polygon: Vec<DVec2> = chosen.iter().map(|&i| flat(i)).collect();
+        let mut polygon: Vec<DVec2> = chosen.iter().map(|&i| self.flat(i)).collect();
         while chosen.len() < count && !rest.is_empty() {
             let gain = |p: DVec2| match polygon.len() {
                 1 => p.distance(polygon[0]),
@@ -121,7 +119,7 @@ impl<'a> Outline<'a> {
             };
             let (k, best) = rest.iter().enumerate().fold((0, 0.0), first_best);
             // Rounding puts points of a line beside it.
-            let extent = self.extent();
+            let extent = self.extent;
             if best <= LEVEL * if polygon.len() == 1 { extent } else { extent * extent } {
                 break;
             }
