@@ -328,6 +328,15 @@ impl TeSdf {
         });
     }
 
+    /// As [`store_normals`](Self::store_normals), for queries. After a move they compute the normals
+    /// of the few faces that they need: the next move may follow soon.
+    #[inline]
+    pub(crate) fn store_normals_unless_moved(&self) {
+        if self.motion.is_none() {
+            self.store_normals();
+        }
+    }
+
     fn check_mesh(&self) -> Result<(), AssetError> {
         let (f, v) = (self.faces.len(), self.vertices.len());
         if f == 0 || f > layout::MAX_FACES {

@@ -416,7 +416,7 @@ mod tests {
         let mut surface = Surface::new(&TriangleMesh::new(vertices, faces).unwrap(), 1.0, Touching::Kept);
         let cell = Cell { corners: [p, p + DVec3::X, p + DVec3::Y, p + DVec3::Z], depth: 0 };
         let all: Vec<u32> = (0..surface.faces.len() as u32).collect();
-        for isa in Isa::all_here() {
+        for &isa in Isa::of_processor() {
             surface.isa = isa;
             let pool = Pool::new(&surface, &all, &cell);
             let mut rows = Vec::new();

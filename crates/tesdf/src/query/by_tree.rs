@@ -30,7 +30,10 @@ impl TeSdf {
         match precision {
             _ if !is_near(local) => self.answer_far(point),
             Precision::F32 => self.by_tree_f32(point, local),
-            Precision::F64 => self.by_tree_f64(point, local),
+            Precision::F64 => {
+                self.store_normals_unless_moved();
+                self.by_tree_f64(point, local)
+            }
         }
     }
 

@@ -66,61 +66,69 @@ fn nearest_avx512(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best:
     nearest_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, best)
 }
 
-/// Appends to `near` those of `faces` whose squared distance is at most `limit`, without
-/// repetitions of the last face.
+/// Writes the squared distances of `faces`, as [`Nearest::distance_squared`], and returns the least.
+/// The distance to a face whose numbers overflow is NaN, and does not count. `out` has the length of
+/// `faces`.
 #[inline]
-pub fn within(
+pub fn distances(
     isa: Isa,
     records: &[FaceRecord],
     faces: &[[u32; LANES]],
     p: Vec3,
-    limit: f32,
-    near: &mut Vec<u32>,
-) {
+    out: &mut [[f32; LANES]],
+) -> f32 {
     match isa {
-        Isa::Baseline => within_lanes::<[f32; LANES], LANES>(records, faces, p, limit, near),
+        Isa::Baseline => distances_lanes::<[f32; LANES], LANES>(records, faces, p, out),
         // SAFETY: `detect` found the features.
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx2 => unsafe { within_avx2(records, faces, p, limit, near) },
+        Isa::Avx2 => unsafe { distances_avx2(records, faces, p, out) },
         // SAFETY: as above.
         #[cfg(target_arch = "x86_64")]
-        Isa::Avx512 => unsafe { within_avx512(records, faces, p, limit, near) },
+        Isa::Avx512 => unsafe { distances_avx512(records, faces, p, out) },
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn within_avx2(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, limit: f32, near: &mut Vec<u32>) {
-    within_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, limit, near);
+fn distances_avx2(
+    records: &[FaceRecord],
+    faces: &[[u32; LANES]],
+    p: Vec3,
+    out: &mut [[f32; LANES]],
+) -> f32 {
+    distances_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, out)
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512vl")]
-fn within_avx512(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, limit: f32, near: &mut Vec<u32>) {
-    within_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, limit, near);
+fn distances_avx512(
+    records: &[FaceRecord],
+    faces: &[[u32; LANES]],
+    p: Vec3,
+    out: &mut [[f32; LANES]],
+) -> f32 {
+    distances_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, out)
 }
 
 #[inline(always)]
-fn within_lanes<L: Lanes<N>, const N: usize>(
+fn distances_lanes<L: Lanes<N>, const N: usize>(
     records: &[FaceRecord],
     faces: &[[u32; N]],
     p: Vec3,
-    limit: f32,
-    near: &mut Vec<u32>,
-) {
+    out: &mut [[f32; N]],
+) -> f32 {
     let p = V([L::splat(p.x), L::splat(p.y), L::splat(p.z)]);
-    for faces in faces {
+    let mut least = L::splat(f32::INFINITY);
+    for (faces, out) in faces.iter().zip(out) {
         let mut rows = [records[0].as_array(); N];
         for l in 0..N {
             rows[l] = records[faces[l] as usize].as_array();
         }
-        let d = distance_squared(L::load(rows), p).to_array();
-        for l in 0..N {
-            if d[l] <= limit && near.last() != Some(&faces[l]) {
-                near.push(faces[l]);
-            }
-        }
+        let d = distance_squared(L::load(rows), p);
+        least = d.min(least);
+        *out = d.to_array();
     }
+    least.least().to_array()[0]
 }
 
 /// Lower bounds of the distances between a polygon and faces, up to rounding: how far they are
@@ -246,12 +254,9 @@ fn nearest_lanes<L: Lanes<N>, const N: usize>(
         least = closer.select(d, least);
         nearest = closer.select(L::from_bits(*faces), nearest);
     }
-    let least = least.to_array();
-    let mut lane = 0;
-    for l in 1..N {
-        lane = if least[l] < least[lane] { l } else { lane };
-    }
-    Nearest { distance_squared: least[lane], face: nearest.to_array()[lane].to_bits() }
+    // One comparison after the other would take as long as eight faces.
+    let lane = least.least().at_least(least).bits().trailing_zeros() as usize % N;
+    Nearest { distance_squared: least.to_array()[lane], face: nearest.to_array()[lane].to_bits() }
 }
 
 // No closures and no iterators over lanes below. The compiler would build them without the caller's
@@ -341,7 +346,7 @@ mod tests {
     fn assert_exact(corners: [DVec3; 3], p: DVec3) -> Result<(), TestCaseError> {
         let record = FaceRecord::new(&Triangle::new(corners), DVec3::ZERO, SignHints::default());
         let squared = exact::squared_distance(p, corners);
-        for isa in Isa::all_here() {
+        for &isa in Isa::of_processor() {
             let found = nearest(isa, &[record], &[[0; LANES]], p.as_vec3(), Nearest::NONE);
             let distance = f64::from(found.distance_squared).sqrt();
             prop_assert!(exact::is_root(distance, &squared, PROMISE), "{isa:?}: {found:?} {record:?}");
@@ -351,9 +356,9 @@ mod tests {
                 edge => triangle.closest_on_edge(edge as usize - 1, p),
             };
             prop_assert!(exact::is_root(closest.distance, &squared, PROMISE), "{isa:?}: {closest:?}");
-            let mut near = Vec::new();
-            within(isa, &[record], &[[0; LANES]], p.as_vec3(), found.distance_squared, &mut near);
-            prop_assert_eq!(near, [0]);
+            let mut all = [[0.0; LANES]];
+            let least = distances(isa, &[record], &[[0; LANES]], p.as_vec3(), &mut all);
+            prop_assert_eq!((least, all), (found.distance_squared, [[found.distance_squared; LANES]]));
         }
         Ok(())
     }

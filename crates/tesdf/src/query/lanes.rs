@@ -32,6 +32,10 @@ pub trait Lanes<const N: usize>: Copy {
     fn select(self, yes: Self, no: Self) -> Self;
     /// The lanes as an array.
     fn to_array(self) -> [f32; N];
+    /// The bits of a mask. Lane 0 is the lowest bit.
+    fn bits(self) -> u32;
+    /// The least number in all lanes, where no lane is NaN.
+    fn least(self) -> Self;
 }
 
 impl Lanes<8> for [f32; 8] {
@@ -94,6 +98,19 @@ impl Lanes<8> for [f32; 8] {
     #[inline(always)]
     fn to_array(self) -> [f32; 8] {
         self
+    }
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        let mut bits = 0;
+        for (l, lane) in self.into_iter().enumerate() {
+            bits |= lane.to_bits() >> 31 << l;
+        }
+        bits
+    }
+    #[inline(always)]
+    fn least(self) -> Self {
+        let [a, b, c, d, e, f, g, h] = self;
+        [a.min(e).min(b.min(f)).min(c.min(g).min(d.min(h))); 8]
     }
 }
 
@@ -190,6 +207,18 @@ mod avx2 {
             let mut out = [0.0; 8];
             unsafe { _mm256_storeu_ps(out.as_mut_ptr(), self) };
             out
+        }
+        #[inline(always)]
+        fn bits(self) -> u32 {
+            unsafe { _mm256_movemask_ps(self) as u32 }
+        }
+        #[inline(always)]
+        fn least(self) -> Self {
+            unsafe {
+                let halves = _mm256_min_ps(self, _mm256_permute2f128_ps::<1>(self, self));
+                let quarters = _mm256_min_ps(halves, _mm256_permute_ps::<0b01_00_11_10>(halves));
+                _mm256_min_ps(quarters, _mm256_permute_ps::<0b10_11_00_01>(quarters))
+            }
         }
     }
 }

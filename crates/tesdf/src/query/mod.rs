@@ -370,7 +370,10 @@ impl TeSdf {
     pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
         match precision {
             Precision::F32 => self.answer_f32(local, place, faces),
-            Precision::F64 => self.answer_f64(local, place, faces),
+            Precision::F64 => {
+                self.store_normals_unless_moved();
+                self.answer_f64(local, place, faces)
+            }
         }
     }
 

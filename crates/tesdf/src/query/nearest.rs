@@ -2,7 +2,7 @@ use std::cell::RefCell;
 
 use glam::{DVec3, Vec3};
 
-use super::kernel::{self, Nearest};
+use super::kernel::{self, LANES, Nearest};
 use super::locate::Faces;
 use super::polygon::{MAX_POINTS, PolygonAxes};
 use crate::TeSdf;
@@ -36,6 +36,10 @@ impl Reads {
 const F32_RELATIVE: f32 = 4e-6;
 const F32_ABSOLUTE: f32 = 4e-6;
 
+/// The constants above hold for cubes with a side up to this, which contain all faces, and for points
+/// up to half of this from the centre along each axis (local frame).
+const F32_REACH: f64 = 4.0;
+
 // A leaf of the face tree is one step of the kernel.
 const _: () = assert!(TREE_LEAF == kernel::LANES);
 
@@ -51,12 +55,8 @@ impl TeSdf {
     /// The nearest of all faces. `p` is relative to the centre of the cube.
     pub(super) fn nearest_in_tree_f32(&self, p: Vec3, reads: &mut Reads) -> Nearest {
         let mut best = Nearest::NONE;
-        let bound = |b: &[f32]| {
-            let d = (Vec3::from_slice(b) - p).max(p - Vec3::from_slice(&b[3..])).max(Vec3::ZERO);
-            d.length_squared()
-        };
         let beyond = |d: f32, limit: f32| d >= limit;
-        reads.tree_nodes += self.walk_tree(bound, beyond, f32::INFINITY, |start, count| {
+        reads.tree_nodes += self.walk_tree(squared_box_bound(p), beyond, f32::INFINITY, |start, count| {
             reads.tree_faces += count as usize;
             let faces = std::array::from_fn(|l| start + (l as u32).min(count - 1));
             best = kernel::nearest(self.isa, &self.records, &[faces], p, best);
@@ -109,21 +109,9 @@ impl TeSdf {
     ///
     /// The `f32` kernel selects the candidates: faces within its rounding of the least distance.
     pub(super) fn nearest_in_list_f64(&self, faces: &Faces, p: DVec3) -> (u32, Closest) {
-        thread_local! {
-            static NEAR: RefCell<Vec<u32>> = const { RefCell::new(Vec::new()) };
-        }
         let relative = (p - self.cube.middle()).as_vec3();
-        let least = self.nearest_in_list_f32(faces, relative).distance_squared;
-        let limit = squared_limit(least.sqrt());
         let mut best = Best::NONE;
-        NEAR.with_borrow_mut(|near| {
-            near.clear();
-            if limit.is_finite() {
-                kernel::within(self.isa, &self.records, faces.chunks(), relative, limit, near);
-            }
-            let candidates = if near.is_empty() { faces.ids() } else { near };
-            candidates.iter().for_each(|&face| best.try_face(self, face, p));
-        });
+        self.each_in_list(faces, relative, |least| least, &mut |face| best.try_face(self, face, p));
         (best.position, best.closest)
     }
 
@@ -137,24 +125,37 @@ impl TeSdf {
         offer: &mut impl FnMut(u32) -> f64,
     ) {
         let relative = (center - self.cube.middle()).as_vec3();
-        let least = self.nearest_in_list_f32(faces, relative).distance_squared.sqrt();
         // The least distance over the ball is at most that at its centre.
-        self.each_in_list(faces, relative, least + radius as f32, &mut |face| {
+        self.each_in_list(faces, relative, |least| least + radius as f32, &mut |face| {
             offer(face);
         });
     }
 
     /// Offers the faces of a list whose distance from a point, relative to the centre of the cube,
-    /// can be up to `distance`.
-    fn each_in_list(&self, faces: &Faces, relative: Vec3, distance: f32, offer: &mut impl FnMut(u32)) {
-        let limit = squared_limit(distance);
+    /// can be up to `distance`, which receives the least distance of all.
+    #[inline]
+    fn each_in_list(
+        &self,
+        faces: &Faces,
+        relative: Vec3,
+        distance: impl Fn(f32) -> f32,
+        offer: &mut impl FnMut(u32),
+    ) {
+        thread_local! {
+            static SQUARED: RefCell<Vec<[f32; LANES]>> = const { RefCell::new(Vec::new()) };
+        }
+        // The buffer is taken, because `offer` may read another list.
+        let mut squared = SQUARED.take();
+        squared.resize(squared.len().max(faces.chunks().len()), [0.0; LANES]);
+        let least = kernel::distances(self.isa, &self.records, faces.chunks(), relative, &mut squared);
+        let limit = squared_limit(distance(least.sqrt()));
         if limit.is_finite() {
-            let mut near = Vec::with_capacity(faces.ids().len());
-            kernel::within(self.isa, &self.records, faces.chunks(), relative, limit, &mut near);
-            near.into_iter().for_each(offer);
+            let squared = squared.as_flattened();
+            faces.ids().iter().zip(squared).filter(|(_, d)| **d <= limit).for_each(|(&face, _)| offer(face));
         } else {
             faces.ids().iter().copied().for_each(offer);
         }
+        SQUARED.set(squared);
     }
 
     /// Offers the faces that can come within a limit of a convex polygon, those in nearer boxes
@@ -234,7 +235,7 @@ impl TeSdf {
             return self.near_polygon(&[p], DVec3::ZERO, limit, &mut offer);
         }
         let relative = (p - self.cube.middle()).as_vec3();
-        self.each_in_list(faces, relative, limit as f32, offer);
+        self.each_in_list(faces, relative, |_| limit as f32, offer);
     }
 
     /// As [`near_in_list`](Self::near_in_list) for all faces, from the face tree. `offer` returns
@@ -260,18 +261,58 @@ impl TeSdf {
 
     /// As [`nearest_in_list_f64`](Self::nearest_in_list_f64) for all faces.
     pub(super) fn nearest_in_tree_f64(&self, p: DVec3) -> (u32, Closest) {
+        let relative = p - self.cube.middle();
         let mut best = Best::NONE;
-        // Faces at the same distance are visited too, because the lowest id wins.
-        self.walk_tree(
-            self.box_bound(p),
-            |d: f64, limit: f64| d > limit,
-            f64::INFINITY,
-            |start, count| {
-                (start..start + count).for_each(|face| best.try_face(self, face, p));
-                best.closest.distance
-            },
-        );
+        if self.cube.side() <= F32_REACH && 2.0 * relative.abs().max_element() <= F32_REACH {
+            self.near_in_tree_f32(relative.as_vec3(), &mut |face| best.try_face(self, face, p));
+        }
+        if best.id == Best::NONE.id {
+            // Faces at the same distance are visited too, because the lowest id wins.
+            self.walk_tree(
+                self.box_bound(p),
+                |d: f64, limit: f64| d > limit,
+                f64::INFINITY,
+                |start, count| {
+                    (start..start + count).for_each(|face| best.try_face(self, face, p));
+                    best.closest.distance
+                },
+            );
+        }
         (best.position, best.closest)
+    }
+
+    /// Offers the faces within the rounding of the `f32` kernel of the least distance, of all faces.
+    /// `p` is relative to the centre of the cube.
+    fn near_in_tree_f32(&self, p: Vec3, offer: &mut impl FnMut(u32)) {
+        thread_local! {
+            static NEAR: RefCell<Vec<(u32, f32)>> = const { RefCell::new(Vec::new()) };
+        }
+        let mut near = NEAR.take();
+        near.clear();
+        let (mut least, mut limit) = (f32::INFINITY, f32::INFINITY);
+        self.walk_tree(squared_box_bound(p), |d, limit| d > limit, f32::INFINITY, |start, count| {
+            let faces = std::array::from_fn(|l| start + (l as u32).min(count - 1));
+            let mut squared = [[0.0; LANES]];
+            let nearer = kernel::distances(self.isa, &self.records, &[faces], p, &mut squared);
+            if nearer < least {
+                (least, limit) = (nearer, squared_limit(nearer.sqrt()));
+            }
+            let all = faces.into_iter().zip(squared[0]).take(count as usize);
+            near.extend(all.filter(|(_, d)| *d <= limit));
+            limit
+        });
+        if limit.is_finite() {
+            near.iter().filter(|(_, d)| *d <= limit).for_each(|(face, _)| offer(*face));
+        }
+        NEAR.set(near);
+    }
+}
+
+/// Lower bound of the squared distance from `p` to a box of the face tree, up to rounding.
+fn squared_box_bound(p: Vec3) -> impl Fn(&[f32]) -> f32 {
+    move |b| {
+        let d = (Vec3::from_slice(b) - p).max(p - Vec3::from_slice(&b[3..])).max(Vec3::ZERO);
+        d.length_squared()
     }
 }
 
@@ -333,14 +374,14 @@ mod tests {
             let axes = PolygonAxes::new(&points, whole.normal);
             let limit = axes.with_slack(distance);
             let record = FaceRecord::new(&triangle, DVec3::ZERO, SignHints::default());
-            for isa in Isa::all_here() {
+            for &isa in Isa::of_processor() {
                 for bound in kernel::apart(isa, &[record], &[0; TREE_LEAF], &axes) {
                     prop_assert!(bound <= limit, "{isa:?}: {bound} of {distance}");
                 }
             }
             let bounds = Aabb::of(&corners).rounded_from(DVec3::ZERO);
             prop_assert!(axes.to_box(&bounds) <= limit, "box: {} of {distance}", axes.to_box(&bounds));
-            for isa in Isa::all_here() {
+            for &isa in Isa::of_processor() {
                 for bound in kernel::boxes_apart(isa, &bounds.map(|x| [x; TREE_LEAF]), &axes) {
                     prop_assert!(bound <= limit, "box, {isa:?}: {bound} of {distance}");
                 }
