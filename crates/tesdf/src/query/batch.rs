@@ -8,6 +8,9 @@ use crate::TeSdf;
 /// Number of points per task.
 const TASK: usize = 1 << 12;
 
+/// Number of points whose faces are on their way from memory.
+const AHEAD: usize = 8;
+
 /// The points that a batch answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
@@ -218,33 +221,43 @@ impl TeSdf {
         self.locate_all(&locals, &mut places);
         for place in &places {
             if let Place::Listed { offset, .. } = *place {
-                fetch(&self.lists[offset as usize..]);
+                fetch(self.lists.as_ptr().wrapping_add(offset as usize));
             }
         }
-        for (place, faces) in places.iter().zip(faces.iter_mut()) {
-            if let Place::Listed { offset, .. } = *place {
+        // The faces of the next points are fetched while distances to those of this point are
+        // computed.
+        for next in 0..points.len() + AHEAD {
+            if let (Some(&Place::Listed { offset, .. }), Some(faces)) = (places.get(next), faces.get_mut(next)) {
                 self.read_list(offset, faces);
-                faces.ids().iter().for_each(|&face| fetch(&self.records[face as usize..]));
+                self.fetch_faces(faces);
+            }
+            if let Some(i) = next.checked_sub(AHEAD) {
+                answers[i] = match (extent, places[i]) {
+                    (Extent::Domain, Place::NotOfDomain) => Answer::NONE,
+                    (_, place) => self.answer(points[i], locals[i], place, &faces[i], precision),
+                };
             }
         }
-        for (i, answer) in answers.iter_mut().enumerate() {
-            *answer = match (extent, places[i]) {
-                (Extent::Domain, Place::NotOfDomain) => Answer::NONE,
-                (_, place) => self.answer(points[i], locals[i], place, &faces[i], precision),
-            };
+    }
+
+    /// Prefetches the faces of a list.
+    #[inline(always)]
+    pub(super) fn fetch_faces(&self, faces: &Faces) {
+        for &face in faces.chunks().as_flattened() {
+            fetch(self.records.as_ptr().wrapping_add(face as usize));
         }
     }
 }
 
-/// Prefetches the cache line of the first element. It is only a hint.
+/// Prefetches the cache line at an address. It is only a hint, so any address will do.
 #[inline(always)]
-fn fetch<T>(slice: &[T]) {
+fn fetch<T>(address: *const T) {
     #[cfg(target_arch = "x86_64")]
     // SAFETY: a prefetch has no visible effect, and the instruction is part of x86-64.
     unsafe {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        _mm_prefetch::<_MM_HINT_T0>(slice.as_ptr().cast());
+        _mm_prefetch::<_MM_HINT_T0>(address.cast());
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = slice;
+    let _ = address;
 }

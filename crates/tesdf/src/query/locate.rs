@@ -32,6 +32,7 @@ pub enum Place {
 /// The faces of a list, by index, padded for the kernel by repeating the last face.
 #[derive(Debug, Default)]
 pub struct Faces {
+    /// At least as long as the list. It never gets shorter.
     chunks: Vec<[u32; LANES]>,
     count: usize,
 }
@@ -40,7 +41,7 @@ impl Faces {
     /// The padded faces, for the kernel.
     #[inline]
     pub fn chunks(&self) -> &[[u32; LANES]] {
-        &self.chunks
+        &self.chunks[..self.count.div_ceil(LANES)]
     }
 
     /// The faces without padding.
@@ -52,16 +53,17 @@ impl Faces {
     /// Replaces the faces by `count` others.
     #[inline(always)]
     fn fill(&mut self, count: usize, face: impl Fn(usize) -> u32) {
+        let chunks = count.div_ceil(LANES);
+        if self.chunks.len() < chunks {
+            self.chunks.resize(chunks, [0; LANES]);
+        }
         self.count = count;
-        self.chunks.clear();
-        let mut first = 0;
-        while first < count {
-            let mut chunk = [0; LANES];
+        // No number of iterations but that of the chunks depends on the list: it could not be
+        // predicted.
+        for (c, chunk) in self.chunks[..chunks].iter_mut().enumerate() {
             for (l, id) in chunk.iter_mut().enumerate() {
-                *id = face((first + l).min(count - 1));
+                *id = face((LANES * c + l).min(count - 1));
             }
-            self.chunks.push(chunk);
-            first += LANES;
         }
     }
 }

@@ -301,6 +301,8 @@ impl TeSdf {
         FACES.with_borrow_mut(|faces| {
             if let Place::Listed { offset, .. } = place {
                 self.read_list(offset, faces);
+                // All of them at once: otherwise those of the second chunk would wait for the first.
+                self.fetch_faces(faces);
             }
             self.answer(point, local, place, faces, precision)
         })
@@ -349,7 +351,7 @@ impl TeSdf {
 
     /// The answer at `point`; `local` is `point` in the local frame. `faces` are those of the
     /// place's list, if it has one.
-    #[inline]
+    #[inline(always)]
     fn answer(
         &self,
         point: DVec3,
@@ -366,7 +368,7 @@ impl TeSdf {
     }
 
     /// As [`answer`](Self::answer), in the local frame. `local` must be finite and not far.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
         match precision {
             Precision::F32 => self.answer_f32(local, place, faces),
