@@ -153,7 +153,7 @@ impl Barycentric {
     /// level` are those of a grid with `2^level` cubes along a side and six cells in each cube:
     /// cell `6 · (x + (y << level) + (z << 2 level)) + root`. `None` as in
     /// [`in_unit_cube`](Self::in_unit_cube).
-    #[inline]
+    #[inline(always)]
     pub fn in_grid(p: DVec3, level: u32) -> Option<(usize, Self)> {
         let inside = p.cmpge(DVec3::ZERO).all() && p.cmple(DVec3::ONE).all();
         if !inside {

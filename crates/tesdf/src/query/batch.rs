@@ -1,6 +1,7 @@
 use crate::parallel::*;
 use glam::DVec3;
 
+use super::far::is_near;
 use super::locate::{FLIGHT, Faces, Place};
 use super::{Answer, Precision};
 use crate::TeSdf;
@@ -232,10 +233,15 @@ impl TeSdf {
                 self.fetch_faces(faces);
             }
             if let Some(i) = next.checked_sub(AHEAD) {
-                answers[i] = match (extent, places[i]) {
-                    (Extent::Domain, Place::NotOfDomain) => Answer::NONE,
-                    (_, place) => self.answer(points[i], locals[i], place, &faces[i], precision),
-                };
+                let (local, place) = (locals[i], places[i]);
+                // Each case writes its own fields: a copy of a whole answer would wait for them.
+                if extent == Extent::Domain && matches!(place, Place::NotOfDomain) {
+                    answers[i] = Answer::NONE;
+                } else if is_near(local) {
+                    answers[i] = self.to_answer(self.find(local, place, &faces[i], precision));
+                } else {
+                    answers[i] = self.answer_far(points[i]);
+                }
             }
         }
     }

@@ -298,13 +298,16 @@ impl TeSdf {
         thread_local! {
             static FACES: RefCell<Faces> = RefCell::default();
         }
+        if !is_near(local) {
+            return self.answer_far(point);
+        }
         FACES.with_borrow_mut(|faces| {
             if let Place::Listed { offset, .. } = place {
                 self.read_list(offset, faces);
                 // All of them at once: otherwise those of the second chunk would wait for the first.
                 self.fetch_faces(faces);
             }
-            self.answer(point, local, place, faces, precision)
+            self.to_answer(self.find(local, place, faces, precision))
         })
     }
 
@@ -349,25 +352,8 @@ impl TeSdf {
         }
     }
 
-    /// The answer at `point`; `local` is `point` in the local frame. `faces` are those of the
+    /// The answer at a point of the local frame that is finite and not far. `faces` are those of the
     /// place's list, if it has one.
-    #[inline(always)]
-    fn answer(
-        &self,
-        point: DVec3,
-        local: DVec3,
-        place: Place,
-        faces: &Faces,
-        precision: Precision,
-    ) -> Answer {
-        if is_near(local) {
-            self.to_answer(self.find(local, place, faces, precision))
-        } else {
-            self.answer_far(point)
-        }
-    }
-
-    /// As [`answer`](Self::answer), in the local frame. `local` must be finite and not far.
     #[inline(always)]
     pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
         match precision {
@@ -380,7 +366,7 @@ impl TeSdf {
     }
 
     /// Converts from the local frame to the mesh's frame.
-    #[inline]
+    #[inline(always)]
     fn to_answer(&self, found: Found) -> Answer {
         Answer {
             signed_distance: found.signed_distance * self.frame.inverse_scale(),
