@@ -10,7 +10,7 @@ pub fn print() -> Result<(), Failure> {
     output::line(&format!("- {}", version_and_date()))?;
     let load = load().map_or("unknown".into(), |[one, _]| one);
     output::line(&format!("- {}, load at the start {load}", processor()))?;
-    output::line(&format!("- compiled for {}; tesdf chose {:?} at run time\n", target(), Isa::detect()))
+    output::line(&format!("- compiled for {}; tesdf used {:?}\n", target(), Isa::detect()))
 }
 
 /// The instruction sets that the whole program, including the peers, was compiled for.

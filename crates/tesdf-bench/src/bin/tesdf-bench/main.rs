@@ -5,6 +5,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use tesdf::base::Isa;
 
 mod algorithm_1;
 mod batch;
@@ -40,6 +41,17 @@ type Failure = Box<dyn std::error::Error + Send + Sync>;
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// Use this instruction set at most, as on a processor without the wider ones
+    #[arg(long, global = true, value_parser = instruction_set)]
+    isa: Option<Isa>,
+}
+
+/// Reads the name of an instruction set that this processor has.
+fn instruction_set(name: &str) -> Result<Isa, String> {
+    let all = Isa::of_processor();
+    all.iter().copied().find(|isa| format!("{isa:?}").eq_ignore_ascii_case(name)).ok_or_else(|| {
+        format!("not an instruction set of this processor; expected one of {all:?}, in any case")
+    })
 }
 
 #[derive(Subcommand)]
@@ -77,7 +89,11 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match &Cli::parse().command {
+    let cli = Cli::parse();
+    if let Some(isa) = cli.isa {
+        isa.limit_to();
+    }
+    let result = match &cli.command {
         Command::Query(args) => query::run(args),
         Command::Batch(args) => batch::run(args),
         Command::Memory(args) => memory::run(args),
