@@ -142,6 +142,23 @@ dispatch! {
 
 #[inline(always)]
 fn judge_lanes<L: Doubles>(rule: &PlaneRule, alive: &[u8], near: &[u8], low: &mut [f64], beaten: &mut [u8]) {
+    if rule.tie < 0.0 {
+        judge_groups::<L, false>(rule, alive, near, low, beaten);
+    } else {
+        judge_groups::<L, true>(rule, alive, near, low, beaten);
+    }
+}
+
+/// `TIES` says whether a corner can share faces.
+#[inline(always)]
+fn judge_groups<L: Doubles, const TIES: bool>(
+    rule: &PlaneRule,
+    alive: &[u8],
+    near: &[u8],
+    low: &mut [f64],
+    beaten: &mut [u8],
+) {
+    let mut winner = 0;
     for group in 0..alive.len() {
         beaten[group] = 0;
         if alive[group] | near[group] == 0 {
@@ -150,16 +167,23 @@ fn judge_lanes<L: Doubles>(rule: &PlaneRule, alive: &[u8], near: &[u8], low: &mu
         let mut lane = 0;
         while lane < GROUP {
             let in_question = alive[group] >> lane;
-            beaten[group] |= judge_at::<L>(rule, group * GROUP + lane, in_question, low) << lane;
+            let at = group * GROUP + lane;
+            beaten[group] |= judge_at::<L, TIES>(rule, at, in_question, low, &mut winner) << lane;
             lane += L::LANES;
         }
     }
 }
 
 /// Computes the bounds of one vector of candidates. Returns which candidates of `in_question` are
-/// beaten.
+/// beaten. `winner` is as for [`any_below`].
 #[inline(always)]
-fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut [f64]) -> u8 {
+fn judge_at<L: Doubles, const TIES: bool>(
+    rule: &PlaneRule,
+    at: usize,
+    in_question: u8,
+    low: &mut [f64],
+    winner: &mut usize,
+) -> u8 {
     let least = &rule.rivals.least;
     let margin = L::splat(rule.margin);
     let floor = L::splat(-rule.margin);
@@ -169,19 +193,22 @@ fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut 
         let rows = rule.seen[from];
         let distance = L::load(rows, at);
         let slope = Vector::<L>::load(&rows[GRADIENT * rule.stride..], rule.stride, at);
-        let lowered = distance.sub(margin).sub(L::splat(rule.turn).div(distance));
+        let by_slope = L::splat(rule.turn).div(distance);
+        let lowered = distance.sub(margin).sub(by_slope);
         let touching = margin.at_least(distance);
         let [to_a, to_b, to_c, to_d] = rule.offsets[from];
-        let a = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_a))));
-        let b = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_b))));
-        let c = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_c))));
-        let d = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_d))));
+        let mut a = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_a))));
+        let mut b = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_b))));
+        let mut c = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_c))));
+        let mut d = L::select(touching, floor, lowered.add(slope.dot(Vector::splat(to_d))));
         highest = highest.max(a.min(b).min(c.min(d)));
-        let raised = margin.add(L::splat(rule.turn).div(distance));
-        let a = at_tie(rule, at, 1, a, raised);
-        let b = at_tie(rule, at, 2, b, raised);
-        let c = at_tie(rule, at, 3, c, raised);
-        let d = at_tie(rule, at, 4, d, raised);
+        if TIES {
+            let raised = margin.add(by_slope);
+            a = at_tie(rule, at, 1, a, raised);
+            b = at_tie(rule, at, 2, b, raised);
+            c = at_tie(rule, at, 3, c, raised);
+            d = at_tie(rule, at, 4, d, raised);
+        }
         let first = L::both(a.at_least(L::splat(least[0])), b.at_least(L::splat(least[1])));
         let second = L::both(c.at_least(L::splat(least[2])), d.at_least(L::splat(least[3])));
         let mut open = L::bits(L::both(first, second)) & in_question & !beaten;
@@ -197,7 +224,7 @@ fn judge_at<L: Doubles>(rule: &PlaneRule, at: usize, in_question: u8, low: &mut 
                 let t = [values[0][lane], values[1][lane], values[2][lane], values[3][lane]];
                 // A cell that is no thicker than the tie cannot tell faces apart.
                 let tied = t[0] == rule.tie && t[1] == rule.tie && t[2] == rule.tie && t[3] == rule.tie;
-                beaten |= u8::from(!tied && any_below::<L>(&rule.rivals.rows, t)) << lane;
+                beaten |= u8::from(!tied && any_below::<L>(&rule.rivals.rows, t, winner)) << lane;
             }
         }
     }
@@ -215,18 +242,37 @@ fn at_tie<L: Doubles>(rule: &PlaneRule, at: usize, corner: usize, value: L, lowe
     L::select(L::both(shares, passes), tie, value)
 }
 
-/// Whether some chord lies below all four values.
+/// Whether some chord lies below all four values. The chords at `winner` are tried first; it becomes
+/// the place of a chord that was found. Neighbouring candidates often have the same rival.
 #[inline(always)]
-fn any_below<L: Doubles>(chords: &[&[f64]; 4], t: [f64; 4]) -> bool {
+fn any_below<L: Doubles>(chords: &[&[f64]; 4], t: [f64; 4], winner: &mut usize) -> bool {
     let t = [L::splat(t[0]), L::splat(t[1]), L::splat(t[2]), L::splat(t[3])];
+    let count = chords[0].len();
+    if *winner < count && group_below(chords, t, *winner) {
+        return true;
+    }
     let mut at = 0;
-    while at < chords[0].len() {
-        let first = L::both(t[0].at_least(L::load(chords[0], at)), t[1].at_least(L::load(chords[1], at)));
-        let second = L::both(t[2].at_least(L::load(chords[2], at)), t[3].at_least(L::load(chords[3], at)));
-        if L::bits(L::both(first, second)) != 0 {
+    while at < count {
+        if group_below(chords, t, at) {
+            *winner = at;
             return true;
         }
-        at += L::LANES;
+        at += GROUP;
     }
     false
+}
+
+/// Whether one of the [`GROUP`] chords at `at` lies below all four values.
+#[inline(always)]
+fn group_below<L: Doubles>(chords: &[&[f64]; 4], t: [L; 4], at: usize) -> bool {
+    let mut below = 0;
+    let mut lane = at;
+    while lane < at + GROUP {
+        let first = L::both(t[0].at_least(L::load(chords[0], lane)), t[1].at_least(L::load(chords[1], lane)));
+        let second =
+            L::both(t[2].at_least(L::load(chords[2], lane)), t[3].at_least(L::load(chords[3], lane)));
+        below |= L::bits(L::both(first, second));
+        lane += L::LANES;
+    }
+    below != 0
 }

@@ -228,7 +228,9 @@ impl TeSdf {
         // The faces of the next points are fetched while distances to those of this point are
         // computed.
         for next in 0..points.len() + AHEAD {
-            if let (Some(&Place::Listed { offset, .. }), Some(faces)) = (places.get(next), faces.get_mut(next)) {
+            if let (Some(&Place::Listed { offset, .. }), Some(faces)) =
+                (places.get(next), faces.get_mut(next))
+            {
                 self.read_list(offset, faces);
                 self.fetch_faces(faces);
             }

@@ -90,12 +90,7 @@ pub fn distances(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn distances_avx2(
-    records: &[FaceRecord],
-    faces: &[[u32; LANES]],
-    p: Vec3,
-    out: &mut [[f32; LANES]],
-) -> f32 {
+fn distances_avx2(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, out: &mut [[f32; LANES]]) -> f32 {
     distances_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, out)
 }
 

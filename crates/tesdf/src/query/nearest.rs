@@ -290,17 +290,22 @@ impl TeSdf {
         let mut near = NEAR.take();
         near.clear();
         let (mut least, mut limit) = (f32::INFINITY, f32::INFINITY);
-        self.walk_tree(squared_box_bound(p), |d, limit| d > limit, f32::INFINITY, |start, count| {
-            let faces = std::array::from_fn(|l| start + (l as u32).min(count - 1));
-            let mut squared = [[0.0; LANES]];
-            let nearer = kernel::distances(self.isa, &self.records, &[faces], p, &mut squared);
-            if nearer < least {
-                (least, limit) = (nearer, squared_limit(nearer.sqrt()));
-            }
-            let all = faces.into_iter().zip(squared[0]).take(count as usize);
-            near.extend(all.filter(|(_, d)| *d <= limit));
-            limit
-        });
+        self.walk_tree(
+            squared_box_bound(p),
+            |d, limit| d > limit,
+            f32::INFINITY,
+            |start, count| {
+                let faces = std::array::from_fn(|l| start + (l as u32).min(count - 1));
+                let mut squared = [[0.0; LANES]];
+                let nearer = kernel::distances(self.isa, &self.records, &[faces], p, &mut squared);
+                if nearer < least {
+                    (least, limit) = (nearer, squared_limit(nearer.sqrt()));
+                }
+                let all = faces.into_iter().zip(squared[0]).take(count as usize);
+                near.extend(all.filter(|(_, d)| *d <= limit));
+                limit
+            },
+        );
         if limit.is_finite() {
             near.iter().filter(|(_, d)| *d <= limit).for_each(|(face, _)| offer(*face));
         }
