@@ -19,9 +19,10 @@ use crate::pool;
 ///
 /// - mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an
 ///   object with attributes of these names.
-/// - preset: "default" (fast queries), "fast" (fast encoding) or "compact" (small), all exact;
-///   "paper" (the paper's encoder: sampled, 129 samples along an edge, plain) or "sampled-safe"
-///   (sampled with a threshold that is large enough that no needed face is missing).
+/// - preset: "default" (fast queries), "fast" (fast encoding), "compact" (small) or "gpu" (few
+///   cells, whose lists fill the 32 threads of a GPU that read them), all exact; "paper" (the
+///   paper's encoder: sampled, 129 samples along an edge, plain) or "sampled-safe" (sampled with a
+///   threshold that is large enough that no needed face is missing).
 /// - domain: the division of space into tetrahedra. None or "bisection" needs no other program.
 ///   "gmsh" runs Gmsh (the program of that name, or the one in the environment variable
 ///   TESDF_GMSH). A path (.msh, .node, .ele, .vtu) has tetrahedra that conform to the mesh's faces.
@@ -125,10 +126,11 @@ fn named_preset(name: &str) -> PyResult<Preset> {
         "default" => Preset::Default,
         "fast" => Preset::Fast,
         "compact" => Preset::Compact,
+        "gpu" => Preset::Gpu,
         "paper" => Preset::Paper,
         "sampled-safe" => Preset::SampledSafe,
         _ => {
-            let expected = "'default', 'fast', 'compact', 'paper' or 'sampled-safe'";
+            let expected = "'default', 'fast', 'compact', 'gpu', 'paper' or 'sampled-safe'";
             return Err(argument("preset", format!("'{name}'"), expected));
         }
     })

@@ -27,7 +27,7 @@ def check(mesh: _Mesh) -> CheckReport: ...
 def repair(mesh: _Mesh, *, weld_tolerance: float | None = None) -> Repaired: ...
 def encode(
     mesh: _Mesh,
-    preset: Literal["default", "fast", "compact", "paper", "sampled-safe"] = "default",
+    preset: Literal["default", "fast", "compact", "gpu", "paper", "sampled-safe"] = "default",
     *,
     domain: Literal["bisection", "gmsh"] | _Path | None = None,
     encoder: Literal["certified", "sampled"] | None = None,

@@ -38,8 +38,9 @@ def test_arrays_of_any_kind():
 
 
 def test_options(torus):
-    sizes = {preset: len(tesdf.encode(torus, preset).to_bytes()) for preset in ("default", "fast", "compact")}
-    assert sizes["compact"] < sizes["default"]
+    presets = ("default", "fast", "compact", "gpu")
+    sizes = {preset: len(tesdf.encode(torus, preset).to_bytes()) for preset in presets}
+    assert sizes["compact"] < sizes["default"] and sizes["gpu"] < sizes["default"]
     plain, wide = tesdf.encode(torus, "fast"), tesdf.encode(torus, "fast", band=1.0, regions=[[3, 3, 3, 3.5, 3.5, 3.5]])
     in_band, in_region = [[0, 0, 1.2]], [[3.2, 3.2, 3.2]]
     assert np.isnan(plain.query_in_domain(in_region).signed_distance[0])

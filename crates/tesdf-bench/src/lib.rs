@@ -3,6 +3,8 @@
 //! - [`detection`]: `tesdf bench`.
 //! - [`evaluate`]: `tesdf evaluate`.
 //!
+//! [`preset`] has the presets of the encoder that they compare.
+//!
 //! The program `tesdf-bench` compares tesdf with peers; it needs the feature `peers`. Each table
 //! names its processor, date and command ([`heading`]).
 #![warn(missing_docs)]
@@ -10,3 +12,4 @@
 pub mod detection;
 pub mod evaluate;
 pub mod heading;
+pub mod preset;

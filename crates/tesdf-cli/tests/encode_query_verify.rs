@@ -39,7 +39,7 @@ fn rows(csv: &str) -> Vec<Vec<f64>> {
 fn every_preset_and_number_of_threads_is_encoded_and_verified() {
     let folder = Folder::new();
     folder.write("torus.obj", torus(24, 12));
-    for preset in ["default", "fast", "compact"] {
+    for preset in ["default", "fast", "compact", "gpu"] {
         let encode = |threads: &str, file: &str| {
             folder.good(&["encode", "torus.obj", "-o", file, "--preset", preset, "--threads", threads]);
             std::fs::read(folder.path(file)).unwrap()

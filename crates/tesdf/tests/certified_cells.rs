@@ -8,7 +8,7 @@ use support::reference::{Reference, exceeds};
 use support::shapes::{FAMILIES, Family, Shape};
 use support::well_formed::WellFormed;
 use tesdf::Length;
-use tesdf::encode::{EncodeOptions, Encoder, Preset};
+use tesdf::encode::{EncodeOptions, Encoder, Groups, Preset};
 use tesdf::glam::DVec3;
 use tesdf::query::Precision;
 
@@ -48,7 +48,9 @@ fn check_member(family: Family, seed: u64, options: &EncodeOptions) -> Result<()
 #[test]
 fn cells_of_each_mesh_family_are_right_with_each_preset() {
     for family in FAMILIES {
-        for (preset, band) in [(Preset::Default, 0.05), (Preset::Fast, 0.0), (Preset::Compact, 0.5)] {
+        let presets =
+            [(Preset::Default, 0.05), (Preset::Fast, 0.0), (Preset::Compact, 0.5), (Preset::Gpu, 0.05)];
+        for (preset, band) in presets {
             if let Err(e) = check_member(family, 1, &options(preset, band)) {
                 panic!("{family:?} {preset:?}: {e}");
             }
@@ -66,11 +68,14 @@ proptest! {
         band in prop::sample::select(vec![0.0, 0.05, 0.3]),
         byte_worth in -3.0..0.5f64,
         tighten_levels in 0u32..14,
+        group in prop::sample::select(vec![0, 0, 4, 32]),
     ) {
+        let fit_within = Length::OfDiagonal(0.05);
         let options = EncodeOptions {
             band: Length::OfDiagonal(band),
             byte_worth: 10f64.powf(byte_worth),
             tighten_levels,
+            groups: (group > 0).then_some(Groups { size: group, fit_within }),
             ..EncodeOptions::default()
         };
         if let Err(e) = check_member(family, seed, &options) {

@@ -7,6 +7,8 @@ use tesdf::collide::ContactsPer;
 use tesdf_terminal::device::{self, Choice};
 use tesdf_terminal::parse;
 
+use crate::preset::Preset;
+
 /// Arguments of `tesdf bench collide`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
@@ -33,6 +35,9 @@ pub struct Args {
     /// otherwise 0]
     #[arg(long, value_name = "D", value_parser = parse::length)]
     pub contact_distance: Option<f64>,
+    /// Preset of the encoder for the meshes of a file of poses
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    pub preset: Preset,
     /// Maximum list length of meshes that are encoded for a file of poses [default: not truncated]
     #[arg(long, value_name = "E")]
     pub e_max: Option<u32>,

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde::Serialize;
-use tesdf::TeSdf;
 use tesdf::collide::{ClearanceOptions, CollideError, Instance, Pose, Scene, clearance};
 use tesdf::glam::DVec3;
+use tesdf::{EncodeOptions, TeSdf};
 use tesdf_terminal::progress::interrupt_flag;
 use tesdf_terminal::report::{self, Failure, Outcome};
 
@@ -54,8 +54,9 @@ type Body = (Arc<TeSdf>, String);
 /// A file cannot be read, or its mesh cannot be encoded.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let interrupted = interrupt_flag()?;
-    let open =
-        |path: &PathBuf| -> Result<Body, Failure> { Ok((geometry(path, None, &interrupted)?, name(path))) };
+    let open = |path: &PathBuf| -> Result<Body, Failure> {
+        Ok((geometry(path, &EncodeOptions::default(), &interrupted)?, name(path)))
+    };
     let bodies = args.bodies.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let mut random = fastrand::Rng::with_seed(args.seed);
     let pair = |_| {

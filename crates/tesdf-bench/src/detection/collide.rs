@@ -1,6 +1,7 @@
 //! `tesdf bench collide SCENE|RUN|POSES`: the cost of a detection, stage by stage.
 use std::time::Instant;
 
+use tesdf::EncodeOptions;
 use tesdf::collide::{CollideOptions, Mode, Reduction, detect};
 
 use super::arguments::{Args, ModeName};
@@ -14,7 +15,8 @@ use tesdf_terminal::report::{self as output, Failure, Outcome};
 /// A file cannot be read, or a device fails.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let device = args.device.open()?;
-    let mut frames = Frames::read(&args.source, args.frames, args.worlds, args.e_max)?;
+    let options = EncodeOptions { max_entries: args.e_max, ..args.preset.options() };
+    let mut frames = Frames::read(&args.source, args.frames, args.worlds, &options)?;
     let contact_distance = args.contact_distance.or(frames.contact_distance).unwrap_or(0.0);
     let mode = match args.mode {
         ModeName::Node => Mode::Node,
@@ -38,6 +40,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         iterations: args.iterations,
         cos_theta: args.cos_theta,
         contact_distance,
+        preset: args.preset.name(),
         e_max: args.e_max,
         lanes: args.lanes,
         worlds: args.worlds,

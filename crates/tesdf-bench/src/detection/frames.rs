@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use tesdf::collide::{Instance, InstanceId, Pose, Scene};
-use tesdf::encode::{EncodeOptions, Encoder, Preset};
+use tesdf::encode::{EncodeOptions, Encoder};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::input;
 use tesdf::mesh::SolidMesh;
@@ -35,7 +35,7 @@ pub struct Frames {
 impl Frames {
     /// Reads a scene (`.toml`), a run (`.tesrun`) or a file of poses (`.json`), and copies it into
     /// `worlds` worlds. At most `max_frames` frames are read; those of a run are evenly spaced.
-    /// Meshes of a file of poses are encoded with lists of at most `max_entries` faces.
+    /// Meshes of a file of poses are encoded with `options`.
     ///
     /// # Errors
     /// A file cannot be read, or its content does not match its extension.
@@ -43,11 +43,11 @@ impl Frames {
         path: &Path,
         max_frames: usize,
         worlds: u32,
-        max_entries: Option<u32>,
+        options: &EncodeOptions,
     ) -> Result<Self, Failure> {
         let frames = match path.extension().and_then(|e| e.to_str()) {
             Some("toml") => Self::of_scene(&LoadedScene::read(path).map_err(Failure::new)?)?,
-            Some("json") => Self::of_poses(path, max_frames, max_entries)?,
+            Some("json") => Self::of_poses(path, max_frames, options)?,
             _ => Self::of_run(path, max_frames)?,
         };
         frames.in_worlds(worlds)
@@ -77,7 +77,7 @@ impl Frames {
         Ok(Self { poses, ..start })
     }
 
-    fn of_poses(path: &Path, max_frames: usize, max_entries: Option<u32>) -> Result<Self, Failure> {
+    fn of_poses(path: &Path, max_frames: usize, options: &EncodeOptions) -> Result<Self, Failure> {
         let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
         let named = |e: &dyn std::fmt::Display| named(e).hint(WRITES_POSES);
         let text = input::read(path).map_err(|e| named(&e))?;
@@ -100,7 +100,7 @@ impl Frames {
             let file = path.canonicalize().unwrap_or_else(|_| path.clone());
             let shape = match opened.get(&file) {
                 Some(&shape) => shape,
-                None => scene.add_shape(geometry(&path, max_entries, &interrupted)?).map_err(Failure::new)?,
+                None => scene.add_shape(geometry(&path, options, &interrupted)?).map_err(Failure::new)?,
             };
             opened.insert(file, shape);
             shapes.push(shape);
@@ -163,7 +163,7 @@ impl Frames {
 /// Opens a `.tesdf` file, or encodes a mesh.
 pub fn geometry(
     path: &Path,
-    max_entries: Option<u32>,
+    options: &EncodeOptions,
     interrupted: &AtomicBool,
 ) -> Result<Arc<TeSdf>, Failure> {
     if path.extension().is_some_and(|e| e == "tesdf") {
@@ -171,9 +171,10 @@ pub fn geometry(
     }
     let named = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", path.display()));
     let solid = SolidMesh::new(mesh_file::read(path)?.mesh).map_err(|e| named(&e))?;
-    let options = EncodeOptions { max_entries, ..EncodeOptions::preset(Preset::Default) };
     let progress = Progress::default();
-    watched(&progress, interrupted, || Encoder::new().options(options).progress(&progress).encode(&solid))
-        .map(Arc::new)
-        .map_err(|e| named(&e))
+    watched(&progress, interrupted, || {
+        Encoder::new().options(options.clone()).progress(&progress).encode(&solid)
+    })
+    .map(Arc::new)
+    .map_err(|e| named(&e))
 }

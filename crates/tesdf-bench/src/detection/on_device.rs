@@ -57,9 +57,9 @@ pub fn fill(
     report.phases_unpruned_ms = Some(all.phases());
     report.counts = measured.counts;
     report.counts.queries_unpruned = Some(all.counts.queries);
-    let is_face = args.mode == ModeName::Face;
-    report.counts.evaluations = operations.counts.evaluations.filter(|_| is_face);
-    report.counts.distances = operations.counts.distances.filter(|_| is_face);
+    let searches = args.mode != ModeName::Node;
+    report.counts.evaluations = operations.counts.evaluations.filter(|_| searches);
+    report.counts.distances = operations.counts.distances.filter(|_| searches);
     report.stages = measured.stages;
     report.bytes = Some(measured.bytes);
     report.wall_ms = measured.wall_ms;

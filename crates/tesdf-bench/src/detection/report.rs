@@ -79,6 +79,8 @@ pub struct Report {
     pub iterations: u32,
     pub cos_theta: f64,
     pub contact_distance: f64,
+    /// Preset of the encoder for the meshes of a file of poses.
+    pub preset: &'static str,
     pub e_max: Option<u32>,
     pub lanes: LanesName,
     pub worlds: u32,

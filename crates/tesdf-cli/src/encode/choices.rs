@@ -25,6 +25,8 @@ pub enum Preset {
     Fast,
     /// Small files
     Compact,
+    /// Few cells, whose lists fill the 32 threads of a GPU that read them; for detection on a GPU
+    Gpu,
     /// The paper's encoder: sampled, 129 samples along an edge, tetrahedra not bisected
     Paper,
     /// Sampled with a threshold that is large enough that no needed face is missing
@@ -46,6 +48,7 @@ impl From<Preset> for tesdf::encode::Preset {
             Preset::Default => Self::Default,
             Preset::Fast => Self::Fast,
             Preset::Compact => Self::Compact,
+            Preset::Gpu => Self::Gpu,
             Preset::Paper => Self::Paper,
             Preset::SampledSafe => Self::SampledSafe,
         }

@@ -22,11 +22,13 @@ pub struct Counts {
     pub filtered: u32,
     /// Faces or nodes that the broad phase kept.
     pub candidates: u32,
-    /// Evaluations of the field by Face-TES; 0 without
-    /// [`Counting::Operations`](crate::Counting::Operations).
+    /// Evaluations of the field by the modes face and exact; 0 without
+    /// [`Counting::Operations`](crate::Counting::Operations). In the mode face a group of 32 threads
+    /// makes an evaluation, of up to eight points at once. In the mode exact, and for the extremes of
+    /// a whole face, a thread makes an evaluation, of one point.
     pub evaluations: u32,
-    /// Point–triangle distances of these evaluations; 0 without
-    /// [`Counting::Operations`](crate::Counting::Operations).
+    /// Distances of points and faces in these evaluations and, in the mode exact, of polygons and
+    /// faces; 0 without [`Counting::Operations`](crate::Counting::Operations).
     pub distances: u32,
     /// Contacts whose narrow phase did not converge. Counted only in a reduction. Without a
     /// reduction, each contact says whether it converged.

@@ -99,6 +99,7 @@ impl Pass<'_> {
         let tolerances = self.tolerances()?;
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
         let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
+        let counting = self.detector.options.counting == Counting::Operations;
         if parts(self.options) == Parts::Faces {
             let faces = buffers.whole_faces();
             return launch!(
@@ -106,7 +107,15 @@ impl Pass<'_> {
                 "exact narrow phase",
                 per_polygon,
                 LANES,
-                exact_faces::narrow_exact_faces(shapes.argument(), pairs, faces, counters, contacts, asked)
+                exact_faces::narrow_exact_faces(
+                    shapes.argument(),
+                    pairs,
+                    faces,
+                    counters,
+                    contacts,
+                    asked,
+                    counting
+                )
             );
         }
         let polygons = buffers.polygons();
@@ -115,7 +124,7 @@ impl Pass<'_> {
             "exact narrow phase",
             per_polygon,
             LANES,
-            exact::narrow_exact(shapes.argument(), pairs, polygons, counters, contacts, asked)
+            exact::narrow_exact(shapes.argument(), pairs, polygons, counters, contacts, asked, counting)
         )
     }
 }

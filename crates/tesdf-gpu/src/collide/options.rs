@@ -83,8 +83,9 @@ pub enum Counting {
     /// No further counts.
     #[default]
     Elements,
-    /// Evaluations of the field and point–triangle distances of Face-TES, in the search for minima.
-    /// This costs two atomic additions per polygon or face.
+    /// Evaluations of the field and distances to faces in the narrow phase of the modes face and
+    /// exact. The mode face pays two atomic additions per polygon. The mode exact and whole faces
+    /// pay two per thread, and search once more for each evaluation.
     Operations,
 }
 

@@ -127,9 +127,13 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     kernels!(all, device, target;
         Indirect narrow::nodes::narrow_nodes, GROUP, (shapes(), pairs(), items(), counters(), contacts());;
         Indirect narrow::exact::narrow_exact, LANES,
-            (shapes(), pairs(), polygons(), counters(), contacts(), exact());;
+            (shapes(), pairs(), polygons(), counters(), contacts(), exact(), false);;
+        Indirect narrow::exact::narrow_exact, LANES,
+            (shapes(), pairs(), polygons(), counters(), contacts(), exact(), true); "counting";;
         Indirect narrow::exact_faces::narrow_exact_faces, LANES,
-            (shapes(), pairs(), polygons(), counters(), contacts(), exact());;
+            (shapes(), pairs(), polygons(), counters(), contacts(), exact(), false);;
+        Indirect narrow::exact_faces::narrow_exact_faces, LANES,
+            (shapes(), pairs(), polygons(), counters(), contacts(), exact(), true); "counting";;
     );
     for counting in [false, true] {
         for lanes in [LANES, 1] {

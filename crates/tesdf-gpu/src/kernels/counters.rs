@@ -21,9 +21,9 @@ pub const FILTERED: u32 = 5;
 pub const CANDIDATES: u32 = 6;
 /// Threads whose loops the driver stopped early: see [`Counters::tell_if_broken_off`].
 pub const BROKEN_OFF: u32 = 7;
-/// Evaluations of the field by Face-TES. Counted on request.
+/// Evaluations of the field by the modes face and exact. Counted on request.
 pub const EVALUATIONS: u32 = 8;
-/// Point–triangle distances of these evaluations.
+/// Distances of points or polygons and faces. Counted on request.
 pub const DISTANCES: u32 = 9;
 /// Instances of shapes with a vertex that was moved to an invalid position.
 pub const BADLY_MOVED: u32 = 10;

@@ -14,6 +14,9 @@ pub enum Preset {
     Fast,
     /// Small files, with more faces for each query.
     Compact,
+    /// For detection on a GPU: [`Groups::OF_A_GPU`], so cells are few and lists fill the threads
+    /// that read them.
+    Gpu,
     /// [`EncodeOptions::PAPER`]: the only preset that is not exact.
     Paper,
     /// [`EncodeOptions::SAMPLED_SAFE`].
@@ -83,6 +86,29 @@ pub enum Deformation {
     Expected,
 }
 
+/// How lists are read where many threads read one list together, as on a GPU.
+///
+/// A group of 32 threads takes as long for a list of 13 faces as for a list of 32. So cells are
+/// merged as long as their list fits a group.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Groups {
+    /// How many faces are read at once. A list costs a query as much as its number of groups.
+    pub size: u32,
+    /// Cells nearer to the surface than this are bisected until their list fits one group. Lists
+    /// stay longer where small cells need them too, such as over a vertex of more faces, or where
+    /// more faces are equally near.
+    ///
+    /// [`max_entries`](EncodeOptions::max_entries) drops no face that is needed nearer to the surface
+    /// than this, so distances are exact that far.
+    pub fit_within: Length,
+}
+
+impl Groups {
+    /// Groups of 32 threads, and the distance within which the paper's assets are exact with lists
+    /// of 32 faces (Table I), as a share of the diagonal.
+    pub const OF_A_GPU: Self = Self { size: 32, fit_within: Length::OfDiagonal(0.03) };
+}
+
 /// The options of an encoding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EncodeOptions {
@@ -104,6 +130,8 @@ pub struct EncodeOptions {
     #[serde(default, rename = "encoder")]
     pub method: Method,
     /// E_max: a longer list is cut to the faces that are needed nearest to the surface (Sec. V-C).
+    /// Faces that the sign in a crossing cell needs stay, and so do those of
+    /// [`Groups::fit_within`].
     #[serde(default)]
     pub max_entries: Option<u32>,
     /// How the tetrahedra of a conforming domain are refined.
@@ -112,6 +140,9 @@ pub struct EncodeOptions {
     /// Whether the vertices will move. Only in a conforming domain.
     #[serde(default)]
     pub deformation: Deformation,
+    /// Groups in which lists are read. `None`: a query pays for each face of a list.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub groups: Option<Groups>,
 }
 
 impl EncodeOptions {
@@ -131,25 +162,33 @@ impl EncodeOptions {
             max_entries: None,
             refinement: Refinement::None,
             deformation: Deformation::None,
+            groups: None,
         }
     }
 
     /// The options of a preset.
     pub fn preset(preset: Preset) -> Self {
-        let (byte_worth, tighten_levels) = match preset {
-            Preset::Default => (0.067, 12),
-            Preset::Fast => (0.12, 2),
-            Preset::Compact => (0.24, 11),
+        let (byte_worth, tighten_levels, groups) = match preset {
+            Preset::Default => (0.067, 12, None),
+            Preset::Fast => (0.12, 2, None),
+            Preset::Compact => (0.24, 11, None),
+            Preset::Gpu => (0.24, 11, Some(Groups::OF_A_GPU)),
             Preset::Paper => return Self::PAPER,
             Preset::SampledSafe => return Self::SAMPLED_SAFE,
         };
         Self {
             byte_worth,
             tighten_levels,
+            groups,
             method: Method::Certified,
             refinement: Refinement::ByCost,
             ..Self::PAPER
         }
+    }
+
+    /// [`Groups::fit_within`] for a mesh of this diagonal, in its unit; 0 without groups.
+    pub(crate) fn fit_within(&self, diagonal: f64) -> f64 {
+        self.groups.map_or(0.0, |groups| groups.fit_within.resolve(diagonal))
     }
 
     /// The regions as boxes.

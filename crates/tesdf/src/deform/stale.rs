@@ -106,6 +106,8 @@ impl TeSdf {
                 tree: &tree,
                 options: &self.about().options,
                 scale: self.frame.scale,
+                kept_within: self.frame.scale
+                    * self.about().options.fit_within(self.about().statistics.diagonal),
             },
             tetrahedra: domain.tetrahedra(),
             moved_tree: AabbTree::build(&moved_boxes, TREE_LEAF),

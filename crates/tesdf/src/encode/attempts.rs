@@ -105,6 +105,7 @@ mod tests {
                 far_distance: 0.1,
                 floor: 6.0,
                 long_faces: 0.0,
+                groups: None,
             },
             band: 0.1,
             bounds: mesh.bounds(),

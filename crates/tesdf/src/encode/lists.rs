@@ -29,6 +29,8 @@ pub struct Lists<'a> {
     pub options: &'a EncodeOptions,
     /// Lengths of the local frame per unit of the mesh.
     pub scale: f64,
+    /// Truncation keeps the faces that are needed nearer to the surface than this (local frame).
+    pub kept_within: f64,
 }
 
 /// The list of a cell, and what is proved of it.
@@ -104,6 +106,8 @@ impl Lists<'_> {
                     crosses = *crossing;
                     let tetrahedron = roots.tetrahedra.get(root);
                     let levels = match tetrahedron {
+                        // Refinement has tightened them already.
+                        _ if self.options.groups.is_some() => 0,
                         None => levels.of(faces),
                         // Wide cells have long lists, which shorten well.
                         Some(_) => self.options.tighten_levels,
@@ -254,7 +258,7 @@ impl Lists<'_> {
             let faces: Vec<u32> = around.flat_map(|v| self.surface.vertex_faces(v).iter().copied()).collect();
             raise(&mut ranked, faces.into_iter(), 0.0);
         }
-        let (faces, exact_within) = truncated(ranked, self.options.max_entries);
+        let (faces, exact_within) = truncated(ranked, self.options.max_entries, self.kept_within);
         List { faces, exact_within, proof }
     }
 }
@@ -279,11 +283,14 @@ fn raise(ranked: &mut Vec<Ranked>, faces: impl Iterator<Item = u32>, order: f64)
 /// The first `most` faces by order, with their ids ascending. Also the least distance at which a
 /// dropped face may be needed.
 ///
-/// This is distance-ordered truncation (Sec. V-C). Faces of order −∞ are never dropped.
-fn truncated(mut ranked: Vec<Ranked>, most: Option<u32>) -> (Vec<u32>, f64) {
+/// This is distance-ordered truncation (Sec. V-C). Faces of order −∞ are never dropped, and neither
+/// are faces that are needed nearer to the surface than `kept_within`.
+fn truncated(mut ranked: Vec<Ranked>, most: Option<u32>, kept_within: f64) -> (Vec<u32>, f64) {
     let most = most.map_or(ranked.len(), |most| most as usize);
     let mut exact_within = f64::INFINITY;
     if ranked.len() > most {
+        let kept = ranked.iter_mut().filter(|r| r.distance < kept_within);
+        kept.for_each(|r| r.order = f64::NEG_INFINITY);
         // The faces for deformation have the order 0. Of these, the faces that are needed nearest
         // to the surface at rest come first.
         let key =

@@ -44,7 +44,7 @@ pub mod internal {
 
 pub use crate::asset::about::Source;
 pub use crate::asset::options::{
-    Deformation, EncodeOptions, Method, Preset, Refinement, Sampling, Threshold,
+    Deformation, EncodeOptions, Groups, Method, Preset, Refinement, Sampling, Threshold,
 };
 pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, MethodChoice};
 pub use encoder::{EncodeFileError, Encoder};

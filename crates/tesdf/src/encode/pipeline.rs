@@ -4,11 +4,12 @@ use super::effort::Effort;
 use super::error::EncodeError;
 use super::hints::{Simplicity, sign_hints};
 use super::lists::{Finished, Lists};
-use super::refine::{Refiner, Weights};
+use super::refine::{GroupWeights, Refiner, Weights};
 use super::roots::{Domain, MAX_SIZE, Roots};
 use super::sampled::{Sampler, lipschitz_candidates};
 use super::statistics::statistics;
 use super::surface::{Surface, Touching};
+use super::tighten::Levels;
 use super::{Deformation, EncodeOptions, Method, Refinement, Source, Threshold};
 use crate::asset::layout::{self, TREE_LEAF, TreeChild};
 use crate::asset::{Section, TeSdf, about, write_container};
@@ -63,6 +64,12 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
     let tree = AabbTree::build(&boxes, TREE_LEAF);
     let near = NEAR * diagonal_local;
 
+    let fit_within = options.fit_within(diagonal) * frame.scale;
+    let groups = options.groups.map(|groups| GroupWeights {
+        size: f64::from(groups.size),
+        fit_within,
+        levels: Levels::new(options.tighten_levels, 0, surface.faces.len()),
+    });
     let unlimited = Effort::new(u64::MAX);
     let mut refiner = Refiner {
         surface: &surface,
@@ -73,8 +80,9 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
             far_faces: FAR_FACES,
             far_list: FAR_LIST,
             far_distance: FAR_DISTANCE * diagonal_local,
-            floor: FLOOR,
+            floor: groups.map_or(FLOOR, |g| FULL * g.size),
             long_faces: 0.0,
+            groups,
         },
         band,
         bounds: local.bounds(),
@@ -98,7 +106,8 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
         }
     };
 
-    let lists = Lists { surface: &surface, tree: &tree, options, scale: frame.scale };
+    let lists =
+        Lists { surface: &surface, tree: &tree, options, scale: frame.scale, kept_within: fit_within };
     let Finished { labels, exact_within, proof } =
         lists.finish(&mut trees, &roots, &winding, sampler, progress)?;
 
@@ -180,6 +189,9 @@ const FAR_LIST: usize = 48;
 const FAR_DISTANCE: f64 = 0.025;
 /// Refinement is not expected to make a list shorter than this.
 const FLOOR: f64 = 6.0;
+/// The same where lists are read in groups, as a share of a group: tightening makes such a list
+/// shorter, and merging fills it again.
+const FULL: f64 = 0.75;
 
 fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<f64, EncodeError> {
     let band = options.band.resolve(diagonal);
@@ -203,6 +215,18 @@ fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<
                 "region",
                 format!("{} to {}", r.min, r.max),
                 "min x y z and a max that is not less",
+            );
+        }
+    }
+    if let Some(groups) = options.groups {
+        if groups.size == 0 {
+            return wrong("groups.size", "0".into(), "1 or more faces");
+        }
+        if !(0.0..=MAX_SIZE * diagonal).contains(&options.fit_within(diagonal)) {
+            return wrong(
+                "groups.fit_within",
+                groups.fit_within.to_string(),
+                "a length from 0 to 8 times the diagonal of the mesh",
             );
         }
     }

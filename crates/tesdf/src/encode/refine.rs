@@ -4,6 +4,7 @@ use super::candidates::{Candidates, Pool, Survivor};
 use super::effort::Effort;
 use super::filter::{Scratch, filter};
 use super::surface::{Requirement, Surface};
+use super::tighten::{Levels, needed};
 use crate::base::{Chains, Progress};
 use crate::domain::Cell;
 use crate::geometry::Aabb;
@@ -56,9 +57,57 @@ pub struct Weights {
     /// For cells with many faces that are longer than the cell: how many stored bytes the cell must
     /// weigh to be bisected.
     pub long_faces: f64,
+    /// Whether a list is read in groups of faces.
+    pub groups: Option<GroupWeights>,
 }
 
+/// The weights of lists that are read in groups, and how they are shortened.
+///
+/// A merged cell should fill a group, so the lengths of lists must be known well while cells are
+/// merged. So a cell is tightened as soon as it is not bisected any more, and the requirements of
+/// merged cells are as tight as those of their parts.
+#[derive(Clone, Copy, Debug)]
+pub struct GroupWeights {
+    /// Faces that are read at once.
+    pub size: f64,
+    /// In a cell nearer to the surface than this, a list of more than one group counts [`OVERFULL`]
+    /// times.
+    pub fit_within: f64,
+    /// How deep the cells are tightened.
+    pub levels: Levels,
+}
+
+impl GroupWeights {
+    /// How many faces reading a list counts as in a cell that comes as near to the surface as
+    /// `nearest`.
+    fn read(&self, faces: f64, nearest: f64) -> f64 {
+        self.rate(faces, nearest) * self.size * (faces / self.size).ceil()
+    }
+
+    fn rate(&self, faces: f64, nearest: f64) -> f64 {
+        if faces > self.size && nearest < self.fit_within { OVERFULL } else { 1.0 }
+    }
+}
+
+/// How much more a list of several groups costs near the surface, where it should fit one group.
+///
+/// The factor ends the bisection where no cell is small enough, on medial axes and at vertices of
+/// many faces.
+const OVERFULL: f64 = 64.0;
+
 impl Weights {
+    /// How many faces reading a list of this length counts as in a cell that comes as near to the
+    /// surface as `nearest`.
+    fn read(&self, faces: f64, nearest: f64) -> f64 {
+        self.groups.as_ref().map_or(faces, |groups| groups.read(faces, nearest))
+    }
+
+    /// Whether the best possible result of bisecting a cell with a list of `faces` would pay.
+    fn could_pay(&self, faces: f64, weight: f64, nearest: f64) -> bool {
+        let rate = self.groups.as_ref().map_or(1.0, |groups| groups.rate(faces, nearest));
+        rate * weight * (faces - self.floor) > self.byte * (LEAF_BYTES + self.floor)
+    }
+
     /// The cost of a cell of this weight when the face tree answers.
     fn by_tree(&self, weight: f64) -> f64 {
         weight * self.far_faces + self.byte * LEAF_BYTES
@@ -117,6 +166,15 @@ struct Own {
     chains: Chains,
 }
 
+/// What the cost of a cell depends on besides its list.
+struct Place {
+    weight: f64,
+    /// Lower bound of the cell's distance from the surface.
+    nearest: f64,
+    /// What the cell may be instead of a cell with a list.
+    unlisted: Option<Leaf>,
+}
+
 impl Refiner<'_> {
     /// Refines a root whose lists can only name `faces`. Returns `None` when the work was cancelled
     /// or the effort is exceeded.
@@ -163,9 +221,8 @@ impl Refiner<'_> {
         }
         let w = &self.weights;
         let weight = cell.volume() * w.per_volume * w.near / (filtered.distance + w.near);
-        let could_pay = weight * (n as f64 - w.floor) > w.byte * (LEAF_BYTES + w.floor);
         let split = cell.depth < self.max_depth
-            && could_pay
+            && w.could_pay(n as f64, weight, nearest)
             && self.long_faces_pay(&cell, candidates, &filtered.survivors, weight);
         let far = n >= w.far_list && nearest > w.far_distance && !filtered.crossing;
         let unlisted = match (beyond, far) {
@@ -173,12 +230,18 @@ impl Refiner<'_> {
             (false, true) => Some(Leaf::Far),
             _ => None,
         };
+        let place = Place { weight, nearest, unlisted };
 
         if !split {
             self.finish(&cell);
-            let own = Own { requirements: own, crossing: filtered.crossing, chains };
+            let mut own = Own { requirements: own, crossing: filtered.crossing, chains };
             scratch.reuse(filtered);
-            return Some(self.leaf(own, weight, unlisted));
+            if let Some(groups) = &w.groups {
+                let list = self.surface.cover(&own.requirements);
+                let levels = groups.levels.of(&list);
+                (own.requirements, own.chains) = needed(self.surface, &cell, &list, levels, chains, scratch);
+            }
+            return Some(self.leaf(own, place));
         }
         let mut pool = scratch.pool();
         pool.narrow(self.surface, &cell, candidates, &filtered.survivors);
@@ -209,7 +272,7 @@ impl Refiner<'_> {
         };
         scratch.give_back(pool);
         let (left, right) = (left?, right?);
-        Some(self.prune(left, right, Own { requirements: own, crossing: false, chains }, weight, unlisted))
+        Some(self.prune(left, right, Own { requirements: own, crossing: false, chains }, place))
     }
 
     /// Whether a bisection can pay, given the faces that are longer than the cell.
@@ -233,12 +296,12 @@ impl Refiner<'_> {
         survivors.iter().filter(is_long).count() <= MANY_LONG
     }
 
-    fn leaf(&self, own: Own, weight: f64, unlisted: Option<Leaf>) -> Pruned {
+    fn leaf(&self, own: Own, Place { weight, nearest, unlisted }: Place) -> Pruned {
         let Own { requirements: mut own, crossing, chains } = own;
         let w = &self.weights;
         let faces = self.surface.cover(&own);
         let n = faces.len() as f64;
-        let listed = weight * n + w.byte * (n + LEAF_BYTES);
+        let listed = weight * w.read(n, nearest) + w.byte * (n + LEAF_BYTES);
         let by_tree = w.by_tree(weight);
         own.truncate(if own.len() > MAX_UNION { 0 } else { own.len() });
         let union = (!own.is_empty()).then_some(own);
@@ -257,11 +320,15 @@ impl Refiner<'_> {
     }
 
     /// Keeps the two children, or merges them when one cell costs less.
-    fn prune(&self, left: Pruned, right: Pruned, own: Own, weight: f64, unlisted: Option<Leaf>) -> Pruned {
+    fn prune(&self, left: Pruned, right: Pruned, own: Own, place: Place) -> Pruned {
         let split = left.cost + right.cost;
         let crossing = left.crossing || right.crossing;
         let below = left.chains.max(right.chains);
-        let most = own.requirements.len().min(MAX_UNION);
+        let most = match self.weights.groups {
+            // Requirements of tightened cells are more, and their lists shorter.
+            Some(_) => MAX_UNION,
+            None => own.requirements.len().min(MAX_UNION),
+        };
         let union = match (left.union, right.union) {
             (Some(a), Some(b)) => Some(merged(a, b)).filter(|u| u.len() <= most),
             _ => None,
@@ -278,16 +345,17 @@ impl Refiner<'_> {
             return Pruned { tree: left.tree, cost: split, union, crossing: false, chains };
         }
         if let Some(all) = tightest {
-            let merged = self.leaf(all, weight, unlisted);
+            let merged = self.leaf(all, place);
             if merged.cost <= split {
                 return merged;
             }
             let tree = Tree::Split(Box::new([left.tree, right.tree]));
             return Pruned { tree, cost: split, ..merged };
         }
-        let tree = match unlisted {
-            Some(leaf) if self.weights.by_tree(weight) <= split => {
-                let cost = self.weights.by_tree(weight);
+        let by_tree = self.weights.by_tree(place.weight);
+        let tree = match place.unlisted {
+            Some(leaf) if by_tree <= split => {
+                let cost = by_tree;
                 return Pruned { tree: Tree::Leaf(leaf), cost, union: None, crossing, chains: below };
             }
             _ => Tree::Split(Box::new([left.tree, right.tree])),

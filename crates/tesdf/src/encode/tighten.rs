@@ -3,7 +3,7 @@
 use super::candidates::Candidates;
 use super::filter::{Scratch, filter};
 use super::settled::Settled;
-use super::surface::Surface;
+use super::surface::{Requirement, Surface};
 use crate::base::Chains;
 use crate::domain::Cell;
 use crate::geometry::Feature;
@@ -64,6 +64,19 @@ pub fn tighten(
     chains: Chains,
     scratch: &mut Scratch,
 ) -> (Vec<u32>, Chains) {
+    let (needed, chains) = needed(surface, cell, list, levels, chains, scratch);
+    (surface.cover(&needed), chains)
+}
+
+/// The requirements of [`tighten`] before faces are chosen for them, ascending.
+pub fn needed(
+    surface: &Surface,
+    cell: &Cell,
+    list: &[u32],
+    levels: u32,
+    chains: Chains,
+    scratch: &mut Scratch,
+) -> (Vec<Requirement>, Chains) {
     let mut settled = std::mem::take(&mut scratch.settled);
     settled.start(surface);
     let mut needed = Needed { surface, settled, heaviest: chains };
@@ -71,9 +84,9 @@ pub fn tighten(
     pool.fill(surface, list, cell);
     needed.descend(*cell, &pool.candidates(), levels, chains, scratch);
     scratch.give_back(pool);
-    let tight = surface.cover(needed.settled.sorted());
+    let sorted = needed.settled.sorted().to_vec();
     scratch.settled = needed.settled;
-    (tight, needed.heaviest)
+    (sorted, needed.heaviest)
 }
 
 struct Needed<'a> {

@@ -2,44 +2,13 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use clap::ValueEnum;
 use tesdf::TeSdf;
 use tesdf::asset::about::Source;
 use tesdf::encode::{EncodeOptions, Encoder};
 use tesdf::mesh::{RepairOptions, SolidMesh, repair};
+pub use tesdf_bench::preset::Preset;
 
 use crate::Failure;
-
-/// The encoder's presets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Preset {
-    /// Few faces per query
-    Default,
-    /// Fast to encode
-    Fast,
-    /// Small files
-    Compact,
-}
-
-impl Preset {
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Default => "default",
-            Self::Fast => "fast",
-            Self::Compact => "compact",
-        }
-    }
-
-    /// The options of the encoder.
-    pub fn options(self) -> EncodeOptions {
-        EncodeOptions::preset(match self {
-            Self::Default => tesdf::encode::Preset::Default,
-            Self::Fast => tesdf::encode::Preset::Fast,
-            Self::Compact => tesdf::encode::Preset::Compact,
-        })
-    }
-}
 
 /// Arguments of the benchmarks that query meshes at random points.
 #[derive(clap::Args)]

@@ -83,6 +83,14 @@ impl TreeChild {
     }
 }
 
+/// The nearest face, and how many distances the search has computed.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+struct SearchedTree {
+    nearest: Nearest,
+    distances: u32,
+}
+
 /// The boxes of both children of a node of the face tree.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
@@ -136,10 +144,15 @@ impl Field<'_> {
     /// The nearest of all faces, by the face tree. The search may miss faces whose squared distance
     /// is above `limit`.
     pub fn nearest_in_tree(self, p: V3, limit: f32) -> Nearest {
+        self.searched_tree(p, limit).nearest
+    }
+
+    fn searched_tree(self, p: V3, limit: f32) -> SearchedTree {
         let children = self.entry(CHILDREN);
         let mut words = Array::<u32>::new(TREE_DEPTH);
         let mut bounds = Array::<f32>::new(TREE_DEPTH);
         let mut found = none_within(limit);
+        let mut distances = 0u32;
         let mut top = 1usize;
         words[0] = 0u32;
         bounds[0] = 0.0f32;
@@ -148,6 +161,7 @@ impl Field<'_> {
             let child = TreeChild { word: words[top] };
             if bounds[top] < found.squared {
                 if child.is_leaf() {
+                    distances += child.count();
                     let end = child.start() + child.count();
                     let mut face = child.start();
                     while face < end {
@@ -169,7 +183,33 @@ impl Field<'_> {
                 }
             }
         }
-        found
+        SearchedTree { nearest: found, distances }
+    }
+
+    /// How many distances of a point and a face [`nearest`](Self::nearest) computes.
+    pub fn distances(self, cell: Cell, p: V3) -> u32 {
+        let mut distances = 0u32;
+        if self.is_mesh() {
+            if cell.is_listed() {
+                distances = self.list(cell.offset()).count;
+            } else {
+                distances = self.searched_tree(p, FAR.runtime()).distances;
+            }
+        }
+        distances
+    }
+
+    /// The same for the exact value at a point, for which truncated lists do not count.
+    pub fn exact_distances(self, cell: Cell, p: V3) -> u32 {
+        let mut distances = 0u32;
+        if self.is_mesh() {
+            if cell.is_listed() && self.has_exact_lists() {
+                distances = self.list(cell.offset()).count;
+            } else {
+                distances = self.searched_tree(p, FAR.runtime()).distances;
+            }
+        }
+        distances
     }
 
     /// The nearest face to a point of a cell. A simple shape has no faces.

@@ -16,6 +16,7 @@ use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
 use super::exchange::LANES;
 use super::piece::{Lowest, POOL, Piece, Pool, Region, empty_pool, region};
 use super::polygon_distance::{Disk, Polygon};
+use super::work::Work;
 
 /// Rounds after which a search gives up. In each round the group halves up to [`LANES`] pieces. The
 /// processor counts evaluations instead (`MAX_EVALUATIONS` in `tesdf::collide::narrow`).
@@ -62,6 +63,7 @@ fn nearest_listed(region: Region<'_>, polygon: Polygon<'_>, normal: V3, pool: &m
     let mut i = UNIT_POS;
     while i < faces.count {
         let apart = polygon.distance_to(disk, field.face(field.listed(faces, i)));
+        pool.work.measure(1u32);
         mine = mine.or(apart.distance, apart.at);
         i += LANES;
     }
@@ -73,7 +75,7 @@ fn nearest_listed(region: Region<'_>, polygon: Polygon<'_>, normal: V3, pool: &m
 #[cube]
 fn fan(region: Region<'_>, polygon: Polygon<'_>, triangles: u32, pool: &mut Pool) -> Lowest {
     let at = polygon.vertex(UNIT_POS.min(polygon.count - 1u32));
-    let here = region.value(at);
+    let here = region.value(at, UNIT_POS < polygon.count, &mut pool.work);
     pool.exchange(here.face);
     if UNIT_POS < triangles {
         let second = (UNIT_POS + 1u32).min(polygon.count - 1u32);
@@ -106,7 +108,7 @@ struct Halves {
 
 /// Halves a piece that is open.
 #[cube]
-fn halve(region: Region<'_>, goal: Goal, whole: Piece, best: Lowest) -> Halves {
+fn halve(region: Region<'_>, goal: Goal, whole: Piece, best: Lowest, work: &mut Work) -> Halves {
     let piece = whole.turned(region.part);
     let middle = Weights { s: 0.5f32 * (piece.a.s + piece.b.s), t: 0.5f32 * (piece.a.t + piece.b.t) };
     let mut halves = no_halves(best);
@@ -121,12 +123,12 @@ fn halve(region: Region<'_>, goal: Goal, whole: Piece, best: Lowest) -> Halves {
         let center = half.center();
         let at =
             Weights { s: select(is_middle, middle.s, center.s), t: select(is_middle, middle.t, center.t) };
-        let here = region.value(at);
+        let here = region.value(at, true.runtime(), work);
         halves.lowest = halves.lowest.or(here.distance, at);
         if is_middle {
             face = here.face;
         } else {
-            half.bound = region.bound(half, here);
+            half.bound = region.bound(half, here, work);
             let open = goal.is_open(half.bound, best);
             if is_first {
                 halves.first = half;
@@ -165,7 +167,7 @@ pub fn search(
         if UNIT_POS < taken {
             let at = base + UNIT_POS;
             if goal.is_open(pool.bound(at), best) {
-                halves = halve(region, goal, pool.get(at), best);
+                halves = halve(region, goal, pool.get(at), best, &mut pool.work);
             }
         }
         let mine = select(halves.first_open, 1u32, 0u32) + select(halves.second_open, 1u32, 0u32);
@@ -209,7 +211,8 @@ fn no_halves(best: Lowest) -> Halves {
 fn minimize(region: Region<'_>, polygon: Polygon<'_>, normal: V3, goal: Goal, pool: &mut Pool) -> Searched {
     let (field, cell) = (region.field, region.cell);
     let ball = polygon.ball();
-    let at_center = region.value(ball.center).distance;
+    let is_first = UNIT_POS == 0u32;
+    let at_center = region.value(ball.center, is_first, &mut pool.work).distance;
     let mut found = Searched { best: Lowest { distance: at_center, at: ball.center }, converged: true };
     if at_center - ball.radius <= goal.reach + ROUNDING {
         let crossing = cell.is_crossing();
@@ -217,7 +220,8 @@ fn minimize(region: Region<'_>, polygon: Polygon<'_>, normal: V3, goal: Goal, po
         let mut searches = true;
         if field.is_mesh() && cell.is_listed() && !all_inside {
             let nearest = nearest_listed(region, polygon, normal, pool);
-            found.best = Lowest { distance: region.value(nearest.at).distance, at: nearest.at };
+            let here = region.value(nearest.at, is_first, &mut pool.work);
+            found.best = Lowest { distance: here.distance, at: nearest.at };
             // The polygon may cross the surface, or be inside the solid.
             searches = crossing && (nearest.distance <= CLEAR || found.best.distance < 0.0f32);
         }
@@ -249,8 +253,9 @@ pub fn narrow_exact(
     counters: &Counters,
     contacts: &mut Contacts,
     asked: &AskedExact,
+    #[comptime] counting: bool,
 ) {
-    let mut pool = empty_pool();
+    let mut pool = empty_pool(counting);
     let number = CUBE_POS as u32;
     let count = counters.within(counters::POLYGONS, polygons.items.room);
     if number < count {
@@ -264,6 +269,7 @@ pub fn narrow_exact(
         let reach = pair.part_reach();
         let goal = Goal { reach, tolerance: asked.tolerances[pair.b as usize] };
         let found = minimize(region, polygons.polygon(number, part), normal, goal, &mut pool);
+        pool.work.add_to(counters);
         if found.best.distance <= reach && UNIT_POS == 0u32 {
             let point = part.at(found.best.at.s, found.best.at.t);
             let v = field.value_in_cell(cell, point);

@@ -25,8 +25,10 @@ use super::taken::{Memory, memory_of};
 /// is at least 1e-6. Distances between faces are off by less.
 const CLEARS: f32 = 0.5;
 
-/// Steps between two corners of a face at which a group looks first: 28 points.
+/// Steps between two corners of a face at which a group looks first.
 const STEPS: u32 = 6;
+/// The number of these points.
+const FIRST_LOOKS: u32 = (STEPS + 1) * (STEPS + 2) / 2;
 
 /// Point `number` of a face at which the group looks first, row by row.
 #[cube]
@@ -73,6 +75,7 @@ fn nearest_face(
                 let f = field.face(face);
                 if axes.to_face(f) <= farthest {
                     let apart = polygon.distance_to(disk, f);
+                    pool.work.measure(1u32);
                     mine = mine.or(apart.distance, apart.at);
                 }
             }
@@ -149,7 +152,8 @@ fn look(
         let looks = is_first && UNIT_POS > 0u32;
         let first = first_look(select(looks, UNIT_POS - 1u32, 0u32));
         let at = Weights { s: select(looks, first.s, near.at.s), t: select(looks, first.t, near.at.t) };
-        let here = everywhere(field, moved).value(at);
+        let is_own = UNIT_POS == 0u32 || (is_first && UNIT_POS <= FIRST_LOOKS);
+        let here = everywhere(field, moved).value(at, is_own, &mut memory.pool.work);
         let found = memory.pool.lowest(Lowest { distance: here.distance, at });
         if is_first {
             known.best = found;
@@ -199,8 +203,9 @@ pub fn narrow_exact_faces(
     counters: &Counters,
     contacts: &mut Contacts,
     asked: &AskedExact,
+    #[comptime] counting: bool,
 ) {
-    let mut memory = memory_of(empty_pool(), no_walk());
+    let mut memory = memory_of(empty_pool(counting), no_walk());
     let number = CUBE_POS as u32;
     let count = counters.within(counters::POLYGONS, polygons.items.room);
     if number < count {
@@ -214,6 +219,7 @@ pub fn narrow_exact_faces(
         if found.best.distance <= reach {
             face.report(found.best.at, found.converged, counters, contacts, &mut memory);
         }
+        memory.pool.work.add_to(counters);
         counters.tell_if_broken_off(count);
     }
 }
@@ -225,7 +231,7 @@ mod tests {
 
     #[test]
     fn the_first_looks_are_a_grid_with_the_corners() {
-        let looks: Vec<(f32, f32)> = (0..28).map(first_look).map(|w| (w.s, w.t)).collect();
+        let looks: Vec<(f32, f32)> = (0..FIRST_LOOKS).map(first_look).map(|w| (w.s, w.t)).collect();
         for corner in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)] {
             assert!(looks.contains(&corner), "{corner:?}");
         }

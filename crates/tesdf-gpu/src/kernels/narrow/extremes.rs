@@ -20,6 +20,7 @@ use super::near::{FACES, Walk, axes_of};
 use super::piece::{Lowest, Pool};
 use super::polygon_distance::weights_of;
 use super::taken::{Memory, Taken, nothing_at};
+use super::work::Work;
 
 /// Number of directions in the plane of a face.
 pub const DIRECTIONS: u32 = internal::DIRECTIONS as u32;
@@ -213,7 +214,7 @@ impl Facing<'_> {
     ///
     /// At a border of the other body's face, a point is nearer to the side of the body than to this
     /// face. It is moved inwards until the side is as deep as the face.
-    fn take(self, patch: Patch, at: V3, corner: u32) -> Taken {
+    fn take(self, patch: Patch, at: V3, corner: u32, is_own: bool, work: &mut Work) -> Taken {
         let mut found = nothing_at(at, corner);
         let mut turn = 0u32;
         let mut open = true;
@@ -221,6 +222,11 @@ impl Facing<'_> {
             let mut cell = no_cell();
             if self.field.is_mesh() {
                 cell = self.field.locate(found.point);
+            }
+            if comptime!(work.counting) {
+                if is_own {
+                    work.evaluate(self.field.exact_distances(cell, found.point));
+                }
             }
             let v = self.field.exact_value_in(cell, found.point);
             let v = self.field.opposing(cell, found.point, self.normal, v);
@@ -384,14 +390,15 @@ impl Facing<'_> {
             }
             searches = searches && candidate.distance < FAR;
             let mut taken = nothing_at(zero(), NO_CORNER.runtime());
+            let writes = select(is_minimum, UNIT_POS == 0u32, UNIT_POS < DIRECTIONS);
             if searches {
                 let point = self.part.at(candidate.at.s, candidate.at.t);
-                taken = self.take(patch, point, corner_of(self.part, candidate.at));
+                let corner = corner_of(self.part, candidate.at);
+                taken = self.take(patch, point, corner, writes, &mut memory.pool.work);
                 below = -candidate.distance - SAME;
             }
             memory.points.put(select(is_minimum, DIRECTIONS, direction), round + 1u32, taken);
             let is_new = memory.points.is_new(select(is_minimum, DIRECTIONS, direction), round + 1u32, taken);
-            let writes = select(is_minimum, UNIT_POS == 0u32, UNIT_POS < DIRECTIONS);
             if writes && taken.is_taken && is_new {
                 self.write(taken, converged, counters, contacts);
             }

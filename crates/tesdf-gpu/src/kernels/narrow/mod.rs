@@ -11,3 +11,4 @@ pub mod piece;
 pub mod polygon_distance;
 pub mod taken;
 pub mod whole_faces;
+pub mod work;

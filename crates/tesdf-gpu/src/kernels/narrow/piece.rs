@@ -10,6 +10,7 @@ use super::super::math::greatest_minimum::Functions;
 use super::super::math::vector::{V3, v3};
 use super::super::middle::items::Weights;
 use super::exchange::LANES;
+use super::work::{Work, no_work};
 
 /// Capacity of the pool of waiting pieces.
 pub const POOL: u32 = 128;
@@ -155,13 +156,28 @@ struct Points {
 
 #[cube]
 impl Region<'_> {
-    /// The field at a point of the part.
-    pub fn value(self, at: Weights) -> Value {
+    /// The field at a point of the part. It counts as work if it `is_own`: if no other thread looks
+    /// at the same point.
+    pub fn value(self, at: Weights, is_own: bool, work: &mut Work) -> Value {
         let p = self.part.at(at.s, at.t);
+        if comptime!(work.counting) {
+            if is_own {
+                work.evaluate(self.distances_at(p));
+            }
+        }
         if comptime!(self.per == ContactsPer::Face) {
             self.field.exact_value(p)
         } else {
             self.field.value_in_cell(self.cell, p)
+        }
+    }
+
+    /// How many distances of a point and a face an evaluation takes.
+    fn distances_at(self, p: V3) -> u32 {
+        if comptime!(self.per == ContactsPer::Face) {
+            self.field.exact_distances(self.field.cell_at(p), p)
+        } else {
+            self.field.distances(self.cell, p)
         }
     }
 
@@ -209,7 +225,7 @@ impl Region<'_> {
 
     /// The bound of a piece, with the field at its center: the value there minus the radius, or minus
     /// the greatest minimum of four functions that the depth does not exceed, whichever is greater.
-    pub fn bound(self, piece: Piece, here: Value) -> f32 {
+    pub fn bound(self, piece: Piece, here: Value, work: &mut Work) -> f32 {
         let points = Points {
             a: self.part.at(piece.a.s, piece.a.t),
             b: self.part.at(piece.b.s, piece.b.t),
@@ -221,6 +237,10 @@ impl Region<'_> {
         let mut bound = here.distance - radius;
         let is_mesh = self.field.is_mesh();
         if !is_mesh || bound < 0.0f32 {
+            if comptime!(work.counting) {
+                // Of three points and four faces.
+                work.measure(select(is_mesh, 12u32, 0u32));
+            }
             let functions = if is_mesh {
                 self.distances_to_faces(piece, points, here.face)
             } else {
@@ -241,6 +261,8 @@ pub struct Pool {
     found: Shared<[f32]>,
     /// A word of each thread, such as the number of pieces that it keeps.
     kept: Shared<[u32]>,
+    /// The work of this thread.
+    pub work: Work,
 }
 
 /// Number of pieces that the threads before this one keep, and that all threads keep.
@@ -252,12 +274,13 @@ pub struct Kept {
 }
 
 #[cube]
-pub fn empty_pool() -> Pool {
+pub fn empty_pool(#[comptime] counting: bool) -> Pool {
     Pool {
         numbers: Shared::<[f32]>::new_slice(comptime!(7 * POOL as usize)),
         faces: Shared::<[u32]>::new_slice(comptime!(3 * POOL as usize)),
         found: Shared::<[f32]>::new_slice(comptime!(3 * LANES as usize)),
         kept: Shared::<[u32]>::new_slice(comptime!(LANES as usize)),
+        work: no_work(counting),
     }
 }
 

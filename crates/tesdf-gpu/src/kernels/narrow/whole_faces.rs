@@ -28,7 +28,7 @@ pub fn narrow_whole_faces(
 ) {
     let mut exchange = exchange(variant);
     let mut best = no_best(variant);
-    let mut memory = memory_of(empty_pool(), no_walk());
+    let mut memory = memory_of(empty_pool(comptime!(variant.counting)), no_walk());
     let number = CUBE_POS as u32;
     let count = counters.within(counters::POLYGONS, polygons.items.room);
     if number < count {
@@ -45,6 +45,7 @@ pub fn narrow_whole_faces(
             // Nothing proves that no point is lower.
             face.report(search.best, false.runtime(), counters, contacts, &mut memory);
         }
+        memory.pool.work.add_to(counters);
         counters.tell_if_broken_off(count);
     }
 }
