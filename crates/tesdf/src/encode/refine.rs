@@ -93,7 +93,7 @@ impl GroupWeights {
 ///
 /// The factor ends the bisection where no cell is small enough, on medial axes and at vertices of
 /// many faces.
-const OVERFULL: f64 = 64.0;
+const OVERFULL: f64 = 16.0;
 
 impl Weights {
     /// How many faces reading a list of this length counts as in a cell that comes as near to the
