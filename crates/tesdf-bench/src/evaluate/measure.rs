@@ -10,6 +10,7 @@ use tesdf::{Progress, TeSdf};
 
 use super::domains::Subject;
 use super::output;
+use crate::preset::Preset;
 use tesdf_terminal::progress::{Bar, watched};
 use tesdf_terminal::report::Failure;
 
@@ -54,6 +55,21 @@ impl Setup {
             encoder: format!("{resolution} / {}", output::threshold(threshold)),
             options: EncodeOptions { method: Method::Sampled(sampling), ..certified.options.clone() },
             ..certified
+        }
+    }
+
+    /// The same, with the cells of another preset. Rows name presets other than the default.
+    pub fn with_preset(self, preset: Preset) -> Self {
+        let Self { encoder, domain, options } = self;
+        let EncodeOptions { method, refinement, deformation, .. } = options;
+        let encoder = match preset {
+            Preset::Default => encoder,
+            _ => format!("{encoder}, {}", preset.name()),
+        };
+        Self {
+            encoder,
+            domain,
+            options: EncodeOptions { method, refinement, deformation, ..preset.options() },
         }
     }
 

@@ -15,6 +15,7 @@ mod table4;
 
 use std::path::PathBuf;
 
+use crate::preset::Preset;
 use meshes::Mesh;
 use output::Sink;
 use tesdf::evaluate::EvaluateOptions;
@@ -47,6 +48,9 @@ pub struct TableArgs {
     /// Division of space into tetrahedra; several values, separated by commas, give separate rows
     #[arg(long, value_enum, value_delimiter = ',', default_value = "bisection")]
     pub domain: Vec<DomainName>,
+    /// Preset of the encoder
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    pub preset: Preset,
     /// Number of grid points along the diagonal of a mesh [default: 1024; with --quick 64]
     #[arg(long, value_name = "N")]
     pub grid: Option<u32>,

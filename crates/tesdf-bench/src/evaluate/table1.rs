@@ -231,13 +231,17 @@ fn measure(
     let deforms = subject.conforming.is_some() && mesh.deforms == Deforms::Yes;
     let deformation = if deforms { Deformation::Expected } else { Deformation::None };
     let setups = [
-        Setup::certified(subject, Cells::Plain, deformation),
-        Setup::sampled(subject, args.resolution(mesh), mesh.threshold, deformation),
+        Setup::certified(subject, Cells::Plain, deformation).with_preset(args.preset),
+        Setup::sampled(subject, args.resolution(mesh), mesh.threshold, deformation).with_preset(args.preset),
     ];
     let mut made =
         setups.into_iter().map(|setup| Made::new(setup, subject, sampler)).collect::<Result<Vec<_>, _>>()?;
     if subject.conforming.is_some() {
-        made.push(Made::new(Setup::certified(subject, Cells::Bisected, deformation), subject, sampler)?);
+        made.push(Made::new(
+            Setup::certified(subject, Cells::Bisected, deformation).with_preset(args.preset),
+            subject,
+            sampler,
+        )?);
     }
     table.extend(rows(mesh, subject, &made, options)?);
     let Some(domain) = subject.conforming.as_ref().filter(|_| deforms) else { return Ok(()) };

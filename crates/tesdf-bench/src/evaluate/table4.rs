@@ -89,11 +89,14 @@ pub fn run(args: &TableArgs, sink: &Sink) -> Result<(), Failure> {
     for &domain in &args.domain {
         let subject = open(mesh, &args.data, domain)?;
         let mut setups = vec![
-            Setup::certified(&subject, Cells::Plain, Deformation::None),
-            Setup::sampled(&subject, args.resolution(mesh), mesh.threshold, Deformation::None),
+            Setup::certified(&subject, Cells::Plain, Deformation::None).with_preset(args.preset),
+            Setup::sampled(&subject, args.resolution(mesh), mesh.threshold, Deformation::None)
+                .with_preset(args.preset),
         ];
         if subject.conforming.is_some() {
-            setups.push(Setup::certified(&subject, Cells::Bisected, Deformation::None));
+            setups.push(
+                Setup::certified(&subject, Cells::Bisected, Deformation::None).with_preset(args.preset),
+            );
         }
         // One pass over the grid compares all assets.
         let mut assets: Vec<TeSdf> = Vec::new();
