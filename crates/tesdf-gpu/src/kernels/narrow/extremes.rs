@@ -224,9 +224,7 @@ impl Facing<'_> {
                 cell = self.field.locate(found.point);
             }
             if comptime!(work.counting) {
-                if is_own {
-                    work.evaluate(self.field.exact_distances(cell, found.point));
-                }
+                work.evaluate(self.field.exact_distances(cell, found.point), is_own);
             }
             let v = self.field.exact_value_in(cell, found.point);
             let v = self.field.opposing(cell, found.point, self.normal, v);

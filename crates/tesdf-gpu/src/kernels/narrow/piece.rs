@@ -161,9 +161,7 @@ impl Region<'_> {
     pub fn value(self, at: Weights, is_own: bool, work: &mut Work) -> Value {
         let p = self.part.at(at.s, at.t);
         if comptime!(work.counting) {
-            if is_own {
-                work.evaluate(self.distances_at(p));
-            }
+            work.evaluate(self.distances_at(p), is_own);
         }
         if comptime!(self.per == ContactsPer::Face) {
             self.field.exact_value(p)

@@ -20,10 +20,11 @@ pub fn no_work(#[comptime] counting: bool) -> Work {
 
 #[cube]
 impl Work {
-    /// An evaluation of the field that takes `distances` of a point and a face.
-    pub fn evaluate(&mut self, distances: u32) {
-        self.evaluations += 1u32;
-        self.distances += distances;
+    /// An evaluation of the field that takes `distances` of a point and a face. It counts if it
+    /// `is_own`: if no other thread looks at the same point.
+    pub fn evaluate(&mut self, distances: u32, is_own: bool) {
+        self.evaluations += select(is_own, 1u32, 0u32);
+        self.distances += select(is_own, distances, 0u32);
     }
 
     /// Distances of points or polygons and faces.
