@@ -109,8 +109,11 @@ impl Lanes<8> for [f32; 8] {
     }
     #[inline(always)]
     fn least(self) -> Self {
-        let [a, b, c, d, e, f, g, h] = self;
-        [a.min(e).min(b.min(f)).min(c.min(g).min(d.min(h))); 8]
+        let mut least = self[0];
+        for lane in self {
+            least = if lane < least { lane } else { least };
+        }
+        [least; 8]
     }
 }
 
