@@ -45,7 +45,7 @@ fn bad_usage_exits_with_2_and_a_reason_on_stderr() {
         (&["encode", "m.stl", "-o", "f", "--quality", "9"], "error: unexpected argument '--quality' found"),
         (
             &["encode", "m.stl", "-o", "f", "--preset", "huge"],
-            "[possible values: default, fast, compact, paper, sampled-safe]",
+            "[possible values: default, fast, compact, gpu, paper, sampled-safe]",
         ),
         (&["encode", "m.stl", "-o", "f", "--band", "-1"], "-1 is negative; expected a length"),
         (&["encode", "m.stl", "-o", "f", "--region", "0 0 0 1 1"], "5 numbers; expected six"),
