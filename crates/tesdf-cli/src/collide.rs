@@ -94,6 +94,10 @@ pub struct Args {
     /// Maximum number of contacts of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
+    /// Find the K deepest contacts of the pair only. This takes less time than finding all, but
+    /// they may all be at one place, where --reduce keeps contacts that are spread
+    #[arg(long, value_name = "K", conflicts_with = "reduce")]
+    pub deepest: Option<u32>,
     /// Where contacts are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = device::help("contacts are found"))]
     pub device: Choice,
@@ -158,7 +162,7 @@ impl Args {
             tolerance,
             contact_distance: self.contact_distance,
             cos_theta: self.cos_theta.0,
-            reduction: self.reduce,
+            reduction: self.deepest.map_or(self.reduce, Reduction::Deepest),
             ..CollideOptions::default()
         }
     }
@@ -244,6 +248,10 @@ fn text(found: &Contacts) -> String {
         let _ = writeln!(text, "{} dropped by the cosine filter, {} by the reduction", s.filtered, s.reduced);
     }
     for r in &found.reductions {
+        if let Some(above) = r.left_out_above {
+            let kept = count(r.kept, "contact");
+            let _ = writeln!(text, "the {kept} that are deepest; no other contact is below {above:.6e}");
+        }
         let _ = writeln!(
             text,
             "wrench error {:.3e} of {} kept of {}: a unit force on any contact can be replaced by forces on the kept \

@@ -131,6 +131,28 @@ fn a_reduction_prints_its_wrench_error() {
 }
 
 #[test]
+fn the_deepest_contacts_are_the_first_of_all() {
+    let folder = cube();
+    let all = ["collide", "c.tesdf", "c.tesdf", "--pose-b", "0.1 0.2 1.9 0.1 0 0 0.99498743710662", "--json"];
+    let mut distances: Vec<f64> =
+        json(&folder, &all).as_array().unwrap().iter().map(|c| c["distance"].as_f64().unwrap()).collect();
+    distances.sort_by(f64::total_cmp);
+    let report = json(&folder, &[&all[..], &["--deepest", "3", "--report"]].concat());
+    let mut found: Vec<f64> =
+        report["contacts"].as_array().unwrap().iter().map(|c| c["distance"].as_f64().unwrap()).collect();
+    found.sort_by(f64::total_cmp);
+    assert!(distances.len() > 3 && found == distances[..3], "{found:?} {distances:?}");
+    let above = report["reductions"][0]["left_out_above"].as_f64().unwrap();
+    assert!(above <= distances[3], "{above} {distances:?}");
+    let text = folder.good(&[&all[..5], &["--deepest", "3"]].concat());
+    assert!(text.contains("the 3 contacts that are deepest; no other contact is below"), "{text}");
+    let (code, _, error) = folder.tesdf(&[&all[..5], &["--deepest", "3", "--reduce", "3"]].concat());
+    assert!(code == Some(2) && error.contains("cannot be used with"), "{error}");
+    let (code, _, error) = folder.tesdf(&[&all[..5], &["--deepest", "0"]].concat());
+    assert!(code != Some(0) && error.contains("at least 1"), "{error}");
+}
+
+#[test]
 fn why_explains_found_and_missing_contacts() {
     let folder = cube();
     let why = |more: &[&str]| {

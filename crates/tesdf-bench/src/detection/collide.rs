@@ -28,7 +28,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         contacts_per: args.contacts_per,
         iterations: args.iterations,
         cos_theta: Some(args.cos_theta),
-        reduction: args.reduce.map_or(Reduction::None, Reduction::PerPair),
+        reduction: match (args.reduce, args.deepest) {
+            (Some(n), _) => Reduction::PerPair(n),
+            (None, Some(k)) => Reduction::Deepest(k),
+            (None, None) => Reduction::None,
+        },
         ..CollideOptions::with_mode(mode)
     };
     options.validate().map_err(Failure::new)?;

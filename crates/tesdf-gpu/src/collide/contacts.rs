@@ -76,6 +76,7 @@ pub fn pair_reduction(instances: &Instances, touching: &Touching, report: &Repor
         wrench_error: f64::from(report.error),
         center: at.to_world(Vec3::from_array(report.center)),
         length: f64::from(report.length) * at.unit,
+        left_out_above: None,
     }
 }
 

@@ -18,6 +18,7 @@ use std::collections::BTreeMap;
 use tesdf::Length;
 use tesdf::collide::{
     CollideError, CollideOptions, Contacts, HiddenOverlap, Reduction, Scene, Shape, ShapeId, Statistics,
+    reduce_pairs,
 };
 
 use buffers::{PipelineBuffers, ROW, WORD};
@@ -112,6 +113,8 @@ impl Detector {
     /// - A reduction follows the rules of the processor, but compares bounds of distances instead
     ///   of distances. So it may keep other contacts. With contacts per face it also chooses among
     ///   several contacts at one vertex, of which otherwise one remains.
+    /// - [`Reduction::Deepest`] cuts the contacts on the processor, after all have been found. So it
+    ///   saves no time here.
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors
@@ -157,6 +160,23 @@ impl Detector {
     }
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
+        let Reduction::Deepest(_) = options.reduction else { return self.find(scene, options, timing) };
+        options.validate()?;
+        let all = self.find(scene, &CollideOptions { reduction: Reduction::None, ..*options }, timing)?;
+        let (mut statistics, hidden) = (all.statistics, all.hidden.clone());
+        let (contacts, reductions) = reduce_pairs(all.into_vec(), options.reduction);
+        statistics.reduced = statistics.touching - statistics.filtered - contacts.len();
+        statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
+        Ok(Contacts::new(contacts, statistics, reductions, hidden))
+    }
+
+    /// Finds all contacts, or those that a reduction on the device keeps.
+    fn find(
+        &mut self,
+        scene: &Scene,
+        options: &CollideOptions,
+        timing: Timing,
+    ) -> Result<Contacts, GpuError> {
         options.validate()?;
         if shape_ids(scene) != self.shape_ids {
             if self.shapes.have_moved() {
@@ -173,7 +193,7 @@ impl Detector {
         self.report = DeviceReport::default();
         loop {
             self.report.passes += 1;
-            if options.reduction != Reduction::None {
+            if matches!(options.reduction, Reduction::PerPair(_)) {
                 self.buffers.add_members(&self.device)?;
             }
             let counts = self.pass(&instances, options, timing)?;
@@ -239,14 +259,16 @@ impl Detector {
         let mut words = self.device.read(words, count as usize)?;
         let mut rows = self.device.read(rows, count as usize)?;
         self.report.read += size_of_val(words.as_slice()) + size_of_val(rows.as_slice());
-        if parts(options) == Parts::Faces && options.reduction == Reduction::None {
+        if parts(options) == Parts::Faces && !matches!(options.reduction, Reduction::PerPair(_)) {
             one_per_vertex(&shapes, instances, &mut words, &mut rows);
         }
         let contacts = contacts(&shapes, instances, options.mode, &words, &rows);
         let reductions = self.reductions(instances, options.reduction)?;
         let (found, unconverged) = match options.reduction {
-            Reduction::None => (contacts.len(), contacts.iter().filter(|c| !c.converged).count()),
             Reduction::PerPair(_) => (counts.contacts as usize, counts.unconverged as usize),
+            Reduction::None | Reduction::Deepest(_) => {
+                (contacts.len(), contacts.iter().filter(|c| !c.converged).count())
+            }
         };
         let pipeline: usize = self.buffers.account().iter().map(|(_, bytes)| bytes).sum();
         let statistics = Statistics {

@@ -64,7 +64,8 @@ pub enum FeatureB {
 pub struct Statistics {
     /// Ordered pairs of instances whose bounds overlap.
     pub instance_pairs: usize,
-    /// Faces or nodes of a that remain after the broad phase, over all pairs.
+    /// Faces or nodes of a that remain after the broad phase, over all pairs. With
+    /// [`Deepest`](super::Reduction::Deepest), this and all other numbers count what was looked at.
     pub candidates: usize,
     /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell. With
     /// one contact per face: faces.
@@ -93,19 +94,25 @@ pub struct PairReduction {
     pub instance_a: InstanceId,
     /// The instance with the higher id.
     pub instance_b: InstanceId,
-    /// Number of contacts of the pair before the reduction, in both orders.
+    /// Number of contacts of the pair before the reduction, in both orders. With
+    /// [`Deepest`](super::Reduction::Deepest), number of contacts that were found.
     pub contacts: usize,
     /// Number of kept contacts.
     pub kept: usize,
     /// The greatest distance of a contact's wrench from the convex hull of the wrenches of the kept
-    /// contacts, without unit; 0 when all are kept.
+    /// contacts, without unit; 0 when all are kept. Where a search for the
+    /// [`Deepest`](super::Reduction::Deepest) has left contacts unfound, an upper bound between 1.41
+    /// and 2.83, because nothing is known about their normals.
     pub wrench_error: f64,
     /// The centre of a box around the contact points `point_a`, in the world. The box is parallel
-    /// to the world's axes, or to those of `instance_b` when a GPU detects.
+    /// to the world's axes, or to those of `instance_b` when a GPU detects or contacts are unfound.
     pub center: DVec3,
     /// The greatest distance of a contact point from `center`, in the world's unit. On a GPU it is
-    /// at least the limit of its rounding.
+    /// at least the limit of its rounding. Where contacts are unfound, an upper bound.
     pub length: f64,
+    /// No contact that was left out has a lower signed distance than this, in the world's unit.
+    /// `None` where all are kept, and for [`PerPair`](super::Reduction::PerPair).
+    pub left_out_above: Option<f64>,
 }
 
 /// The contacts of a scene, sorted by world, instances, face and cell. Iterates over the contacts

@@ -1,14 +1,13 @@
 use crate::parallel::*;
 
-use super::hidden;
-use super::narrow::Minimum;
+use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
 use super::ordered_pair::OrderedPair;
 use super::reduce::{Reduced, reduced};
-use super::surface::{Candidates, Part};
+use super::surface::Candidates;
 use super::{
-    CollideError, CollideOptions, Contact, Contacts, InstancePair, InstancePairs, Scene, Statistics,
+    CollideError, CollideOptions, Contacts, InstancePair, InstancePairs, Reduction, Scene, Statistics,
+    deepest, hidden,
 };
-use crate::geometry::Aabb;
 
 /// Number of faces or nodes per task.
 const TASK: usize = 64;
@@ -76,6 +75,9 @@ pub fn detect_pairs(
 }
 
 fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions) -> Contacts {
+    if let Reduction::Deepest(count) = options.reduction {
+        return deepest::of_pairs(pairs, count, options.mode);
+    }
     let candidates: Vec<Candidates> = pairs.par_iter().map(OrderedPair::candidates).collect();
     let tasks: Vec<(&OrderedPair, &[u32])> = pairs
         .iter()
@@ -107,113 +109,11 @@ fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions) -> Contacts {
     // Tasks follow the sorted order of the pairs. Within a pair, contacts are sorted by face.
     contacts
         .chunk_by_mut(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b))
-        .for_each(|run| run.sort_unstable_by_key(order));
+        .for_each(|run| run.sort_by_key(order));
     let all = contacts.len();
     let Reduced { contacts, reports, bytes } = reduced(contacts, options.reduction);
     statistics.reduced = all - contacts.len();
     statistics.bytes += bytes;
     let hidden = hidden::among(pairs, options.mode, &contacts);
     Contacts::new(contacts, statistics, reports, hidden)
-}
-
-/// Sort key within one ordered pair of instances. Without a cell, several pieces outside the cube
-/// may have the same face, so the point decides.
-fn order(c: &Contact) -> (u32, u32, Option<u32>, [u64; 3]) {
-    (c.face_a, c.feature.a, c.tet_b, c.point_a.to_array().map(f64::to_bits))
-}
-
-/// A contact at a vertex of its face.
-struct AtVertex {
-    /// The index of the contact.
-    index: usize,
-    /// The vertex, by its bits in the field's frame.
-    vertex: [u64; 3],
-    /// Cosine between the gradient and the face's normal.
-    cosine: f64,
-}
-
-/// Of the contacts of several faces at one vertex, keeps the one whose gradient most opposes its
-/// face; among equals, that of the lowest face.
-fn one_per_vertex(contacts: Vec<Contact>, at_vertices: &[AtVertex]) -> Vec<Contact> {
-    if at_vertices.is_empty() {
-        return contacts;
-    }
-    let key = |&AtVertex { index, vertex, cosine }: &AtVertex| {
-        let Contact { instance_a, instance_b, face_a, .. } = contacts[index];
-        // Cosines that differ by rounding are equal.
-        ((instance_a, instance_b, vertex), (cosine * 1e9).round() as i64, face_a, index)
-    };
-    let keep = kept_at_vertices(at_vertices.iter().map(key).collect(), contacts.len());
-    contacts.into_iter().zip(keep).filter_map(|(contact, keep)| keep.then_some(contact)).collect()
-}
-
-/// For each of `count` contacts: whether it is kept. Of those with the same vertex, the one with the
-/// least cosine is; among equals, that of the lowest face. `keys` are vertex, cosine, face and index
-/// of the contacts at vertices.
-pub fn kept_at_vertices<V: Ord + Send>(mut keys: Vec<(V, i64, u32, usize)>, count: usize) -> Vec<bool> {
-    keys.par_sort_unstable();
-    let mut keep = vec![true; count];
-    for same in keys.chunk_by(|x, y| x.0 == y.0) {
-        same[1..].iter().for_each(|&(.., index)| keep[index] = false);
-    }
-    keep
-}
-
-#[derive(Default)]
-struct Found {
-    contacts: Vec<Contact>,
-    at_vertices: Vec<AtVertex>,
-    polygons: usize,
-    filtered: usize,
-}
-
-/// Middle phase, narrow phase and cosine filter.
-fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
-    let mut found = Found::default();
-    let Found { contacts, at_vertices, polygons, filtered } = &mut found;
-    let parts: Vec<(Part, u32, u32)> = candidates.iter().map(|&candidate| pair.part(candidate)).collect();
-    let mut rest = parts.as_slice();
-    while !rest.is_empty() {
-        let count = if pair.search.is_of_faces() { near_each_other(rest) } else { rest.len() };
-        let (group, others) = rest.split_at(count);
-        rest = others;
-        let around = pair.search.surroundings(&pair.field, group.iter().map(|(part, ..)| part));
-        for (part, face_a, feature) in group {
-            let mut found = |minimum: Minimum| {
-                if pair.is_filtered(part, &minimum) {
-                    *filtered += 1;
-                    return;
-                }
-                if let Some(vertex) = pair.vertex(part, &minimum) {
-                    let cosine = minimum.value.gradient.dot(part.normal);
-                    at_vertices.push(AtVertex { index: contacts.len(), vertex, cosine });
-                }
-                contacts.push(pair.contact(part, &minimum, *face_a, *feature));
-            };
-            let mut polygon = |_: &_| *polygons += 1;
-            pair.search.minima(&pair.field, part, around.as_ref(), &mut polygon, &mut |_, m| found(m));
-        }
-    }
-    found
-}
-
-/// Largest number of parts whose surroundings are searched together, and the largest size of their
-/// bounds, relative to the largest part.
-const GROUP: usize = 16;
-const SPREAD: f64 = 4.0;
-
-/// The number of parts, from the first on, that lie near each other; at least 1.
-fn near_each_other(parts: &[(Part, u32, u32)]) -> usize {
-    let (mut bounds, mut largest) = (Aabb::EMPTY, 0.0f64);
-    parts
-        .iter()
-        .take(GROUP)
-        .take_while(|(part, ..)| {
-            let own = Aabb::of(part.points());
-            bounds = bounds.union(own);
-            largest = largest.max(own.extent().max_element());
-            bounds.extent().max_element() <= SPREAD * largest
-        })
-        .count()
-        .max(1)
 }

@@ -120,15 +120,35 @@ impl<'a> FieldBody<'a> {
     /// Whether no point within `radius` of `p` can have a signed distance up to `reach`. All in the
     /// field's frame. `true` is certain; `false` may be wrong.
     pub fn is_beyond(&self, p: DVec3, radius: f64, reach: f64) -> bool {
+        self.least_up_to(p, radius, reach).is_none()
+    }
+
+    /// Lower bound of the signed distance within `radius` of `p`; `None` where it is certain that no
+    /// point there has a signed distance up to `reach`. All in the field's frame.
+    fn least_up_to(&self, p: DVec3, radius: f64, reach: f64) -> Option<f64> {
         let limit = radius + reach;
         // Far out, the bounds are a good approximation of the body.
         if let Field::Mesh(asset) = self.field
             && asset.local_bounds().distance_squared(p) > (limit.max(0.0) + ROUNDING).powi(2)
         {
-            return true;
+            return None;
         }
         let (distance, slack) = self.rough(p);
-        distance > limit + slack
+        (distance <= limit + slack).then_some(distance - slack - radius)
+    }
+
+    /// Lower bound of the distances that contacts within `radius` of `p` report; `None` where none
+    /// is up to `reach`. All in the field's frame.
+    pub fn least_contact(&self, p: DVec3, radius: f64, reach: f64) -> Option<f64> {
+        let least = self.least_up_to(p, radius, reach)?;
+        // A list that lacks faces gives too great a depth.
+        let is_unknown = least < 0.0 && !self.has_exact_lists();
+        Some(if is_unknown { f64::NEG_INFINITY } else { least })
+    }
+
+    /// Whether all values are exact up to rounding, inside the body, too.
+    pub fn has_exact_lists(&self) -> bool {
+        !matches!(self.field, Field::Mesh(asset) if !asset.has_exact_lists())
     }
 
     /// The signed distance at `p` and a bound of its error, in the field's frame.

@@ -13,7 +13,7 @@
 //!   [`detect_with`], which finds the same contacts.
 //! - [`candidates`](candidates()): the result of the broad and the middle phase, for debug views.
 //! - [`reduce_pairs`]: fewer contacts per pair, with a bound of the loss; [`wrench_error`] computes
-//!   the loss.
+//!   the loss. [`Reduction::Deepest`] finds the deepest contacts without the others.
 //! - [`PatchTracker`]: contacts grouped into patches, which keep their ids from step to step.
 //! - [`hidden_overlaps`]: pairs that overlap without a contact that shows it. Detections report
 //!   them beside the contacts.
@@ -29,11 +29,13 @@ mod candidates;
 mod clearance;
 mod coarse;
 mod contact;
+mod deepest;
 mod depth_bounds;
 mod detect;
 mod error;
 mod field;
 mod field_value;
+mod found;
 mod greatest_minimum;
 mod hidden;
 mod hidden_overlap;
@@ -65,7 +67,7 @@ mod why;
 /// Not part of the API.
 #[doc(hidden)]
 pub mod internal {
-    pub use super::detect::kept_at_vertices;
+    pub use super::found::kept_at_vertices;
     pub use super::field::ROUNDING;
     pub use super::greatest_minimum::greatest_minimum;
     pub use super::hidden::{DEEPER, SETTLED, THICK};

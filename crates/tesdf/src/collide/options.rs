@@ -42,6 +42,11 @@ pub enum Reduction {
     /// At most this many per pair of instances: the deepest, the extremes, then those that matter
     /// most for the wrench.
     PerPair(u32),
+    /// The deepest contacts, at most this many per pair of instances. They are exactly the deepest
+    /// of all contacts; of equally deep ones, the first in the order of a detection. The search is
+    /// best-first and does not find the other contacts. All deepest contacts may be at one place, so
+    /// they can hold a body worse than as many contacts of [`PerPair`](Self::PerPair).
+    Deepest(u32),
 }
 
 /// Options of a detection.
@@ -124,7 +129,7 @@ impl CollideOptions {
                 "at most 65536: from some hundred on nothing is gained",
             );
         }
-        if self.reduction == Reduction::PerPair(0) {
+        if matches!(self.reduction, Reduction::PerPair(0) | Reduction::Deepest(0)) {
             return refuse("reduction", "0 contacts per pair".into(), "at least 1, or none");
         }
         Ok(())

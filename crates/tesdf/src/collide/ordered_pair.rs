@@ -73,6 +73,11 @@ impl<'a> OrderedPair<'a> {
         }
     }
 
+    /// The mode of the detection.
+    pub fn mode(&self) -> Mode {
+        self.options.mode
+    }
+
     /// A candidate, the id of its face, and its feature: the id of the node or of the face.
     pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
         match self.options.mode {

@@ -203,6 +203,27 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
+    /// The candidates of a leaf of the face tree, or of all parts of a simple shape. In node mode, a
+    /// vertex belongs to the leaf of its lowest face.
+    pub fn of_leaf(&self, start: u32, count: u32, mode: Mode) -> Candidates {
+        match (mode, self.shape) {
+            (Mode::Node, Shape::Mesh(asset)) => {
+                let lowest = asset.lowest_faces();
+                let of_face = |face: u32| {
+                    let id = asset.face_ids[face as usize];
+                    let corners = asset.faces[face as usize];
+                    corners.into_iter().filter(move |&node| lowest[node as usize] == id)
+                };
+                let mut nodes: Candidates = (start..start + count).flat_map(of_face).collect();
+                nodes.sort_unstable();
+                nodes.dedup();
+                nodes
+            }
+            (Mode::Node, _) => (0..self.node_count()).collect(),
+            _ => (start..start + count).collect(),
+        }
+    }
+
     /// The root of the face tree, or all parts of a simple shape.
     pub fn whole(&self) -> TreeChild {
         match self.shape {
@@ -251,21 +272,22 @@ impl<'a> SurfaceBody<'a> {
         Some((self.to_field(center), radius * self.scale))
     }
 
+    /// Bounds in the field's frame; infinite for a plane.
+    pub fn bounds(&self) -> Aabb {
+        match self.shape {
+            Shape::Plane => Aabb { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY },
+            _ => image(self.shape.bounds(), &|p| self.to_field(p)),
+        }
+    }
+
     /// Whether the bounds of the shape and a box of the field's frame may have a common point.
     /// False only when a side of one of them separates them.
     pub fn may_meet(&self, other: Aabb) -> bool {
         let own = self.shape.bounds();
-        let around = |b: Aabb, to: &dyn Fn(DVec3) -> DVec3| {
-            let corner = |k: usize| {
-                let pick = |axis: usize| if k >> axis & 1 == 1 { b.max[axis] } else { b.min[axis] };
-                to(DVec3::new(pick(0), pick(1), pick(2)))
-            };
-            Aabb::of(&std::array::from_fn::<_, 8, _>(corner))
-        };
         let back = self.linear.transpose() * (1.0 / (self.scale * self.scale));
         other.min.cmple(other.max).all()
-            && around(own, &|p| self.to_field(p)).overlaps(other)
-            && around(other, &|p| back * (p - self.shift)).overlaps(own)
+            && image(own, &|p| self.to_field(p)).overlaps(other)
+            && image(other, &|p| back * (p - self.shift)).overlaps(own)
     }
 
     /// Visits the leaves of the face tree that can come within `reach` of the solid. The field is
@@ -314,6 +336,15 @@ impl<'a> SurfaceBody<'a> {
         }
         least
     }
+}
+
+/// Bounds of the image of a box under an affine map.
+fn image(b: Aabb, to: &dyn Fn(DVec3) -> DVec3) -> Aabb {
+    let corner = |k: usize| {
+        let pick = |axis: usize| if k >> axis & 1 == 1 { b.max[axis] } else { b.min[axis] };
+        to(DVec3::new(pick(0), pick(1), pick(2)))
+    };
+    Aabb::of(&std::array::from_fn::<_, 8, _>(corner))
 }
 
 impl FieldBody<'_> {

@@ -55,9 +55,22 @@ impl<'a> Surroundings<'a> {
         limit: f64,
         offer: &mut impl FnMut(u32) -> f64,
     ) {
-        let leaves =
-            (limit <= self.limit).then(|| self.leaves.get_or_init(|| self.find())).and_then(Option::as_ref);
-        let Some(leaves) = leaves else { return self.asset.near_polygon(points, normal, limit, offer) };
+        if limit > self.limit {
+            return self.asset.near_polygon(points, normal, limit, offer);
+        }
+        // Where the group has too many leaves, those of the polygon alone. So the order of the faces
+        // does not depend on the group.
+        let own;
+        let leaves = match self.leaves.get_or_init(|| self.find(self.bounds)) {
+            Some(leaves) => leaves,
+            None => match self.find(Aabb::of(points)) {
+                Some(leaves) => {
+                    own = leaves;
+                    &own
+                }
+                None => return self.asset.near_polygon(points, normal, limit, offer),
+            },
+        };
         let axes = self.asset.axes(points, normal);
         let mut now = axes.with_slack(limit);
         let mut near = [(0.0, 0); MOST];
@@ -82,8 +95,9 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    fn find(&self) -> Option<Leaves> {
-        let b = self.bounds.rounded_from(self.asset.cube.middle());
+    /// The leaves near `bounds`; `None` where there are too many.
+    fn find(&self, bounds: Aabb) -> Option<Leaves> {
+        let b = bounds.rounded_from(self.asset.cube.middle());
         let (low, high) = (Vec3::from_slice(&b), Vec3::from_slice(&b[3..]));
         let reach = low.abs().max(high.abs()).max_element();
         let limit = self.limit as f32 * (1.0 + polygon::ROUNDING) + polygon::ROUNDING * (1.0 + reach);

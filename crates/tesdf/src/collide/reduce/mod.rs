@@ -27,6 +27,7 @@
 //! a reduction loses".
 
 mod bins;
+mod deepest;
 mod loss;
 mod selection;
 mod survivors;
@@ -40,6 +41,7 @@ use glam::DVec3;
 use super::hull::{Wrench, dot, residual};
 use super::{Contact, InstanceId, PairReduction, Reduction};
 use bins::{Bins, sort_bytes};
+pub use deepest::{Unfound, deepest_of_pair};
 use loss::{Loss, Projected};
 use selection::Selection;
 use survivors::{PER_BIN, Survivors};
@@ -55,8 +57,11 @@ const BINS_PER_KEPT: usize = 4;
 /// order. The reports are sorted by instances, one for each pair that touches. [`Reduction::None`]
 /// returns the contacts unchanged, without reports.
 ///
-/// `PerPair(0)`, which [`CollideOptions::validate`](super::CollideOptions::validate) refuses,
-/// counts as 1.
+/// [`Reduction::Deepest`] keeps the contacts that a detection with it finds. Its reports are those of
+/// contacts that were all found.
+///
+/// `PerPair(0)` and `Deepest(0)`, which [`CollideOptions::validate`](super::CollideOptions::validate)
+/// refuses, count as 1.
 ///
 /// The same input gives the same output for any number of threads. To keep `n` of `N` contacts of a
 /// pair takes `O(N + n²)` time and about 72 bytes per contact.
@@ -76,8 +81,10 @@ pub struct Reduced {
 
 /// As [`reduce_pairs`], with the bytes.
 pub fn reduced(mut contacts: Vec<Contact>, reduction: Reduction) -> Reduced {
-    let Reduction::PerPair(n) = reduction else {
-        return Reduced { contacts, reports: Vec::new(), bytes: 0 };
+    let (n, reduce): (_, fn(&[Contact], &[Run], usize) -> OfPair) = match reduction {
+        Reduction::None => return Reduced { contacts, reports: Vec::new(), bytes: 0 },
+        Reduction::PerPair(n) => (n, reduce),
+        Reduction::Deepest(n) => (n, deepest::reduce),
     };
     let mut runs = runs(&contacts);
     runs.sort_unstable();
@@ -147,6 +154,12 @@ fn center_of(points: impl Iterator<Item = DVec3>) -> DVec3 {
     0.5 * (low + high)
 }
 
+/// The centre of contact points, and the greatest distance of one from it.
+fn ball<'a>(contacts: impl Iterator<Item = &'a Contact> + Clone) -> (DVec3, f64) {
+    let center = center_of(contacts.clone().map(|c| c.point_a));
+    (center, contacts.map(|c| c.point_a.distance(center)).fold(0.0, f64::max))
+}
+
 /// The reduction of one pair of instances.
 struct OfPair {
     /// Indices of the kept contacts.
@@ -191,10 +204,10 @@ fn reduce_any(contacts: &[Contact], runs: &[Run], n: usize) -> OfPair {
         wrench_error,
         center,
         length,
+        left_out_above: None,
     };
     if count <= n {
-        let center = center_of(of_pair().map(|c| c.point_a));
-        let length = of_pair().map(|c| c.point_a.distance(center)).fold(0.0, f64::max);
+        let (center, length) = ball(of_pair());
         let kept: Vec<usize> = runs.iter().flat_map(|run| run.start..run.end).collect();
         return OfPair {
             bytes: size_of_val(kept.as_slice()),
