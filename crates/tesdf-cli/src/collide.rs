@@ -94,8 +94,8 @@ pub struct Args {
     /// Maximum number of contacts of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
-    /// Find the K deepest contacts of the pair only. This takes less time than finding all, but
-    /// they may all be at one place, where --reduce keeps contacts that are spread
+    /// Find the K deepest contacts of the pair only. They may all be at one place, where --reduce
+    /// keeps contacts that are spread
     #[arg(long, value_name = "K", conflicts_with = "reduce")]
     pub deepest: Option<u32>,
     /// Where contacts are found
