@@ -67,8 +67,8 @@ mod why;
 /// Not part of the API.
 #[doc(hidden)]
 pub mod internal {
-    pub use super::found::kept_at_vertices;
     pub use super::field::ROUNDING;
+    pub use super::found::kept_at_vertices;
     pub use super::greatest_minimum::greatest_minimum;
     pub use super::hidden::{DEEPER, SETTLED, THICK};
     pub use super::hull::{Wrench, residual};
