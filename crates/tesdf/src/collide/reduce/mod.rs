@@ -70,6 +70,9 @@ pub fn reduce_pairs(contacts: Vec<Contact>, reduction: Reduction) -> (Vec<Contac
     (contacts, reports)
 }
 
+/// Reduces the contacts of one pair, whose runs are given, to a number of contacts.
+type OneReduction = fn(&[Contact], &[Run], usize) -> OfPair;
+
 /// The result of a reduction.
 pub struct Reduced {
     pub contacts: Vec<Contact>,
@@ -81,7 +84,7 @@ pub struct Reduced {
 
 /// As [`reduce_pairs`], with the bytes.
 pub fn reduced(mut contacts: Vec<Contact>, reduction: Reduction) -> Reduced {
-    let (n, reduce): (_, fn(&[Contact], &[Run], usize) -> OfPair) = match reduction {
+    let (n, reduce): (u32, OneReduction) = match reduction {
         Reduction::None => return Reduced { contacts, reports: Vec::new(), bytes: 0 },
         Reduction::PerPair(n) => (n, reduce),
         Reduction::Deepest(n) => (n, deepest::reduce),
