@@ -43,11 +43,11 @@ pub fn margin<'a>(values: impl Iterator<Item = &'a [f64; 3]>) -> f64 {
 /// the curvature of the distances. So a search converges even when the minimum extends along a
 /// whole line.
 pub fn greatest_minimum<const N: usize>(values: [[f64; 3]; N]) -> f64 {
-    summit(values).0
+    summit(&values).0
 }
 
 /// As [`greatest_minimum`], with the place where it is attained.
-pub fn summit<const N: usize>(values: [[f64; 3]; N]) -> (f64, [f64; 3]) {
+pub fn summit(values: &[[f64; 3]]) -> (f64, [f64; 3]) {
     let mut greatest = (f64::NEG_INFINITY, CORNERS[0]);
     let mut offer = |weights: [f64; 3]| {
         let least = values.iter().map(|at| value(at, weights)).fold(f64::INFINITY, f64::min);
@@ -56,8 +56,8 @@ pub fn summit<const N: usize>(values: [[f64; 3]; N]) -> (f64, [f64; 3]) {
         }
     };
     CORNERS.into_iter().for_each(&mut offer);
-    for k in 0..N {
-        for l in k + 1..N {
+    for k in 0..values.len() {
+        for l in k + 1..values.len() {
             let d = difference(values[k], values[l]);
             equal_on_edges(d).for_each(&mut offer);
             for third in &values[l + 1..] {

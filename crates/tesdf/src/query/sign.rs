@@ -1,6 +1,6 @@
 use glam::DVec3;
 
-use super::ON_SURFACE_F32;
+use super::ON_SURFACE_F64;
 use super::locate::Faces;
 use crate::TeSdf;
 use crate::asset::layout::{Label, SignHint, SignHints};
@@ -30,7 +30,7 @@ impl TeSdf {
     /// elsewhere the winding number decides.
     #[inline]
     pub(super) fn side_in_cell(&self, local: DVec3, position: u32, closest: &Closest) -> Side {
-        if closest.distance < ON_SURFACE_F32 {
+        if closest.distance < ON_SURFACE_F64 {
             return self.exact_side(local);
         }
         let triangle = self.local_triangle(position as usize);

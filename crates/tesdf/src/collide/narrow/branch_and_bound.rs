@@ -3,13 +3,14 @@
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
+use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::Lowest;
 use crate::TeSdf;
 use crate::collide::field::{CellField, ROUNDING};
 use crate::collide::field_value::FieldValue;
-use crate::collide::greatest_minimum::summit;
+use crate::collide::greatest_minimum::{self, CORNERS, summit};
 use crate::collide::polygon::Polygon;
 use crate::geometry::Triangle;
 use crate::query::{Precision, Surroundings};
@@ -30,6 +31,8 @@ struct Piece {
     /// Lower bound of the signed distances on it.
     bound: f64,
     corners: [Corner; 3],
+    /// The value at the centre.
+    center: FieldValue,
 }
 
 impl PartialEq for Piece {
@@ -68,8 +71,8 @@ pub fn branch_and_bound(
         if search.evaluations > MAX_EVALUATIONS {
             return Lowest { point: search.best.1, converged: false, face: None };
         }
-        for half in search.halves(piece.corners) {
-            let piece = search.piece(half);
+        for part in search.parts(&piece) {
+            let piece = search.piece(part);
             if search.is_open(piece.bound) {
                 open.push(piece);
             }
@@ -151,6 +154,49 @@ impl<'a> Branches<'a> {
         bound < self.best.0 - self.tolerance && bound <= self.reach
     }
 
+    /// Divides a triangle, along a side of the face nearest to its centre where that helps.
+    fn parts(&mut self, piece: &Piece) -> ArrayVec<[Corner; 3], 3> {
+        self.along_side(piece).unwrap_or_else(|| self.halves(piece.corners).into_iter().collect())
+    }
+
+    /// Cuts a triangle near the surface where it leaves the space over the nearest face. The distance
+    /// to the face is linear over it, and beside it bounds the depth badly: halves that reach across
+    /// would be as short as the depth before they are closed.
+    fn along_side(&mut self, piece: &Piece) -> Option<ArrayVec<[Corner; 3], 3>> {
+        let (CellField::Mesh { asset, .. } | CellField::Whole(&Surroundings { asset, .. })) = *self.cell
+        else {
+            return None;
+        };
+        let points = piece.corners.map(|c| c.point);
+        let longest = (0..3).map(|i| points[i].distance_squared(points[(i + 1) % 3])).fold(0.0, f64::max);
+        if (SHALLOW * piece.center.distance).powi(2) > longest {
+            return None;
+        }
+        let face = asset.local_triangle(piece.center.position as usize);
+        let mut deepest = (0.1 * self.tolerance, [0.0; 3]);
+        for k in 0..3 {
+            let side = face.corners[(k + 1) % 3] - face.corners[k];
+            let Some(inward) = face.normal.cross(side).try_normalize() else { continue };
+            let heights = points.map(|p| inward.dot(p - face.corners[k]));
+            let (low, high) =
+                heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+            if high.min(-low) > deepest.0 {
+                deepest = (high.min(-low), heights);
+            }
+        }
+        let heights = deepest.1;
+        // The corner that is alone on its side.
+        let alone = (0..3).find(|&i| {
+            let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+            (heights[i] < 0.0) != (heights[j] < 0.0) && (heights[i] < 0.0) != (heights[k] < 0.0)
+        })?;
+        let [(a, x), (b, y), (c, z)] =
+            [0, 1, 2].map(|i| (piece.corners[(alone + i) % 3], heights[(alone + i) % 3]));
+        let ab = self.corner(a.point.lerp(b.point, x / (x - y)));
+        let ac = self.corner(a.point.lerp(c.point, x / (x - z)));
+        Some([[a, ab, ac], [ab, b, c], [ab, c, ac]].into_iter().collect())
+    }
+
     /// Halves the longest edge.
     fn halves(&mut self, [a, b, c]: [Corner; 3]) -> [[Corner; 3]; 2] {
         let edge = |p: Corner, q: Corner| p.point.distance_squared(q.point);
@@ -186,16 +232,16 @@ impl<'a> Branches<'a> {
                     }
                 }
                 if self.is_open(bound) {
-                    let [u, v, w] = corners.map(|c| distances(&triangle(c.value.position)));
-                    // A face that matters at the deepest point may not be the nearest at any of
-                    // these points.
-                    let deepest = distances(&triangle(self.best_face));
-                    let (depth, at) = summit([near, u, v, w, deepest]);
-                    bound = bound.max(-depth);
-                    if self.is_open(bound) {
-                        // Where the faces that matter are among these, this is the deepest point.
-                        self.value(at[0] * points[0] + at[1] * points[1] + at[2] * points[2]);
+                    let faces = corners.map(|c| c.value.position);
+                    let mut cuts = Cuts::default();
+                    cuts.add(value.position, near, CORNERS[0]);
+                    for face in faces.into_iter().chain([self.best_face]) {
+                        if !cuts.holds(face) {
+                            cuts.add(face, distances(&triangle(face)), CORNERS[0]);
+                        }
                     }
+                    bound =
+                        bound.max(self.bound_by_faces(&mut cuts, points, |face| distances(&triangle(face))));
                 }
             }
             // A convex function lies above its tangents.
@@ -203,14 +249,76 @@ impl<'a> Branches<'a> {
                 let tangent =
                     |v: &FieldValue, from: DVec3| points.map(|p| -(v.distance + v.gradient.dot(p - from)));
                 let [u, v, w] = corners.map(|c| tangent(&c.value, c.point));
-                let (depth, at) = summit([tangent(&value, center), u, v, w]);
+                let (depth, at) = summit(&[tangent(&value, center), u, v, w]);
                 bound = bound.max(-depth);
                 if self.is_open(bound) {
                     self.value(at[0] * points[0] + at[1] * points[1] + at[2] * points[2]);
                 }
             }
         }
-        Piece { bound, corners }
+        Piece { bound, corners, center: value }
+    }
+
+    /// Bounds the depth over a triangle by one face after the other: each is the nearest one to the
+    /// place where the faces so far leave the greatest depth. Returns a lower bound of the signed
+    /// distance.
+    fn bound_by_faces(
+        &mut self,
+        cuts: &mut Cuts,
+        points: [DVec3; 3],
+        distances: impl Fn(u32) -> [f64; 3],
+    ) -> f64 {
+        let mut bound = f64::NEG_INFINITY;
+        for _ in 0..MAX_ADDED {
+            let (depth, at) = summit(&cuts.values);
+            bound = bound.max(-depth);
+            if !self.is_open(bound) {
+                break;
+            }
+            // Where the faces that matter are among these, this is the deepest point.
+            let found = self.value(at[0] * points[0] + at[1] * points[1] + at[2] * points[2]);
+            if !self.is_open(bound) || cuts.holds(found.position) {
+                break;
+            }
+            cuts.add(found.position, distances(found.position), at);
+        }
+        bound
+    }
+}
+
+/// A triangle whose longest edge is shorter than this multiple of its depth is halved.
+const SHALLOW: f64 = 4.0;
+
+/// Number of faces that bound the depth over a triangle at a time. Three are equally near to its
+/// deepest point; more may be.
+const CUTS: usize = 6;
+
+/// Number of times that a face is added before a triangle is halved.
+const MAX_ADDED: usize = 16;
+
+/// Faces, and their distances from the corners of a triangle.
+#[derive(Default)]
+struct Cuts {
+    faces: ArrayVec<u32, CUTS>,
+    values: ArrayVec<[f64; 3], CUTS>,
+}
+
+impl Cuts {
+    fn holds(&self, face: u32) -> bool {
+        self.faces.contains(&face)
+    }
+
+    /// Adds a face. If there are too many, it takes the place of the one that is farthest from the
+    /// point of barycentric coordinates `at`.
+    fn add(&mut self, face: u32, distances: [f64; 3], at: [f64; 3]) {
+        if self.faces.is_full() {
+            let far = |k: &usize| greatest_minimum::value(&self.values[*k], at);
+            let Some(farthest) = (0..CUTS).max_by(|k, l| far(k).total_cmp(&far(l))) else { return };
+            (self.faces[farthest], self.values[farthest]) = (face, distances);
+        } else {
+            self.faces.push(face);
+            self.values.push(distances);
+        }
     }
 }
 

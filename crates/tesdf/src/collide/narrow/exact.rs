@@ -7,7 +7,6 @@ use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
 use crate::collide::field::{CellField, ROUNDING};
-use crate::collide::middle;
 use crate::collide::polygon::{MAX_VERTICES, Parts, Polygon};
 use crate::geometry::polygon_to_triangle;
 use crate::query::{Faces, Place, Precision, Surroundings};
@@ -18,7 +17,7 @@ use crate::query::{Faces, Place, Precision, Surroundings};
 const CLEAR: f64 = 1e-9;
 
 /// Where a whole face is deeper than this fraction of its radius, branch and bound over it drops the
-/// parts near the surface at once, and finds the deepest point faster than a search of each cell.
+/// parts near the surface at once, and finds the deepest point faster than if the face was cut first.
 const SUNK: f64 = 1.0 / 16.0;
 
 /// The least signed distance over a polygon, within `tolerance`; both in the field's frame. `None`
@@ -77,11 +76,7 @@ pub fn lowest(
             return Some(branch_and_bound(cell, polygon, tolerance, reach, precision));
         }
         if depth > ROUNDING || !query.only_touches(cell, distance, point) {
-            return match cell {
-                // A whole face may cross any number of faces; in a cell there are few.
-                CellField::Whole(_) => query.lowest_by_cells(cell, precision),
-                _ => query.lowest_of_parts(cell, precision),
-            };
+            return query.lowest_of_parts(cell, precision);
         }
     }
     // A polygon that keeps clear of the surface is on one side of it.
@@ -231,37 +226,6 @@ impl Query<'_> {
             }
             _ => self.asset.near_polygon(&self.points(), self.normal, first, offer),
         }
-    }
-
-    /// The lowest point of a polygon, cell by cell. What is found in one cell is the limit in the
-    /// next. `everywhere` is the whole field.
-    fn lowest_by_cells(&self, everywhere: &CellField, precision: Precision) -> Option<Lowest> {
-        let value = |point: DVec3| everywhere.value(point, Precision::F64).distance;
-        let mut least = self
-            .polygon
-            .points()
-            .map(|point| (value(point), Lowest { point, converged: true, face: None }))
-            .filter(|(distance, _)| *distance <= self.reach)
-            .min_by(|x, y| x.0.total_cmp(&y.0));
-        let mut converged = true;
-        middle::clip(self.asset, self.polygon.clone(), self.reach.max(0.0), &mut |clipped| {
-            let mut look = |faces: &Faces| {
-                let cell = CellField::Mesh { asset: self.asset, place: clipped.place, faces };
-                let limit = least.as_ref().map_or(self.reach, |(distance, _)| distance - self.tolerance);
-                let found = lowest(&cell, &clipped.polygon, self.normal, self.tolerance, limit, precision);
-                let Some(found) = found else { return };
-                converged &= found.converged;
-                let distance = cell.value(found.point, Precision::F64).distance;
-                if distance <= limit {
-                    least = Some((distance, Lowest { face: None, ..found }));
-                }
-            };
-            match clipped.place {
-                Place::Listed { offset, .. } => self.asset.with_list(offset, look),
-                _ => look(&Faces::default()),
-            }
-        });
-        least.map(|(_, lowest)| Lowest { converged, ..lowest })
     }
 
     /// The lowest point of a polygon that crosses the surface. The polygon is cut along the faces
