@@ -4,7 +4,7 @@ mod support;
 
 mod compare;
 
-use compare::{Compared, device, each_mode, found, hold, hold_against};
+use compare::{Compared, device, each_mode, found, hold, hold_against, per_cell};
 use support::random::Random;
 use support::shapes;
 use support::tetrahedra::{bare_beam, beam, bend, moves};
@@ -124,7 +124,7 @@ fn a_pass_takes_the_documented_number_of_launches() {
         }
         for mode in [Mode::Node, Mode::Face, Mode::Exact] {
             for (reduction, of_reduction) in [(Reduction::None, 0), (Reduction::PerPair(2), 7)] {
-                let options = CollideOptions { reduction, ..CollideOptions::with_mode(mode) };
+                let options = CollideOptions { reduction, ..per_cell(mode) };
                 let (_, detector) = found(&scene, &options, DetectorOptions::default());
                 let outside = if mode == Mode::Node { 0 } else { for_domain };
                 assert_eq!(detector.report().launches, 10 + outside + of_reduction, "{options:?}");

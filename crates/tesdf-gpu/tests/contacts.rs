@@ -7,7 +7,7 @@ mod compare;
 
 use std::sync::Arc;
 
-use compare::{Compared, device, each_mode, found, hold, least};
+use compare::{Compared, device, each_mode, found, hold, least, per_cell};
 
 use support::bodies::{Body, Placed, RELATIONS, Relation, body, rotation, scene};
 use support::meshes;
@@ -69,11 +69,7 @@ fn a_nut_on_its_bolt() {
     let nut = Placed { body: body("iso_m16_nut_c25"), at: bolt.at };
     let size = bolt.diagonal();
     for mode in [Mode::Node, Mode::Face, Mode::Exact] {
-        let options = CollideOptions {
-            contact_distance: 2e-5,
-            cos_theta: Some(0.3),
-            ..CollideOptions::with_mode(mode)
-        };
+        let options = CollideOptions { contact_distance: 2e-5, cos_theta: Some(0.3), ..per_cell(mode) };
         let nut = nut.moved(Pose::at(2e-5 * random.direction()));
         hold(&scene(&[bolt.clone(), nut]), &options, size).is_good(50);
     }
@@ -220,7 +216,7 @@ fn groups_and_exclusions() {
 fn buffers_grow_or_say_what_they_need() {
     let mut random = Random(4);
     let scene = worlds(6, &mut random);
-    let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::Face) };
+    let options = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::Face) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
     let capacities =
         Capacities { ordered_pairs: 1, blocks: 1, meshlets: 1, polygons: 1, contacts: 1, kept: 1 };
@@ -242,7 +238,7 @@ fn buffers_grow_or_say_what_they_need() {
 fn every_variant_of_the_narrow_phase_gives_the_same_contacts() {
     let mut random = Random(6);
     let scene = worlds(3, &mut random);
-    let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::Face) };
+    let options = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::Face) };
     let (expected, _) = found(&scene, &options, DetectorOptions::default());
     let usual = DetectorOptions::default();
     for with in [

@@ -3,8 +3,11 @@
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
+mod compare;
+
 use std::collections::BTreeMap;
 
+use compare::{device, per_cell};
 use support::bodies::{Placed, Relation, body, rotation, scene};
 use support::random::Random;
 use tesdf::collide::{
@@ -12,7 +15,7 @@ use tesdf::collide::{
     Scene, Shape, reduce_pairs, wrench_error,
 };
 use tesdf::glam::{DQuat, DVec3};
-use tesdf_gpu::{Capacities, Detector, DetectorOptions, Device, GpuError, Memory};
+use tesdf_gpu::{Capacities, Detector, DetectorOptions, GpuError, Memory};
 
 /// The reported error may exceed the true error by this factor, and by this share of a unit force.
 /// Steps toward vertices end, or become slow, before the minimum.
@@ -24,10 +27,6 @@ const ROUNDING: f64 = 2e-5;
 /// The largest ratio found was 1.87.
 const WORSE: f64 = 3.0;
 const LITTLE: f64 = 5e-3;
-
-fn device() -> Device {
-    Device::choose(None).expect("a device: `.ci/vulkan.sh` installs the software one")
-}
 
 fn detected(scene: &Scene, options: &CollideOptions, with: DetectorOptions) -> (Contacts, Detector) {
     let mut detector = Detector::new(&device(), scene, with).expect("fits");
@@ -176,13 +175,9 @@ fn worlds(count: u32, random: &mut Random) -> Scene {
 fn many_worlds() {
     let mut random = Random(17);
     let scene = worlds(6, &mut random);
-    let options = CollideOptions {
-        contact_distance: 1e-3,
-        cos_theta: Some(0.3),
-        ..CollideOptions::with_mode(Mode::Face)
-    };
+    let options = CollideOptions { contact_distance: 1e-3, cos_theta: Some(0.3), ..per_cell(Mode::Face) };
     assert!(hold(&scene, &options, &[3, 12, 100_000]) >= 12);
-    let exact = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(Mode::Exact) };
+    let exact = CollideOptions { contact_distance: 1e-3, ..per_cell(Mode::Exact) };
     hold(&worlds(1, &mut random), &exact, &[6]);
 }
 
@@ -251,7 +246,7 @@ fn contacts_at_one_point() {
             let pose = Pose { translation: pose.translation + by, ..pose };
             scene.add(Instance::new(shape, pose)).expect("an instance");
         }
-        let options = CollideOptions { contact_distance: 0.0, ..CollideOptions::with_mode(Mode::Face) };
+        let options = CollideOptions { contact_distance: 0.0, ..per_cell(Mode::Face) };
         assert!(hold(&scene, &options, &[1, 2]) > 0);
     }
 }

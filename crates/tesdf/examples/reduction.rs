@@ -8,7 +8,9 @@ use std::time::Instant;
 use tesdf::collide::{Contact, FeatureB, FeatureId, InstanceId, reduce_pairs};
 use tesdf::encode::EncodeFileError;
 use tesdf::glam::DVec3;
-use tesdf::{CollideOptions, Encoder, Instance, Mode, Pose, Preset, Reduction, Scene, TeSdf, detect};
+use tesdf::{
+    CollideOptions, ContactsPer, Encoder, Instance, Mode, Pose, Preset, Reduction, Scene, TeSdf, detect,
+};
 
 const RANDOM: u32 = 100_000;
 
@@ -24,7 +26,8 @@ fn contacts(of: [&str; 2], at: DVec3, contact_distance: f64) -> Result<Vec<Conta
         let shape = scene.add_shape(load(name)?)?;
         scene.add(Instance::new(shape, Pose::at(at)))?;
     }
-    let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(Mode::Face) };
+    let contacts_per = ContactsPer::Cell;
+    let options = CollideOptions { contact_distance, contacts_per, ..CollideOptions::with_mode(Mode::Face) };
     Ok(detect(&scene, &options)?.into_vec())
 }
 

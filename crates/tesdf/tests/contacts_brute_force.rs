@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use support::bodies::{Placed, Relation, of_direction, rotation, scene};
 use support::lowest::{area, clip, sampled};
 use support::random::Random;
-use tesdf::collide::{CollideOptions, Mode, candidates, detect};
+use tesdf::collide::{CollideOptions, ContactsPer, Mode, candidates, detect};
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
 
@@ -72,7 +72,8 @@ impl BruteForce {
 /// decide.
 fn compare(a: usize, b: usize, bodies: &[Placed], stride: usize, contact_distance: f64) -> [usize; 2] {
     let all = BruteForce::of(&bodies[a], &bodies[b], stride, contact_distance);
-    let options = CollideOptions { contact_distance, ..CollideOptions::default() };
+    let contacts_per = ContactsPer::Cell;
+    let options = CollideOptions { contact_distance, contacts_per, ..CollideOptions::default() };
     let scene = scene(bodies);
     let found = detect(&scene, &options).expect("a good scene");
     let of_stride = |face: u32| (face as usize).is_multiple_of(stride);

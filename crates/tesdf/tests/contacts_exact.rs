@@ -10,7 +10,9 @@ use support::lowest::{certified, sampled};
 use support::random::Random;
 use support::shapes;
 use tesdf::Length;
-use tesdf::collide::{CollideOptions, Contacts, Instance, Placement, Pose, Scene, Shape, detect};
+use tesdf::collide::{
+    CollideOptions, Contacts, ContactsPer, Instance, Placement, Pose, Scene, Shape, detect,
+};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
@@ -19,6 +21,11 @@ use tesdf::glam::DVec3;
 const DEEPER: f64 = 1e-6;
 /// The default tolerance of the exact mode, plus rounding.
 const TOLERANCE: f64 = 1.001e-7;
+
+/// Contacts of every face, also of those that share a vertex.
+fn per_cell() -> CollideOptions {
+    CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::default() }
+}
 
 /// The least distance of each face of an ordered pair.
 fn least_by_face(found: &Contacts, a: u32, b: u32) -> BTreeMap<u32, f64> {
@@ -73,7 +80,7 @@ fn faces(body: &Placed, stride: usize) -> Vec<(u32, [DVec3; 3])> {
 
 /// Compares both orders in the mode `exact`. Returns the number of faces that touch.
 fn hold(bodies: &[Placed; 2], stride: [usize; 2], contact_distance: f64) -> usize {
-    let options = CollideOptions { contact_distance, ..CollideOptions::default() };
+    let options = CollideOptions { contact_distance, ..per_cell() };
     let found = detect(&scene(bodies), &options).expect("a good scene");
     let mut touching = 0;
     for (a, b) in [(0, 1), (1, 0)] {
@@ -130,7 +137,7 @@ fn distances_are_within_the_tolerance_of_certified_bounds() {
     for relation in [Relation::Deep, Relation::Deep, Relation::Inside] {
         for names in [["torus_quads", "l_bracket"], ["beam", "tetra"]] {
             let bodies = relation.place(names, &mut random);
-            let found = detect(&scene(&bodies), &CollideOptions::default()).expect("a good scene");
+            let found = detect(&scene(&bodies), &per_cell()).expect("a good scene");
             for (a, b) in [(0, 1), (1, 0)] {
                 let (field, diagonal) = (&bodies[b], bodies[b].diagonal());
                 let nearest = |p: DVec3| {
@@ -179,7 +186,7 @@ fn boxes_against_meshes() {
             scene.add(Instance::new(id, pose)).expect("a pose");
         }
         let contact_distance = 0.02 * mesh.diagonal();
-        let options = CollideOptions { contact_distance, ..CollideOptions::default() };
+        let options = CollideOptions { contact_distance, ..per_cell() };
         let found = detect(&scene, &options).expect("a good scene");
         let of_mesh = faces(&mesh, mesh.body.solid.mesh().faces().len().div_ceil(150));
         let of_box = shapes::Shape::default().add_box(-half, half, 1).mesh();
@@ -217,7 +224,7 @@ fn coplanar_faces_of_different_triangulations_touch() {
         let id = scene.add_shape(body.asset.clone()).expect("a mesh");
         scene.add(Instance::new(id, pose)).expect("a pose");
     }
-    let options = CollideOptions { contact_distance: 1e-6, ..CollideOptions::default() };
+    let options = CollideOptions { contact_distance: 1e-6, ..per_cell() };
     let found = detect(&scene, &options).expect("a good scene");
     let least = least_by_face(&found, 1, 0);
     let on_floor: Vec<u32> =
@@ -234,10 +241,10 @@ fn tolerances_bound_the_error() {
     let mut random = Random(6);
     let bodies = Relation::Deep.place(["beam", "l_bracket"], &mut random);
     let scene = scene(&bodies);
-    let fine = detect(&scene, &CollideOptions::default()).expect("a good scene");
+    let fine = detect(&scene, &per_cell()).expect("a good scene");
     for share in [1e-3, 1e-5] {
         for tolerance in [Length::OfDiagonal(share), Length::Absolute(share * bodies[0].diagonal())] {
-            let coarse = CollideOptions { tolerance, ..CollideOptions::default() };
+            let coarse = CollideOptions { tolerance, ..per_cell() };
             let coarse = detect(&scene, &coarse).expect("a good scene");
             for (a, b) in [(0, 1), (1, 0)] {
                 let allowed = match tolerance {

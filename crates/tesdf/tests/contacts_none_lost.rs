@@ -12,7 +12,9 @@ use support::lowest::sampled;
 use support::meshes;
 use support::random::Random;
 use tesdf::Length;
-use tesdf::collide::{CollideOptions, Contact, Contacts, FeatureId, InstanceId, Mode, Pose, detect};
+use tesdf::collide::{
+    CollideOptions, Contact, Contacts, ContactsPer, FeatureId, InstanceId, Mode, Pose, detect,
+};
 use tesdf::geometry::{Aabb, Triangle};
 use tesdf::glam::DVec3;
 
@@ -248,6 +250,7 @@ fn no_contact_is_lost() {
                 }
                 let options = CollideOptions {
                     contact_distance,
+                    contacts_per: ContactsPer::Cell,
                     tolerance: TOLERANCE,
                     ..CollideOptions::with_mode(mode)
                 };
@@ -296,9 +299,16 @@ fn the_same_bytes_on_any_number_of_threads() {
         })
         .collect();
     let scene = scene(&bodies);
-    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
+    for (mode, contacts_per) in [
+        (Mode::Node, ContactsPer::Face),
+        (Mode::Face, ContactsPer::Cell),
+        (Mode::Face, ContactsPer::Face),
+        (Mode::Exact, ContactsPer::Cell),
+        (Mode::Exact, ContactsPer::Face),
+    ] {
         let options = CollideOptions {
             contact_distance: 1e-4,
+            contacts_per,
             tolerance: TOLERANCE,
             ..CollideOptions::with_mode(mode)
         };
@@ -307,10 +317,10 @@ fn the_same_bytes_on_any_number_of_threads() {
             pool.install(|| detect(&scene, &options).expect("a good scene"))
         };
         let [one, two, eight] = [1, 2, 8].map(on);
-        assert!(one.len() > 100, "{mode:?}: {} contacts", one.len());
+        assert!(one.len() > 100, "{mode:?}, {contacts_per:?}: {} contacts", one.len());
         is_sorted(one.as_slice());
         for other in [two, eight] {
-            assert_eq!(bits(one.as_slice()), bits(other.as_slice()), "{mode:?}");
+            assert_eq!(bits(one.as_slice()), bits(other.as_slice()), "{mode:?}, {contacts_per:?}");
             assert_eq!(one.statistics, other.statistics);
         }
     }

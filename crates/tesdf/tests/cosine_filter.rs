@@ -4,7 +4,7 @@ mod support;
 
 use support::bodies::Body;
 use support::shapes::Shape;
-use tesdf::collide::{CollideOptions, Contact, Instance, InstanceId, Mode, Pose, Scene, detect};
+use tesdf::collide::{CollideOptions, Contact, ContactsPer, Instance, InstanceId, Mode, Pose, Scene, detect};
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
 
@@ -54,7 +54,8 @@ impl Figure {
 
     /// Contacts of the probe's faces, and the number of contacts that were dropped in total.
     fn contacts(&self, mode: Mode, cos_theta: Option<f64>) -> (Vec<Contact>, usize) {
-        let options = CollideOptions { cos_theta, ..CollideOptions::with_mode(mode) };
+        let contacts_per = ContactsPer::Cell;
+        let options = CollideOptions { cos_theta, contacts_per, ..CollideOptions::with_mode(mode) };
         let found = detect(&self.scene, &options).expect("a good scene");
         let all = found.iter().filter(|c| c.instance_a == InstanceId(0)).copied().collect();
         (all, found.statistics.filtered)

@@ -5,7 +5,9 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use support::bodies::body;
-use tesdf::collide::{CollideOptions, Instance, Mode, Pose, Reduction, Scene, detect, reduce_pairs};
+use tesdf::collide::{
+    CollideOptions, ContactsPer, Instance, Mode, Pose, Reduction, Scene, detect, reduce_pairs,
+};
 use tesdf::glam::DVec3;
 
 /// Bytes that the program holds, and the largest value so far.
@@ -48,6 +50,7 @@ fn the_reported_bytes_are_those_held() {
     let all = CollideOptions {
         contact_distance: 0.3 * diagonal,
         iterations: 1,
+        contacts_per: ContactsPer::Cell,
         ..CollideOptions::with_mode(Mode::Face)
     };
     for n in [16, 1000] {

@@ -230,9 +230,14 @@ impl Corners {
     }
 }
 
+/// Options with a contact for each cell that a face meets.
+pub fn per_cell(mode: Mode) -> CollideOptions {
+    CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(mode) }
+}
+
 /// All modes of detection, for bodies of diagonal `size`: with contacts per cell, then per face.
 pub fn each_mode(size: f64) -> [CollideOptions; 6] {
-    let face = CollideOptions { contact_distance: 1e-3 * size, ..CollideOptions::with_mode(Mode::Face) };
+    let face = CollideOptions { contact_distance: 1e-3 * size, ..per_cell(Mode::Face) };
     let exact = CollideOptions { mode: Mode::Exact, ..face };
     let per_face = |options| CollideOptions { contacts_per: ContactsPer::Face, ..options };
     [

@@ -186,7 +186,7 @@ impl Default for DetectorSection {
     fn default() -> Self {
         Self {
             mode: DetectorMode::Exact,
-            contacts_per: ContactsPer::Cell,
+            contacts_per: ContactsPer::Face,
             iterations: 16,
             tolerance: 1e-7,
             cos_theta: None,

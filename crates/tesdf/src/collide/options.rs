@@ -137,12 +137,12 @@ impl CollideOptions {
 }
 
 impl Default for CollideOptions {
-    /// Exact mode, contacts per cell, a tolerance of 1e-7 of the diagonal, contact distance 0, no
+    /// Exact mode, contacts per face, a tolerance of 1e-7 of the diagonal, contact distance 0, no
     /// filter and no reduction.
     fn default() -> Self {
         Self {
             mode: Mode::Exact,
-            contacts_per: ContactsPer::Cell,
+            contacts_per: ContactsPer::Face,
             iterations: 16,
             tolerance: Length::OfDiagonal(1e-7),
             contact_distance: 0.0,

@@ -41,7 +41,8 @@ impl Detection<'_> {
     /// face: its own, or that of one of its vertices.
     pub fn keeps_least_distances(&self, bodies: &[Placed; 2], contact_distance: f64) -> Kept {
         let scene = scene(bodies);
-        let by_cell = CollideOptions { contact_distance, ..CollideOptions::default() };
+        let contacts_per = ContactsPer::Cell;
+        let by_cell = CollideOptions { contact_distance, contacts_per, ..CollideOptions::default() };
         let by_cell = detect(&scene, &by_cell).expect("a good scene");
         let by_face = self.found(&scene, contact_distance);
         let pairs =
@@ -194,7 +195,8 @@ impl Detection<'_> {
             of_direction(found.as_slice(), 1, 0).map(|c| (c.face_a, c.distance)).collect::<Vec<_>>()
         };
         for &mode in modes {
-            let by_cell = CollideOptions::with_mode(mode);
+            let by_cell =
+                CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(mode) };
             let all = own(&detect(&scene, &by_cell).expect("a good scene"));
             assert!(all.len() >= 3, "{all:?}");
             let by_face = CollideOptions { contacts_per: ContactsPer::Face, ..by_cell };
