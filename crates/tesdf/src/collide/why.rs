@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::middle::ClippedPolygon;
+use super::narrow::Minimum;
 use super::ordered_pair::OrderedPair;
 use super::{CollideError, CollideOptions, InstanceId, Mode, Scene, Shape};
 
@@ -66,7 +67,7 @@ pub enum PolygonVerdict {
     },
 }
 
-/// A face clipped by one cell, or a node; in the world's unit and frame.
+/// A face clipped by one cell, a point of a whole face, or a node; in the world's unit and frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PolygonReport {
     /// The cell's word in `domain.nodes`; `None` outside the domain's cube, and in the field of a
@@ -91,7 +92,8 @@ pub struct PartReport {
     pub id: u32,
     /// The result of the broad phase.
     pub broad: BroadVerdict,
-    /// All its polygons, in the order of the forest.
+    /// All its polygons, in the order of the forest. With one contact per face: its contacts, or
+    /// else the face with its least distance.
     pub polygons: Vec<PolygonReport>,
 }
 
@@ -237,32 +239,41 @@ impl Stages<'_> {
                 }
             }
         };
+        let describe = |polygon: &ClippedPolygon, minimum: &Minimum, verdict| PolygonReport {
+            cell: polygon.cell,
+            vertices: polygon.polygon.points().map(|p| field.to_world(p)).collect(),
+            distance: (minimum.value.distance - part.radius) * unit,
+            point: field.to_world(minimum.point - part.radius * minimum.value.gradient),
+            face_b: field.names(&minimum.value).0,
+            verdict,
+        };
         // First the limits of the detection, then no limit.
         let mut seen = Vec::new();
         let mut kept = Vec::new();
         search.minima(field, &part, None, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
-            kept.push((key(polygon), minimum))
+            let verdict = match self.pair.is_filtered(&part, &minimum) {
+                true => PolygonVerdict::Filtered { cosine: minimum.value.gradient.dot(part.normal) },
+                false => PolygonVerdict::Contact,
+            };
+            kept.push((key(polygon), describe(polygon, &minimum, verdict)));
         });
+        if search.is_of_faces() && !kept.is_empty() {
+            return PartReport { id, broad, polygons: kept.into_iter().map(|k| k.1).collect() };
+        }
         let mut polygons = Vec::new();
         search.within(f64::INFINITY).minima(field, &part, None, &mut |_| (), &mut |polygon, minimum| {
             let key = key(polygon);
             let verdict = match kept.iter().find(|k| k.0 == key) {
-                Some((_, minimum)) if self.pair.is_filtered(&part, minimum) => {
-                    PolygonVerdict::Filtered { cosine: minimum.value.gradient.dot(part.normal) }
-                }
-                Some(_) => PolygonVerdict::Contact,
+                Some((_, found)) => found.verdict,
                 None if seen.contains(&key) => PolygonVerdict::Beyond,
                 None => PolygonVerdict::CellBeyond,
             };
-            polygons.push(PolygonReport {
-                cell: polygon.cell,
-                vertices: polygon.polygon.points().map(|p| field.to_world(p)).collect(),
-                distance: (minimum.value.distance - part.radius) * unit,
-                point: field.to_world(minimum.point - part.radius * minimum.value.gradient),
-                face_b: field.names(&minimum.value).0,
-                verdict,
-            });
+            polygons.push(describe(polygon, &minimum, verdict));
         });
+        if search.is_of_faces() {
+            // Without a limit, the extremes of flat contact are others.
+            polygons.truncate(1);
+        }
         PartReport { id, broad, polygons }
     }
 }
