@@ -83,7 +83,7 @@ def test_meshes_without_an_inside_are_errors():
 def test_invalid_options_are_errors(torus):
     with pytest.raises(tesdf.EncodeError, match="band"):
         tesdf.encode(torus, band=-1.0)
-    with pytest.raises(ValueError, match="preset: 'best'; expected 'default', 'fast', 'compact', 'paper' or"):
+    with pytest.raises(ValueError, match="preset: 'best'; expected 'default', 'fast', 'compact', 'gpu', 'paper' or"):
         tesdf.encode(torus, "best")
     with pytest.raises(ValueError):
         tesdf.encode(torus, threads=0)
