@@ -94,10 +94,13 @@ pub struct Args {
     /// Maximum number of contacts of the pair, or `none` to keep all
     #[arg(long, value_name = "N|none", value_parser = reduction, default_value = "none")]
     pub reduce: Reduction,
-    /// Find the K deepest contacts of the pair only. They may all be at one place, where --reduce
-    /// keeps contacts that are spread
+    /// Find the K deepest contacts of the pair only. They may all be at one place
     #[arg(long, value_name = "K", conflicts_with = "reduce")]
     pub deepest: Option<u32>,
+    /// Find at most K contacts of the pair only, spread over the places that touch. The time follows
+    /// K. The deepest contact may be missing
+    #[arg(long, value_name = "K", conflicts_with_all = ["reduce", "deepest"])]
+    pub spread: Option<u32>,
     /// Where contacts are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = device::help("contacts are found"))]
     pub device: Choice,
@@ -162,7 +165,11 @@ impl Args {
             tolerance,
             contact_distance: self.contact_distance,
             cos_theta: self.cos_theta.0,
-            reduction: self.deepest.map_or(self.reduce, Reduction::Deepest),
+            reduction: match (self.deepest, self.spread) {
+                (Some(k), _) => Reduction::Deepest(k),
+                (None, Some(k)) => Reduction::Spread(k),
+                (None, None) => self.reduce,
+            },
             ..CollideOptions::default()
         }
     }
@@ -249,8 +256,8 @@ fn text(found: &Contacts) -> String {
     }
     for r in &found.reductions {
         if let Some(above) = r.left_out_above {
-            let kept = count(r.kept, "contact");
-            let _ = writeln!(text, "the {kept} that are deepest; no other contact is below {above:.6e}");
+            let _ =
+                writeln!(text, "{} kept; no other contact is below {above:.6e}", count(r.kept, "contact"));
         }
         let _ = writeln!(
             text,

@@ -145,7 +145,9 @@ fn the_deepest_contacts_are_the_first_of_all() {
     let above = report["reductions"][0]["left_out_above"].as_f64().unwrap();
     assert!(above <= distances[3], "{above} {distances:?}");
     let text = folder.good(&[&all[..5], &["--deepest", "3"]].concat());
-    assert!(text.contains("the 3 contacts that are deepest; no other contact is below"), "{text}");
+    assert!(text.contains("3 contacts kept; no other contact is below"), "{text}");
+    let report = json(&folder, &[&all[..], &["--spread", "3", "--report"]].concat());
+    assert!((1..=3).contains(&report["contacts"].as_array().unwrap().len()), "{report}");
     let (code, _, error) = folder.tesdf(&[&all[..5], &["--deepest", "3", "--reduce", "3"]].concat());
     assert!(code == Some(2) && error.contains("cannot be used with"), "{error}");
     let (code, _, error) = folder.tesdf(&[&all[..5], &["--deepest", "0"]].concat());

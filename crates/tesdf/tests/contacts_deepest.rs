@@ -1,4 +1,5 @@
-//! The deepest contacts of each pair, against all contacts, sorted and cut.
+//! Detections that do not find all contacts of a pair, against all contacts: the deepest, which are
+//! all contacts, sorted and cut; and contacts that are spread over the places that touch.
 mod support;
 
 use std::collections::BTreeMap;
@@ -102,7 +103,43 @@ fn compare(scene: &Scene, options: &CollideOptions) -> (usize, usize) {
             assert!((of_all.wrench_error == 0.0) || of_all.left_out_above.is_some());
         }
     }
+    compare_spread(scene, options, &all);
     (all.len(), unfound)
+}
+
+/// Contacts that are spread are some of all contacts, and the report bounds the others.
+fn compare_spread(scene: &Scene, options: &CollideOptions, all: &Contacts) {
+    for count in [1, 7, 64] {
+        let reduction = Reduction::Spread(count);
+        let found = detect(scene, &CollideOptions { reduction, ..*options });
+        let what = || format!("{:?} {:?}, {count}", options.mode, options.contacts_per);
+        let s = found.statistics;
+        assert_eq!(s.touching - s.filtered - s.reduced, found.len(), "{s:?}");
+        assert_eq!(found.reductions.len(), pairs(found.as_slice()).len());
+        for report in &found.reductions {
+            let pair = (report.instance_a, report.instance_b);
+            let is_of_pair =
+                |c: &&Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b)) == pair;
+            let before: Vec<Contact> = all.iter().filter(is_of_pair).copied().collect();
+            let kept: Vec<Contact> = found.iter().filter(is_of_pair).copied().collect();
+            assert!(kept.len() <= count as usize && kept.len() == report.kept, "{}", what());
+            // At a vertex, all contacts may have that of another face.
+            let is_same = |c: &Contact, d: &Contact| {
+                c.instance_a == d.instance_a
+                    && c.point_a == d.point_a
+                    && (c.distance - d.distance).abs() < 1e-9
+            };
+            for c in &kept {
+                assert!(before.iter().any(|d| is_same(c, d)), "{}: {c:?}", what());
+            }
+            let left_out = before.iter().filter(|c| !kept.iter().any(|k| is_same(k, c)));
+            let least = left_out.map(|c| c.distance).fold(f64::INFINITY, f64::min);
+            let above = report.left_out_above.unwrap_or(f64::INFINITY);
+            assert!(above <= least, "{}: {least} {report:?}", what());
+            let error = wrench_error(&before, &kept, report.center, report.length);
+            assert!(error <= report.wrench_error + 1e-7, "{}: {error} {report:?}", what());
+        }
+    }
 }
 
 #[test]
@@ -263,6 +300,8 @@ fn a_scene_without_contacts_has_no_reports() {
     assert_eq!(reduce_pairs(Vec::new(), reduction), (Vec::new(), Vec::new()));
     let none = CollideOptions { reduction: Reduction::Deepest(0), ..options };
     assert!(tesdf::collide::detect(&Scene::new(), &none).is_err());
+    let none = CollideOptions { reduction: Reduction::Spread(0), ..options };
+    assert!(tesdf::collide::detect(&Scene::new(), &none).is_err());
 }
 
 /// A ball that is deep in a finely meshed block: few of the faces that touch are looked at.
@@ -283,5 +322,34 @@ fn few_contacts_of_a_deep_overlap_take_few_searches() {
         });
         assert!(looks.is_sorted() && 10 * looks[0] < all.polygons, "{mode:?}: {looks:?} of {all:?}");
         assert!(4 * looks[2] < all.polygons, "{mode:?}: {looks:?} of {all:?}");
+    }
+}
+
+/// On a thread, where depths are nearly equal: the number of faces that are looked at follows the
+/// number of contacts, and the contacts go around the thread.
+#[test]
+fn spread_contacts_take_searches_in_proportion_to_their_number() {
+    let at = Placement { pose: Pose::IDENTITY, scale: 1.0 };
+    let bodies = [Placed::new("iso_m16_bolt_6k", at), Placed::new("iso_m16_nut_c100", at)];
+    let scene = scene(&bodies);
+    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
+        let contacts_per = ContactsPer::Face;
+        let base = CollideOptions { contact_distance: 2e-4, contacts_per, ..CollideOptions::with_mode(mode) };
+        let all = detect(&scene, &base);
+        for count in [1, 8, 64, 256] {
+            let found = detect(&scene, &CollideOptions { reduction: Reduction::Spread(count), ..base });
+            let s = found.statistics;
+            // Four leaves of eight faces in each region, and two regions at least.
+            assert!(s.candidates <= 32 * count.max(2) as usize, "{mode:?}, {count}: {s:?}");
+            // A dive may end without a contact.
+            assert!(found.len() <= count as usize && 4 * found.len() >= count as usize, "{s:?}");
+            if count >= 64 {
+                let sides = |contacts: &Contacts| {
+                    let side = |c: &Contact| (c.point_a.x > 0.0, c.point_a.y > 0.0, c.normal.z > 0.0);
+                    contacts.iter().map(side).collect::<std::collections::BTreeSet<_>>()
+                };
+                assert_eq!(sides(&found), sides(&all), "{mode:?}, {count}");
+            }
+        }
     }
 }

@@ -121,7 +121,8 @@ fn measure(
             queries: count(|c| c.polygons),
             contacts: count(|c| c.contacts),
             filtered: count(|c| c.filtered),
-            kept: matches!(options.reduction, Reduction::PerPair(_)).then(|| count(|c| c.kept)),
+            kept: matches!(options.reduction, Reduction::PerPair(_) | Reduction::Spread(_))
+                .then(|| count(|c| c.kept)),
             candidates: count(|c| c.candidates),
             queries_unpruned: None,
             evaluations: Some(count(|c| c.evaluations)),

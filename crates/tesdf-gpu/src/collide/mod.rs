@@ -114,7 +114,7 @@ impl Detector {
     ///   of distances. So it may keep other contacts. With contacts per face it also chooses among
     ///   several contacts at one vertex, of which otherwise one remains.
     /// - [`Reduction::Deepest`] cuts the contacts on the processor, after all have been found. So it
-    ///   saves no time here.
+    ///   saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors
@@ -160,8 +160,15 @@ impl Detector {
     }
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
-        let Reduction::Deepest(_) = options.reduction else { return self.find(scene, options, timing) };
         options.validate()?;
+        match options.reduction {
+            Reduction::None | Reduction::PerPair(_) => return self.find(scene, options, timing),
+            Reduction::Spread(n) => {
+                let per_pair = CollideOptions { reduction: Reduction::PerPair(n), ..*options };
+                return self.find(scene, &per_pair, timing);
+            }
+            Reduction::Deepest(_) => {}
+        }
         let all = self.find(scene, &CollideOptions { reduction: Reduction::None, ..*options }, timing)?;
         let (mut statistics, hidden) = (all.statistics, all.hidden.clone());
         let (contacts, reductions) = reduce_pairs(all.into_vec(), options.reduction);
@@ -266,7 +273,7 @@ impl Detector {
         let reductions = self.reductions(instances, options.reduction)?;
         let (found, unconverged) = match options.reduction {
             Reduction::PerPair(_) => (counts.contacts as usize, counts.unconverged as usize),
-            Reduction::None | Reduction::Deepest(_) => {
+            Reduction::None | Reduction::Deepest(_) | Reduction::Spread(_) => {
                 (contacts.len(), contacts.iter().filter(|c| !c.converged).count())
             }
         };

@@ -95,14 +95,14 @@ pub struct PairReduction {
     /// The instance with the higher id.
     pub instance_b: InstanceId,
     /// Number of contacts of the pair before the reduction, in both orders. With
-    /// [`Deepest`](super::Reduction::Deepest), number of contacts that were found.
+    /// [`Deepest`](super::Reduction::Deepest) and [`Spread`](super::Reduction::Spread), number of
+    /// contacts that were found.
     pub contacts: usize,
     /// Number of kept contacts.
     pub kept: usize,
     /// The greatest distance of a contact's wrench from the convex hull of the wrenches of the kept
-    /// contacts, without unit; 0 when all are kept. Where a search for the
-    /// [`Deepest`](super::Reduction::Deepest) has left contacts unfound, an upper bound between 1.41
-    /// and 2.83, because nothing is known about their normals.
+    /// contacts, without unit; 0 when all are kept. Where contacts may be
+    /// unfound, an upper bound between 1.41 and 2.83, because nothing is known about their normals.
     pub wrench_error: f64,
     /// The centre of a box around the contact points `point_a`, in the world. The box is parallel
     /// to the world's axes, or to those of `instance_b` when a GPU detects or contacts are unfound.

@@ -12,16 +12,14 @@
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BinaryHeap};
 
-use glam::DVec3;
-
+use super::few::{OfPair, unfound};
 use super::field::{Field, FieldBody, ROUNDING};
 use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
 use super::ordered_pair::OrderedPair;
-use super::reduce::{Unfound, deepest_of_pair};
+use super::reduce::deepest_of_pair;
 use super::surface::{Branch, Part};
-use super::{Contact, Contacts, Mode, PairReduction, Statistics, hidden};
+use super::{Contact, Mode, Statistics};
 use crate::asset::layout::{TREE_LEAF, TreeChild};
-use crate::geometry::Aabb;
 use crate::parallel::*;
 
 /// Largest number of nodes and leaves that are searched in parallel.
@@ -30,38 +28,6 @@ const BATCH: usize = 128;
 const FEW: usize = 16;
 /// One in this number of open nodes and leaves is searched at a time.
 const SHARE: usize = 8;
-
-/// The contacts of ordered pairs, at most `count` per pair of instances. The two orders of a pair
-/// must be adjacent.
-pub fn of_pairs(pairs: &[OrderedPair], count: u32, mode: Mode) -> Contacts {
-    let of_pair = |orders: &[OrderedPair]| Search::new(orders, (count as usize).max(1)).run();
-    let found: Vec<OfPair> = pairs.par_chunks(2).map(of_pair).collect();
-    let mut all = Vec::with_capacity(found.iter().map(|f| f.contacts.len()).sum());
-    let mut reports = Vec::new();
-    let mut statistics = Statistics { instance_pairs: pairs.len(), ..Statistics::default() };
-    for OfPair { contacts, report, statistics: own } in found {
-        statistics.candidates += own.candidates;
-        statistics.polygons += own.polygons;
-        statistics.touching += own.touching;
-        statistics.filtered += own.filtered;
-        statistics.reduced += own.reduced;
-        statistics.unconverged += own.unconverged;
-        statistics.bytes += own.bytes;
-        all.extend(contacts);
-        reports.extend(report);
-    }
-    statistics.bytes += size_of_val(pairs) + size_of_val(all.as_slice());
-    reports.sort_unstable_by_key(|r| (r.instance_a, r.instance_b));
-    let hidden = hidden::among(pairs, mode, &all);
-    Contacts::new(all, statistics, reports, hidden)
-}
-
-/// The deepest contacts of a pair.
-struct OfPair {
-    contacts: Vec<Contact>,
-    report: Option<PairReduction>,
-    statistics: Statistics,
-}
 
 /// A node or leaf that is still to be searched.
 struct Open {
@@ -98,6 +64,11 @@ enum Searched {
     /// The contacts of a leaf, and the number of its candidates that were searched and that the
     /// limit ruled out.
     Leaf { found: Found, searched: usize, ruled_out: usize },
+}
+
+/// The deepest contacts of a pair, whose two orders are given.
+pub fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
+    Search::new(orders, count.max(1)).run()
 }
 
 struct Search<'a> {
@@ -281,16 +252,4 @@ fn slack(field: &FieldBody) -> f64 {
         Field::Mesh(_) => ROUNDING,
         Field::Simple(_) => 0.0,
     }
-}
-
-/// A ball around all points that both bodies can have within the contact distance.
-fn unfound(pair: &OrderedPair) -> Unfound {
-    let OrderedPair { surface, field, search, .. } = pair;
-    let bounds = [field.bounds(), surface.bounds()];
-    // A plane is infinite.
-    let size = bounds.map(|b| b.extent().max_element()).into_iter().fold(f64::INFINITY, f64::min);
-    let [x, y] = bounds.map(|b| b.grown(search.reach.max(0.0) + ROUNDING * size));
-    let common = Aabb { min: x.min.max(y.min), max: x.max.min(y.max) };
-    let length = 0.5 * common.extent().max(DVec3::ZERO).length() * field.unit();
-    Unfound { center: field.to_world(common.center()), length }
 }

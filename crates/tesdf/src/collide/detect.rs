@@ -6,7 +6,7 @@ use super::reduce::{Reduced, reduced};
 use super::surface::Candidates;
 use super::{
     CollideError, CollideOptions, Contacts, InstancePair, InstancePairs, Reduction, Scene, Statistics,
-    deepest, hidden,
+    deepest, few, hidden, spread,
 };
 
 /// Number of faces or nodes per task.
@@ -75,8 +75,14 @@ pub fn detect_pairs(
 }
 
 fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions) -> Contacts {
-    if let Reduction::Deepest(count) = options.reduction {
-        return deepest::of_pairs(pairs, count, options.mode);
+    match options.reduction {
+        Reduction::Deepest(n) => {
+            return few::of_pairs(pairs, options.mode, |pair| deepest::of_pair(pair, n as usize));
+        }
+        Reduction::Spread(n) => {
+            return few::of_pairs(pairs, options.mode, |pair| spread::of_pair(pair, n as usize));
+        }
+        Reduction::None | Reduction::PerPair(_) => {}
     }
     let candidates: Vec<Candidates> = pairs.par_iter().map(OrderedPair::candidates).collect();
     let tasks: Vec<(&OrderedPair, &[u32])> = pairs

@@ -13,7 +13,7 @@
 //!   [`detect_with`], which finds the same contacts.
 //! - [`candidates`](candidates()): the result of the broad and the middle phase, for debug views.
 //! - [`reduce_pairs`]: fewer contacts per pair, with a bound of the loss; [`wrench_error`] computes
-//!   the loss. [`Reduction::Deepest`] finds the deepest contacts without the others.
+//!   the loss. [`Reduction::Deepest`] and [`Reduction::Spread`] do not find all contacts.
 //! - [`PatchTracker`]: contacts grouped into patches, which keep their ids from step to step.
 //! - [`hidden_overlaps`]: pairs that overlap without a contact that shows it. Detections report
 //!   them beside the contacts.
@@ -33,6 +33,7 @@ mod deepest;
 mod depth_bounds;
 mod detect;
 mod error;
+mod few;
 mod field;
 mod field_value;
 mod found;
@@ -59,6 +60,7 @@ mod shape;
 mod shape_distance;
 mod shape_ray;
 mod simple;
+mod spread;
 mod surface;
 mod time_of_impact;
 mod why;

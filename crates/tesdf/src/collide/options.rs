@@ -47,6 +47,14 @@ pub enum Reduction {
     /// best-first and does not find the other contacts. All deepest contacts may be at one place, so
     /// they can hold a body worse than as many contacts of [`PerPair`](Self::PerPair).
     Deepest(u32),
+    /// At most this many contacts per pair of instances, spread over the places that touch. The
+    /// surfaces are divided into as many regions, and the deepest contact that a dive into each
+    /// region finds is kept. The time follows this number, not the number of faces that touch. The
+    /// deepest contact of all may be missing; [`PairReduction::left_out_above`] says how deep it can
+    /// be. A device finds all contacts and keeps those of [`PerPair`](Self::PerPair).
+    ///
+    /// [`PairReduction::left_out_above`]: super::PairReduction::left_out_above
+    Spread(u32),
 }
 
 /// Options of a detection.
@@ -129,7 +137,7 @@ impl CollideOptions {
                 "at most 65536: from some hundred on nothing is gained",
             );
         }
-        if matches!(self.reduction, Reduction::PerPair(0) | Reduction::Deepest(0)) {
+        if matches!(self.reduction, Reduction::PerPair(0) | Reduction::Deepest(0) | Reduction::Spread(0)) {
             return refuse("reduction", "0 contacts per pair".into(), "at least 1, or none");
         }
         Ok(())

@@ -39,6 +39,28 @@ pub fn deepest_of_pair(
     (kept.into_iter().map(|k| contacts[k]).collect(), Some(report))
 }
 
+/// The report of contacts of a pair that were kept although others can be in the ball, none of them
+/// with a distance below `left_out_above`.
+pub fn report_of_kept(
+    kept: &[Contact],
+    found: usize,
+    Unfound { center, length }: Unfound,
+    left_out_above: f64,
+) -> Option<PairReduction> {
+    let Contact { instance_a: a, instance_b: b, .. } = *kept.first()?;
+    let hull: Vec<Wrench> = kept.iter().map(|c| wrench_of(c, center, length)).collect();
+    Some(PairReduction {
+        instance_a: a.min(b),
+        instance_b: a.max(b),
+        contacts: found,
+        kept: kept.len(),
+        wrench_error: greatest_error(&hull),
+        center,
+        length,
+        left_out_above: Some(left_out_above),
+    })
+}
+
 /// The indices of the deepest contacts, ascending. Of equally deep contacts, the first are kept.
 fn keep(contacts: &[Contact], n: usize, unfound: Option<Unfound>) -> (Vec<usize>, PairReduction) {
     let mut order: Vec<usize> = (0..contacts.len()).collect();

@@ -41,7 +41,7 @@ use glam::DVec3;
 use super::hull::{Wrench, dot, residual};
 use super::{Contact, InstanceId, PairReduction, Reduction};
 use bins::{Bins, sort_bytes};
-pub use deepest::{Unfound, deepest_of_pair};
+pub use deepest::{Unfound, deepest_of_pair, report_of_kept};
 use loss::{Loss, Projected};
 use selection::Selection;
 use survivors::{PER_BIN, Survivors};
@@ -58,10 +58,10 @@ const BINS_PER_KEPT: usize = 4;
 /// returns the contacts unchanged, without reports.
 ///
 /// [`Reduction::Deepest`] keeps the contacts that a detection with it finds. Its reports are those of
-/// contacts that were all found.
+/// contacts that were all found. [`Reduction::Spread`] keeps those of [`Reduction::PerPair`].
 ///
-/// `PerPair(0)` and `Deepest(0)`, which [`CollideOptions::validate`](super::CollideOptions::validate)
-/// refuses, count as 1.
+/// A number of 0, which [`CollideOptions::validate`](super::CollideOptions::validate) refuses, counts
+/// as 1.
 ///
 /// The same input gives the same output for any number of threads. To keep `n` of `N` contacts of a
 /// pair takes `O(N + n²)` time and about 72 bytes per contact.
@@ -86,7 +86,7 @@ pub struct Reduced {
 pub fn reduced(mut contacts: Vec<Contact>, reduction: Reduction) -> Reduced {
     let (n, reduce): (u32, OneReduction) = match reduction {
         Reduction::None => return Reduced { contacts, reports: Vec::new(), bytes: 0 },
-        Reduction::PerPair(n) => (n, reduce),
+        Reduction::PerPair(n) | Reduction::Spread(n) => (n, reduce),
         Reduction::Deepest(n) => (n, deepest::reduce),
     };
     let mut runs = runs(&contacts);
