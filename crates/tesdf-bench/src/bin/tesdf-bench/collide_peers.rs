@@ -142,9 +142,12 @@ fn ours(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
 
 const ALL: Reduction = Reduction::None;
 const KEPT: Reduction = Reduction::PerPair(64);
+const SPREAD: Reduction = Reduction::Spread(64);
 
 /// What the exact operations give.
 const CERTIFIED: &str = "f64; signed, of the solids, to 1e-7";
+
+const SPREAD_ONLY: &str = "f64; signed; not always the deepest";
 
 /// The rows of the detector in each mode, and of the clearance.
 fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure> {
@@ -196,6 +199,7 @@ fn detector(set: &PoseSet, a: &Encoded, b: &Encoded) -> Result<Vec<Row>, Failure
         row("detect, exact, per cell", CERTIFIED, contacts(Mode::Exact, Cell, ALL)?),
         row("detect, exact, per face", CERTIFIED, contacts(Mode::Exact, Face, ALL)?),
         row("detect, exact, per face, 64 kept", CERTIFIED, contacts(Mode::Exact, Face, KEPT)?),
+        row("detect, exact, per face, 64 spread", SPREAD_ONLY, contacts(Mode::Exact, Face, SPREAD)?),
         row("clearance", CERTIFIED, apart),
     ])
 }
