@@ -111,7 +111,15 @@ impl LoadedScene {
     pub fn coarse_contacts(&self, system: &System) -> Result<Vec<CoarseContact>, CollideError> {
         match self.scene.detector.mode {
             DetectorMode::Node => {
-                coarse_contacts(system.scene(), &collide_options(&self.scene.detector, system))
+                let options = collide_options(&self.scene.detector, system);
+                let mut found = coarse_contacts(system.scene(), &options)?;
+                // Bodies that are both fixed need no contacts.
+                let is_free = |id| {
+                    let body = system.body_of(id).map(|body| &system.bodies()[body]);
+                    body.is_some_and(|body| matches!(body.mass, Mass::Free(_)))
+                };
+                found.retain(|c| is_free(c.instance_a) || is_free(c.instance_b));
+                Ok(found)
             }
             DetectorMode::Face | DetectorMode::Exact | DetectorMode::Off => Ok(Vec::new()),
         }
