@@ -126,7 +126,8 @@ fn is_sound(c: &Contact, bodies: &[Placed], mode: Mode, contact_distance: f64) {
     }
 }
 
-/// Contacts are sorted by pair, order, face and cell. Per cell, a face has at most one contact in a cell.
+/// Contacts are sorted by pair, order, face and cell. Contacts per cell: a face has at most one in
+/// each cell.
 fn is_sorted(contacts: &[Contact], per: ContactsPer) {
     let key = |c: &Contact| {
         let (a, b) = (c.instance_a, c.instance_b);

@@ -184,7 +184,6 @@ impl Detector {
         options: &CollideOptions,
         timing: Timing,
     ) -> Result<Contacts, GpuError> {
-        options.validate()?;
         if shape_ids(scene) != self.shape_ids {
             if self.shapes.have_moved() {
                 return Err(GpuError::Unavailable {

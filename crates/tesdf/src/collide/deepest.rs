@@ -9,13 +9,12 @@
 //! The result is exact: the contacts are those that a detection without reduction finds, cut to the
 //! deepest. Where bounds cannot tell depths apart, as between two flanks of a thread that are nearly
 //! parallel, every face that touches is still compared with the limit.
-use std::cmp::Ordering;
-use std::collections::{BTreeMap, BinaryHeap};
+use std::collections::BTreeMap;
 
 use super::few::{OfPair, unfound};
-use super::field::{Field, FieldBody, ROUNDING};
 use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
 use super::ordered_pair::OrderedPair;
+use super::queue::Queue;
 use super::reduce::deepest_of_pair;
 use super::surface::{Branch, Part};
 use super::{Contact, Mode, Statistics};
@@ -33,28 +32,8 @@ const SHARE: usize = 8;
 struct Open {
     /// Lower bound of the distances of its contacts, in the world's unit.
     bound: f64,
-    /// Among equal bounds, those that were found first come first.
-    serial: u64,
     order: usize,
     child: TreeChild,
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Open {}
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // The heap returns the lowest bound first.
-        other.bound.total_cmp(&self.bound).then(other.serial.cmp(&self.serial))
-    }
 }
 
 /// What a node or leaf has become.
@@ -74,8 +53,7 @@ pub fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
 struct Search<'a> {
     orders: &'a [OrderedPair<'a>],
     count: usize,
-    open: BinaryHeap<Open>,
-    serial: u64,
+    open: Queue<Open>,
     /// The contacts of each order.
     found: Vec<Found>,
     /// Distances of contacts that are not at a vertex.
@@ -95,8 +73,7 @@ impl<'a> Search<'a> {
         Self {
             orders,
             count,
-            open: BinaryHeap::new(),
-            serial: 0,
+            open: Queue::new(),
             found: orders.iter().map(|_| Found::default()).collect(),
             alone: Vec::new(),
             at_vertices: BTreeMap::new(),
@@ -129,8 +106,7 @@ impl<'a> Search<'a> {
     }
 
     fn push(&mut self, bound: f64, order: usize, child: TreeChild) {
-        self.serial += 1;
-        self.open.push(Open { bound, serial: self.serial, order, child });
+        self.open.push(bound, Open { bound, order, child });
     }
 
     /// Number of contacts, those at one vertex counted once.
@@ -165,7 +141,7 @@ impl<'a> Search<'a> {
             TreeChild::Node(node) => {
                 let bound = |branch: Branch| {
                     let least = field.least_contact(branch.center, branch.radius, search.reach)?;
-                    Some(((least - slack(field)) * field.unit(), branch.child))
+                    Some(((least - field.rounding()) * field.unit(), branch.child))
                 };
                 let branches = surface.halves(node).into_iter().flatten();
                 return Searched::Node(branches.filter_map(bound).collect());
@@ -175,7 +151,7 @@ impl<'a> Search<'a> {
         let mut candidates = surface.of_leaf(start, count, pair.mode());
         let all = candidates.len();
         if self.limit < f64::INFINITY && pair.mode() != Mode::Node {
-            let limit = self.limit / field.unit() + slack(field);
+            let limit = self.limit / field.unit() + field.rounding();
             let limited = search.of_whole_faces(field, limit);
             let parts: Vec<Part> = candidates.iter().map(|&c| pair.part(c).0).collect();
             let around = limited.surroundings(field, parts.iter());
@@ -242,14 +218,5 @@ impl<'a> Search<'a> {
         statistics.reduced = all.len() - contacts.len();
         statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
         OfPair { contacts, report, statistics }
-    }
-}
-
-/// Contacts at one vertex report distances that differ by less than this (field's frame). With this
-/// slack, a contact is known together with all others at its vertex.
-fn slack(field: &FieldBody) -> f64 {
-    match field.field {
-        Field::Mesh(_) => ROUNDING,
-        Field::Simple(_) => 0.0,
     }
 }

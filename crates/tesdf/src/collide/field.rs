@@ -125,7 +125,7 @@ impl<'a> FieldBody<'a> {
 
     /// Lower bound of the signed distance within `radius` of `p`; `None` where it is certain that no
     /// point there has a signed distance up to `reach`. All in the field's frame.
-    fn least_up_to(&self, p: DVec3, radius: f64, reach: f64) -> Option<f64> {
+    pub fn least_up_to(&self, p: DVec3, radius: f64, reach: f64) -> Option<f64> {
         let limit = radius + reach;
         // Far out, the bounds are a good approximation of the body.
         if let Field::Mesh(asset) = self.field
@@ -144,6 +144,15 @@ impl<'a> FieldBody<'a> {
         // A list that lacks faces gives too great a depth.
         let is_unknown = least < 0.0 && !self.has_exact_lists();
         Some(if is_unknown { f64::NEG_INFINITY } else { least })
+    }
+
+    /// Contacts at one vertex report distances that differ by less than this (field's frame). With
+    /// this slack, a contact is known together with all others at its vertex.
+    pub fn rounding(&self) -> f64 {
+        match self.field {
+            Field::Mesh(_) => ROUNDING,
+            Field::Simple(_) => 0.0,
+        }
     }
 
     /// Whether all values are exact up to rounding, inside the body, too.

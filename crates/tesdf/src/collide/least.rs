@@ -1,9 +1,7 @@
 //! The least signed distance over whole surfaces, by best-first search over their face trees.
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
 use super::field::FieldBody;
 use super::piece::{Looks, Lowest, Piece, Rest};
+use super::queue::Queue;
 use super::surface::{Branch, SurfaceBody};
 use crate::asset::layout::TreeChild;
 use crate::parallel::*;
@@ -36,8 +34,6 @@ pub struct Least {
 struct Open {
     /// Lower bound of the signed distances on it, in the world's unit.
     bound: f64,
-    /// Among equal bounds, parts that were found first come first.
-    serial: u64,
     order: usize,
     item: Item,
 }
@@ -45,24 +41,6 @@ struct Open {
 enum Item {
     Tree(TreeChild),
     Piece(Box<Piece>),
-}
-
-impl PartialEq for Open {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Open {}
-impl PartialOrd for Open {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Open {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // The heap returns the lowest bound first.
-        other.bound.total_cmp(&self.bound).then(other.serial.cmp(&self.serial))
-    }
 }
 
 /// Number of parts after which the search stops early. Random deep pairs of the meshes of the data
@@ -95,15 +73,14 @@ struct Search<'a> {
     tolerance: f64,
     /// The lowest signed distance, in the world's unit, its order and its point.
     best: Option<(f64, usize, Lowest)>,
-    open: BinaryHeap<Open>,
+    open: Queue<Open>,
     /// Roots of orders that are searched later.
     waiting: Vec<usize>,
-    serial: u64,
 }
 
 impl<'a> Search<'a> {
     fn new(orders: &'a [Order<'a>], tolerance: f64) -> Self {
-        Self { orders, tolerance, best: None, open: BinaryHeap::new(), waiting: Vec::new(), serial: 0 }
+        Self { orders, tolerance, best: None, open: Queue::new(), waiting: Vec::new() }
     }
 
     /// Searches at most this number of parts.
@@ -117,7 +94,7 @@ impl<'a> Search<'a> {
         let mut bound = f64::INFINITY;
         loop {
             let overlap = self.least() <= 0.0;
-            let is_done = self.open.peek().is_none_or(|open| open.bound >= self.least() - self.tolerance);
+            let is_done = self.open.least().is_none_or(|bound| bound >= self.least() - self.tolerance);
             if overlap || is_done {
                 for order in std::mem::take(&mut self.waiting) {
                     self.push(f64::NEG_INFINITY, order, Item::Tree(self.orders[order].surface.whole()));
@@ -158,8 +135,7 @@ impl<'a> Search<'a> {
     }
 
     fn push(&mut self, bound: f64, order: usize, item: Item) {
-        self.serial += 1;
-        self.open.push(Open { bound, serial: self.serial, order, item });
+        self.open.push(bound, Open { bound, order, item });
     }
 
     /// The parts that are searched next.
@@ -213,7 +189,7 @@ impl<'a> Search<'a> {
 
     /// Searches a part.
     fn search(&self, open: Open) -> Found {
-        let Open { bound, order, item, .. } = open;
+        let Open { bound, order, item } = open;
         let Order { surface, field } = &self.orders[order];
         let (mut looks, mut found) = (self.looks(order), Vec::new());
         let bound = bound / field.unit();
@@ -225,11 +201,9 @@ impl<'a> Search<'a> {
         match item {
             Item::Tree(TreeChild::Node(node)) => {
                 for branch in surface.halves(node).into_iter().flatten() {
-                    if field.is_beyond(branch.center, branch.radius, looks.limit) {
-                        continue;
+                    if let Some(own) = field.least_up_to(branch.center, branch.radius, looks.limit) {
+                        found.push((own.max(bound), Item::Tree(branch.child)));
                     }
-                    let own = field.least_within(branch.center, branch.radius).max(bound);
-                    found.push((own, Item::Tree(branch.child)));
                 }
             }
             Item::Tree(TreeChild::Leaf(start, count)) => {

@@ -54,6 +54,7 @@ mod patches;
 mod piece;
 mod polygon;
 mod pose;
+mod queue;
 mod reduce;
 mod scene;
 mod shape;

@@ -9,13 +9,11 @@
 //!
 //! Every node that was passed has a lower bound of the distances of its contacts. The least of these
 //! bounds says how deep a contact can be that was not found.
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
 use super::few::{OfPair, unfound};
 use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
 use super::ordered_pair::OrderedPair;
-use super::reduce::{deepest_of_pair, report_of_kept};
+use super::queue::Queue;
+use super::reduce::{deepest_of_pair, report_of_kept, split_deepest};
 use super::{Contact, Statistics};
 use crate::asset::layout::TreeChild;
 use crate::parallel::*;
@@ -30,30 +28,10 @@ const FEW: usize = 8;
 struct Region {
     /// Its radius, in the world's unit.
     radius: f64,
-    /// Among equally large regions, those that were found first come first.
-    serial: u64,
     order: usize,
     child: TreeChild,
     /// Lower bound of the distances of its contacts, in the world's unit.
     bound: f64,
-}
-
-impl PartialEq for Region {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Region {}
-impl PartialOrd for Region {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Region {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // The heap returns the largest first.
-        self.radius.total_cmp(&other.radius).then(other.serial.cmp(&self.serial))
-    }
 }
 
 /// What a dive into a region has found.
@@ -105,8 +83,8 @@ pub fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
     if kept.len() > count {
         // Each order has a region.
         let (deepest, cut) = split_deepest(&kept, count);
-        left = cut.iter().map(|c| c.distance).fold(left, f64::min);
-        kept = deepest;
+        left = cut.into_iter().map(|i| kept[i].distance).fold(left, f64::min);
+        kept = deepest.into_iter().map(|i| kept[i]).collect();
     }
     statistics.reduced = found - kept.len();
     statistics.unconverged = kept.iter().filter(|c| !c.converged).count();
@@ -118,75 +96,54 @@ pub fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
     OfPair { contacts: kept, report, statistics }
 }
 
-/// The deepest contacts in their order, and the others.
-fn split_deepest(contacts: &[Contact], count: usize) -> (Vec<Contact>, Vec<Contact>) {
-    let mut by_depth: Vec<usize> = (0..contacts.len()).collect();
-    by_depth.sort_by(|&i, &j| contacts[i].distance.total_cmp(&contacts[j].distance));
-    let (kept, cut) = by_depth.split_at_mut(count);
-    kept.sort_unstable();
-    let of = |indices: &[usize]| indices.iter().map(|&i| contacts[i]).collect();
-    (of(kept), of(cut))
-}
-
 /// The children of a node that can have contacts.
-fn children(pair: &OrderedPair, order: usize, node: u32, bound: f64, serial: &mut u64) -> Vec<Region> {
+fn children(pair: &OrderedPair, order: usize, node: u32, bound: f64) -> impl Iterator<Item = Region> {
     let OrderedPair { surface, field, search, .. } = pair;
-    let mut regions = Vec::with_capacity(2);
-    for branch in surface.halves(node).into_iter().flatten() {
-        if let Some(least) = field.least_contact(branch.center, branch.radius, search.reach) {
-            *serial += 1;
-            let radius = branch.radius * field.unit();
-            let bound = bound.max(least * field.unit());
-            regions.push(Region { radius, serial: *serial, order, child: branch.child, bound });
-        }
-    }
-    regions
+    surface.halves(node).into_iter().flatten().filter_map(move |branch| {
+        let least = field.least_contact(branch.center, branch.radius, search.reach)?;
+        let (radius, bound) = (branch.radius * field.unit(), bound.max(least * field.unit()));
+        Some(Region { radius, order, child: branch.child, bound })
+    })
 }
 
 /// The regions: at most `count`, and at least one for each order where it can have contacts.
 fn regions(orders: &[OrderedPair], count: usize) -> Vec<Region> {
-    let whole = |(order, pair): (usize, &OrderedPair)| Region {
-        radius: f64::INFINITY,
-        serial: 0,
-        order,
-        child: pair.surface.whole(),
-        bound: f64::NEG_INFINITY,
-    };
-    let mut open: BinaryHeap<Region> = orders.iter().enumerate().map(whole).collect();
+    // The largest come first.
+    let mut open = Queue::new();
+    for (order, pair) in orders.iter().enumerate() {
+        let (radius, bound) = (f64::INFINITY, f64::NEG_INFINITY);
+        open.push(-radius, Region { radius, order, child: pair.surface.whole(), bound });
+    }
     let mut leaves = Vec::new();
-    let mut serial = 0;
     while open.len() + leaves.len() < count
         && let Some(largest) = open.pop()
     {
-        match largest.child {
-            TreeChild::Node(node) => {
-                let Region { order, bound, .. } = largest;
-                open.extend(children(&orders[order], order, node, bound, &mut serial));
-            }
+        let Region { order, child, bound, .. } = largest;
+        match child {
+            TreeChild::Node(node) => children(&orders[order], order, node, bound)
+                .for_each(|region| open.push(-region.radius, region)),
             TreeChild::Leaf(..) => leaves.push(largest),
         }
     }
-    leaves.extend(open.into_sorted_vec());
+    leaves.extend(open.into_items());
     leaves
 }
 
 /// Goes down to a leaf of a region where the surface is low.
 fn dive(pair: &OrderedPair, region: &Region) -> Dive {
     let mut dive = Dive { left: f64::INFINITY, ..Dive::default() };
-    let (mut serial, mut leaves) = (0, 0);
-    let mut open = vec![*region];
+    let mut leaves = 0;
+    let mut open = Queue::new();
     // The middle of a region is its radius above its bound.
-    let lower = |x: &Region, y: &Region| {
-        (x.bound + x.radius).total_cmp(&(y.bound + y.radius)).then(x.serial.cmp(&y.serial))
-    };
+    let middle = |region: &Region| region.bound + region.radius;
+    open.push(middle(region), *region);
     while leaves < LEAVES
         && dive.found.contacts.is_empty()
-        && let Some(at) = (0..open.len()).min_by(|&i, &j| lower(&open[i], &open[j]))
+        && let Some(Region { order, child, bound, .. }) = open.pop()
     {
-        let lowest = open.swap_remove(at);
-        match lowest.child {
+        match child {
             TreeChild::Node(node) => {
-                open.extend(children(pair, lowest.order, node, lowest.bound, &mut serial));
+                children(pair, order, node, bound).for_each(|region| open.push(middle(&region), region));
             }
             TreeChild::Leaf(start, count) => {
                 leaves += 1;
@@ -200,6 +157,6 @@ fn dive(pair: &OrderedPair, region: &Region) -> Dive {
             }
         }
     }
-    dive.left = open.iter().map(|region| region.bound).fold(dive.left, f64::min);
+    dive.left = open.into_items().map(|region| region.bound).fold(dive.left, f64::min);
     dive
 }

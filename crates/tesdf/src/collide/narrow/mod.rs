@@ -82,8 +82,7 @@ impl Search {
     /// The search that [`may_reach`](Self::may_reach) uses for contacts of this search up to
     /// `distance` (field's frame).
     pub fn of_whole_faces(self, field: &FieldBody, distance: f64) -> Self {
-        let rounding = if matches!(field.field, Field::Mesh(_)) { ROUNDING } else { 0.0 };
-        let reach = distance + 2.0 * self.tolerance + rounding;
+        let reach = distance + 2.0 * self.tolerance + field.rounding();
         Self { mode: Mode::Exact, per: ContactsPer::Face, reach, ..self }
     }
 

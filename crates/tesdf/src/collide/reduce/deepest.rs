@@ -61,8 +61,9 @@ pub fn report_of_kept(
     })
 }
 
-/// The indices of the deepest contacts, ascending. Of equally deep contacts, the first are kept.
-fn keep(contacts: &[Contact], n: usize, unfound: Option<Unfound>) -> (Vec<usize>, PairReduction) {
+/// The indices of the deepest contacts, ascending, and those of the others. Of equally deep contacts,
+/// the first are among the deepest.
+pub fn split_deepest(contacts: &[Contact], n: usize) -> (Vec<usize>, Vec<usize>) {
     let mut order: Vec<usize> = (0..contacts.len()).collect();
     let deeper =
         |&i: &usize, &j: &usize| contacts[i].distance.total_cmp(&contacts[j].distance).then(i.cmp(&j));
@@ -70,8 +71,14 @@ fn keep(contacts: &[Contact], n: usize, unfound: Option<Unfound>) -> (Vec<usize>
     if count < contacts.len() {
         order.select_nth_unstable_by(count, deeper);
     }
-    let (kept, others) = order.split_at_mut(count);
-    kept.sort_unstable();
+    let others = order.split_off(count);
+    order.sort_unstable();
+    (order, others)
+}
+
+/// The indices of the deepest contacts, ascending, and the report.
+fn keep(contacts: &[Contact], n: usize, unfound: Option<Unfound>) -> (Vec<usize>, PairReduction) {
+    let (kept, others) = split_deepest(contacts, n);
     let (center, length) = match unfound {
         Some(Unfound { center, length }) => (center, length),
         None => ball(contacts.iter()),
@@ -95,7 +102,7 @@ fn keep(contacts: &[Contact], n: usize, unfound: Option<Unfound>) -> (Vec<usize>
         length,
         left_out_above: (!is_all).then_some(last),
     };
-    (kept.to_vec(), report)
+    (kept, report)
 }
 
 /// Upper bound of the distance of any wrench from the hull: a unit force in any direction, at any

@@ -41,7 +41,7 @@ use glam::DVec3;
 use super::hull::{Wrench, dot, residual};
 use super::{Contact, InstanceId, PairReduction, Reduction};
 use bins::{Bins, sort_bytes};
-pub use deepest::{Unfound, deepest_of_pair, report_of_kept};
+pub use deepest::{Unfound, deepest_of_pair, report_of_kept, split_deepest};
 use loss::{Loss, Projected};
 use selection::Selection;
 use survivors::{PER_BIN, Survivors};
