@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use tesdf::collide::{CollideError, Contact, HiddenOverlap};
 
-use crate::{State, System};
+use crate::{Motor, State, System, Wrench};
 
 /// A physics engine that moves the bodies of a [`System`].
 pub trait Dynamics {
@@ -15,6 +15,18 @@ pub trait Dynamics {
     /// [`DynamicsError::NoBody`], or [`DynamicsError::NotFinite`] when a number of the state is not
     /// finite.
     fn set_state(&mut self, body: usize, state: State) -> Result<(), DynamicsError>;
+
+    /// Replaces the motor of a joint.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoJoint`], or [`DynamicsError::Joint`] when the motor does not fit the joint.
+    fn set_motor(&mut self, joint: usize, motor: Option<Motor>) -> Result<(), DynamicsError>;
+
+    /// Sets the wrench that acts on a body from now on.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::NotFinite`].
+    fn set_wrench(&mut self, body: usize, wrench: Wrench) -> Result<(), DynamicsError>;
 
     /// Advances all bodies by `time_step` seconds.
     ///
@@ -63,6 +75,22 @@ pub enum DynamicsError {
         body: usize,
         /// Number of bodies in the system.
         bodies: usize,
+    },
+    /// The system has no joint of this number.
+    #[error("there is no joint {joint}; the system has {joints}, counted from 0")]
+    NoJoint {
+        /// The number that was given.
+        joint: usize,
+        /// Number of joints in the system.
+        joints: usize,
+    },
+    /// The values of a joint do not fit.
+    #[error("joint {name}: {reason}")]
+    Joint {
+        /// Name of the joint.
+        name: String,
+        /// What was found and what was expected.
+        reason: String,
     },
     /// The number of states differs from the number of bodies.
     #[error("{found} states for {expected} bodies")]

@@ -22,6 +22,7 @@
 
 pub mod criterion;
 mod dynamics;
+mod joint;
 mod mass;
 pub mod newton;
 pub mod record;
@@ -30,7 +31,8 @@ mod simulate;
 mod system;
 
 pub use dynamics::{Dynamics, DynamicsError, StepReport};
+pub use joint::{Drive, Joint, JointKind, Motor};
 pub use mass::{MassError, MassProperties};
 pub use record::{HiddenPair, InterruptedRun, RunJournal, RunOrigin, RunRecord};
 pub use simulate::{Moment, PartialRun, SimulateError, Summary, simulate, simulate_from};
-pub use system::{Body, Mass, State, System};
+pub use system::{Body, Mass, State, System, Wrench};

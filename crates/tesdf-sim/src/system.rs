@@ -1,13 +1,17 @@
+use std::collections::BTreeMap;
+
 use glam::{DMat3, DVec3};
 use tesdf::collide::{CollideError, Instance, InstanceId, Pose, Scene, Shape, ShapeId, Velocity};
 
-use crate::{DynamicsError, MassProperties};
+use crate::{DynamicsError, Joint, MassProperties, Motor};
 
 /// Whether a body moves, and its mass properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mass {
     /// The body never moves.
     Fixed,
+    /// The body moves with the velocities of its state, whatever it meets.
+    Kinematic,
     /// The body moves freely.
     Free(MassProperties),
 }
@@ -19,8 +23,19 @@ pub struct Body {
     pub name: String,
     /// The body's instance in the system's scene.
     pub instance: InstanceId,
-    /// Fixed, or its mass properties.
+    /// Fixed, kinematic, or its mass properties.
     pub mass: Mass,
+    /// Coefficient of friction, see [`System::friction`].
+    pub friction: f64,
+}
+
+/// A force and a torque that act on a body from outside, in the world frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// Force on the centre of mass, N.
+    pub force: DVec3,
+    /// Torque about the centre of mass, N m.
+    pub torque: DVec3,
 }
 
 /// Pose and velocities of a body, in the world frame.
@@ -28,7 +43,8 @@ pub struct Body {
 pub struct State {
     /// Pose of the body's frame, which is the frame of its mesh or shape.
     pub pose: Pose,
-    /// Velocity of the centre of mass, m/s; zero for a fixed body.
+    /// Velocity of the centre of mass, m/s; of a kinematic body that of its frame's origin; zero for a
+    /// fixed body.
     pub linear: DVec3,
     /// Angular velocity, rad/s.
     pub angular: DVec3,
@@ -59,6 +75,10 @@ pub struct System {
     scene: Scene,
     bodies: Vec<Body>,
     states: Vec<State>,
+    wrenches: Vec<Wrench>,
+    joints: Vec<Joint>,
+    /// Coefficients of friction of pairs of bodies, the lower number first.
+    pair_friction: BTreeMap<(usize, usize), f64>,
     /// Acceleration of every free body, m/s².
     pub gravity: DVec3,
 }
@@ -77,8 +97,8 @@ impl System {
         self.scene.add_shape(shape)
     }
 
-    /// Adds a body and returns its number: 0, 1, 2, … in the order of the calls. A free body starts
-    /// with the velocity of `instance`.
+    /// Adds a body and returns its number: 0, 1, 2, … in the order of the calls. A free or
+    /// kinematic body starts with the velocity of `instance`. Its coefficient of friction is 0.
     ///
     /// # Errors
     /// The same errors as [`Scene::add`].
@@ -91,12 +111,18 @@ impl System {
         let id = self.scene.add(instance)?;
         let Instance { pose, velocity, .. } = *self.scene.instance(id)?;
         let mut state = State::at_rest(pose);
-        if let Mass::Free(mass) = mass {
-            let arm = pose.rotation * mass.center;
-            (state.linear, state.angular) = (velocity.linear + velocity.angular.cross(arm), velocity.angular);
+        match mass {
+            Mass::Fixed => {}
+            Mass::Kinematic => (state.linear, state.angular) = (velocity.linear, velocity.angular),
+            Mass::Free(mass) => {
+                let arm = pose.rotation * mass.center;
+                (state.linear, state.angular) =
+                    (velocity.linear + velocity.angular.cross(arm), velocity.angular);
+            }
         }
-        self.bodies.push(Body { name: name.into(), instance: id, mass });
+        self.bodies.push(Body { name: name.into(), instance: id, mass, friction: 0.0 });
         self.states.push(state);
+        self.wrenches.push(Wrench::default());
         Ok(self.bodies.len() - 1)
     }
 
@@ -107,6 +133,102 @@ impl System {
     pub fn exclude(&mut self, a: usize, b: usize) -> Result<(), DynamicsError> {
         let [a, b] = [self.body(a)?.instance, self.body(b)?.instance];
         Ok(self.scene.exclude(a, b)?)
+    }
+
+    /// Adds a joint and returns its number: 0, 1, 2, … in the order of the calls. The two bodies of a
+    /// joint have no contacts with each other.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::Joint`] when its values do not fit its kind or
+    /// neither of its bodies is free.
+    pub fn add_joint(&mut self, joint: Joint) -> Result<usize, DynamicsError> {
+        let refuse = |reason| DynamicsError::Joint { name: joint.name.clone(), reason };
+        joint.validate().map_err(refuse)?;
+        let is_free = |body: usize| Ok::<_, DynamicsError>(matches!(self.body(body)?.mass, Mass::Free(_)));
+        let parent_is_free = joint.parent.map_or(Ok(false), is_free)?;
+        if !is_free(joint.child)? && !parent_is_free {
+            return Err(refuse("neither of its bodies is free; a joint needs one that can move".into()));
+        }
+        if let Some(parent) = joint.parent {
+            self.exclude(parent, joint.child)?;
+        }
+        self.joints.push(joint);
+        Ok(self.joints.len() - 1)
+    }
+
+    /// The joints.
+    pub fn joints(&self) -> &[Joint] {
+        &self.joints
+    }
+
+    /// Replaces the motor of a joint.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoJoint`], or [`DynamicsError::Joint`] when the motor does not fit the joint.
+    pub fn set_motor(&mut self, joint: usize, motor: Option<Motor>) -> Result<(), DynamicsError> {
+        let joints = self.joints.len();
+        let old = self.joints.get_mut(joint).ok_or(DynamicsError::NoJoint { joint, joints })?;
+        let new = Joint { motor, ..old.clone() };
+        new.validate().map_err(|reason| DynamicsError::Joint { name: new.name.clone(), reason })?;
+        *old = new;
+        Ok(())
+    }
+
+    /// The poses of the parent and the child of a joint at `states`; a missing parent is at the
+    /// origin.
+    pub fn poses_of(joint: &Joint, states: &[State]) -> [Pose; 2] {
+        [joint.parent.map_or(Pose::IDENTITY, |parent| states[parent].pose), states[joint.child].pose]
+    }
+
+    /// Sets the coefficient of friction of a body.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::Option`] when it is not a finite number of 0 or
+    /// more.
+    pub fn set_friction(&mut self, body: usize, coefficient: f64) -> Result<(), DynamicsError> {
+        self.body(body)?;
+        check_friction(coefficient)?;
+        self.bodies[body].friction = coefficient;
+        Ok(())
+    }
+
+    /// Sets the coefficient of friction between two bodies, in place of the one that follows from
+    /// those of the bodies.
+    ///
+    /// # Errors
+    /// The same errors as [`set_friction`](Self::set_friction).
+    pub fn set_pair_friction(&mut self, a: usize, b: usize, coefficient: f64) -> Result<(), DynamicsError> {
+        (self.body(a)?, self.body(b)?);
+        check_friction(coefficient)?;
+        self.pair_friction.insert((a.min(b), a.max(b)), coefficient);
+        Ok(())
+    }
+
+    /// The coefficient of friction between two bodies: that of the pair if one was set, otherwise the
+    /// geometric mean of those of the bodies. So a body of coefficient 0 has no friction with any
+    /// other.
+    pub fn friction(&self, a: usize, b: usize) -> f64 {
+        let of_bodies = || (self.bodies[a].friction * self.bodies[b].friction).sqrt();
+        self.pair_friction.get(&(a.min(b), a.max(b))).copied().unwrap_or_else(of_bodies)
+    }
+
+    /// Sets the wrench that acts on a body from now on. It has no effect on fixed and kinematic bodies.
+    ///
+    /// # Errors
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::NotFinite`].
+    pub fn set_wrench(&mut self, body: usize, wrench: Wrench) -> Result<(), DynamicsError> {
+        let name = &self.body(body)?.name;
+        if !wrench.force.is_finite() || !wrench.torque.is_finite() {
+            let found = format!("{wrench:?}");
+            return Err(DynamicsError::NotFinite { body, name: name.clone(), found });
+        }
+        self.wrenches[body] = wrench;
+        Ok(())
+    }
+
+    /// The wrenches on the bodies.
+    pub fn wrenches(&self) -> &[Wrench] {
+        &self.wrenches
     }
 
     /// The bodies.
@@ -185,6 +307,7 @@ impl System {
             let before = *self.scene.instance(body.instance)?;
             let velocity = match body.mass {
                 Mass::Fixed => Velocity::default(),
+                Mass::Kinematic => Velocity { linear: state.linear, angular: state.angular },
                 Mass::Free(mass) => {
                     let arm = state.pose.rotation * mass.center;
                     Velocity { linear: state.linear - state.angular.cross(arm), angular: state.angular }
@@ -220,8 +343,19 @@ impl System {
     fn free(&self) -> impl Iterator<Item = (MassProperties, &State)> {
         self.bodies.iter().zip(&self.states).filter_map(|(body, state)| match body.mass {
             Mass::Free(mass) => Some((mass, state)),
-            Mass::Fixed => None,
+            Mass::Fixed | Mass::Kinematic => None,
         })
+    }
+}
+
+fn check_friction(found: f64) -> Result<(), DynamicsError> {
+    match found >= 0.0 && found.is_finite() {
+        true => Ok(()),
+        false => Err(DynamicsError::Option {
+            option: "friction",
+            found,
+            expected: "a finite number, 0 or greater",
+        }),
     }
 }
 

@@ -166,30 +166,6 @@ fn a_fast_ball_does_not_pass_a_plane() {
     }
 }
 
-#[test]
-fn islands_of_any_size_give_the_same_motion() {
-    let run = |dense_bodies: usize| {
-        let mut system = System::new(GRAVITY);
-        add_plane(&mut system, Pose::IDENTITY);
-        for k in 0..5 {
-            let lean = 1e-3 * f64::from(k);
-            let pose = Pose::at(DVec3::new(lean, -lean, 0.01 + 0.02 * f64::from(k)));
-            add_free(&mut system, Shape::Box { half_extents: DVec3::splat(0.01) }, pose, Velocity::default());
-        }
-        let options = NewtonOptions { dense_bodies, ..NewtonOptions::default() };
-        let mut engine = Newton::new(system, detect, nodes(1e-3), options).unwrap();
-        for _ in 0..40 {
-            let report = engine.step(2e-3).unwrap();
-            assert!(report.converged && report.islands == 1, "{report:?}");
-        }
-        engine.system().states().to_vec()
-    };
-    for (dense, iterative) in run(12).iter().zip(run(0)) {
-        assert!(dense.pose.translation.distance(iterative.pose.translation) < 1e-8);
-        assert!(dense.linear.distance(iterative.linear) < 1e-5);
-    }
-}
-
 /// Ten bricks that fall on a plane and never meet form ten islands, which are solved in parallel.
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {

@@ -195,10 +195,6 @@ fn the_size_of_a_scene_is_bounded() {
             "line 6: solver.max_iterations: 1000000000; expected 1 to 10000",
         ),
         (
-            change("[record]", "[solver]\ndense_bodies = 1000000000\n[record]"),
-            "line 6: solver.dense_bodies: 1000000000; expected at most 256",
-        ),
-        (
             change("[record]", "[detector]\nmode = \"face\"\niterations = 1000000000\n[record]"),
             "line 7: detector.iterations: 1000000000; expected at most 65536",
         ),

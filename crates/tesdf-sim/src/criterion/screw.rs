@@ -94,6 +94,7 @@ impl ScrewCriterion {
         match system.bodies()[body].mass {
             Mass::Free(mass) => Ok((body, mass)),
             Mass::Fixed => Err(format!("body {} is fixed; it cannot turn", self.body)),
+            Mass::Kinematic => Err(format!("body {} is kinematic; no contact can turn it", self.body)),
         }
     }
 }

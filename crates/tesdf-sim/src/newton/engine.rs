@@ -1,5 +1,6 @@
 use std::time::Instant;
 
+use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 use tesdf::collide::{
@@ -10,10 +11,11 @@ use tesdf::collide::{
 use super::NewtonOptions;
 use super::integrate::{free_velocity, moved, unpack, velocity};
 use super::islands::{Island, islands};
+use super::joints::{joint_rows, predict};
 use super::problem::{Minimum, Problem};
 use super::rigid::have_normal_of_face;
-use super::rows::{FreeBody, Resistance, Row};
-use crate::{Dynamics, DynamicsError, Mass, State, StepReport, System};
+use super::rows::{Bodies, FreeBody, Resistance, Row};
+use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
 
 /// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
 /// signature implement this trait.
@@ -109,7 +111,8 @@ impl Newton {
             if let Mass::Free(mass) = body.mass {
                 free_of[k] = Some(free.len());
                 free.push(FreeBody::new(k, &mass, state));
-                target.push(free_velocity(&mass, state, self.system.gravity, h));
+                let wrench = self.system.wrenches()[k];
+                target.push(free_velocity(&mass, state, self.system.gravity, wrench, h));
             }
         }
         let poses = states.iter().map(|state| state.pose).collect();
@@ -121,11 +124,16 @@ impl Newton {
     /// The states after moving for one step at `velocities`. Their velocities are `velocities`.
     fn moved(&self, step: &Step, velocities: &[Vector6<f64>]) -> Vec<State> {
         let mut states = self.system.states().to_vec();
+        for (body, state) in self.system.bodies().iter().zip(&mut states) {
+            if body.mass == Mass::Kinematic {
+                state.pose = moved(DVec3::ZERO, state.pose, &velocity(state), step.h);
+            }
+        }
         for (free, v) in step.free.iter().zip(velocities) {
             if let Mass::Free(mass) = self.system.bodies()[free.body].mass {
                 let (linear, angular) = unpack(v);
                 states[free.body] =
-                    State { pose: moved(&mass, step.poses[free.body], v, step.h), linear, angular };
+                    State { pose: moved(mass.center, step.poses[free.body], v, step.h), linear, angular };
             }
         }
         states
@@ -145,9 +153,29 @@ impl Newton {
         (self.options.correction * depth).min(self.options.correction_speed * h)
     }
 
-    fn row(&self, step: &Step, contact: &Contact, poses: &[Pose]) -> Option<Row> {
+    fn bodies<'a>(&'a self, step: &'a Step) -> Bodies<'a> {
         let softness = step.h * step.h / self.options.stiffness;
-        Row::of_contact(contact, &self.system, poses, &step.free, &step.free_of, softness)
+        Bodies { system: &self.system, free: &step.free, free_of: &step.free_of, softness }
+    }
+
+    /// The row of a contact that was detected at `poses`, and the way by which kinematic bodies open
+    /// its gap in the step, m.
+    fn row(&self, step: &Step, contact: &Contact, poses: &[Pose]) -> Option<(Row, f64)> {
+        let [a, b] = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
+        let (a, b) = (a?, b?);
+        let mut row = Row::of_contact(contact, &self.bodies(step), poses, self.system.friction(a, b))?;
+        let way = |body: usize| match self.system.bodies()[body].mass {
+            Mass::Kinematic => {
+                let State { linear, angular, .. } = self.system.states()[body];
+                step.h * (linear + angular.cross(contact.point_a - poses[body].translation))
+            }
+            Mass::Fixed | Mass::Free(_) => DVec3::ZERO,
+        };
+        let way = way(a) - way(b);
+        if let Some(friction) = &mut row.friction {
+            friction.way = way.reject_from_normalized(contact.normal);
+        }
+        Some((row, way.dot(contact.normal)))
     }
 
     /// How each contact resists where bodies do not overlap deeply.
@@ -166,12 +194,14 @@ impl Newton {
     /// The rows of the contacts at the beginning of the step.
     fn first_rows(&self, step: &Step, contacts: &[Contact]) -> Vec<Row> {
         let row = |(contact, resistance): (&Contact, Resistance)| {
-            let mut row = self.row(step, contact, &step.poses)?;
+            let (mut row, way) = self.row(step, contact, &step.poses)?;
             row.resistance = resistance;
             if contact.distance < 0.0 {
                 row.gap = -self.correction(-contact.distance, step.h);
                 row.relaxed_gap = 0.0;
             }
+            row.gap += way;
+            row.relaxed_gap += way;
             Some(row)
         };
         contacts.iter().zip(self.resistances(contacts)).filter_map(row).collect()
@@ -188,7 +218,7 @@ impl Newton {
         depths: &Depths,
     ) -> Vec<Row> {
         let row = |(contact, resistance): (&Contact, Resistance)| {
-            let mut row = self.row(step, contact, poses)?;
+            let (mut row, _) = self.row(step, contact, poses)?;
             row.resistance = resistance;
             let gap = contact.distance - step.h * row.rate(velocities);
             // A face may have several contacts, and its deepest one is not at this place. The body
@@ -248,11 +278,7 @@ impl Newton {
         gap: Gap,
         start: &[Vector6<f64>],
     ) -> Minimum {
-        let is_deep = island.bodies.iter().any(|&k| step.deep[k]);
         let local = |mut row: Row| {
-            if is_deep {
-                row.resistance = Resistance::Spring;
-            }
             for (body, _) in row.sides.iter_mut().flatten() {
                 // Every free body of an island's rows is in `island.bodies`, which is sorted.
                 *body = island.bodies.partition_point(|b| b < body);
@@ -275,14 +301,20 @@ impl Newton {
         step: &mut Step,
         contacts: &[Contact],
     ) -> Result<[Vec<Vector6<f64>>; 2], DynamicsError> {
-        let first = self.first_rows(step, contacts);
-        step.deep = self.deep(step, contacts, &first);
-        let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
-        let mut velocities = self.solve(step, &first, Gap::Position, &start);
-        let mut rows = first.clone();
+        let mut contact_rows = self.first_rows(step, contacts);
+        let mut joints = joint_rows(&self.bodies(step), step.h);
+        let rows = [contact_rows.as_slice(), &joints].concat();
+        step.deep = self.deep(step, contacts, &rows);
         let deep = step.deep.clone();
         let stays = |row: &Row| row.sides.iter().flatten().all(|(k, _)| deep[*k]);
-        if first.iter().any(|row| !stays(row)) {
+        // Where bodies overlap deeply, rigid contacts would contradict each other.
+        for row in contact_rows.iter_mut().filter(|row| stays(row)) {
+            row.resistance = Resistance::Spring;
+        }
+        let mut rows = [contact_rows.as_slice(), &joints].concat();
+        let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
+        let mut velocities = self.solve(step, &rows, Gap::Position, &start);
+        if rows.iter().any(|row| !stays(row)) {
             let depths = Depths::of_contacts(contacts);
             for _ in 0..self.options.redetections {
                 let predicted = self.moved(step, &velocities);
@@ -290,7 +322,9 @@ impl Newton {
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
                 rows = self.predicted_rows(step, contacts.as_slice(), &poses, &velocities, &depths);
                 rows.retain(|row| !stays(row));
-                rows.extend(first.iter().filter(|row| stays(row)).cloned());
+                rows.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
+                predict(&mut joints, &self.bodies(step), &poses, &velocities, step.h);
+                rows.extend_from_slice(&joints);
                 velocities = self.solve(step, &rows, Gap::Position, &velocities);
             }
         }
@@ -309,6 +343,14 @@ impl Dynamics for Newton {
 
     fn set_state(&mut self, body: usize, state: State) -> Result<(), DynamicsError> {
         self.system.set_state(body, state)
+    }
+
+    fn set_motor(&mut self, joint: usize, motor: Option<Motor>) -> Result<(), DynamicsError> {
+        self.system.set_motor(joint, motor)
+    }
+
+    fn set_wrench(&mut self, body: usize, wrench: Wrench) -> Result<(), DynamicsError> {
+        self.system.set_wrench(body, wrench)
     }
 
     fn step(&mut self, time_step: f64) -> Result<StepReport, DynamicsError> {

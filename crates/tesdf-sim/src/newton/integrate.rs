@@ -3,7 +3,7 @@ use glam::{DMat3, DQuat, DVec3};
 use nalgebra::Vector6;
 use tesdf::collide::Pose;
 
-use crate::{MassProperties, State};
+use crate::{MassProperties, State, Wrench};
 
 /// Linear velocity of the centre of mass, then angular velocity, both in the world frame.
 pub fn velocity(state: &State) -> Vector6<f64> {
@@ -20,9 +20,15 @@ pub fn unpack(v: &Vector6<f64>) -> (DVec3, DVec3) {
     (DVec3::new(v[0], v[1], v[2]), DVec3::new(v[3], v[4], v[5]))
 }
 
-/// The velocity after a step of `h` seconds without contacts: gravity and an implicit gyroscopic
-/// term.
-pub fn free_velocity(mass: &MassProperties, state: &State, gravity: DVec3, h: f64) -> Vector6<f64> {
+/// The velocity after a step of `h` seconds without contacts: gravity, a wrench from outside and an
+/// implicit gyroscopic term.
+pub fn free_velocity(
+    mass: &MassProperties,
+    state: &State,
+    gravity: DVec3,
+    wrench: Wrench,
+    h: f64,
+) -> Vector6<f64> {
     let rotation = state.pose.rotation;
     let before = rotation.inverse() * state.angular;
     let inertia = mass.inertia;
@@ -43,16 +49,17 @@ pub fn free_velocity(mass: &MassProperties, state: &State, gravity: DVec3, h: f6
             break;
         }
     }
-    pack(state.linear + h * gravity, rotation * spin)
+    let turn = rotation * spin + h * (mass.inertia_in_world(state.pose).inverse() * wrench.torque);
+    pack(state.linear + h * (gravity + wrench.force / mass.mass), turn)
 }
 
-/// The pose after moving for `h` seconds with a constant velocity of the centre of mass and a
-/// constant angular velocity.
-pub fn moved(mass: &MassProperties, pose: Pose, v: &Vector6<f64>, h: f64) -> Pose {
+/// The pose after moving for `h` seconds with a constant velocity of `center`, a point of the body in
+/// its frame, and a constant angular velocity.
+pub fn moved(center: DVec3, pose: Pose, v: &Vector6<f64>, h: f64) -> Pose {
     let (linear, angular) = unpack(v);
-    let center = pose.to_world(mass.center) + h * linear;
+    let moved = pose.to_world(center) + h * linear;
     let rotation = (DQuat::from_scaled_axis(h * angular) * pose.rotation).normalize();
-    Pose { translation: center - rotation * mass.center, rotation }
+    Pose { translation: moved - rotation * center, rotation }
 }
 
 fn cross_matrix(a: DVec3) -> DMat3 {
@@ -74,7 +81,7 @@ mod tests {
         let mut state = State::at_rest(Pose { translation: DVec3::ONE, rotation });
         state.angular = DVec3::new(3.0, -5.0, 8.0);
         let h = 0.01;
-        let (linear, angular) = unpack(&free_velocity(&mass, &state, DVec3::NEG_Z, h));
+        let (linear, angular) = unpack(&free_velocity(&mass, &state, DVec3::NEG_Z, Wrench::default(), h));
         assert_eq!(linear, DVec3::new(0.0, 0.0, -0.01));
         let i = mass.inertia_in_world(state.pose);
         let residual = i * (angular - state.angular) + h * angular.cross(i * angular);
@@ -84,9 +91,8 @@ mod tests {
     #[test]
     fn rotation_keeps_the_centre_of_mass_in_place() {
         let center = DVec3::new(0.1, 0.2, 0.3);
-        let mass = MassProperties { mass: 1.0, center, inertia: DMat3::IDENTITY };
         let pose = Pose::at(DVec3::new(1.0, 2.0, 3.0));
-        let turned = moved(&mass, pose, &pack(DVec3::ZERO, DVec3::new(0.0, 0.0, 100.0)), 0.01);
+        let turned = moved(center, pose, &pack(DVec3::ZERO, DVec3::new(0.0, 0.0, 100.0)), 0.01);
         assert!(turned.to_world(center).distance(pose.to_world(center)) < 1e-15);
         assert!(turned.rotation.angle_between(DQuat::from_rotation_z(1.0)) < 1e-7);
     }

@@ -66,7 +66,9 @@ mod tests {
             gap: 0.0,
             relaxed_gap: 0.0,
             stiffness: 1.0,
+            bounds: [0.0, f64::INFINITY],
             resistance: Resistance::Rigid,
+            friction: None,
         }
     }
 

@@ -28,11 +28,13 @@
 mod engine;
 mod integrate;
 mod islands;
+mod joints;
 mod linear;
 mod options;
 mod problem;
 mod rigid;
 mod rows;
+mod spring;
 
 pub use engine::{Detect, Newton};
 pub use options::NewtonOptions;

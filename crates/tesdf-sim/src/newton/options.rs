@@ -25,9 +25,6 @@ pub struct NewtonOptions {
     /// Contacts are detected as far ahead as the motion of this number of steps can close. With a
     /// fixed distance instead, a peg of 50 µm clearance tunnelled at steps of 5 ms.
     pub speculation: f64,
-    /// Islands of at most this number of free bodies are solved by dense Cholesky factorisation,
-    /// larger islands by conjugate gradients. At most 256.
-    pub dense_bodies: usize,
     /// A minimisation ends when the predicted decrease of the next iteration, relative to the
     /// energy, is below the square of this value. Forces are raised until contacts give way by less
     /// than this fraction of what springs of the stiffness κ give way.
@@ -37,7 +34,6 @@ pub struct NewtonOptions {
 }
 
 const MAX_ITERATIONS: u32 = 10_000;
-const MAX_DENSE_BODIES: usize = 256;
 
 impl Default for NewtonOptions {
     fn default() -> Self {
@@ -48,7 +44,6 @@ impl Default for NewtonOptions {
             redetections: 1,
             deep: 3e-4,
             speculation: 1.2,
-            dense_bodies: 12,
             tolerance: 1e-8,
             max_iterations: 50,
         }
@@ -91,12 +86,6 @@ impl NewtonOptions {
                 f64::from(self.max_iterations),
                 (1..=MAX_ITERATIONS).contains(&self.max_iterations),
                 "1 to 10000",
-            ),
-            (
-                "dense_bodies",
-                self.dense_bodies as f64,
-                self.dense_bodies <= MAX_DENSE_BODIES,
-                "at most 256: the matrix grows with the square of their number",
             ),
         ];
         match checks.into_iter().find(|&(_, _, good, _)| !good) {

@@ -9,26 +9,17 @@ use nalgebra::Vector6;
 
 use super::NewtonOptions;
 use super::linear::{BlockMatrix, Pattern, dot};
-use super::rows::{FreeBody, Resistance, Row};
+use super::rows::{FreeBody, Row};
+use super::spring::{Change, Deflection, Spring};
 
-/// The function `½ |v − target|²_M + Σ ½ K min(0, gap + h J v)²` of the velocities `v`.
+/// The function `½ |v − target|²_M + Σ energy of the springs` of the velocities `v`.
 #[derive(Debug)]
 pub struct Problem<'a> {
     bodies: Vec<&'a FreeBody>,
     target: Vec<Vector6<f64>>,
-    rows: Vec<Spring>,
+    springs: Vec<Spring>,
     pattern: Pattern,
     time_step: f64,
-}
-
-/// A row whose bodies are indices within the island.
-#[derive(Clone, Debug)]
-struct Spring {
-    sides: [Option<(usize, Vector6<f64>)>; 2],
-    pair: Option<usize>,
-    gap: f64,
-    stiffness: f64,
-    resistance: Resistance,
 }
 
 /// Result of a minimisation.
@@ -38,7 +29,7 @@ pub struct Minimum {
     pub velocity: Vec<Vector6<f64>>,
     /// Number of Newton iterations.
     pub iterations: u32,
-    /// Whether every minimisation reached the tolerance.
+    /// Whether every minimisation reached the tolerance, and the limits of friction have settled.
     pub converged: bool,
 }
 
@@ -46,10 +37,8 @@ pub struct Minimum {
 #[derive(Clone, Debug)]
 struct Iterate {
     velocity: Vec<Vector6<f64>>,
-    /// For each row: the gap at the end of the step, less `compression`, m.
-    gaps: Vec<f64>,
-    /// For each row: the compression of its spring when the gap is zero, m.
-    compression: Vec<f64>,
+    /// One for each spring.
+    deflections: Vec<Deflection>,
     /// Multiplies the stiffness of rigid rows.
     stiffening: f64,
 }
@@ -65,39 +54,42 @@ const STIFFENING: f64 = 10.0;
 /// faces on each other.
 const ROUNDS: u32 = 8;
 
-/// Maximum number of evaluations of a line search. The derivative is piecewise linear, so its root
-/// is usually found after a few.
+/// Maximum number of times that forces are raised where contacts have friction, whose limits lag.
+const ROUNDS_WITH_FRICTION: u32 = 16;
+
+/// Springs do not become stiffer than this factor. More would leave no digits to the masses.
+const STIFFEST: f64 = 1e8;
+
+/// The limits of friction have settled when their changes are less than this share of them.
+const LAG: f64 = 1e-3;
+
+/// Maximum number of evaluations of a line search. The derivative is piecewise linear without
+/// friction, so its root is usually found after a few.
 const LINE_SEARCH: usize = 60;
 
 impl<'a> Problem<'a> {
     /// `target` has one velocity per body, in the order of `bodies`. Each row comes with its gap,
-    /// m, and refers to bodies by their index in `bodies`.
+    /// and refers to bodies by their index in `bodies`.
     pub fn new(
         bodies: Vec<&'a FreeBody>,
         target: Vec<Vector6<f64>>,
         rows: impl Iterator<Item = (Row, f64)>,
         time_step: f64,
     ) -> Self {
-        let spring = |(row, gap): (Row, f64)| {
-            let Row { sides, stiffness, resistance, .. } = row;
-            Spring { sides, pair: None, gap, stiffness, resistance }
-        };
-        let mut rows: Vec<Spring> = rows.map(spring).collect();
-        let pair = |row: &Spring| match row.sides {
+        let mut springs: Vec<Spring> = rows.map(|(row, gap)| Spring { row, gap, pair: None }).collect();
+        let pair = |spring: &Spring| match spring.row.sides {
             [Some((a, _)), Some((b, _))] => Some((a.min(b), a.max(b))),
             _ => None,
         };
-        let mut pairs: Vec<_> = rows.iter().filter_map(pair).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
-        for row in &mut rows {
-            row.pair = pair(row).and_then(|p| pairs.binary_search(&p).ok());
+        let pattern = Pattern::new(bodies.len(), springs.iter().filter_map(pair).collect());
+        for spring in &mut springs {
+            spring.pair = pair(spring).and_then(|(a, b)| pattern.pair(a, b));
         }
-        Self { bodies, target, rows, pattern: Pattern { pairs }, time_step }
+        Self { bodies, target, springs, pattern, time_step }
     }
 
-    /// Minimises from `start`. Where rows are rigid, raises their forces and minimises again, until
-    /// no rigid row gives way.
+    /// Minimises from `start`. Where rows are rigid or have friction, raises their forces and
+    /// minimises again, until no rigid row gives way and the limits of friction have settled.
     pub fn minimise(&self, start: Vec<Vector6<f64>>, options: &NewtonOptions) -> Minimum {
         let mut at = self.start(start);
         let (iterations, converged) = self.raise_forces(&mut at, options);
@@ -105,23 +97,26 @@ impl<'a> Problem<'a> {
     }
 
     fn start(&self, velocity: Vec<Vector6<f64>>) -> Iterate {
-        let gaps = self.rows.iter().map(|row| row.gap + self.time_step * row.rate(&velocity)).collect();
-        Iterate { velocity, gaps, compression: vec![0.0; self.rows.len()], stiffening: 1.0 }
+        let deflections = self.springs.iter().map(|s| s.deflection(&velocity, self.time_step)).collect();
+        Iterate { velocity, deflections, stiffening: 1.0 }
     }
 
-    /// Returns the number of Newton iterations, and whether each minimisation reached the tolerance.
+    /// Returns the number of Newton iterations, and whether it converged.
     fn raise_forces(&self, at: &mut Iterate, options: &NewtonOptions) -> (u32, bool) {
         let (mut iterations, mut converged) = self.descend(at, options);
-        let most = at.gaps.iter().fold(0.0f64, |most, gap| most.max(-gap));
-        for _ in 0..ROUNDS {
-            if !converged || self.error(at) <= options.tolerance * most {
-                break;
+        let [_, most] = self.error(at);
+        let has_friction = self.springs.iter().any(|s| s.row.friction.is_some());
+        let rounds = if has_friction { ROUNDS_WITH_FRICTION } else { ROUNDS };
+        for _ in 0..rounds {
+            let settled = self.lag(at) <= LAG;
+            if !converged || settled && self.error(at)[0] <= options.tolerance * most {
+                return (iterations, converged);
             }
             self.raise(at);
             let (more, good) = self.descend(at, options);
             (iterations, converged) = (iterations + more, good);
         }
-        (iterations, converged)
+        (iterations, converged && self.lag(at) <= LAG)
     }
 
     /// Newton's method with an exact line search. Returns the number of iterations, and whether it
@@ -130,55 +125,59 @@ impl<'a> Problem<'a> {
         let goal = options.tolerance * options.tolerance * self.energy();
         for iteration in 1..=options.max_iterations {
             let force = self.force(at);
-            let Some(direction) = self.direction(at, &force, options) else { return (iteration, false) };
-            let rates: Vec<f64> = self.rows.iter().map(|row| self.time_step * row.rate(&direction)).collect();
+            let Some(direction) = self.direction(at, &force) else { return (iteration, false) };
+            let changes: Vec<_> = self.springs.iter().map(|s| s.change(&direction, self.time_step)).collect();
             // This is twice the decrease that a quadratic function would have.
             let small = dot(&force, &direction) <= goal;
-            let step = if small { 1.0 } else { self.line_search(at, &direction, &rates) };
+            let step = if small { 1.0 } else { self.line_search(at, &direction, &changes) };
             at.velocity.iter_mut().zip(&direction).for_each(|(v, d)| *v += step * d);
-            let mut same = step == 1.0;
-            for (gap, rate) in at.gaps.iter_mut().zip(&rates) {
-                let before = *gap < 0.0;
-                *gap += step * rate;
-                same &= before == (*gap < 0.0);
+            let mut is_quadratic = step == 1.0;
+            for ((spring, deflection), change) in self.springs.iter().zip(&mut at.deflections).zip(&changes) {
+                let after = deflection.after(change, step);
+                is_quadratic = is_quadratic && spring.is_linear_between(deflection, &after, at.stiffening);
+                *deflection = after;
             }
             // If all springs kept their state, the function is quadratic along the step and this is
             // its minimum.
-            if small || (same && self.bodies.len() <= options.dense_bodies) {
+            if small || is_quadratic {
                 return (iteration, true);
             }
         }
         (options.max_iterations, false)
     }
 
-    /// The greatest distance by which a rigid row gives way, or keeps a force across a gap, m.
-    fn error(&self, at: &Iterate) -> f64 {
-        let rows = self.rows.iter().zip(&at.gaps).zip(&at.compression);
-        let rigid = rows.filter(|((row, _), _)| row.resistance == Resistance::Rigid);
-        rigid.map(|((_, gap), c)| ((-gap).max(0.0) - c).abs()).fold(0.0, f64::max)
+    /// The greatest distance by which a rigid row gives way, or keeps a force that it should not, and
+    /// the greatest one that corresponds to a force. The two are m or rad.
+    fn error(&self, at: &Iterate) -> [f64; 2] {
+        let errors = self.springs.iter().zip(&at.deflections).map(|(s, d)| s.error(d, at.stiffening));
+        errors.fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])
     }
 
-    /// Gives each rigid row its present force as the force at gap zero, and stiffens it.
+    /// The changes of the limits of friction that are due, as a share of these limits.
+    fn lag(&self, at: &Iterate) -> f64 {
+        let grips = self.springs.iter().zip(&at.deflections).filter_map(|(s, d)| s.grips(d, at.stiffening));
+        let [change, all] = grips.fold([0.0; 2], |[a, b], [next, now]| [a + (next - now).abs(), b + next]);
+        if change > 0.0 { change / all.max(f64::MIN_POSITIVE) } else { 0.0 }
+    }
+
+    /// Gives each rigid row its present force as the force at zero deflection, and stiffens it.
     fn raise(&self, at: &mut Iterate) {
-        for ((row, gap), compression) in self.rows.iter().zip(&mut at.gaps).zip(&mut at.compression) {
-            if row.resistance == Resistance::Rigid {
-                let next = (-*gap).max(0.0) / STIFFENING;
-                *gap += *compression - next;
-                *compression = next;
-            }
+        let factor = STIFFENING.min(STIFFEST / at.stiffening);
+        for (spring, deflection) in self.springs.iter().zip(&mut at.deflections) {
+            spring.keep(deflection, at.stiffening, factor);
         }
-        at.stiffening *= STIFFENING;
+        at.stiffening *= factor;
     }
 
     /// The energy that the tolerance is relative to: twice the kinetic energy of the motion without
     /// contacts, plus twice the energy of the springs that this motion would compress.
     fn energy(&self) -> f64 {
-        let springs = self
-            .rows
-            .iter()
-            .map(|row| row.stiffness * (row.gap + self.time_step * row.rate(&self.target)).min(0.0).powi(2));
+        let energy = |spring: &Spring| {
+            let deflection = spring.deflection(&self.target, self.time_step);
+            spring.force(&deflection, 1.0).0 * -deflection.gap
+        };
         let motion = self.bodies.iter().zip(&self.target).map(|(body, v)| v.dot(&(body.inertia * v)));
-        motion.sum::<f64>() + springs.sum::<f64>()
+        motion.sum::<f64>() + self.springs.iter().map(energy).sum::<f64>()
     }
 
     /// The negative gradient.
@@ -186,34 +185,24 @@ impl<'a> Problem<'a> {
         let of_body =
             |((body, v), target): ((&&FreeBody, &Vector6<f64>), &Vector6<f64>)| body.inertia * (target - v);
         let mut force: Vec<_> = self.bodies.iter().zip(&at.velocity).zip(&self.target).map(of_body).collect();
-        for (row, &gap) in self.rows.iter().zip(&at.gaps).filter(|&(_, &gap)| gap < 0.0) {
-            let push = -row.stiffness_at(at) * gap * self.time_step;
-            row.sides.iter().flatten().for_each(|(body, j)| force[*body].axpy(push, j, 1.0));
+        for (spring, deflection) in self.springs.iter().zip(&at.deflections) {
+            spring.push(deflection, at.stiffening, self.time_step, &mut force);
         }
         force
     }
 
-    fn direction(
-        &self,
-        at: &Iterate,
-        force: &[Vector6<f64>],
-        options: &NewtonOptions,
-    ) -> Option<Vec<Vector6<f64>>> {
+    fn direction(&self, at: &Iterate, force: &[Vector6<f64>]) -> Option<Vec<Vector6<f64>>> {
         let mut hessian =
             BlockMatrix::new(&self.pattern, self.bodies.iter().map(|body| body.inertia).collect());
         let h2 = self.time_step * self.time_step;
-        for (row, _) in self.rows.iter().zip(&at.gaps).filter(|&(_, &gap)| gap < 0.0) {
-            hessian.add(&row.sides, row.pair, row.stiffness_at(at) * h2);
+        for (spring, deflection) in self.springs.iter().zip(&at.deflections) {
+            spring.stiffen(deflection, at.stiffening, h2, &mut hessian);
         }
-        match self.bodies.len() <= options.dense_bodies {
-            true => hessian.solve_dense(force),
-            false => hessian.solve_iterative(force),
-        }
+        hessian.solve(force)
     }
 
-    /// The step length along `direction` at which the derivative is zero. The derivative increases
-    /// and is piecewise linear.
-    fn line_search(&self, at: &Iterate, direction: &[Vector6<f64>], rates: &[f64]) -> f64 {
+    /// The step length along `direction` at which the derivative is zero. The derivative increases.
+    fn line_search(&self, at: &Iterate, direction: &[Vector6<f64>], changes: &[Change]) -> f64 {
         let (mut constant, mut linear) = (0.0, 0.0);
         for (((body, v), target), d) in self.bodies.iter().zip(&at.velocity).zip(&self.target).zip(direction)
         {
@@ -223,12 +212,10 @@ impl<'a> Problem<'a> {
         }
         let derivative = |step: f64| {
             let (mut value, mut slope) = (constant + step * linear, linear);
-            for ((row, gap), rate) in self.rows.iter().zip(&at.gaps).zip(rates) {
-                let gap = gap + step * rate;
-                if gap < 0.0 {
-                    value += row.stiffness_at(at) * gap * rate;
-                    slope += row.stiffness_at(at) * rate * rate;
-                }
+            for ((spring, deflection), change) in self.springs.iter().zip(&at.deflections).zip(changes) {
+                let resistance = spring.resist(&deflection.after(change, step), change, at.stiffening);
+                value += resistance.0;
+                slope += resistance.1;
             }
             (value, slope)
         };
@@ -256,27 +243,13 @@ impl<'a> Problem<'a> {
     }
 }
 
-impl Spring {
-    #[inline]
-    fn stiffness_at(&self, at: &Iterate) -> f64 {
-        match self.resistance {
-            Resistance::Spring => self.stiffness,
-            Resistance::Rigid => self.stiffness * at.stiffening,
-        }
-    }
-
-    #[inline]
-    fn rate(&self, velocity: &[Vector6<f64>]) -> f64 {
-        self.sides.iter().flatten().map(|(body, j)| j.dot(&velocity[*body])).sum()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use glam::{DMat3, DVec3};
     use tesdf::collide::Pose;
 
     use super::*;
+    use crate::newton::rows::Resistance;
     use crate::{MassProperties, State};
 
     /// A chain of bodies with random rows; some rows connect a body to a fixed body.
@@ -292,14 +265,15 @@ mod tests {
             let gap = 0.1 * h * vector()[0];
             let sides = [Some((a, vector())), other];
             let (stiffness, resistance) = (30.0 / (h * h), Resistance::Spring);
-            let row = Row { sides, gap, relaxed_gap: gap, stiffness, resistance };
+            let bounds = [0.0, f64::INFINITY];
+            let row = Row { sides, gap, relaxed_gap: gap, stiffness, bounds, resistance, friction: None };
             rows.push((row, gap));
         }
         Problem::new(free.iter().collect(), target, rows.into_iter(), h)
     }
 
     #[test]
-    fn the_gradient_vanishes_at_the_minimum_dense_and_iterative() {
+    fn the_gradient_vanishes_at_the_minimum() {
         let mass = MassProperties {
             mass: 2.0,
             center: DVec3::ZERO,
@@ -308,15 +282,13 @@ mod tests {
         let free: Vec<_> = (0..5).map(|k| FreeBody::new(k, &mass, &State::at_rest(Pose::IDENTITY))).collect();
         for seed in 0..20 {
             let problem = random_problem(&free, 1e-3, seed);
-            for dense_bodies in [0, 12] {
-                let options = NewtonOptions { dense_bodies, ..NewtonOptions::default() };
-                let found = problem.minimise(problem.target.clone(), &options);
-                assert!(found.converged, "seed {seed}: {found:?}");
-                let force = problem.force(&problem.start(found.velocity));
-                let size: f64 = problem.energy().sqrt();
-                let left = dot(&force, &force).sqrt();
-                assert!(left < 1e-5 * size, "seed {seed}, dense up to {dense_bodies}: {left:e} of {size:e}");
-            }
+            let options = NewtonOptions::default();
+            let found = problem.minimise(problem.target.clone(), &options);
+            assert!(found.converged, "seed {seed}: {found:?}");
+            let force = problem.force(&problem.start(found.velocity));
+            let size: f64 = problem.energy().sqrt();
+            let left = dot(&force, &force).sqrt();
+            assert!(left < 1e-5 * size, "seed {seed}: {left:e} of {size:e}");
         }
     }
 
@@ -330,19 +302,19 @@ mod tests {
         for seed in 0..20 {
             let mut problem = random_problem(&free, 1e-3, seed);
             // Without motion no gap is negative, so the rows do not contradict each other.
-            problem.rows.iter_mut().for_each(|row| row.gap = row.gap.abs());
-            problem.rows.iter_mut().for_each(|row| row.resistance = Resistance::Rigid);
+            problem.springs.iter_mut().for_each(|spring| spring.gap = spring.gap.abs());
+            problem.springs.iter_mut().for_each(|spring| spring.row.resistance = Resistance::Rigid);
             let mut at = problem.start(problem.target.clone());
             let (_, converged) = problem.raise_forces(&mut at, &NewtonOptions::default());
             assert!(converged, "seed {seed}");
             let force = problem.force(&at);
             assert!(dot(&force, &force).sqrt() < 1e-6 * problem.energy().sqrt(), "seed {seed}: {force:?}");
-            let pushing = at.gaps.iter().filter(|gap| **gap < 0.0).count();
+            let pushing = at.deflections.iter().filter(|d| d.gap < 0.0).count();
             assert!(pushing > 5, "seed {seed}: {pushing} contacts");
-            for ((row, &gap), compression) in problem.rows.iter().zip(&at.gaps).zip(&at.compression) {
-                let end = row.gap + 1e-3 * row.rate(&at.velocity);
-                assert!((end - gap - compression).abs() < 1e-15, "seed {seed}: {end:e}");
-                assert!(end > -1e-12 && (end < 1e-12 || gap >= 0.0), "seed {seed}: {end:e}, {gap:e}");
+            for (spring, d) in problem.springs.iter().zip(&at.deflections) {
+                let end = spring.gap + 1e-3 * spring.row.rate(&at.velocity);
+                assert!((end - d.gap - d.compression()).abs() < 1e-15, "seed {seed}: {end:e}");
+                assert!(end > -1e-12 && (end < 1e-12 || d.gap >= 0.0), "seed {seed}: {end:e}, {d:?}");
             }
         }
     }

@@ -35,23 +35,45 @@ impl FreeBody {
     }
 }
 
-/// A gap between two bodies. A spring keeps `gap + h Σ jacobian · v ≥ 0`.
+/// A condition on the velocities of two bodies: a force acts between them, along `sides`, so that
+/// `gap + h Σ jacobian · v` becomes zero, as far as the force stays within its bounds.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// Up to two free bodies: the index of each in the list of free bodies, and the derivative of
     /// the gap by its velocity.
     pub sides: [Option<(usize, Vector6<f64>)>; 2],
-    /// Gap at the beginning of the step, m.
+    /// Gap at the beginning of the step, with the motion of kinematic bodies in the step, m or rad.
     pub gap: f64,
-    /// The gap without the correction that pushes penetrating bodies apart, m.
+    /// The gap without the correction that pushes penetrating bodies apart.
     pub relaxed_gap: f64,
-    /// Stiffness K, N/m.
+    /// Stiffness K, N/m or N m/rad.
     pub stiffness: f64,
-    /// How the contact resists in an island that does not overlap deeply.
+    /// The least and the greatest force, N or N m; positive forces open the gap. A contact pushes
+    /// only: 0 to infinity.
+    pub bounds: [f64; 2],
+    /// How the row resists in an island that does not overlap deeply.
     pub resistance: Resistance,
+    /// Friction of a contact, if it has any.
+    pub friction: Option<Friction>,
 }
 
-/// How a contact resists.
+/// Friction of a contact. It acts against the velocity of the first body relative to the second one
+/// in the tangent plane.
+#[derive(Clone, Copy, Debug)]
+pub struct Friction {
+    /// Unit normal of the tangent plane.
+    pub normal: DVec3,
+    /// The vectors from the centres of mass of the two sides to the contact, m.
+    pub arms: [DVec3; 2],
+    /// Coefficient of friction.
+    pub coefficient: f64,
+    /// Stiffness of sticking, N/m.
+    pub stiffness: f64,
+    /// The way in the step that kinematic bodies add to that of the free ones, in the tangent plane, m.
+    pub way: DVec3,
+}
+
+/// How a row resists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resistance {
     /// As a spring, which gives way under load.
@@ -61,42 +83,73 @@ pub enum Resistance {
 }
 
 impl Row {
-    /// Rate of change of the gap at `velocity`, m/s.
+    /// Rate of change of the gap at `velocity`, m/s or rad/s.
     #[inline]
     pub fn rate(&self, velocity: &[Vector6<f64>]) -> f64 {
         self.sides.iter().flatten().map(|(free, jacobian)| jacobian.dot(&velocity[*free])).sum()
     }
 
+    /// J M⁻¹ Jᵀ: the rate that an impulse of 1 causes.
+    pub fn weight(sides: &[Option<(usize, Vector6<f64>)>; 2], free: &[FreeBody]) -> f64 {
+        sides.iter().flatten().map(|(k, j)| j.dot(&(free[*k].inverse * j))).sum()
+    }
+
     /// The row of a contact, with the contact's distance as its gap. Returns `None` when neither
     /// body is free.
     ///
-    /// `poses` are the poses at which the contact was detected, `free_of` maps bodies to free
-    /// bodies, and `softness` is h² / κ, s².
+    /// `poses` are the poses at which the contact was detected, and `coefficient` is that of friction.
     pub fn of_contact(
         contact: &Contact,
-        system: &System,
+        bodies: &Bodies<'_>,
         poses: &[Pose],
-        free: &[FreeBody],
-        free_of: &[Option<usize>],
-        softness: f64,
+        coefficient: f64,
     ) -> Option<Self> {
-        let side = |instance, direction: DVec3| {
+        let Bodies { system, free, free_of, softness } = *bodies;
+        let of = |instance| {
             let body = system.body_of(instance)?;
-            let free = free_of[body]?;
             let Mass::Free(mass) = system.bodies()[body].mass else { return None };
             // Both sides use one point. The closest points lie on a line along the normal, so the
             // rate is the rate of the distance.
-            let arm = contact.point_a - poses[body].to_world(mass.center);
-            Some((free, pack(direction, arm.cross(direction))))
+            Some((free_of[body]?, contact.point_a - poses[body].to_world(mass.center)))
         };
-        let sides = [side(contact.instance_a, contact.normal), side(contact.instance_b, -contact.normal)];
-        let weight: f64 = sides.iter().flatten().map(|(k, j)| j.dot(&(free[*k].inverse * j))).sum();
+        let points = [of(contact.instance_a), of(contact.instance_b)];
+        let side = |k: usize, direction: DVec3| {
+            points[k].map(|(free, arm)| (free, pack(direction, arm.cross(direction))))
+        };
+        let sides = [side(0, contact.normal), side(1, -contact.normal)];
+        let weight = Self::weight(&sides, free);
+        let friction = || {
+            let tangents = contact.normal.any_orthonormal_pair();
+            let weight = |t: DVec3| Self::weight(&[side(0, t), side(1, -t)], free);
+            Friction {
+                normal: contact.normal,
+                arms: points.map(|point| point.map_or(DVec3::ZERO, |(_, arm)| arm)),
+                coefficient,
+                stiffness: 2.0 / ((weight(tangents.0) + weight(tangents.1)) * softness),
+                way: DVec3::ZERO,
+            }
+        };
         (weight > 0.0).then(|| Self {
             sides,
             gap: contact.distance,
             relaxed_gap: contact.distance,
             stiffness: 1.0 / (weight * softness),
+            bounds: [0.0, f64::INFINITY],
             resistance: Resistance::Spring,
+            friction: (coefficient > 0.0).then(friction),
         })
     }
+}
+
+/// The bodies that rows connect.
+#[derive(Clone, Copy, Debug)]
+pub struct Bodies<'a> {
+    /// All bodies.
+    pub system: &'a System,
+    /// The free ones.
+    pub free: &'a [FreeBody],
+    /// For each body its index in `free`; `None` when it is not free.
+    pub free_of: &'a [Option<usize>],
+    /// h² / κ, s².
+    pub softness: f64,
 }
