@@ -10,7 +10,7 @@ use nalgebra::Vector6;
 use super::NewtonOptions;
 use super::linear::{BlockMatrix, Pattern, dot};
 use super::rows::{FreeBody, Row};
-use super::spring::{Change, Deflection, Spring};
+use super::spring::{Change, Deflection, Grips, Spring};
 
 /// The function `½ |v − target|²_M + Σ energy of the springs` of the velocities `v`.
 #[derive(Debug)]
@@ -41,6 +41,9 @@ struct Iterate {
     deflections: Vec<Deflection>,
     /// Multiplies the stiffness of rigid rows.
     stiffening: f64,
+    /// Whether the limits of friction follow the pushes of the contacts. Once they have settled they
+    /// stay: rounding moves the pushes of contacts that share a load, the more the stiffer they are.
+    grips: Grips,
 }
 
 /// Every time that the forces are raised, the springs become stiffer by this factor. An error then
@@ -98,25 +101,32 @@ impl<'a> Problem<'a> {
 
     fn start(&self, velocity: Vec<Vector6<f64>>) -> Iterate {
         let deflections = self.springs.iter().map(|s| s.deflection(&velocity, self.time_step)).collect();
-        Iterate { velocity, deflections, stiffening: 1.0 }
+        let has_friction = self.springs.iter().any(|s| s.row.friction.is_some());
+        let grips = if has_friction { Grips::Follow } else { Grips::Stay };
+        Iterate { velocity, deflections, stiffening: 1.0, grips }
     }
 
     /// Returns the number of Newton iterations, and whether it converged.
     fn raise_forces(&self, at: &mut Iterate, options: &NewtonOptions) -> (u32, bool) {
         let (mut iterations, mut converged) = self.descend(at, options);
         let [_, most] = self.error(at);
-        let has_friction = self.springs.iter().any(|s| s.row.friction.is_some());
-        let rounds = if has_friction { ROUNDS_WITH_FRICTION } else { ROUNDS };
+        let rounds = match at.grips {
+            Grips::Follow => ROUNDS_WITH_FRICTION,
+            Grips::Stay => ROUNDS,
+        };
         for _ in 0..rounds {
-            let settled = self.lag(at) <= LAG;
+            if self.lag(at) <= LAG {
+                at.grips = Grips::Stay;
+            }
+            let settled = at.grips == Grips::Stay;
             if !converged || settled && self.error(at)[0] <= options.tolerance * most {
-                return (iterations, converged);
+                break;
             }
             self.raise(at);
             let (more, good) = self.descend(at, options);
             (iterations, converged) = (iterations + more, good);
         }
-        (iterations, converged && self.lag(at) <= LAG)
+        (iterations, converged && (at.grips == Grips::Stay || self.lag(at) <= LAG))
     }
 
     /// Newton's method with an exact line search. Returns the number of iterations, and whether it
@@ -164,7 +174,7 @@ impl<'a> Problem<'a> {
     fn raise(&self, at: &mut Iterate) {
         let factor = STIFFENING.min(STIFFEST / at.stiffening);
         for (spring, deflection) in self.springs.iter().zip(&mut at.deflections) {
-            spring.keep(deflection, at.stiffening, factor);
+            spring.keep(deflection, at.stiffening, factor, at.grips);
         }
         at.stiffening *= factor;
     }

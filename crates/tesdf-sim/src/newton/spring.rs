@@ -33,6 +33,13 @@ pub struct Deflection {
     grip: f64,
 }
 
+/// Whether the limits of friction follow the pushes of the contacts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grips {
+    Follow,
+    Stay,
+}
+
 /// The change of a deflection by a change of the velocities.
 #[derive(Clone, Copy, Debug)]
 pub struct Change {
@@ -177,9 +184,13 @@ impl Spring {
     }
 
     /// Keeps the present forces of a rigid row as the forces at zero deflection when all rigid rows
-    /// become `factor` times as stiff, and takes the limit of friction from the present push.
-    pub fn keep(&self, at: &mut Deflection, stiffening: f64, factor: f64) {
-        let grip = self.grips(at, stiffening).map_or(0.0, |[next, _]| next);
+    /// become `factor` times as stiff. Where limits of friction follow, the limit becomes that of the
+    /// present push.
+    pub fn keep(&self, at: &mut Deflection, stiffening: f64, factor: f64, grips: Grips) {
+        let grip = match grips {
+            Grips::Stay => at.grip,
+            Grips::Follow => self.grips(at, stiffening).map_or(0.0, |[next, _]| next),
+        };
         if self.is_rigid() {
             let next = self.force(at, stiffening).0 / (self.row.stiffness * stiffening * factor);
             at.gap += at.compression - next;
