@@ -2,7 +2,7 @@ use std::time::Instant;
 
 use rapier3d_f64::geometry::PairContacts;
 use tesdf::collide::{CollideOptions, Contact, HiddenOverlap, Pose, hidden_overlaps};
-use tesdf_sim::{Dynamics, DynamicsError, State, StepReport, System};
+use tesdf_sim::{Dynamics, DynamicsError, Motor, State, StepReport, System, Wrench};
 
 use crate::RapierOptions;
 use crate::manifolds::FIRST;
@@ -39,7 +39,8 @@ impl RapierEngine {
     /// pair.
     ///
     /// # Errors
-    /// An option of `options` or `collide` is out of range.
+    /// An option of `options` or `collide` is out of range, or [`DynamicsError::Unsupported`] when the
+    /// system has joints or friction of single pairs.
     pub fn new(
         system: System,
         collide: CollideOptions,
@@ -47,6 +48,13 @@ impl RapierEngine {
     ) -> Result<Self, DynamicsError> {
         options.validate()?;
         collide.validate()?;
+        let unsupported = |what| Err(DynamicsError::Unsupported { engine: "Rapier", what });
+        if !system.joints().is_empty() {
+            return unsupported("joints");
+        }
+        if system.has_pair_friction() {
+            return unsupported("friction of single pairs");
+        }
         let (record, contacts, hidden) = (Record::default(), Vec::new(), Vec::new());
         Ok(Self { system, collide, options, record, world: None, contacts, hidden })
     }
@@ -134,6 +142,18 @@ impl Dynamics for RapierEngine {
         self.system.set_state(body, state)?;
         if let Some(world) = &mut self.world {
             world.set_state(body, &self.system.states()[body]);
+        }
+        Ok(())
+    }
+
+    fn set_motor(&mut self, joint: usize, motor: Option<Motor>) -> Result<(), DynamicsError> {
+        self.system.set_motor(joint, motor)
+    }
+
+    fn set_wrench(&mut self, body: usize, wrench: Wrench) -> Result<(), DynamicsError> {
+        self.system.set_wrench(body, wrench)?;
+        if let Some(world) = &mut self.world {
+            world.set_wrench(body, wrench);
         }
         Ok(())
     }

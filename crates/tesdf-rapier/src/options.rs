@@ -18,8 +18,6 @@ pub struct RapierOptions {
     /// the velocities of the two bodies' centres can close in a step. With 0 it considers only
     /// contacts within the contact distance.
     pub speculative_distance: f64,
-    /// Coulomb friction coefficient of all bodies.
-    pub friction: f64,
 }
 
 impl Default for RapierOptions {
@@ -30,7 +28,6 @@ impl Default for RapierOptions {
             contact_damping: 10.0,
             length_unit: 0.01,
             speculative_distance: 0.01,
-            friction: 0.0,
         }
     }
 }
@@ -84,7 +81,6 @@ impl RapierOptions {
                 not_negative(self.speculative_distance),
                 from,
             ),
-            ("friction", self.friction, not_negative(self.friction), from),
         ];
         match checks.into_iter().find(|&(_, _, good, _)| !good) {
             Some((option, found, _, expected)) => Err(DynamicsError::Option { option, found, expected }),

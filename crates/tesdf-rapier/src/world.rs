@@ -1,6 +1,6 @@
 //! The bodies of a system in Rapier.
 use glam::DVec3;
-use rapier3d_f64::dynamics::{RigidBody, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d_f64::dynamics::{CoefficientCombineRule, RigidBody, RigidBodyBuilder, RigidBodyHandle};
 use rapier3d_f64::geometry::{
     Capsule, Collider, ColliderBuilder, ColliderHandle, Cuboid, HalfSpace, SharedShape, SolverFlags,
 };
@@ -8,7 +8,7 @@ use rapier3d_f64::parry::mass_properties::MassProperties;
 use rapier3d_f64::parry::shape::Ball;
 use rapier3d_f64::pipeline::{ActiveHooks, PairFilterContext, PhysicsHooks, PhysicsWorld};
 use tesdf::collide::{CollideError, CollideOptions, Instance, Shape};
-use tesdf_sim::{Body, Mass, State, System};
+use tesdf_sim::{Body, Mass, State, System, Wrench};
 
 use crate::known::{parry_pose, pose};
 use crate::record::Record;
@@ -40,20 +40,31 @@ impl World {
             let instance = system.scene().instance(body.instance)?;
             let shape = shape(system.scene().shape(instance.shape)?, instance);
             let handle = rapier.insert_body(rigid_body(number, body, state, options));
-            rapier.insert_collider(collider(shape, options), Some(handle));
+            rapier.insert_collider(collider(shape, body.friction), Some(handle));
             handles.push(handle);
         }
-        Ok(Self { rapier, handles, prediction })
+        let mut world = Self { rapier, handles, prediction };
+        system.wrenches().iter().enumerate().for_each(|(body, &wrench)| world.set_wrench(body, wrench));
+        Ok(world)
     }
 
     pub fn prediction(&self) -> f64 {
         self.prediction
     }
 
+    /// Sets the force and the torque that act on a body from now on.
+    pub fn set_wrench(&mut self, body: usize, wrench: Wrench) {
+        let Some(body) = self.rapier.bodies.get_mut(self.handles[body]) else { return };
+        body.reset_forces(true);
+        body.reset_torques(true);
+        body.add_force(wrench.force, true);
+        body.add_torque(wrench.torque, true);
+    }
+
     pub fn set_state(&mut self, body: usize, state: &State) {
         let Some(body) = self.rapier.bodies.get_mut(self.handles[body]) else { return };
         body.set_position(parry_pose(state.pose), true);
-        if body.is_dynamic() {
+        if !body.is_fixed() {
             body.set_linvel(state.linear, true);
             body.set_angvel(state.angular, true);
         }
@@ -62,7 +73,7 @@ impl World {
     /// The states of all bodies, in order. A fixed body keeps its state of `before`.
     pub fn states(&self, before: &[State]) -> Vec<State> {
         let state = |(handle, before): (&RigidBodyHandle, &State)| match self.rapier.bodies.get(*handle) {
-            Some(body) if body.is_dynamic() => {
+            Some(body) if !body.is_fixed() => {
                 State { pose: pose(body.position()), linear: body.linvel(), angular: body.angvel() }
             }
             _ => *before,
@@ -84,6 +95,9 @@ fn number(body: &RigidBody) -> Option<usize> {
 fn rigid_body(number: usize, body: &Body, state: &State, options: &RapierOptions) -> RigidBody {
     let builder = match body.mass {
         Mass::Fixed => RigidBodyBuilder::fixed(),
+        Mass::Kinematic => {
+            RigidBodyBuilder::kinematic_velocity_based().linvel(state.linear).angvel(state.angular)
+        }
         Mass::Free(mass) => RigidBodyBuilder::dynamic()
             .additional_mass_properties(MassProperties::with_inertia_matrix(
                 mass.center,
@@ -98,11 +112,13 @@ fn rigid_body(number: usize, body: &Body, state: &State, options: &RapierOptions
     builder.pose(parry_pose(state.pose)).user_data(number as u128).build()
 }
 
-fn collider(shape: SharedShape, options: &RapierOptions) -> Collider {
-    // The body has the mass, so the collider has none.
+fn collider(shape: SharedShape, friction: f64) -> Collider {
+    // The body has the mass, so the collider has none. The product of two roots is the geometric mean,
+    // by which a system combines coefficients.
     ColliderBuilder::new(shape)
         .density(0.0)
-        .friction(options.friction)
+        .friction(friction.sqrt())
+        .friction_combine_rule(CoefficientCombineRule::Multiply)
         .restitution(0.0)
         .active_hooks(ActiveHooks::FILTER_CONTACT_PAIRS)
         .build()

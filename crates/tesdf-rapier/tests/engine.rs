@@ -8,7 +8,7 @@ use tesdf::collide::{CollideOptions, Groups, Instance, Mode, Pose, Reduction, Sh
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_rapier::{RapierEngine, RapierOptions};
 use tesdf_sim::criterion::{ScrewCriterion, ScrewTracker};
-use tesdf_sim::{Dynamics, DynamicsError, Mass, State, System};
+use tesdf_sim::{Dynamics, DynamicsError, Joint, JointKind, Mass, State, System, Wrench};
 
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
@@ -228,4 +228,56 @@ fn values_out_of_range_are_refused() {
     assert_eq!(engine.system().states(), fast);
     engine.set_state(1, before[1]).expect("a state");
     engine.step(1e-3).expect("a step");
+}
+
+#[test]
+fn friction_holds_a_box_that_gravity_or_a_wrench_pulls() {
+    let half_extents = DVec3::new(0.02, 0.02, 0.01);
+    let run = |pull: f64| {
+        let shape = Shape::Box { half_extents };
+        let mass = steel(&shape);
+        let mut system = System::new(GRAVITY);
+        let plane = add(&mut system, "plane", Shape::Plane, Pose::at(DVec3::ZERO), Mass::Fixed);
+        let body = add(&mut system, "box", shape, Pose::at(0.01 * DVec3::Z), Mass::Free(mass));
+        // The geometric mean is 0.4.
+        system.set_friction(plane, 0.8).expect("a body");
+        system.set_friction(body, 0.2).expect("a body");
+        let force = pull * mass.mass * 9.81 * DVec3::X;
+        system.set_wrench(body, Wrench { force, torque: DVec3::ZERO }).expect("a body");
+        let mut engine = engine(system, collide(Mode::Exact));
+        let mut speed_after = |steps: usize| {
+            for _ in 0..steps {
+                engine.step(1e-3).expect("a step");
+            }
+            engine.system().states()[body].linear.x
+        };
+        // The first contacts take some steps to carry the load.
+        let first = speed_after(100);
+        speed_after(100) - first
+    };
+    assert!(run(0.35).abs() < 1e-3, "{}", run(0.35));
+    let expected = 0.1 * 9.81 * 0.1;
+    assert!((run(0.5) / expected - 1.0).abs() < 0.05, "{} instead of {expected}", run(0.5));
+}
+
+#[test]
+fn kinematic_bodies_move_and_joints_are_refused() {
+    let ball = Shape::Sphere { radius: 0.01 };
+    let mut system = System::new(GRAVITY);
+    let body = add(&mut system, "wrist", ball.clone(), Pose::at(DVec3::ZERO), Mass::Kinematic);
+    let other = add(&mut system, "ball", ball.clone(), Pose::at(DVec3::X), Mass::Free(steel(&ball)));
+    let state = State { linear: DVec3::Y, ..State::at_rest(Pose::at(DVec3::ZERO)) };
+    system.set_state(body, state).expect("a state");
+    let mut jointed = system.clone();
+    let mut engine = engine(system, collide(Mode::Exact));
+    for _ in 0..100 {
+        engine.step(1e-3).expect("a step");
+    }
+    let pose = engine.system().states()[body].pose;
+    assert!(pose.translation.distance(0.1 * DVec3::Y) < 1e-9, "{pose:?}");
+    let weld = Joint::new("weld", JointKind::Weld, (Some(body), other), [pose; 2], pose);
+    jointed.add_joint(weld).expect("a joint");
+    let error = RapierEngine::new(jointed, collide(Mode::Exact), RapierOptions::default()).err();
+    let message = error.expect("a refusal").to_string();
+    assert_eq!(message, "Rapier does not simulate joints; use the built-in engine");
 }

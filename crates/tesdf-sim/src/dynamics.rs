@@ -92,6 +92,14 @@ pub enum DynamicsError {
         /// What was found and what was expected.
         reason: String,
     },
+    /// The engine cannot simulate something that the system has.
+    #[error("{engine} does not simulate {what}; use the built-in engine")]
+    Unsupported {
+        /// Name of the engine.
+        engine: &'static str,
+        /// What the system has.
+        what: &'static str,
+    },
     /// The number of states differs from the number of bodies.
     #[error("{found} states for {expected} bodies")]
     States {

@@ -12,6 +12,8 @@
 //! - [`System`]: the bodies, their states and gravity.
 //! - [`Dynamics`]: the trait of every physics engine, which advances a system by a time step.
 //!   [`newton`] is the built-in engine.
+//! - [`Joint`], [`Motor`]: what connects bodies besides contacts.
+//! - [`script`]: keyframes of kinematic bodies, motors and wrenches.
 //! - [`scene_file`]: scenes as TOML files.
 //! - [`criterion`]: what makes a run a success.
 //! - [`record`]: run files.
@@ -27,6 +29,7 @@ mod mass;
 pub mod newton;
 pub mod record;
 pub mod scene_file;
+pub mod script;
 mod simulate;
 mod system;
 

@@ -209,7 +209,7 @@ impl RunRecord {
 
     /// The states of all bodies after `step` steps, bit for bit. `None` when the record ends
     /// earlier.
-    pub(crate) fn states(&self, step: usize) -> Option<Vec<State>> {
+    pub fn states(&self, step: usize) -> Option<Vec<State>> {
         let state = |body| {
             let [linear, angular] = self.velocity(step, body)?;
             Some(State { pose: self.pose(step, body)?, linear, angular })

@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::criterion::{RestReport, ScrewReport, Trackers};
+use crate::criterion::{JointDrift, RestReport, ScrewReport, Trackers};
 use crate::scene_file::{LimitError, SceneFile};
+use crate::script::Scripts;
 use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
 
 /// The state of a run after a step.
@@ -43,6 +44,12 @@ pub struct Summary {
     pub kinetic_energy: f64,
     /// Kinetic energy at the beginning plus the potential energy lost during the run, J.
     pub released_energy: f64,
+    /// Linear momentum of all free bodies at the end, kg m/s, world frame.
+    pub momentum: [f64; 3],
+    /// Angular momentum of all free bodies about the world's origin at the end, kg m²/s.
+    pub angular_momentum: [f64; 3],
+    /// How far joints came apart; `None` when the scene has none.
+    pub joint_drift: Option<JointDrift>,
     /// Mean number of solver iterations per step.
     pub mean_iterations: f64,
     /// Number of steps whose solution did not reach the tolerance.
@@ -79,6 +86,9 @@ pub enum SimulateError {
     /// The criterion does not match the bodies.
     #[error("criterion: {0}")]
     Criterion(String),
+    /// A script does not match the bodies and joints.
+    #[error("{0}")]
+    Script(String),
     /// The caller stopped the run.
     #[error("interrupted after {steps} steps")]
     Interrupted {
@@ -131,7 +141,7 @@ pub fn simulate(
 }
 
 /// As [`simulate`], but continues from the last step of `run`; `engine` must have the states of
-/// that step. A step depends on the states of the bodies alone, so the record equals that of an
+/// that step. A step depends on the states of the bodies and the time alone, so the record equals that of an
 /// uninterrupted run, bit for bit.
 ///
 /// # Errors
@@ -144,12 +154,14 @@ pub fn simulate_from(
 ) -> Result<(RunRecord, Summary), SimulateError> {
     let h = scene.time_step;
     let steps = scene.steps()?;
-    let (mut trackers, energy) = replay(scene, engine.system(), &run.record)?;
+    let Start { mut trackers, scripts, energy } = replay(scene, engine.system(), &run.record)?;
     let PartialRun { mut record, mut totals } = run;
     record.reserve(steps).map_err(|_| LimitError::memory(steps, record.bodies.len()))?;
     record.plan(Some(steps));
     for step in record.steps()..steps {
-        let report = engine.step(h).map_err(|source| SimulateError::Step { step, source })?;
+        let failed = |source| SimulateError::Step { step, source };
+        scripts.drive(engine, step as f64 * h, h).map_err(failed)?;
+        let report = engine.step(h).map_err(failed)?;
         let (system, time) = (engine.system(), (step + 1) as f64 * h);
         record.push(time, system);
         let every = u64::from(scene.record.contacts_every);
@@ -174,7 +186,11 @@ pub fn simulate_from(
     let passed = (!failures.is_empty()).then(|| failures.iter().all(|failures| failures.is_empty()));
     let sums = totals.summary();
     let depths = hidden.iter().map(|pair| pair.depth);
+    let (momentum, angular_momentum) = system.momentum();
     let summary = Summary {
+        momentum: momentum.to_array(),
+        angular_momentum: angular_momentum.to_array(),
+        joint_drift: trackers.drift(system),
         seconds: steps as f64 * h,
         kinetic_energy: system.kinetic_energy(),
         released_energy: energy - system.potential_energy(),
@@ -188,8 +204,16 @@ pub fn simulate_from(
     Ok((record, summary))
 }
 
-/// The trackers after the recorded steps, and the energy at the beginning, J.
-fn replay(scene: &SceneFile, system: &System, record: &RunRecord) -> Result<(Trackers, f64), SimulateError> {
+/// What a run needs besides its engine.
+struct Start {
+    /// The trackers after the recorded steps.
+    trackers: Trackers,
+    scripts: Scripts,
+    /// Energy at time 0, J.
+    energy: f64,
+}
+
+fn replay(scene: &SceneFile, system: &System, record: &RunRecord) -> Result<Start, SimulateError> {
     let mut system = system.clone();
     let show = |system: &mut System, step: u64| {
         let states = record.states(step as usize).unwrap_or_default();
@@ -197,12 +221,13 @@ fn replay(scene: &SceneFile, system: &System, record: &RunRecord) -> Result<(Tra
     };
     show(&mut system, 0)?;
     let energy = system.kinetic_energy() + system.potential_energy();
+    let scripts = Scripts::new(&scene.scripts, &system).map_err(SimulateError::Script)?;
     let mut trackers = Trackers::new(&scene.criterion, &system).map_err(SimulateError::Criterion)?;
     for step in 1..=record.steps() {
         show(&mut system, step)?;
         trackers.observe(&system, scene.time_step);
     }
-    Ok((trackers, energy))
+    Ok(Start { trackers, scripts, energy })
 }
 
 /// Sums over the steps of a run.

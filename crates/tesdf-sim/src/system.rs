@@ -212,6 +212,11 @@ impl System {
         self.pair_friction.get(&(a.min(b), a.max(b))).copied().unwrap_or_else(of_bodies)
     }
 
+    /// Whether pairs of bodies have a coefficient of their own.
+    pub fn has_pair_friction(&self) -> bool {
+        !self.pair_friction.is_empty()
+    }
+
     /// Sets the wrench that acts on a body from now on. It has no effect on fixed and kinematic bodies.
     ///
     /// # Errors

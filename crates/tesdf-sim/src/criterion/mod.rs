@@ -5,14 +5,26 @@ mod screw;
 pub use rest::{RestCriterion, RestReport, RestTracker};
 pub use screw::{ScrewCriterion, ScrewReport, ScrewTracker, screw_acceleration};
 
+use serde::Serialize;
+
 use crate::System;
 use crate::scene_file::CriterionSection;
+
+/// How far joints came apart, at any step.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct JointDrift {
+    /// The greatest distance in a direction that is not free, m.
+    pub distance: f64,
+    /// The greatest angle about an axis that is not free, rad.
+    pub angle: f64,
+}
 
 /// Follows the criteria of a scene along a run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Trackers {
     screw: Option<ScrewTracker>,
     rest: Option<RestTracker>,
+    drift: JointDrift,
 }
 
 impl Trackers {
@@ -22,6 +34,7 @@ impl Trackers {
         Ok(Self {
             screw: screw.as_ref().map(|screw| ScrewTracker::new(screw, system)).transpose()?,
             rest: rest.as_ref().map(|rest| RestTracker::new(rest, system)).transpose()?,
+            drift: JointDrift::default(),
         })
     }
 
@@ -33,6 +46,16 @@ impl Trackers {
         if let Some(rest) = &mut self.rest {
             rest.observe(system, time_step);
         }
+        for joint in system.joints() {
+            let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
+            self.drift.distance = self.drift.distance.max(distance);
+            self.drift.angle = self.drift.angle.max(angle);
+        }
+    }
+
+    /// How far the joints came apart; `None` when there are none.
+    pub(crate) fn drift(&self, system: &System) -> Option<JointDrift> {
+        (!system.joints().is_empty()).then_some(self.drift)
     }
 
     /// Compares the run so far with the criteria. `failures` are added to those of each criterion.

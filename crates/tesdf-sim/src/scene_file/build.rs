@@ -57,8 +57,12 @@ impl LoadedScene {
             }
             let mass = mass(&system, section, shape).map_err(at)?;
             let instance = instance(section, shape).map_err(at)?;
-            system.add(&section.name, instance, mass).map_err(|e| self.body_error(k, instance_reason(e)))?;
+            let body = system
+                .add(&section.name, instance, mass)
+                .map_err(|e| self.body_error(k, instance_reason(e)))?;
+            system.set_friction(body, section.friction).map_err(|e| self.body_error(k, e.to_string()))?;
         }
+        self.connect(&mut system)?;
         if let Some(screw) = &scene.criterion.screw {
             screw.validate(&system).map_err(|reason| self.value("criterion.screw", reason))?;
         }
@@ -248,13 +252,21 @@ fn mass(system: &System, body: &BodySection, shape: ShapeId) -> Result<Mass, Str
         let shape = system.scene().shape(shape).map_err(|e| e.to_string())?;
         MassProperties::of_shape(shape, body.scale, density).map_err(|e| e.to_string())
     };
-    Ok(match (body.fixed, body.density, body.mass) {
-        (true, _, None) => Mass::Fixed,
-        (true, _, Some(_)) => return Err("it is fixed, so it needs no mass; take one of the two out".into()),
-        (false, Some(density), None) => Mass::Free(of_density(density)?),
-        (false, None, Some(mass)) => Mass::Free(of_density(1.0)?.with_mass(mass).map_err(|e| e.to_string())?),
-        (false, Some(_), Some(_)) => return Err("it has a density and a mass; keep one".into()),
-        (false, None, None) => {
+    let given = match (body.fixed, body.kinematic) {
+        (true, true) => return Err("it is fixed and kinematic; keep one".into()),
+        (true, false) => Some((Mass::Fixed, "fixed")),
+        (false, true) => Some((Mass::Kinematic, "kinematic")),
+        (false, false) => None,
+    };
+    Ok(match (given, body.density, body.mass) {
+        (Some((mass, _)), _, None) => mass,
+        (Some((_, word)), _, Some(_)) => {
+            return Err(format!("it is {word}, so it needs no mass; take one of the two out"));
+        }
+        (None, Some(density), None) => Mass::Free(of_density(density)?),
+        (None, None, Some(mass)) => Mass::Free(of_density(1.0)?.with_mass(mass).map_err(|e| e.to_string())?),
+        (None, Some(_), Some(_)) => return Err("it has a density and a mass; keep one".into()),
+        (None, None, None) => {
             return Err("it has neither density nor mass; give one, or fixed = true".into());
         }
     })

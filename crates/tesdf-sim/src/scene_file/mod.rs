@@ -1,4 +1,4 @@
-//! Scene files in TOML: bodies, detection, solver, recording and success criteria.
+//! Scene files in TOML: bodies, joints, scripts, detection, solver, recording and success criteria.
 //!
 //! ```toml
 //! time_step = 1e-3             # s
@@ -16,6 +16,21 @@
 //! density = 7850               # kg/m³; or mass = 0.1
 //! translation = [0, 0, 0.05]   # of the mesh's origin; rotation = [x, y, z, w]
 //!
+//! friction = 0.2               # with another body: the geometric mean of both
+//!
+//! [[joints]]
+//! name = "spindle"
+//! kind = "hinge"               # or weld, ball, slider
+//! child = "nut"                # parent = "…": a body; without it, the world
+//! anchor = [0, 0, 0.05]
+//! axis = [0, 0, 1]
+//! motor = { drive = { velocity = 1.5 }, limit = 0.2 }    # rad/s, N m
+//!
+//! [[scripts]]                  # the motor stops after a second
+//! joint = "spindle"
+//! interpolation = "step"
+//! keyframes = [{ time = 0, target = 1.5 }, { time = 1, target = 0 }]
+//!
 //! [detector]
 //! mode = "exact"               # node, face, exact, or off
 //! ```
@@ -25,6 +40,7 @@
 //! these units, or loading fails.
 
 mod build;
+mod connect;
 mod error;
 mod limits;
 mod read;
@@ -42,6 +58,8 @@ pub use read::LoadedScene;
 
 use crate::criterion::{RestCriterion, ScrewCriterion};
 use crate::newton::NewtonOptions;
+use crate::script::Script;
+use crate::{JointKind, Motor};
 
 /// The content of a scene file, in SI units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -68,6 +86,59 @@ pub struct SceneFile {
     pub criterion: CriterionSection,
     /// The bodies, at most [`MAX_BODIES`].
     pub bodies: Vec<Spanned<BodySection>>,
+    /// Coefficients of friction of pairs of bodies, in place of those that follow from the bodies.
+    #[serde(default)]
+    pub friction: Vec<FrictionSection>,
+    /// Joints between bodies, or a body and the world.
+    #[serde(default)]
+    pub joints: Vec<JointSection>,
+    /// What drives kinematic bodies, motors and wrenches in time.
+    #[serde(default)]
+    pub scripts: Vec<Script>,
+}
+
+/// Friction between two bodies.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionSection {
+    /// The names of the two bodies.
+    pub bodies: [String; 2],
+    /// Coefficient of friction.
+    pub coefficient: f64,
+}
+
+/// A joint. Its two bodies have no contacts with each other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointSection {
+    /// Name, unique among the joints.
+    pub name: String,
+    /// `weld`, `ball`, `hinge` or `slider`.
+    pub kind: JointKind,
+    /// Name of the parent body [default: the world].
+    #[serde(default)]
+    pub parent: Option<String>,
+    /// Name of the child body.
+    pub child: String,
+    /// A point of the joint, m, world frame, with the bodies where they start [default: the origin of
+    /// the child].
+    #[serde(default)]
+    pub anchor: Option<[f64; 3]>,
+    /// Axis of a hinge or a slider, or of the cone that limits a ball: any length except 0, world frame,
+    /// with the bodies where they start.
+    #[serde(default = "up")]
+    pub axis: [f64; 3],
+    /// Bounds of a hinge's angle, rad, or of a slider's travel, m, which are 0 at the start. Of a ball:
+    /// 0 and the greatest angle of its axis, rad.
+    #[serde(default)]
+    pub limits: Option<[f64; 2]>,
+    /// Drives a hinge or a slider.
+    #[serde(default)]
+    pub motor: Option<Motor>,
+}
+
+fn up() -> [f64; 3] {
+    [0.0, 0.0, 1.0]
 }
 
 fn earth() -> [f64; 3] {
@@ -113,6 +184,12 @@ pub struct BodySection {
     /// Whether the body never moves.
     #[serde(default)]
     pub fixed: bool,
+    /// Whether the body moves with its velocities, or as a script says, whatever it meets.
+    #[serde(default)]
+    pub kinematic: bool,
+    /// Coefficient of friction. Between two bodies the geometric mean of theirs acts.
+    #[serde(default)]
+    pub friction: f64,
 }
 
 fn one() -> f64 {

@@ -1,0 +1,285 @@
+//! Keyframes in time: poses of kinematic bodies, targets of motors and wrenches.
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+use tesdf::collide::Pose;
+
+use crate::joint::rotation_between;
+use crate::{Drive, Dynamics, DynamicsError, Joint, Mass, Motor, State, System, Wrench};
+
+/// What a script drives, and its keyframes. Before the first and after the last keyframe their
+/// values hold.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Script {
+    /// Name of a kinematic body; its keyframes have `translation` and `rotation`. Of a free body they
+    /// have `force` and `torque`.
+    #[serde(default)]
+    pub body: Option<String>,
+    /// Name of a joint with a motor; its keyframes have `target`.
+    #[serde(default)]
+    pub joint: Option<String>,
+    /// How values change between keyframes.
+    #[serde(default)]
+    pub interpolation: Interpolation,
+    /// The keyframes, in the order of their times.
+    pub keyframes: Vec<Keyframe>,
+}
+
+/// The values at a time. A value that is missing is that of the keyframe before, of the first one its
+/// default.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Keyframe {
+    /// Time, s.
+    pub time: f64,
+    /// Position of the body's origin, m, world frame [default: where the body starts].
+    #[serde(default)]
+    pub translation: Option<[f64; 3]>,
+    /// Orientation of the body: a unit quaternion x y z w [default: that in which the body starts].
+    /// Between keyframes it turns the short way, so a turn needs three keyframes.
+    #[serde(default)]
+    pub rotation: Option<[f64; 4]>,
+    /// Target of the motor, in the unit of its drive: rad/s or m/s, rad or m, N m or N [default: that
+    /// of the motor].
+    #[serde(default)]
+    pub target: Option<f64>,
+    /// Force on the centre of mass, N, world frame [default: 0].
+    #[serde(default)]
+    pub force: Option<[f64; 3]>,
+    /// Torque about the centre of mass, N m, world frame [default: 0].
+    #[serde(default)]
+    pub torque: Option<[f64; 3]>,
+}
+
+/// How values change between two keyframes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Interpolation {
+    /// By 3 s² − 2 s³ of the time s between them, so that the motion stops at each keyframe.
+    #[default]
+    Smooth,
+    /// Evenly. The velocity jumps at keyframes.
+    Linear,
+    /// Not until the next keyframe, where they jump.
+    Step,
+}
+
+/// The scripts of a scene, whose bodies and joints are found.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scripts(Vec<Track>);
+
+#[derive(Clone, Debug)]
+struct Track {
+    interpolation: Interpolation,
+    times: Vec<f64>,
+    values: Values,
+}
+
+/// One value for each keyframe.
+#[derive(Clone, Debug)]
+enum Values {
+    Poses { body: usize, poses: Vec<Pose> },
+    Wrenches { body: usize, wrenches: Vec<Wrench> },
+    Targets { joint: usize, motor: Motor, targets: Vec<f64> },
+}
+
+impl Scripts {
+    /// The scripts, for a system in its state at time 0.
+    ///
+    /// # Errors
+    /// A message that names the script, what was found and what was expected.
+    pub(crate) fn new(scripts: &[Script], system: &System) -> Result<Self, String> {
+        let track = |(k, script): (usize, &Script)| {
+            script.track(system).map_err(|reason| format!("script {}{}: {reason}", k + 1, script.name()))
+        };
+        scripts.iter().enumerate().map(track).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// Sets the velocities, wrenches and motors for the step from `time` to `time + h`.
+    pub(crate) fn drive(&self, engine: &mut dyn Dynamics, time: f64, h: f64) -> Result<(), DynamicsError> {
+        for track in &self.0 {
+            match &track.values {
+                Values::Poses { body, poses } => {
+                    let target = track.at(time + h, poses, between);
+                    let state = engine.system().states()[*body];
+                    let linear = (target.translation - state.pose.translation) / h;
+                    let angular = rotation_between(state.pose, target) / h;
+                    engine.set_state(*body, State { linear, angular, ..state })?;
+                }
+                Values::Wrenches { body, wrenches } => {
+                    let wrench = track.at(time, wrenches, |a: Wrench, b: Wrench, s| Wrench {
+                        force: a.force.lerp(b.force, s),
+                        torque: a.torque.lerp(b.torque, s),
+                    });
+                    engine.set_wrench(*body, wrench)?;
+                }
+                Values::Targets { joint, motor, targets } => {
+                    // A position is reached at the end of the step.
+                    let at = if matches!(motor.drive, Drive::Position(_)) { time + h } else { time };
+                    let target = track.at(at, targets, |a: f64, b: f64, s| a + (b - a) * s);
+                    engine.set_motor(*joint, Some(with_target(*motor, target)))?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Track {
+    fn at<T: Copy>(&self, time: f64, values: &[T], between: impl Fn(T, T, f64) -> T) -> T {
+        // There is at least one keyframe.
+        let after = self.times.partition_point(|&t| t <= time);
+        if after == 0 || after == self.times.len() {
+            return values[after.max(1) - 1];
+        }
+        let s = (time - self.times[after - 1]) / (self.times[after] - self.times[after - 1]);
+        let s = match self.interpolation {
+            Interpolation::Smooth => s * s * (3.0 - 2.0 * s),
+            Interpolation::Linear => s,
+            Interpolation::Step => 0.0,
+        };
+        between(values[after - 1], values[after], s)
+    }
+}
+
+impl Script {
+    fn name(&self) -> String {
+        match self.body.as_ref().or(self.joint.as_ref()) {
+            Some(name) => format!(" ({name})"),
+            None => String::new(),
+        }
+    }
+
+    fn track(&self, system: &System) -> Result<Track, String> {
+        let times: Vec<f64> = self.keyframes.iter().map(|k| k.time).collect();
+        if times.is_empty() {
+            return Err("it has no keyframes; give at least one".into());
+        }
+        if !times.iter().all(|t| t.is_finite()) || !times.is_sorted_by(|a, b| a < b) {
+            return Err(format!(
+                "its keyframes are at {times:?} s; expected finite times, each after the one before"
+            ));
+        }
+        self.check_keys(system)?;
+        let values = match (&self.body, &self.joint) {
+            (Some(name), None) => {
+                let body = body(system, name)?;
+                match system.bodies()[body].mass {
+                    Mass::Kinematic => self.poses(body, system.states()[body].pose)?,
+                    Mass::Free(_) => self.wrenches(body)?,
+                    Mass::Fixed => return Err(fixed()),
+                }
+            }
+            (None, Some(name)) => {
+                let joint = joint(system, name)?;
+                self.targets(joint, &system.joints()[joint])?
+            }
+            _ => return Err("expected either body or joint".into()),
+        };
+        Ok(Track { interpolation: self.interpolation, times, values })
+    }
+
+    /// Refuses values that have no meaning for what the script drives.
+    fn check_keys(&self, system: &System) -> Result<(), String> {
+        let mass =
+            self.body.as_ref().map(|name| body(system, name)).transpose()?.map(|b| system.bodies()[b].mass);
+        let expected: &[&str] = match mass {
+            Some(Mass::Kinematic) => &["translation", "rotation"],
+            Some(Mass::Free(_)) => &["force", "torque"],
+            Some(Mass::Fixed) => return Err(fixed()),
+            None => &["target"],
+        };
+        for keyframe in &self.keyframes {
+            let given = [
+                ("translation", keyframe.translation.is_some()),
+                ("rotation", keyframe.rotation.is_some()),
+                ("target", keyframe.target.is_some()),
+                ("force", keyframe.force.is_some()),
+                ("torque", keyframe.torque.is_some()),
+            ];
+            if let Some((key, _)) = given.into_iter().find(|(key, given)| *given && !expected.contains(key)) {
+                let expected = expected.join(" and ");
+                return Err(format!("the keyframe at {} s has {key}; expected {expected}", keyframe.time));
+            }
+        }
+        Ok(())
+    }
+
+    fn poses(&self, body: usize, start: Pose) -> Result<Values, String> {
+        let (mut poses, mut last) = (Vec::new(), start);
+        for keyframe in &self.keyframes {
+            let translation = keyframe.translation.map_or(last.translation, DVec3::from_array);
+            let rotation = keyframe.rotation.map_or(last.rotation, DQuat::from_array);
+            last = Pose::new(translation, rotation)
+                .map_err(|e| format!("the keyframe at {} s: {e}", keyframe.time))?;
+            poses.push(last);
+        }
+        Ok(Values::Poses { body, poses })
+    }
+
+    fn wrenches(&self, body: usize) -> Result<Values, String> {
+        let (mut wrenches, mut last) = (Vec::new(), Wrench::default());
+        for keyframe in &self.keyframes {
+            last.force = keyframe.force.map_or(last.force, DVec3::from_array);
+            last.torque = keyframe.torque.map_or(last.torque, DVec3::from_array);
+            if !last.force.is_finite() || !last.torque.is_finite() {
+                return Err(format!(
+                    "the keyframe at {} s has {last:?}; expected finite numbers",
+                    keyframe.time
+                ));
+            }
+            wrenches.push(last);
+        }
+        Ok(Values::Wrenches { body, wrenches })
+    }
+
+    fn targets(&self, number: usize, joint: &Joint) -> Result<Values, String> {
+        let motor = joint.motor.ok_or("the joint has no motor; give it one, with its limit")?;
+        let mut last = match motor.drive {
+            Drive::Velocity(x) | Drive::Position(x) | Drive::Force(x) => x,
+            Drive::Spring { rest, .. } => rest,
+        };
+        let mut targets = Vec::new();
+        for keyframe in &self.keyframes {
+            last = keyframe.target.unwrap_or(last);
+            if !last.is_finite() {
+                return Err(format!(
+                    "the keyframe at {} s has target {last}; expected a finite number",
+                    keyframe.time
+                ));
+            }
+            targets.push(last);
+        }
+        Ok(Values::Targets { joint: number, motor, targets })
+    }
+}
+
+fn fixed() -> String {
+    "the body is fixed; give it kinematic = true to move it".into()
+}
+
+fn body(system: &System, name: &str) -> Result<usize, String> {
+    let found = system.bodies().iter().position(|body| body.name == name);
+    found.ok_or_else(|| format!("there is no body {name}; give the name of one of the scene's bodies"))
+}
+
+fn joint(system: &System, name: &str) -> Result<usize, String> {
+    let found = system.joints().iter().position(|joint| joint.name == name);
+    found.ok_or_else(|| format!("there is no joint {name}; give the name of one of the scene's joints"))
+}
+
+/// The pose at the share `s` of the way.
+fn between(a: Pose, b: Pose, s: f64) -> Pose {
+    let turn = DQuat::from_scaled_axis(s * rotation_between(a, b));
+    Pose { translation: a.translation.lerp(b.translation, s), rotation: (turn * a.rotation).normalize() }
+}
+
+fn with_target(motor: Motor, target: f64) -> Motor {
+    let drive = match motor.drive {
+        Drive::Velocity(_) => Drive::Velocity(target),
+        Drive::Position(_) => Drive::Position(target),
+        Drive::Force(_) => Drive::Force(target),
+        Drive::Spring { stiffness, damping, .. } => Drive::Spring { rest: target, stiffness, damping },
+    };
+    Motor { drive, ..motor }
+}
