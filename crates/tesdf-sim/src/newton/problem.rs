@@ -66,6 +66,9 @@ const STIFFEST: f64 = 1e8;
 /// The limits of friction have settled when their changes are less than this share of them.
 const LAG: f64 = 1e-3;
 
+/// Limits of friction below this share of the forces that would stop the bodies do not matter.
+const NO_LIMIT: f64 = 1e-6;
+
 /// Maximum number of evaluations of a line search. The derivative is piecewise linear without
 /// friction, so its root is usually found after a few.
 const LINE_SEARCH: usize = 60;
@@ -163,11 +166,19 @@ impl<'a> Problem<'a> {
         errors.fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])
     }
 
-    /// The changes of the limits of friction that are due, as a share of these limits.
+    /// The changes of the limits of friction that are due, as a share of these limits. Limits far
+    /// below the forces that would stop the bodies in this step are of no account: where two bodies
+    /// just come together, rounding makes the push.
     fn lag(&self, at: &Iterate) -> f64 {
         let grips = self.springs.iter().zip(&at.deflections).filter_map(|(s, d)| s.grips(d, at.stiffening));
         let [change, all] = grips.fold([0.0; 2], |[a, b], [next, now]| [a + (next - now).abs(), b + next]);
-        if change > 0.0 { change / all.max(f64::MIN_POSITIVE) } else { 0.0 }
+        let stop = self
+            .bodies
+            .iter()
+            .zip(&self.target)
+            .map(|(body, v)| (body.inertia * v).fixed_rows::<3>(0).norm());
+        let least = NO_LIMIT * stop.sum::<f64>() / self.time_step;
+        if change > 0.0 { change / all.max(least) } else { 0.0 }
     }
 
     /// Gives each rigid row its present force as the force at zero deflection, and stiffens it.
