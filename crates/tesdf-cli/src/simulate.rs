@@ -329,6 +329,10 @@ fn print(args: &Args, summary: &Summary) -> Result<(), Failure> {
             ),
         ),
     ];
+    if let Some(drift) = summary.joint_drift {
+        let [distance, angle] = [1e6 * drift.distance, 1e6 * drift.angle];
+        rows.push(("joints", format!("apart by at most {distance:.2} µm and {angle:.2} µrad")));
+    }
     if let Some(screw) = &summary.screw {
         rows.extend(screw_rows(screw));
     }

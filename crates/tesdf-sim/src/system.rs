@@ -198,7 +198,8 @@ impl System {
     /// # Errors
     /// The same errors as [`set_friction`](Self::set_friction).
     pub fn set_pair_friction(&mut self, a: usize, b: usize, coefficient: f64) -> Result<(), DynamicsError> {
-        (self.body(a)?, self.body(b)?);
+        self.body(a)?;
+        self.body(b)?;
         check_friction(coefficient)?;
         self.pair_friction.insert((a.min(b), a.max(b)), coefficient);
         Ok(())

@@ -3,10 +3,10 @@
 //! A contact is a spring that acts at the end of the step, so a step minimises a convex function of
 //! the velocities. This is the formulation of Todorov, *Convex and analytically-invertible dynamics
 //! with contacts and constraints* (ICRA 2014), and of Castro, Permenter and Han, *An unconstrained
-//! convex formulation of compliant contact* (IEEE T-RO 2022), here without friction:
+//! convex formulation of compliant contact* (IEEE T-RO 2022):
 //!
 //! ```text
-//! minimise over v   ½ |v − v*|²_M + Σ ½ Kᵢ min(0, gᵢ + h Jᵢ v)²
+//! minimise over v   ½ |v − v*|²_M + Σ ½ Kᵢ min(0, gᵢ + h Jᵢ v)² + Σ friction + Σ joints + Σ motors
 //! with              Kᵢ = κ / (wᵢ h²),   wᵢ = Jᵢ M⁻¹ Jᵢᵀ
 //! ```
 //!
@@ -15,15 +15,23 @@
 //! contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Contacts whose normal is not that
 //! of a face keep their springs (`rigid.rs`), and so do islands that overlap deeply.
 //!
+//! *Friction* is a spring against the slip `h t`, where `t` is the tangential velocity, whose force
+//! ends at the limit `b = μ` × push of the contact. The push is that of the minimisation before, so that
+//! each minimisation is convex (lagged friction: Kaufman et al., *Staggered projections for
+//! frictional contact in multibody systems*, SIGGRAPH Asia 2008). It cannot act across a gap, as the
+//! convex cone of Castro et al. can. The limits are those of the last minimisation but one when they
+//! change by less than 0.1 %. Below the limit the force is raised, too, so a body that sticks does
+//! not creep.
+//!
+//! *Joints* (`joints.rs`) are rows `eᵢ + h Jᵢ v = 0`, and *motors* rows whose force stays within their
+//! limit.
+//!
 //! `v*` is the velocity without contacts, `gᵢ` the gap, `Jᵢ v` its rate and `h` the time step. The
 //! minimiser moves the poses. The velocity that the next step starts from is the result of a second
 //! minimisation, without the terms that push penetrating bodies apart.
 //!
 //! With re-detection, the gaps and rows come from the predicted pose. The step is then an iteration
 //! of sequential quadratic programming on the exact distance.
-//!
-//! A joint, a motor or a friction cone would be one more convex term; only `problem.rs` would
-//! change.
 
 mod engine;
 mod integrate;
