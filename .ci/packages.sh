@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Packages each crate that can be published. Builds the packages of the library and of dynamics
-# from the packaged files. The other packages are not built: they need the GPU's or Rapier's crates,
-# which would be compiled again for minutes, and ./test compiles the same files.
+# Packages each crate that can be published. Builds the packages of the library, of parts and of
+# dynamics from the packaged files. The other packages are not built: they need the GPU's or
+# Rapier's crates, which would be compiled again for minutes, and ./test compiles the same files.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
@@ -13,5 +13,5 @@ export CARGO_PROFILE_DEV_OPT_LEVEL=0
 mkdir -p target/packages
 target_dir=$(mktemp -d "$PWD/target/packages/XXXXXX")
 trap 'rm -rf "$target_dir"' EXIT
-step cargo package --quiet --allow-dirty --target-dir "$target_dir" -p tesdf -p tesdf-sim
+step cargo package --quiet --allow-dirty --target-dir "$target_dir" -p tesdf -p tesdf-parts -p tesdf-sim
 step cargo package --quiet --allow-dirty --target-dir "$target_dir" --no-verify --workspace --exclude tesdf-python
