@@ -1,4 +1,6 @@
 //! The body of a pair whose signed distance field is used.
+use std::cell::RefCell;
+
 use glam::DVec3;
 
 use super::field_value::FieldValue;
@@ -6,7 +8,7 @@ use super::simple::Simple;
 use super::{FeatureB, Placement, Shape};
 use crate::TeSdf;
 use crate::base::Side;
-use crate::geometry::Feature;
+use crate::geometry::{Closest, Feature};
 use crate::query::{Faces, ON_SURFACE_F64, Place, Precision, Surroundings};
 
 /// A field in the frame of its computations: the local frame of an asset, or the frame of a simple
@@ -256,24 +258,52 @@ impl CellField<'_> {
         }
     }
 
-    /// The `value` at `p`. Where several faces are equally near, with the gradient that most opposes
+    /// The value at `p`. Where several faces are equally near, with the gradient that most opposes
     /// `normal`.
-    pub fn opposing(&self, p: DVec3, normal: DVec3, value: FieldValue, precision: Precision) -> FieldValue {
-        if normal == DVec3::ZERO || value.gradient.dot(normal) < OPPOSITE {
+    pub fn opposing(&self, p: DVec3, normal: DVec3, precision: Precision) -> FieldValue {
+        match (*self, precision) {
+            (Self::Mesh { asset, place, faces }, Precision::F64) => asset.opposing(p, normal, place, faces),
+            (Self::Whole(Surroundings { asset, .. }), Precision::F64) => {
+                asset.opposing_at(p, normal, asset.locate(p))
+            }
+            _ => self.most_opposing(p, normal, self.value(p, precision), precision),
+        }
+    }
+
+    /// As [`opposing`](Self::opposing), where the `value` is known.
+    pub fn most_opposing(
+        &self,
+        p: DVec3,
+        normal: DVec3,
+        value: FieldValue,
+        precision: Precision,
+    ) -> FieldValue {
+        if opposes(&value, normal) {
             return value;
         }
         let tie = if precision == Precision::F32 { ROUNDING } else { TIE };
+        let near = |asset: &TeSdf, faces: &Faces| {
+            asset.most_opposing(p, normal, value, tie, |offer| {
+                asset.faces_within(p, faces, value.distance.abs() + tie, &mut |face| {
+                    offer(face, asset.local_triangle(face as usize).closest(p));
+                });
+            })
+        };
         match *self {
-            Self::Mesh { asset, faces, .. } => asset.most_opposing(p, faces, normal, value, tie),
+            Self::Mesh { asset, faces, .. } => near(asset, faces),
             Self::Whole(Surroundings { asset, .. }) => match asset.locate(p) {
-                Place::Listed { offset, .. } => {
-                    asset.with_list(offset, |faces| asset.most_opposing(p, faces, normal, value, tie))
-                }
-                _ => asset.most_opposing(p, &Faces::default(), normal, value, tie),
+                Place::Listed { offset, .. } => asset.with_list(offset, |faces| near(asset, faces)),
+                _ => near(asset, &Faces::default()),
             },
             Self::Simple(simple) => simple.most_opposing(p, normal, value),
         }
     }
+}
+
+/// Whether the gradient opposes the normal so well that ties are not looked for. A part without a
+/// normal takes any gradient.
+fn opposes(value: &FieldValue, normal: DVec3) -> bool {
+    normal == DVec3::ZERO || value.gradient.dot(normal) < OPPOSITE
 }
 
 /// Below this cosine a gradient opposes a normal so well that ties are not looked for.
@@ -295,32 +325,60 @@ impl TeSdf {
         })
     }
 
+    /// As [`opposing`](Self::opposing), with the list of the place.
+    fn opposing_at(&self, p: DVec3, normal: DVec3, place: Place) -> FieldValue {
+        match place {
+            Place::Listed { offset, .. } => {
+                self.with_list(offset, |faces| self.opposing(p, normal, place, faces))
+            }
+            _ => self.opposing(p, normal, place, &Faces::default()),
+        }
+    }
+
+    /// The value at `p` in `f64`. Of the equally near faces, the one whose gradient most opposes
+    /// `normal`. `faces` are those of the place's list, if it has one.
+    fn opposing(&self, p: DVec3, normal: DVec3, place: Place, faces: &Faces) -> FieldValue {
+        thread_local! {
+            static NEAR: RefCell<Vec<(u32, Closest)>> = const { RefCell::new(Vec::new()) };
+        }
+        NEAR.with_borrow_mut(|near| {
+            let value = self.found_with_near(p, place, faces, TIE, near).into();
+            if near.len() == 1 && !is_on_surface(&value, TIE) || opposes(&value, normal) {
+                return value;
+            }
+            self.most_opposing(p, normal, value, TIE, |offer| {
+                near.iter().for_each(|(face, closest)| offer(*face, *closest));
+            })
+        })
+    }
+
     /// Of the faces at the distance of `value`, the one whose gradient most opposes `normal`.
-    /// `faces` are those of the list that answers the point, if it has one.
+    /// `near` offers all faces up to this distance, and maybe others, with their nearest points.
     fn most_opposing(
         &self,
         p: DVec3,
-        faces: &Faces,
         normal: DVec3,
         value: FieldValue,
         tie: f64,
+        near: impl FnOnce(&mut dyn FnMut(u32, Closest)),
     ) -> FieldValue {
         let limit = value.distance.abs() + tie;
         // On the surface the gradients are the normals of the faces.
-        let on_surface = value.distance.abs() <= tie.max(ON_SURFACE_F64);
+        let on_surface = is_on_surface(&value, tie);
         let (mut best, mut id) = (value, self.face_ids[value.position as usize]);
-        self.faces_within(p, faces, limit, &mut |face| {
-            if face == value.position && !on_surface {
+        near(&mut |face, closest| {
+            if closest.distance > limit || face == value.position && !on_surface {
                 return;
             }
-            let triangle = self.local_triangle(face as usize);
-            let closest = triangle.closest(p);
             let outward = if value.distance < 0.0 { closest.point - p } else { p - closest.point };
-            let gradient = if on_surface { triangle.normal } else { outward.normalize_or_zero() };
+            let gradient = match on_surface {
+                true => self.local_triangle(face as usize).normal,
+                false => outward.normalize_or_zero(),
+            };
             let (own, other) = (gradient.dot(normal), best.gradient.dot(normal));
             let face_id = self.face_ids[face as usize];
             let is_better = own < other - TIE || (own < other + TIE && face_id < id);
-            if closest.distance <= limit && gradient != DVec3::ZERO && is_better {
+            if gradient != DVec3::ZERO && is_better {
                 let (closest_point, feature) = (closest.point, closest.feature);
                 best = FieldValue { gradient, closest_point, position: face, feature, ..value };
                 id = face_id;
@@ -328,4 +386,9 @@ impl TeSdf {
         });
         best
     }
+}
+
+/// Whether the gradients at a value are the normals of the faces.
+fn is_on_surface(value: &FieldValue, tie: f64) -> bool {
+    value.distance.abs() <= tie.max(ON_SURFACE_F64)
 }

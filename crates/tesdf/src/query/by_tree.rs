@@ -72,7 +72,7 @@ impl TeSdf {
     }
 
     fn by_tree_f64(&self, point: DVec3, local: DVec3) -> Answer {
-        let (position, closest) = self.nearest_in_tree_f64(local);
+        let (position, closest) = self.nearest_in_tree_f64(local, &mut |_, _| ());
         let side = if closest.distance > 0.0 { self.side_of(point) } else { Side::Outside };
         let on_surface = |d| (d < ON_SURFACE_F64).then(|| self.query(point).gradient);
         self.to_answer(self.finish(local, closest, side, position, DVec3::ZERO, on_surface))

@@ -419,9 +419,49 @@ impl TeSdf {
     }
 
     fn answer_f64(&self, local: DVec3, place: Place, faces: &Faces) -> Found {
+        self.answer_f64_and_seen(local, place, faces, &mut |_, _| ())
+    }
+
+    /// As [`found_at`](Self::found_at) in `f64`. `faces` are those of the place's list, if it has one.
+    /// `near` receives all faces that are within `tie` of the least distance, and maybe others. `tie`
+    /// is far below the rounding of `f32`.
+    #[cfg(feature = "collide")]
+    pub(crate) fn found_with_near(
+        &self,
+        local: DVec3,
+        place: Place,
+        faces: &Faces,
+        tie: f64,
+        near: &mut Vec<(u32, Closest)>,
+    ) -> Found {
+        self.store_normals_unless_moved();
+        near.clear();
+        let found =
+            self.answer_f64_and_seen(local, place, faces, &mut |face, closest| near.push((face, *closest)));
+        if !matches!(place, Place::Listed { .. }) && !self.is_in_reach_of_f32(local) {
+            // The search has dropped boxes by their distance in `f64`.
+            near.clear();
+            let limit = found.signed_distance.abs() + tie;
+            self.near_polygon(&[local], DVec3::ZERO, limit, &mut |face| {
+                near.push((face, self.local_triangle(face as usize).closest(local)));
+                limit
+            });
+        }
+        found
+    }
+
+    /// `seen` receives the faces whose distance is computed.
+    #[inline]
+    fn answer_f64_and_seen(
+        &self,
+        local: DVec3,
+        place: Place,
+        faces: &Faces,
+        seen: &mut impl FnMut(u32, &Closest),
+    ) -> Found {
         let (position, closest) = match place {
-            Place::Listed { .. } => self.nearest_in_list_f64(faces, local),
-            _ => self.nearest_in_tree_f64(local),
+            Place::Listed { .. } => self.nearest_in_list_f64(faces, local, seen),
+            _ => self.nearest_in_tree_f64(local, seen),
         };
         let side = match place {
             Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,

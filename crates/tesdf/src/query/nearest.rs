@@ -108,10 +108,17 @@ impl TeSdf {
     /// to the lowest id.
     ///
     /// The `f32` kernel selects the candidates: faces within its rounding of the least distance.
-    pub(super) fn nearest_in_list_f64(&self, faces: &Faces, p: DVec3) -> (u32, Closest) {
+    /// `seen` receives them.
+    #[inline]
+    pub(super) fn nearest_in_list_f64(
+        &self,
+        faces: &Faces,
+        p: DVec3,
+        seen: &mut impl FnMut(u32, &Closest),
+    ) -> (u32, Closest) {
         let relative = (p - self.cube.middle()).as_vec3();
         let mut best = Best::NONE;
-        self.each_in_list(faces, relative, |least| least, &mut |face| best.try_face(self, face, p));
+        self.each_in_list(faces, relative, |least| least, &mut |face| best.try_face(self, face, p, seen));
         (best.position, best.closest)
     }
 
@@ -259,12 +266,22 @@ impl TeSdf {
         }
     }
 
-    /// As [`nearest_in_list_f64`](Self::nearest_in_list_f64) for all faces.
-    pub(super) fn nearest_in_tree_f64(&self, p: DVec3) -> (u32, Closest) {
+    /// Whether the error bounds of distances in `f32` hold at a point.
+    pub(super) fn is_in_reach_of_f32(&self, p: DVec3) -> bool {
         let relative = p - self.cube.middle();
+        self.cube.side() <= F32_REACH && 2.0 * relative.abs().max_element() <= F32_REACH
+    }
+
+    /// As [`nearest_in_list_f64`](Self::nearest_in_list_f64) for all faces.
+    pub(super) fn nearest_in_tree_f64(
+        &self,
+        p: DVec3,
+        seen: &mut impl FnMut(u32, &Closest),
+    ) -> (u32, Closest) {
         let mut best = Best::NONE;
-        if self.cube.side() <= F32_REACH && 2.0 * relative.abs().max_element() <= F32_REACH {
-            self.near_in_tree_f32(relative.as_vec3(), &mut |face| best.try_face(self, face, p));
+        if self.is_in_reach_of_f32(p) {
+            let relative = (p - self.cube.middle()).as_vec3();
+            self.near_in_tree_f32(relative, &mut |face| best.try_face(self, face, p, seen));
         }
         if best.id == Best::NONE.id {
             // Faces at the same distance are visited too, because the lowest id wins.
@@ -273,7 +290,7 @@ impl TeSdf {
                 |d: f64, limit: f64| d > limit,
                 f64::INFINITY,
                 |start, count| {
-                    (start..start + count).for_each(|face| best.try_face(self, face, p));
+                    (start..start + count).for_each(|face| best.try_face(self, face, p, seen));
                     best.closest.distance
                 },
             );
@@ -339,8 +356,10 @@ impl Best {
         closest: Closest { distance: f64::INFINITY, point: DVec3::NAN, feature: Feature::Face },
     };
 
-    fn try_face(&mut self, asset: &TeSdf, position: u32, p: DVec3) {
+    #[inline]
+    fn try_face(&mut self, asset: &TeSdf, position: u32, p: DVec3, seen: &mut impl FnMut(u32, &Closest)) {
         let closest = asset.local_triangle(position as usize).closest(p);
+        seen(position, &closest);
         let id = asset.face_ids[position as usize];
         let tie = closest.distance == self.closest.distance && id < self.id;
         if closest.distance < self.closest.distance || tie {

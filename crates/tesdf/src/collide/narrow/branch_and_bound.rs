@@ -11,7 +11,7 @@ use crate::TeSdf;
 use crate::collide::field::{CellField, ROUNDING};
 use crate::collide::field_value::FieldValue;
 use crate::collide::greatest_minimum::{self, CORNERS, summit};
-use crate::collide::polygon::Polygon;
+use crate::collide::polygon::{MAX_VERTICES, Polygon};
 use crate::geometry::Triangle;
 use crate::query::{Precision, Surroundings};
 
@@ -63,7 +63,8 @@ pub fn branch_and_bound(
     precision: Precision,
 ) -> Lowest {
     let mut search = Branches::new(cell, polygon, precision, tolerance, reach);
-    let mut open = BinaryHeap::from(search.pieces(polygon));
+    let corners = search.corners(polygon);
+    let mut open: BinaryHeap<Piece> = triangles(&corners).map(|corners| search.piece(corners)).collect();
     while let Some(piece) = open.pop() {
         if !search.is_open(piece.bound) {
             break;
@@ -81,11 +82,17 @@ pub fn branch_and_bound(
     Lowest { point: search.best.1, converged: true, face: None }
 }
 
-/// Lower bound of the signed distances over a polygon, without a search.
-pub fn lower_bound(cell: &CellField, polygon: &Polygon, tolerance: f64) -> f64 {
+/// Whether `best`, the signed distance at a point of the polygon and its nearest face, is the least
+/// one up to `tolerance`, as far as bounds show without a search.
+pub fn is_least(cell: &CellField, polygon: &Polygon, best: (f64, DVec3, u32), tolerance: f64) -> bool {
     let mut search = Branches::new(cell, polygon, Precision::F64, tolerance, f64::INFINITY);
+    let (least, point, face) = best;
     search.slack = f64::INFINITY;
-    search.pieces(polygon).iter().map(|piece| piece.bound).fold(f64::INFINITY, f64::min)
+    (search.best, search.best_face) = ((least, point), face);
+    search.enough = least - tolerance;
+    let corners = search.corners(polygon);
+    triangles(&corners)
+        .all(|corners| search.best.0 >= search.enough && search.piece(corners).bound >= least - tolerance)
 }
 
 struct Branches<'a> {
@@ -96,6 +103,8 @@ struct Branches<'a> {
     slack: f64,
     tolerance: f64,
     reach: f64,
+    /// The search ends at a distance below this.
+    enough: f64,
     best: (f64, DVec3),
     /// The face nearest to the best point.
     best_face: u32,
@@ -111,7 +120,8 @@ impl<'a> Branches<'a> {
         reach: f64,
     ) -> Self {
         let best = (f64::INFINITY, polygon.center());
-        Self { cell, precision, slack: ROUNDING, tolerance, reach, best, best_face: 0, evaluations: 0 }
+        let (slack, enough) = (ROUNDING, f64::NEG_INFINITY);
+        Self { cell, precision, slack, tolerance, reach, enough, best, best_face: 0, evaluations: 0 }
     }
 
     /// The value at a point. Where `f32` shows that it is not the best, the distance is only a lower
@@ -140,18 +150,13 @@ impl<'a> Branches<'a> {
         Corner { point, value: self.value(point) }
     }
 
-    /// The triangles of a polygon. A segment is a triangle with two equal corners.
-    fn pieces(&mut self, polygon: &Polygon) -> Vec<Piece> {
-        let corners: Vec<Corner> = polygon.points().map(|p| self.corner(p)).collect();
-        let last = corners.len() - 1;
-        (2..corners.len().max(3))
-            .map(|k| self.piece([corners[0], corners[k - 1], corners[k.min(last)]]))
-            .collect()
+    fn corners(&mut self, polygon: &Polygon) -> ArrayVec<Corner, MAX_VERTICES> {
+        polygon.points().map(|p| self.corner(p)).collect()
     }
 
     /// Whether a part with this bound can still improve the result.
     fn is_open(&self, bound: f64) -> bool {
-        bound < self.best.0 - self.tolerance && bound <= self.reach
+        bound < self.best.0 - self.tolerance && bound <= self.reach && self.best.0 >= self.enough
     }
 
     /// Divides a triangle, along a side of the face nearest to its centre where that helps.
@@ -284,6 +289,12 @@ impl<'a> Branches<'a> {
         }
         bound
     }
+}
+
+/// The triangles of a polygon. A segment is a triangle with two equal corners.
+fn triangles(corners: &[Corner]) -> impl Iterator<Item = [Corner; 3]> {
+    let last = corners.len() - 1;
+    (2..corners.len().max(3)).map(move |k| [corners[0], corners[k - 1], corners[k.min(last)]])
 }
 
 /// A triangle whose longest edge is shorter than this multiple of its depth is halved.

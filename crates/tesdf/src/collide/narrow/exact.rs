@@ -2,11 +2,12 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::Lowest;
-use super::branch_and_bound::{branch_and_bound, lower_bound};
+use super::branch_and_bound::{self, branch_and_bound};
 use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
 use crate::collide::field::{CellField, ROUNDING};
+use crate::collide::field_value::FieldValue;
 use crate::collide::polygon::{MAX_VERTICES, Parts, Polygon};
 use crate::geometry::polygon_to_triangle;
 use crate::query::{Faces, Place, Precision, Surroundings};
@@ -90,8 +91,8 @@ pub fn lowest(
     (distance <= reach).then_some(Lowest { point, converged: true, face })
 }
 
-/// Whether `least`, the signed distance at a point of the polygon, is the least one of the polygon,
-/// up to `tolerance`; `false` when this is not clear. All in the field's frame.
+/// Whether the value at a point of the polygon, `least`, has the least signed distance of the
+/// polygon, up to `tolerance`; `false` when this is not clear. All in the field's frame.
 ///
 /// Outside, the distance to a face is convex and lies above its tangent at the point; where that is
 /// too low, the polygon is compared with the face. Inside, the bound is that of branch and bound
@@ -101,7 +102,7 @@ pub fn is_least(
     polygon: &Polygon,
     normal: DVec3,
     point: DVec3,
-    least: f64,
+    &FieldValue { distance: least, position: face, .. }: &FieldValue,
     tolerance: f64,
 ) -> bool {
     if let CellField::Simple(simple) = cell {
@@ -112,7 +113,7 @@ pub fn is_least(
     let none = Faces::default();
     let Some((asset, place, faces)) = cell.mesh(&none) else { return false };
     if least <= CLEAR {
-        return lower_bound(cell, polygon, tolerance) >= least - tolerance;
+        return branch_and_bound::is_least(cell, polygon, (least, point, face), tolerance);
     }
     let center = polygon.center();
     let radius = polygon.reach(center);

@@ -61,6 +61,17 @@ pub struct Patch<'a> {
     within: ArrayVec<DVec3, 3>,
     /// The normal of `within`; zero for a chord.
     normal: DVec3,
+    sides: [Side; 3],
+}
+
+/// A side of a triangle.
+#[derive(Clone, Copy, Default)]
+struct Side {
+    start: DVec3,
+    /// Perpendicular to the side in the triangle's plane, as long as the side.
+    inward: DVec3,
+    /// The least height over the side, along `inward`, that counts as on it.
+    least: f64,
 }
 
 /// A point of the part that may be a corner of the patch.
@@ -69,8 +80,8 @@ struct Candidate {
     point: DVec3,
     /// The corner of the part that it is, if it is one.
     corner: Option<u8>,
-    /// Its contact, once it is known.
-    taken: Option<Minimum>,
+    /// Its contact, or that it has none, once this is known.
+    taken: Option<Option<Minimum>>,
 }
 
 impl<'a> Patch<'a> {
@@ -85,7 +96,19 @@ impl<'a> Patch<'a> {
         let is_large = search.is_large(part);
         let Search { tolerance, reach, .. } = *search;
         let limit = if is_large { reach + part.radius } else { minimum.value.distance + tolerance };
-        Self { field, part, minimum, search, longest, is_large, limit, within, normal: part.normal }
+        let normal = part.normal;
+        Self {
+            field,
+            part,
+            minimum,
+            search,
+            longest,
+            is_large,
+            limit,
+            within,
+            normal,
+            sides: Default::default(),
+        }
     }
 
     /// Points of the patch other than the minimum, at most one for each direction.
@@ -94,6 +117,7 @@ impl<'a> Patch<'a> {
         if self.part.points().len() < 2 || !(self.is_large || self.may_be_flat()) {
             return found;
         }
+        self.sides = sides(self.part);
         let mut candidates = self.candidates();
         candidates.retain(|candidate| self.may_hold(candidate.point));
         for direction in self.directions() {
@@ -200,12 +224,15 @@ impl<'a> Patch<'a> {
             }
             let (at, i) = next?;
             let Candidate { point, corner, taken } = candidates[i];
-            let taken = taken.or_else(|| self.take(point, corner));
+            let taken = taken.unwrap_or_else(|| self.take(point, corner));
             if taken.is_some() {
-                candidates[i].taken = taken;
+                candidates[i].taken = Some(taken);
                 return taken;
             }
             candidates.remove(i);
+            // Faces that share a corner have offered it, too.
+            let same = candidates.iter_mut().filter(|candidate| candidate.point == point);
+            same.for_each(|candidate| candidate.taken = Some(None));
             limit = at;
         }
         None
@@ -215,10 +242,7 @@ impl<'a> Patch<'a> {
     /// face.
     fn take(&self, point: DVec3, corner: Option<u8>) -> Option<Minimum> {
         let normal = self.part.normal;
-        let value = |p: DVec3| {
-            let precision = self.search.precision;
-            self.field.opposing(p, normal, self.field.value(p, precision), precision)
-        };
+        let value = |p: DVec3| self.field.opposing(p, normal, self.search.precision);
         let holds = |v: &FieldValue| {
             v.distance <= self.limit && (normal == DVec3::ZERO || v.gradient.dot(normal) < OPPOSES)
         };
@@ -268,11 +292,7 @@ impl<'a> Patch<'a> {
 
     /// Whether a point lies over the face, or on it.
     fn holds(&self, p: DVec3) -> bool {
-        let (points, normal) = (self.part.points(), self.part.normal);
-        (0..3).all(|i| {
-            let edge = points[(i + 1) % 3] - points[i];
-            normal.cross(edge).dot(p - points[i]) >= -HEIGHT * edge.length()
-        })
+        self.sides.iter().all(|side| side.inward.dot(p - side.start) >= side.least)
     }
 
     /// Corners of the overlay of the part and the faces of the other body near it.
@@ -321,15 +341,16 @@ impl<'a> Patch<'a> {
                 }
             }
         }
+        let inward: [DVec3; 3] =
+            std::array::from_fn(|k| face.normal.cross(face.corners[(k + 1) % 3] - face.corners[k]));
+        let heights: ArrayVec<[f64; 3], 3> =
+            points.iter().map(|p| std::array::from_fn(|k| inward[k].dot(*p - face.corners[k]))).collect();
         let count = points.len();
         for i in 0..if count == 3 { 3 } else { 1 } {
-            let (a, b) = (points[i], points[(i + 1) % count]);
+            let j = (i + 1) % count;
             // The part of the edge over the face.
             let (mut from, mut to) = (0.0f64, 1.0f64);
-            for k in 0..3 {
-                let (c, d) = (face.corners[k], face.corners[(k + 1) % 3]);
-                let inward = face.normal.cross(d - c);
-                let (start, end) = (inward.dot(a - c), inward.dot(b - c));
+            for (start, end) in heights[i].into_iter().zip(heights[j]) {
                 match (start < 0.0, end < 0.0) {
                     (true, true) => (from, to) = (1.0, 0.0),
                     (true, false) => from = from.max(start / (start - end)),
@@ -337,10 +358,13 @@ impl<'a> Patch<'a> {
                     (false, false) => {}
                 }
             }
+            if from > to {
+                continue;
+            }
             for t in [from, to] {
-                let point = a + t * (b - a);
+                let point = points[i] + t * (points[j] - points[i]);
                 let height = face.normal.dot(point - face.corners[0]);
-                if from <= to && t > 0.0 && t < 1.0 && height.abs() <= limit {
+                if t > 0.0 && t < 1.0 && height.abs() <= limit {
                     offer(point);
                 }
             }
@@ -355,4 +379,13 @@ impl<'a> Patch<'a> {
             _ => self.part.points()[0],
         }
     }
+}
+
+/// The sides of a part that is a triangle.
+fn sides(part: &Part) -> [Side; 3] {
+    let &[a, b, c] = part.points() else { return Default::default() };
+    [(a, b), (b, c), (c, a)].map(|(start, end)| {
+        let edge = end - start;
+        Side { start, inward: part.normal.cross(edge), least: -HEIGHT * edge.length() }
+    })
 }

@@ -237,27 +237,32 @@ impl Search {
             }
         }?;
         let Lowest { point, converged, face } = lowest;
-        let value = match (cell, face) {
+        let normal = part.normal;
+        let outside = match (cell, face) {
             (CellField::Whole(around), Some(face)) if self.precision == Precision::F64 => {
                 around.asset.value_outside(point, face)
             }
             _ => None,
         };
-        let value = value.unwrap_or_else(|| cell.value(point, self.precision));
+        let value = match (outside, self.per) {
+            (Some(value), _) => value,
+            (None, ContactsPer::Cell) => cell.value(point, self.precision),
+            (None, ContactsPer::Face) => cell.opposing(point, normal, self.precision),
+        };
         let value = Some(value).filter(|value| value.distance <= reach)?;
         let converged = match self.mode {
             Mode::Face if polygon.vertices().len() > 1 => {
                 let least = match self.precision {
-                    Precision::F64 => value.distance,
-                    Precision::F32 => cell.value(point, Precision::F64).distance,
+                    Precision::F64 => value,
+                    Precision::F32 => cell.value(point, Precision::F64),
                 };
-                exact::is_least(cell, polygon, part.normal, point, least, self.tolerance)
+                exact::is_least(cell, polygon, normal, point, &least, self.tolerance)
             }
             _ => converged,
         };
-        let value = match self.per {
-            ContactsPer::Cell => value,
-            ContactsPer::Face => cell.opposing(point, part.normal, value, self.precision),
+        let value = match (outside, self.per) {
+            (Some(value), ContactsPer::Face) => cell.most_opposing(point, normal, value, self.precision),
+            _ => value,
         };
         let listed = clipped.cell.filter(|_| matches!(clipped.place, Place::Listed { .. }));
         let cell = listed.or_else(|| cell_of(cell, point));
