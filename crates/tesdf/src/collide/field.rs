@@ -44,6 +44,16 @@ impl Field<'_> {
         }
     }
 
+    /// As [`rough_value`](Self::rough_value) for several points, in order.
+    pub fn rough_values(&self, points: &[DVec3]) -> Vec<FieldValue> {
+        let mut values = Vec::with_capacity(points.len());
+        match self {
+            Field::Mesh(asset) => asset.found_exactly_all(points, |found| values.push(found.into())),
+            Field::Simple(simple) => values.extend(points.iter().map(|&p| simple.value(p))),
+        }
+        values
+    }
+
     /// The value at `p` in `f64`, with the exact distance also where lists are not proved exact.
     pub fn exact_value(&self, p: DVec3) -> FieldValue {
         match self {

@@ -13,9 +13,11 @@ use std::collections::BTreeMap;
 use crate::parallel::*;
 use glam::DVec3;
 
-use super::field::FieldBody;
+use super::field::{Field, FieldBody};
+use super::field_value::FieldValue;
 use super::ordered_pair::OrderedPair;
-use super::surface::SurfaceBody;
+use super::queue::Queue;
+use super::surface::{Branch, SurfaceBody};
 use super::{CollideError, CollideOptions, Contact, HiddenOverlap, InstanceId, Mode, Scene};
 use crate::asset::layout::TreeChild;
 use crate::geometry::Aabb;
@@ -30,21 +32,40 @@ pub const SETTLED: f64 = 0.25;
 /// A body is searched only when the least depth of a hidden overlap is more than this many times
 /// the rounding error of distances.
 pub const THICK: f64 = 2.0;
-
+/// Number of triangles that are halved at a time.
+const WAVE: usize = 16;
+/// From this number of places on, they are looked at on several threads, this number at a time.
+const MANY: usize = 512;
+const TASK: usize = 128;
 impl HiddenOverlap {
     /// The overlaps that the contacts do not show.
     pub fn not_shown(overlaps: Vec<Self>, contacts: &[Contact]) -> Vec<Self> {
         if overlaps.is_empty() {
             return overlaps;
         }
-        let mut shown: BTreeMap<(InstanceId, InstanceId), f64> = BTreeMap::new();
-        for c in contacts {
-            let pair = (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
-            let depth = shown.entry(pair).or_default();
-            *depth = depth.max(-c.distance);
+        let shown = Shown::by(contacts);
+        let is_hidden = |o: &Self| o.depth > Self::SHOWN * shown.of(o.instance_a, o.instance_b);
+        overlaps.into_iter().filter(is_hidden).collect()
+    }
+}
+
+/// The depth of the deepest contact of each pair of instances, in the world's unit.
+struct Shown(BTreeMap<(InstanceId, InstanceId), f64>);
+
+impl Shown {
+    fn by(contacts: &[Contact]) -> Self {
+        let mut shown = BTreeMap::new();
+        for run in contacts.chunk_by(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b)) {
+            let (a, b) = (run[0].instance_a, run[0].instance_b);
+            let depth: &mut f64 = shown.entry((a.min(b), a.max(b))).or_default();
+            *depth = run.iter().map(|c| -c.distance).fold(*depth, f64::max);
         }
-        let of_pair = |o: &Self| shown.get(&(o.instance_a, o.instance_b)).copied().unwrap_or(0.0);
-        overlaps.into_iter().filter(|overlap| overlap.depth > Self::SHOWN * of_pair(overlap)).collect()
+        Self(shown)
+    }
+
+    /// 0 where no contact is inside.
+    fn of(&self, a: InstanceId, b: InstanceId) -> f64 {
+        self.0.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0)
     }
 }
 
@@ -64,18 +85,25 @@ pub fn hidden_overlaps(
 
 /// The same for ordered pairs. The two orders of a pair must be adjacent.
 pub fn among(pairs: &[OrderedPair], mode: Mode, contacts: &[Contact]) -> Vec<HiddenOverlap> {
+    let shown = Shown::by(contacts);
     let overlap = |pair: &[OrderedPair]| {
-        let depth = |p: &OrderedPair| depth(&p.surface, &p.field, mode) * p.field.unit();
         let (a, b) = (pair[0].a, pair[0].b);
+        let shown = shown.of(a, b);
+        let depth = |p: &OrderedPair| {
+            let unit = p.field.unit();
+            depth(&p.surface, &p.field, mode, shown / unit) * unit
+        };
         let depth = pair.iter().map(depth).fold(0.0, f64::max);
-        (depth > 0.0).then_some(HiddenOverlap { instance_a: a.min(b), instance_b: a.max(b), depth })
+        let is_hidden = depth > HiddenOverlap::SHOWN * shown;
+        is_hidden.then_some(HiddenOverlap { instance_a: a.min(b), instance_b: a.max(b), depth })
     };
-    HiddenOverlap::not_shown(pairs.par_chunks(2).filter_map(overlap).collect(), contacts)
+    pairs.par_chunks(2).filter_map(overlap).collect()
 }
 
 /// Lower bound of the depth of a surface in a field, at places that need not have a contact. In the
-/// field's frame; 0 when no such place was found.
-fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode) -> f64 {
+/// field's frame; 0 when no place was found that is deep compared with the thickness. `shown` is
+/// the depth that contacts show.
+fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode, shown: f64) -> f64 {
     let (Some((center, radius)), Some(of_field)) = (surface.inner_ball(), field.inner_radius()) else {
         return 0.0;
     };
@@ -89,9 +117,11 @@ fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode) -> f64 {
         // The body is too thin relative to rounding.
         return 0.0;
     }
-    let mut search = Looks { field, core, thickness, deepest: radius.min(-at_center).max(0.0), looks: 0 };
+    let deepest = radius.min(-at_center).max(0.0);
+    let mut search = Looks { field, core, thickness, shown, deepest, looks: 0 };
     if mode == Mode::Node {
-        search.at_surface(surface);
+        let faces = search.faces(surface);
+        search.search(faces);
     }
     if search.deepest > HiddenOverlap::FINE * thickness { search.deepest } else { 0.0 }
 }
@@ -102,75 +132,156 @@ struct Looks<'a> {
     /// Points that are deep enough lie in this box.
     core: Aabb,
     thickness: f64,
+    /// The depth that contacts show.
+    shown: f64,
     /// The greatest depth so far.
     deepest: f64,
     looks: u32,
 }
 
+/// A triangle that can be deep.
+#[derive(Clone, Copy)]
+struct Piece {
+    corners: [DVec3; 3],
+    /// The surface lies within this distance of the triangle.
+    radius: f64,
+}
+
 impl Looks<'_> {
     /// The search ignores depths up to this value.
     fn wanted(&self, share: f64) -> f64 {
-        (share * self.thickness).max(DEEPER * self.deepest)
+        (share * self.thickness).max(HiddenOverlap::SHOWN * self.shown).max(DEEPER * self.deepest)
     }
 
-    /// Depth of a point in the field.
-    fn look(&mut self, p: DVec3) -> f64 {
-        self.looks += 1;
-        -self.field.rough(p).0
+    /// Whether faces with this greatest [`corner_reach`] are skipped: contacts show the depth of
+    /// their corners.
+    fn is_fine(&self, reach: f64) -> bool {
+        reach <= (HiddenOverlap::SURE * self.thickness).max(self.wanted(0.0) - self.shown)
     }
 
-    fn at_surface(&mut self, surface: &SurfaceBody) {
-        let mut stack = vec![surface.whole()];
-        while let Some(child) = stack.pop() {
-            match child {
-                TreeChild::Leaf(start, count) => {
-                    (start..start + count).for_each(|f| self.at_face(surface, f))
-                }
-                TreeChild::Node(node) => {
-                    for branch in surface.halves(node).into_iter().flatten() {
-                        let is_fine = surface.corner_reach(branch.child) <= self.wanted(HiddenOverlap::SURE);
-                        let is_out =
-                            self.core.distance_squared(branch.center) > branch.radius * branch.radius;
-                        if !is_fine
-                            && !is_out
-                            && self.look(branch.center) + branch.radius > self.wanted(HiddenOverlap::FINE)
-                        {
-                            stack.push(branch.child);
-                        }
+    /// The values at points, which are many. In order, for any number of threads.
+    fn values(&mut self, points: &[DVec3]) -> Vec<FieldValue> {
+        self.looks += points.len() as u32;
+        let field = &self.field.field;
+        match points.len() {
+            ..MANY => field.rough_values(points),
+            _ => {
+                let parts: Vec<_> = points.par_chunks(TASK).map(|part| field.rough_values(part)).collect();
+                parts.into_iter().flatten().collect()
+            }
+        }
+    }
+
+    /// The faces that can be deep, by the balls around the nodes of the face tree.
+    fn faces(&mut self, surface: &SurfaceBody) -> Vec<Piece> {
+        let mut faces = Vec::new();
+        let mut level = vec![surface.whole()];
+        while !level.is_empty() {
+            let mut branches = Vec::new();
+            for child in level {
+                match child {
+                    TreeChild::Leaf(start, count) => {
+                        let pieces =
+                            (start..start + count).map(|face| Piece::face(surface, face, self.field));
+                        faces.extend(pieces.filter(|piece| !self.is_fine(corner_reach(piece.corners))));
+                    }
+                    TreeChild::Node(node) => {
+                        branches.extend(surface.halves(node).into_iter().flatten().filter(|branch| {
+                            self.core.distance_squared(branch.center) <= branch.radius * branch.radius
+                                && !self.is_fine(surface.corner_reach(branch.child))
+                        }));
                     }
                 }
             }
+            let centers: Vec<DVec3> = branches.iter().map(|branch| branch.center).collect();
+            let values = self.values(&centers);
+            let wanted = self.wanted(HiddenOverlap::FINE);
+            let can_be_deep =
+                |(branch, value): &(Branch, FieldValue)| branch.radius - value.distance > wanted;
+            level = branches.into_iter().zip(values).filter(can_be_deep).map(|(b, _)| b.child).collect();
+        }
+        faces
+    }
+
+    /// Looks at each face, then at halves of those that can be deepest.
+    fn search(&mut self, faces: Vec<Piece>) {
+        let mut open = Queue::new();
+        self.look(faces, &mut open);
+        let mut fine = 0;
+        while self.looks < HiddenOverlap::MAX_LOOKS
+            && let Some(greatest) = open.least().map(|bound| -bound)
+        {
+            let is_sure = greatest > self.wanted(HiddenOverlap::SURE);
+            if !is_sure && (fine >= HiddenOverlap::FINE_LOOKS || greatest <= self.wanted(HiddenOverlap::FINE))
+            {
+                break;
+            }
+            let before = self.looks;
+            let wave: Vec<Piece> = std::iter::from_fn(|| open.pop()).take(WAVE).collect();
+            self.look(wave.into_iter().flat_map(Piece::halves).collect(), &mut open);
+            if !is_sure {
+                fine += self.looks - before;
+            }
         }
     }
 
-    /// Evaluates a face at its middle, then quarters it as long as its parts can be deep enough.
-    fn at_face(&mut self, surface: &SurfaceBody, face: u32) {
-        let part = surface.face(face, self.field, 0.0);
-        let (first, last) = (part.points()[0], part.points()[part.points().len() - 1]);
-        let corners = [first, *part.points().get(1).unwrap_or(&last), last];
-        if corner_reach(corners) <= self.wanted(HiddenOverlap::SURE) {
-            return;
-        }
-        let before = self.looks;
-        let mut stack = vec![corners];
-        while let Some(corners) = stack.pop() {
-            if self.looks >= HiddenOverlap::MAX_LOOKS
-                || !Aabb::of(&corners).grown(part.radius).overlaps(self.core)
-            {
+    /// Looks at triangles, and keeps those that can be deep enough.
+    fn look(&mut self, mut pieces: Vec<Piece>, open: &mut Queue<Piece>) {
+        pieces.retain(|piece| Aabb::of(&piece.corners).grown(piece.radius).overlaps(self.core));
+        let middles: Vec<(DVec3, f64)> = pieces.iter().map(|piece| middle(piece.corners)).collect();
+        let points: Vec<DVec3> = middles.iter().map(|(middle, _)| *middle).collect();
+        let values = self.values(&points);
+        let depth = |(piece, value): (&Piece, &FieldValue)| piece.radius - value.distance;
+        self.deepest = pieces.iter().zip(&values).map(depth).fold(self.deepest, f64::max);
+        let wanted = self.wanted(HiddenOverlap::FINE);
+        for ((piece, (middle, reach)), value) in pieces.into_iter().zip(middles).zip(&values) {
+            let within_reach = piece.radius - value.distance + reach;
+            if within_reach <= wanted || reach <= SETTLED * wanted {
                 continue;
             }
-            let (middle, reach) = middle(corners);
-            let depth = self.look(middle) + part.radius;
-            self.deepest = self.deepest.max(depth);
-            let wanted = self.wanted(if self.looks - before <= HiddenOverlap::FINE_LOOKS {
-                HiddenOverlap::FINE
-            } else {
-                HiddenOverlap::SURE
-            });
-            if depth + reach > wanted && reach > SETTLED * wanted {
-                stack.extend(quarters(corners));
+            let greatest = piece.radius + self.field.greatest_depth(piece.corners, middle, value);
+            if greatest > wanted {
+                open.push(-greatest.min(within_reach), piece);
             }
         }
+    }
+}
+
+impl Piece {
+    fn face(surface: &SurfaceBody, face: u32, field: &FieldBody) -> Self {
+        let part = surface.face(face, field, 0.0);
+        let (first, last) = (part.points()[0], part.points()[part.points().len() - 1]);
+        Self { corners: [first, *part.points().get(1).unwrap_or(&last), last], radius: part.radius }
+    }
+
+    /// The halves, divided in the middle of the longest side. Quarters of a needle would be as
+    /// slender, and many more.
+    fn halves(self) -> [Self; 2] {
+        let [a, b, c] = self.corners;
+        let (ab, bc, ca) = (a.distance_squared(b), b.distance_squared(c), c.distance_squared(a));
+        let [a, b, c] = match () {
+            () if ab >= bc && ab >= ca => [a, b, c],
+            () if bc >= ca => [b, c, a],
+            () => [c, a, b],
+        };
+        let middle = 0.5 * (a + b);
+        [[a, middle, c], [middle, b, c]].map(|corners| Self { corners, ..self })
+    }
+}
+
+impl FieldBody<'_> {
+    /// Upper bound of the depth over a triangle, by the value at a point.
+    fn greatest_depth(&self, corners: [DVec3; 3], p: DVec3, value: &FieldValue) -> f64 {
+        let bounds = match self.field {
+            // The distance from a face is convex.
+            Field::Mesh(asset) => {
+                let triangle = asset.local_triangle(value.position as usize);
+                corners.map(|c| triangle.closest(c).distance)
+            }
+            // A convex function lies above its tangents.
+            Field::Simple(_) => corners.map(|c| -(value.distance + value.gradient.dot(c - p))),
+        };
+        bounds.into_iter().fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -182,10 +293,4 @@ fn middle(corners: [DVec3; 3]) -> (DVec3, f64) {
     let points = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a), (a + b + c) / 3.0];
     let nearer = |x: (DVec3, f64), y: (DVec3, f64)| if y.1 < x.1 { y } else { x };
     points.into_iter().map(|p| (p, reach(p))).fold((a, f64::INFINITY), nearer)
-}
-
-/// The triangle in the middle is last, so a stack returns it first.
-fn quarters([a, b, c]: [DVec3; 3]) -> [[DVec3; 3]; 4] {
-    let (ab, bc, ca) = (0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a));
-    [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
 }

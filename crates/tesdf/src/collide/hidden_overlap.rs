@@ -18,11 +18,13 @@ impl HiddenOverlap {
     /// Overlaps at least this deep are found. A fraction of the smaller of the bodies' [inner
     /// balls](super::Shape::inner_ball).
     pub const SURE: f64 = 0.5;
-    /// Overlaps at least this deep are found when few evaluations per face are enough. Shallower
-    /// overlaps are never reported. A fraction as for [`SURE`](Self::SURE).
+    /// Overlaps at least this deep are found when few evaluations are enough: one for each face, and
+    /// [`FINE_LOOKS`](Self::FINE_LOOKS) more. Shallower overlaps are never reported. A fraction as
+    /// for [`SURE`](Self::SURE).
     pub const FINE: f64 = 0.05;
-    /// Number of evaluations per face in the search for depths below [`SURE`](Self::SURE).
-    pub const FINE_LOOKS: u32 = 4;
+    /// Number of evaluations per body, besides one for each face, in the search for depths below
+    /// [`SURE`](Self::SURE).
+    pub const FINE_LOOKS: u32 = 128;
     /// Number of evaluations per body after which a search gives up. Two plates with a thickness of
     /// a thousandth, lying on each other, would need a million.
     pub const MAX_LOOKS: u32 = 1 << 14;

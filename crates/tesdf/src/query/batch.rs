@@ -1,9 +1,11 @@
+use std::cell::RefCell;
+
 use crate::parallel::*;
 use glam::DVec3;
 
 use super::far::is_near;
 use super::locate::{FLIGHT, Faces, Place};
-use super::{Answer, Precision};
+use super::{Answer, Found, Precision};
 use crate::TeSdf;
 
 /// Number of points per task.
@@ -218,8 +220,29 @@ impl TeSdf {
     ) {
         let mut locals = [DVec3::NAN; FLIGHT];
         locals.iter_mut().zip(points).for_each(|(local, &p)| *local = self.frame.to_local(p));
+        self.pass_flight(&locals[..points.len()], faces, |i, place, faces| {
+            // Each case writes its own fields: a copy of a whole answer would wait for them.
+            if extent == Extent::Domain && matches!(place, Place::NotOfDomain) {
+                answers[i] = Answer::NONE;
+            } else if is_near(locals[i]) {
+                answers[i] = self.to_answer(self.find(locals[i], place, faces, precision));
+            } else {
+                answers[i] = self.answer_far(points[i]);
+            }
+        });
+    }
+
+    /// Passes up to [`FLIGHT`] points of the local frame through the stages. `answer` receives the
+    /// number of each point, its place and the faces of its list.
+    #[inline(always)]
+    fn pass_flight(
+        &self,
+        locals: &[DVec3],
+        faces: &mut [Faces; FLIGHT],
+        mut answer: impl FnMut(usize, Place, &Faces),
+    ) {
         let mut places = [Place::NotOfDomain; FLIGHT];
-        self.locate_all(&locals, &mut places);
+        self.locate_all(locals, &mut places);
         for place in &places {
             if let Place::Listed { offset, .. } = *place {
                 fetch(self.lists.as_ptr().wrapping_add(offset as usize));
@@ -227,7 +250,7 @@ impl TeSdf {
         }
         // The faces of the next points are fetched while distances to those of this point are
         // computed.
-        for next in 0..points.len() + AHEAD {
+        for next in 0..locals.len() + AHEAD {
             if let (Some(&Place::Listed { offset, .. }), Some(faces)) =
                 (places.get(next), faces.get_mut(next))
             {
@@ -235,17 +258,28 @@ impl TeSdf {
                 self.fetch_faces(faces);
             }
             if let Some(i) = next.checked_sub(AHEAD) {
-                let (local, place) = (locals[i], places[i]);
-                // Each case writes its own fields: a copy of a whole answer would wait for them.
-                if extent == Extent::Domain && matches!(place, Place::NotOfDomain) {
-                    answers[i] = Answer::NONE;
-                } else if is_near(local) {
-                    answers[i] = self.to_answer(self.find(local, place, &faces[i], precision));
-                } else {
-                    answers[i] = self.answer_far(points[i]);
-                }
+                answer(i, places[i], &faces[i]);
             }
         }
+    }
+
+    /// As [`found_exactly`](Self::found_exactly) for several points, in order. `put` receives the
+    /// answers.
+    pub(crate) fn found_exactly_all(&self, locals: &[DVec3], mut put: impl FnMut(Found)) {
+        thread_local! {
+            static FACES: RefCell<[Faces; FLIGHT]> = RefCell::default();
+        }
+        if !self.has_exact_lists() {
+            return locals.iter().for_each(|&local| put(self.found_exactly(local)));
+        }
+        // `put` may ask for other points.
+        let mut faces = FACES.take();
+        for locals in locals.chunks(FLIGHT) {
+            self.pass_flight(locals, &mut faces, |i, place, faces| {
+                put(self.find(locals[i], place, faces, Precision::F32));
+            });
+        }
+        FACES.set(faces);
     }
 
     /// Prefetches the faces of a list.

@@ -16,7 +16,9 @@ use super::cut::quarter_at;
 
 const SURE: f32 = HiddenOverlap::SURE as f32;
 const FINE: f32 = HiddenOverlap::FINE as f32;
-const FINE_LOOKS: u32 = HiddenOverlap::FINE_LOOKS;
+/// Number of looks per face in the search for depths below [`SURE`]. The processor counts those of
+/// a body together ([`HiddenOverlap::FINE_LOOKS`]), the faces that can be deepest first.
+const FINE_LOOKS: u32 = 4;
 const DEEPER: f32 = internal::DEEPER as f32;
 const SETTLED: f32 = internal::SETTLED as f32;
 const THICK: f32 = internal::THICK as f32;
