@@ -159,17 +159,22 @@ impl Looks<'_> {
         reach <= (HiddenOverlap::SURE * self.thickness).max(self.wanted(0.0) - self.shown)
     }
 
-    /// The values at points, which are many. In order, for any number of threads.
-    fn values(&mut self, points: &[DVec3]) -> Vec<FieldValue> {
-        self.looks += points.len() as u32;
+    /// The values at the points that can be deep, `None` for points outside the core: these often
+    /// lie outside the domain, where a value takes long. In order, for any number of threads.
+    fn values(&mut self, points: &[DVec3]) -> Vec<Option<FieldValue>> {
+        let is_in_core = |p: &DVec3| self.core.distance_squared(*p) == 0.0;
+        let in_core: Vec<DVec3> = points.iter().copied().filter(is_in_core).collect();
         let field = &self.field.field;
-        match points.len() {
-            ..MANY => field.rough_values(points),
+        let values = match in_core.len() {
+            ..MANY => field.rough_values(&in_core),
             _ => {
-                let parts: Vec<_> = points.par_chunks(TASK).map(|part| field.rough_values(part)).collect();
+                let parts: Vec<_> = in_core.par_chunks(TASK).map(|part| field.rough_values(part)).collect();
                 parts.into_iter().flatten().collect()
             }
-        }
+        };
+        self.looks += values.len() as u32;
+        let mut values = values.into_iter();
+        points.iter().map(|p| if is_in_core(p) { values.next() } else { None }).collect()
     }
 
     /// The faces that can be deep, by the balls around the nodes of the face tree.
@@ -196,8 +201,9 @@ impl Looks<'_> {
             let centers: Vec<DVec3> = branches.iter().map(|branch| branch.center).collect();
             let values = self.values(&centers);
             let wanted = self.wanted(HiddenOverlap::FINE);
-            let can_be_deep =
-                |(branch, value): &(Branch, FieldValue)| branch.radius - value.distance > wanted;
+            let can_be_deep = |(branch, value): &(Branch, Option<FieldValue>)| {
+                value.is_none_or(|value| branch.radius - value.distance > wanted)
+            };
             level = branches.into_iter().zip(values).filter(can_be_deep).map(|(b, _)| b.child).collect();
         }
         faces
@@ -231,17 +237,26 @@ impl Looks<'_> {
         let middles: Vec<(DVec3, f64)> = pieces.iter().map(|piece| middle(piece.corners)).collect();
         let points: Vec<DVec3> = middles.iter().map(|(middle, _)| *middle).collect();
         let values = self.values(&points);
-        let depth = |(piece, value): (&Piece, &FieldValue)| piece.radius - value.distance;
-        self.deepest = pieces.iter().zip(&values).map(depth).fold(self.deepest, f64::max);
+        let depth =
+            |(piece, value): (&Piece, &Option<FieldValue>)| Some(piece.radius - value.as_ref()?.distance);
+        self.deepest = pieces.iter().zip(&values).filter_map(depth).fold(self.deepest, f64::max);
         let wanted = self.wanted(HiddenOverlap::FINE);
-        for ((piece, (middle, reach)), value) in pieces.into_iter().zip(middles).zip(&values) {
-            let within_reach = piece.radius - value.distance + reach;
-            if within_reach <= wanted || reach <= SETTLED * wanted {
+        for ((piece, (middle, reach)), value) in pieces.into_iter().zip(middles).zip(values) {
+            if reach <= SETTLED * wanted {
                 continue;
             }
-            let greatest = piece.radius + self.field.greatest_depth(piece.corners, middle, value);
+            let greatest = match value {
+                None => piece.radius + reach - self.core.distance_squared(middle).sqrt(),
+                Some(value) => {
+                    let within_reach = reach - value.distance;
+                    if piece.radius + within_reach <= wanted {
+                        continue;
+                    }
+                    piece.radius + within_reach.min(self.field.greatest_depth(piece.corners, middle, &value))
+                }
+            };
             if greatest > wanted {
-                open.push(-greatest.min(within_reach), piece);
+                open.push(-greatest, piece);
             }
         }
     }
@@ -249,9 +264,8 @@ impl Looks<'_> {
 
 impl Piece {
     fn face(surface: &SurfaceBody, face: u32, field: &FieldBody) -> Self {
-        let part = surface.face(face, field, 0.0);
-        let (first, last) = (part.points()[0], part.points()[part.points().len() - 1]);
-        Self { corners: [first, *part.points().get(1).unwrap_or(&last), last], radius: part.radius }
+        let (corners, radius) = surface.triangle(face, field);
+        Self { corners, radius }
     }
 
     /// The halves, divided in the middle of the longest side. Quarters of a needle would be as
@@ -273,10 +287,19 @@ impl FieldBody<'_> {
     /// Upper bound of the depth over a triangle, by the value at a point.
     fn greatest_depth(&self, corners: [DVec3; 3], p: DVec3, value: &FieldValue) -> f64 {
         let bounds = match self.field {
-            // The distance from a face is convex.
+            // The distance from the longest side of a face is convex, and takes less time than that
+            // from the face.
             Field::Mesh(asset) => {
-                let triangle = asset.local_triangle(value.position as usize);
-                corners.map(|c| triangle.closest(c).distance)
+                let [a, b, c] = asset.local_corners(value.position as usize);
+                let longer = |x: [DVec3; 2], y: [DVec3; 2]| {
+                    if x[0].distance_squared(x[1]) < y[0].distance_squared(y[1]) { y } else { x }
+                };
+                let [start, end] = longer([a, b], longer([b, c], [c, a]));
+                let along = (end - start) / start.distance_squared(end).max(f64::MIN_POSITIVE);
+                corners.map(|p| {
+                    let t = along.dot(p - start).clamp(0.0, 1.0);
+                    p.distance(start + t * (end - start))
+                })
             }
             // A convex function lies above its tangents.
             Field::Simple(_) => corners.map(|c| -(value.distance + value.gradient.dot(c - p))),
@@ -289,8 +312,9 @@ impl FieldBody<'_> {
 /// farthest corner, and that distance.
 fn middle(corners: [DVec3; 3]) -> (DVec3, f64) {
     let [a, b, c] = corners;
-    let reach = |p: DVec3| corners.map(|q| q.distance(p)).into_iter().fold(0.0, f64::max);
+    let reach = |p: DVec3| corners.map(|q| q.distance_squared(p)).into_iter().fold(0.0, f64::max);
     let points = [0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a), (a + b + c) / 3.0];
     let nearer = |x: (DVec3, f64), y: (DVec3, f64)| if y.1 < x.1 { y } else { x };
-    points.into_iter().map(|p| (p, reach(p))).fold((a, f64::INFINITY), nearer)
+    let (middle, squared) = points.into_iter().map(|p| (p, reach(p))).fold((a, f64::INFINITY), nearer);
+    (middle, squared.sqrt())
 }

@@ -146,6 +146,19 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
+    /// The corners of a face, or of the core of a rounded shape, whose surface lies within the radius.
+    /// A segment has two equal corners.
+    pub fn triangle(&self, face: u32, field: &FieldBody) -> ([DVec3; 3], f64) {
+        match self.shape {
+            Shape::Mesh(asset) => (asset.face_corners(face as usize).map(|p| self.to_field(p)), 0.0),
+            _ => {
+                let part = self.face(face, field, 0.0);
+                let points = part.points();
+                (std::array::from_fn(|k| points[k.min(points.len() - 1)]), part.radius)
+            }
+        }
+    }
+
     /// A candidate node as a part of one point.
     pub fn node(&self, node: u32) -> Part {
         match self.shape {
