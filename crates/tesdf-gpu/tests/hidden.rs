@@ -31,9 +31,13 @@ fn moved(body: &Arc<Body>, to: DVec3) -> Placed {
     Placed { body: body.clone(), at: Placement { pose: Pose::at(to), scale: 1.0 } }
 }
 
+fn options(mode: Mode) -> CollideOptions {
+    CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode) }
+}
+
 /// The overlaps of a scene that the device and the host report.
 fn both(scene: &Scene, mode: Mode) -> [Vec<HiddenOverlap>; 2] {
-    let options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode) };
+    let options = options(mode);
     let mut detector = Detector::new(&device(), scene, DetectorOptions::default()).expect("fits");
     let found = detector.detect(scene, &options).expect("detects");
     [found.hidden, detect(scene, &options).expect("a good scene").hidden]
@@ -86,8 +90,8 @@ fn bars_that_cross_and_bodies_that_touch() {
     }
 }
 
-/// Both report the overlaps that are certain to be found. They may differ in overlaps so shallow
-/// that finding them depends on the search.
+/// Both report the overlaps that are certain to be found. They may differ in overlaps so shallow, or
+/// so near to the depth that contacts show, that finding them depends on the search.
 #[test]
 fn relations_of_meshes_are_told_as_by_the_host() {
     let names = ["cube", "tetra", "l_bracket", "beam", "torus_quads", "spoon"];
@@ -119,7 +123,12 @@ fn relations_of_meshes_are_told_as_by_the_host() {
         if device.len() != host.len() {
             differing += 1;
             let most = depth(&device).max(depth(&host));
-            assert!(most <= 1.5 * sure, "{pair:?} {relation:?}: {device:?}, the host {host:?}");
+            let found = detect(&scene, &options(NODE)).expect("a good scene");
+            let shown = found.iter().map(|c| -c.distance).fold(0.0, f64::max);
+            assert!(
+                most <= (1.5 * sure).max(2.7 * shown),
+                "{pair:?} {relation:?}: {device:?}, the host {host:?}, shown {shown}"
+            );
         }
     }
     println!("{told} told, {differing} otherwise");
