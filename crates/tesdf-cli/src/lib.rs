@@ -20,6 +20,7 @@ pub mod completions;
 pub mod devices;
 pub mod encode;
 pub mod inspect;
+pub mod part;
 pub mod query;
 pub mod render;
 pub mod repair;
@@ -49,6 +50,8 @@ pub enum Command {
     Check(check::Args),
     /// Repair defects of a mesh that have a unique repair, and report the changes
     Repair(repair::Args),
+    /// Make the mesh of a machine part: bolt, nut, gear, shaft, …
+    Part(part::Args),
     /// Encode a mesh into a .tesdf file
     Encode(encode::Args),
     /// Print signed distance, gradient and closest point at the points of a CSV file
@@ -113,6 +116,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
     match command {
         Command::Check(args) => check::run(args),
         Command::Repair(args) => repair::run(args),
+        Command::Part(args) => part::run(args),
         Command::Encode(args) => encode::run(args),
         Command::Query(args) => query::run(args),
         Command::Inspect(args) => inspect::run(args),

@@ -27,6 +27,48 @@ pub fn length(text: &str) -> Result<f64, String> {
     })
 }
 
+/// The units of [`metres`], by their names, and their length in metres. Longer names come first.
+const UNITS: [(&str, f64); 6] =
+    [("nm", 1e-9), ("um", 1e-6), ("µm", 1e-6), ("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
+
+/// Parses a length with its unit, such as `16mm` or `25um`, in metres. Only 0 needs no unit.
+///
+/// # Errors
+/// The message says what was found and expected.
+pub fn metres(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let Some((value, unit)) =
+        UNITS.into_iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, unit)))
+    else {
+        return match length(text) {
+            Ok(0.0) => Ok(0.0),
+            _ => Err("expected a length with its unit (nm, um, mm, cm or m), such as 16mm".into()),
+        };
+    };
+    // Division by a power of ten gives the nearest number: 25um is 2.5e-5, as written.
+    Ok(length(value)? / (1.0 / unit).round())
+}
+
+/// Parses `N` lengths with units, separated by spaces or commas. `expected` describes them in error
+/// messages.
+///
+/// # Errors
+/// The message says how many lengths were found, or which one is at fault.
+pub fn all_metres<const N: usize>(words: &[&str], expected: &str) -> Result<[f64; N], String> {
+    let words: [&str; N] =
+        words.try_into().map_err(|_| format!("{} lengths; expected {expected}", words.len()))?;
+    let mut values = [0.0; N];
+    for (value, word) in values.iter_mut().zip(words) {
+        *value = metres(word).map_err(|e| format!("{word}: {e}"))?;
+    }
+    Ok(values)
+}
+
+/// The words of a list, separated by spaces or commas.
+pub fn words(text: &str) -> Vec<&str> {
+    text.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty()).collect()
+}
+
 /// Parses what a contact of a face stands for.
 ///
 /// # Errors
@@ -168,10 +210,8 @@ pub fn part(text: &str) -> Result<(u32, u32), String> {
 /// # Errors
 /// The message says how many numbers were found, or which one is at fault.
 pub fn numbers<const N: usize>(text: &str, expected: &str) -> Result<[f64; N], String> {
-    let words: Vec<&str> =
-        text.split(|c: char| c == ',' || c.is_whitespace()).filter(|w| !w.is_empty()).collect();
     let words: [&str; N] =
-        words.try_into().map_err(|w: Vec<_>| format!("{} numbers; expected {expected}", w.len()))?;
+        words(text).try_into().map_err(|w: Vec<_>| format!("{} numbers; expected {expected}", w.len()))?;
     let mut values = [0.0; N];
     for (value, word) in values.iter_mut().zip(words) {
         *value = number(word).map_err(|e| format!("{word}: {e}"))?;
@@ -188,6 +228,17 @@ mod tests {
         assert_eq!(number(" -1e-3"), Ok(-1e-3));
         assert_eq!(number("inf"), Err("inf is not a finite number".into()));
         assert_eq!(length("-1"), Err("-1 is negative; expected a length".into()));
+        assert_eq!(metres("25um"), Ok(25e-6));
+        assert_eq!(metres(" 0.2 mm"), Ok(0.2e-3));
+        assert_eq!(
+            [metres("1.5m"), metres("3cm"), metres("10nm"), metres("0")].map(Result::unwrap),
+            [1.5, 0.03, 1e-8, 0.0]
+        );
+        assert_eq!(metres("-1mm"), Err("-1 is negative; expected a length".into()));
+        assert!(metres("16").unwrap_err().starts_with("expected a length with its unit"));
+        assert!(metres("mm").is_err() && metres("infm").is_err());
+        assert_eq!(all_metres(&words("1mm, 2mm"), "two"), Ok([1e-3, 2e-3]));
+        assert_eq!(all_metres::<2>(&["1mm"], "two"), Err("1 lengths; expected two".into()));
         assert_eq!(fraction("1.5"), Err("1.5 is not between 0 and 1".into()));
         let expected = Aabb { min: DVec3::new(-1., -2., -3.), max: DVec3::new(1., 2., 3.) };
         assert_eq!(region("-1 -2,-3  1, 2 3"), Ok(expected));
