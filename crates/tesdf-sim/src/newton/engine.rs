@@ -1,19 +1,19 @@
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, ContactsPer, HiddenOverlap, InstanceId, Mode, Pose,
-    Scene,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, Pose, Scene,
 };
 
 use super::NewtonOptions;
 use super::integrate::{free_velocity, moved, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
+use super::normals::normals;
 use super::problem::{Minimum, Problem};
-use super::rigid::have_normal_of_face;
 use super::rows::{Bodies, FreeBody, Resistance, Row};
 use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
 
@@ -64,9 +64,28 @@ struct Step {
     report: StepReport,
 }
 
-/// For each pair of instances and feature of the first one: its penetration depth at the beginning
-/// of the step, m.
-struct Depths(Vec<((InstanceId, InstanceId, u32), f64)>);
+/// For each pair of instances and feature of the first one: how far it is below the skin at the
+/// beginning of the step, m.
+struct Depths {
+    features: Vec<((InstanceId, InstanceId, u32), f64)>,
+    /// The same for each pair, the lower instance first.
+    pairs: BTreeMap<(InstanceId, InstanceId), f64>,
+}
+
+/// The row of a contact and what its gap depends on.
+struct Found {
+    /// The gap is the distance above the skin.
+    row: Row,
+    /// The way by which kinematic bodies open the gap in the step, m.
+    carried: f64,
+    /// The distance that the contact keeps, m.
+    skin: f64,
+    /// The way by which the contact slides in the step, m.
+    way: f64,
+}
+
+/// A contact that slides is lifted by at most this share of its way.
+const LIFT: f64 = 0.01;
 
 /// The two gaps of a row.
 #[derive(Clone, Copy)]
@@ -148,9 +167,31 @@ impl Newton {
         Ok(contacts)
     }
 
-    /// The part of a penetration of `depth` metres that one step of `h` seconds removes, m.
-    fn correction(&self, depth: f64, h: f64) -> f64 {
-        (self.options.correction * depth).min(self.options.correction_speed * h)
+    /// The distance by which one step of `h` seconds lifts a contact that is `depth` metres below its
+    /// skin and slides by `way` metres.
+    fn lift(&self, depth: f64, skin: f64, way: f64, h: f64) -> f64 {
+        let penetration = (depth - skin).max(0.0);
+        let removed = (self.options.correction * penetration).min(self.options.correction_speed * h);
+        removed + (self.options.correction * (depth - penetration)).min(LIFT * way)
+    }
+
+    /// The distance that contacts of a pair of bodies keep, m.
+    fn skin(&self, a: usize, b: usize) -> f64 {
+        self.options.skin * self.sizes[a].min(self.sizes[b])
+    }
+
+    /// The way by which a contact slides in a step at the velocities of the beginning, m.
+    fn way(&self, contact: &Contact, poses: &[Pose], [a, b]: [usize; 2], h: f64) -> f64 {
+        let of = |body: usize| {
+            let State { linear, angular, .. } = self.system.states()[body];
+            let center = match self.system.bodies()[body].mass {
+                Mass::Free(mass) => poses[body].to_world(mass.center),
+                Mass::Kinematic => poses[body].translation,
+                Mass::Fixed => return DVec3::ZERO,
+            };
+            linear + angular.cross(contact.point_a - center)
+        };
+        h * (of(a) - of(b)).reject_from_normalized(contact.normal).length()
     }
 
     fn bodies<'a>(&'a self, step: &'a Step) -> Bodies<'a> {
@@ -158,53 +199,39 @@ impl Newton {
         Bodies { system: &self.system, free: &step.free, free_of: &step.free_of, softness }
     }
 
-    /// The row of a contact that was detected at `poses`, and the way by which kinematic bodies open
-    /// its gap in the step, m.
-    fn row(&self, step: &Step, contact: &Contact, poses: &[Pose]) -> Option<(Row, f64)> {
+    /// The row of a contact that was detected at `poses`, with its distance above the skin as its gap.
+    fn row(&self, step: &Step, contact: &Contact, poses: &[Pose]) -> Option<Found> {
         let [a, b] = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
         let (a, b) = (a?, b?);
         let mut row = Row::of_contact(contact, &self.bodies(step), poses, self.system.friction(a, b))?;
-        let way = |body: usize| match self.system.bodies()[body].mass {
+        let carried = |body: usize| match self.system.bodies()[body].mass {
             Mass::Kinematic => {
                 let State { linear, angular, .. } = self.system.states()[body];
                 step.h * (linear + angular.cross(contact.point_a - poses[body].translation))
             }
             Mass::Fixed | Mass::Free(_) => DVec3::ZERO,
         };
-        let way = way(a) - way(b);
+        let carried = carried(a) - carried(b);
         if let Some(friction) = &mut row.friction {
-            friction.way = way.reject_from_normalized(contact.normal);
+            friction.way = carried.reject_from_normalized(contact.normal);
         }
-        Some((row, way.dot(contact.normal)))
-    }
-
-    /// How each contact resists where bodies do not overlap deeply.
-    fn resistances(&self, contacts: &[Contact]) -> Vec<Resistance> {
-        match (self.collide.mode, self.collide.contacts_per) {
-            (Mode::Node, _) => vec![Resistance::Rigid; contacts.len()],
-            // Each cell that an edge crosses has a contact there, with the normal of the edge.
-            (Mode::Face | Mode::Exact, ContactsPer::Cell) => vec![Resistance::Spring; contacts.len()],
-            (Mode::Face | Mode::Exact, ContactsPer::Face) => {
-                let resistance = |rigid| if rigid { Resistance::Rigid } else { Resistance::Spring };
-                have_normal_of_face(contacts).into_iter().map(resistance).collect()
-            }
-        }
+        let skin = self.skin(a, b);
+        row.gap -= skin;
+        let way = self.way(contact, poses, [a, b], step.h);
+        Some(Found { row, carried: carried.dot(contact.normal), skin, way })
     }
 
     /// The rows of the contacts at the beginning of the step.
     fn first_rows(&self, step: &Step, contacts: &[Contact]) -> Vec<Row> {
-        let row = |(contact, resistance): (&Contact, Resistance)| {
-            let (mut row, way) = self.row(step, contact, &step.poses)?;
-            row.resistance = resistance;
-            if contact.distance < 0.0 {
-                row.gap = -self.correction(-contact.distance, step.h);
-                row.relaxed_gap = 0.0;
-            }
-            row.gap += way;
-            row.relaxed_gap += way;
+        let row = |(contact, normal): (&Contact, DVec3)| {
+            let contact = &Contact { normal, ..*contact };
+            let Found { mut row, carried, skin, way } = self.row(step, contact, &step.poses)?;
+            let depth = (-row.gap).max(0.0);
+            row.relaxed_gap = row.gap + depth + carried;
+            row.gap = row.relaxed_gap - self.lift(depth, skin, way, step.h);
             Some(row)
         };
-        contacts.iter().zip(self.resistances(contacts)).filter_map(row).collect()
+        contacts.iter().zip(normals(contacts)).filter_map(row).collect()
     }
 
     /// The rows of the contacts at the poses that `velocities` predict. Each gap is the predicted
@@ -217,18 +244,18 @@ impl Newton {
         velocities: &[Vector6<f64>],
         depths: &Depths,
     ) -> Vec<Row> {
-        let row = |(contact, resistance): (&Contact, Resistance)| {
-            let (mut row, _) = self.row(step, contact, poses)?;
-            row.resistance = resistance;
-            let gap = contact.distance - step.h * row.rate(velocities);
+        let row = |(contact, normal): (&Contact, DVec3)| {
+            let contact = &Contact { normal, ..*contact };
+            let Found { mut row, skin, way, .. } = self.row(step, contact, poses)?;
+            let gap = row.gap - step.h * row.rate(velocities);
             // A face may have several contacts, and its deepest one is not at this place. The body
             // must not sink in here by the depth there.
-            let depth = depths.of(contact).min(-gap).max(0.0);
+            let depth = depths.of(contact, skin).min(-gap).max(0.0);
             row.relaxed_gap = gap + depth;
-            row.gap = row.relaxed_gap - self.correction(depth, step.h);
+            row.gap = row.relaxed_gap - self.lift(depth, skin, way, step.h);
             Some(row)
         };
-        contacts.iter().zip(self.resistances(contacts)).filter_map(row).collect()
+        contacts.iter().zip(normals(contacts)).filter_map(row).collect()
     }
 
     /// The bodies of islands that overlap deeply, as [`Step::deep`].
@@ -247,6 +274,25 @@ impl Newton {
             }
         }
         deep
+    }
+
+    /// How far the contacts at the beginning of the step are below their skins.
+    fn depths(&self, contacts: &[Contact]) -> Depths {
+        let depth = |c: &Contact| {
+            let [a, b] = [c.instance_a, c.instance_b].map(|id| self.system.body_of(id));
+            let depth = self.skin(a?, b?) - c.distance;
+            (depth > 0.0).then_some(((c.instance_a, c.instance_b, c.feature.a), depth))
+        };
+        let mut depths: Vec<_> = contacts.iter().filter_map(depth).collect();
+        // The deepest contact of each key comes first, because a face may touch in several cells.
+        depths.sort_by(|(k, d), (l, e)| k.cmp(l).then(e.total_cmp(d)));
+        depths.dedup_by_key(|(key, _)| *key);
+        let mut pairs = BTreeMap::new();
+        for &((a, b, _), depth) in &depths {
+            let of_pair = pairs.entry((a.min(b), a.max(b))).or_insert(depth);
+            *of_pair = depth.max(*of_pair);
+        }
+        Depths { features: depths, pairs }
     }
 
     /// Minimises the problem of every island from `start`. A body without rows keeps its target
@@ -315,7 +361,7 @@ impl Newton {
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut velocities = self.solve(step, &rows, Gap::Position, &start);
         if rows.iter().any(|row| !stays(row)) {
-            let depths = Depths::of_contacts(contacts);
+            let depths = self.depths(contacts);
             for _ in 0..self.options.redetections {
                 let predicted = self.moved(step, &velocities);
                 let contacts = self.detect(step, &predicted)?;
@@ -391,19 +437,14 @@ impl Dynamics for Newton {
 }
 
 impl Depths {
-    fn of_contacts(contacts: &[Contact]) -> Self {
-        let key = |c: &Contact| (c.instance_a, c.instance_b, c.feature.a);
-        let penetrating = contacts.iter().filter(|c| c.distance < 0.0);
-        let mut depths: Vec<_> = penetrating.map(|c| (key(c), -c.distance)).collect();
-        // The deepest contact of each key comes first, because a face may touch in several cells.
-        depths.sort_by(|(k, d), (l, e)| k.cmp(l).then(e.total_cmp(d)));
-        depths.dedup_by_key(|(key, _)| *key);
-        Self(depths)
-    }
-
-    /// Depth of the feature that `contact` belongs to, m; 0 when it did not penetrate.
-    fn of(&self, contact: &Contact) -> f64 {
-        let key = (contact.instance_a, contact.instance_b, contact.feature.a);
-        self.0.binary_search_by_key(&key, |&(key, _)| key).map_or(0.0, |at| self.0[at].1)
+    /// Depth of the feature that `contact` belongs to, m. Within the skin it is at least that of the
+    /// pair: contacts come and go there, and one that comes must not lift the bodies.
+    fn of(&self, contact: &Contact, skin: f64) -> f64 {
+        let (a, b) = (contact.instance_a, contact.instance_b);
+        let key = (a, b, contact.feature.a);
+        let of_feature =
+            self.features.binary_search_by_key(&key, |&(key, _)| key).map_or(0.0, |at| self.features[at].1);
+        let of_pair = self.pairs.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0);
+        of_feature.max(of_pair.min(skin))
     }
 }

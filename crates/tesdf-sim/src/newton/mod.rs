@@ -38,9 +38,9 @@ mod integrate;
 mod islands;
 mod joints;
 mod linear;
+mod normals;
 mod options;
 mod problem;
-mod rigid;
 mod rows;
 mod spring;
 

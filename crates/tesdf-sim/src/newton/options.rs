@@ -18,6 +18,11 @@ pub struct NewtonOptions {
     /// Number of times that contacts are detected again at the predicted pose: 0, 1, or 2 for more
     /// accuracy.
     pub redetections: u32,
+    /// Distance that contacts keep, as a fraction of the smaller body's diagonal. Where edges cross, the
+    /// gradient of the distance is their common normal as long as they are apart; below, it is that of
+    /// one of the faces, and such a contact is a wall in the way of a nut. Contacts at rest are not
+    /// lifted to it.
+    pub skin: f64,
     /// Bodies that penetrate deeper than this fraction of the smaller body's diagonal are not
     /// detected again, because linear predictions of a deep overlap add energy. The default is 10
     /// µm for a part of 3 cm.
@@ -42,6 +47,7 @@ impl Default for NewtonOptions {
             correction: 0.5,
             correction_speed: 0.5,
             redetections: 1,
+            skin: 2e-6,
             deep: 3e-4,
             speculation: 1.2,
             tolerance: 1e-8,
@@ -68,6 +74,7 @@ impl NewtonOptions {
                 "a finite number, 0 or greater",
             ),
             ("redetections", f64::from(self.redetections), self.redetections <= 2, "0, 1 or 2"),
+            ("skin", self.skin, self.skin == 0.0 || positive(self.skin), "a finite number, 0 or greater"),
             ("deep", self.deep, self.deep == 0.0 || positive(self.deep), "a finite number, 0 or greater"),
             (
                 "speculation",

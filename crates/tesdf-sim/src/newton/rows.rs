@@ -135,7 +135,7 @@ impl Row {
             relaxed_gap: contact.distance,
             stiffness: 1.0 / (weight * softness),
             bounds: [0.0, f64::INFINITY],
-            resistance: Resistance::Spring,
+            resistance: Resistance::Rigid,
             friction: (coefficient > 0.0).then(friction),
         })
     }
