@@ -12,8 +12,9 @@
 //!
 //! Springs give way. So the problem is solved again, with each spring compressed by its force, until
 //! no contact gives way (the method of multipliers, in `problem.rs`). Its solution is that of rigid
-//! contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Contacts whose normal is not that
-//! of a face keep their springs (`rigid.rs`), and so do islands that overlap deeply.
+//! contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Islands that overlap deeply keep
+//! their springs. Gaps are counted from a skin ([`NewtonOptions::skin`]), and normals at edges that are
+//! flush are those of the faces (`normals.rs`).
 //!
 //! *Friction* is a spring against the slip `h t`, where `t` is the tangential velocity, whose force
 //! ends at the limit `b = μ` × push of the contact. The push is that of the minimisation before, so that
