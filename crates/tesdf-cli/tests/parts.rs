@@ -119,7 +119,10 @@ fn errors_name_what_was_expected() {
             "bolt|--length|30mm|--thread-length|30mm",
             "error: the thread length is 30 mm; expected less than 27.84 mm",
         ),
-        ("nut|--deviation|0mm", "error: the deviation is 0 mm; expected more than 0 mm"),
+        (
+            "nut|--deviation|0mm",
+            "error: the deviation is 0 mm; expected at least 0.000004 mm, which takes 4096 segments",
+        ),
         ("nut|--segments|5", "error: the number of segments is 5; expected 12 to 4096"),
         ("gear|--teeth|14", "14 teeth are undercut"),
         ("gear|--teeth|14", "hint: tesdf part gear --help lists all dimensions"),

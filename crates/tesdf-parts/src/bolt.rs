@@ -96,7 +96,7 @@ impl Bolt {
             rows: &thread.rows(segments),
             radius: |phase: f64, z: f64| (thread.radius(phase) - clearance).min(tip + z),
         }
-        .build(&mut surface);
+        .build(&mut surface)?;
         surface.fan(DVec3::ZERO, &bottom, Facing::Down);
         let shank = thread.diameter / 2.0 - clearance;
         let mut below = top;
@@ -126,7 +126,7 @@ impl Bolt {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        resolution.check(self.across_flats / 2.0)?;
         let Self { thread, length, thread_length, across_flats, head_height, washer_diameter, .. } = *self;
         thread.check(self.clearance)?;
         positive("length", length)?;

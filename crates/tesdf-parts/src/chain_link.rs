@@ -57,8 +57,8 @@ impl ChainLink {
         let wire = wire_diameter / 2.0;
         let around = resolution.turn(wire, 4);
         let bend = resolution.arc(bend_radius + wire, PI).next_multiple_of(2);
-        // As long as the chords of the bends.
-        let along = (straight / (PI * bend_radius / bend as f64)).ceil().max(1.0) as usize;
+        // As long as the chords of the bends, and at most 256.
+        let along = (straight / (PI * bend_radius / bend as f64)).ceil().clamp(1.0, 256.0) as usize;
         let mut surface = Surface::new("chain link");
         let mut rings = Vec::new();
         let mut ring = |centre: DVec2, out: DVec2| {
@@ -86,7 +86,7 @@ impl ChainLink {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        resolution.check(self.bend_radius + self.wire_diameter)?;
         positive("diameter of the wire", self.wire_diameter)?;
         above("radius of the bends", self.bend_radius, self.wire_diameter, ", so that the next link fits")?;
         positive("straight length", self.straight)

@@ -37,8 +37,20 @@ pub enum PartError {
         /// The first defect.
         defect: String,
     },
-    /// The part has more vertices or faces than a mesh can have.
-    #[error("the {part}: {source}; choose fewer segments or a larger deviation")]
+    /// The part would have more faces than a `.tesdf` file can have.
+    #[error(
+        "the {part} would have about {faces:.0} faces, and a .tesdf file has at most {limit}; choose fewer segments or a larger deviation"
+    )]
+    TooFine {
+        /// The part.
+        part: &'static str,
+        /// Number of faces, about.
+        faces: f64,
+        /// The largest number of faces.
+        limit: f64,
+    },
+    /// The part is no mesh: a coordinate is not finite.
+    #[error("the {part}: {source}")]
     Mesh {
         /// The part.
         part: &'static str,

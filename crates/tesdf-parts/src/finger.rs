@@ -121,7 +121,7 @@ impl Finger {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        resolution.check(self.hole_diameter / 2.0)?;
         positive("width", self.width)?;
         positive("thickness of the tip", self.tip_thickness)?;
         above("thickness of the root", self.root_thickness, 0.0, "")?;

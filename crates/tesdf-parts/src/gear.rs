@@ -90,7 +90,7 @@ impl Gear {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        resolution.check(self.teeth.tip_radius())?;
         self.teeth.check()?;
         positive("width", self.width)?;
         // Chords of a circle come nearer to the axis than the circle.

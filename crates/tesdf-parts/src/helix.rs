@@ -1,6 +1,7 @@
 //! Surfaces whose radius repeats along a helix: threads and grooves.
 use tesdf::glam::DVec3;
 
+use crate::error::PartError;
 use crate::outline::{angles, polar};
 use crate::surface::{Loop, Surface};
 
@@ -29,8 +30,10 @@ const JOINS: f64 = 0.012;
 
 impl<F: Fn(f64, f64) -> f64> Helix<'_, F> {
     /// Adds the surface, looking outwards. Returns its lower and upper ring.
-    pub(crate) fn build(&self, surface: &mut Surface) -> [Loop; 2] {
+    pub(crate) fn build(&self, surface: &mut Surface) -> Result<[Loop; 2], PartError> {
         let [z0, z1] = self.heights;
+        let turns = ((z1 - z0) / self.pitch).ceil();
+        surface.check_count(2.0 * turns * (self.columns * self.rows.len()) as f64)?;
         let join = self.pitch * JOINS;
         // Rows start three pitches early, so that the last column finds all its neighbours.
         let pitches = (z0 / self.pitch).floor() as i64 - 3..(z1 / self.pitch).ceil() as i64 + 3;
@@ -65,6 +68,6 @@ impl<F: Fn(f64, f64) -> f64> Helix<'_, F> {
                 surface.triangle(a, c, d);
             }
         }
-        [bottom, top]
+        Ok([bottom, top])
     }
 }

@@ -68,6 +68,12 @@ impl Lobes {
         // Curvature of a curve r(φ) where r' = 0: (r − r'') / r².
         r * r / (r + bend)
     }
+
+    /// Radius of curvature of the valleys between the lobes, infinite where they are convex.
+    fn narrowest(&self) -> f64 {
+        let (r, bend) = (self.radius - self.amplitude, self.amplitude * (self.count * self.count) as f64);
+        if bend > r { r * r / (bend - r) } else { f64::INFINITY }
+    }
 }
 
 /// A peg with lobes. Its axis is z, and one end at z = 0. Both ends are chamfered at 45°.
@@ -100,7 +106,7 @@ impl LobedPeg {
     /// # Errors
     /// [`PartError`] names the parameter at fault.
     pub fn mesh(&self, resolution: Resolution) -> Result<SolidMesh, PartError> {
-        resolution.check()?;
+        resolution.check(self.lobes.radius + self.lobes.amplitude)?;
         let Self { lobes, length, chamfer } = *self;
         lobes.check()?;
         positive("chamfer", chamfer)?;
@@ -121,9 +127,9 @@ impl LobedPeg {
     }
 }
 
-/// Heights from `low` to `high`, about as far apart as `step`.
+/// Heights from `low` to `high`, about as far apart as `step`, at most 65.
 fn heights(low: f64, high: f64, step: f64) -> impl DoubleEndedIterator<Item = f64> {
-    let count = ((high - low) / step).round().max(1.0) as usize;
+    let count = ((high - low) / step).round().clamp(1.0, 64.0) as usize;
     (0..=count).map(move |i| if i == count { high } else { low + (high - low) * i as f64 / count as f64 })
 }
 
@@ -172,7 +178,7 @@ impl LobedHole {
     /// # Errors
     /// [`PartError`] names the parameter at fault.
     pub fn mesh(&self, resolution: Resolution) -> Result<SolidMesh, PartError> {
-        resolution.check()?;
+        resolution.check(self.outer_radius)?;
         let Self { lobes, clearance, depth, floor, outer_radius, chamfer } = *self;
         lobes.check()?;
         not_negative("clearance", clearance)?;
@@ -181,6 +187,8 @@ impl LobedHole {
         above("depth", depth, chamfer, ", the chamfer")?;
         let segments = lobes.segments(resolution);
         let distance = clearance + lobes.sagitta(segments, clearance);
+        let most = lobes.narrowest() - distance;
+        below("chamfer", chamfer, most, ", the radius of curvature between the lobes less the clearance")?;
         let mouth = lobes.radius + lobes.amplitude + distance + chamfer;
         if outer_radius * (PI / segments as f64).cos() <= mouth {
             let least = mouth / (PI / segments as f64).cos();

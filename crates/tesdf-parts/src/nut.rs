@@ -69,7 +69,7 @@ impl Nut {
                 outwards * (thread.radius(phase) + clearance).max(mouth - z.min(height - z))
             },
         }
-        .build(&mut surface);
+        .build(&mut surface)?;
         surface.turn_over();
         let hexagon = Hexagon { across_flats, segments };
         let rings = [
@@ -92,7 +92,7 @@ impl Nut {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        resolution.check(self.across_flats / 2.0)?;
         self.thread.check(self.clearance)?;
         above("height", self.height, self.thread.pitch, ", the pitch")?;
         let widest = self.thread.segments(resolution) as f64;

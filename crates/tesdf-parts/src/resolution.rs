@@ -20,21 +20,26 @@ impl Resolution {
     /// 96 segments for a turn: the deviation is 5.4e-4 of the radius, 4 µm on an M16 thread.
     pub const DEFAULT: Self = Self::Segments(96);
 
-    /// Checks the value.
-    pub(crate) fn check(self) -> Result<Self, PartError> {
+    /// Checks the value for a part whose largest circle has this radius.
+    pub(crate) fn check(self, radius: f64) -> Result<(), PartError> {
         match self {
             Self::Segments(segments) => count("number of segments", segments, FEWEST..=MOST)?,
-            Self::Deviation(deviation) if deviation > 0.0 && deviation.is_finite() => {}
             Self::Deviation(deviation) => {
-                let found = Mm(deviation).to_string();
-                return Err(PartError::Parameter {
-                    name: "deviation",
-                    found,
-                    expected: "more than 0 mm".into(),
-                });
+                let least = radius * (1.0 - (TAU / 2.0 / MOST as f64).cos());
+                if !(deviation > 0.0 && deviation.is_finite()) || deviation < least {
+                    // Rounded up to the last digit that is printed.
+                    let least = Mm((least * 1e9).ceil() * 1e-9);
+                    return Err(PartError::Parameter {
+                        name: "deviation",
+                        found: Mm(deviation).to_string(),
+                        expected: format!(
+                            "at least {least}, which takes {MOST} segments of the largest circle"
+                        ),
+                    });
+                }
             }
         }
-        Ok(self)
+        Ok(())
     }
 
     /// Segments of a full turn of this radius, rounded up to a multiple of `multiple`.
@@ -74,6 +79,14 @@ mod tests {
             assert!(radius * (1.0 - (TAU / 2.0 / n as f64).cos()) <= deviation, "{n} segments");
         }
         assert_eq!(Resolution::DEFAULT.arc(1.0, TAU / 4.0), 24);
-        assert!(Resolution::Segments(11).check().is_err() && Resolution::Deviation(0.0).check().is_err());
+        assert!(
+            Resolution::Segments(11).check(0.01).is_err() && Resolution::Deviation(0.0).check(0.0).is_err()
+        );
+        let error = Resolution::Deviation(1e-9).check(0.01).unwrap_err().to_string();
+        assert!(
+            error.starts_with("the deviation is 0.000001 mm; expected at least 0.000003 mm, "),
+            "{error}"
+        );
+        Resolution::Deviation(3e-9).check(0.01).unwrap();
     }
 }

@@ -182,7 +182,8 @@ impl Shaft {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        let widest = self.sections.iter().map(|section| section.profile.outer_radius()).fold(0.0, f64::max);
+        resolution.check(widest)?;
         crate::error::count("number of sections", self.sections.len(), 1..=1000)?;
         not_negative("chamfer", self.chamfer)?;
         for section in &self.sections {

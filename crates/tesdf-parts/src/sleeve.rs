@@ -75,7 +75,7 @@ impl Sleeve {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        resolution.check(self.diameter / 2.0)?;
         positive("diameter", self.diameter)?;
         positive("width of the groove", self.groove_width)?;
         positive("depth of the groove", self.groove_depth)?;

@@ -145,7 +145,7 @@ impl Spool {
                     drum - groove.depth * groove.share(phase) * grown
                 },
             }
-            .build(&mut surface),
+            .build(&mut surface)?,
         };
         let below = [(bore, 0.0), (flange, 0.0), (flange, heights[0])];
         let above = [(flange, heights[1]), (flange, end), (bore, end)];
@@ -162,7 +162,7 @@ impl Spool {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        resolution.check(self.flange_diameter / 2.0)?;
         positive("diameter of the bore", self.bore_diameter)?;
         above("diameter of the drum", self.drum_diameter, self.bore_diameter, ", that of the bore")?;
         above("diameter of the flanges", self.flange_diameter, self.drum_diameter, ", that of the drum")?;

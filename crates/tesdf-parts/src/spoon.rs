@@ -102,7 +102,7 @@ impl Spoon {
     }
 
     fn check(&self, resolution: Resolution) -> Result<(), PartError> {
-        resolution.check()?;
+        resolution.check(self.bowl_width / 2.0)?;
         positive("width of the handle", self.handle_width)?;
         above("width of the bowl", self.bowl_width, self.handle_width, ", the width of the handle")?;
         above("length", self.length, 2.0 * self.bowl_width, ", twice the width of the bowl")?;

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use spade::handles::{FixedFaceHandle, PossiblyOuterTag};
 use spade::{ConstrainedDelaunayTriangulation, HasPosition, Point2, Triangulation};
 use tesdf::glam::{DVec2, DVec3};
-use tesdf::mesh::Severity;
+use tesdf::mesh::{Defect, Severity};
 use tesdf::{SolidMesh, TriangleMesh};
 
 use crate::error::PartError;
@@ -21,6 +21,9 @@ pub(crate) enum Facing {
     Up,
     Down,
 }
+
+/// Most faces of a part: as many as a `.tesdf` file can have.
+const MOST_FACES: f64 = (1 << 24) as f64;
 
 /// A surface under construction.
 pub(crate) struct Surface {
@@ -161,17 +164,27 @@ impl Surface {
         loops
     }
 
+    /// Checks a number of faces, before memory is taken for them or for their check.
+    pub(crate) fn check_count(&self, faces: f64) -> Result<(), PartError> {
+        match faces <= MOST_FACES {
+            true => Ok(()),
+            false => Err(PartError::TooFine { part: self.part, faces, limit: MOST_FACES }),
+        }
+    }
+
     /// Checks the surface: closed, oriented outwards, and free of overlaps.
     pub(crate) fn finish(self) -> Result<SolidMesh, PartError> {
+        self.check_count(self.faces.len() as f64)?;
         let Self { part, vertices, faces } = self;
         let mesh = TriangleMesh::new(vertices, faces).map_err(|source| PartError::Mesh { part, source })?;
         let solid = SolidMesh::new(mesh).map_err(|source| PartError::NotSolid { part, source })?;
-        match solid.warnings().iter().find(|defect| defect.severity == Severity::Warning) {
-            Some(defect) if !solid.is_simple() => {
-                Err(PartError::Overlap { part, defect: defect.to_string() })
-            }
-            _ => Ok(solid),
+        if solid.is_simple() {
+            return Ok(solid);
         }
+        let first = |defect: &&Defect| defect.severity == Severity::Warning;
+        let defect = solid.warnings().iter().find(first).or(solid.warnings().first());
+        let defect = defect.map_or_else(String::new, |defect| defect.message.clone());
+        Err(PartError::Overlap { part, defect })
     }
 }
 

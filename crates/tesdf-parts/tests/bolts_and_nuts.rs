@@ -188,10 +188,16 @@ fn impossible_bolts_and_nuts_are_errors_that_name_the_limit() {
         (message(nut.mesh(Resolution::Segments(3))), "the number of segments is 3; expected 12 to 4096"),
         (
             message(nut.mesh(Resolution::Deviation(f64::NAN))),
-            "the deviation is NaN mm; expected more than 0 mm",
+            "the deviation is NaN mm; expected at least 0.000004 mm, which takes 4096 segments",
         ),
         (
-            message(Nut { thread: Thread { diameter: 4e-3, pitch: 3e-3 }, ..nut }.mesh(n)),
+            message(
+                Nut { thread: Thread { pitch: 1e-5, ..nut.thread }, ..nut }.mesh(Resolution::Segments(4000)),
+            ),
+            "the nut would have about",
+        ),
+        (
+            message(Nut { thread: Thread { diameter: 4e-3, pitch: 3e-3 }, clearance: 0.0, ..nut }.mesh(n)),
             "the pitch is 3 mm; expected less than 2 mm, half of the thread diameter",
         ),
     ] {
