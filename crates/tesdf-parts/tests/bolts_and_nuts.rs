@@ -192,12 +192,13 @@ fn impossible_bolts_and_nuts_are_errors_that_name_the_limit() {
         ),
         (
             message(
-                Nut { thread: Thread { pitch: 1e-5, ..nut.thread }, ..nut }.mesh(Resolution::Segments(4000)),
+                Nut { thread: Thread { pitch: 1e-5, ..nut.thread }, clearance: 0.0, ..nut }
+                    .mesh(Resolution::Segments(4000)),
             ),
             "the nut would have about",
         ),
         (
-            message(Nut { thread: Thread { diameter: 4e-3, pitch: 3e-3 }, clearance: 0.0, ..nut }.mesh(n)),
+            message(Nut { thread: Thread { diameter: 4e-3, pitch: 3e-3 }, ..nut }.mesh(n)),
             "the pitch is 3 mm; expected less than 2 mm, half of the thread diameter",
         ),
     ] {
