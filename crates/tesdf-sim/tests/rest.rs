@@ -9,7 +9,7 @@ use tesdf::collide::{CollideOptions, ContactsPer, Instance, Pose, Shape, ShapeId
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
-use tesdf_sim::criterion::{RestCriterion, RestTracker};
+use tesdf_sim::criterion::{RestCriterion, RestReport, RestTracker};
 use tesdf_sim::newton::{Newton, NewtonOptions};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
 use tesdf_sim::{Dynamics, Mass, MassProperties, Summary, System, simulate};
@@ -75,6 +75,11 @@ impl Bodies {
     /// Checks that the bodies rest for `seconds`, after having settled for `after` seconds, in steps
     /// of 5 ms.
     fn rest(self, after: f64, seconds: f64) {
+        let report = self.report(after, seconds);
+        assert!(report.failures.is_empty(), "{report:?}");
+    }
+
+    fn report(self, after: f64, seconds: f64) -> RestReport {
         let collide = CollideOptions {
             contacts_per: ContactsPer::Face,
             contact_distance: 5e-4,
@@ -89,8 +94,7 @@ impl Bodies {
             assert!(engine.step(5e-3).unwrap().converged);
             tracker.observe(engine.system(), 5e-3);
         }
-        let report = tracker.report();
-        assert!(report.failures.is_empty(), "{report:?}");
+        tracker.report()
     }
 }
 
@@ -127,12 +131,21 @@ fn cubes_that_fall_on_each_other_come_to_rest() {
 /// tolerance of the detection, and to more.
 #[test]
 fn cubes_whose_edges_are_almost_flush_rest() {
-    // The third shift is a tenth of the skin. There a normal at an edge is neither that of a face nor far
-    // from it, and the cubes drift at an even speed.
-    for (shift, seconds) in [(1e-13, 1.0), (1e-10, 1.0), (3e-8, 10.0), (1e-6, 1.0)] {
-        stack(3, 0.0, shift).rest(0.0, seconds);
-        stack(3, 1e-6, shift).rest(0.1, seconds);
+    for shift in [1e-13, 1e-10, 3e-8, 1e-6] {
+        stack(3, 0.0, shift).rest(0.0, 1.0);
     }
+    for shift in [1e-13, 1e-10, 1e-6] {
+        stack(3, 1e-6, shift).rest(0.1, 1.0);
+    }
+}
+
+/// A shift of a tenth of the skin: at an edge the normal is neither that of a face nor far from it. Cubes
+/// that fall by 1 µm, at 4 mm/s, get less than a ten-thousandth of this as a velocity to the side, which
+/// nothing stops.
+#[test]
+fn edges_that_are_flush_within_the_skin_push_little() {
+    let report = stack(3, 1e-6, 3e-8).report(0.1, 1.0);
+    assert!(report.drift < 4e-7 && report.energy_gain < ROUNDING, "{report:?}");
 }
 
 #[test]

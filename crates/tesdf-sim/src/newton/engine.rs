@@ -348,7 +348,7 @@ impl Newton {
         contacts: &[Contact],
     ) -> Result<[Vec<Vector6<f64>>; 2], DynamicsError> {
         let mut contact_rows = self.first_rows(step, contacts);
-        let mut joints = joint_rows(&self.bodies(step), step.h);
+        let joints = joint_rows(&self.bodies(step), step.h);
         let rows = [contact_rows.as_slice(), &joints].concat();
         step.deep = self.deep(step, contacts, &rows);
         let deep = step.deep.clone();
@@ -366,11 +366,13 @@ impl Newton {
                 let predicted = self.moved(step, &velocities);
                 let contacts = self.detect(step, &predicted)?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
-                rows = self.predicted_rows(step, contacts.as_slice(), &poses, &velocities, &depths);
-                rows.retain(|row| !stays(row));
-                rows.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
-                predict(&mut joints, &self.bodies(step), &poses, &velocities, step.h);
-                rows.extend_from_slice(&joints);
+                let mut next = self.predicted_rows(step, contacts.as_slice(), &poses, &velocities, &depths);
+                next.retain(|row| !stays(row));
+                next.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
+                next.extend_from_slice(&joints);
+                rows = next;
+                let joints = rows.len() - joints.len()..;
+                predict(&mut rows[joints], &self.bodies(step), &poses, &velocities, step.h);
                 velocities = self.solve(step, &rows, Gap::Position, &velocities);
             }
         }

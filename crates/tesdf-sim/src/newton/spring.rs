@@ -6,14 +6,19 @@ use super::integrate::{pack, unpack};
 use super::linear::BlockMatrix;
 use super::rows::{Friction, Resistance, Row};
 
-/// A row whose bodies are indices within the island.
+/// A row whose bodies are indices within the island. It has only what a minimisation reads, because
+/// all springs are read many times.
 #[derive(Clone, Debug)]
 pub struct Spring {
-    pub row: Row,
+    pub sides: [Option<(usize, Vector6<f64>)>; 2],
     /// The gap that counts: with the correction of a penetration, or without.
     pub gap: f64,
     /// The pair of the two bodies in the pattern of the matrix.
     pub pair: Option<usize>,
+    pub stiffness: f64,
+    pub bounds: [f64; 2],
+    pub resistance: Resistance,
+    pub friction: Option<Box<Friction>>,
 }
 
 /// How far a row is from the state in which its force is the one that it keeps.
@@ -48,10 +53,16 @@ pub struct Change {
 }
 
 impl Spring {
+    /// The spring of a row with this gap; the pattern is not known yet.
+    pub fn new(row: &Row, gap: f64) -> Self {
+        let Row { sides, stiffness, bounds, resistance, friction, .. } = *row;
+        Self { sides, gap, pair: None, stiffness, bounds, resistance, friction: friction.map(Box::new) }
+    }
+
     /// The deflection at `velocity`, when no force is kept yet.
     pub fn deflection(&self, velocity: &[Vector6<f64>], h: f64) -> Deflection {
         let change = self.change(velocity, h);
-        let way = self.row.friction.map_or(DVec3::ZERO, |friction| friction.way);
+        let way = self.friction.as_ref().map_or(DVec3::ZERO, |friction| friction.way);
         Deflection { gap: self.gap + change.gap, slip: way + change.slip, ..Deflection::default() }
     }
 
@@ -64,17 +75,24 @@ impl Spring {
                     linear + angular.cross(arm)
                 })
             };
-            let [a, b] = [0, 1].map(|k| of_side((&self.row.sides[k], friction.arms[k])));
+            let [a, b] = [0, 1].map(|k| of_side((&self.sides[k], friction.arms[k])));
             h * (a - b).reject_from_normalized(friction.normal)
         };
-        Change {
-            gap: h * self.row.rate(velocity),
-            slip: self.row.friction.as_ref().map_or(DVec3::ZERO, slip),
-        }
+        Change { gap: h * self.rate(velocity), slip: self.friction.as_deref().map_or(DVec3::ZERO, slip) }
+    }
+
+    #[inline]
+    pub fn rate(&self, velocity: &[Vector6<f64>]) -> f64 {
+        self.sides.iter().flatten().map(|(body, j)| j.dot(&velocity[*body])).sum()
+    }
+
+    /// Whether the spring is a contact: it pushes only.
+    pub fn is_contact(&self) -> bool {
+        self.bounds == [0.0, f64::INFINITY]
     }
 
     fn is_rigid(&self) -> bool {
-        self.row.resistance == Resistance::Rigid
+        self.resistance == Resistance::Rigid
     }
 
     fn stiffening(&self, stiffening: f64) -> f64 {
@@ -85,8 +103,8 @@ impl Spring {
     /// opposite sign.
     #[inline]
     pub fn force(&self, at: &Deflection, stiffening: f64) -> (f64, f64) {
-        let stiffness = self.row.stiffness * self.stiffening(stiffening);
-        let [least, most] = self.row.bounds;
+        let stiffness = self.stiffness * self.stiffening(stiffening);
+        let [least, most] = self.bounds;
         match -stiffness * at.gap {
             force if force <= least => (least, 0.0),
             force if force >= most => (most, 0.0),
@@ -96,7 +114,7 @@ impl Spring {
 
     /// The friction on the first side, N, and its derivative by the slip with the opposite sign.
     fn friction(&self, at: &Deflection, stiffening: f64) -> Option<(DVec3, DMat3)> {
-        let friction = self.row.friction.as_ref().filter(|_| at.grip > 0.0)?;
+        let friction = self.friction.as_ref().filter(|_| at.grip > 0.0)?;
         let stiffness = friction.stiffness * self.stiffening(stiffening);
         let slip = at.slip.length();
         let n = friction.normal;
@@ -111,14 +129,14 @@ impl Spring {
     /// Whether the two deflections are in the same piece of the force, and it is linear there.
     pub fn is_linear_between(&self, from: &Deflection, to: &Deflection, stiffening: f64) -> bool {
         let sticks = |at: &Deflection| {
-            let friction = self.row.friction.as_ref().filter(|_| at.grip > 0.0);
+            let friction = self.friction.as_ref().filter(|_| at.grip > 0.0);
             friction.is_none_or(|friction| {
                 friction.stiffness * self.stiffening(stiffening) * at.slip.length() <= at.grip
             })
         };
         let piece = |at: &Deflection| {
             let (force, stiffness) = self.force(at, stiffening);
-            (stiffness > 0.0, stiffness == 0.0 && force > self.row.bounds[0])
+            (stiffness > 0.0, stiffness == 0.0 && force > self.bounds[0])
         };
         piece(from) == piece(to) && sticks(from) && sticks(to)
     }
@@ -127,11 +145,11 @@ impl Spring {
     pub fn push(&self, at: &Deflection, stiffening: f64, h: f64, forces: &mut [Vector6<f64>]) {
         let (force, _) = self.force(at, stiffening);
         if force != 0.0 {
-            self.row.sides.iter().flatten().for_each(|(body, j)| forces[*body].axpy(h * force, j, 1.0));
+            self.sides.iter().flatten().for_each(|(body, j)| forces[*body].axpy(h * force, j, 1.0));
         }
-        if let (Some(friction), Some((force, _))) = (&self.row.friction, self.friction(at, stiffening)) {
+        if let (Some(friction), Some((force, _))) = (&self.friction, self.friction(at, stiffening)) {
             for (k, sign) in [(0, h), (1, -h)] {
-                if let Some((body, _)) = self.row.sides[k] {
+                if let Some((body, _)) = self.sides[k] {
                     forces[body] += pack(sign * force, friction.arms[k].cross(sign * force));
                 }
             }
@@ -142,10 +160,10 @@ impl Spring {
     pub fn stiffen(&self, at: &Deflection, stiffening: f64, h2: f64, matrix: &mut BlockMatrix<'_>) {
         let (_, stiffness) = self.force(at, stiffening);
         if stiffness > 0.0 {
-            matrix.add(&self.row.sides, self.pair, h2 * stiffness);
+            matrix.add(&self.sides, self.pair, h2 * stiffness);
         }
-        if let (Some(friction), Some((_, derivative))) = (&self.row.friction, self.friction(at, stiffening)) {
-            let point = |k: usize| self.row.sides[k].map(|(body, _)| (body, friction.arms[k]));
+        if let (Some(friction), Some((_, derivative))) = (&self.friction, self.friction(at, stiffening)) {
+            let point = |k: usize| self.sides[k].map(|(body, _)| (body, friction.arms[k]));
             matrix.add_point([point(0), point(1)], self.pair, h2 * derivative);
         }
     }
@@ -168,9 +186,9 @@ impl Spring {
         if !self.is_rigid() {
             return [0.0; 2];
         }
-        let force = self.force(at, stiffening).0 / (self.row.stiffness * stiffening);
+        let force = self.force(at, stiffening).0 / (self.stiffness * stiffening);
         let mut error = [(force - at.compression).abs(), force.abs()];
-        if let (Some(friction), Some((force, _))) = (&self.row.friction, self.friction(at, stiffening)) {
+        if let (Some(friction), Some((force, _))) = (&self.friction, self.friction(at, stiffening)) {
             let force = force / (friction.stiffness * stiffening);
             error = [error[0].max((force - at.drag).length()), error[1].max(force.length())];
         }
@@ -179,7 +197,7 @@ impl Spring {
 
     /// The limit of the friction force, N, that follows from the contact's push, and the present one.
     pub fn grips(&self, at: &Deflection, stiffening: f64) -> Option<[f64; 2]> {
-        let friction = self.row.friction.as_ref()?;
+        let friction = self.friction.as_ref()?;
         Some([friction.coefficient * self.force(at, stiffening).0, at.grip])
     }
 
@@ -192,10 +210,10 @@ impl Spring {
             Grips::Follow => self.grips(at, stiffening).map_or(0.0, |[next, _]| next),
         };
         if self.is_rigid() {
-            let next = self.force(at, stiffening).0 / (self.row.stiffness * stiffening * factor);
+            let next = self.force(at, stiffening).0 / (self.stiffness * stiffening * factor);
             at.gap += at.compression - next;
             at.compression = next;
-            if let Some(friction) = &self.row.friction {
+            if let Some(friction) = &self.friction {
                 let force = self.friction(at, stiffening).map_or(DVec3::ZERO, |(force, _)| force);
                 // More than the limit cannot be kept.
                 let next = force.clamp_length_max(grip) / (friction.stiffness * stiffening * factor);
