@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tesdf::Progress;
-use tesdf_sim::criterion::{RestReport, ScrewReport};
+use tesdf_sim::criterion::{InsertionReport, RestReport, ScrewReport};
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{HiddenPair, InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
@@ -339,6 +339,9 @@ fn print(args: &Args, summary: &Summary) -> Result<(), Failure> {
     if let Some(rest) = &summary.rest {
         rows.extend(rest_rows(rest));
     }
+    if let Some(insertion) = &summary.insertion {
+        rows.extend(insertion_rows(insertion));
+    }
     report::table(&rows)
 }
 
@@ -374,6 +377,35 @@ fn rest_rows(rest: &RestReport) -> Vec<(&'static str, String)> {
         ("energy gain", format!("{:.2e} J", rest.energy_gain)),
     ];
     rows.extend(verdict_rows(&rest.failures));
+    rows
+}
+
+fn insertion_rows(insertion: &InsertionReport) -> Vec<(&'static str, String)> {
+    let seated = insertion.seated_at.map_or("not seated".into(), |time| format!("seated at {time:.4} s"));
+    let mut rows = vec![
+        ("insertion", format!("{:.4} mm, {seated}", insertion.travel * 1e3)),
+        (
+            "play",
+            format!(
+                "at most {:.1} µm across the axis and {:.2} mrad of tilt",
+                insertion.offset * 1e6,
+                insertion.tilt * 1e3
+            ),
+        ),
+        (
+            "clearance",
+            format!(
+                "at most {:.3} µm of penetration, in {}",
+                insertion.penetration * 1e6,
+                report::count(insertion.measurements, "exact measurement")
+            ),
+        ),
+        (
+            "energy gain",
+            format!("{:.2e} J; {:.2e} J kinetic when settled", insertion.energy_gain, insertion.jitter),
+        ),
+    ];
+    rows.extend(verdict_rows(&insertion.failures));
     rows
 }
 

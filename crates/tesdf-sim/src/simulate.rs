@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::criterion::{JointDrift, RestReport, ScrewReport, Trackers};
+use crate::criterion::{InsertionReport, JointDrift, Reports, RestReport, ScrewReport, Trackers};
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
 use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
@@ -65,6 +65,8 @@ pub struct Summary {
     pub screw: Option<ScrewReport>,
     /// Result of the rest criterion, if the scene has one.
     pub rest: Option<RestReport>,
+    /// Result of the insertion criterion, if the scene has one.
+    pub insertion: Option<InsertionReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
 }
@@ -180,10 +182,9 @@ pub fn simulate_from(
     let system = engine.system();
     let hidden = record.hidden_pairs();
     let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
-    let (screw, rest) = trackers.report(system, &messages);
-    let failures = [screw.as_ref().map(|screw| &screw.failures), rest.as_ref().map(|rest| &rest.failures)];
-    let failures: Vec<_> = failures.into_iter().flatten().collect();
-    let passed = (!failures.is_empty()).then(|| failures.iter().all(|failures| failures.is_empty()));
+    let mut reports = trackers.report(system, &messages);
+    let passed = reports.passed();
+    let Reports { screw, rest, insertion } = reports;
     let sums = totals.summary();
     let depths = hidden.iter().map(|pair| pair.depth);
     let (momentum, angular_momentum) = system.momentum();
@@ -197,6 +198,7 @@ pub fn simulate_from(
         passed,
         screw,
         rest,
+        insertion,
         deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
         hidden,
         ..sums

@@ -1,7 +1,9 @@
 //! Success criteria of a run.
+mod insertion;
 mod rest;
 mod screw;
 
+pub use insertion::{InsertionCriterion, InsertionReport, InsertionTracker};
 pub use rest::{RestCriterion, RestReport, RestTracker};
 pub use screw::{ScrewCriterion, ScrewReport, ScrewTracker, screw_acceleration};
 
@@ -24,16 +26,21 @@ pub struct JointDrift {
 pub(crate) struct Trackers {
     screw: Option<ScrewTracker>,
     rest: Option<RestTracker>,
+    insertion: Option<InsertionTracker>,
     drift: JointDrift,
 }
 
 impl Trackers {
     /// Trackers that start from the current state of `system`.
     pub(crate) fn new(section: &CriterionSection, system: &System) -> Result<Self, String> {
-        let CriterionSection { screw, rest } = section;
+        let CriterionSection { screw, rest, insertion } = section;
         Ok(Self {
             screw: screw.as_ref().map(|screw| ScrewTracker::new(screw, system)).transpose()?,
             rest: rest.as_ref().map(|rest| RestTracker::new(rest, system)).transpose()?,
+            insertion: insertion
+                .as_ref()
+                .map(|insertion| InsertionTracker::new(insertion, system))
+                .transpose()?,
             drift: JointDrift::default(),
         })
     }
@@ -45,6 +52,9 @@ impl Trackers {
         }
         if let Some(rest) = &mut self.rest {
             rest.observe(system, time_step);
+        }
+        if let Some(insertion) = &mut self.insertion {
+            insertion.observe(system, time_step);
         }
         for joint in system.joints() {
             let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
@@ -59,19 +69,37 @@ impl Trackers {
     }
 
     /// Compares the run so far with the criteria. `failures` are added to those of each criterion.
-    pub(crate) fn report(
-        &self,
-        system: &System,
-        failures: &[String],
-    ) -> (Option<ScrewReport>, Option<RestReport>) {
-        let mut screw = self.screw.as_ref().map(|screw| screw.report(system));
-        let mut rest = self.rest.as_ref().map(RestTracker::report);
-        if let Some(screw) = &mut screw {
-            screw.failures.extend_from_slice(failures);
-        }
-        if let Some(rest) = &mut rest {
-            rest.failures.extend_from_slice(failures);
-        }
-        (screw, rest)
+    pub(crate) fn report(&self, system: &System, failures: &[String]) -> Reports {
+        let mut reports = Reports {
+            screw: self.screw.as_ref().map(|screw| screw.report(system)),
+            rest: self.rest.as_ref().map(RestTracker::report),
+            insertion: self.insertion.as_ref().map(InsertionTracker::report),
+        };
+        reports.failures_mut().for_each(|of_one| of_one.extend_from_slice(failures));
+        reports
+    }
+}
+
+/// Results of the criteria of a scene.
+#[derive(Clone, Debug)]
+pub(crate) struct Reports {
+    pub(crate) screw: Option<ScrewReport>,
+    pub(crate) rest: Option<RestReport>,
+    pub(crate) insertion: Option<InsertionReport>,
+}
+
+impl Reports {
+    /// Whether all criteria hold; `None` when there are none.
+    pub(crate) fn passed(&mut self) -> Option<bool> {
+        let mut failures = self.failures_mut().peekable();
+        failures.peek().is_some().then(|| failures.all(|failures| failures.is_empty()))
+    }
+
+    fn failures_mut(&mut self) -> impl Iterator<Item = &mut Vec<String>> {
+        let Self { screw, rest, insertion } = self;
+        let screw = screw.as_mut().map(|screw| &mut screw.failures);
+        let rest = rest.as_mut().map(|rest| &mut rest.failures);
+        let insertion = insertion.as_mut().map(|insertion| &mut insertion.failures);
+        [screw, rest, insertion].into_iter().flatten()
     }
 }

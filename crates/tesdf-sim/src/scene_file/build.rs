@@ -69,6 +69,10 @@ impl LoadedScene {
         if let Some(rest) = &scene.criterion.rest {
             rest.validate().map_err(|reason| self.value("criterion.rest", reason))?;
         }
+        if let Some(insertion) = &scene.criterion.insertion {
+            let failed = |reason| self.value("criterion.insertion", reason);
+            insertion.validate(&system).map_err(failed)?;
+        }
         Ok(system)
     }
 

@@ -56,7 +56,7 @@ pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
 
-use crate::criterion::{RestCriterion, ScrewCriterion};
+use crate::criterion::{InsertionCriterion, RestCriterion, ScrewCriterion};
 use crate::newton::NewtonOptions;
 use crate::script::Script;
 use crate::{JointKind, Motor};
@@ -289,4 +289,6 @@ pub struct CriterionSection {
     pub screw: Option<ScrewCriterion>,
     /// The bodies must stay where they are.
     pub rest: Option<RestCriterion>,
+    /// A body must slide into another one and seat.
+    pub insertion: Option<InsertionCriterion>,
 }
