@@ -2,6 +2,7 @@
 //!
 //! - [`detection`]: `tesdf bench`.
 //! - [`evaluate`]: `tesdf evaluate`.
+//! - [`voxel`]: voxel grids, which Table III compares with.
 //!
 //! [`preset`] has the presets of the encoder that they compare.
 //!
@@ -13,3 +14,4 @@ pub mod detection;
 pub mod evaluate;
 pub mod heading;
 pub mod preset;
+pub mod voxel;
