@@ -2,7 +2,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, Instance, Pose, Scene, Shape, ShapeId, Velocity,
+    CollideError, CollideOptions, Contacts, Instance, Pose, Scene, Shape, ShapeId, Velocity, detect,
 };
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::newton::{Newton, NewtonOptions};
@@ -294,6 +294,30 @@ fn a_long_chain_holds_together() {
         let (way, angle) = drift(engine.system());
         assert!(way < 1e-4 && angle < 1e-6, "step {step}: {way:e} m, {angle:e} rad");
         assert!(energy(engine.system()) <= start + 1e-6 * start.abs().max(1.0), "step {step}");
+    }
+}
+
+/// A motor pushes a light finger by 2.5 mm in a step, through a plate of 1 mm. Gravity alone moves
+/// nothing, so the first detection does not look that far.
+#[test]
+fn a_motor_does_not_push_a_finger_through_a_plate() {
+    let mut system = System::new(DVec3::ZERO);
+    let plate = system.add_shape(Shape::Box { half_extents: DVec3::new(0.05, 0.05, 5e-4) }).unwrap();
+    system.add("plate", Instance::new(plate, Pose::IDENTITY), Mass::Fixed).unwrap();
+    let shape = Shape::Sphere { radius: 1e-3 };
+    let mass = MassProperties::of_shape(&shape, 1.0, 1000.0).unwrap().with_mass(0.1).unwrap();
+    let finger = system.add_shape(shape).unwrap();
+    let start = Pose::at(DVec3::new(0.0, 0.0, 2e-3));
+    let finger = system.add("finger", Instance::new(finger, start), Mass::Free(mass)).unwrap();
+    let slider = Joint::new("slider", JointKind::Slider, (None, finger), [Pose::IDENTITY, start], start);
+    let motor = Some(Motor { drive: Drive::Force(-20.0), limit: 20.0 });
+    system.add_joint(Joint { motor, ..slider }).unwrap();
+    let collide = CollideOptions { contact_distance: 1e-4, ..CollideOptions::default() };
+    let mut engine = Newton::new(system, detect, collide, NewtonOptions::default()).unwrap();
+    for step in 0..20 {
+        engine.step(5e-3).unwrap();
+        let height = engine.system().states()[finger].pose.translation.z;
+        assert!(height > 1.5e-3 - 1e-6, "step {step}: {height}");
     }
 }
 

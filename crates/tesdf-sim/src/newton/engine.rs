@@ -64,6 +64,9 @@ struct Step {
     report: StepReport,
 }
 
+/// The velocities of the free bodies that move the poses, and those that the next step starts from.
+type Velocities = [Vec<Vector6<f64>>; 2];
+
 /// For each pair of instances and feature of the first one: how far it is below the skin at the
 /// beginning of the step, m.
 struct Depths {
@@ -83,6 +86,9 @@ struct Found {
     /// The way by which the contact slides in the step, m.
     way: f64,
 }
+
+/// Maximum number of further detections in a step when bodies are faster than was foreseen.
+const MORE_LOOKS: u32 = 2;
 
 /// A contact that slides is lifted by at most this share of its way.
 const LIFT: f64 = 0.01;
@@ -341,12 +347,37 @@ impl Newton {
         Problem::new(bodies, of(&step.target), rows, step.h).minimise(of(start), &self.options)
     }
 
+    /// Detects as far ahead as the velocities of `ahead` move the bodies, and solves.
+    fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<(Contacts, Velocities), DynamicsError> {
+        // What an earlier look did not reach is of no account.
+        step.report.converged = true;
+        let found = self.detect(step, ahead)?;
+        let velocities = self.velocities(step, found.as_slice())?;
+        Ok((found, velocities))
+    }
+
+    /// Whether a body moves farther at `velocities` than the detection looked, which was `ahead`. Such
+    /// bodies get these velocities in `ahead`.
+    fn outrun(&self, step: &Step, ahead: &mut [State], velocities: &[Vector6<f64>]) -> bool {
+        let mut outrun = false;
+        // Bodies that overlap deeply are pushed apart, not into others.
+        let bodies = step.free.iter().zip(velocities).zip(&step.deep).filter(|(_, deep)| !**deep);
+        for ((free, v), _) in bodies {
+            let (linear, angular) = unpack(v);
+            let seen = &mut ahead[free.body];
+            let size = self.sizes[free.body];
+            let way = |linear: DVec3, angular: DVec3| step.h * (linear.length() + angular.length() * size);
+            let range = self.options.speculation * way(seen.linear, seen.angular)
+                + 0.5 * self.collide.contact_distance;
+            if way(linear, angular) > range {
+                (seen.linear, seen.angular, outrun) = (linear, angular, true);
+            }
+        }
+        outrun
+    }
+
     /// The velocities that move the poses, and the velocities that the next step starts from.
-    fn velocities(
-        &mut self,
-        step: &mut Step,
-        contacts: &[Contact],
-    ) -> Result<[Vec<Vector6<f64>>; 2], DynamicsError> {
+    fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
         let mut contact_rows = self.first_rows(step, contacts);
         let joints = joint_rows(&self.bodies(step), step.h);
         let rows = [contact_rows.as_slice(), &joints].concat();
@@ -384,6 +415,13 @@ impl Newton {
     }
 }
 
+/// Gives the free bodies these velocities.
+fn set_velocities(states: &mut [State], free: &[FreeBody], velocities: &[Vector6<f64>]) {
+    for (free, v) in free.iter().zip(velocities) {
+        (states[free.body].linear, states[free.body].angular) = unpack(v);
+    }
+}
+
 impl Dynamics for Newton {
     fn system(&self) -> &System {
         &self.system
@@ -409,17 +447,18 @@ impl Dynamics for Newton {
         }
         let mut step = self.begin(time_step);
         // The detection must reach as far as the step can move the bodies, so it uses the
-        // velocities after gravity.
+        // velocities after gravity. Motors and joints can make a body faster than that.
         let mut ahead = self.system.states().to_vec();
-        for (free, target) in step.free.iter().zip(&step.target) {
-            (ahead[free.body].linear, ahead[free.body].angular) = unpack(target);
+        set_velocities(&mut ahead, &step.free, &step.target);
+        let (mut found, [mut velocities, mut carried]) = self.look(&mut step, &ahead)?;
+        for _ in 0..MORE_LOOKS {
+            if !self.outrun(&step, &mut ahead, &velocities) {
+                break;
+            }
+            (found, [velocities, carried]) = self.look(&mut step, &ahead)?;
         }
-        let found = self.detect(&mut step, &ahead)?;
-        let [velocities, carried] = self.velocities(&mut step, found.as_slice())?;
         let mut states = self.moved(&step, &velocities);
-        for (free, v) in step.free.iter().zip(&carried) {
-            (states[free.body].linear, states[free.body].angular) = unpack(v);
-        }
+        set_velocities(&mut states, &step.free, &carried);
         self.system.set_states(states)?;
         let mut report = step.report;
         report.contacts = found.len();
