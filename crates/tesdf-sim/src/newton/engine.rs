@@ -5,7 +5,7 @@ use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, Pose, Scene,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, Mode, Pose, Scene,
 };
 
 use super::NewtonOptions;
@@ -64,6 +64,10 @@ struct Step {
     report: StepReport,
 }
 
+/// The contacts of faces at the beginning of the step, sorted by their features, and their points in
+/// the frame of *a*.
+struct Before(Vec<(Contact, DVec3)>);
+
 /// The velocities of the free bodies that move the poses, and those that the next step starts from.
 type Velocities = [Vec<Vector6<f64>>; 2];
 
@@ -89,6 +93,10 @@ struct Found {
 
 /// Maximum number of further detections in a step when bodies are faster than was foreseen.
 const MORE_LOOKS: u32 = 2;
+
+/// Directions at the beginning and the end of a step are averaged when the cosine of their angle is
+/// above this: the contact crosses an edge of a curved surface. Sharper edges are two surfaces.
+const SAME_SURFACE: f64 = 0.97;
 
 /// A contact that slides is lifted by at most this share of its way.
 const LIFT: f64 = 0.01;
@@ -249,10 +257,14 @@ impl Newton {
         poses: &[Pose],
         velocities: &[Vector6<f64>],
         depths: &Depths,
+        before: &Before,
     ) -> Vec<Row> {
         let row = |(contact, normal): (&Contact, DVec3)| {
             let contact = &Contact { normal, ..*contact };
             let Found { mut row, skin, way, .. } = self.row(step, contact, poses)?;
+            if let Some(before) = before.of(contact, self.point_of_a(contact, poses)?) {
+                row.average(&self.row(step, before, &step.poses)?.row);
+            }
             let gap = row.gap - step.h * row.rate(velocities);
             // A face may have several contacts, and its deepest one is not at this place. The body
             // must not sink in here by the depth there.
@@ -282,12 +294,32 @@ impl Newton {
         deep
     }
 
+    /// The contacts whose directions the predicted ones are averaged with. With those of the end alone, a
+    /// body that crosses an edge is braked or driven on by it; the mean over the step does neither.
+    /// Contacts of vertices stay as they are: for gears the mean was worse.
+    fn before(&self, step: &Step, contacts: &[Contact]) -> Before {
+        if self.collide.mode == Mode::Node {
+            return Before(Vec::new());
+        }
+        let turned = contacts.iter().zip(normals(contacts)).map(|(c, normal)| Contact { normal, ..*c });
+        let mut before: Vec<_> =
+            turned.filter_map(|c| Some((c, self.point_of_a(&c, &step.poses)?))).collect();
+        before.sort_by_key(|(contact, _)| feature(contact));
+        Before(before)
+    }
+
+    /// The point of *a* of a contact that was found at `poses`, in the frame of *a*.
+    fn point_of_a(&self, contact: &Contact, poses: &[Pose]) -> Option<DVec3> {
+        let pose = poses[self.system.body_of(contact.instance_a)?];
+        Some(pose.rotation.inverse() * (contact.point_a - pose.translation))
+    }
+
     /// How far the contacts at the beginning of the step are below their skins.
     fn depths(&self, contacts: &[Contact]) -> Depths {
         let depth = |c: &Contact| {
             let [a, b] = [c.instance_a, c.instance_b].map(|id| self.system.body_of(id));
             let depth = self.skin(a?, b?) - c.distance;
-            (depth > 0.0).then_some(((c.instance_a, c.instance_b, c.feature.a), depth))
+            (depth > 0.0).then_some((feature(c), depth))
         };
         let mut depths: Vec<_> = contacts.iter().filter_map(depth).collect();
         // The deepest contact of each key comes first, because a face may touch in several cells.
@@ -393,11 +425,13 @@ impl Newton {
         let mut velocities = self.solve(step, &rows, Gap::Position, &start);
         if rows.iter().any(|row| !stays(row)) {
             let depths = self.depths(contacts);
+            let before = self.before(step, contacts);
             for _ in 0..self.options.redetections {
                 let predicted = self.moved(step, &velocities);
                 let contacts = self.detect(step, &predicted)?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
-                let mut next = self.predicted_rows(step, contacts.as_slice(), &poses, &velocities, &depths);
+                let mut next =
+                    self.predicted_rows(step, contacts.as_slice(), &poses, &velocities, &depths, &before);
                 next.retain(|row| !stays(row));
                 next.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
                 next.extend_from_slice(&joints);
@@ -475,6 +509,24 @@ impl Dynamics for Newton {
     fn hidden(&self) -> &[HiddenOverlap] {
         &self.found.hidden
     }
+}
+
+impl Before {
+    /// The contact of the same face of *a* whose point is nearest to that of `contact`, which is
+    /// `point` in the frame of *a*.
+    fn of(&self, contact: &Contact, point: DVec3) -> Option<&Contact> {
+        let key = feature(contact);
+        let first = self.0.partition_point(|(c, _)| feature(c) < key);
+        let same = self.0[first..].iter().take_while(|(c, _)| feature(c) == key);
+        let same = same.filter(|(c, _)| c.normal.dot(contact.normal) > SAME_SURFACE);
+        let nearest = same.min_by(|(_, p), (_, q)| p.distance(point).total_cmp(&q.distance(point)));
+        nearest.map(|(contact, _)| contact)
+    }
+}
+
+/// The face or vertex of a contact.
+fn feature(contact: &Contact) -> (InstanceId, InstanceId, u32) {
+    (contact.instance_a, contact.instance_b, contact.feature.a)
 }
 
 impl Depths {

@@ -57,14 +57,18 @@ const STIFFENING: f64 = 10.0;
 /// faces on each other.
 const ROUNDS: u32 = 8;
 
-/// Maximum number of times that forces are raised where contacts have friction, whose limits lag.
-const ROUNDS_WITH_FRICTION: u32 = 16;
+/// Maximum number of further times where contacts have friction, until its limits have settled.
+const ROUNDS_OF_FRICTION: u32 = 16;
 
 /// Springs do not become stiffer than this factor. More would leave no digits to the masses.
 const STIFFEST: f64 = 1e8;
 
+/// The same while the limits of friction follow: the stiffer the springs, the more the pushes of contacts
+/// that share a load differ from one minimisation to the next.
+const STIFFEST_UNSETTLED: f64 = 1e4;
+
 /// The limits of friction have settled when their changes are less than this share of them.
-const LAG: f64 = 1e-3;
+const LAG: f64 = 3e-3;
 
 /// Limits of friction below this share of the forces that would stop the bodies do not matter.
 const NO_LIMIT: f64 = 1e-6;
@@ -151,7 +155,7 @@ impl Part<'_> {
         let (mut iterations, mut converged) = self.descend(at, options);
         let [_, most] = self.error(at);
         let rounds = match at.grips {
-            Grips::Follow => ROUNDS_WITH_FRICTION,
+            Grips::Follow => ROUNDS_OF_FRICTION + ROUNDS,
             Grips::Stay => ROUNDS,
         };
         for _ in 0..rounds {
@@ -222,7 +226,11 @@ impl Part<'_> {
 
     /// Gives each rigid row its present force as the force at zero deflection, and stiffens it.
     fn raise(&self, at: &mut Iterate) {
-        let factor = STIFFENING.min(STIFFEST / at.stiffening);
+        let stiffest = match at.grips {
+            Grips::Follow => STIFFEST_UNSETTLED,
+            Grips::Stay => STIFFEST,
+        };
+        let factor = STIFFENING.min(stiffest / at.stiffening);
         for (spring, deflection) in self.springs.iter().zip(&mut at.deflections) {
             spring.keep(deflection, at.stiffening, factor, at.grips);
         }

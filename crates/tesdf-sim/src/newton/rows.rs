@@ -89,6 +89,15 @@ impl Row {
         self.sides.iter().flatten().map(|(free, jacobian)| jacobian.dot(&velocity[*free])).sum()
     }
 
+    /// Takes the mean of the directions of this row and of `other`, which has the same bodies.
+    pub fn average(&mut self, other: &Self) {
+        for (side, other) in self.sides.iter_mut().zip(&other.sides) {
+            if let (Some((_, j)), Some((_, k))) = (side, other) {
+                *j = 0.5 * (*j + k);
+            }
+        }
+    }
+
     /// J M⁻¹ Jᵀ: the rate that an impulse of 1 causes.
     pub fn weight(sides: &[Option<(usize, Vector6<f64>)>; 2], free: &[FreeBody]) -> f64 {
         sides.iter().flatten().map(|(k, j)| j.dot(&(free[*k].inverse * j))).sum()
