@@ -115,3 +115,43 @@ fn a_folder_that_cannot_be_made_is_reported_before_the_work() {
     assert_eq!(code, Some(2));
     assert!(err.contains("cannot make the folder file/results"), "{err}");
 }
+
+#[test]
+fn the_quick_table_3_has_encoded_meshes_that_succeed_beside_voxels_and_the_paper() {
+    let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").display().to_string();
+    let folder = Folder::new();
+    folder.good(&["evaluate", "table3", "--quick", "--scenes", &scenes, "-o", "results"]);
+    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
+    let table: Value = serde_json::from_str(&read("results/table3.json")).unwrap();
+    let cells = table["cells"].as_array().unwrap();
+    // Two scenes, each with voxels and encoded.
+    assert_eq!(cells.len(), 4);
+    for cell in cells {
+        assert_eq!(cell["success"] == true, cell["failures"].as_array().unwrap().is_empty(), "{cell:#}");
+        assert!(cell["contacts"].as_f64() > Some(100.0), "{cell:#}");
+        if cell["voxels"].is_null() {
+            assert_eq!(cell["success"], true, "{cell:#}");
+            let tolerance = cell["tolerance_um"].as_f64().unwrap();
+            assert!(cell["penetration_um"].as_f64().unwrap() < 0.1 * tolerance, "{cell:#}");
+        }
+    }
+    let grids = table["voxels"].as_array().unwrap();
+    assert_eq!(grids.len(), 4, "a grid for each body");
+    for grid in grids {
+        assert!(grid["sparse_bytes"].as_u64() < grid["dense_bytes"].as_u64(), "{grid:#}");
+        let error = grid["accuracy"]["max_error"].as_f64().unwrap();
+        assert!(error > 0.0 && error < grid["voxel"].as_f64().unwrap(), "{grid:#}");
+    }
+    for encoded in table["encoded"].as_array().unwrap() {
+        assert!(encoded["whole_bytes"].as_u64() < Some(10_000_000), "{encoded:#}");
+    }
+    assert_eq!(read("results/table3.csv").lines().count(), 5);
+    let md = read("results/table3.md");
+    for part in [
+        "`tesdf evaluate table3 --quick",
+        "## bolt-nut: 100 µm",
+        "| 5 | *paper* | F/F/F | node S/S/S, face S/S/S |",
+    ] {
+        assert!(md.contains(part), "{part}: {md}");
+    }
+}

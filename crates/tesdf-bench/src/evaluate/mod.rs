@@ -1,9 +1,10 @@
-//! `tesdf evaluate table1|table4`: measures Tables I and IV of the paper, next to the paper's
-//! figures.
+//! `tesdf evaluate table1|table3|table4`: measures Tables I, III and IV of the paper, next to the
+//! paper's figures.
 //!
 //! The meshes of the repository (`meshes`) are encoded in a domain with both encoders, with full
 //! and with truncated lists (`measure`). The assets are compared with exact distances on a grid.
-//! The rows (`table1`, `table4`) are printed as Markdown, CSV or JSON.
+//! The rows (`table1`, `table4`) are printed as Markdown, CSV or JSON. Table III simulates two scenes
+//! with voxel grids and with encoded meshes (`table3`).
 mod deformed;
 mod domains;
 mod measure;
@@ -11,13 +12,15 @@ mod meshes;
 mod output;
 mod paper;
 mod table1;
+mod table3;
 mod table4;
 
 use std::path::PathBuf;
 
 use crate::preset::Preset;
-use meshes::Mesh;
+use meshes::{MESHES, Mesh};
 use output::Sink;
+use tesdf::domain::tetrahedra_files;
 use tesdf::evaluate::EvaluateOptions;
 
 use tesdf_terminal::device::{self, Choice};
@@ -38,6 +41,9 @@ pub enum Table {
     /// Table I: memory, largest error and bands of several meshes, with full lists and with at most
     /// 32 faces per list
     Table1(TableArgs),
+    /// Table III: a nut on its bolt and a peg in its hole, simulated with voxel grids of several
+    /// resolutions and with encoded meshes; success or the kind of failure, and memory
+    Table3(table3::Args),
     /// Table IV: the same figures for the shaft, with at most 32, 64, ... 288 faces per list
     Table4(TableArgs),
 }
@@ -70,6 +76,14 @@ pub struct TableArgs {
     /// Folder of the meshes: `data` of the repository
     #[arg(long, value_name = "FOLDER", default_value = "data")]
     pub data: PathBuf,
+    /// Where the result goes.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+/// Format and destination of a table.
+#[derive(clap::Args, Clone, Debug)]
+pub struct OutputArgs {
     /// Format of the result
     #[arg(long, value_enum, default_value_t = Format::Md)]
     pub format: Format,
@@ -103,6 +117,11 @@ pub enum Format {
 }
 
 impl TableArgs {
+    /// The files of all meshes, which no output may replace.
+    fn mesh_files(&self) -> Vec<PathBuf> {
+        MESHES.iter().flat_map(|mesh| tetrahedra_files(self.data.join(mesh.path))).collect()
+    }
+
     fn evaluate_options(&self) -> EvaluateOptions {
         let usual = if self.quick { 64 } else { 1 << 10 };
         EvaluateOptions { fineness: self.grid.unwrap_or(usual), ..EvaluateOptions::default() }
@@ -124,8 +143,9 @@ impl TableArgs {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     // The output files are opened before the work, which takes minutes to hours.
     match &args.table {
-        Table::Table1(args) => table1::run(args, &Sink::open(args, "table1")?)?,
-        Table::Table4(args) => table4::run(args, &Sink::open(args, "table4")?)?,
+        Table::Table1(args) => table1::run(args, &Sink::open(&args.output, "table1", &args.mesh_files())?)?,
+        Table::Table4(args) => table4::run(args, &Sink::open(&args.output, "table4", &args.mesh_files())?)?,
+        Table::Table3(args) => table3::run(args)?,
     }
     Ok(Outcome::Good)
 }

@@ -1,11 +1,11 @@
 //! Formats tables as text.
+use std::path::PathBuf;
+
 use serde::Serialize;
-use tesdf::domain::tetrahedra_files;
 use tesdf::evaluate::BandReport;
 use tesdf::save::Destination;
 
-use super::meshes::MESHES;
-use super::{Format, TableArgs};
+use super::{Format, OutputArgs};
 use tesdf_terminal::output;
 use tesdf_terminal::report::{self, Failure};
 
@@ -44,18 +44,17 @@ pub enum Sink {
 }
 
 impl Sink {
-    /// The destination in the arguments. Its folder is created if necessary.
+    /// The destination in the arguments. Its folder is created if necessary. `inputs` are files that
+    /// must not be replaced.
     ///
     /// # Errors
-    /// A file cannot be written, or is one of the meshes.
-    pub fn open(args: &TableArgs, name: &str) -> Result<Self, Failure> {
+    /// A file cannot be written, or is one of the inputs.
+    pub fn open(args: &OutputArgs, name: &str, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let Some(folder) = &args.output else { return Ok(Self::Stdout(args.format)) };
         std::fs::create_dir_all(folder)
             .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", folder.display())))?;
-        let meshes: Vec<_> =
-            MESHES.iter().flat_map(|mesh| tetrahedra_files(args.data.join(mesh.path))).collect();
         let open =
-            |extension| output::open(&folder.join(format!("{name}.{extension}")), &meshes, args.consent);
+            |extension| output::open(&folder.join(format!("{name}.{extension}")), inputs, args.consent);
         Ok(Self::Files([open("json")?, open("csv")?, open("md")?]))
     }
 

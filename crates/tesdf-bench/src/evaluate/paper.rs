@@ -1,6 +1,6 @@
 //! The figures of the paper: H. Ji, Y. Lee, D. Lee, *TE-SDF: Tetra-Encoded Signed Distance Field
-//! for Memory-Efficient and Accurate Collision Detection*, Tables I and IV. Memory is in MiB;
-//! `docs/paper-map.md` gives the reason.
+//! for Memory-Efficient and Accurate Collision Detection*, Tables I, III and IV. Memory is in MiB;
+//! `docs/paper-map.md` gives the reason. Table III prints it as Mb.
 
 /// A row of Table I. Pairs are for full lists and for E_max = 32.
 pub struct Table1 {
@@ -117,6 +117,38 @@ pub const TABLE_1: [Table1; 7] = [
 pub fn table_1(name: &str) -> Option<&'static Table1> {
     TABLE_1.iter().find(|row| row.name == name)
 }
+
+/// One half of Table III. A cell has a letter for each tolerance: S for success, F for failure.
+pub struct Table3 {
+    /// Quality settings of the moving and the fixed body, for each voxel column.
+    pub qualities: [[u32; 2]; 4],
+    /// Time step, ms, and the cells of the voxel columns, of Node-TES and of Face-TES.
+    pub rows: [(f64, [&'static str; 6]); 3],
+    /// Memory of the voxel columns and of TES, as printed.
+    pub memory: [f64; 5],
+}
+
+/// Table III, bolt and nut: tolerances of 100, 50 and 25 µm.
+pub const TABLE_3_NUT: Table3 = Table3 {
+    qualities: [[256, 256], [512, 512], [512, 1024], [1024, 1024]],
+    rows: [
+        (1.0, ["F/F/F", "S/F/F", "S/S/F", "S/S/F", "S/S/S", "S/S/S"]),
+        (3.0, ["F/F/F", "S/F/F", "S/S/F", "S/S/F", "S/S/S", "S/S/S"]),
+        (5.0, ["F/F/F", "S/F/F", "S/S/F", "S/S/F", "S/S/S", "S/S/S"]),
+    ],
+    memory: [15.82, 126.26, 502.08, 1007.52, 3.69],
+};
+
+/// Table III, peg in hole: tolerances of 150, 100 and 50 µm.
+pub const TABLE_3_PEG: Table3 = Table3 {
+    qualities: [[256, 512], [512, 256], [512, 512], [1024, 1024]],
+    rows: [
+        (1.0, ["F/F/F", "S/S/F", "S/S/F", "S/S/S", "S/S/S", "S/S/S"]),
+        (3.0, ["S/F/F", "S/S/F", "S/S/F", "S/S/S", "S/S/S", "S/S/S"]),
+        (5.0, ["S/F/F", "S/S/F", "S/S/F", "S/S/S", "S/S/S", "S/S/S"]),
+    ],
+    memory: [70.20, 45.54, 102.41, 815.03, 2.59],
+};
 
 /// A column of Table IV.
 pub struct Table4 {

@@ -1,0 +1,205 @@
+//! Table III: success, failures and memory of voxel grids and of encoded meshes in two tight fits.
+mod cell;
+mod memory;
+mod scenario;
+mod text;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use serde::Serialize;
+use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene, detect};
+use tesdf_sim::newton::Detect;
+use tesdf_sim::scene_file::LoadedScene;
+
+use super::OutputArgs;
+use super::output::Sink;
+use crate::voxel::VoxelDetector;
+use cell::{Cell, Setup};
+use memory::{Encoded, Grids, Voxels, geometries};
+pub use scenario::Scenario;
+use tesdf_terminal::device::{self, Choice};
+use tesdf_terminal::progress::Bar;
+use tesdf_terminal::report::{Failure, note};
+
+/// Arguments of Table III.
+#[derive(clap::Args, Clone, Debug)]
+pub struct Args {
+    /// Scenes, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "bolt-nut,peg-in-hole")]
+    pub scenarios: Vec<Scenario>,
+    /// Time steps in ms, separated by commas [default: 1,3,5; with --quick 5]
+    #[arg(long, value_name = "MS", value_delimiter = ',')]
+    pub time_steps: Option<Vec<f64>>,
+    /// Tolerances in µm, separated by commas; a scene takes those that it has [default: all; with
+    /// --quick the largest]
+    #[arg(long, value_name = "UM", value_delimiter = ',')]
+    pub tolerances: Option<Vec<u32>>,
+    /// Number of voxel columns, from the lowest quality on [default: 4; with --quick 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=4))]
+    pub qualities: Option<u8>,
+    /// What is tested against the distance fields [default: node,face; with --quick node]
+    #[arg(long, value_enum, value_delimiter = ',')]
+    pub features: Option<Vec<Features>>,
+    /// Where contacts with encoded meshes are found
+    #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("contacts with encoded meshes are found"))]
+    pub device: Choice,
+    /// Run one time step, tolerance and voxel quality of each scene, and the nut for 0.06 s
+    #[arg(long)]
+    pub quick: bool,
+    /// Folder of the scenes: `scenes` of the repository, beside `data`
+    #[arg(long, value_name = "FOLDER", default_value = "scenes")]
+    pub scenes: PathBuf,
+    /// Where the result goes.
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+/// What of a body is tested against the distance field of another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "snake_case")]
+pub enum Features {
+    /// The vertices
+    Node,
+    /// The faces, by Frank–Wolfe
+    Face,
+}
+
+impl Features {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Node => "node",
+            Self::Face => "face",
+        }
+    }
+}
+
+/// The output of `--format json`.
+#[derive(Serialize)]
+struct Table {
+    table: u32,
+    quick: bool,
+    encoded: Vec<Encoded>,
+    voxels: Vec<Voxels>,
+    cells: Vec<Cell>,
+}
+
+/// A detector that several engines use, one after the other.
+#[derive(Clone)]
+struct Shared(Arc<dyn Detect>);
+
+impl Detect for Shared {
+    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
+        self.0.detect(scene, options)
+    }
+}
+
+impl Args {
+    fn tolerances(&self, scenario: Scenario) -> Vec<u32> {
+        let all = scenario.tolerances();
+        match (&self.tolerances, self.quick) {
+            (Some(chosen), _) => all.into_iter().filter(|t| chosen.contains(t)).collect(),
+            (None, true) => vec![all[0]],
+            (None, false) => all.to_vec(),
+        }
+    }
+
+    fn qualities(&self, scenario: Scenario) -> &'static [[u32; 2]] {
+        let count = self.qualities.unwrap_or(if self.quick { 1 } else { 4 });
+        &scenario.paper().qualities[..usize::from(count)]
+    }
+
+    fn time_steps(&self) -> Vec<f64> {
+        self.time_steps.clone().unwrap_or(if self.quick { vec![5.0] } else { vec![1.0, 3.0, 5.0] })
+    }
+
+    fn features(&self) -> Vec<Features> {
+        let usual = if self.quick { vec![Features::Node] } else { vec![Features::Node, Features::Face] };
+        self.features.clone().unwrap_or(usual)
+    }
+}
+
+/// Runs all cells, and prints the table.
+///
+/// # Errors
+/// A scene or mesh cannot be read, the device is missing, or the result cannot be written.
+pub fn run(args: &Args) -> Result<(), Failure> {
+    if let Some(step) = args.time_steps().into_iter().find(|step| !(*step > 0.0 && step.is_finite())) {
+        return Err(Failure::new(format!("--time-steps: {step}; expected positive numbers, in ms")));
+    }
+    let sink = Sink::open(&args.output, "table3", &[])?;
+    let exact = match args.device.open()? {
+        Some(device) => Shared(Arc::new(device.into_detector())),
+        None => Shared(Arc::new(detect)),
+    };
+    let mut table =
+        Table { table: 3, quick: args.quick, encoded: Vec::new(), voxels: Vec::new(), cells: Vec::new() };
+    for &scenario in &args.scenarios {
+        let mut grids = Grids::default();
+        let mut last = None;
+        for tolerance in args.tolerances(scenario) {
+            let changed = of_tolerance(args, scenario, tolerance, &exact, &mut grids, &mut table)?;
+            last = Some(changed);
+        }
+        if let Some(geometries) = last {
+            table.voxels.extend(geometries.iter().flat_map(|geometry| grids.release(geometry)));
+        }
+    }
+    sink.print(&table, &text::csv(&table.cells), &text::markdown(args, &table))
+}
+
+/// Runs the cells of a scene at a tolerance. Returns its meshes.
+fn of_tolerance(
+    args: &Args,
+    scenario: Scenario,
+    tolerance: u32,
+    exact: &Shared,
+    grids: &mut Grids,
+    table: &mut Table,
+) -> Result<[memory::Geometry; 2], Failure> {
+    let bar = Bar::new("encoding");
+    let mut loaded = scenario.scene(args, tolerance)?;
+    let system = loaded.system().map_err(Failure::new)?;
+    let meshes = scenario.bodies().map(|name| mesh(&loaded, name));
+    let geometries = geometries(scenario, &system, meshes)?;
+    table.encoded.push(Encoded::of(scenario, tolerance, &geometries));
+    let distance = loaded.scene.detector.contact_distance.unwrap_or(0.0);
+    let columns = args.qualities(scenario).iter().copied().map(Some).chain([None]);
+    for voxels in columns {
+        let detector = match voxels {
+            None => exact.clone(),
+            Some(qualities) => {
+                let mut of_shapes = BTreeMap::new();
+                for (geometry, quality) in geometries.iter().zip(qualities) {
+                    let grid = grids.get((scenario, tolerance), geometry, quality, distance, &bar)?;
+                    of_shapes.insert(geometry.shape, grid);
+                }
+                Shared(Arc::new(VoxelDetector::new(of_shapes)))
+            }
+        };
+        for features in args.features() {
+            for time_step in args.time_steps() {
+                bar.stage("simulating");
+                scenario::set(&mut loaded, features, time_step);
+                let setup = Setup { scenario, tolerance, voxels, features, time_step };
+                let cell = setup.run(&loaded, system.clone(), detector.clone(), |share| bar.set(share))?;
+                note(&text::line(&cell));
+                table.cells.push(cell);
+            }
+        }
+    }
+    // The next tolerance has another mesh of this body.
+    let changing = match scenario {
+        Scenario::BoltNut => &geometries[0],
+        Scenario::PegInHole => &geometries[1],
+    };
+    table.voxels.extend(grids.release(changing));
+    Ok(geometries)
+}
+
+/// The mesh file of a body of a scene.
+fn mesh(loaded: &LoadedScene, name: &str) -> PathBuf {
+    let section = loaded.scene.bodies.iter().map(|b| b.get_ref()).find(|b| b.name == name);
+    section.and_then(|body| body.mesh.clone()).unwrap_or_default()
+}
