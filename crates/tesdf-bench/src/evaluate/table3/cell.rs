@@ -165,7 +165,7 @@ fn of_criterion(summary: &Summary, loaded: &LoadedScene) -> Vec<(&'static str, S
         );
         demand(
             share >= criterion.min_acceleration,
-            "sticking",
+            "braking",
             format!(
                 "{share:.3} of the acceleration of an ideal screw; expected at least {}",
                 criterion.min_acceleration
