@@ -8,7 +8,6 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use tesdf::Progress;
-use tesdf_sim::criterion::{InsertionReport, RestReport, ScrewReport};
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{HiddenPair, InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
@@ -20,6 +19,7 @@ use tesdf_terminal::progress::{interrupt_flag, watched};
 use tesdf_terminal::report::{self, Failure, Outcome};
 use tesdf_terminal::{parse, run_file};
 
+mod criteria;
 mod recorder;
 
 use recorder::Recorder;
@@ -333,84 +333,6 @@ fn print(args: &Args, summary: &Summary) -> Result<(), Failure> {
         let [distance, angle] = [1e6 * drift.distance, 1e6 * drift.angle];
         rows.push(("joints", format!("apart by at most {distance:.2} µm and {angle:.2} µrad")));
     }
-    if let Some(screw) = &summary.screw {
-        rows.extend(screw_rows(screw));
-    }
-    if let Some(rest) = &summary.rest {
-        rows.extend(rest_rows(rest));
-    }
-    if let Some(insertion) = &summary.insertion {
-        rows.extend(insertion_rows(insertion));
-    }
+    rows.extend(criteria::rows(summary));
     report::table(&rows)
-}
-
-fn screw_rows(screw: &ScrewReport) -> Vec<(&'static str, String)> {
-    let mut rows = vec![
-        (
-            "screw",
-            format!(
-                "{:.4} mm and {:.4} turns, at most {:.1} µm from the pitch",
-                screw.travel * 1e3,
-                screw.turns,
-                screw.largest_pitch_error * 1e6
-            ),
-        ),
-        (
-            "acceleration",
-            format!(
-                "{:.3e} m/s², ideal screw {:.3e} m/s²; {:.1} % of the ideal travel",
-                screw.acceleration,
-                screw.analytic_acceleration,
-                100.0 * screw.travel_of_analytic
-            ),
-        ),
-    ];
-    rows.extend(verdict_rows(&screw.failures));
-    rows
-}
-
-fn rest_rows(rest: &RestReport) -> Vec<(&'static str, String)> {
-    let nanometres = rest.drift * 1e9;
-    let mut rows = vec![
-        ("rest", format!("{} moves most, by at most {nanometres:.3} nm", rest.body)),
-        ("energy gain", format!("{:.2e} J", rest.energy_gain)),
-    ];
-    rows.extend(verdict_rows(&rest.failures));
-    rows
-}
-
-fn insertion_rows(insertion: &InsertionReport) -> Vec<(&'static str, String)> {
-    let seated = insertion.seated_at.map_or("not seated".into(), |time| format!("seated at {time:.4} s"));
-    let mut rows = vec![
-        ("insertion", format!("{:.4} mm, {seated}", insertion.travel * 1e3)),
-        (
-            "play",
-            format!(
-                "at most {:.1} µm across the axis and {:.2} mrad of tilt",
-                insertion.offset * 1e6,
-                insertion.tilt * 1e3
-            ),
-        ),
-        (
-            "clearance",
-            format!(
-                "at most {:.3} µm of penetration, in {}",
-                insertion.penetration * 1e6,
-                report::count(insertion.measurements, "exact measurement")
-            ),
-        ),
-        (
-            "energy gain",
-            format!("{:.2e} J; {:.2e} J kinetic when settled", insertion.energy_gain, insertion.jitter),
-        ),
-    ];
-    rows.extend(verdict_rows(&insertion.failures));
-    rows
-}
-
-fn verdict_rows(failures: &[String]) -> Vec<(&'static str, String)> {
-    let not_met = failures.iter().map(|failure| ("not met", failure.clone()));
-    let verdict = if failures.is_empty() { "passed" } else { "not passed" };
-    not_met.chain([("criterion", verdict.into())]).collect()
 }

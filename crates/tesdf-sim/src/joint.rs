@@ -176,7 +176,7 @@ impl Joint {
 }
 
 /// `frame` as seen from `body`.
-fn relative(body: Pose, frame: Pose) -> Pose {
+pub(crate) fn relative(body: Pose, frame: Pose) -> Pose {
     let inverse = body.rotation.inverse();
     Pose {
         translation: inverse * (frame.translation - body.translation),

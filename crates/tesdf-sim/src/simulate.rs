@@ -4,7 +4,9 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::criterion::{InsertionReport, JointDrift, Reports, RestReport, ScrewReport, Trackers};
+use crate::criterion::{
+    GearRatioReport, InsertionReport, JointDrift, LiftReport, Reports, RestReport, ScrewReport, Trackers,
+};
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
 use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
@@ -67,6 +69,10 @@ pub struct Summary {
     pub rest: Option<RestReport>,
     /// Result of the insertion criterion, if the scene has one.
     pub insertion: Option<InsertionReport>,
+    /// Result of the lift criterion, if the scene has one.
+    pub lift: Option<LiftReport>,
+    /// Result of the gear ratio criterion, if the scene has one.
+    pub gear_ratio: Option<GearRatioReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
 }
@@ -184,7 +190,7 @@ pub fn simulate_from(
     let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
     let mut reports = trackers.report(system, &messages);
     let passed = reports.passed();
-    let Reports { screw, rest, insertion } = reports;
+    let Reports { screw, rest, insertion, lift, gear_ratio } = reports;
     let sums = totals.summary();
     let depths = hidden.iter().map(|pair| pair.depth);
     let (momentum, angular_momentum) = system.momentum();
@@ -199,6 +205,8 @@ pub fn simulate_from(
         screw,
         rest,
         insertion,
+        lift,
+        gear_ratio,
         deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
         hidden,
         ..sums

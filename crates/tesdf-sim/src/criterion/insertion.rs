@@ -1,10 +1,10 @@
 //! A body slides into another body and seats on its floor.
 use serde::{Deserialize, Serialize};
-use tesdf::Length;
-use tesdf::collide::{ClearanceOptions, CollideError, InstanceId, Pose, clearance};
+use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
 
-use crate::{Mass, MassProperties, System};
+use super::shared::{Checks, Penetration, body, free_body, positive};
+use crate::{MassProperties, System};
 
 /// The body moves along the axis until it seats, stays within its clearance on the way, and comes
 /// to rest.
@@ -102,7 +102,7 @@ impl InsertionCriterion {
         if (axis.length() - 1.0).abs() > 1e-6 || axis.is_nan() {
             return Err(format!("axis has length {}; expected 1", axis.length()));
         }
-        for (key, value) in [
+        positive([
             ("depth", self.depth),
             ("depth_tolerance", self.depth_tolerance),
             ("within", self.within),
@@ -114,28 +114,16 @@ impl InsertionCriterion {
             ("max_jitter", self.max_jitter),
             ("max_energy_gain", self.max_energy_gain),
             ("check_every", self.check_every),
-        ] {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(format!("{key} is {value}; expected a positive number"));
-            }
-        }
+        ])?;
         self.find(system).map(|_| ())
     }
 
     fn find(&self, system: &System) -> Result<(usize, MassProperties, InstanceId), String> {
-        let names = || system.bodies().iter().map(|b| b.name.as_str()).collect::<Vec<_>>().join(", ");
-        let find = |name: &str| {
-            let body = system.bodies().iter().position(|b| b.name == name);
-            body.ok_or_else(|| format!("there is no body {name}; the bodies are {}", names()))
-        };
-        let (body, into) = (find(&self.body)?, find(&self.into)?);
-        if body == into {
-            return Err(format!("body {} cannot move into itself", self.body));
-        }
-        match system.bodies()[body].mass {
-            Mass::Free(mass) => Ok((body, mass, system.bodies()[into].instance)),
-            Mass::Fixed => Err(format!("body {} is fixed; it cannot move", self.body)),
-            Mass::Kinematic => Err(format!("body {} is kinematic; no contact can stop it", self.body)),
+        let (moving, mass) = free_body(system, &self.body, "stop")?;
+        let into = body(system, &self.into)?;
+        match moving == into {
+            true => Err(format!("body {} cannot move into itself", self.body)),
+            false => Ok((moving, mass, system.bodies()[into].instance)),
         }
     }
 }
@@ -155,7 +143,9 @@ pub struct InsertionTracker {
     start: Pose,
     time: f64,
     settled: bool,
-    /// What was found so far. Its failures are those of the measurements.
+    checks: Checks,
+    penetration: Penetration,
+    /// What was found so far, without the penetration and failures.
     found: InsertionReport,
 }
 
@@ -179,6 +169,8 @@ impl InsertionTracker {
             start: system.states()[body].pose,
             time: 0.0,
             settled: false,
+            checks: Checks::new(criterion.check_every),
+            penetration: Penetration::default(),
             found: InsertionReport {
                 travel: 0.0,
                 seated_at: None,
@@ -196,9 +188,7 @@ impl InsertionTracker {
 
     /// Records the state after a step of `time_step` seconds.
     pub fn observe(&mut self, system: &System, time_step: f64) {
-        let InsertionCriterion { depth, depth_tolerance, settled, check_every, .. } = self.criterion;
-        let checks = |time: f64| (time / check_every + 1e-9).floor();
-        let before = checks(self.time);
+        let InsertionCriterion { depth, depth_tolerance, settled, .. } = self.criterion;
         self.time += time_step;
         let pose = system.states()[self.body].pose;
         let moved = pose.to_world(self.mass.center) - self.start.to_world(self.mass.center);
@@ -220,35 +210,20 @@ impl InsertionTracker {
             self.settled = true;
             found.jitter = found.jitter.max(kinetic);
         }
-        if checks(self.time) > before {
-            self.measure(system);
-        }
-    }
-
-    /// Measures the exact clearance of the two bodies.
-    fn measure(&mut self, system: &System) {
-        let instance = system.bodies()[self.body].instance;
-        let tolerance = Length::Absolute(1e-3 * self.criterion.clearance);
-        let measured = || -> Result<f64, CollideError> {
-            // The instances of the system have the poses of the last detection.
-            let mut system = system.clone();
-            let states = system.states().to_vec();
-            let scene = system.scene_at(&states)?;
-            Ok(clearance(scene, instance, self.into, &ClearanceOptions { tolerance })?.distance)
-        };
-        match measured() {
-            Ok(distance) => {
-                self.found.measurements += 1;
-                self.found.penetration = self.found.penetration.max(-distance);
-            }
-            Err(e) => self.found.failures.push(format!("penetration: not measured: {e}")),
+        if self.checks.due(time_step) {
+            let pair = [system.bodies()[self.body].instance, self.into];
+            self.penetration.measure(system, &[pair], 1e-3 * self.criterion.clearance);
         }
     }
 
     /// Compares the run so far with the criterion.
     pub fn report(&self) -> InsertionReport {
-        let mut report = self.found.clone();
-        let InsertionReport { travel, seated_at, farthest, offset, tilt, penetration, .. } = report;
+        let mut report = InsertionReport {
+            penetration: self.penetration.depth,
+            measurements: self.penetration.measurements,
+            ..self.found.clone()
+        };
+        let InsertionReport { travel, seated_at, farthest, offset, tilt, .. } = report;
         let InsertionCriterion { depth, depth_tolerance, within, max_tilt, max_offset, .. } = self.criterion;
         let mut demand = |met: bool, text: String| {
             if !met {
@@ -282,16 +257,7 @@ impl InsertionTracker {
             format!("tunnelling: the body tilts by {tilt:.3e} rad; expected at most {max_tilt:.3e} rad"),
         );
         let allowed = self.criterion.max_penetration * self.criterion.clearance;
-        demand(
-            penetration <= allowed,
-            format!(
-                "penetration: {penetration:.3e} m by the exact clearance; expected at most {allowed:.3e} m"
-            ),
-        );
-        demand(
-            report.measurements > 0,
-            "penetration: the run is too short for a measurement of the exact clearance".into(),
-        );
+        self.penetration.failures(allowed).into_iter().for_each(|text| demand(false, text));
         let (jitter, allowed) = (report.jitter, self.criterion.max_jitter * self.released);
         demand(
             self.settled && jitter <= allowed,

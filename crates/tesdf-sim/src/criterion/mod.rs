@@ -1,9 +1,14 @@
 //! Success criteria of a run.
+mod gear_ratio;
 mod insertion;
+mod lift;
 mod rest;
 mod screw;
+mod shared;
 
+pub use gear_ratio::{GearRatioCriterion, GearRatioReport, GearRatioTracker};
 pub use insertion::{InsertionCriterion, InsertionReport, InsertionTracker};
+pub use lift::{LiftCriterion, LiftReport, LiftTracker};
 pub use rest::{RestCriterion, RestReport, RestTracker};
 pub use screw::{ScrewCriterion, ScrewReport, ScrewTracker, screw_acceleration};
 
@@ -27,13 +32,15 @@ pub(crate) struct Trackers {
     screw: Option<ScrewTracker>,
     rest: Option<RestTracker>,
     insertion: Option<InsertionTracker>,
+    lift: Option<LiftTracker>,
+    gear_ratio: Option<GearRatioTracker>,
     drift: JointDrift,
 }
 
 impl Trackers {
     /// Trackers that start from the current state of `system`.
     pub(crate) fn new(section: &CriterionSection, system: &System) -> Result<Self, String> {
-        let CriterionSection { screw, rest, insertion } = section;
+        let CriterionSection { screw, rest, insertion, lift, gear_ratio } = section;
         Ok(Self {
             screw: screw.as_ref().map(|screw| ScrewTracker::new(screw, system)).transpose()?,
             rest: rest.as_ref().map(|rest| RestTracker::new(rest, system)).transpose()?,
@@ -41,6 +48,8 @@ impl Trackers {
                 .as_ref()
                 .map(|insertion| InsertionTracker::new(insertion, system))
                 .transpose()?,
+            lift: lift.as_ref().map(|lift| LiftTracker::new(lift, system)).transpose()?,
+            gear_ratio: gear_ratio.as_ref().map(|gears| GearRatioTracker::new(gears, system)).transpose()?,
             drift: JointDrift::default(),
         })
     }
@@ -55,6 +64,12 @@ impl Trackers {
         }
         if let Some(insertion) = &mut self.insertion {
             insertion.observe(system, time_step);
+        }
+        if let Some(lift) = &mut self.lift {
+            lift.observe(system, time_step);
+        }
+        if let Some(gears) = &mut self.gear_ratio {
+            gears.observe(system, time_step);
         }
         for joint in system.joints() {
             let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
@@ -74,6 +89,8 @@ impl Trackers {
             screw: self.screw.as_ref().map(|screw| screw.report(system)),
             rest: self.rest.as_ref().map(RestTracker::report),
             insertion: self.insertion.as_ref().map(InsertionTracker::report),
+            lift: self.lift.as_ref().map(|lift| lift.report(system)),
+            gear_ratio: self.gear_ratio.as_ref().map(GearRatioTracker::report),
         };
         reports.failures_mut().for_each(|of_one| of_one.extend_from_slice(failures));
         reports
@@ -86,6 +103,8 @@ pub(crate) struct Reports {
     pub(crate) screw: Option<ScrewReport>,
     pub(crate) rest: Option<RestReport>,
     pub(crate) insertion: Option<InsertionReport>,
+    pub(crate) lift: Option<LiftReport>,
+    pub(crate) gear_ratio: Option<GearRatioReport>,
 }
 
 impl Reports {
@@ -96,10 +115,12 @@ impl Reports {
     }
 
     fn failures_mut(&mut self) -> impl Iterator<Item = &mut Vec<String>> {
-        let Self { screw, rest, insertion } = self;
+        let Self { screw, rest, insertion, lift, gear_ratio } = self;
         let screw = screw.as_mut().map(|screw| &mut screw.failures);
         let rest = rest.as_mut().map(|rest| &mut rest.failures);
         let insertion = insertion.as_mut().map(|insertion| &mut insertion.failures);
-        [screw, rest, insertion].into_iter().flatten()
+        let lift = lift.as_mut().map(|lift| &mut lift.failures);
+        let gear_ratio = gear_ratio.as_mut().map(|gears| &mut gears.failures);
+        [screw, rest, insertion, lift, gear_ratio].into_iter().flatten()
     }
 }

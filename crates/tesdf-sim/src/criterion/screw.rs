@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::Pose;
 use tesdf::glam::DVec3;
 
-use crate::{Mass, MassProperties, System};
+use super::shared::free_body;
+use crate::{MassProperties, System};
 
 /// The body moves along a thread: at every step its travel along the axis differs from its number
 /// of turns times the pitch by at most the backlash.
@@ -85,17 +86,7 @@ impl ScrewCriterion {
     }
 
     fn find(&self, system: &System) -> Result<(usize, MassProperties), String> {
-        let names = || system.bodies().iter().map(|b| b.name.as_str()).collect::<Vec<_>>().join(", ");
-        let body = system
-            .bodies()
-            .iter()
-            .position(|b| b.name == self.body)
-            .ok_or_else(|| format!("there is no body {}; the bodies are {}", self.body, names()))?;
-        match system.bodies()[body].mass {
-            Mass::Free(mass) => Ok((body, mass)),
-            Mass::Fixed => Err(format!("body {} is fixed; it cannot turn", self.body)),
-            Mass::Kinematic => Err(format!("body {} is kinematic; no contact can turn it", self.body)),
-        }
+        free_body(system, &self.body, "turn")
     }
 }
 

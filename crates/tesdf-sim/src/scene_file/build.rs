@@ -63,16 +63,7 @@ impl LoadedScene {
             system.set_friction(body, section.friction).map_err(|e| self.body_error(k, e.to_string()))?;
         }
         self.connect(&mut system)?;
-        if let Some(screw) = &scene.criterion.screw {
-            screw.validate(&system).map_err(|reason| self.value("criterion.screw", reason))?;
-        }
-        if let Some(rest) = &scene.criterion.rest {
-            rest.validate().map_err(|reason| self.value("criterion.rest", reason))?;
-        }
-        if let Some(insertion) = &scene.criterion.insertion {
-            let failed = |reason| self.value("criterion.insertion", reason);
-            insertion.validate(&system).map_err(failed)?;
-        }
+        self.check_criteria(&system)?;
         Ok(system)
     }
 

@@ -56,7 +56,9 @@ pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
 
-use crate::criterion::{InsertionCriterion, RestCriterion, ScrewCriterion};
+use crate::criterion::{
+    GearRatioCriterion, InsertionCriterion, LiftCriterion, RestCriterion, ScrewCriterion,
+};
 use crate::newton::NewtonOptions;
 use crate::script::Script;
 use crate::{JointKind, Motor};
@@ -291,4 +293,8 @@ pub struct CriterionSection {
     pub rest: Option<RestCriterion>,
     /// A body must slide into another one and seat.
     pub insertion: Option<InsertionCriterion>,
+    /// Fingers must lift a body and hold it.
+    pub lift: Option<LiftCriterion>,
+    /// A gear must turn another one.
+    pub gear_ratio: Option<GearRatioCriterion>,
 }

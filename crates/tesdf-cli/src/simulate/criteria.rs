@@ -1,0 +1,132 @@
+//! What the summary of a run says of the scene's criteria.
+use tesdf_sim::Summary;
+use tesdf_sim::criterion::{GearRatioReport, InsertionReport, LiftReport, RestReport, ScrewReport};
+use tesdf_terminal::report;
+
+type Rows = Vec<(&'static str, String)>;
+
+/// The rows of all criteria.
+pub fn rows(summary: &Summary) -> Rows {
+    let Summary { screw, rest, insertion, lift, gear_ratio, .. } = summary;
+    [
+        screw.as_ref().map(screw_rows),
+        rest.as_ref().map(rest_rows),
+        insertion.as_ref().map(insertion_rows),
+        lift.as_ref().map(lift_rows),
+        gear_ratio.as_ref().map(gear_ratio_rows),
+    ]
+    .into_iter()
+    .flatten()
+    .flatten()
+    .collect()
+}
+
+fn screw_rows(screw: &ScrewReport) -> Rows {
+    let mut rows = vec![
+        (
+            "screw",
+            format!(
+                "{:.4} mm and {:.4} turns, at most {:.1} µm from the pitch",
+                screw.travel * 1e3,
+                screw.turns,
+                screw.largest_pitch_error * 1e6
+            ),
+        ),
+        (
+            "acceleration",
+            format!(
+                "{:.3e} m/s², ideal screw {:.3e} m/s²; {:.1} % of the ideal travel",
+                screw.acceleration,
+                screw.analytic_acceleration,
+                100.0 * screw.travel_of_analytic
+            ),
+        ),
+    ];
+    rows.extend(verdict_rows(&screw.failures));
+    rows
+}
+
+fn rest_rows(rest: &RestReport) -> Rows {
+    let nanometres = rest.drift * 1e9;
+    let mut rows = vec![
+        ("rest", format!("{} moves most, by at most {nanometres:.3} nm", rest.body)),
+        ("energy gain", format!("{:.2e} J", rest.energy_gain)),
+    ];
+    rows.extend(verdict_rows(&rest.failures));
+    rows
+}
+
+fn insertion_rows(insertion: &InsertionReport) -> Rows {
+    let seated = insertion.seated_at.map_or("not seated".into(), |time| format!("seated at {time:.4} s"));
+    let mut rows = vec![
+        ("insertion", format!("{:.4} mm, {seated}", insertion.travel * 1e3)),
+        (
+            "play",
+            format!(
+                "at most {:.1} µm across the axis and {:.2} mrad of tilt",
+                insertion.offset * 1e6,
+                insertion.tilt * 1e3
+            ),
+        ),
+        clearance_row(insertion.penetration, insertion.measurements),
+        (
+            "energy gain",
+            format!("{:.2e} J; {:.2e} J kinetic when settled", insertion.energy_gain, insertion.jitter),
+        ),
+    ];
+    rows.extend(verdict_rows(&insertion.failures));
+    rows
+}
+
+fn lift_rows(lift: &LiftReport) -> Rows {
+    let mut rows = vec![
+        (
+            "lift",
+            format!("{:.4} mm, held within {:.2} µm of the height", lift.rise * 1e3, lift.height_error * 1e6),
+        ),
+        (
+            "creep",
+            format!(
+                "{:.2e} mm/s relative to a finger; at most {:.2e} mm/s in a step",
+                lift.creep * 1e3,
+                lift.jitter * 1e3
+            ),
+        ),
+        clearance_row(lift.penetration, lift.measurements),
+        ("energy gain", format!("{:.2e} J while held", lift.energy_gain)),
+    ];
+    rows.extend(verdict_rows(&lift.failures));
+    rows
+}
+
+fn gear_ratio_rows(gears: &GearRatioReport) -> Rows {
+    let ratio = gears.ratio.map_or("none".into(), |ratio| format!("{ratio:.6}"));
+    let mut rows = vec![
+        (
+            "gear ratio",
+            format!("{ratio}, {:.4} turns for {:.4} of the driver", gears.driven_turns, gears.driver_turns),
+        ),
+        (
+            "transmission",
+            format!(
+                "error {:.2} µm peak to peak, {:.2} % of the speed",
+                gears.transmission_error * 1e6,
+                100.0 * gears.speed_error
+            ),
+        ),
+        clearance_row(gears.penetration, gears.measurements),
+    ];
+    rows.extend(verdict_rows(&gears.failures));
+    rows
+}
+
+fn clearance_row(penetration: f64, measurements: usize) -> (&'static str, String) {
+    let measured = report::count(measurements, "exact measurement");
+    ("clearance", format!("at most {:.3} µm of penetration, in {measured}", penetration * 1e6))
+}
+
+fn verdict_rows(failures: &[String]) -> Rows {
+    let not_met = failures.iter().map(|failure| ("not met", failure.clone()));
+    let verdict = if failures.is_empty() { "passed" } else { "not passed" };
+    not_met.chain([("criterion", verdict.into())]).collect()
+}

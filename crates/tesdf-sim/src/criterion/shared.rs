@@ -1,0 +1,103 @@
+//! What several criteria look up and measure.
+use tesdf::Length;
+use tesdf::collide::{ClearanceOptions, CollideError, InstanceId, clearance};
+
+use crate::{Mass, MassProperties, System};
+
+/// The number of the body of this name.
+pub(super) fn body(system: &System, name: &str) -> Result<usize, String> {
+    let names = || system.bodies().iter().map(|b| b.name.as_str()).collect::<Vec<_>>().join(", ");
+    let found = system.bodies().iter().position(|b| b.name == name);
+    found.ok_or_else(|| format!("there is no body {name}; the bodies are {}", names()))
+}
+
+/// The number and mass of the free body of this name. `verb` says what no contact could do to it
+/// otherwise: `stop`, for example.
+pub(super) fn free_body(system: &System, name: &str, verb: &str) -> Result<(usize, MassProperties), String> {
+    let body = body(system, name)?;
+    match system.bodies()[body].mass {
+        Mass::Free(mass) => Ok((body, mass)),
+        Mass::Fixed => Err(format!("body {name} is fixed; no contact can {verb} it")),
+        Mass::Kinematic => Err(format!("body {name} is kinematic; no contact can {verb} it")),
+    }
+}
+
+/// Checks that each of these values is finite and greater than 0.
+pub(super) fn positive<const N: usize>(values: [(&str, f64); N]) -> Result<(), String> {
+    match values.into_iter().find(|&(_, value)| !(value > 0.0 && value.is_finite())) {
+        Some((key, value)) => Err(format!("{key} is {value}; expected a positive number")),
+        None => Ok(()),
+    }
+}
+
+/// Measurements of the exact clearance at regular times.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Checks {
+    every: f64,
+    time: f64,
+}
+
+impl Checks {
+    /// A check for each `every` seconds.
+    pub(super) fn new(every: f64) -> Self {
+        Self { every, time: 0.0 }
+    }
+
+    /// Whether a check is due within the next `time_step` seconds.
+    pub(super) fn due(&mut self, time_step: f64) -> bool {
+        let number = |time: f64| (time / self.every + 1e-9).floor();
+        let before = number(self.time);
+        self.time += time_step;
+        number(self.time) > before
+    }
+}
+
+/// What exact measurements of the clearance found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Penetration {
+    /// The greatest penetration, m; 0 when none was found.
+    pub(super) depth: f64,
+    /// Number of measurements.
+    pub(super) measurements: usize,
+    /// Reasons of measurements that failed.
+    pub(super) unmeasured: Vec<String>,
+}
+
+impl Penetration {
+    /// Measures the clearance of pairs of instances at the current states, to `tolerance` metres.
+    pub(super) fn measure(&mut self, system: &System, pairs: &[[InstanceId; 2]], tolerance: f64) {
+        let options = ClearanceOptions { tolerance: Length::Absolute(tolerance) };
+        let measured = || -> Result<f64, CollideError> {
+            // The instances of the system have the poses of the last detection.
+            let mut system = system.clone();
+            let states = system.states().to_vec();
+            let scene = system.scene_at(&states)?;
+            let distance = |&[a, b]: &[InstanceId; 2]| Ok(clearance(scene, a, b, &options)?.distance);
+            pairs.iter().map(distance).try_fold(f64::INFINITY, |least, d| Ok(least.min(d?)))
+        };
+        match measured() {
+            Ok(distance) => {
+                self.measurements += 1;
+                self.depth = self.depth.max(-distance);
+            }
+            Err(e) => self.unmeasured.push(e.to_string()),
+        }
+    }
+
+    /// The failures, when at most `allowed` metres of penetration are.
+    pub(super) fn failures(&self, allowed: f64) -> Vec<String> {
+        let mut failures: Vec<String> =
+            self.unmeasured.iter().map(|e| format!("penetration: not measured: {e}")).collect();
+        if self.depth > allowed {
+            let depth = self.depth;
+            failures.push(format!(
+                "penetration: {depth:.3e} m by the exact clearance; expected at most {allowed:.3e} m"
+            ));
+        }
+        if self.measurements == 0 && failures.is_empty() {
+            failures
+                .push("penetration: the run is too short for a measurement of the exact clearance".into());
+        }
+        failures
+    }
+}
