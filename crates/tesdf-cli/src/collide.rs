@@ -74,8 +74,9 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = ModeName::Exact)]
     pub mode: ModeName,
     /// In the modes `face` and `exact`: one contact for each cell of the other body that a face
-    /// meets, or for each face, with the extremes of flat contact
-    #[arg(long, value_name = "cell|face", value_parser = parse::contacts_per, default_value = "face")]
+    /// meets; or for each face, with the extremes of flat contact; or of these, only the local
+    /// minima over the surface
+    #[arg(long, value_name = "cell|face|minimum", value_parser = parse::contacts_per, default_value = "face")]
     pub contacts_per: ContactsPer,
     /// Report contacts up to this signed distance, in the meshes' unit
     #[arg(long, value_name = "D", value_parser = parse::length, default_value_t = 0.0, allow_hyphen_values = true)]

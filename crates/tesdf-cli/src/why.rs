@@ -94,6 +94,7 @@ fn part_text(part: &PartReport, noun: &str, text: &mut String) {
             PolygonVerdict::Contact => "contact".to_string(),
             PolygonVerdict::CellBeyond => "dropped: its cell is beyond the contact distance".into(),
             PolygonVerdict::Beyond => "dropped: beyond the contact distance".into(),
+            PolygonVerdict::Descending => "dropped: the surface is lower beside it".into(),
             PolygonVerdict::Filtered { cosine } => format!("dropped by the cosine filter: {cosine:.4}"),
         };
         let cell = p.cell.map_or("no cell".into(), |cell| format!("cell {cell}"));

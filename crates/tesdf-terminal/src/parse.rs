@@ -77,7 +77,8 @@ pub fn contacts_per(text: &str) -> Result<ContactsPer, String> {
     match text {
         "cell" => Ok(ContactsPer::Cell),
         "face" => Ok(ContactsPer::Face),
-        _ => Err("expected cell or face".into()),
+        "minimum" => Ok(ContactsPer::Minimum),
+        _ => Err("expected cell, face or minimum".into()),
     }
 }
 

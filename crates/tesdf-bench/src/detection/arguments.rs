@@ -22,8 +22,9 @@ pub struct Args {
     #[arg(long, value_enum, default_value_t = ModeName::Face)]
     pub mode: ModeName,
     /// In the modes `face` and `exact`: one contact for each cell of the other body that a face
-    /// meets, or for each face, with the extremes of flat contact
-    #[arg(long, value_name = "cell|face", value_parser = parse::contacts_per, default_value = "cell")]
+    /// meets; or for each face, with the extremes of flat contact; or of these, only the local
+    /// minima over the surface
+    #[arg(long, value_name = "cell|face|minimum", value_parser = parse::contacts_per, default_value = "cell")]
     pub contacts_per: ContactsPer,
     /// Number of Frank-Wolfe iterations in the mode `face`
     #[arg(long, value_name = "K", default_value_t = 16)]

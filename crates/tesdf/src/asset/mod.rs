@@ -24,6 +24,7 @@ mod container;
 mod entries;
 mod error;
 mod face_record;
+mod faces_at;
 mod header;
 mod incidence;
 mod inner_ball;

@@ -8,6 +8,7 @@ use super::cell_bounds::CellBounds;
 use super::conforming::Conforming;
 use super::entries::Entries;
 use super::face_record::FaceRecord;
+use super::faces_at::FacesAt;
 use super::inner_ball::InnerBall;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
 use super::motion::Motion;
@@ -65,6 +66,7 @@ pub struct TeSdf {
     /// What has moved since the asset was opened. `None` when nothing has.
     pub(crate) motion: Option<Motion>,
     lowest_faces: OnceLock<Vec<u32>>,
+    faces_at: OnceLock<FacesAt>,
     pub(crate) inner_ball: OnceLock<InnerBall>,
     pub(crate) corner_reaches: OnceLock<Vec<f32>>,
     face_normals: OnceLock<Vec<(DVec3, bool)>>,
@@ -145,6 +147,7 @@ impl TeSdf {
             cell_bounds: OnceLock::new(),
             motion: None,
             lowest_faces: OnceLock::new(),
+            faces_at: OnceLock::new(),
             inner_ball: OnceLock::new(),
             corner_reaches: OnceLock::new(),
             face_normals: OnceLock::new(),
@@ -260,6 +263,11 @@ impl TeSdf {
             }
             lowest
         })
+    }
+
+    /// The faces that have a vertex, by their places in the file, in ascending order.
+    pub(crate) fn faces_at(&self, vertex: u32) -> &[u32] {
+        self.faces_at.get_or_init(|| FacesAt::new(&self.faces, self.vertices.len())).of(vertex)
     }
 
     /// How far around the solid the domain reaches for certain (local frame): the width of the

@@ -72,7 +72,7 @@ pub struct Statistics {
     pub polygons: usize,
     /// Contacts within the contact distance.
     pub touching: usize,
-    /// Contacts that the cosine filter dropped.
+    /// Contacts that the cosine filter dropped, or that are no local minima where those are wanted.
     pub filtered: usize,
     /// Contacts that the reduction dropped.
     pub reduced: usize,

@@ -58,24 +58,25 @@ pub struct Found {
     pub at_vertices: Vec<AtVertex>,
     /// Number of polygons that were searched.
     pub polygons: usize,
-    /// Number of contacts that the cosine filter dropped.
+    /// Number of contacts that a filter dropped.
     pub filtered: usize,
 }
 
-/// Middle phase, narrow phase and cosine filter.
+/// Middle phase, narrow phase and filters.
 pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let mut found = Found::default();
     let Found { contacts, at_vertices, polygons, filtered } = &mut found;
     let parts: Vec<(Part, u32, u32)> = candidates.iter().map(|&candidate| pair.part(candidate)).collect();
     let mut rest = parts.as_slice();
+    let mut next = candidates.iter();
     while !rest.is_empty() {
         let count = if pair.search.is_of_faces() { near_each_other(rest) } else { rest.len() };
         let (group, others) = rest.split_at(count);
         rest = others;
         let around = pair.search.surroundings(&pair.field, group.iter().map(|(part, ..)| part));
-        for (part, face_a, feature) in group {
+        for ((part, face_a, feature), &candidate) in group.iter().zip(&mut next) {
             let mut found = |minimum: Minimum| {
-                if pair.is_filtered(part, &minimum) {
+                if pair.dropped(part, candidate, &minimum).is_some() {
                     *filtered += 1;
                     return;
                 }

@@ -31,6 +31,7 @@ mod coarse;
 mod contact;
 mod deepest;
 mod depth_bounds;
+mod descent;
 mod detect;
 mod error;
 mod few;

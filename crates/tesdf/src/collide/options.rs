@@ -31,6 +31,11 @@ pub enum ContactsPer {
     /// stands on its corners. Of equally near faces of *b*, the one that opposes the face gives the
     /// normal. Faces that have the same vertex as their contact share it.
     Face,
+    /// A local minimum of the signed distance over the surface of body *a*: the contacts of
+    /// [`Face`](Self::Face), without those beside which the surface is lower, where the distance
+    /// falls by more than 0.1 per unit of length. The deepest contact remains. As planes, the
+    /// contacts that are dropped would stop bodies that have room.
+    Minimum,
 }
 
 /// Number of contacts kept per pair of instances.
@@ -62,7 +67,8 @@ pub enum Reduction {
 pub struct CollideOptions {
     /// Nodes or faces, and the method.
     pub mode: Mode,
-    /// One contact for each cell that a face meets, or for each face. Not used for nodes.
+    /// One contact for each cell that a face meets, for each face, or for each local minimum. Not
+    /// used for nodes.
     #[serde(default = "per_cell")]
     pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations of the mode [`Face`](Mode::Face), at most

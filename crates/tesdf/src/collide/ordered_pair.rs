@@ -1,10 +1,21 @@
 //! Two instances in an order: the surface of the first against the signed distance field of the
 //! second.
+use super::descent::{OnFace, descends};
 use super::field::FieldBody;
 use super::instance_pairs::{InstancePair, instance_pairs};
 use super::narrow::{Minimum, Search};
 use super::surface::{Candidates, Part, SurfaceBody};
 use super::{CollideError, CollideOptions, Contact, ContactsPer, FeatureId, InstanceId, Mode, Scene, Shape};
+use crate::query::Precision;
+
+/// Why a minimum is no contact.
+#[derive(Clone, Copy, Debug)]
+pub enum Dropped {
+    /// The cosine filter drops this cosine.
+    ByCosine(f64),
+    /// The surface is lower beside the point.
+    Descending,
+}
 
 /// The surface of one body and the field of another.
 pub struct OrderedPair<'a> {
@@ -66,7 +77,7 @@ impl<'a> OrderedPair<'a> {
         match self.options.mode {
             Mode::Node => self.surface.nodes(&self.field, self.search.reach),
             // The search over a face begins with the test by which `faces` drops it.
-            Mode::Face | Mode::Exact if self.options.contacts_per == ContactsPer::Face => {
+            Mode::Face | Mode::Exact if self.search.is_of_faces() => {
                 self.surface.faces_of_leaves(&self.field, self.search.reach)
             }
             Mode::Face | Mode::Exact => self.surface.faces(&self.field, self.search.reach),
@@ -89,14 +100,32 @@ impl<'a> OrderedPair<'a> {
         }
     }
 
-    /// Eq. (10). It does not apply to rounded shapes, which have normals in all directions.
-    pub fn is_filtered(&self, part: &Part, minimum: &Minimum) -> bool {
-        match (self.options.mode, self.options.cos_theta) {
-            (Mode::Face | Mode::Exact, Some(cos)) if part.points().len() == 3 => {
-                minimum.value.gradient.dot(part.normal) > -cos
-            }
-            _ => false,
+    /// Why a minimum of a candidate is no contact, if it is none: Eq. (10), which does not apply to
+    /// rounded shapes, because they have normals in all directions; or a lower point beside it.
+    pub fn dropped(&self, part: &Part, candidate: u32, minimum: &Minimum) -> Option<Dropped> {
+        if self.options.mode == Mode::Node {
+            return None;
         }
+        let gradient = minimum.value.gradient;
+        let cosine = gradient.dot(part.normal);
+        if part.points().len() == 3 && self.options.cos_theta.is_some_and(|cos| cosine > -cos) {
+            return Some(Dropped::ByCosine(cosine));
+        }
+        let Minimum { point, is_lowest, .. } = *minimum;
+        let at = || {
+            let distance = match self.options.precision {
+                Precision::F64 => minimum.value.distance,
+                Precision::F32 => self.field.field.exact_value(point).distance,
+            };
+            OnFace { face: candidate, point, distance, gradient, is_lowest }
+        };
+        let descends = self.options.contacts_per == ContactsPer::Minimum && self.descends(&at());
+        descends.then_some(Dropped::Descending)
+    }
+
+    /// Whether the surface is lower beside a point of a face.
+    pub fn descends(&self, at: &OnFace) -> bool {
+        descends(&self.surface, &self.field, at)
     }
 
     /// The vertex at which a minimum is, by its bits; `None` in the mode node, where each vertex has

@@ -159,6 +159,54 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
+    /// A face in the field's frame; `None` for planes and rounded shapes, which have none.
+    pub fn face_triangle(&self, face: u32) -> Option<Triangle> {
+        let corners = match self.shape {
+            Shape::Mesh(asset) => asset.face_corners(face as usize),
+            Shape::Plane => return None,
+            simple => *<&[DVec3; 3]>::try_from(Simple::from(simple).parts().0.get(face as usize)?.as_slice()).ok()?,
+        };
+        Some(Triangle::new(corners.map(|p| self.to_field(p))))
+    }
+
+    /// Whether one of the other faces that share all of these corners of a face is accepted. Faces of
+    /// a mesh are left out to which a direction `across` is perpendicular, up to an angle whose sine
+    /// is `level`.
+    pub fn any_beside(
+        &self,
+        face: u32,
+        corners: &[usize],
+        (across, level): (DVec3, f64),
+        mut accept: impl FnMut(&Triangle) -> bool,
+    ) -> bool {
+        let mut accept = |other: u32| {
+            other != face && self.face_triangle(other).is_some_and(|triangle| accept(&triangle))
+        };
+        match self.shape {
+            Shape::Mesh(asset) => {
+                let own = asset.faces[face as usize];
+                let shares = |other: &[u32; 3]| corners.iter().all(|&k| other.contains(&own[k]));
+                let across = (self.linear.transpose() * across).normalize_or_zero();
+                // Most neighbours are, and `f32` is enough to tell.
+                let cosine = (1.0 - level * level).sqrt() + 1e-5;
+                let is_level = |other: u32| {
+                    let normal = asset.records[other as usize].triangle().normal;
+                    across.dot(normal).abs() > cosine
+                };
+                let around = corners.first().map_or(&[][..], |&k| asset.faces_at(own[k])).iter();
+                around.copied().any(|other| {
+                    shares(&asset.faces[other as usize]) && !is_level(other) && accept(other)
+                })
+            }
+            simple => {
+                let parts = Simple::from(simple).parts().0;
+                let own = &parts[face as usize];
+                let shares = |other: u32| corners.iter().all(|&k| parts[other as usize].contains(&own[k]));
+                (0..parts.len() as u32).any(|other| shares(other) && accept(other))
+            }
+        }
+    }
+
     /// A candidate node as a part of one point.
     pub fn node(&self, node: u32) -> Part {
         match self.shape {

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::middle::ClippedPolygon;
 use super::narrow::Minimum;
-use super::ordered_pair::OrderedPair;
+use super::ordered_pair::{Dropped, OrderedPair};
 use super::{CollideError, CollideOptions, InstanceId, Mode, Scene, Shape};
 
 /// The result for a pair of instances.
@@ -65,6 +65,8 @@ pub enum PolygonVerdict {
         /// ∇φ · n.
         cosine: f64,
     },
+    /// Dropped because the surface is lower beside it, where local minima are wanted.
+    Descending,
 }
 
 /// A face clipped by one cell, a point of a whole face, or a node; in the world's unit and frame.
@@ -251,9 +253,10 @@ impl Stages<'_> {
         let mut seen = Vec::new();
         let mut kept = Vec::new();
         search.minima(field, &part, None, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
-            let verdict = match self.pair.is_filtered(&part, &minimum) {
-                true => PolygonVerdict::Filtered { cosine: minimum.value.gradient.dot(part.normal) },
-                false => PolygonVerdict::Contact,
+            let verdict = match self.pair.dropped(&part, candidate, &minimum) {
+                Some(Dropped::ByCosine(cosine)) => PolygonVerdict::Filtered { cosine },
+                Some(Dropped::Descending) => PolygonVerdict::Descending,
+                None => PolygonVerdict::Contact,
             };
             kept.push((key(polygon), describe(polygon, &minimum, verdict)));
         });

@@ -252,6 +252,7 @@ impl<'a> Patch<'a> {
             cell: cell_of(self.field, point),
             converged: self.minimum.converged,
             corner,
+            is_lowest: false,
         };
         // From the nearest point of the other body, along the face.
         let offset = |p: DVec3, v: &FieldValue| (p - v.closest_point).reject_from_normalized(normal);

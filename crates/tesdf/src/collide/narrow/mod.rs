@@ -29,6 +29,8 @@ pub struct Minimum {
     pub converged: bool,
     /// The corner of the part that the point is, if it is one.
     pub corner: Option<u8>,
+    /// Whether the point was found as the lowest of its part, not as an extreme of what touches.
+    pub is_lowest: bool,
 }
 
 /// Result of a search over one polygon: a point of it, and whether no other point is lower by more
@@ -132,7 +134,7 @@ impl Search {
 
     /// Whether parts are searched as a whole, not cell by cell.
     pub fn is_of_faces(&self) -> bool {
-        self.per == ContactsPer::Face && self.mode != Mode::Node
+        self.per != ContactsPer::Cell && self.mode != Mode::Node
     }
 
     /// The mesh around parts that lie near each other, for [`minima`](Self::minima). `None` where
@@ -247,7 +249,7 @@ impl Search {
         let value = match (outside, self.per) {
             (Some(value), _) => value,
             (None, ContactsPer::Cell) => cell.value(point, self.precision),
-            (None, ContactsPer::Face) => cell.opposing(point, normal, self.precision),
+            (None, _) => cell.opposing(point, normal, self.precision),
         };
         let value = Some(value).filter(|value| value.distance <= reach)?;
         let converged = match self.mode {
@@ -261,13 +263,15 @@ impl Search {
             _ => converged,
         };
         let value = match (outside, self.per) {
-            (Some(value), ContactsPer::Face) => cell.most_opposing(point, normal, value, self.precision),
+            (Some(value), ContactsPer::Face | ContactsPer::Minimum) => {
+                cell.most_opposing(point, normal, value, self.precision)
+            }
             _ => value,
         };
         let listed = clipped.cell.filter(|_| matches!(clipped.place, Place::Listed { .. }));
         let cell = listed.or_else(|| cell_of(cell, point));
         let corner = part.points().iter().position(|p| *p == point).map(|k| k as u8);
-        Some(Minimum { point, value, cell, converged, corner })
+        Some(Minimum { point, value, cell, converged, corner, is_lowest: true })
     }
 }
 
