@@ -3,8 +3,10 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use tesdf::collide::internal::kept_at_vertices;
-use tesdf::collide::{Contact, FeatureB, FeatureId, Mode, PairReduction, Shape};
+use tesdf::collide::internal::{kept_at_vertices, local_minima};
+use tesdf::collide::{
+    CollideError, CollideOptions, Contact, FeatureB, FeatureId, Mode, PairReduction, Scene, Shape,
+};
 
 use super::scene::instances::Instances;
 use crate::kernels::field::shapes::NONE;
@@ -104,6 +106,36 @@ pub fn contacts(
     found.into_iter().map(|(_, contact)| contact).collect()
 }
 
+/// Removes contacts that are no local minima over the surface. Returns their number.
+///
+/// # Errors
+/// An instance is missing.
+pub fn keep_minima(
+    scene: &Scene,
+    options: &CollideOptions,
+    shapes: &[&Shape],
+    instances: &Instances,
+    words: &mut Vec<Words>,
+    rows: &mut Vec<Row>,
+) -> Result<usize, CollideError> {
+    let found: Vec<Contact> = words
+        .par_iter()
+        .zip(&*rows)
+        .map(|(words, row)| contact(shapes, instances, options.mode, words, row))
+        .collect();
+    let faces: Vec<u32> = words.iter().map(|words| words.face_a).collect();
+    let keep = local_minima(scene, options, &found, &faces)?;
+    retain(&keep, words, rows);
+    Ok(keep.iter().filter(|keep| !**keep).count())
+}
+
+fn retain(keep: &[bool], words: &mut Vec<Words>, rows: &mut Vec<Row>) {
+    let mut kept = keep.iter();
+    words.retain(|_| *kept.next().unwrap_or(&true));
+    let mut kept = keep.iter();
+    rows.retain(|_| *kept.next().unwrap_or(&true));
+}
+
 /// Removes contacts of whole faces: of the contacts of several faces at one vertex, keeps the one
 /// whose gradient most opposes its face; among equals, that of the lowest face.
 pub fn one_per_vertex(shapes: &[&Shape], instances: &Instances, words: &mut Vec<Words>, rows: &mut Vec<Row>) {
@@ -116,10 +148,7 @@ pub fn one_per_vertex(shapes: &[&Shape], instances: &Instances, words: &mut Vec<
     };
     let keys = words.iter().zip(&*rows).enumerate().filter_map(key).collect();
     let keep = kept_at_vertices(keys, words.len());
-    let mut kept = keep.iter();
-    words.retain(|_| *kept.next().unwrap_or(&true));
-    let mut kept = keep.iter();
-    rows.retain(|_| *kept.next().unwrap_or(&true));
+    retain(&keep, words, rows);
 }
 
 /// Cosines that differ by less are equal: the rounding of unit vectors in `f32`. On the processor it

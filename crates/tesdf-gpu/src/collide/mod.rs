@@ -17,12 +17,12 @@ use std::collections::BTreeMap;
 
 use tesdf::Length;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, HiddenOverlap, Reduction, Scene, Shape, ShapeId, Statistics,
-    reduce_pairs,
+    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, Mode, Reduction, Scene, Shape,
+    ShapeId, Statistics, reduce_pairs,
 };
 
 use buffers::{PipelineBuffers, ROW, WORD};
-use contacts::{contacts, one_per_vertex};
+use contacts::{contacts, keep_minima, one_per_vertex};
 pub use counts::Counts;
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
@@ -161,13 +161,21 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         options.validate()?;
-        match options.reduction {
-            Reduction::None | Reduction::PerPair(_) => return self.find(scene, options, timing),
-            Reduction::Spread(n) => {
-                let per_pair = CollideOptions { reduction: Reduction::PerPair(n), ..*options };
-                return self.find(scene, &per_pair, timing);
-            }
-            Reduction::Deepest(_) => {}
+        let reduction = match options.reduction {
+            Reduction::Spread(n) => Reduction::PerPair(n),
+            reduction => reduction,
+        };
+        let options = &CollideOptions { reduction, ..*options };
+        if wants_minima(options) && self.shapes.have_moved() {
+            return Err(GpuError::Unavailable {
+                what: "contacts per minimum of shapes whose vertices have moved on the device".into(),
+                instead: "ask for contacts per face",
+            });
+        }
+        // These are known on the processor only.
+        let of_processor = matches!(reduction, Reduction::Deepest(_)) || wants_minima(options);
+        if reduction == Reduction::None || !of_processor {
+            return self.find(scene, options, timing);
         }
         let all = self.find(scene, &CollideOptions { reduction: Reduction::None, ..*options }, timing)?;
         let (mut statistics, hidden) = (all.statistics, all.hidden.clone());
@@ -265,7 +273,11 @@ impl Detector {
         let mut words = self.device.read(words, count as usize)?;
         let mut rows = self.device.read(rows, count as usize)?;
         self.report.read += size_of_val(words.as_slice()) + size_of_val(rows.as_slice());
+        let mut filtered = counts.filtered as usize;
         if parts(options) == Parts::Faces && !matches!(options.reduction, Reduction::PerPair(_)) {
+            if wants_minima(options) {
+                filtered += keep_minima(scene, options, &shapes, instances, &mut words, &mut rows)?;
+            }
             one_per_vertex(&shapes, instances, &mut words, &mut rows);
         }
         let contacts = contacts(&shapes, instances, options.mode, &words, &rows);
@@ -281,8 +293,8 @@ impl Detector {
             instance_pairs: counts.ordered_pairs as usize,
             candidates: counts.candidates as usize,
             polygons: counts.polygons as usize,
-            touching: found + counts.filtered as usize,
-            filtered: counts.filtered as usize,
+            touching: found + filtered,
+            filtered,
             reduced: found - contacts.len(),
             unconverged,
             bytes: pipeline + size_of_val(contacts.as_slice()),
@@ -313,6 +325,11 @@ impl Detector {
         };
         Ok(deepest.into_iter().map(overlap).collect())
     }
+}
+
+/// Whether contacts that are no local minima are dropped, which the processor does.
+fn wants_minima(options: &CollideOptions) -> bool {
+    options.contacts_per == ContactsPer::Minimum && options.mode != Mode::Node
 }
 
 /// The shapes of all instances, sorted and without duplicates.

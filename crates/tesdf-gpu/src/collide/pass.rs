@@ -27,7 +27,7 @@ pub fn parts(options: &CollideOptions) -> Parts {
     match (options.mode, options.contacts_per) {
         (Mode::Node, _) => Parts::Nodes,
         (Mode::Face | Mode::Exact, ContactsPer::Cell) => Parts::Polygons,
-        (Mode::Face | Mode::Exact, ContactsPer::Face) => Parts::Faces,
+        (Mode::Face | Mode::Exact, ContactsPer::Face | ContactsPer::Minimum) => Parts::Faces,
     }
 }
 

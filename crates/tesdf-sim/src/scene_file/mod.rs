@@ -248,7 +248,8 @@ pub struct DetectorSection {
     /// Which features are tested.
     pub mode: DetectorMode,
     /// What a contact of the modes `face` and `exact` stands for: a face in one cell of the other
-    /// body, or a face.
+    /// body, a face, or a local minimum of the distance over the surface. As planes, other contacts
+    /// of faces stop bodies that have room.
     pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations in the mode `face`.
     pub iterations: u32,
@@ -265,7 +266,7 @@ impl Default for DetectorSection {
     fn default() -> Self {
         Self {
             mode: DetectorMode::Exact,
-            contacts_per: ContactsPer::Face,
+            contacts_per: ContactsPer::Minimum,
             iterations: 16,
             tolerance: 1e-7,
             cos_theta: None,

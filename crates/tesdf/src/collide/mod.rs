@@ -46,6 +46,7 @@ mod ids;
 mod instance_pairs;
 mod kept_pairs;
 mod least;
+mod local_minima;
 mod middle;
 mod motion;
 mod narrow;
@@ -76,6 +77,7 @@ pub mod internal {
     pub use super::greatest_minimum::greatest_minimum;
     pub use super::hidden::{DEEPER, SETTLED, THICK};
     pub use super::hull::{Wrench, residual};
+    pub use super::local_minima::local_minima;
     pub use super::narrow::LARGE;
     pub use super::narrow::extremes::{BEYOND, DIRECTIONS, LEVEL, MOVES, OPPOSES, TRIALS};
     pub use super::polygon::{MAX_VERTICES, Parts, Polygon};

@@ -164,7 +164,8 @@ impl<'a> SurfaceBody<'a> {
         let corners = match self.shape {
             Shape::Mesh(asset) => asset.face_corners(face as usize),
             Shape::Plane => return None,
-            simple => *<&[DVec3; 3]>::try_from(Simple::from(simple).parts().0.get(face as usize)?.as_slice()).ok()?,
+            simple => *<&[DVec3; 3]>::try_from(Simple::from(simple).parts().0.get(face as usize)?.as_slice())
+                .ok()?,
         };
         Some(Triangle::new(corners.map(|p| self.to_field(p))))
     }
@@ -179,9 +180,8 @@ impl<'a> SurfaceBody<'a> {
         (across, level): (DVec3, f64),
         mut accept: impl FnMut(&Triangle) -> bool,
     ) -> bool {
-        let mut accept = |other: u32| {
-            other != face && self.face_triangle(other).is_some_and(|triangle| accept(&triangle))
-        };
+        let mut accept =
+            |other: u32| other != face && self.face_triangle(other).is_some_and(|triangle| accept(&triangle));
         match self.shape {
             Shape::Mesh(asset) => {
                 let own = asset.faces[face as usize];
@@ -194,9 +194,9 @@ impl<'a> SurfaceBody<'a> {
                     across.dot(normal).abs() > cosine
                 };
                 let around = corners.first().map_or(&[][..], |&k| asset.faces_at(own[k])).iter();
-                around.copied().any(|other| {
-                    shares(&asset.faces[other as usize]) && !is_level(other) && accept(other)
-                })
+                around
+                    .copied()
+                    .any(|other| shares(&asset.faces[other as usize]) && !is_level(other) && accept(other))
             }
             simple => {
                 let parts = Simple::from(simple).parts().0;
