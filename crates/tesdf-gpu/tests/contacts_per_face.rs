@@ -52,14 +52,40 @@ fn each_face_of_bolt_and_nut_keeps_its_least_distance() {
 }
 
 #[test]
+fn minima_are_followed_by_no_lower_point() {
+    let mut random = Random(23);
+    let names = [["l_bracket", "cube"], ["torus_quads", "tetra"], ["lobed_peg", "lobed_hole_c100"]];
+    let mut all = [0, 0];
+    for names in names {
+        for relation in RELATIONS.into_iter().filter(|&relation| relation != Relation::Same) {
+            let bodies = relation.place(names, &mut random);
+            let contact_distance = 1e-3 * bodies[0].diagonal();
+            for mode in [Mode::Exact, Mode::Face] {
+                let counts = DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, mode);
+                all = [all[0] + counts[0], all[1] + counts[1]];
+            }
+        }
+    }
+    assert!(all[0] > 1000 && all[1] > 1000, "{all:?}");
+}
+
+#[test]
+fn a_border_ahead_of_a_peg_is_no_minimum() {
+    DEVICE.border_ahead_of_a_peg_is_no_minimum();
+}
+
+#[test]
 fn a_box_stands_on_the_corners_of_the_patch() {
-    let unconverged = DEVICE.box_stands_on_the_corners_of_the_patch();
-    assert_eq!(unconverged, 0);
+    for per in [ContactsPer::Face, ContactsPer::Minimum] {
+        assert_eq!(DEVICE.box_stands_on_the_corners_of_the_patch(per), 0, "all searches converge");
+    }
 }
 
 #[test]
 fn a_box_stands_on_a_plane_and_on_four_pegs() {
-    DEVICE.box_stands_on_a_plane_and_on_four_pegs();
+    for per in [ContactsPer::Face, ContactsPer::Minimum] {
+        DEVICE.box_stands_on_a_plane_and_on_four_pegs(per);
+    }
 }
 
 #[test]

@@ -81,7 +81,7 @@ impl Bodies {
 
     fn report(self, after: f64, seconds: f64) -> RestReport {
         let collide = CollideOptions {
-            contacts_per: ContactsPer::Face,
+            contacts_per: ContactsPer::Minimum,
             contact_distance: 5e-4,
             ..CollideOptions::default()
         };

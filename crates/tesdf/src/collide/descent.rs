@@ -54,11 +54,19 @@ struct Side {
 /// Whether the distance falls from a point along the surface, steeper than [`SLOPE`].
 ///
 /// Another point of the same face or of a face beside it shows the fall: it is lower. So each
-/// contact that is dropped is followed by a lower one on another face, and the deepest one stays.
-/// Planes and rounded shapes have no faces, and their points stay.
-pub fn descends(surface: &SurfaceBody, field: &FieldBody, at: &OnFace) -> bool {
+/// contact that is dropped is followed by a lower one, and the deepest one stays. Planes and rounded
+/// shapes have no faces, and their points stay.
+///
+/// `has_contact` tells whether a face with a lower point has a lower contact.
+pub fn descends(
+    surface: &SurfaceBody,
+    field: &FieldBody,
+    at: &OnFace,
+    has_contact: impl Fn(&Triangle) -> bool,
+) -> bool {
+    let falls_in = |face: &Triangle| falls_in(face, field, at) && has_contact(face);
     let Some(own) = surface.face_triangle(at.face) else { return false };
-    if !at.is_lowest && falls_in(&own, field, at) {
+    if !at.is_lowest && falls_in(&own) {
         return true;
     }
     let corners: ArrayVec<usize, 2> = match sides_at(&own, field, at.point).as_slice() {
@@ -70,7 +78,7 @@ pub fn descends(surface: &SurfaceBody, field: &FieldBody, at: &OnFace) -> bool {
             [if is_last { last.corner } else { first.corner }].into_iter().collect()
         }
     };
-    surface.any_beside(at.face, &corners, (at.gradient, SLOPE), |face| falls_in(face, field, at))
+    surface.any_beside(at.face, &corners, (at.gradient, SLOPE), falls_in)
 }
 
 /// Whether a point of a face is lower than a point of its border, or of the face itself.

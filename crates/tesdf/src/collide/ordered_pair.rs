@@ -123,9 +123,13 @@ impl<'a> OrderedPair<'a> {
         descends.then_some(Dropped::Descending)
     }
 
-    /// Whether the surface is lower beside a point of a face.
+    /// Whether the surface is lower beside a point of a face. So is then a contact there.
     pub fn descends(&self, at: &OnFace) -> bool {
-        descends(&self.surface, &self.field, at)
+        descends(&self.surface, &self.field, at, |face| match self.options.mode {
+            // Frank–Wolfe need not find the lower point.
+            Mode::Face => self.search.frank_wolfe(&self.field, face) < at.distance,
+            Mode::Node | Mode::Exact => true,
+        })
     }
 
     /// The vertex at which a minimum is, by its bits; `None` in the mode node, where each vertex has

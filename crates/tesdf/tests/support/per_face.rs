@@ -1,10 +1,11 @@
 //! Contacts per face: what holds for them on every device.
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use tesdf::collide::{
     CollideOptions, Contact, Contacts, ContactsPer, Instance, Mode, Placement, Pose, Scene, Shape, detect,
 };
+use tesdf::geometry::Triangle;
 use tesdf::glam::{DQuat, DVec3};
 
 use super::bodies::{Body, Placed, of_direction, scene};
@@ -84,6 +85,92 @@ impl Detection<'_> {
         kept
     }
 
+    /// Checks that contacts per minimum are those per face, without some beside which a sampled point
+    /// of the surface is lower. Returns how many there are, and how many were dropped.
+    pub fn minima_are_followed_by_no_lower_point(
+        &self,
+        bodies: &[Placed; 2],
+        contact_distance: f64,
+        mode: Mode,
+    ) -> [usize; 2] {
+        let scene = scene(bodies);
+        let options = CollideOptions { contact_distance, ..CollideOptions::with_mode(mode) };
+        let [all, minima] = [ContactsPer::Face, ContactsPer::Minimum]
+            .map(|contacts_per| (self.detect)(&scene, &CollideOptions { contacts_per, ..options }));
+        let size = bodies[0].diagonal().max(bodies[1].diagonal());
+        let mut counts = [minima.len(), 0];
+        for [a, b] in [[0, 1], [1, 0]] {
+            let of = |contacts| of_direction(contacts, a as u32, b as u32);
+            let bits = |c: &Contact| c.point_a.to_array().map(f64::to_bits);
+            let places: BTreeSet<_> = of(all.as_slice()).map(bits).collect();
+            let kept: BTreeSet<_> = of(minima.as_slice()).map(bits).collect();
+            assert!(kept.is_subset(&places), "a contact that no face has");
+            let least = |contacts| of(contacts).map(|c| c.distance).fold(f64::INFINITY, f64::min);
+            let [deepest, of_minima] = [least(all.as_slice()), least(minima.as_slice())];
+            let is_kept = of_minima == deepest || of_minima <= deepest + self.distance * size;
+            assert!(is_kept, "{mode:?}: {of_minima} instead of {deepest}");
+            let near = (1e-3 * size).max(self.point * size);
+            let dropped: Vec<_> = of(all.as_slice()).filter(|c| !kept.contains(&bits(c))).collect();
+            counts[1] += dropped.len();
+            for c in dropped.iter().step_by(1 + dropped.len() / 24) {
+                let lower = self.lowest_sample(&bodies[a], &bodies[b], c.point_a, near);
+                assert!(lower < c.distance, "{lower} is the least beside {c:?}");
+            }
+        }
+        counts
+    }
+
+    /// The least signed distance in `field` of samples on the faces of `surface` at a point, up to
+    /// `near` away from it.
+    fn lowest_sample(&self, surface: &Placed, field: &Placed, p: DVec3, near: f64) -> f64 {
+        let mesh = surface.body.solid.mesh();
+        let mut lowest = f64::INFINITY;
+        for face in 0..mesh.faces().len() {
+            let [a, b, c] = surface.body.face(face as u32, surface.at);
+            let triangle = Triangle::new([a, b, c]);
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            if triangle.closest(p).distance > 1.01e-4 * longest + self.point * surface.diagonal() {
+                continue;
+            }
+            for k in 0..32 {
+                let angle = std::f64::consts::TAU * f64::from(k) / 32.0;
+                let along = (b - a).normalize_or_zero();
+                let way = angle.cos() * along + angle.sin() * triangle.normal.cross(along);
+                for exponent in 0..8 {
+                    let step = near.max(longest / 32.0) * 0.25f64.powi(exponent);
+                    lowest = lowest.min(field.distance_by_tree(triangle.closest(p + step * way).point));
+                }
+            }
+        }
+        lowest
+    }
+
+    /// A peg in front of a wall of two storeys, whose border lies just below the end of the peg: the
+    /// border is no contact, because the wall beside the peg is nearer.
+    pub fn border_ahead_of_a_peg_is_no_minimum(&self) {
+        let wall =
+            shapes::Shape::default().add_box(DVec3::new(0.0, -0.5, -1.0), DVec3::new(0.2, 0.5, 1.0), 8);
+        let wall = Placed {
+            body: Arc::new(Body::new(wall.solid())),
+            at: Placement { pose: Pose::IDENTITY, scale: 1.0 },
+        };
+        let (clearance, above) = (0.01, 0.02);
+        let end = DVec3::new(-0.3 - clearance, -0.1, above);
+        let peg = block(end, end + DVec3::new(0.3, 0.2, 0.6), 1);
+        let scene = scene(&[wall, peg]);
+        for (contacts_per, is_there) in [(ContactsPer::Face, true), (ContactsPer::Minimum, false)] {
+            let options =
+                CollideOptions { contacts_per, contact_distance: 0.05, ..CollideOptions::default() };
+            let found = (self.detect)(&scene, &options);
+            let oblique = of_direction(found.as_slice(), 0, 1).any(|c| c.normal.z.abs() > 0.3);
+            assert_eq!(oblique, is_there, "{contacts_per:?}");
+            let beside = of_direction(found.as_slice(), 0, 1).any(|c| {
+                c.normal.x > 1.0 - self.cosine && (c.distance - clearance).abs() < self.level + 1e-9
+            });
+            assert!(beside, "{contacts_per:?}");
+        }
+    }
+
     /// The contacts hold the upper body up: the normals of the nearest contacts are vertical, and each
     /// corner of the patch has a contact nearby. Beside the patch, faces are farther away, with other
     /// normals.
@@ -104,10 +191,10 @@ impl Detection<'_> {
 
     /// Boxes of side 0.1 on a lower one with n × n squares a side. Returns the number of contacts
     /// whose search has not converged.
-    pub fn box_stands_on_the_corners_of_the_patch(&self) -> usize {
+    pub fn box_stands_on_the_corners_of_the_patch(&self, contacts_per: ContactsPer) -> usize {
         let half = DVec3::splat(0.05);
         let options = CollideOptions {
-            contacts_per: ContactsPer::Face,
+            contacts_per,
             contact_distance: 2e-4,
             cos_theta: Some(0.5),
             ..CollideOptions::default()
@@ -142,9 +229,9 @@ impl Detection<'_> {
         unconverged
     }
 
-    pub fn box_stands_on_a_plane_and_on_four_pegs(&self) {
+    pub fn box_stands_on_a_plane_and_on_four_pegs(&self, contacts_per: ContactsPer) {
         let options = CollideOptions {
-            contacts_per: ContactsPer::Face,
+            contacts_per,
             contact_distance: 2e-4,
             cos_theta: Some(0.5),
             ..CollideOptions::default()

@@ -12,7 +12,7 @@ use super::middle::{self, ClippedPolygon};
 use super::polygon::Polygon;
 use super::surface::Part;
 use super::{CollideOptions, ContactsPer, Mode};
-use crate::geometry::Aabb;
+use crate::geometry::{Aabb, Triangle};
 use crate::query::{Faces, Place, Precision, Surroundings};
 use extremes::Patch;
 
@@ -196,6 +196,18 @@ impl Search {
                 }
             }
         });
+    }
+
+    /// The least signed distance over a whole face that Frank–Wolfe finds; infinite beyond reach.
+    pub fn frank_wolfe(&self, field: &FieldBody, face: &Triangle) -> f64 {
+        let least = |cell: &CellField| {
+            let lowest = frank_wolfe::lowest(cell, &Polygon::new(&face.corners), self.iterations, self.reach);
+            lowest.map_or(f64::INFINITY, |lowest| cell.value(lowest.point, self.precision).distance)
+        };
+        match field.field {
+            Field::Mesh(asset) => least(&CellField::Whole(&Surroundings::all(asset))),
+            Field::Simple(simple) => least(&CellField::Simple(simple)),
+        }
     }
 
     /// The least signed distance over a whole part. Where the part is flat on the field's body, or
