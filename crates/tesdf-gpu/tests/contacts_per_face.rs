@@ -54,7 +54,7 @@ fn each_face_of_bolt_and_nut_keeps_its_least_distance() {
 #[test]
 fn minima_are_followed_by_no_lower_point() {
     let mut random = Random(23);
-    let names = [["l_bracket", "cube"], ["torus_quads", "tetra"], ["lobed_peg", "lobed_hole_c100"]];
+    let names = [["l_bracket", "cube"], ["torus_quads", "tetra"], ["beam", "l_bracket"]];
     let mut all = [0, 0];
     for names in names {
         for relation in RELATIONS.into_iter().filter(|&relation| relation != Relation::Same) {
@@ -66,7 +66,7 @@ fn minima_are_followed_by_no_lower_point() {
             }
         }
     }
-    assert!(all[0] > 1000 && all[1] > 1000, "{all:?}");
+    assert!(all[0] > 500 && all[1] > 500, "{all:?}");
 }
 
 #[test]
