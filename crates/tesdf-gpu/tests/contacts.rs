@@ -15,7 +15,7 @@ use support::random::Random;
 use tesdf::TeSdf;
 use tesdf::collide::{
     CollideOptions, Contact, Contacts, ContactsPer, Groups, Instance, InstanceId, Mode, Pose, Scene, Shape,
-    detect,
+    Velocity, detect, instance_pairs,
 };
 use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
@@ -103,6 +103,59 @@ fn simple_shapes_meet_meshes_and_each_other() {
         }
     }
     compared.is_good(5000);
+}
+
+/// Bodies that fall and turn together by half their size, and move by a hundredth relative to each
+/// other, find the same contacts within the distances that their relative motions can close.
+#[test]
+fn moving_bodies_look_ahead() {
+    let mut random = Random(29);
+    let shapes = [
+        Shape::Mesh(body("l_bracket").asset.clone()),
+        Shape::Mesh(body("cube").asset.clone()),
+        Shape::Box { half_extents: DVec3::new(0.05, 0.08, 0.03) },
+        Shape::Capsule { half_height: 0.06, radius: 0.03 },
+        Shape::Plane,
+    ];
+    let size = shapes[0].diagonal();
+    let (fall, turn) = (0.5 * size * random.direction(), 0.5 * random.direction());
+    let mut scene = Scene::new();
+    for world in 0..3 {
+        for (k, shape) in shapes.iter().cycle().take(8).enumerate() {
+            let is_plane = matches!(shape, Shape::Plane);
+            let id = scene.add_shape(shape.clone()).expect("a shape");
+            let scale = if is_plane { 1.0 } else { size / shape.diagonal() };
+            // Far from the origin, where `f32` alone would round poses by more than the motion.
+            let translation = DVec3::splat(100.0 * size * f64::from(world))
+                + if is_plane { -0.6 * size * DVec3::Z } else { 0.6 * size * random.in_cube() };
+            let rotation = if is_plane { tesdf::glam::DQuat::IDENTITY } else { rotation(&mut random) };
+            let around = translation - DVec3::splat(100.0 * size * f64::from(world));
+            let own = 0.01 * size * random.in_cube();
+            let velocity = match k {
+                5 => Velocity::default(),
+                _ if is_plane => Velocity { linear: fall + own, angular: DVec3::ZERO },
+                _ => Velocity {
+                    linear: fall + turn.cross(around) + own,
+                    angular: turn + 0.02 * random.in_cube(),
+                },
+            };
+            let pose = Pose { translation, rotation };
+            scene.add(Instance { scale, world, velocity, ..Instance::new(id, pose) }).expect("an instance");
+        }
+    }
+    let mut compared = Compared::default();
+    for options in each_mode(size) {
+        let options = CollideOptions { speculative_time: 0.5, ..options };
+        compared.add(hold(&scene, &options, 2.0 * size));
+        let (all, _) = found(&scene, &options, DetectorOptions::default());
+        let by_host = DetectorOptions { max_pair_tests: 0, ..DetectorOptions::default() };
+        assert_eq!(all.as_slice(), found(&scene, &options, by_host).0.as_slice());
+    }
+    compared.is_good(5000);
+    let pairs = instance_pairs(&scene, 0.0, 0.5).expect("pairs");
+    let widest = pairs.iter().map(|p| p.contact_distance).fold(0.0, f64::max);
+    let narrow = pairs.iter().filter(|p| p.contact_distance < 0.2 * widest).count();
+    assert!(narrow > 10 && narrow < pairs.len(), "{narrow} of {}", pairs.len());
 }
 
 /// Lists of at most 32 faces: both sides return the distance to the listed faces, which may differ

@@ -243,3 +243,41 @@ fn a_hidden_overlap_of_equal_bricks_is_reported() {
     let fell = engine.system().states()[falling].pose.translation.z < 0.0;
     assert!(told > 20 || !fell, "{told} steps told");
 }
+
+/// The signed distance between two boxes that stand on each other, which do not turn.
+fn gaps(engine: &Newton, bodies: &[usize], height: f64) -> Vec<f64> {
+    let z = |&body: &usize| engine.system().states()[body].pose.translation.z;
+    let below = std::iter::once(-0.5 * height).chain(bodies.iter().map(z));
+    bodies.iter().map(z).zip(below).map(|(upper, lower)| upper - lower - height).collect()
+}
+
+/// Boxes that fall together have no contacts with each other. When the floor stops the lowest, the
+/// others still meet it in the same step.
+#[test]
+fn boxes_that_fall_together_stop_each_other() {
+    let half = DVec3::new(0.02, 0.02, 0.01);
+    let height = 2.0 * half.z;
+    for gap in [4e-3, 5e-4, 5e-5] {
+        let mut system = System::new(GRAVITY);
+        add_plane(&mut system, Pose::IDENTITY);
+        let velocity = Velocity { linear: DVec3::new(0.0, 0.0, -2.0), angular: DVec3::ZERO };
+        let bodies: Vec<usize> = (0..8)
+            .map(|k| {
+                let z = 0.05 + half.z + f64::from(k) * (height + gap);
+                add_free(&mut system, Shape::Box { half_extents: half }, Pose::at(z * DVec3::Z), velocity)
+            })
+            .collect();
+        let mut engine = Newton::new(system, detect, nodes(1e-4), NewtonOptions::default()).unwrap();
+        for step in 0..30 {
+            let report = engine.step(5e-3).unwrap();
+            let gaps = gaps(&engine, &bodies, height);
+            assert!(gaps.iter().all(|&gap| gap > -1e-6), "gap {gap}, step {step}: {gaps:?}");
+            // The lowest meets the floor in the fifth step.
+            if step < 4 && gap > 4e-4 {
+                assert_eq!((report.contacts, report.detections), (0, 1), "gap {gap}, step {step}");
+            }
+        }
+        let rest = gaps(&engine, &bodies, height);
+        assert!(rest.iter().all(|&gap| gap < 1e-6), "gap {gap}: {rest:?}");
+    }
+}

@@ -3,29 +3,31 @@
 mod support;
 
 use support::random::Random;
+use tesdf::collide::internal::Ahead;
 use tesdf::collide::{
     CollideError, CollideOptions, Groups, Instance, InstanceId, InstancePair, InstancePairs, Pose, Scene,
     Shape, Velocity, detect, detect_pairs, detect_with, instance_pairs,
 };
 use tesdf::glam::{DQuat, DVec3};
 
-/// All pairs of instances whose grown bounds overlap, sorted by world and ids.
+/// All pairs of instances whose bounds are within their contact distance, sorted by world and ids.
 fn all_pairs(scene: &Scene, options: &CollideOptions) -> Vec<InstancePair> {
     let all: Vec<(InstanceId, &Instance)> = scene.instances().collect();
     let shape = |i: &Instance| scene.shape(i.shape).expect("a shape");
-    let motion = |i: &Instance| i.motion_ahead(shape(i), options.speculative_time);
-    let grown = |id: InstanceId, i: &Instance| {
+    let ahead = |i: &Instance| Ahead::new(i, shape(i), options.speculative_time);
+    let bounds = |id: InstanceId| {
         let bounds = scene.bounds(id).expect("bounds");
         let rounding = 8.0 * f64::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
-        bounds.grown(0.5 * options.contact_distance + motion(i) + rounding)
+        bounds.grown(rounding)
     };
     let is_plane = |i: &Instance| matches!(shape(i), Shape::Plane);
     let mut pairs = Vec::new();
     for (k, &(a, x)) in all.iter().enumerate() {
         for &(b, y) in &all[k + 1..] {
             let two_planes = is_plane(x) && is_plane(y);
-            if !two_planes && scene.may_meet((a, x), (b, y)) && grown(a, x).overlaps(grown(b, y)) {
-                let contact_distance = options.contact_distance + motion(x) + motion(y);
+            let contact_distance = options.contact_distance + ahead(x).closing(&ahead(y));
+            let are_near = bounds(a).grown(contact_distance).overlaps(bounds(b));
+            if !two_planes && scene.may_meet((a, x), (b, y)) && are_near {
                 pairs.push((x.world, InstancePair { first: a, second: b, contact_distance }));
             }
         }

@@ -9,9 +9,10 @@ use tesdf::collide::{
 };
 
 use super::NewtonOptions;
-use super::integrate::{free_velocity, moved, unpack, velocity};
+use super::integrate::{free_velocity, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
+use super::look::Look;
 use super::normals::normals;
 use super::problem::{Minimum, Problem};
 use super::rows::{Bodies, FreeBody, Resistance, Row};
@@ -91,7 +92,7 @@ struct Found {
     way: f64,
 }
 
-/// Maximum number of further detections in a step when bodies are faster than was foreseen.
+/// Maximum number of further detections in a step when bodies close faster than was foreseen.
 const MORE_LOOKS: u32 = 2;
 
 /// Directions at the beginning and the end of a step are averaged when the cosine of their angle is
@@ -176,9 +177,18 @@ impl Newton {
         states
     }
 
+    /// The options of a detection. Within a step, gravity acts on one body of a pair while contacts hold
+    /// the other, so it counts for all pairs.
+    fn options_of(&self, step: &Step) -> CollideOptions {
+        let speculative_time = self.options.speculation * step.h;
+        let fall = speculative_time * step.h * self.system.gravity.length();
+        let contact_distance = self.collide.contact_distance + fall;
+        CollideOptions { contact_distance, speculative_time, ..self.collide }
+    }
+
     fn detect(&mut self, step: &mut Step, states: &[State]) -> Result<Contacts, DynamicsError> {
         let start = Instant::now();
-        let options = CollideOptions { speculative_time: self.options.speculation * step.h, ..self.collide };
+        let options = self.options_of(step);
         let contacts = self.detector.detect(self.system.scene_at(states)?, &options)?;
         step.report.detections += 1;
         step.report.detection += start.elapsed();
@@ -390,33 +400,78 @@ impl Newton {
         Problem::new(bodies, of(&step.target), rows, step.h).minimise(of(start), &self.options)
     }
 
-    /// Detects as far ahead as the velocities of `ahead` move the bodies, and solves.
-    fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<(Contacts, Velocities), DynamicsError> {
-        // What an earlier look did not reach is of no account.
-        step.report.converged = true;
-        let found = self.detect(step, ahead)?;
-        let velocities = self.velocities(step, found.as_slice())?;
-        Ok((found, velocities))
+    /// Detects as far ahead as the velocities of `ahead` move the bodies.
+    fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
+        let contacts = self.detect(step, ahead)?;
+        let options = self.options_of(step);
+        Ok(Look::new(contacts, self.system.scene_at(ahead)?, &options)?)
     }
 
-    /// Whether a body moves farther at `velocities` than the detection looked, which was `ahead`. Such
-    /// bodies get these velocities in `ahead`.
-    fn outrun(&self, step: &Step, ahead: &mut [State], velocities: &[Vector6<f64>]) -> bool {
-        let mut outrun = false;
-        // Bodies that overlap deeply are pushed apart, not into others.
-        let bodies = step.free.iter().zip(velocities).zip(&step.deep).filter(|(_, deep)| !**deep);
-        for ((free, v), _) in bodies {
-            let (linear, angular) = unpack(v);
-            let seen = &mut ahead[free.body];
-            let size = self.sizes[free.body];
-            let way = |linear: DVec3, angular: DVec3| step.h * (linear.length() + angular.length() * size);
-            let range = self.options.speculation * way(seen.linear, seen.angular)
-                + 0.5 * self.collide.contact_distance;
-            if way(linear, angular) > range {
-                (seen.linear, seen.angular, outrun) = (linear, angular, true);
+    /// The pairs of bodies that move closer at the velocities of `ahead` than `look` has looked.
+    fn outrun(
+        &mut self,
+        step: &Step,
+        look: &Look,
+        ahead: &[State],
+    ) -> Result<Vec<[usize; 2]>, DynamicsError> {
+        let pairs = look.outrun(self.system.scene_at(ahead)?, step.h)?;
+        let bodies = pairs.into_iter().filter_map(|(a, b)| {
+            let bodies = [self.system.body_of(a)?, self.system.body_of(b)?];
+            // Bodies that overlap deeply are pushed apart, not into others.
+            let is_driven = |body: usize| step.free_of[body].is_some_and(|k| !step.deep[k]);
+            bodies.iter().any(|&body| is_driven(body)).then_some(bodies)
+        });
+        Ok(bodies.collect())
+    }
+
+    /// Puts the velocities into `ahead` with which the next look finds what `velocities` bring
+    /// together and `look`, with the velocities that are in `ahead`, has not. Returns whether there is
+    /// something to find.
+    ///
+    /// Where bodies fall together and the lowest is stopped, the next one may be stopped by it, and so
+    /// on. So a body that is met takes over the velocity of the one that it meets, and may meet others
+    /// with it. Of two bodies in a row, the look has one at its own velocity and one at that which it
+    /// takes over.
+    fn look_on(
+        &mut self,
+        step: &Step,
+        look: &Look,
+        ahead: &mut [State],
+        velocities: &[Vector6<f64>],
+    ) -> Result<bool, DynamicsError> {
+        let foreseen = ahead.to_vec();
+        set_velocities(ahead, &step.free, velocities);
+        let own = ahead.to_vec();
+        let change = |body: usize| {
+            let (from, to) = (&foreseen[body], &own[body]);
+            from.linear.distance(to.linear) + self.sizes[body] * from.angular.distance(to.angular)
+        };
+        let changes: Vec<f64> = (0..own.len()).map(change).collect();
+        // How many bodies are between a body and the first one of its row.
+        let mut place: Vec<Option<u32>> = vec![None; own.len()];
+        loop {
+            let mut is_longer = false;
+            for [a, b] in self.outrun(step, look, ahead)? {
+                let [a, b] = if changes[a] >= changes[b] { [a, b] } else { [b, a] };
+                let (meets, met) = match (place[a], place[b]) {
+                    (None, Some(_)) => (b, a),
+                    (_, None) => (a, b),
+                    (Some(_), Some(_)) => continue,
+                };
+                let first = *place[meets].get_or_insert(0);
+                place[met] = Some(first + 1);
+                is_longer = true;
+                if step.free_of[met].is_some() {
+                    (ahead[met].linear, ahead[met].angular) = (ahead[meets].linear, ahead[meets].angular);
+                }
+            }
+            if !is_longer {
+                break;
             }
         }
-        outrun
+        let is_odd = |body: usize| place[body].is_some_and(|place| place % 2 == 1);
+        (0..own.len()).filter(|&body| is_odd(body)).for_each(|body| ahead[body] = own[body]);
+        Ok(place.iter().any(Option::is_some))
     }
 
     /// The velocities that move the poses, and the velocities that the next step starts from.
@@ -491,21 +546,31 @@ impl Dynamics for Newton {
             return Err(DynamicsError::Option { option: "time step", found: time_step, expected });
         }
         let mut step = self.begin(time_step);
-        // The detection must reach as far as the step can move the bodies, so it uses the
-        // velocities after gravity. Motors and joints can make a body faster than that.
+        // The detection must reach as far as the step can close, so it uses the velocities that
+        // wrenches give; gravity is in the contact distance. Contacts, motors and joints change them.
         let mut ahead = self.system.states().to_vec();
-        set_velocities(&mut ahead, &step.free, &step.target);
-        let (mut found, [mut velocities, mut carried]) = self.look(&mut step, &ahead)?;
+        let falling = pack(time_step * self.system.gravity, DVec3::ZERO);
+        let target: Vec<_> = step.target.iter().map(|v| v - falling).collect();
+        set_velocities(&mut ahead, &step.free, &target);
+        let mut look = self.look(&mut step, &ahead)?;
+        let [mut velocities, mut carried] = self.velocities(&mut step, look.contacts.as_slice())?;
         for _ in 0..MORE_LOOKS {
-            if !self.outrun(&step, &mut ahead, &velocities) {
+            if !self.look_on(&step, &look, &mut ahead, &velocities)? {
                 break;
             }
-            (found, [velocities, carried]) = self.look(&mut step, &ahead)?;
+            let more = self.look(&mut step, &ahead)?;
+            if !look.extend(more, self.system.scene()) {
+                break;
+            }
+            // What an earlier minimisation did not reach is of no account.
+            step.report.converged = true;
+            [velocities, carried] = self.velocities(&mut step, look.contacts.as_slice())?;
         }
         let mut states = self.moved(&step, &velocities);
         set_velocities(&mut states, &step.free, &carried);
         self.system.set_states(states)?;
         let mut report = step.report;
+        let found = look.contacts;
         report.contacts = found.len();
         report.deepest = found.iter().map(|c| c.distance).reduce(f64::min);
         report.solution = begin.elapsed().saturating_sub(report.detection);

@@ -38,6 +38,7 @@ mod integrate;
 mod islands;
 mod joints;
 mod linear;
+mod look;
 mod normals;
 mod options;
 mod problem;

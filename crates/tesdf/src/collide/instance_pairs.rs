@@ -1,10 +1,11 @@
 //! Finds the instances that can touch: instances of one world whose bounds overlap.
 use std::collections::BTreeMap;
 
-use super::{CollideError, Instance, InstanceId, Scene, Shape, Velocity};
+use super::ahead::Ahead;
+use super::{CollideError, Instance, InstanceId, Scene, Shape};
 use crate::geometry::{Aabb, AabbTree};
 
-/// Two instances whose bounds come within their contact distance.
+/// Two instances whose bounds are within their contact distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstancePair {
     /// The instance with the lower id.
@@ -12,7 +13,8 @@ pub struct InstancePair {
     /// The instance with the higher id.
     pub second: InstanceId,
     /// The pair's contact distance: contacts are reported up to this signed distance, in the
-    /// world's unit.
+    /// world's unit. It is that of the options, plus what the velocities of the two, relative to each
+    /// other, can close within the speculative time.
     pub contact_distance: f64,
 }
 
@@ -21,10 +23,12 @@ pub struct InstancePair {
 pub struct Entry {
     /// The instance.
     pub id: InstanceId,
-    /// Its bounds, grown by half of the contact distance and by its motion.
+    /// Its own bounds.
+    own: Aabb,
+    /// The same, grown by half of the contact distance and by its motion. Those of a pair overlap.
     pub bounds: Aabb,
-    /// Distance that it can move within the speculative time.
-    pub motion: f64,
+    /// Its motion within the speculative time.
+    ahead: Ahead,
     /// Whether it is a plane, whose bounds are infinite.
     pub is_plane: bool,
 }
@@ -59,11 +63,10 @@ pub fn instance_pairs(
         let first = pairs.len();
         let mut offer = |i: usize, j: usize| {
             let ((a, x), (b, y)) = (&entries[i.min(j)], &entries[i.max(j)]);
-            if a.bounds.overlaps(b.bounds)
-                && !(a.is_plane && b.is_plane)
+            if let Some(pair) = Entry::pair(a, b, contact_distance)
                 && scene.may_meet((a.id, x), (b.id, y))
             {
-                pairs.push(Entry::pair(a, b, contact_distance));
+                pairs.push(pair);
             }
             pairs.len()
         };
@@ -112,12 +115,13 @@ impl Entry {
         let shape = scene
             .shape(instance.shape)
             .map_err(|e| CollideError::Instance { instance: id.0, reason: e.to_string() })?;
-        let motion = instance.motion_ahead(shape, speculative_time);
-        let bounds = instance.bounds(shape);
+        let ahead = Ahead::new(instance, shape, speculative_time);
+        let own = instance.bounds(shape);
         // Without this, rounding could separate bounds that touch.
-        let rounding = ULPS * f64::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
-        let bounds = bounds.grown(0.5 * contact_distance + motion + rounding);
-        Ok(Self { id, bounds, motion, is_plane: matches!(shape, Shape::Plane) })
+        let rounding = ULPS * f64::EPSILON * own.min.abs().max(own.max.abs()).max_element();
+        let own = own.grown(rounding);
+        let bounds = own.grown(0.5 * contact_distance + ahead.motion());
+        Ok(Self { id, own, bounds, ahead, is_plane: matches!(shape, Shape::Plane) })
     }
 
     /// The bounds, grown by a share of their longest edge.
@@ -128,30 +132,16 @@ impl Entry {
         }
     }
 
-    /// The pair of two entries, the lower id first.
-    pub fn pair(a: &Self, b: &Self, contact_distance: f64) -> InstancePair {
-        let contact_distance = contact_distance + a.motion + b.motion;
-        InstancePair { first: a.id, second: b.id, contact_distance }
-    }
-}
-
-impl Instance {
-    /// Greatest distance that the velocity can move a point of the instance in `time`. `shape` is
-    /// its shape.
-    pub fn motion_ahead(&self, shape: &Shape, time: f64) -> f64 {
-        if time > 0.0 {
-            let arm = if matches!(shape, Shape::Plane) { 0.0 } else { reach(shape.bounds()) * self.scale };
-            let Velocity { linear, angular } = self.velocity;
-            time * (linear.length() + angular.length() * arm)
-        } else {
-            0.0
+    /// The pair of two entries, the lower id first, if their own bounds are within the pair's contact
+    /// distance. Two planes are no pair.
+    pub fn pair(a: &Self, b: &Self, contact_distance: f64) -> Option<InstancePair> {
+        if !a.bounds.overlaps(b.bounds) || a.is_plane && b.is_plane {
+            return None;
         }
+        let contact_distance = contact_distance + a.ahead.closing(&b.ahead);
+        let is_near = a.own.grown(contact_distance).overlaps(b.own);
+        is_near.then_some(InstancePair { first: a.id, second: b.id, contact_distance })
     }
-}
-
-/// Greatest distance from the origin to a point of a box.
-fn reach(bounds: Aabb) -> f64 {
-    bounds.min.abs().max(bounds.max.abs()).length()
 }
 
 #[cfg(test)]

@@ -80,7 +80,8 @@ struct Candidate {
     world: u32,
     first: u32,
     second: u32,
-    is_pair: bool,
+    /// The pair, if they are one.
+    pair: Option<InstancePair>,
 }
 
 /// A wider box extends by this share of the longest edge of the body's box to each side.
@@ -224,7 +225,7 @@ impl InstancePairs {
     fn search(&mut self) -> Result<(), CollideError> {
         let bodies = &self.bodies;
         let mut found: Vec<Candidate> = Vec::new();
-        let mut overlapping = 0;
+        let mut near = 0;
         for world in self.worlds.values_mut() {
             let left = |indices: &[u32]| -> Vec<u32> {
                 indices.iter().copied().filter(|&i| bodies[i as usize].has_left).collect()
@@ -238,11 +239,12 @@ impl InstancePairs {
                 // Of two bodies that have both left, the first finds the pair.
                 let is_other = i != j && (i < j || !b.has_left);
                 if is_other && a.wide.overlaps(b.wide) && a.state.groups.meet(b.state.groups) {
-                    overlapping += usize::from(a.entry.bounds.overlaps(b.entry.bounds));
+                    let pair = Entry::pair(&a.entry, &b.entry, self.measures.contact_distance);
+                    near += usize::from(pair.is_some());
                     let (world, first, second) = (a.state.world, i.min(j), i.max(j));
-                    found.push(Candidate { world, first, second, is_pair: false });
+                    found.push(Candidate { world, first, second, pair: None });
                 }
-                overlapping <= 2 * MAX_PAIRS
+                near <= 2 * MAX_PAIRS
             };
             let too_many = CollideError::TooManyPairs { limit: MAX_PAIRS };
             for &i in &planes {
@@ -278,11 +280,11 @@ impl InstancePairs {
         for candidate in candidates {
             let [a, b] = [candidate.first, candidate.second].map(|i| &bodies[i as usize]);
             if a.has_changed || b.has_changed {
-                candidate.is_pair =
-                    a.entry.bounds.overlaps(b.entry.bounds) && !scene.is_excluded(a.entry.id, b.entry.id);
+                candidate.pair = Entry::pair(&a.entry, &b.entry, measures.contact_distance)
+                    .filter(|pair| !scene.is_excluded(pair.first, pair.second));
             }
-            if candidate.is_pair {
-                pairs.push(Entry::pair(&a.entry, &b.entry, measures.contact_distance));
+            if let Some(pair) = candidate.pair {
+                pairs.push(pair);
                 if pairs.len() > MAX_PAIRS {
                     return Err(CollideError::TooManyPairs { limit: MAX_PAIRS });
                 }

@@ -25,6 +25,7 @@
 //!
 //! In each contact, *a* is the body that has the face (or node), and *b* is the body whose signed
 //! distance field is used. Both orders of a pair are evaluated.
+mod ahead;
 mod candidates;
 mod clearance;
 mod coarse;
@@ -72,6 +73,7 @@ mod why;
 /// Not part of the API.
 #[doc(hidden)]
 pub mod internal {
+    pub use super::ahead::Ahead;
     pub use super::field::ROUNDING;
     pub use super::found::kept_at_vertices;
     pub use super::greatest_minimum::greatest_minimum;

@@ -81,8 +81,9 @@ pub struct CollideOptions {
     /// Contacts are reported up to this signed distance, in the world's unit. It may be wider than
     /// the band of an asset: outside the domain, the face tree answers, also exactly.
     pub contact_distance: f64,
-    /// Adds to a pair's contact distance what its velocities can close within this time; 0 adds
-    /// nothing.
+    /// Adds to a pair's contact distance what the velocities of the two instances, relative to each
+    /// other, can close within this time; 0 adds nothing. Instances that move together add next to
+    /// nothing, whatever their speed.
     pub speculative_time: f64,
     /// Eq. (10): a contact of a face is dropped when ∇φ · n > −cos θ. `None` keeps all. Not used
     /// for nodes.

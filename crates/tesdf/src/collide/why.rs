@@ -3,6 +3,7 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use super::ahead::Ahead;
 use super::middle::ClippedPolygon;
 use super::narrow::Minimum;
 use super::ordered_pair::{Dropped, OrderedPair};
@@ -152,9 +153,9 @@ pub fn why(
     options.validate()?;
     let (of_a, of_b) = (scene.instance(a)?, scene.instance(b)?);
     let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
-    let contact_distance = options.contact_distance
-        + of_a.motion_ahead(shape_a, options.speculative_time)
-        + of_b.motion_ahead(shape_b, options.speculative_time);
+    let [ahead_a, ahead_b] =
+        [(of_a, shape_a), (of_b, shape_b)].map(|(i, s)| Ahead::new(i, s, options.speculative_time));
+    let contact_distance = options.contact_distance + ahead_a.closing(&ahead_b);
     let (bounds_a, bounds_b) = (scene.bounds(a)?, scene.bounds(b)?);
     let bounds_gap = (bounds_a.min - bounds_b.max).max(bounds_b.min - bounds_a.max).max_element().max(0.0);
     let pair = match () {

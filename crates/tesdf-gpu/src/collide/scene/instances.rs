@@ -1,8 +1,10 @@
 //! The instances of a scene, in the layout of the device.
+use tesdf::collide::internal::Ahead;
 use tesdf::collide::{CollideOptions, InstanceId, InstancePair, Scene, ShapeId, instance_pairs};
 
 use super::placed::{FieldFrame, Placed};
 use crate::GpuError;
+use crate::kernels::broad::ahead;
 use crate::kernels::broad::pairs::{INSTANCE_ROWS, INSTANCE_WORDS};
 
 /// All instances, sorted by world and then by id.
@@ -13,13 +15,13 @@ pub struct Instances {
     pub placed: Vec<Placed>,
     /// For each instance, the index of its shape.
     pub shapes: Vec<usize>,
-    /// [`INSTANCE_ROWS`] rows for each instance.
+    /// [`INSTANCE_ROWS`] rows for each instance: all poses, then all motions.
     pub rows: Vec<[f32; 4]>,
     /// [`INSTANCE_WORDS`] words for each instance.
     pub words: Vec<u32>,
     /// Excluded pairs, by index, sorted.
     pub excluded: Vec<u32>,
-    /// All pairs whose bounds meet, by index. Only for worlds so large that a tree on the processor
+    /// All pairs that can touch, by index. Only for worlds so large that a tree on the processor
     /// is faster than testing all pairs on the device.
     pub pairs: Option<Vec<u32>>,
 }
@@ -45,6 +47,7 @@ impl Instances {
             excluded: Vec::new(),
             pairs: None,
         };
+        let mut motions = Vec::new();
         let mut end = 0;
         for (k, &(world, id)) in order.iter().enumerate() {
             if k >= end {
@@ -57,15 +60,15 @@ impl Instances {
                 reason: format!("shape {} is not on the device; upload the scene again", instance.shape.0),
             })?;
             let placed = Placed::new(frames[number], instance.placement());
-            let motion = instance.motion_ahead(shape, options.speculative_time);
-            let [high, mut low, rotation] = placed.rows();
-            low[3] = motion as f32;
-            all.rows.extend([high, low, rotation]);
+            all.rows.extend(placed.rows());
+            motions
+                .extend(ahead::rows(&Ahead::new(instance, shape, options.speculative_time), placed.origin));
             let groups = instance.groups;
             all.words.extend([number as u32, end as u32, groups.memberships, groups.filter]);
             all.placed.push(placed);
             all.shapes.push(number);
         }
+        all.rows.append(&mut motions);
         let mut place = vec![0u32; order.iter().map(|&(_, id)| id.0 as usize + 1).max().unwrap_or(0)];
         all.ids.iter().enumerate().for_each(|(k, id)| place[id.0 as usize] = k as u32);
         let mut excluded: Vec<[u32; 2]> = scene

@@ -1,4 +1,5 @@
 //! Broad phase: finds pairs of instances, then the meshlets that can touch.
+pub mod ahead;
 pub mod meshlets;
 pub mod ordered_pair;
 pub mod pairs;

@@ -6,15 +6,16 @@ use super::super::counters::{BADLY_MOVED, BLOCKS, Counters, ORDERED_PAIRS};
 use super::super::field::nearest::FAR;
 use super::super::field::shapes::{BAD_VERTEX, KIND, MESHLET_COUNT, NONE, PLANE, ROUND, SIZES, Shapes};
 use super::super::math::pose::{FarPoint, Pose, ROWS as POSE_ROWS, pose};
-use super::super::math::vector::{Row, V3, last, row_of, v3, xyz};
+use super::super::math::vector::{Row, V3, row_of, v3, xyz};
+use super::ahead::{self, Ahead, ROWS as MOTION_ROWS};
 use super::meshlets::{Blocks, MESHLETS_OF_BLOCK};
 use super::ordered_pair::{OrderedPair, OrderedPairs};
 
 /// The instances of a scene. The instances of a world are consecutive.
 #[derive(CubeType, CubeLaunch)]
 pub struct Instances {
-    /// A pose for each instance. The last number of its second row is the motion ahead.
-    pub poses: Box<[Row]>,
+    /// A pose for each instance, then a motion for each.
+    pub rows: Box<[Row]>,
     /// [`INSTANCE_WORDS`] words for each: shape, end of the world, memberships, filter.
     pub words: Box<[u32]>,
     pub count: u32,
@@ -22,7 +23,7 @@ pub struct Instances {
 }
 
 /// Rows of an instance.
-pub const INSTANCE_ROWS: u32 = POSE_ROWS;
+pub const INSTANCE_ROWS: u32 = POSE_ROWS + MOTION_ROWS;
 /// Words of an instance.
 pub const INSTANCE_WORDS: u32 = 4;
 /// Rows of an instance's bounds: center as high and low `f32`, half extents.
@@ -74,12 +75,26 @@ impl Instances {
     }
 
     fn pose(&self, instance: u32) -> Pose {
-        pose(&self.poses, instance)
+        pose(&self.rows, instance)
+    }
+
+    /// The row of an instance's motion.
+    fn row_of_motion(&self, instance: u32) -> u32 {
+        self.count * POSE_ROWS + instance * MOTION_ROWS
+    }
+
+    fn ahead(&self, instance: u32) -> Ahead {
+        ahead::ahead(&self.rows, self.row_of_motion(instance), self.pose(instance).origin)
     }
 
     /// The greatest distance that the velocity can move a point of an instance.
     fn motion(&self, instance: u32) -> f32 {
-        last(self.poses[(instance * INSTANCE_ROWS + 1u32) as usize])
+        ahead::motion(&self.rows, self.row_of_motion(instance))
+    }
+
+    /// The contact distance of a pair.
+    fn contact_distance_of(&self, i: u32, j: u32) -> f32 {
+        self.contact_distance + self.ahead(i).closing(self.ahead(j))
     }
 }
 
@@ -111,9 +126,8 @@ const ENDLESS: f32 = FAR;
 /// its bounds by 8 ulps of `f64` (`ULPS` in `tesdf::collide::instance_pairs`).
 const GROWN: f32 = 2e-6;
 
-/// Computes the bounds of an instance per thread, in the world. They include the motion ahead and
-/// half the contact distance. Counts the instances of shapes with a vertex that was moved to an
-/// invalid position.
+/// Computes the bounds of an instance per thread, in the world. Counts the instances of shapes with
+/// a vertex that was moved to an invalid position.
 #[cube(launch, create_dummy_kernel)]
 pub fn instance_bounds(shapes: &Shapes, instances: &Instances, counters: &Counters, bounds: &mut [Row]) {
     let i = ABSOLUTE_POS as u32;
@@ -127,8 +141,7 @@ pub fn instance_bounds(shapes: &Shapes, instances: &Instances, counters: &Counte
         let y = at.rotation.rotate(v3(0.0f32, at.unit * half.y, 0.0f32));
         let z = at.rotation.rotate(v3(0.0f32, 0.0f32, at.unit * half.z));
         let reach = (x.abs() + y.abs()) + z.abs();
-        let ahead = instances.motion(i);
-        let more = GROWN * (off.length() + reach.length()) + 0.5f32 * instances.contact_distance + ahead;
+        let more = GROWN * (off.length() + reach.length());
         let endless = field.entry(KIND) == PLANE;
         let to = (i * BOUNDS_ROWS) as usize;
         bounds[to] = row_of(at.origin.high, 0.0f32);
@@ -154,12 +167,21 @@ struct WorldBounds {
 }
 
 #[cube]
+impl WorldBounds {
+    /// The greatest gap between the bounds along an axis; negative when they overlap.
+    fn gap(self, other: WorldBounds) -> f32 {
+        (other.center.from(self.center).abs() - (self.half + other.half)).greatest()
+    }
+}
+
+#[cube]
 fn world_bounds(rows: &[Row], instance: u32) -> WorldBounds {
     let at = (instance * BOUNDS_ROWS) as usize;
     WorldBounds { center: FarPoint { high: xyz(rows[at]), low: xyz(rows[at + 1]) }, half: xyz(rows[at + 2]) }
 }
 
-/// Tests the bounds of one instance per thread against all later instances of its world.
+/// Tests the bounds of one instance per thread against all later instances of its world. Two are a
+/// pair when their bounds are within their contact distance.
 #[cube(launch, create_dummy_kernel)]
 pub fn instance_pairs(
     shapes: &Shapes,
@@ -174,16 +196,20 @@ pub fn instance_pairs(
         let is_plane = shapes.field(instances.shape(i)).entry(KIND) == PLANE;
         let groups = instances.groups(i);
         let own = world_bounds(bounds, i);
+        let widest = instances.contact_distance + instances.motion(i);
         let end = instances.end_of_world(i);
         let mut j = i + 1u32;
         while j < end {
             let other = world_bounds(bounds, j);
-            let apart = other.center.from(own.center);
-            let overlap = apart.abs().is_at_most(own.half + other.half);
+            let gap = own.gap(other);
             let meet = groups.meet(instances.groups(j));
             let planes = is_plane && shapes.field(instances.shape(j)).entry(KIND) == PLANE;
-            if overlap && meet && !planes && !excluded.contain(i, j) {
-                write_pair(shapes, instances, counters, found, i, j);
+            // Only bodies that are near each other are worth the bound of their relative motion.
+            if gap <= widest + instances.motion(j) && meet && !planes && !excluded.contain(i, j) {
+                let distance = instances.contact_distance_of(i, j);
+                if gap <= distance {
+                    write_pair(shapes, instances, counters, found, distance, i, j);
+                }
             }
             j += 1u32;
         }
@@ -203,23 +229,25 @@ pub fn given_pairs(
     if pair < pairs.count {
         let i = pairs.words[(2u32 * pair) as usize];
         let j = pairs.words[(2u32 * pair + 1u32) as usize];
-        write_pair(shapes, instances, counters, found, i, j);
+        let distance = instances.contact_distance_of(i, j);
+        write_pair(shapes, instances, counters, found, distance, i, j);
     }
 }
 
-/// Writes both ordered pairs of two instances, with their blocks.
+/// Writes both ordered pairs of two instances, with their blocks. Signed distances up to `distance` are
+/// contacts.
 #[cube]
 fn write_pair(
     shapes: &Shapes,
     instances: &Instances,
     counters: &Counters,
     found: &mut Found,
+    distance: f32,
     i: u32,
     j: u32,
 ) {
     let at = counters.add(ORDERED_PAIRS, 2u32);
     if at + 2u32 <= found.pairs.room {
-        let distance = instances.contact_distance + instances.motion(i) + instances.motion(j);
         let first = ordered_pair(shapes, instances, distance, at, i, j);
         found.pairs.put(first);
         let second = ordered_pair(shapes, instances, distance, at + 1u32, j, i);
