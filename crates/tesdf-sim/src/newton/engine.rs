@@ -93,7 +93,7 @@ struct Found {
 }
 
 /// Maximum number of further detections in a step when bodies close faster than was foreseen.
-const MORE_LOOKS: u32 = 2;
+const MORE_LOOKS: u32 = 8;
 
 /// Directions at the beginning and the end of a step are averaged when the cosine of their angle is
 /// above this: the contact crosses an edge of a curved surface. Sharper edges are two surfaces.
@@ -418,8 +418,8 @@ impl Newton {
         let bodies = pairs.into_iter().filter_map(|(a, b)| {
             let bodies = [self.system.body_of(a)?, self.system.body_of(b)?];
             // Bodies that overlap deeply are pushed apart, not into others.
-            let is_driven = |body: usize| step.free_of[body].is_some_and(|k| !step.deep[k]);
-            bodies.iter().any(|&body| is_driven(body)).then_some(bodies)
+            let is_deep = |body: usize| step.free_of[body].is_some_and(|k| step.deep[k]);
+            (!bodies.iter().any(|&body| is_deep(body))).then_some(bodies)
         });
         Ok(bodies.collect())
     }
@@ -462,7 +462,7 @@ impl Newton {
                 place[met] = Some(first + 1);
                 is_longer = true;
                 if step.free_of[met].is_some() {
-                    (ahead[met].linear, ahead[met].angular) = (ahead[meets].linear, ahead[meets].angular);
+                    ahead[met].linear = ahead[meets].linear;
                 }
             }
             if !is_longer {
