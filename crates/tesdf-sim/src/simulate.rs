@@ -5,7 +5,8 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::criterion::{
-    GearRatioReport, InsertionReport, JointDrift, LiftReport, Reports, RestReport, ScrewReport, Trackers,
+    GearRatioReport, InsertionReport, JointDrift, LiftReport, Reports, RestReport, ScrewReport,
+    SeparationReport, Trackers,
 };
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
@@ -73,6 +74,8 @@ pub struct Summary {
     pub lift: Option<LiftReport>,
     /// Result of the gear ratio criterion, if the scene has one.
     pub gear_ratio: Option<GearRatioReport>,
+    /// Result of the separation criterion, if the scene has one.
+    pub separation: Option<SeparationReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
 }
@@ -190,7 +193,7 @@ pub fn simulate_from(
     let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
     let mut reports = trackers.report(system, &messages);
     let passed = reports.passed();
-    let Reports { screw, rest, insertion, lift, gear_ratio } = reports;
+    let Reports { screw, rest, insertion, lift, gear_ratio, separation } = reports;
     let sums = totals.summary();
     let depths = hidden.iter().map(|pair| pair.depth);
     let (momentum, angular_momentum) = system.momentum();
@@ -207,6 +210,7 @@ pub fn simulate_from(
         insertion,
         lift,
         gear_ratio,
+        separation,
         deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
         hidden,
         ..sums

@@ -1,19 +1,22 @@
 //! What the summary of a run says of the scene's criteria.
 use tesdf_sim::Summary;
-use tesdf_sim::criterion::{GearRatioReport, InsertionReport, LiftReport, RestReport, ScrewReport};
+use tesdf_sim::criterion::{
+    GearRatioReport, InsertionReport, LiftReport, RestReport, ScrewReport, SeparationReport,
+};
 use tesdf_terminal::report;
 
 type Rows = Vec<(&'static str, String)>;
 
 /// The rows of all criteria.
 pub fn rows(summary: &Summary) -> Rows {
-    let Summary { screw, rest, insertion, lift, gear_ratio, .. } = summary;
+    let Summary { screw, rest, insertion, lift, gear_ratio, separation, .. } = summary;
     [
         screw.as_ref().map(screw_rows),
         rest.as_ref().map(rest_rows),
         insertion.as_ref().map(insertion_rows),
         lift.as_ref().map(lift_rows),
         gear_ratio.as_ref().map(gear_ratio_rows),
+        separation.as_ref().map(separation_rows),
     ]
     .into_iter()
     .flatten()
@@ -96,6 +99,19 @@ fn lift_rows(lift: &LiftReport) -> Rows {
         ("energy gain", format!("{:.2e} J while held", lift.energy_gain)),
     ];
     rows.extend(verdict_rows(&lift.failures));
+    rows
+}
+
+fn separation_rows(separation: &SeparationReport) -> Rows {
+    let micrometres = |depth: &f64| format!("{:.1}", 1e6 * depth);
+    let found = &separation.penetration;
+    let shown: Vec<String> = found.iter().step_by(found.len().div_ceil(8).max(1)).map(micrometres).collect();
+    let last = found.last().map_or("none".into(), micrometres);
+    let mut rows = vec![
+        ("separation", format!("{} µm deep over the run, {last} µm at the end", shown.join(", "))),
+        ("kinetic", format!("at most {:.3} of the energy of free fall", separation.kinetic_energy)),
+    ];
+    rows.extend(verdict_rows(&separation.failures));
     rows
 }
 

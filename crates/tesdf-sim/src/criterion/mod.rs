@@ -4,6 +4,7 @@ mod insertion;
 mod lift;
 mod rest;
 mod screw;
+mod separation;
 mod shared;
 
 pub use gear_ratio::{GearRatioCriterion, GearRatioReport, GearRatioTracker};
@@ -11,6 +12,7 @@ pub use insertion::{InsertionCriterion, InsertionReport, InsertionTracker};
 pub use lift::{LiftCriterion, LiftReport, LiftTracker};
 pub use rest::{RestCriterion, RestReport, RestTracker};
 pub use screw::{ScrewCriterion, ScrewReport, ScrewTracker, screw_acceleration};
+pub use separation::{SeparationCriterion, SeparationReport, SeparationTracker};
 
 use serde::Serialize;
 
@@ -34,13 +36,14 @@ pub(crate) struct Trackers {
     insertion: Option<InsertionTracker>,
     lift: Option<LiftTracker>,
     gear_ratio: Option<GearRatioTracker>,
+    separation: Option<SeparationTracker>,
     drift: JointDrift,
 }
 
 impl Trackers {
     /// Trackers that start from the current state of `system`.
     pub(crate) fn new(section: &CriterionSection, system: &System) -> Result<Self, String> {
-        let CriterionSection { screw, rest, insertion, lift, gear_ratio } = section;
+        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation } = section;
         Ok(Self {
             screw: screw.as_ref().map(|screw| ScrewTracker::new(screw, system)).transpose()?,
             rest: rest.as_ref().map(|rest| RestTracker::new(rest, system)).transpose()?,
@@ -50,6 +53,7 @@ impl Trackers {
                 .transpose()?,
             lift: lift.as_ref().map(|lift| LiftTracker::new(lift, system)).transpose()?,
             gear_ratio: gear_ratio.as_ref().map(|gears| GearRatioTracker::new(gears, system)).transpose()?,
+            separation: separation.as_ref().map(|of| SeparationTracker::new(of, system)).transpose()?,
             drift: JointDrift::default(),
         })
     }
@@ -71,6 +75,9 @@ impl Trackers {
         if let Some(gears) = &mut self.gear_ratio {
             gears.observe(system, time_step);
         }
+        if let Some(separation) = &mut self.separation {
+            separation.observe(system, time_step);
+        }
         for joint in system.joints() {
             let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
             self.drift.distance = self.drift.distance.max(distance);
@@ -91,6 +98,7 @@ impl Trackers {
             insertion: self.insertion.as_ref().map(InsertionTracker::report),
             lift: self.lift.as_ref().map(|lift| lift.report(system)),
             gear_ratio: self.gear_ratio.as_ref().map(GearRatioTracker::report),
+            separation: self.separation.as_ref().map(SeparationTracker::report),
         };
         reports.failures_mut().for_each(|of_one| of_one.extend_from_slice(failures));
         reports
@@ -105,6 +113,7 @@ pub(crate) struct Reports {
     pub(crate) insertion: Option<InsertionReport>,
     pub(crate) lift: Option<LiftReport>,
     pub(crate) gear_ratio: Option<GearRatioReport>,
+    pub(crate) separation: Option<SeparationReport>,
 }
 
 impl Reports {
@@ -115,12 +124,13 @@ impl Reports {
     }
 
     fn failures_mut(&mut self) -> impl Iterator<Item = &mut Vec<String>> {
-        let Self { screw, rest, insertion, lift, gear_ratio } = self;
+        let Self { screw, rest, insertion, lift, gear_ratio, separation } = self;
         let screw = screw.as_mut().map(|screw| &mut screw.failures);
         let rest = rest.as_mut().map(|rest| &mut rest.failures);
         let insertion = insertion.as_mut().map(|insertion| &mut insertion.failures);
         let lift = lift.as_mut().map(|lift| &mut lift.failures);
         let gear_ratio = gear_ratio.as_mut().map(|gears| &mut gears.failures);
-        [screw, rest, insertion, lift, gear_ratio].into_iter().flatten()
+        let separation = separation.as_mut().map(|separation| &mut separation.failures);
+        [screw, rest, insertion, lift, gear_ratio, separation].into_iter().flatten()
     }
 }

@@ -9,6 +9,7 @@ use tesdf::collide::{
 };
 
 use super::NewtonOptions;
+use super::deep::Surfaces;
 use super::integrate::{free_velocity, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
@@ -45,6 +46,8 @@ pub struct Newton {
     options: NewtonOptions,
     /// Diagonal of each body's bounding box, m.
     sizes: Vec<f64>,
+    /// For bodies that overlap deeply.
+    surfaces: Surfaces,
     /// What the last step found at its beginning.
     found: Contacts,
 }
@@ -138,7 +141,8 @@ impl Newton {
         };
         let sizes = system.bodies().iter().map(size).collect::<Result<_, CollideError>>()?;
         let (detector, found) = (Box::new(detector), Contacts::default());
-        Ok(Self { system, detector, collide, options, sizes, found })
+        let surfaces = Surfaces::new(system.scene(), collide.mode);
+        Ok(Self { system, detector, collide, options, sizes, surfaces, found })
     }
 
     fn begin(&self, h: f64) -> Step {
@@ -297,15 +301,19 @@ impl Newton {
         contacts.iter().zip(normals(contacts)).filter_map(row).collect()
     }
 
+    /// Whether a contact penetrates too deeply for a linear prediction.
+    fn is_deep(&self, contact: &Contact) -> bool {
+        let bodies = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
+        let size = bodies.iter().flatten().map(|&b| self.sizes[b]).fold(f64::INFINITY, f64::min);
+        -contact.distance > self.options.deep * size
+    }
+
     /// The bodies of islands that overlap deeply, as [`Step::deep`].
     fn deep(&self, step: &Step, contacts: &[Contact], rows: &[Row]) -> Vec<bool> {
         let mut deep = vec![false; step.free.len()];
-        for contact in contacts.iter().filter(|c| c.distance < 0.0) {
+        for contact in contacts.iter().filter(|c| self.is_deep(c)) {
             let bodies = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
-            let size = bodies.iter().flatten().map(|&b| self.sizes[b]).fold(f64::INFINITY, f64::min);
-            if -contact.distance > self.options.deep * size {
-                bodies.iter().flatten().filter_map(|&b| step.free_of[b]).for_each(|k| deep[k] = true);
-            }
+            bodies.iter().flatten().filter_map(|&b| step.free_of[b]).for_each(|k| deep[k] = true);
         }
         for island in islands(step.free.len(), rows) {
             if island.bodies.iter().any(|&k| deep[k]) {
@@ -476,6 +484,7 @@ impl Newton {
 
     /// The velocities that move the poses, and the velocities that the next step starts from.
     fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
+        let contacts = &self.surfaces.acting(self.system.scene(), contacts, |c| self.is_deep(c));
         let mut contact_rows = self.first_rows(step, contacts);
         let joints = joint_rows(&self.bodies(step), step.h);
         let rows = [contact_rows.as_slice(), &joints].concat();
@@ -493,7 +502,13 @@ impl Newton {
             let depths = self.depths(contacts);
             let before = self.before(step, contacts);
             for _ in 0..self.options.redetections {
-                let predicted = self.moved(step, &velocities);
+                let mut predicted = self.moved(step, &velocities);
+                // The contacts of these bodies stay, so the detection need not look as far as they are
+                // pushed.
+                for (k, free) in step.free.iter().enumerate().filter(|(k, _)| deep[*k]) {
+                    let seen = &mut predicted[free.body];
+                    (seen.linear, seen.angular) = unpack(&step.target[k]);
+                }
                 let contacts = self.detect(step, &predicted)?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
                 let mut next =

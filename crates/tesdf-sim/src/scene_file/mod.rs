@@ -57,7 +57,7 @@ pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
 
 use crate::criterion::{
-    GearRatioCriterion, InsertionCriterion, LiftCriterion, RestCriterion, ScrewCriterion,
+    GearRatioCriterion, InsertionCriterion, LiftCriterion, RestCriterion, ScrewCriterion, SeparationCriterion,
 };
 use crate::newton::NewtonOptions;
 use crate::script::Script;
@@ -298,4 +298,6 @@ pub struct CriterionSection {
     pub lift: Option<LiftCriterion>,
     /// A gear must turn another one.
     pub gear_ratio: Option<GearRatioCriterion>,
+    /// Bodies that begin deep in each other must come apart.
+    pub separation: Option<SeparationCriterion>,
 }

@@ -1,0 +1,259 @@
+//! Which contacts of bodies that overlap deeply push them apart.
+//!
+//! Deep inside of a body the nearest face can be on any side. Where two bodies are deep in each other,
+//! contacts on both sides of one then push it both ways, and nothing moves: 128 shafts in a pile stay
+//! 11.6 mm deep. Of the penetrating contacts of such a pair only those act that push a vertex or face
+//! against its own normal, into the body that it belongs to (Eq. (10) of the paper, for vertices, too).
+//!
+//! Two shafts that cross within a radius of each other are past the middle: their deepest contacts
+//! push along the own normals. Such a pair gets one direction for all of its pushes: of the normals of
+//! its contacts the one along which the bodies overlap least, measured by their extents (the separating
+//! axis test). Contacts act that push along it.
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use tesdf::TeSdf;
+use tesdf::collide::{Contact, InstanceId, Mode, Pose, Scene, Shape, ShapeId};
+
+/// cos θ of the filter: the normal of the contact is at least this much against that of the vertex or
+/// face, or along the direction of the pair.
+const COS_THETA: f64 = 0.3;
+
+/// A pair is past the middle when a contact pushes along the own normal that is deeper than this
+/// fraction of the deepest one that pushes against it.
+const PAST_THE_MIDDLE: f64 = 0.5;
+
+/// Maximum number of normals that are tried as directions of a pair.
+const TRIALS: usize = 32;
+
+/// The normals of the vertices or faces of the meshes of a scene, and their vertices, in the frames of
+/// the meshes.
+#[derive(Clone, Debug)]
+pub struct Surfaces(BTreeMap<ShapeId, Surface>);
+
+#[derive(Clone, Debug)]
+struct Surface {
+    /// For each feature that has contacts.
+    normals: Vec<DVec3>,
+    vertices: Vec<DVec3>,
+}
+
+impl Surfaces {
+    /// The surfaces of `scene`, with the normals of the features that have contacts in a mode.
+    pub fn new(scene: &Scene, mode: Mode) -> Self {
+        let of_shape = |(id, shape): (ShapeId, &Shape)| {
+            let Shape::Mesh(asset) = shape else { return None };
+            let normals = match mode {
+                Mode::Node => normals_of_vertices(asset),
+                Mode::Face | Mode::Exact => normals_of_faces(asset),
+            };
+            Some((id, Surface { normals, vertices: vertices(asset) }))
+        };
+        Self(scene.shapes().filter_map(of_shape).collect())
+    }
+
+    /// The contacts that act. `is_deep` tells whether a contact is that of a deep pair. The instances of
+    /// `scene` have the poses at which the contacts were found.
+    pub fn acting(
+        &self,
+        scene: &Scene,
+        contacts: &[Contact],
+        is_deep: impl Fn(&Contact) -> bool,
+    ) -> Vec<Contact> {
+        let mut deep: BTreeMap<[InstanceId; 2], Vec<(DVec3, f64, f64)>> = BTreeMap::new();
+        for contact in contacts.iter().filter(|c| is_deep(c)) {
+            deep.entry(pair(contact)).or_default();
+        }
+        if deep.is_empty() {
+            return contacts.to_vec();
+        }
+        for contact in contacts.iter().filter(|c| c.distance < 0.0) {
+            if let Some(pushes) = deep.get_mut(&pair(contact)) {
+                pushes.push((on_first(contact), -contact.distance, self.cosine(scene, contact)));
+            }
+        }
+        let directions: BTreeMap<[InstanceId; 2], Option<DVec3>> =
+            deep.iter().map(|(pair, pushes)| (*pair, self.direction(scene, *pair, pushes))).collect();
+        let acts = |contact: &&Contact| match directions.get(&pair(contact)) {
+            Some(direction) if contact.distance < 0.0 => match direction {
+                Some(direction) => direction.dot(on_first(contact)) > COS_THETA,
+                None => self.cosine(scene, contact) <= -COS_THETA,
+            },
+            _ => true,
+        };
+        contacts.iter().filter(acts).copied().collect()
+    }
+
+    fn of(&self, scene: &Scene, instance: InstanceId) -> Option<(&Surface, Pose, f64)> {
+        let instance = scene.instance(instance).ok()?;
+        Some((self.0.get(&instance.shape)?, instance.pose, instance.scale))
+    }
+
+    /// The cosine between the normal of a contact and that of its vertex or face. Vertices and faces of
+    /// simple shapes are always opposed.
+    fn cosine(&self, scene: &Scene, contact: &Contact) -> f64 {
+        let own = || {
+            let (surface, pose, _) = self.of(scene, contact.instance_a)?;
+            Some(pose.rotation * *surface.normals.get(contact.feature.a as usize)?)
+        };
+        own().map_or(-1.0, |normal: DVec3| normal.dot(contact.normal))
+    }
+
+    /// The direction in which a pair that is past the middle pushes its first instance. `pushes` are the
+    /// directions, depths and cosines of its penetrating contacts.
+    fn direction(&self, scene: &Scene, pair: [InstanceId; 2], pushes: &[(DVec3, f64, f64)]) -> Option<DVec3> {
+        let deepest = |along: bool| {
+            let of_side = pushes.iter().filter(|(.., cosine)| match along {
+                true => *cosine > COS_THETA,
+                false => *cosine <= -COS_THETA,
+            });
+            of_side.map(|(_, depth, _)| *depth).fold(0.0, f64::max)
+        };
+        let (along, against) = (deepest(true), deepest(false));
+        if along <= PAST_THE_MIDDLE * against || along == 0.0 {
+            return None;
+        }
+        let [first, second] = pair.map(|instance| self.of(scene, instance));
+        let (first, second) = (first?, second?);
+        let overlap = |d: DVec3| extent(first, -d) + extent(second, d);
+        let tried = pushes.iter().step_by(pushes.len().div_ceil(TRIALS)).map(|(d, ..)| (*d, overlap(*d)));
+        tried.min_by(|(_, o), (_, p)| o.total_cmp(p)).map(|(direction, _)| direction)
+    }
+}
+
+/// How far a body extends from the origin along a direction.
+fn extent((surface, pose, scale): (&Surface, Pose, f64), direction: DVec3) -> f64 {
+    let local = scale * (pose.rotation.inverse() * direction);
+    let farthest = surface.vertices.iter().map(|v| v.dot(local)).fold(f64::NEG_INFINITY, f64::max);
+    farthest + pose.translation.dot(direction)
+}
+
+/// The instances of a contact, the lower one first.
+fn pair(contact: &Contact) -> [InstanceId; 2] {
+    let (a, b) = (contact.instance_a, contact.instance_b);
+    [a.min(b), a.max(b)]
+}
+
+/// The direction in which a contact pushes the instance with the lower id.
+fn on_first(contact: &Contact) -> DVec3 {
+    if contact.instance_a < contact.instance_b { contact.normal } else { -contact.normal }
+}
+
+/// The vertices of the faces.
+fn vertices(asset: &TeSdf) -> Vec<DVec3> {
+    let mut vertices = Vec::new();
+    for face in 0..asset.face_count() {
+        for (vertex, corner) in asset.face_vertices(face).into_iter().zip(asset.face_corners(face)) {
+            if vertices.len() <= vertex as usize {
+                vertices.resize(vertex as usize + 1, corner);
+            }
+            vertices[vertex as usize] = corner;
+        }
+    }
+    vertices
+}
+
+/// The unit normal of each face, by its id.
+fn normals_of_faces(asset: &TeSdf) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::ZERO; asset.face_count()];
+    for face in 0..asset.face_count() {
+        let [p, q, r] = asset.face_corners(face);
+        normals[asset.face_id(face) as usize] = (q - p).cross(r - p).normalize_or_zero();
+    }
+    normals
+}
+
+/// The sum of the normals of the faces at each vertex, weighted by their angles there, as a unit
+/// vector (Thürmer and Wüthrich 1998).
+fn normals_of_vertices(asset: &TeSdf) -> Vec<DVec3> {
+    let mut normals = Vec::new();
+    for face in 0..asset.face_count() {
+        let corners = asset.face_corners(face);
+        for (k, vertex) in asset.face_vertices(face).into_iter().enumerate() {
+            let vertex = vertex as usize;
+            if normals.len() <= vertex {
+                normals.resize(vertex + 1, DVec3::ZERO);
+            }
+            let [p, q, r] = [0, 1, 2].map(|j| corners[(k + j) % 3]);
+            let normal = (q - p).cross(r - p);
+            let angle = normal.length().atan2((q - p).dot(r - p));
+            normals[vertex] += angle * normal.normalize_or_zero();
+        }
+    }
+    normals.into_iter().map(DVec3::normalize_or_zero).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use tesdf::collide::{FeatureB, FeatureId, Instance, Pose};
+    use tesdf::encode::{Encoder, Preset};
+    use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
+
+    use super::*;
+
+    /// Each corner of a cube has one or two triangles of a side, and the same normal.
+    #[test]
+    fn normals_of_a_cube_point_along_its_diagonals() {
+        let mut obj = String::new();
+        for k in 0..8 {
+            let c = |bit: usize| if k >> bit & 1 == 1 { 1 } else { -1 };
+            obj += &format!("v {} {} {}\n", c(0), c(1), c(2));
+        }
+        for [a, b, c, d] in
+            [[1, 5, 7, 3], [2, 4, 8, 6], [1, 2, 6, 5], [3, 7, 8, 4], [1, 3, 4, 2], [5, 6, 8, 7]]
+        {
+            obj += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        }
+        let solid = SolidMesh::new(read_bytes(obj.as_bytes(), MeshFormat::Obj).unwrap().mesh).unwrap();
+        let asset = Encoder::new().preset(Preset::Fast).encode(&solid).unwrap();
+        let normals = normals_of_vertices(&asset);
+        assert_eq!(normals.len(), 8);
+        for face in 0..asset.face_count() {
+            for (vertex, corner) in asset.face_vertices(face).into_iter().zip(asset.face_corners(face)) {
+                assert!(normals[vertex as usize].distance(corner.normalize()) < 1e-15);
+            }
+        }
+    }
+
+    fn contact(ids: [u32; 2], feature: u32, normal: DVec3, distance: f64) -> Contact {
+        Contact {
+            point_a: DVec3::ZERO,
+            point_b: DVec3::ZERO,
+            normal,
+            distance,
+            face_a: 0,
+            face_b: 0,
+            tet_b: None,
+            instance_a: InstanceId(ids[0]),
+            instance_b: InstanceId(ids[1]),
+            feature: FeatureId { a: feature, b: FeatureB::Face(0) },
+            converged: true,
+        }
+    }
+
+    /// Vertex 0 looks up. Instances 0 to 2 have the same mesh.
+    #[test]
+    fn pushes_along_the_own_normal_are_left_out() {
+        let mut scene = Scene::new();
+        let shape = scene.add_shape(Shape::Sphere { radius: 1.0 }).unwrap();
+        let _ids = [0; 3].map(|_| scene.add(Instance::new(shape, Pose::IDENTITY)).unwrap());
+        let own = OwnNormals(BTreeMap::from([(shape, vec![DVec3::Z])]));
+        let (up, down) = (DVec3::Z, DVec3::NEG_Z);
+        let found = [
+            // Deep, with a contact against the normal.
+            contact([0, 1], 0, up, -0.5),
+            contact([1, 0], 0, down, -0.1),
+            contact([0, 1], 0, up, 0.1),
+            // Deep, without one: the pushes on instance 0 are 0.3 up, and 0.2 down.
+            contact([0, 2], 0, up, -0.3),
+            contact([2, 0], 0, up, -0.2),
+            // Not deep.
+            contact([1, 2], 0, up, -0.01),
+        ];
+        let acting = own.pushing(&scene, &found, |c| c.distance < -0.05);
+        assert_eq!(acting, [found[1], found[2], found[3], found[5]]);
+        // Pushes that cancel: the deepest decides, the first of equal ones.
+        let found = [contact([0, 2], 0, up, -0.3), contact([2, 0], 0, up, -0.3)];
+        assert_eq!(own.pushing(&scene, &found, |_| true), [found[0]]);
+    }
+}
