@@ -231,29 +231,34 @@ mod tests {
         }
     }
 
-    /// Vertex 0 looks up. Instances 0 to 2 have the same mesh.
+    /// Vertex 0 looks up. The instances have the same mesh of two points, one above the other.
     #[test]
-    fn pushes_along_the_own_normal_are_left_out() {
+    fn pushes_along_the_own_normal_do_not_act() {
         let mut scene = Scene::new();
         let shape = scene.add_shape(Shape::Sphere { radius: 1.0 }).unwrap();
-        let _ids = [0; 3].map(|_| scene.add(Instance::new(shape, Pose::IDENTITY)).unwrap());
-        let own = OwnNormals(BTreeMap::from([(shape, vec![DVec3::Z])]));
-        let (up, down) = (DVec3::Z, DVec3::NEG_Z);
+        for height in [0.0, 0.0, 0.5] {
+            scene.add(Instance::new(shape, Pose::at(DVec3::Z * height))).unwrap();
+        }
+        let surface = Surface { normals: vec![DVec3::Z], vertices: vec![DVec3::NEG_Z, DVec3::Z] };
+        let surfaces = Surfaces(BTreeMap::from([(shape, surface)]));
+        let (up, down, aside) = (DVec3::Z, DVec3::NEG_Z, DVec3::X);
         let found = [
-            // Deep, with a contact against the normal.
-            contact([0, 1], 0, up, -0.5),
-            contact([1, 0], 0, down, -0.1),
+            // Deep; the deepest contact pushes against the normal.
+            contact([0, 1], 0, down, -0.5),
+            contact([1, 0], 0, up, -0.1),
+            contact([0, 1], 0, aside, -0.1),
             contact([0, 1], 0, up, 0.1),
-            // Deep, without one: the pushes on instance 0 are 0.3 up, and 0.2 down.
+            // Deep and past the middle: instance 2 is higher, so 0 is pushed down.
             contact([0, 2], 0, up, -0.3),
             contact([2, 0], 0, up, -0.2),
+            contact([0, 2], 0, down, -0.1),
             // Not deep.
             contact([1, 2], 0, up, -0.01),
         ];
-        let acting = own.pushing(&scene, &found, |c| c.distance < -0.05);
-        assert_eq!(acting, [found[1], found[2], found[3], found[5]]);
-        // Pushes that cancel: the deepest decides, the first of equal ones.
-        let found = [contact([0, 2], 0, up, -0.3), contact([2, 0], 0, up, -0.3)];
-        assert_eq!(own.pushing(&scene, &found, |_| true), [found[0]]);
+        let acting = surfaces.acting(&scene, &found, |c| c.distance < -0.05);
+        assert_eq!(acting, [found[0], found[3], found[5], found[6], found[7]]);
+        // Across, the two bodies do not extend at all: that is the shortest way out.
+        let found = [contact([0, 2], 0, up, -0.3), contact([2, 0], 0, aside, -0.2)];
+        assert_eq!(surfaces.acting(&scene, &found, |_| true), [found[1]]);
     }
 }

@@ -449,6 +449,10 @@ impl Newton {
     ) -> Result<bool, DynamicsError> {
         let foreseen = ahead.to_vec();
         set_velocities(ahead, &step.free, velocities);
+        // The speed at which deep bodies are pushed apart would make the look reach through the pile.
+        for (free, _) in step.free.iter().zip(&step.deep).filter(|(_, deep)| **deep) {
+            ahead[free.body] = foreseen[free.body];
+        }
         let own = ahead.to_vec();
         let change = |body: usize| {
             let (from, to) = (&foreseen[body], &own[body]);
@@ -490,7 +494,9 @@ impl Newton {
         let rows = [contact_rows.as_slice(), &joints].concat();
         step.deep = self.deep(step, contacts, &rows);
         let deep = step.deep.clone();
-        let stays = |row: &Row| row.sides.iter().flatten().all(|(k, _)| deep[*k]);
+        // A deep body that is pushed into another one must not kick it, so what is detected again says
+        // nothing about deep bodies.
+        let stays = |row: &Row| row.sides.iter().flatten().any(|(k, _)| deep[*k]);
         // Where bodies overlap deeply, rigid contacts would contradict each other.
         for row in contact_rows.iter_mut().filter(|row| stays(row)) {
             row.resistance = Resistance::Spring;
