@@ -24,9 +24,9 @@ pub struct SeparationCriterion {
     pub tolerance: f64,
 }
 
-/// Allows for rounding.
+/// Allows for the energy that the springs of the contacts store.
 fn as_in_free_fall() -> f64 {
-    1.0 + 1e-9
+    1.001
 }
 
 fn tenth_of_a_micrometre() -> f64 {
