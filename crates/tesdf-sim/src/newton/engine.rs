@@ -1,22 +1,20 @@
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
-use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, InstanceId, Mode, Pose, Scene,
-};
+use tesdf::collide::{CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, Pose, Scene};
 
 use super::NewtonOptions;
 use super::deep::Surfaces;
+use super::gaps::Gaps;
 use super::integrate::{free_velocity, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
 use super::look::Look;
-use super::normals::normals;
 use super::problem::{Minimum, Problem};
-use super::rows::{Bodies, FreeBody, Resistance, Row};
+use super::rows::{FreeBody, Resistance, Row};
+use super::step::Step;
 use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
 
 /// Finds the contacts of a scene. [`tesdf::collide::detect`] and every function of the same
@@ -52,62 +50,11 @@ pub struct Newton {
     found: Contacts,
 }
 
-/// Values that are constant during a step.
-struct Step {
-    h: f64,
-    /// Poses at the beginning of the step.
-    poses: Vec<Pose>,
-    free: Vec<FreeBody>,
-    /// For each body its index in `free`, or `None` when it is fixed.
-    free_of: Vec<Option<usize>>,
-    /// Velocities at the end of the step without contacts.
-    target: Vec<Vector6<f64>>,
-    /// For each free body: whether a body of its island penetrates too deeply for a linear
-    /// prediction.
-    deep: Vec<bool>,
-    report: StepReport,
-}
-
-/// The contacts of faces at the beginning of the step, sorted by their features, and their points in
-/// the frame of *a*.
-struct Before(Vec<(Contact, DVec3)>);
-
 /// The velocities of the free bodies that move the poses, and those that the next step starts from.
 type Velocities = [Vec<Vector6<f64>>; 2];
 
-/// For each pair of instances and feature of the first one: how far it is below the skin at the
-/// beginning of the step, m.
-struct Depths {
-    features: Vec<((InstanceId, InstanceId, u32), f64)>,
-    /// The same for each pair, the lower instance first.
-    pairs: BTreeMap<(InstanceId, InstanceId), f64>,
-}
-
-/// The row of a contact and what its gap depends on.
-struct Found {
-    /// The gap is the distance above the skin.
-    row: Row,
-    /// The way by which kinematic bodies open the gap in the step, m.
-    carried: f64,
-    /// The distance that the contact keeps, m.
-    skin: f64,
-    /// The way by which the contact slides in the step, m.
-    way: f64,
-}
-
 /// Maximum number of further detections in a step when bodies close faster than was foreseen.
 const MORE_LOOKS: u32 = 8;
-
-/// Directions at the beginning and the end of a step are averaged when the cosine of their angle is
-/// above this: the contact crosses an edge of a curved surface. Sharper edges are two surfaces.
-const SAME_SURFACE: f64 = 0.97;
-
-/// A contact that slides is lifted by at most this share of its way.
-const LIFT: f64 = 0.01;
-
-/// A contact that slides by less than this share of its skin in a step is at rest. Lifts by the
-/// rounding of bodies at rest would add up.
-const STILL: f64 = 0.1;
 
 /// The two gaps of a row.
 #[derive(Clone, Copy)]
@@ -199,106 +146,9 @@ impl Newton {
         Ok(contacts)
     }
 
-    /// The distance by which one step of `h` seconds lifts a contact that is `depth` metres below its
-    /// skin and slides by `way` metres.
-    fn lift(&self, depth: f64, skin: f64, way: f64, h: f64) -> f64 {
-        let penetration = (depth - skin).max(0.0);
-        let removed = (self.options.correction * penetration).min(self.options.correction_speed * h);
-        let slid = (way - STILL * skin).max(0.0);
-        removed + (self.options.correction * (depth - penetration)).min(LIFT * slid)
-    }
-
-    /// The distance that contacts of a pair of bodies keep, m.
-    fn skin(&self, a: usize, b: usize) -> f64 {
-        self.options.skin * self.sizes[a].min(self.sizes[b])
-    }
-
-    /// The way by which a contact slides in a step at the velocities of the beginning, m.
-    fn way(&self, contact: &Contact, poses: &[Pose], [a, b]: [usize; 2], h: f64) -> f64 {
-        let of = |body: usize| {
-            let State { linear, angular, .. } = self.system.states()[body];
-            let center = match self.system.bodies()[body].mass {
-                Mass::Free(mass) => poses[body].to_world(mass.center),
-                Mass::Kinematic => poses[body].translation,
-                Mass::Fixed => return DVec3::ZERO,
-            };
-            linear + angular.cross(contact.point_a - center)
-        };
-        h * (of(a) - of(b)).reject_from_normalized(contact.normal).length()
-    }
-
-    fn bodies<'a>(&'a self, step: &'a Step) -> Bodies<'a> {
-        let softness = step.h * step.h / self.options.stiffness;
-        Bodies { system: &self.system, free: &step.free, free_of: &step.free_of, softness }
-    }
-
-    /// The row of a contact that was detected at `poses`, with its distance above the skin as its gap.
-    fn row(&self, step: &Step, contact: &Contact, poses: &[Pose]) -> Option<Found> {
-        let [a, b] = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
-        let (a, b) = (a?, b?);
-        let mut row = Row::of_contact(contact, &self.bodies(step), poses, self.system.friction(a, b))?;
-        let carried = |body: usize| match self.system.bodies()[body].mass {
-            Mass::Kinematic => {
-                let State { linear, angular, .. } = self.system.states()[body];
-                step.h * (linear + angular.cross(contact.point_a - poses[body].translation))
-            }
-            Mass::Fixed | Mass::Free(_) => DVec3::ZERO,
-        };
-        let carried = carried(a) - carried(b);
-        if let Some(friction) = &mut row.friction {
-            friction.way = carried.reject_from_normalized(contact.normal);
-        }
-        let skin = self.skin(a, b);
-        row.gap -= skin;
-        let way = self.way(contact, poses, [a, b], step.h);
-        Some(Found { row, carried: carried.dot(contact.normal), skin, way })
-    }
-
-    /// The rows of the contacts at the beginning of the step.
-    fn first_rows(&self, step: &Step, contacts: &[Contact]) -> Vec<Row> {
-        let row = |(contact, normal): (&Contact, DVec3)| {
-            let contact = &Contact { normal, ..*contact };
-            let Found { mut row, carried, skin, way } = self.row(step, contact, &step.poses)?;
-            let depth = (-row.gap).max(0.0);
-            row.relaxed_gap = row.gap + depth + carried;
-            row.gap = row.relaxed_gap - self.lift(depth, skin, way, step.h);
-            Some(row)
-        };
-        contacts.iter().zip(normals(contacts)).filter_map(row).collect()
-    }
-
-    /// The rows of the contacts at the poses that `velocities` predict. Each gap is the predicted
-    /// distance, extrapolated back to the beginning of the step along its gradient.
-    fn predicted_rows(
-        &self,
-        step: &Step,
-        contacts: &[Contact],
-        poses: &[Pose],
-        velocities: &[Vector6<f64>],
-        depths: &Depths,
-        before: &Before,
-    ) -> Vec<Row> {
-        let row = |(contact, normal): (&Contact, DVec3)| {
-            let contact = &Contact { normal, ..*contact };
-            let Found { mut row, carried, skin, way } = self.row(step, contact, poses)?;
-            if let Some(before) = before.of(contact, self.point_of_a(contact, poses)?) {
-                row.average(&self.row(step, before, &step.poses)?.row);
-            }
-            let gap = row.gap - step.h * row.rate(velocities);
-            // A face may have several contacts, and its deepest one is not at this place. The body
-            // must not sink in here by the depth there.
-            let depth = depths.of(contact, skin).min(-gap).max(0.0);
-            row.gap = gap + depth - self.lift(depth, skin, way, step.h);
-            row.relaxed_gap = gap + depth;
-            if self.collide.mode != Mode::Node {
-                // Where a body crosses an edge, the gap at the beginning is below the plane of the face at
-                // the end. Asking for that way as a velocity, too, drove a nut on. Only bodies that are
-                // moved may ask for a velocity that parts the bodies, so energy is never gained.
-                row.relaxed_gap = row.relaxed_gap.max(carried.min(0.0));
-            }
-            Some(row)
-        };
-        contacts.iter().zip(normals(contacts)).filter_map(row).collect()
+    fn gaps<'a>(&'a self, step: &'a Step) -> Gaps<'a> {
+        let Self { system, options, sizes, collide: CollideOptions { mode, .. }, .. } = self;
+        Gaps { system, options, sizes, mode: *mode, step }
     }
 
     /// Whether a contact penetrates too deeply for a linear prediction.
@@ -321,45 +171,6 @@ impl Newton {
             }
         }
         deep
-    }
-
-    /// The contacts whose directions the predicted ones are averaged with. With those of the end alone, a
-    /// body that crosses an edge is braked or driven on by it; the mean over the step does neither.
-    /// Contacts of vertices stay as they are: for gears the mean was worse.
-    fn before(&self, step: &Step, contacts: &[Contact]) -> Before {
-        if self.collide.mode == Mode::Node {
-            return Before(Vec::new());
-        }
-        let turned = contacts.iter().zip(normals(contacts)).map(|(c, normal)| Contact { normal, ..*c });
-        let mut before: Vec<_> =
-            turned.filter_map(|c| Some((c, self.point_of_a(&c, &step.poses)?))).collect();
-        before.sort_by_key(|(contact, _)| feature(contact));
-        Before(before)
-    }
-
-    /// The point of *a* of a contact that was found at `poses`, in the frame of *a*.
-    fn point_of_a(&self, contact: &Contact, poses: &[Pose]) -> Option<DVec3> {
-        let pose = poses[self.system.body_of(contact.instance_a)?];
-        Some(pose.rotation.inverse() * (contact.point_a - pose.translation))
-    }
-
-    /// How far the contacts at the beginning of the step are below their skins.
-    fn depths(&self, contacts: &[Contact]) -> Depths {
-        let depth = |c: &Contact| {
-            let [a, b] = [c.instance_a, c.instance_b].map(|id| self.system.body_of(id));
-            let depth = self.skin(a?, b?) - c.distance;
-            (depth > 0.0).then_some((feature(c), depth))
-        };
-        let mut depths: Vec<_> = contacts.iter().filter_map(depth).collect();
-        // The deepest contact of each key comes first, because a face may touch in several cells.
-        depths.sort_by(|(k, d), (l, e)| k.cmp(l).then(e.total_cmp(d)));
-        depths.dedup_by_key(|(key, _)| *key);
-        let mut pairs = BTreeMap::new();
-        for &((a, b, _), depth) in &depths {
-            let of_pair = pairs.entry((a.min(b), a.max(b))).or_insert(depth);
-            *of_pair = depth.max(*of_pair);
-        }
-        Depths { features: depths, pairs }
     }
 
     /// Minimises the problem of every island from `start`. A body without rows keeps its target
@@ -489,8 +300,9 @@ impl Newton {
     /// The velocities that move the poses, and the velocities that the next step starts from.
     fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
         let contacts = &self.surfaces.acting(self.system.scene(), contacts, |c| self.is_deep(c));
-        let mut contact_rows = self.first_rows(step, contacts);
-        let joints = joint_rows(&self.bodies(step), step.h);
+        let found = self.gaps(step).find(contacts, &step.poses);
+        let mut contact_rows: Vec<Row> = found.iter().map(|found| self.gaps(step).first_row(found)).collect();
+        let joints = joint_rows(&self.gaps(step).bodies(), step.h);
         let rows = [contact_rows.as_slice(), &joints].concat();
         step.deep = self.deep(step, contacts, &rows);
         let deep = step.deep.clone();
@@ -505,8 +317,7 @@ impl Newton {
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut velocities = self.solve(step, &rows, Gap::Position, &start);
         if rows.iter().any(|row| !stays(row)) {
-            let depths = self.depths(contacts);
-            let before = self.before(step, contacts);
+            let beginning = self.gaps(step).beginning(contacts, &found);
             for _ in 0..self.options.redetections {
                 let mut predicted = self.moved(step, &velocities);
                 // The contacts of these bodies stay, so the detection need not look as far as they are
@@ -518,13 +329,13 @@ impl Newton {
                 let contacts = self.detect(step, &predicted)?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
                 let mut next =
-                    self.predicted_rows(step, contacts.as_slice(), &poses, &velocities, &depths, &before);
+                    self.gaps(step).predicted_rows(contacts.as_slice(), &poses, &velocities, &beginning);
                 next.retain(|row| !stays(row));
                 next.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
                 next.extend_from_slice(&joints);
                 rows = next;
                 let joints = rows.len() - joints.len()..;
-                predict(&mut rows[joints], &self.bodies(step), &poses, &velocities, step.h);
+                predict(&mut rows[joints], &self.gaps(step).bodies(), &poses, &velocities, step.h);
                 velocities = self.solve(step, &rows, Gap::Position, &velocities);
             }
         }
@@ -605,36 +416,5 @@ impl Dynamics for Newton {
 
     fn hidden(&self) -> &[HiddenOverlap] {
         &self.found.hidden
-    }
-}
-
-impl Before {
-    /// The contact of the same face of *a* whose point is nearest to that of `contact`, which is
-    /// `point` in the frame of *a*.
-    fn of(&self, contact: &Contact, point: DVec3) -> Option<&Contact> {
-        let key = feature(contact);
-        let first = self.0.partition_point(|(c, _)| feature(c) < key);
-        let same = self.0[first..].iter().take_while(|(c, _)| feature(c) == key);
-        let same = same.filter(|(c, _)| c.normal.dot(contact.normal) > SAME_SURFACE);
-        let nearest = same.min_by(|(_, p), (_, q)| p.distance(point).total_cmp(&q.distance(point)));
-        nearest.map(|(contact, _)| contact)
-    }
-}
-
-/// The face or vertex of a contact.
-fn feature(contact: &Contact) -> (InstanceId, InstanceId, u32) {
-    (contact.instance_a, contact.instance_b, contact.feature.a)
-}
-
-impl Depths {
-    /// Depth of the feature that `contact` belongs to, m. Within the skin it is at least that of the
-    /// pair: contacts come and go there, and one that comes must not lift the bodies.
-    fn of(&self, contact: &Contact, skin: f64) -> f64 {
-        let (a, b) = (contact.instance_a, contact.instance_b);
-        let key = (a, b, contact.feature.a);
-        let of_feature =
-            self.features.binary_search_by_key(&key, |&(key, _)| key).map_or(0.0, |at| self.features[at].1);
-        let of_pair = self.pairs.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0);
-        of_feature.max(of_pair.min(skin))
     }
 }

@@ -35,6 +35,7 @@
 
 mod deep;
 mod engine;
+mod gaps;
 mod integrate;
 mod islands;
 mod joints;
@@ -45,6 +46,7 @@ mod options;
 mod problem;
 mod rows;
 mod spring;
+mod step;
 
 pub use engine::{Detect, Newton};
 pub use options::NewtonOptions;

@@ -1,0 +1,241 @@
+//! The gaps of contacts: at the beginning of a step, and at the poses that a minimisation predicts.
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use nalgebra::Vector6;
+use tesdf::collide::{Contact, InstanceId, Mode, Pose};
+
+use super::NewtonOptions;
+use super::normals::normals;
+use super::rows::{Bodies, Row};
+use super::step::Step;
+use crate::{Mass, State, System};
+
+/// Directions at the beginning and the end of a step are averaged when the cosine of their angle is
+/// above this: the contact crosses an edge of a curved surface. Sharper edges are two surfaces.
+const SAME_SURFACE: f64 = 0.97;
+
+/// A contact that slides is lifted by at most this share of its way.
+const LIFT: f64 = 0.01;
+
+/// A contact that slides by less than this share of its skin in a step is at rest. Lifts by the
+/// rounding of bodies at rest would add up.
+const STILL: f64 = 0.1;
+
+/// What the gaps of contacts depend on.
+#[derive(Clone, Copy)]
+pub struct Gaps<'a> {
+    /// The bodies, in the states at the beginning of the step.
+    pub system: &'a System,
+    /// Parameters of the engine.
+    pub options: &'a NewtonOptions,
+    /// Diagonal of each body's bounding box, m.
+    pub sizes: &'a [f64],
+    /// The mode of the detection.
+    pub mode: Mode,
+    /// The step.
+    pub step: &'a Step,
+}
+
+/// A contact and what its gap depends on.
+pub struct Found {
+    /// With the normal of [`normals`].
+    contact: Contact,
+    /// The gap is the distance above the skin.
+    row: Row,
+    /// The way by which kinematic bodies open the gap in the step, m.
+    carried: f64,
+    /// The distance that the contact keeps, m.
+    skin: f64,
+    /// The way by which the contact slides in the step, m.
+    way: f64,
+}
+
+/// What predicted gaps need of the contacts at the beginning of the step.
+pub struct Beginning<'a> {
+    depths: Depths,
+    before: Before<'a>,
+}
+
+/// For each pair of instances and feature of the first one: how far it is below the skin, m.
+struct Depths {
+    features: Vec<((InstanceId, InstanceId, u32), f64)>,
+    /// The same for each pair, the lower instance first.
+    pairs: BTreeMap<(InstanceId, InstanceId), f64>,
+}
+
+/// The contacts whose directions the predicted ones are averaged with, sorted by their features, and
+/// their points in the frame of *a*.
+struct Before<'a>(Vec<(&'a Found, DVec3)>);
+
+impl<'a> Gaps<'a> {
+    /// The bodies that rows connect.
+    pub fn bodies(&self) -> Bodies<'a> {
+        let softness = self.step.h * self.step.h / self.options.stiffness;
+        Bodies { system: self.system, free: &self.step.free, free_of: &self.step.free_of, softness }
+    }
+
+    /// The contacts that were detected at `poses` and have a free body.
+    pub fn find(&self, contacts: &[Contact], poses: &[Pose]) -> Vec<Found> {
+        let turned = contacts.iter().zip(normals(contacts)).map(|(c, normal)| Contact { normal, ..*c });
+        turned.filter_map(|contact| self.found(contact, poses)).collect()
+    }
+
+    fn found(&self, contact: Contact, poses: &[Pose]) -> Option<Found> {
+        let [a, b] = [contact.instance_a, contact.instance_b].map(|id| self.system.body_of(id));
+        let (a, b) = (a?, b?);
+        let mut row = Row::of_contact(&contact, &self.bodies(), poses, self.system.friction(a, b))?;
+        let [of_a, of_b] = [a, b].map(|body| self.velocity_at(body, poses, contact.point_a));
+        let carried = |body: usize, velocity: DVec3| match self.system.bodies()[body].mass {
+            Mass::Kinematic => self.step.h * velocity,
+            Mass::Fixed | Mass::Free(_) => DVec3::ZERO,
+        };
+        let carried = carried(a, of_a) - carried(b, of_b);
+        if let Some(friction) = &mut row.friction {
+            friction.way = carried.reject_from_normalized(contact.normal);
+        }
+        let (skin, carried) = (self.skin(a, b), carried.dot(contact.normal));
+        row.gap -= skin;
+        let way = self.step.h * (of_a - of_b).reject_from_normalized(contact.normal).length();
+        Some(Found { contact, row, carried, skin, way })
+    }
+
+    /// The velocity of a body's point at the beginning of the step, m/s. `point` is given in the world
+    /// while the bodies are at `poses`.
+    fn velocity_at(&self, body: usize, poses: &[Pose], point: DVec3) -> DVec3 {
+        let State { linear, angular, .. } = self.system.states()[body];
+        let center = match self.system.bodies()[body].mass {
+            Mass::Free(mass) => poses[body].to_world(mass.center),
+            Mass::Kinematic => poses[body].translation,
+            Mass::Fixed => return DVec3::ZERO,
+        };
+        linear + angular.cross(point - center)
+    }
+
+    /// The row of a contact at the beginning of the step.
+    pub fn first_row(&self, found: &Found) -> Row {
+        let mut row = found.row.clone();
+        let depth = (-row.gap).max(0.0);
+        row.relaxed_gap = row.gap + depth + found.carried;
+        row.gap = row.relaxed_gap - self.lift(depth, found);
+        row
+    }
+
+    /// The rows of the contacts at the poses that `velocities` predict. Each gap is the predicted
+    /// distance, extrapolated back to the beginning of the step along its gradient.
+    pub fn predicted_rows(
+        &self,
+        contacts: &[Contact],
+        poses: &[Pose],
+        velocities: &[Vector6<f64>],
+        Beginning { depths, before }: &Beginning<'_>,
+    ) -> Vec<Row> {
+        let row = |found: Found| {
+            let mut row = found.row.clone();
+            if let Some(before) = before.of(&found.contact, self.point_of_a(&found.contact, poses)?) {
+                row.average(&before.row);
+            }
+            let gap = row.gap - self.step.h * row.rate(velocities);
+            // A face may have several contacts, and its deepest one is not at this place. The body
+            // must not sink in here by the depth there.
+            let depth = depths.of(&found).min(-gap).max(0.0);
+            row.gap = gap + depth - self.lift(depth, &found);
+            row.relaxed_gap = gap + depth;
+            if self.mode != Mode::Node {
+                // Where a body crosses an edge, the gap at the beginning is below the plane of the face at
+                // the end. Asking for that way as a velocity, too, drove a nut on. Only bodies that are
+                // moved may ask for a velocity that parts the bodies, so energy is never gained.
+                row.relaxed_gap = row.relaxed_gap.max(found.carried.min(0.0));
+            }
+            Some(row)
+        };
+        self.find(contacts, poses).into_iter().filter_map(row).collect()
+    }
+
+    /// What [`predicted_rows`](Self::predicted_rows) needs of the `contacts` at the beginning of the
+    /// step. Those in `found` have a free body.
+    pub fn beginning<'f>(&self, contacts: &[Contact], found: &'f [Found]) -> Beginning<'f> {
+        Beginning { depths: self.depths(contacts), before: self.before(found) }
+    }
+
+    /// With the directions of the end alone, a body that crosses an edge is braked or driven on by it;
+    /// the mean over the step does neither. Contacts of vertices stay as they are: for gears the mean
+    /// was worse.
+    fn before<'f>(&self, found: &'f [Found]) -> Before<'f> {
+        if self.mode == Mode::Node {
+            return Before(Vec::new());
+        }
+        let point = |f: &'f Found| Some((f, self.point_of_a(&f.contact, &self.step.poses)?));
+        let mut before: Vec<_> = found.iter().filter_map(point).collect();
+        before.sort_by_key(|(found, _)| feature(&found.contact));
+        Before(before)
+    }
+
+    /// The point of *a* of a contact that was found at `poses`, in the frame of *a*.
+    fn point_of_a(&self, contact: &Contact, poses: &[Pose]) -> Option<DVec3> {
+        Some(poses[self.system.body_of(contact.instance_a)?].to_body(contact.point_a))
+    }
+
+    fn depths(&self, contacts: &[Contact]) -> Depths {
+        let depth = |c: &Contact| {
+            let [a, b] = [c.instance_a, c.instance_b].map(|id| self.system.body_of(id));
+            let depth = self.skin(a?, b?) - c.distance;
+            (depth > 0.0).then_some((feature(c), depth))
+        };
+        let mut depths: Vec<_> = contacts.iter().filter_map(depth).collect();
+        // The deepest contact of each key comes first, because a face may touch in several cells.
+        depths.sort_by(|(k, d), (l, e)| k.cmp(l).then(e.total_cmp(d)));
+        depths.dedup_by_key(|(key, _)| *key);
+        let mut pairs = BTreeMap::new();
+        for &((a, b, _), depth) in &depths {
+            let of_pair = pairs.entry((a.min(b), a.max(b))).or_insert(depth);
+            *of_pair = depth.max(*of_pair);
+        }
+        Depths { features: depths, pairs }
+    }
+
+    /// The distance by which the step lifts a contact that is `depth` metres below its skin.
+    fn lift(&self, depth: f64, &Found { skin, way, .. }: &Found) -> f64 {
+        let NewtonOptions { correction, correction_speed, .. } = *self.options;
+        let penetration = (depth - skin).max(0.0);
+        let removed = (correction * penetration).min(correction_speed * self.step.h);
+        let slid = (way - STILL * skin).max(0.0);
+        removed + (correction * (depth - penetration)).min(LIFT * slid)
+    }
+
+    /// The distance that contacts of a pair of bodies keep, m.
+    fn skin(&self, a: usize, b: usize) -> f64 {
+        self.options.skin * self.sizes[a].min(self.sizes[b])
+    }
+}
+
+impl<'a> Before<'a> {
+    /// The contact of the same face of *a* whose point is nearest to that of `contact`, which is
+    /// `point` in the frame of *a*.
+    fn of(&self, contact: &Contact, point: DVec3) -> Option<&'a Found> {
+        let key = feature(contact);
+        let first = self.0.partition_point(|(f, _)| feature(&f.contact) < key);
+        let same = self.0[first..].iter().take_while(|(f, _)| feature(&f.contact) == key);
+        let same = same.filter(|(f, _)| f.contact.normal.dot(contact.normal) > SAME_SURFACE);
+        let nearest = same.min_by(|(_, p), (_, q)| p.distance(point).total_cmp(&q.distance(point)));
+        nearest.map(|(found, _)| *found)
+    }
+}
+
+impl Depths {
+    /// Depth of the feature that a contact belongs to, m. Within the skin it is at least that of the
+    /// pair: contacts come and go there, and one that comes must not lift the bodies.
+    fn of(&self, Found { contact, skin, .. }: &Found) -> f64 {
+        let (a, b) = (contact.instance_a, contact.instance_b);
+        let key = (a, b, contact.feature.a);
+        let of_feature =
+            self.features.binary_search_by_key(&key, |&(key, _)| key).map_or(0.0, |at| self.features[at].1);
+        let of_pair = self.pairs.get(&(a.min(b), a.max(b))).copied().unwrap_or(0.0);
+        of_feature.max(of_pair.min(*skin))
+    }
+}
+
+/// The face or vertex of a contact.
+fn feature(contact: &Contact) -> (InstanceId, InstanceId, u32) {
+    (contact.instance_a, contact.instance_b, contact.feature.a)
+}
