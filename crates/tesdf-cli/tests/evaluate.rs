@@ -155,3 +155,64 @@ fn the_quick_table_3_has_encoded_meshes_that_succeed_beside_voxels_and_the_paper
         assert!(md.contains(part), "{part}: {md}");
     }
 }
+
+/// The JSON of a quick figure, and its folder with all files.
+fn quick_figure(name: &str, more: &[&str]) -> (Folder, Value) {
+    let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").display().to_string();
+    let (folder, data) = (Folder::new(), meshes());
+    let args = ["evaluate", name, "--quick", "--scenes", &scenes, "--data", &data, "-o", "results"];
+    folder.good(&[&args[..], more].concat());
+    let read = |end: &str| std::fs::read_to_string(folder.path(&format!("results/{name}.{end}"))).unwrap();
+    let svg = read("svg");
+    assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && !svg.contains("NaN"), "{svg}");
+    assert!(read("md").contains(&format!("`tesdf evaluate {name} --quick")), "{}", read("md"));
+    let figure = serde_json::from_str(&read("json")).unwrap();
+    (folder, figure)
+}
+
+#[test]
+fn deep_shafts_come_apart_in_the_quick_figure_8_even_with_truncated_lists() {
+    let (folder, figure) = quick_figure("fig8", &["--runs", "runs"]);
+    assert_eq!(figure["shafts"], 24);
+    let rows = figure["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 6, "three modes, truncated and full");
+    for row in rows {
+        let depths: Vec<f64> =
+            row["penetration"].as_array().unwrap().iter().map(|d| d.as_f64().unwrap()).collect();
+        assert_eq!(depths.len(), 11, "{row:#}");
+        assert!(depths[0] > 5e-3, "the pile begins with deep overlaps: {row:#}");
+        assert!(depths[10] < 0.2 * depths[0], "{row:#}");
+        assert_eq!(row["success"] == true, row["failures"].as_array().unwrap().is_empty(), "{row:#}");
+        if row["mode"] == "exact" && row["max_entries"].is_null() {
+            assert_eq!(row["success"], true, "{row:#}");
+            assert!(row["resolved_at"].as_u64() <= Some(6), "{row:#}");
+        }
+    }
+    let csv = std::fs::read_to_string(folder.path("results/fig8.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 6 * 11);
+    let runs = std::fs::read_dir(folder.path("runs")).unwrap().count();
+    assert_eq!(runs, 6);
+    let run = "runs/pile-bisection-face-32.tesrun";
+    folder.good(&["render", "--run", run, "--time", "0", "--size", "64x48", "-o", "start.png"]);
+    assert!(folder.path("start.png").exists());
+}
+
+#[test]
+fn the_quick_figure_9_has_fewer_queries_at_the_end_of_the_pile() {
+    for device in ["cpu", "gpu"] {
+        let (_folder, figure) = quick_figure("fig9", &["--device", device, "--repeat", "1"]);
+        let rows = figure["rows"].as_array().unwrap();
+        assert_eq!(rows.len(), 6, "three settings at two frames");
+        let count = |row: &Value, name: &str| row[name].as_u64().unwrap_or_else(|| panic!("{name}: {row:#}"));
+        for (start, end) in rows[..3].iter().zip(&rows[3..]) {
+            assert_eq!(start["max_entries"], end["max_entries"]);
+            assert!(count(start, "queries") > count(end, "queries"), "{start:#} {end:#}");
+            assert!(start["detection_ms"].as_f64() > Some(0.0), "{start:#}");
+        }
+        assert_eq!(rows[0]["ratio"], 1.0);
+        assert!(count(&rows[0], "longest_list") < count(&rows[2], "longest_list"));
+        let counted = rows.iter().all(|row| row["distances"].as_u64() > row["evaluations"].as_u64());
+        assert_eq!(counted, device == "gpu", "{figure:#}");
+        assert_eq!(rows[0]["narrow_ms"].is_null(), device == "cpu");
+    }
+}

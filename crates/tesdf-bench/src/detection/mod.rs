@@ -2,12 +2,12 @@
 mod arguments;
 mod clearance;
 mod collide;
-mod frames;
+pub(crate) mod frames;
 mod heap;
 #[cfg(feature = "gpu")]
-mod on_device;
+pub(crate) mod on_device;
 mod poses;
-mod report;
+pub(crate) mod report;
 
 use tesdf_terminal::report::{Failure, Outcome};
 

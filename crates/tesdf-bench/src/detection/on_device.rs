@@ -66,6 +66,35 @@ pub fn fill(
     Ok(())
 }
 
+/// The narrow phase of the frames, and what it counts.
+pub struct FaceTes {
+    /// Median device time, ms.
+    pub narrow_ms: f64,
+    pub wall_ms: Spread,
+    /// With evaluations and distances.
+    pub counts: Counts,
+}
+
+/// Measures the mode `face` on the device: first as it is, then with counted operations.
+///
+/// # Errors
+/// The device fails.
+pub fn face_tes(
+    device: &Device,
+    frames: &mut Frames,
+    options: &CollideOptions,
+    repeat: u32,
+) -> Result<FaceTes, Failure> {
+    let with = DetectorOptions { memory: Memory::Grow, ..DetectorOptions::default() };
+    let mut detector = Detector::new(device, &frames.scene, with).map_err(Failure::new)?;
+    let measured = measure(frames, &mut detector, options, repeat)?;
+    let counting = DetectorOptions { counting: Counting::Operations, ..with };
+    let mut detector = Detector::new(device, &frames.scene, counting).map_err(Failure::new)?;
+    let counts = measure(frames, &mut detector, options, 1)?.counts;
+    let narrow = measured.stages.iter().filter(|stage| stage.phase == "NP");
+    Ok(FaceTes { narrow_ms: narrow.map(|stage| stage.ms.median).sum(), wall_ms: measured.wall_ms, counts })
+}
+
 struct Measured {
     stages: Vec<Stage>,
     counts: Counts,

@@ -1,16 +1,19 @@
-//! `tesdf evaluate table1|table3|table4`: measures Tables I, III and IV of the paper, next to the
-//! paper's figures.
+//! `tesdf evaluate table1|table3|table4|fig8|fig9`: measures Tables I, III and IV and Figures 8 and 9
+//! of the paper, next to the paper's figures.
 //!
 //! The meshes of the repository (`meshes`) are encoded in a domain with both encoders, with full
 //! and with truncated lists (`measure`). The assets are compared with exact distances on a grid.
 //! The rows (`table1`, `table4`) are printed as Markdown, CSV or JSON. Table III simulates two scenes
-//! with voxel grids and with encoded meshes (`table3`).
+//! with voxel grids and with encoded meshes (`table3`). The figures simulate a pile of shafts with
+//! truncated lists, and detect its contacts (`pile`).
 mod deformed;
+mod detector;
 mod domains;
 mod measure;
 mod meshes;
 mod output;
 mod paper;
+mod pile;
 mod table1;
 mod table3;
 mod table4;
@@ -30,12 +33,12 @@ use tesdf_terminal::report::{Failure, Outcome};
 /// Arguments of `tesdf evaluate`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// The table
+    /// The table or figure
     #[command(subcommand)]
     pub table: Table,
 }
 
-/// Tables of the paper.
+/// Tables and figures of the paper.
 #[derive(clap::Subcommand, Clone, Debug)]
 pub enum Table {
     /// Table I: memory, largest error and bands of several meshes, with full lists and with at most
@@ -46,6 +49,12 @@ pub enum Table {
     Table3(table3::Args),
     /// Table IV: the same figures for the shaft, with at most 32, 64, ... 288 faces per list
     Table4(TableArgs),
+    /// Figure 8: penetrations in a pile of shafts by frame, with nodes, faces and the exact minimum,
+    /// with full lists and with at most 32 faces per list
+    Fig8(pile::fig8::Args),
+    /// Figure 9: time of the narrow phase at the start and the end of the pile, with at most 32, 64,
+    /// ... 288 faces per list
+    Fig9(pile::fig9::Args),
 }
 
 /// Arguments of a table.
@@ -146,6 +155,8 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         Table::Table1(args) => table1::run(args, &Sink::open(&args.output, "table1", &args.mesh_files())?)?,
         Table::Table4(args) => table4::run(args, &Sink::open(&args.output, "table4", &args.mesh_files())?)?,
         Table::Table3(args) => table3::run(args)?,
+        Table::Fig8(args) => pile::fig8::run(args)?,
+        Table::Fig9(args) => pile::fig9::run(args)?,
     }
     Ok(Outcome::Good)
 }

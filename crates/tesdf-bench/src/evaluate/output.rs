@@ -36,6 +36,21 @@ impl Text {
     }
 }
 
+/// A file in the output folder, which is created if necessary; `None` without such a folder.
+///
+/// # Errors
+/// The file cannot be written, or is one of the inputs.
+pub fn open_in_folder(
+    args: &OutputArgs,
+    name: &str,
+    inputs: &[PathBuf],
+) -> Result<Option<Destination>, Failure> {
+    let Some(folder) = &args.output else { return Ok(None) };
+    std::fs::create_dir_all(folder)
+        .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", folder.display())))?;
+    output::open(&folder.join(name), inputs, args.consent).map(Some)
+}
+
 /// The destination of a table.
 pub enum Sink {
     Stdout(Format),
@@ -50,12 +65,11 @@ impl Sink {
     /// # Errors
     /// A file cannot be written, or is one of the inputs.
     pub fn open(args: &OutputArgs, name: &str, inputs: &[PathBuf]) -> Result<Self, Failure> {
-        let Some(folder) = &args.output else { return Ok(Self::Stdout(args.format)) };
-        std::fs::create_dir_all(folder)
-            .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", folder.display())))?;
-        let open =
-            |extension| output::open(&folder.join(format!("{name}.{extension}")), inputs, args.consent);
-        Ok(Self::Files([open("json")?, open("csv")?, open("md")?]))
+        let open = |extension| open_in_folder(args, &format!("{name}.{extension}"), inputs);
+        match (open("json")?, open("csv")?, open("md")?) {
+            (Some(json), Some(csv), Some(md)) => Ok(Self::Files([json, csv, md])),
+            _ => Ok(Self::Stdout(args.format)),
+        }
     }
 
     /// Prints a table in the chosen format, or writes it in all formats. Markdown is printed as

@@ -1,6 +1,6 @@
 //! The figures of the paper: H. Ji, Y. Lee, D. Lee, *TE-SDF: Tetra-Encoded Signed Distance Field
-//! for Memory-Efficient and Accurate Collision Detection*, Tables I, III and IV. Memory is in MiB;
-//! `docs/paper-map.md` gives the reason. Table III prints it as Mb.
+//! for Memory-Efficient and Accurate Collision Detection*, Tables I, III and IV, and Figures 8 and 9.
+//! Memory is in MiB; `docs/paper-map.md` gives the reason. Table III prints it as Mb.
 
 /// A row of Table I. Pairs are for full lists and for E_max = 32.
 pub struct Table1 {
@@ -179,3 +179,12 @@ pub const TABLE_4: [Table4; 9] = [
     column(256, [0.782, 0.0, 1.0, 1.0]),
     column(288, [0.782, 0.0, 1.0, 1.0]),
 ];
+
+/// E_max of Figure 8.
+pub const FIGURE_8_MAX_ENTRIES: u32 = 32;
+
+/// The frame of Figure 8 at which the penetrations are resolved.
+pub const FIGURE_8_RESOLVED_AT: u32 = 6;
+
+/// Narrow-phase queries of the frames of Figure 9, from Sec. VII-D.
+pub const FIGURE_9_QUERIES: [(&str, u32); 2] = [("start", 150_678), ("end", 8_208)];

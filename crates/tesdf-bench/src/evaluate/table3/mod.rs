@@ -9,11 +9,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use serde::Serialize;
-use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene, detect};
-use tesdf_sim::newton::Detect;
 use tesdf_sim::scene_file::LoadedScene;
 
 use super::OutputArgs;
+use super::detector::Shared;
 use super::output::Sink;
 use crate::voxel::VoxelDetector;
 use cell::{Cell, Setup};
@@ -85,16 +84,6 @@ struct Table {
     cells: Vec<Cell>,
 }
 
-/// A detector that several engines use, one after the other.
-#[derive(Clone)]
-struct Shared(Arc<dyn Detect>);
-
-impl Detect for Shared {
-    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-        self.0.detect(scene, options)
-    }
-}
-
 impl Args {
     fn tolerances(&self, scenario: Scenario) -> Vec<u32> {
         let all = scenario.tolerances();
@@ -129,10 +118,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         return Err(Failure::new(format!("--time-steps: {step}; expected positive numbers, in ms")));
     }
     let sink = Sink::open(&args.output, "table3", &[])?;
-    let exact = match args.device.open()? {
-        Some(device) => Shared(Arc::new(device.into_detector())),
-        None => Shared(Arc::new(detect)),
-    };
+    let exact = Shared::open(&args.device)?;
     let mut table =
         Table { table: 3, quick: args.quick, encoded: Vec::new(), voxels: Vec::new(), cells: Vec::new() };
     for &scenario in &args.scenarios {

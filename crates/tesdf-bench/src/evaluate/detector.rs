@@ -1,0 +1,31 @@
+//! The detector of a simulation: the processor, or a device.
+use std::sync::Arc;
+
+use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene, detect};
+use tesdf_sim::newton::Detect;
+
+use tesdf_terminal::device::Choice;
+use tesdf_terminal::report::Failure;
+
+/// A detector that several engines use, one after the other.
+#[derive(Clone)]
+pub struct Shared(pub Arc<dyn Detect>);
+
+impl Shared {
+    /// The detector of encoded meshes on a device.
+    ///
+    /// # Errors
+    /// The device is missing.
+    pub fn open(choice: &Choice) -> Result<Self, Failure> {
+        Ok(match choice.open()? {
+            Some(device) => Self(Arc::new(device.into_detector())),
+            None => Self(Arc::new(detect)),
+        })
+    }
+}
+
+impl Detect for Shared {
+    fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
+        self.0.detect(scene, options)
+    }
+}
