@@ -32,6 +32,9 @@ pub struct PileArgs {
     /// Take the 24 shafts in the middle, 10 frames, and few settings
     #[arg(long)]
     pub quick: bool,
+    /// Number of shafts, the nearest to the middle [default: all; with --quick 24]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..))]
+    pub shafts: Option<u16>,
     /// Folder of the scene: `scenes` of the repository, beside `data`
     #[arg(long, value_name = "FOLDER", default_value = "scenes")]
     pub scenes: PathBuf,

@@ -39,6 +39,10 @@ impl Pile {
         if args.quick {
             shorten(&mut loaded);
         }
+        let (shafts, _) = QUICK;
+        if let Some(shafts) = args.shafts.map(usize::from).or(args.quick.then_some(shafts)) {
+            keep_nearest(&mut loaded, shafts);
+        }
         let exact = loaded.system().map_err(Failure::new)?;
         let folder = path.parent().unwrap_or(&path).to_string_lossy().into_owned();
         Ok(Self { loaded, exact, folder })
@@ -93,20 +97,24 @@ impl Pile {
     }
 }
 
-/// Keeps the shafts that are nearest to the middle, which overlap as deeply as all of them, and the
-/// limits of the criterion within the first frames.
+/// Simulates the first frames, with the limits of the criterion within them.
 fn shorten(loaded: &mut LoadedScene) {
-    let (shafts, frames) = QUICK;
+    let (_, frames) = QUICK;
     let scene = &mut loaded.scene;
     scene.duration = f64::from(frames) * scene.time_step;
+    if let Some(separation) = &mut scene.criterion.separation {
+        separation.limits.retain(|[time, _]| *time <= scene.duration);
+    }
+}
+
+/// Keeps the shafts that are nearest to the middle, which overlap as deeply as all of them.
+fn keep_nearest(loaded: &mut LoadedScene, shafts: usize) {
+    let scene = &mut loaded.scene;
     let distance = |t: [f64; 3]| t.iter().map(|x| x * x).sum::<f64>();
     let moving = scene.bodies.iter().map(|b| b.get_ref()).filter(|b| !b.fixed);
     let mut distances: Vec<f64> = moving.map(|b| distance(b.translation)).collect();
     distances.sort_by(f64::total_cmp);
     if let Some(&beyond) = distances.get(shafts) {
         scene.bodies.retain(|b| b.get_ref().fixed || distance(b.get_ref().translation) < beyond);
-    }
-    if let Some(separation) = &mut scene.criterion.separation {
-        separation.limits.retain(|[time, _]| *time <= scene.duration);
     }
 }
