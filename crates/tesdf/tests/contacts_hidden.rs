@@ -14,7 +14,7 @@ use tesdf::collide::{
 use tesdf::glam::{DQuat, DVec3};
 
 const NODE: Mode = Mode::Node;
-const MODES: [Mode; 3] = [NODE, Mode::Face, Mode::Exact];
+const MODES: [Mode; 4] = [NODE, Mode::Edge, Mode::Face, Mode::Exact];
 const IDS: [InstanceId; 2] = [InstanceId(0), InstanceId(1)];
 
 /// A mesh of the box from 0 to `size`.

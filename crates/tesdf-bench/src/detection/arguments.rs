@@ -80,6 +80,8 @@ pub struct Args {
 pub enum ModeName {
     /// The vertices
     Node,
+    /// The vertices and the edges, with the exact minimum
+    Edge,
     /// The faces, by Frank-Wolfe iterations
     Face,
     /// The faces, with the exact minimum

@@ -20,6 +20,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let contact_distance = args.contact_distance.or(frames.contact_distance).unwrap_or(0.0);
     let mode = match args.mode {
         ModeName::Node => Mode::Node,
+        ModeName::Edge => Mode::Edge,
         ModeName::Face => Mode::Face,
         ModeName::Exact => Mode::Exact,
     };

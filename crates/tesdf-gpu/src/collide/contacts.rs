@@ -206,12 +206,13 @@ fn surface_names(shape: &Shape, mode: Mode, words: &Words) -> (u32, u32) {
             let node = simple.nodes().iter().position(|&(p, _)| p == point).unwrap_or(0);
             (part, node as u32)
         }
-        (Mode::Face | Mode::Exact, Shape::Mesh(asset)) => {
+        // A detection refuses edges.
+        (Mode::Edge | Mode::Face | Mode::Exact, Shape::Mesh(asset)) => {
             let face = asset.face_id(part as usize);
             (face, face)
         }
-        (Mode::Face | Mode::Exact, Shape::Plane) => (0, 0),
-        (Mode::Face | Mode::Exact, _) => (part, part),
+        (Mode::Edge | Mode::Face | Mode::Exact, Shape::Plane) => (0, 0),
+        (Mode::Edge | Mode::Face | Mode::Exact, _) => (part, part),
     }
 }
 

@@ -17,7 +17,8 @@ impl Pass<'_> {
         match self.options.mode {
             Mode::Node => self.narrow_nodes(),
             Mode::Face => self.narrow_faces(),
-            Mode::Exact => self.narrow_exact(),
+            // A detection refuses edges.
+            Mode::Edge | Mode::Exact => self.narrow_exact(),
         }
     }
 

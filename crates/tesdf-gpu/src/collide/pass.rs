@@ -26,8 +26,11 @@ pub enum Parts {
 pub fn parts(options: &CollideOptions) -> Parts {
     match (options.mode, options.contacts_per) {
         (Mode::Node, _) => Parts::Nodes,
+        // A detection refuses edges.
         (Mode::Face | Mode::Exact, ContactsPer::Cell) => Parts::Polygons,
-        (Mode::Face | Mode::Exact, ContactsPer::Face | ContactsPer::Minimum) => Parts::Faces,
+        (Mode::Edge, _) | (Mode::Face | Mode::Exact, ContactsPer::Face | ContactsPer::Minimum) => {
+            Parts::Faces
+        }
     }
 }
 

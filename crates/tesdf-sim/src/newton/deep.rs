@@ -26,7 +26,7 @@ const PAST_THE_MIDDLE: f64 = 0.5;
 /// Maximum number of normals that are tried as directions of a pair.
 const TRIALS: usize = 32;
 
-/// The normals of the vertices or faces of the meshes of a scene, and their vertices, in the frames of
+/// The normals of the vertices, edges or faces of the meshes of a scene, and their vertices, in the frames of
 /// the meshes.
 #[derive(Clone, Debug)]
 pub struct Surfaces(BTreeMap<ShapeId, Surface>);
@@ -45,6 +45,12 @@ impl Surfaces {
             let Shape::Mesh(asset) = shape else { return None };
             let normals = match mode {
                 Mode::Node => normals_of_vertices(asset),
+                Mode::Edge => {
+                    let mut normals = normals_of_vertices(asset);
+                    normals.resize(asset.arrays().vertices.len(), DVec3::ZERO);
+                    normals.extend(normals_of_edges(asset));
+                    normals
+                }
                 Mode::Face | Mode::Exact => normals_of_faces(asset),
             };
             Some((id, Surface { normals, vertices: vertices(asset) }))
@@ -159,6 +165,28 @@ fn normals_of_faces(asset: &TeSdf) -> Vec<DVec3> {
     for face in 0..asset.face_count() {
         let [p, q, r] = asset.face_corners(face);
         normals[asset.face_id(face) as usize] = (q - p).cross(r - p).normalize_or_zero();
+    }
+    normals
+}
+
+/// The mean of the normals of the faces that have a side of a face, as a unit vector, by 3 × face + side.
+fn normals_of_edges(asset: &TeSdf) -> Vec<DVec3> {
+    let edge = |[p, q]: [u32; 2]| [p.min(q), p.max(q)];
+    let sides = |face: usize| {
+        let [p, q, r] = asset.face_vertices(face);
+        [[p, q], [q, r], [r, p]].map(edge)
+    };
+    let of_faces = normals_of_faces(asset);
+    let normal = |face: usize| of_faces[asset.face_id(face) as usize];
+    let mut sums: BTreeMap<[u32; 2], DVec3> = BTreeMap::new();
+    for face in 0..asset.face_count() {
+        sides(face).into_iter().for_each(|side| *sums.entry(side).or_default() += normal(face));
+    }
+    let mut normals = vec![DVec3::ZERO; 3 * asset.face_count()];
+    for face in 0..asset.face_count() {
+        for (k, side) in sides(face).into_iter().enumerate() {
+            normals[3 * asset.face_id(face) as usize + k] = sums[&side].normalize_or_zero();
+        }
     }
     normals
 }

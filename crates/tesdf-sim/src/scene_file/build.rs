@@ -120,7 +120,9 @@ impl LoadedScene {
                 found.retain(|c| is_free(c.instance_a) || is_free(c.instance_b));
                 Ok(found)
             }
-            DetectorMode::Face | DetectorMode::Exact | DetectorMode::Off => Ok(Vec::new()),
+            DetectorMode::Edge | DetectorMode::Face | DetectorMode::Exact | DetectorMode::Off => {
+                Ok(Vec::new())
+            }
         }
     }
 
@@ -143,6 +145,7 @@ fn nothing(_: &Scene, _: &CollideOptions) -> Result<Contacts, CollideError> {
 fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions {
     let mode = match section.mode {
         DetectorMode::Node | DetectorMode::Off => Mode::Node,
+        DetectorMode::Edge => Mode::Edge,
         DetectorMode::Face => Mode::Face,
         DetectorMode::Exact => Mode::Exact,
     };

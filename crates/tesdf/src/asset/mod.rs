@@ -33,6 +33,7 @@ mod motion;
 pub(crate) mod options;
 mod roots;
 mod section;
+mod sharp_edges;
 mod te_sdf;
 #[cfg(feature = "encode")]
 mod write;

@@ -67,6 +67,7 @@ pub struct TeSdf {
     pub(crate) motion: Option<Motion>,
     lowest_faces: OnceLock<Vec<u32>>,
     faces_at: OnceLock<FacesAt>,
+    pub(super) sharp_sides: OnceLock<Vec<u8>>,
     pub(crate) inner_ball: OnceLock<InnerBall>,
     pub(crate) corner_reaches: OnceLock<Vec<f32>>,
     face_normals: OnceLock<Vec<(DVec3, bool)>>,
@@ -148,6 +149,7 @@ impl TeSdf {
             motion: None,
             lowest_faces: OnceLock::new(),
             faces_at: OnceLock::new(),
+            sharp_sides: OnceLock::new(),
             inner_ball: OnceLock::new(),
             corner_reaches: OnceLock::new(),
             face_normals: OnceLock::new(),
@@ -196,6 +198,7 @@ impl TeSdf {
         self.cell_bounds = OnceLock::from(CellBounds::none());
         self.inner_ball = OnceLock::new();
         self.corner_reaches = OnceLock::new();
+        self.sharp_sides = OnceLock::new();
         self.forget_normals();
     }
 

@@ -1,7 +1,7 @@
-//! The contacts of some faces or nodes of an ordered pair.
+//! The contacts of some faces, edges or nodes of an ordered pair.
 use super::Contact;
 use super::narrow::Minimum;
-use super::ordered_pair::OrderedPair;
+use super::ordered_pair::{Dropped, OrderedPair};
 use super::surface::Part;
 use crate::geometry::Aabb;
 use crate::parallel::*;
@@ -70,15 +70,23 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
     let mut rest = parts.as_slice();
     let mut next = candidates.iter();
     while !rest.is_empty() {
-        let count = if pair.search.is_of_faces() { near_each_other(rest) } else { rest.len() };
-        let (group, others) = rest.split_at(count);
+        let is_whole = |(part, ..): &(Part, u32, u32)| pair.search.is_whole(part);
+        let nodes = rest.iter().take_while(|part| !is_whole(part)).count();
+        let (group, others) = rest.split_at(if nodes == 0 { near_each_other(rest) } else { nodes });
         rest = others;
-        let around = pair.search.surroundings(&pair.field, group.iter().map(|(part, ..)| part));
+        let around = match nodes {
+            0 => pair.search.surroundings(&pair.field, group.iter().map(|(part, ..)| part)),
+            _ => None,
+        };
         for ((part, face_a, feature), &candidate) in group.iter().zip(&mut next) {
             let mut found = |minimum: Minimum| {
-                if pair.dropped(part, candidate, &minimum).is_some() {
-                    *filtered += 1;
-                    return;
+                match pair.dropped(part, candidate, &minimum) {
+                    None => {}
+                    Some(Dropped::AtEnd) => return,
+                    Some(Dropped::ByCosine(_) | Dropped::Descending) => {
+                        *filtered += 1;
+                        return;
+                    }
                 }
                 if let Some(vertex) = pair.vertex(part, &minimum) {
                     let cosine = minimum.value.gradient.dot(part.normal);

@@ -10,6 +10,11 @@ use crate::query::Precision;
 pub enum Mode {
     /// Node-TES: the vertices.
     Node,
+    /// The vertices, as [`Node`](Self::Node), and the edges where the surface is convex: the least
+    /// signed distance over each, within a [`tolerance`](CollideOptions::tolerance). Of bodies that
+    /// are apart, this finds the least distance. Where an edge lies on the other body, or is large
+    /// and near it, the ends of that part are contacts, so that bars that cross hold each other.
+    Edge,
     /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9). A fixed number of
     /// Frank–Wolfe [`iterations`](CollideOptions::iterations) gives an upper bound of the minimum.
     Face,
@@ -65,16 +70,16 @@ pub enum Reduction {
 /// Options of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CollideOptions {
-    /// Nodes or faces, and the method.
+    /// Nodes, edges or faces, and the method.
     pub mode: Mode,
     /// One contact for each cell that a face meets, for each face, or for each local minimum. Not
-    /// used for nodes.
+    /// used for nodes and edges.
     #[serde(default = "per_cell")]
     pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations of the mode [`Face`](Mode::Face), at most
     /// [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). Each evaluates the field once. The paper uses 16.
     pub iterations: u32,
-    /// Bound of the error of the mode [`Exact`](Mode::Exact), and of results of the mode
+    /// Bound of the error of the modes [`Exact`](Mode::Exact) and [`Edge`](Mode::Edge), and of results of the mode
     /// [`Face`](Mode::Face) that count as converged: a fraction of the diagonal of the field's body,
     /// or a length in the world's unit.
     pub tolerance: Length,
@@ -86,7 +91,7 @@ pub struct CollideOptions {
     /// nothing, whatever their speed.
     pub speculative_time: f64,
     /// Eq. (10): a contact of a face is dropped when ∇φ · n > −cos θ. `None` keeps all. Not used
-    /// for nodes.
+    /// for nodes and edges.
     pub cos_theta: Option<f64>,
     /// Number of contacts kept per pair of instances.
     pub reduction: Reduction,

@@ -15,11 +15,13 @@ pub enum Dropped {
     ByCosine(f64),
     /// The surface is lower beside the point.
     Descending,
+    /// The point is an end of an edge, which has a contact of its own.
+    AtEnd,
 }
 
 /// The surface of one body and the field of another.
 pub struct OrderedPair<'a> {
-    /// The body that has the faces or nodes.
+    /// The body that has the faces, edges or nodes.
     pub surface: SurfaceBody<'a>,
     /// The body whose signed distances are used.
     pub field: FieldBody<'a>,
@@ -76,6 +78,11 @@ impl<'a> OrderedPair<'a> {
     pub fn candidates(&self) -> Candidates {
         match self.options.mode {
             Mode::Node => self.surface.nodes(&self.field, self.search.reach),
+            Mode::Edge => {
+                let mut both = self.surface.nodes(&self.field, self.search.reach);
+                both.extend(self.surface.edges(&self.field, self.search.reach));
+                both
+            }
             // The search over a face begins with the test by which `faces` drops it.
             Mode::Face | Mode::Exact if self.search.is_of_faces() => {
                 self.surface.faces_of_leaves(&self.field, self.search.reach)
@@ -89,10 +96,16 @@ impl<'a> OrderedPair<'a> {
         self.options.mode
     }
 
-    /// A candidate, the id of its face, and its feature: the id of the node or of the face.
+    /// A candidate, the id of its face, and its feature: the id of the node, the edge or the face.
     pub fn part(&self, candidate: u32) -> (Part, u32, u32) {
         match self.options.mode {
-            Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
+            Mode::Edge if self.surface.is_edge(candidate) => {
+                let (face, id) = self.surface.edge_ids(candidate);
+                (self.surface.edge(candidate), face, id)
+            }
+            Mode::Node | Mode::Edge => {
+                (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate)
+            }
             Mode::Face | Mode::Exact => {
                 let face = self.surface.face_id(candidate);
                 (self.surface.face(candidate, &self.field, self.search.reach), face, face)
@@ -103,8 +116,13 @@ impl<'a> OrderedPair<'a> {
     /// Why a minimum of a candidate is no contact, if it is none: Eq. (10), which does not apply to
     /// rounded shapes, because they have normals in all directions; or a lower point beside it.
     pub fn dropped(&self, part: &Part, candidate: u32, minimum: &Minimum) -> Option<Dropped> {
-        if self.options.mode == Mode::Node {
-            return None;
+        match self.options.mode {
+            Mode::Node => return None,
+            Mode::Edge => {
+                let is_end = part.points().len() == 2 && minimum.corner.is_some();
+                return is_end.then_some(Dropped::AtEnd);
+            }
+            Mode::Face | Mode::Exact => {}
         }
         let gradient = minimum.value.gradient;
         let cosine = gradient.dot(part.normal);
@@ -128,14 +146,15 @@ impl<'a> OrderedPair<'a> {
         descends(&self.surface, &self.field, at, |face| match self.options.mode {
             // Frank–Wolfe need not find the lower point.
             Mode::Face => self.search.frank_wolfe(&self.field, face) < at.distance,
-            Mode::Node | Mode::Exact => true,
+            Mode::Node | Mode::Edge | Mode::Exact => true,
         })
     }
 
-    /// The vertex at which a minimum is, by its bits; `None` in the mode node, where each vertex has
-    /// one contact, and for contacts per cell.
+    /// The vertex at which a minimum is, by its bits; `None` in the modes node and edge, where
+    /// each vertex has one contact, and for contacts per cell.
     pub fn vertex(&self, part: &Part, minimum: &Minimum) -> Option<[u64; 3]> {
-        let one_each = self.options.mode == Mode::Node || self.options.contacts_per == ContactsPer::Cell;
+        let one_each = matches!(self.options.mode, Mode::Node | Mode::Edge)
+            || self.options.contacts_per == ContactsPer::Cell;
         let corner = minimum.corner.filter(|_| !one_each)?;
         Some(part.points()[usize::from(corner)].to_array().map(f64::to_bits))
     }

@@ -100,6 +100,35 @@ impl Simple {
         }
     }
 
+    /// The edges: twelve of a box, the segment of a capsule. The surface lies within the radius.
+    pub fn edges(&self) -> (Vec<SimpleEdge>, f64) {
+        let (parts, radius) = self.parts();
+        let mut edges: Vec<SimpleEdge> = Vec::new();
+        for (part, points) in (0..).zip(&parts) {
+            for side in 0..if points.len() == 3 { 3 } else { points.len() as u32 - 1 } {
+                let [p, q] = [side, side + 1].map(|k| points[k as usize % points.len()]);
+                let normals = match *self {
+                    Self::Box(half) => {
+                        // The side lies in the sides of the box where both ends do.
+                        let outward = |axis: usize| {
+                            let is_common = p[axis] == q[axis] && p[axis].abs() == half[axis];
+                            is_common.then(|| DVec3::AXES[axis] * p[axis].signum())
+                        };
+                        let outward: Vec<DVec3> = (0..3).filter_map(outward).collect();
+                        // The diagonal of a side is no edge.
+                        let &[first, second] = outward.as_slice() else { continue };
+                        [first, second]
+                    }
+                    _ => [DVec3::ZERO; 2],
+                };
+                if edges.iter().all(|e| e.points != [p, q] && e.points != [q, p]) {
+                    edges.push(SimpleEdge { id: 3 * part + side, points: [p, q], normals });
+                }
+            }
+        }
+        (edges, radius)
+    }
+
     /// The distinct points of the parts, each with the lowest part that has it.
     pub fn nodes(&self) -> (Vec<(DVec3, u32)>, f64) {
         let (parts, radius) = self.parts();
@@ -113,6 +142,17 @@ impl Simple {
         }
         (nodes, radius)
     }
+}
+
+/// An edge of a box, or the core of a capsule.
+#[derive(Clone, Copy, Debug)]
+pub struct SimpleEdge {
+    /// 3 × part + side: that side of the lowest part that has it.
+    pub id: u32,
+    /// Its ends.
+    pub points: [DVec3; 2],
+    /// The normals of the two sides of a box; zero for a capsule.
+    pub normals: [DVec3; 2],
 }
 
 fn box_value(p: DVec3, half: DVec3) -> (f64, DVec3, DVec3, u32) {
@@ -206,5 +246,20 @@ mod tests {
         assert_eq!(sphere.value(DVec3::ZERO).distance, -2.0);
         assert_eq!(capsule.nodes().0.len(), 2);
         assert_eq!(Simple::Box(DVec3::ONE).nodes().0.len(), 8);
+        assert_eq!(capsule.edges().0.len(), 1);
+        assert!(sphere.edges().0.is_empty() && Simple::Plane.edges().0.is_empty());
+    }
+
+    #[test]
+    fn a_box_has_twelve_edges() {
+        let half = DVec3::new(1.0, 2.0, 3.0);
+        let (edges, _) = Simple::Box(half).edges();
+        assert_eq!(edges.len(), 12);
+        for SimpleEdge { id, points: [p, q], normals: [m, n] } in edges {
+            assert_eq!((p != q, m.dot(n), m.dot(p - q), n.dot(p - q)), (true, 0.0, 0.0, 0.0));
+            assert!(m.dot(p) > 0.0 && n.dot(p) > 0.0);
+            let part = &Simple::Box(half).parts().0[id as usize / 3];
+            assert_eq!((part[id as usize % 3], part[(id as usize + 1) % 3]), (p, q));
+        }
     }
 }

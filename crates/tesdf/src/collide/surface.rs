@@ -1,5 +1,5 @@
-//! The body of a pair whose surface is tested, and the broad phase, which finds its faces or nodes
-//! that can touch a field.
+//! The body of a pair whose surface is tested, and the broad phase, which finds its faces,
+//! edges or nodes that can touch a field.
 use glam::{DMat3, DVec3, Vec3};
 
 use super::field::{Field, FieldBody};
@@ -20,7 +20,8 @@ pub struct SurfaceBody<'a> {
     scale: f64,
 }
 
-/// The result of the broad phase: faces or nodes of a surface that can touch, in order.
+/// The result of the broad phase: faces, edges or nodes of a surface that can touch, in order. In edge
+/// mode, numbers below that of the nodes are nodes.
 pub type Candidates = Vec<u32>;
 
 /// A node or leaf of the face tree.
@@ -34,25 +35,41 @@ pub struct Branch {
     pub radius: f64,
 }
 
-/// A face, or the core of a rounded shape, in the field's frame.
+/// A face, an edge, or the core of a rounded shape, in the field's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Part {
     points: [DVec3; 3],
     count: usize,
     /// The surface lies within this distance of the part.
     pub radius: f64,
-    /// Unit normal; zero for a rounded shape or a part without area.
+    /// Unit normal; zero for a rounded shape or a part without area. For an edge, the mean of those of
+    /// its faces.
     pub normal: DVec3,
+    /// The least cosine between the normal and that of a face that has the part.
+    pub cosine: f64,
 }
 
 impl Part {
     fn new(points: &[DVec3], radius: f64) -> Self {
-        let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal: DVec3::ZERO };
+        let (normal, cosine) = (DVec3::ZERO, 1.0);
+        let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal, cosine };
         part.points[..points.len()].copy_from_slice(points);
         if let [a, b, c] = *points {
             part.normal = Triangle::new([a, b, c]).normal;
         }
         part
+    }
+
+    /// An edge of faces with these normals.
+    fn edge(points: [DVec3; 2], radius: f64, normals: impl Iterator<Item = DVec3> + Clone) -> Self {
+        let normal = normals.clone().map(DVec3::normalize_or_zero).sum::<DVec3>().normalize_or_zero();
+        let cosine = normals.map(|n| n.normalize_or_zero().dot(normal)).fold(1.0, f64::min).max(0.0);
+        Self { normal, cosine, ..Self::new(&points, radius) }
+    }
+
+    /// The normal of the part's plane; zero where it has none.
+    pub fn plane_normal(&self) -> DVec3 {
+        if self.count == 3 { self.normal } else { DVec3::ZERO }
     }
 
     /// The one to three points.
@@ -123,6 +140,30 @@ impl<'a> SurfaceBody<'a> {
         nodes.sort_unstable();
         nodes.dedup();
         nodes
+    }
+
+    /// The edges of the faces in the leaves that can come within `reach`; see
+    /// [`edge`](Self::edge). For a simple shape, all its edges.
+    pub fn edges(&self, field: &FieldBody, reach: f64) -> Candidates {
+        match self.shape {
+            Shape::Mesh(asset) => {
+                let mut edges = Vec::new();
+                self.visit_leaves(asset, field, reach, |start, count| {
+                    edges.extend(self.edges_of_leaf(start, count));
+                });
+                edges
+            }
+            _ => self.edges_of_leaf(0, 0),
+        }
+    }
+
+    /// The edges that belong to a leaf of the face tree, or all edges of a simple shape.
+    fn edges_of_leaf(&self, start: u32, count: u32) -> Candidates {
+        let first = self.node_count();
+        match self.shape {
+            Shape::Mesh(asset) => asset.sharp_edges(start, count).map(|edge| first + edge).collect(),
+            simple => Simple::from(simple).edges().0.iter().map(|edge| first + edge.id).collect(),
+        }
     }
 
     /// A candidate face.
@@ -220,6 +261,40 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
+    /// A candidate edge as a part of two points. Its number is that of the nodes + 3 × face + side.
+    pub fn edge(&self, candidate: u32) -> Part {
+        let edge = candidate - self.node_count();
+        let (face, side) = (edge as usize / 3, edge as usize % 3);
+        match self.shape {
+            Shape::Mesh(asset) => {
+                let corners = asset.face_corners(face);
+                let points = [corners[side], corners[(side + 1) % 3]].map(|p| self.to_field(p));
+                let faces = asset.faces_beside(face, side).chain([face]);
+                let normals: Vec<DVec3> =
+                    faces.map(|f| self.linear * asset.local_triangle(f).normal).collect();
+                Part::edge(points, 0.0, normals.into_iter())
+            }
+            simple => {
+                let (edges, radius) = Simple::from(simple).edges();
+                let found = edges.iter().find(|e| e.id == edge).unwrap_or(&edges[0]);
+                let normals = found.normals.map(|n| self.linear * n);
+                Part::edge(found.points.map(|p| self.to_field(p)), radius * self.scale, normals.into_iter())
+            }
+        }
+    }
+
+    /// The id of the lowest face that has a candidate edge, and of the edge, in the user's numbering.
+    pub fn edge_ids(&self, candidate: u32) -> (u32, u32) {
+        let (first, edge) = (self.node_count(), candidate - self.node_count());
+        let face = self.face_id(edge / 3);
+        (face, first + 3 * face + edge % 3)
+    }
+
+    /// Whether a candidate of the edge mode is an edge, not a node.
+    pub fn is_edge(&self, candidate: u32) -> bool {
+        candidate >= self.node_count()
+    }
+
     /// The id of a face in the user's numbering.
     pub fn face_id(&self, face: u32) -> u32 {
         match self.shape {
@@ -254,9 +329,13 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// Whether a range of faces contains a face, or in node mode a node.
+    /// Whether a range of faces contains a face, or in node mode a node; in edge mode, a node or edge.
     pub fn holds(&self, start: u32, count: u32, candidate: u32, mode: Mode) -> bool {
         match (mode, self.shape) {
+            (Mode::Edge, Shape::Mesh(_)) if self.is_edge(candidate) => {
+                (start..start + count).contains(&((candidate - self.node_count()) / 3))
+            }
+            (Mode::Edge, Shape::Mesh(_)) => self.holds(start, count, candidate, Mode::Node),
             (Mode::Node, Shape::Mesh(asset)) => {
                 asset.faces[start as usize..(start + count) as usize].as_flattened().contains(&candidate)
             }
@@ -265,9 +344,14 @@ impl<'a> SurfaceBody<'a> {
     }
 
     /// The candidates of a leaf of the face tree, or of all parts of a simple shape. In node mode, a
-    /// vertex belongs to the leaf of its lowest face.
+    /// vertex belongs to the leaf of its lowest face, and in edge mode an edge, too.
     pub fn of_leaf(&self, start: u32, count: u32, mode: Mode) -> Candidates {
         match (mode, self.shape) {
+            (Mode::Edge, _) => {
+                let mut both = self.of_leaf(start, count, Mode::Node);
+                both.extend(self.edges_of_leaf(start, count));
+                both
+            }
             (Mode::Node, Shape::Mesh(asset)) => {
                 let lowest = asset.lowest_faces();
                 let of_face = |face: u32| {

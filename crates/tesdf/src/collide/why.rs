@@ -68,6 +68,8 @@ pub enum PolygonVerdict {
     },
     /// Dropped because the surface is lower beside it, where local minima are wanted.
     Descending,
+    /// The least distance of an edge is at one of its ends, which are contacts as nodes.
+    AtEnd,
 }
 
 /// A face clipped by one cell, a point of a whole face, or a node; in the world's unit and frame.
@@ -88,10 +90,10 @@ pub struct PolygonReport {
     pub verdict: PolygonVerdict,
 }
 
-/// A face of *a*, or a node in node mode.
+/// A face of *a*, or a node in node mode; a node or an edge in edge mode.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartReport {
-    /// The id of the face or node in the user's numbering.
+    /// The id of the face or node in the user's numbering; of an edge, as [`FeatureId::a`](super::FeatureId::a).
     pub id: u32,
     /// The result of the broad phase.
     pub broad: BroadVerdict,
@@ -202,6 +204,7 @@ impl Stages<'_> {
         let surface = &self.pair.surface;
         match self.options.mode {
             Mode::Node => surface.node_count() as usize,
+            Mode::Edge => surface.of_leaf(0, surface.face_count(), Mode::Edge).len(),
             Mode::Face | Mode::Exact => surface.face_count() as usize,
         }
     }
@@ -211,11 +214,20 @@ impl Stages<'_> {
         let total = self.total() as u32;
         let found: Vec<u32> = match self.options.mode {
             Mode::Node => (0..total).filter(|&node| node == id).collect(),
+            Mode::Edge => {
+                let surface = &self.pair.surface;
+                let mut all = surface.of_leaf(0, surface.face_count(), Mode::Edge);
+                all.retain(|&candidate| self.pair.part(candidate).2 == id);
+                all
+            }
             Mode::Face | Mode::Exact => (0..total).filter(|&f| self.pair.surface.face_id(f) == id).collect(),
         };
         if found.is_empty() {
             let (option, expected) = match self.options.mode {
                 Mode::Node => ("node", "a node of the body, counted from 0"),
+                Mode::Edge => {
+                    ("edge", "a node of the body, or the number of an edge that is tested, as in `feature.a`")
+                }
                 Mode::Face | Mode::Exact => {
                     ("face", "a face of the body, counted from 0 as in the encoded mesh")
                 }
@@ -257,11 +269,12 @@ impl Stages<'_> {
             let verdict = match self.pair.dropped(&part, candidate, &minimum) {
                 Some(Dropped::ByCosine(cosine)) => PolygonVerdict::Filtered { cosine },
                 Some(Dropped::Descending) => PolygonVerdict::Descending,
+                Some(Dropped::AtEnd) => PolygonVerdict::AtEnd,
                 None => PolygonVerdict::Contact,
             };
             kept.push((key(polygon), describe(polygon, &minimum, verdict)));
         });
-        if search.is_of_faces() && !kept.is_empty() {
+        if search.is_whole(&part) && !kept.is_empty() {
             return PartReport { id, broad, polygons: kept.into_iter().map(|k| k.1).collect() };
         }
         let mut polygons = Vec::new();
@@ -274,7 +287,7 @@ impl Stages<'_> {
             };
             polygons.push(describe(polygon, &minimum, verdict));
         });
-        if search.is_of_faces() {
+        if search.is_whole(&part) {
             // Without a limit, the extremes of flat contact are others.
             polygons.truncate(1);
         }

@@ -192,6 +192,27 @@ impl Detection<'_> {
     /// Boxes of side 0.1 on a lower one with n × n squares a side. Returns the number of contacts
     /// whose search has not converged.
     pub fn box_stands_on_the_corners_of_the_patch(&self, contacts_per: ContactsPer) -> usize {
+        self.box_stands(contacts_per, (0.0, DVec3::ZERO))
+            + self.shifted_or_turned_box_stands_on_the_corners_of_the_patch(contacts_per)
+    }
+
+    /// The same for boxes whose edges are not flush.
+    pub fn shifted_or_turned_box_stands_on_the_corners_of_the_patch(
+        &self,
+        contacts_per: ContactsPer,
+    ) -> usize {
+        [
+            (0.0, DVec3::new(0.03, 0.02, 0.0)),
+            (std::f64::consts::FRAC_PI_6, DVec3::ZERO),
+            (std::f64::consts::FRAC_PI_6, DVec3::new(0.04, 0.0, 0.0)),
+        ]
+        .into_iter()
+        .map(|place| self.box_stands(contacts_per, place))
+        .sum()
+    }
+
+    /// The same for one angle and shift.
+    fn box_stands(&self, contacts_per: ContactsPer, (turn, shift): (f64, DVec3)) -> usize {
         let half = DVec3::splat(0.05);
         let options = CollideOptions {
             contacts_per,
@@ -203,27 +224,20 @@ impl Detection<'_> {
         for [n_lower, n_upper] in [[1, 1], [1, 8], [8, 1], [8, 8], [3, 5]] {
             let lower = block(-half, half, n_lower);
             let upper = block(-half, half, n_upper);
-            for (turn, shift) in [
-                (0.0, DVec3::ZERO),
-                (0.0, DVec3::new(0.03, 0.02, 0.0)),
-                (std::f64::consts::FRAC_PI_6, DVec3::ZERO),
-                (std::f64::consts::FRAC_PI_6, DVec3::new(0.04, 0.0, 0.0)),
-            ] {
-                for gap in [-1e-6, 0.0, 5e-5] {
-                    let rotation = DQuat::from_rotation_z(turn);
-                    let translation = shift + DVec3::new(0.0, 0.0, 0.1 + gap);
-                    let mut placed = upper.clone();
-                    placed.at.pose = Pose { translation, rotation };
-                    let found = (self.detect)(&scene(&[lower.clone(), placed.clone()]), &options);
-                    let corners = overlap(&rotation, shift);
-                    // A small face reports the flat part of itself within the tolerance, a large one
-                    // everything within the contact distance.
-                    let what = format!(
-                        "{n_lower} and {n_upper} squares, turned by {turn}, shifted by {shift}, gap {gap}"
-                    );
-                    self.stands(found.as_slice(), &corners, 1.5e-5, &what);
-                    unconverged += found.statistics.unconverged;
-                }
+            for gap in [-1e-6, 0.0, 5e-5] {
+                let rotation = DQuat::from_rotation_z(turn);
+                let translation = shift + DVec3::new(0.0, 0.0, 0.1 + gap);
+                let mut placed = upper.clone();
+                placed.at.pose = Pose { translation, rotation };
+                let found = (self.detect)(&scene(&[lower.clone(), placed.clone()]), &options);
+                let corners = overlap(&rotation, shift);
+                // A small face reports the flat part of itself within the tolerance, a large one
+                // everything within the contact distance.
+                let what = format!(
+                    "{n_lower} and {n_upper} squares, turned by {turn}, shifted by {shift}, gap {gap}"
+                );
+                self.stands(found.as_slice(), &corners, 1.5e-5, &what);
+                unconverged += found.statistics.unconverged;
             }
         }
         unconverged

@@ -43,6 +43,7 @@ pub struct Args {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Mode {
     Node,
+    Edge,
     Face,
     Exact,
     Off,
@@ -100,6 +101,7 @@ pub fn run(args: &Args) -> Result<(), Failure> {
         for &mode in &args.modes {
             loaded.scene.detector.mode = match mode {
                 Mode::Node => DetectorMode::Node,
+                Mode::Edge => DetectorMode::Edge,
                 Mode::Face => DetectorMode::Face,
                 Mode::Exact => DetectorMode::Exact,
                 Mode::Off => DetectorMode::Off,

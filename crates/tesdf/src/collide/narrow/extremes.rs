@@ -59,7 +59,7 @@ pub struct Patch<'a> {
     limit: f64,
     /// Where the patch can be: the part, or a chord of it.
     within: ArrayVec<DVec3, 3>,
-    /// The normal of `within`; zero for a chord.
+    /// The normal of `within`; zero for a chord or an edge.
     normal: DVec3,
     sides: [Side; 3],
 }
@@ -96,7 +96,7 @@ impl<'a> Patch<'a> {
         let is_large = search.is_large(part);
         let Search { tolerance, reach, .. } = *search;
         let limit = if is_large { reach + part.radius } else { minimum.value.distance + tolerance };
-        let normal = part.normal;
+        let normal = part.plane_normal();
         Self {
             field,
             part,
@@ -188,7 +188,12 @@ impl<'a> Patch<'a> {
     /// Whether a candidate may be in the patch and matters beside the minimum.
     fn may_hold(&self, p: DVec3) -> bool {
         let from = p - self.minimum.point;
-        let beside = if self.normal == DVec3::ZERO { SMALL * self.longest.length() } else { 0.0 };
+        let beside = match (self.normal == DVec3::ZERO, self.is_large && self.part.normal != DVec3::ZERO) {
+            (false, _) => 0.0,
+            (true, false) => SMALL * self.longest.length(),
+            // A large edge, whose ends on the other body must hold it up.
+            (true, true) => self.search.tolerance,
+        };
         from.length_squared() > beside * beside && (self.is_large || self.is_level(from))
     }
 
@@ -243,8 +248,10 @@ impl<'a> Patch<'a> {
     fn take(&self, point: DVec3, corner: Option<u8>) -> Option<Minimum> {
         let normal = self.part.normal;
         let value = |p: DVec3| self.field.opposing(p, normal, self.search.precision);
+        // The normal of an edge is oblique to its faces, and the other body may oppose either of them.
+        let opposes = OPPOSES * self.part.cosine;
         let holds = |v: &FieldValue| {
-            v.distance <= self.limit && (normal == DVec3::ZERO || v.gradient.dot(normal) < OPPOSES)
+            v.distance <= self.limit && (normal == DVec3::ZERO || v.gradient.dot(normal) < opposes)
         };
         let minimum = |point, value, corner| Minimum {
             point,
@@ -255,7 +262,7 @@ impl<'a> Patch<'a> {
             is_lowest: false,
         };
         // From the nearest point of the other body, along the face.
-        let offset = |p: DVec3, v: &FieldValue| (p - v.closest_point).reject_from_normalized(normal);
+        let offset = |p: DVec3, v: &FieldValue| self.along_part(p - v.closest_point);
         let is_over = |p, v: &FieldValue| v.feature == Feature::Face || offset(p, v).length() < HEIGHT;
         let first = value(point);
         let taken = holds(&first).then(|| minimum(point, first, corner));
@@ -269,7 +276,7 @@ impl<'a> Patch<'a> {
         let (mut at, mut moved) = (first, point);
         for _ in 0..MOVES {
             let missing = at.distance + depth;
-            let gradient = at.gradient.reject_from_normalized(normal);
+            let gradient = self.along_part(at.gradient);
             let (outward, slope) = match at.distance < 0.0 {
                 true => (gradient, gradient.length()),
                 // The gradient on the surface does not say on which side of an edge the point lies.
@@ -291,7 +298,15 @@ impl<'a> Patch<'a> {
         taken
     }
 
-    /// Whether a point lies over the face, or on it.
+    /// The component of a vector in the plane of a face, or along an edge.
+    fn along_part(&self, v: DVec3) -> DVec3 {
+        match self.part.points() {
+            [_, _] => v.project_onto_normalized(self.longest.normalize_or_zero()),
+            _ => v.reject_from_normalized(self.part.normal),
+        }
+    }
+
+    /// Whether a point lies over the face, or on it, or on the edge.
     fn holds(&self, p: DVec3) -> bool {
         self.sides.iter().all(|side| side.inward.dot(p - side.start) >= side.least)
     }
@@ -382,9 +397,13 @@ impl<'a> Patch<'a> {
     }
 }
 
-/// The sides of a part that is a triangle.
+/// The sides of a part that is a triangle, or the ends of an edge.
 fn sides(part: &Part) -> [Side; 3] {
-    let &[a, b, c] = part.points() else { return Default::default() };
+    let &[a, b, c] = part.points() else {
+        let &[a, b] = part.points() else { return Default::default() };
+        let end = |start, inward: DVec3| Side { start, inward, least: -HEIGHT * inward.length() };
+        return [end(a, b - a), end(b, a - b), Side::default()];
+    };
     [(a, b), (b, c), (c, a)].map(|(start, end)| {
         let edge = end - start;
         Side { start, inward: part.normal.cross(edge), least: -HEIGHT * edge.length() }

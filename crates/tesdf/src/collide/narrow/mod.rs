@@ -72,7 +72,8 @@ impl Search {
         let unit = field.unit();
         let tolerance = options.tolerance.resolve(diagonals[1]) / unit;
         let large = LARGE * diagonals[0].min(diagonals[1]) / unit;
-        let CollideOptions { mode, contacts_per: per, iterations, precision, .. } = *options;
+        let CollideOptions { mode, contacts_per, iterations, precision, .. } = *options;
+        let per = if mode == Mode::Edge { ContactsPer::Face } else { contacts_per };
         Self { mode, per, iterations, large, reach: reach / unit, tolerance, precision }
     }
 
@@ -106,7 +107,7 @@ impl Search {
         let cell = CellField::Whole(around);
         let polygon = Polygon::new(part.points());
         let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
-        exact::lowest(&cell, &polygon, part.normal, self.tolerance, reach, precision)
+        exact::lowest(&cell, &polygon, part.plane_normal(), self.tolerance, reach, precision)
             .is_some_and(|found| !found.converged || cell.rough(found.point).0 <= reach + ROUNDING)
     }
 
@@ -132,9 +133,15 @@ impl Search {
         edges.fold(0.0, f64::max) > self.large * self.large
     }
 
-    /// Whether parts are searched as a whole, not cell by cell.
+    /// Whether parts other than nodes are searched as a whole, not cell by cell.
     pub fn is_of_faces(&self) -> bool {
         self.per != ContactsPer::Cell && self.mode != Mode::Node
+    }
+
+    /// Whether a part is searched as a whole.
+    pub fn is_whole(&self, part: &Part) -> bool {
+        let is_node = self.mode == Mode::Edge && part.points().len() == 1;
+        self.is_of_faces() && !is_node
     }
 
     /// The mesh around parts that lie near each other, for [`minima`](Self::minima). `None` where
@@ -167,7 +174,7 @@ impl Search {
         polygon: &mut impl FnMut(&ClippedPolygon),
         found: &mut impl FnMut(&ClippedPolygon, Minimum),
     ) {
-        if self.is_of_faces() {
+        if self.is_whole(part) {
             return match (around, field.field) {
                 (Some(around), _) => self.of_face(&CellField::Whole(around), part, polygon, found),
                 (None, Field::Mesh(asset)) => {
@@ -224,11 +231,31 @@ impl Search {
         polygon(&whole);
         let reach = self.reach + part.radius;
         let Some(minimum) = self.in_cell(everywhere, &whole, part, reach) else { return };
-        found(&whole, minimum);
-        Patch::new(everywhere, part, &minimum, self)
-            .extremes()
-            .into_iter()
-            .for_each(|extreme| found(&whole, extreme));
+        let extremes = Patch::new(everywhere, part, &minimum, self).extremes();
+        if self.mode != Mode::Edge || !self.is_between(part, &minimum, &extremes) {
+            found(&whole, self.at_end(part, minimum));
+        }
+        extremes.into_iter().for_each(|extreme| found(&whole, self.at_end(part, extreme)));
+    }
+
+    /// Whether an edge is as low, within the tolerance, at points on both sides of its minimum. The
+    /// contacts there hold a body as well.
+    fn is_between(&self, part: &Part, minimum: &Minimum, extremes: &[Minimum]) -> bool {
+        let &[start, end] = part.points() else { return false };
+        let is_low = |m: &&Minimum| m.value.distance <= minimum.value.distance + self.tolerance;
+        let way = |m: &Minimum| (end - start).dot(m.point - minimum.point);
+        let mut ways = extremes.iter().filter(is_low).map(way);
+        ways.clone().any(|way| way < 0.0) && ways.any(|way| way > 0.0)
+    }
+
+    /// A minimum of an edge within the tolerance of an end is there.
+    fn at_end(&self, part: &Part, minimum: Minimum) -> Minimum {
+        if self.mode != Mode::Edge {
+            return minimum;
+        }
+        let is_near = |end: &DVec3| end.distance(minimum.point) <= self.tolerance;
+        let corner = part.points().iter().position(is_near).map(|k| k as u8);
+        Minimum { corner, ..minimum }
     }
 
     fn in_cell(
@@ -245,9 +272,9 @@ impl Search {
             }
             Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true, face: None }),
             Mode::Face => frank_wolfe::lowest(cell, polygon, self.iterations, reach),
-            Mode::Exact => {
+            Mode::Edge | Mode::Exact => {
                 let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
-                exact::lowest(cell, polygon, part.normal, self.tolerance, reach, precision)
+                exact::lowest(cell, polygon, part.plane_normal(), self.tolerance, reach, precision)
             }
         }?;
         let Lowest { point, converged, face } = lowest;
