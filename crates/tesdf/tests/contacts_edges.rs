@@ -219,8 +219,13 @@ const PROCESSOR: Detection =
 
 #[test]
 fn a_box_stands_on_the_corners_of_the_patch() {
-    // Nodes on the edges of flush boxes have any normal of the edge.
-    assert_eq!(PROCESSOR.shifted_or_turned_box_stands_on_the_corners_of_the_patch(ContactsPer::Minimum), 0);
+    // Nodes on the edges of flush boxes have any normal of the edge. A corner of the patch has a
+    // contact of a vertex of one of the boxes, which may be 5e-5 above it.
+    let near = 5e-5 + 1e-9;
+    assert_eq!(
+        PROCESSOR.shifted_or_turned_box_stands_on_the_corners_of_the_patch(ContactsPer::Minimum, near),
+        0
+    );
 }
 
 #[test]

@@ -192,14 +192,18 @@ impl Detection<'_> {
     /// Boxes of side 0.1 on a lower one with n × n squares a side. Returns the number of contacts
     /// whose search has not converged.
     pub fn box_stands_on_the_corners_of_the_patch(&self, contacts_per: ContactsPer) -> usize {
-        self.box_stands(contacts_per, (0.0, DVec3::ZERO))
-            + self.shifted_or_turned_box_stands_on_the_corners_of_the_patch(contacts_per)
+        // A small face reports the flat part of itself within the tolerance, a large one everything
+        // within the contact distance.
+        let near = 1.5e-5;
+        self.box_stands(contacts_per, (0.0, DVec3::ZERO), near)
+            + self.shifted_or_turned_box_stands_on_the_corners_of_the_patch(contacts_per, near)
     }
 
-    /// The same for boxes whose edges are not flush.
+    /// The same for boxes whose edges are not flush, with contacts up to `near` from the corners.
     pub fn shifted_or_turned_box_stands_on_the_corners_of_the_patch(
         &self,
         contacts_per: ContactsPer,
+        near: f64,
     ) -> usize {
         [
             (0.0, DVec3::new(0.03, 0.02, 0.0)),
@@ -207,12 +211,12 @@ impl Detection<'_> {
             (std::f64::consts::FRAC_PI_6, DVec3::new(0.04, 0.0, 0.0)),
         ]
         .into_iter()
-        .map(|place| self.box_stands(contacts_per, place))
+        .map(|place| self.box_stands(contacts_per, place, near))
         .sum()
     }
 
     /// The same for one angle and shift.
-    fn box_stands(&self, contacts_per: ContactsPer, (turn, shift): (f64, DVec3)) -> usize {
+    fn box_stands(&self, contacts_per: ContactsPer, (turn, shift): (f64, DVec3), near: f64) -> usize {
         let half = DVec3::splat(0.05);
         let options = CollideOptions {
             contacts_per,
@@ -231,12 +235,10 @@ impl Detection<'_> {
                 placed.at.pose = Pose { translation, rotation };
                 let found = (self.detect)(&scene(&[lower.clone(), placed.clone()]), &options);
                 let corners = overlap(&rotation, shift);
-                // A small face reports the flat part of itself within the tolerance, a large one
-                // everything within the contact distance.
                 let what = format!(
                     "{n_lower} and {n_upper} squares, turned by {turn}, shifted by {shift}, gap {gap}"
                 );
-                self.stands(found.as_slice(), &corners, 1.5e-5, &what);
+                self.stands(found.as_slice(), &corners, near, &what);
                 unconverged += found.statistics.unconverged;
             }
         }
