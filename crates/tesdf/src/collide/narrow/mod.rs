@@ -92,6 +92,10 @@ impl Search {
     /// Whether a part can have a contact within reach. `false` is certain. Where contacts are
     /// found in inexact lists, nothing is certain.
     pub fn may_reach(&self, field: &FieldBody, part: &Part, around: Option<&Surroundings>) -> bool {
+        if part.points().len() == 1 {
+            // The contact itself takes no more time.
+            return true;
+        }
         let reach = self.reach + part.radius;
         let around = match (field.field, around) {
             (Field::Simple(simple), _) => {
