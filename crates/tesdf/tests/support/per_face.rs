@@ -196,17 +196,23 @@ impl Detection<'_> {
         // within the contact distance.
         let near = 1.5e-5;
         self.box_stands(contacts_per, (0.0, DVec3::ZERO), near)
-            + self.shifted_or_turned_box_stands_on_the_corners_of_the_patch(contacts_per, near)
+            + self.shifted_or_turned_box_stands_on_the_corners_of_the_patch(
+                contacts_per,
+                DVec3::new(0.03, 0.02, 0.0),
+                near,
+            )
     }
 
-    /// The same for boxes whose edges are not flush, with contacts up to `near` from the corners.
+    /// The same for a box that is shifted, and turned ones, with contacts up to `near` from the
+    /// corners.
     pub fn shifted_or_turned_box_stands_on_the_corners_of_the_patch(
         &self,
         contacts_per: ContactsPer,
+        shift: DVec3,
         near: f64,
     ) -> usize {
         [
-            (0.0, DVec3::new(0.03, 0.02, 0.0)),
+            (0.0, shift),
             (std::f64::consts::FRAC_PI_6, DVec3::ZERO),
             (std::f64::consts::FRAC_PI_6, DVec3::new(0.04, 0.0, 0.0)),
         ]
