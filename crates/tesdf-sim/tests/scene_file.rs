@@ -77,7 +77,7 @@ fn errors_name_the_line_and_the_body() {
         (change("time_step = 1e-3", "time_step = 0"), vec!["time_step", "above 0"]),
         (change("[record]", "[solver]\nredetections = 3\n[record]"), vec!["solver", "redetections"]),
         (change("[record]", "[detector]\ntolerance = 0\n[record]"), vec!["detector", "tolerance"]),
-        (change("[record]", "[detector]\nmode = \"edge\"\n[record]"), vec!["line 6", "edge"]),
+        (change("[record]", "[detector]\nmode = \"vertex\"\n[record]"), vec!["line 6", "vertex"]),
         (change("[record]", "[detector]\ncontacts_per = \"body\"\n[record]"), vec!["line 6", "body"]),
         (
             DROP.to_string()
