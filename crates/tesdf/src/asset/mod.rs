@@ -24,6 +24,7 @@ mod container;
 mod entries;
 mod error;
 mod face_record;
+#[cfg(feature = "collide")]
 mod faces_at;
 mod header;
 mod incidence;
@@ -33,6 +34,7 @@ mod motion;
 pub(crate) mod options;
 mod roots;
 mod section;
+#[cfg(feature = "collide")]
 mod sharp_edges;
 mod te_sdf;
 #[cfg(feature = "encode")]

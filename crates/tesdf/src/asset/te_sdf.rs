@@ -8,6 +8,7 @@ use super::cell_bounds::CellBounds;
 use super::conforming::Conforming;
 use super::entries::Entries;
 use super::face_record::FaceRecord;
+#[cfg(feature = "collide")]
 use super::faces_at::FacesAt;
 use super::inner_ball::InnerBall;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
@@ -66,7 +67,9 @@ pub struct TeSdf {
     /// What has moved since the asset was opened. `None` when nothing has.
     pub(crate) motion: Option<Motion>,
     lowest_faces: OnceLock<Vec<u32>>,
+    #[cfg(feature = "collide")]
     faces_at: OnceLock<FacesAt>,
+    #[cfg(feature = "collide")]
     pub(super) sharp_sides: OnceLock<Vec<u8>>,
     pub(crate) inner_ball: OnceLock<InnerBall>,
     pub(crate) corner_reaches: OnceLock<Vec<f32>>,
@@ -148,7 +151,9 @@ impl TeSdf {
             cell_bounds: OnceLock::new(),
             motion: None,
             lowest_faces: OnceLock::new(),
+            #[cfg(feature = "collide")]
             faces_at: OnceLock::new(),
+            #[cfg(feature = "collide")]
             sharp_sides: OnceLock::new(),
             inner_ball: OnceLock::new(),
             corner_reaches: OnceLock::new(),
@@ -198,7 +203,10 @@ impl TeSdf {
         self.cell_bounds = OnceLock::from(CellBounds::none());
         self.inner_ball = OnceLock::new();
         self.corner_reaches = OnceLock::new();
-        self.sharp_sides = OnceLock::new();
+        #[cfg(feature = "collide")]
+        {
+            self.sharp_sides = OnceLock::new();
+        }
         self.forget_normals();
     }
 
@@ -269,6 +277,7 @@ impl TeSdf {
     }
 
     /// The faces that have a vertex, by their places in the file, in ascending order.
+    #[cfg(feature = "collide")]
     pub(crate) fn faces_at(&self, vertex: u32) -> &[u32] {
         self.faces_at.get_or_init(|| FacesAt::new(&self.faces, self.vertices.len())).of(vertex)
     }
