@@ -120,7 +120,8 @@ fn a_folder_that_cannot_be_made_is_reported_before_the_work() {
 fn the_quick_table_3_has_encoded_meshes_that_succeed_beside_voxels_and_the_paper() {
     let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").display().to_string();
     let folder = Folder::new();
-    folder.good(&["evaluate", "table3", "--quick", "--scenes", &scenes, "-o", "results"]);
+    let args = ["evaluate", "table3", "--quick", "--preset", "fast", "--scenes", &scenes, "-o", "results"];
+    folder.good(&args);
     let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
     let table: Value = serde_json::from_str(&read("results/table3.json")).unwrap();
     let cells = table["cells"].as_array().unwrap();
@@ -154,6 +155,25 @@ fn the_quick_table_3_has_encoded_meshes_that_succeed_beside_voxels_and_the_paper
     ] {
         assert!(md.contains(part), "{part}: {md}");
     }
+}
+
+#[test]
+fn in_table_3_tighter_fits_and_longer_steps_than_the_papers_have_no_voxels() {
+    let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").display().to_string();
+    let folder = Folder::new();
+    let args = ["evaluate", "table3", "--quick", "--preset", "fast", "--scenes", &scenes, "-o", "results"];
+    folder.good(&[&args[..], &["--tolerances", "150,10,20", "--time-steps", "10"]].concat());
+    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
+    let table: Value = serde_json::from_str(&read("results/table3.json")).unwrap();
+    let cells = table["cells"].as_array().unwrap();
+    let tolerances: Vec<_> = cells.iter().map(|cell| cell["tolerance_um"].as_u64().unwrap()).collect();
+    assert_eq!(tolerances, [10, 150, 20]);
+    for cell in cells {
+        assert!(cell["voxels"].is_null() && cell["success"] == true, "{cell:#}");
+    }
+    assert_eq!(table["voxels"].as_array().unwrap().len(), 0);
+    let md = read("results/table3.md");
+    assert!(md.contains("| 10 | node | –/– | S/S |"), "{md}");
 }
 
 /// The JSON of a quick figure, and its folder with all files.

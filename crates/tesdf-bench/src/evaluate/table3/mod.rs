@@ -1,4 +1,5 @@
 //! Table III: success, failures and memory of voxel grids and of encoded meshes in two tight fits.
+mod assets;
 mod cell;
 mod memory;
 mod scenario;
@@ -14,7 +15,9 @@ use tesdf_sim::scene_file::LoadedScene;
 use super::OutputArgs;
 use super::detector::Shared;
 use super::output::Sink;
+use crate::preset::Preset;
 use crate::voxel::VoxelDetector;
+use assets::Assets;
 use cell::{Cell, Setup};
 use memory::{Encoded, Grids, Voxels, geometries};
 pub use scenario::Scenario;
@@ -28,11 +31,12 @@ pub struct Args {
     /// Scenes, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_value = "bolt-nut,peg-in-hole")]
     pub scenarios: Vec<Scenario>,
-    /// Time steps in ms, separated by commas [default: 1,3,5; with --quick 5]
+    /// Time steps in ms, separated by commas; only those of the paper have voxels [default:
+    /// 1,3,5,10; with --quick 5]
     #[arg(long, value_name = "MS", value_delimiter = ',')]
     pub time_steps: Option<Vec<f64>>,
-    /// Tolerances in µm, separated by commas; a scene takes those that it has [default: all; with
-    /// --quick the largest]
+    /// Tolerances in µm, separated by commas; a scene takes those that it has. Only those of the
+    /// paper have voxels [default: all; with --quick the largest]
     #[arg(long, value_name = "UM", value_delimiter = ',')]
     pub tolerances: Option<Vec<u32>>,
     /// Number of voxel columns, from the lowest quality on [default: 4; with --quick 1]
@@ -41,6 +45,9 @@ pub struct Args {
     /// What is tested against the distance fields [default: node,face; with --quick node]
     #[arg(long, value_enum, value_delimiter = ',')]
     pub features: Option<Vec<Features>>,
+    /// Preset of the encoder
+    #[arg(long, value_enum, default_value_t = Preset::Compact)]
+    pub preset: Preset,
     /// Where contacts with encoded meshes are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("contacts with encoded meshes are found"))]
     pub device: Choice,
@@ -79,6 +86,7 @@ impl Features {
 struct Table {
     table: u32,
     quick: bool,
+    preset: &'static str,
     encoded: Vec<Encoded>,
     voxels: Vec<Voxels>,
     cells: Vec<Cell>,
@@ -100,7 +108,7 @@ impl Args {
     }
 
     fn time_steps(&self) -> Vec<f64> {
-        self.time_steps.clone().unwrap_or(if self.quick { vec![5.0] } else { vec![1.0, 3.0, 5.0] })
+        self.time_steps.clone().unwrap_or(if self.quick { vec![5.0] } else { vec![1.0, 3.0, 5.0, 10.0] })
     }
 
     fn features(&self) -> Vec<Features> {
@@ -119,13 +127,20 @@ pub fn run(args: &Args) -> Result<(), Failure> {
     }
     let sink = Sink::open(&args.output, "table3", &[])?;
     let exact = Shared::open(&args.device)?;
-    let mut table =
-        Table { table: 3, quick: args.quick, encoded: Vec::new(), voxels: Vec::new(), cells: Vec::new() };
+    let assets = Assets::new(args.preset)?;
+    let mut table = Table {
+        table: 3,
+        quick: args.quick,
+        preset: args.preset.name(),
+        encoded: Vec::new(),
+        voxels: Vec::new(),
+        cells: Vec::new(),
+    };
     for &scenario in &args.scenarios {
         let mut grids = Grids::default();
         let mut last = None;
         for tolerance in args.tolerances(scenario) {
-            let changed = of_tolerance(args, scenario, tolerance, &exact, &mut grids, &mut table)?;
+            let changed = of_tolerance(args, (scenario, tolerance), &assets, &exact, &mut grids, &mut table)?;
             last = Some(changed);
         }
         if let Some(geometries) = last {
@@ -138,21 +153,22 @@ pub fn run(args: &Args) -> Result<(), Failure> {
 /// Runs the cells of a scene at a tolerance. Returns its meshes.
 fn of_tolerance(
     args: &Args,
-    scenario: Scenario,
-    tolerance: u32,
+    (scenario, tolerance): (Scenario, u32),
+    assets: &Assets,
     exact: &Shared,
     grids: &mut Grids,
     table: &mut Table,
 ) -> Result<[memory::Geometry; 2], Failure> {
     let bar = Bar::new("encoding");
-    let mut loaded = scenario.scene(args, tolerance)?;
+    let mut loaded = scenario.scene(args, tolerance, assets)?;
     let system = loaded.system().map_err(Failure::new)?;
-    let meshes = scenario.bodies().map(|name| mesh(&loaded, name));
-    let geometries = geometries(scenario, &system, meshes)?;
+    let files = scenario.bodies().map(|name| asset(&loaded, name));
+    let geometries = geometries(scenario, &system, files)?;
     table.encoded.push(Encoded::of(scenario, tolerance, &geometries));
     let distance = loaded.scene.detector.contact_distance.unwrap_or(0.0);
-    let columns = args.qualities(scenario).iter().copied().map(Some).chain([None]);
-    for voxels in columns {
+    let is_of_paper = args.time_steps().iter().any(|&step| scenario.is_of_paper(tolerance, step));
+    let grids_of_paper = if is_of_paper { args.qualities(scenario) } else { &[] };
+    for voxels in grids_of_paper.iter().copied().map(Some).chain([None]) {
         let detector = match voxels {
             None => exact.clone(),
             Some(qualities) => {
@@ -166,6 +182,9 @@ fn of_tolerance(
         };
         for features in args.features() {
             for time_step in args.time_steps() {
+                if voxels.is_some() && !scenario.is_of_paper(tolerance, time_step) {
+                    continue;
+                }
                 bar.stage("simulating");
                 scenario::set(&mut loaded, features, time_step);
                 let setup = Setup { scenario, tolerance, voxels, features, time_step };
@@ -184,8 +203,8 @@ fn of_tolerance(
     Ok(geometries)
 }
 
-/// The mesh file of a body of a scene.
-fn mesh(loaded: &LoadedScene, name: &str) -> PathBuf {
+/// The asset file of a body of a scene.
+fn asset(loaded: &LoadedScene, name: &str) -> PathBuf {
     let section = loaded.scene.bodies.iter().map(|b| b.get_ref()).find(|b| b.name == name);
-    section.and_then(|body| body.mesh.clone()).unwrap_or_default()
+    section.and_then(|body| body.asset.clone()).unwrap_or_default()
 }

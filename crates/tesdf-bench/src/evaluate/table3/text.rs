@@ -70,7 +70,9 @@ pub fn csv(cells: &[Cell]) -> Text {
 pub fn markdown(args: &Args, table: &Table) -> String {
     let mut text = crate::heading::lines();
     text += "\nS: success, F: failure, for each tolerance. Columns: voxels along the longest side of the moving and \
-             the fixed body, and encoded meshes. Memory in MiB.\n";
+             the fixed body, and encoded meshes. A dash: not in the paper, and not run with voxels. Memory in \
+             MiB.\n";
+    text += &format!("Encoded with the preset {}.\n", table.preset);
     if table.quick {
         text += "Quick: a part of the table, and the nut for 0.06 s.\n";
     }
@@ -100,7 +102,7 @@ fn verdicts(args: &Args, scenario: Scenario, table: &Table) -> Text {
     let mut rows = Vec::new();
     for step in args.time_steps() {
         for features in args.features() {
-            let cells = all.iter().map(|voxels| letters(scenario, table, (step, features, *voxels)));
+            let cells = all.iter().map(|voxels| letters(args, scenario, table, (step, features, *voxels)));
             rows.push([step.to_string(), features.name().into()].into_iter().chain(cells).collect());
         }
         if let Some((_, cells)) = scenario.paper().rows.iter().find(|(ms, _)| *ms == step) {
@@ -114,18 +116,21 @@ fn verdicts(args: &Args, scenario: Scenario, table: &Table) -> Text {
     Text { columns, rows }
 }
 
-/// S or F for each tolerance.
+/// S or F for each tolerance, or a dash.
 fn letters(
+    args: &Args,
     scenario: Scenario,
     table: &Table,
     (step, features, voxels): (f64, Features, Option<[u32; 2]>),
 ) -> String {
-    let is_meant = |cell: &&Cell| {
-        (cell.scenario, cell.time_step_ms, cell.features, cell.voxels)
-            == (scenario.name(), step, features, voxels)
+    let letter = |tolerance: u32| {
+        let is_meant = |cell: &&Cell| {
+            (cell.scenario, cell.tolerance_um, cell.time_step_ms, cell.features, cell.voxels)
+                == (scenario.name(), tolerance, step, features, voxels)
+        };
+        table.cells.iter().find(is_meant).map_or("–", |cell| if cell.success { "S" } else { "F" })
     };
-    let letter = |cell: &Cell| if cell.success { "S" } else { "F" };
-    table.cells.iter().filter(is_meant).map(letter).collect::<Vec<_>>().join("/")
+    args.tolerances(scenario).into_iter().map(letter).collect::<Vec<_>>().join("/")
 }
 
 /// Rows of memory, and of the greatest error of the grids. Where grids or assets differ by
