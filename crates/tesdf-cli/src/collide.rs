@@ -90,8 +90,8 @@ pub struct Args {
     /// Number of Frank-Wolfe iterations in the mode `face`
     #[arg(long, value_name = "K", default_value_t = 16)]
     pub iterations: u32,
-    /// Maximum error in the modes `exact` and `edge`, in the meshes' unit [default: 1e-7 of the diagonal of the
-    /// body with the field]
+    /// Maximum error in the modes `exact` and `edge`, in the meshes' unit [default: 1e-7 of the
+    /// diagonal of the body with the field]
     #[arg(long, value_name = "T", value_parser = parse::number, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
     /// Maximum number of contacts of the pair, or `none` to keep all
@@ -108,8 +108,8 @@ pub struct Args {
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, conflicts_with = "why", help = device::help("contacts are found"))]
     pub device: Choice,
     /// Print why contacts exist or not instead: what each stage did with all candidates, or with
-    /// one face (in the mode `node`, one vertex; in the mode `edge`, one vertex or edge) of instance 0, or of either instance as
-    /// INSTANCE:FACE
+    /// one face (in the mode `node`, one vertex; in the mode `edge`, one vertex or edge) of
+    /// instance 0, or of either instance as INSTANCE:FACE
     #[arg(long, value_name = "FACE", value_parser = parse::part, num_args = 0..=1)]
     pub why: Option<Option<(u32, u32)>>,
     /// Print the contacts as a JSON array; with --why, print the reports

@@ -152,8 +152,8 @@ pub fn simulate(
 }
 
 /// As [`simulate`], but continues from the last step of `run`; `engine` must have the states of
-/// that step. A step depends on the states of the bodies and the time alone, so the record equals that of an
-/// uninterrupted run, bit for bit.
+/// that step. A step depends on the states of the bodies and the time alone, so the record equals
+/// that of an uninterrupted run, bit for bit.
 ///
 /// # Errors
 /// The same errors as [`simulate`].

@@ -84,8 +84,8 @@ fn a_box_on_an_incline_sticks_below_the_angle_of_friction() {
     }
 }
 
-/// The way to rest is v² / 2 μ g, also when the velocity turns relative to the box, and the box stays on
-/// the floor: friction must not act across a gap.
+/// The way to rest is v² / 2 μ g, also when the velocity turns relative to the box, and the box
+/// stays on the floor: friction must not act across a gap.
 #[test]
 fn a_sliding_box_comes_to_rest_where_it_must() {
     let (friction, speed) = (0.4, 1.6);

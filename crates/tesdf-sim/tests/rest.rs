@@ -139,9 +139,9 @@ fn cubes_whose_edges_are_almost_flush_rest() {
     }
 }
 
-/// A shift of a tenth of the skin: at an edge the normal is neither that of a face nor far from it. Cubes
-/// that fall by 1 µm, at 4 mm/s, get less than a ten-thousandth of this as a velocity to the side, which
-/// nothing stops.
+/// A shift of a tenth of the skin: at an edge the normal is neither that of a face nor far from it.
+/// Cubes that fall by 1 µm, at 4 mm/s, get less than a ten-thousandth of this as a velocity to the
+/// side, which nothing stops.
 #[test]
 fn edges_that_are_flush_within_the_skin_push_little() {
     let report = stack(3, 1e-6, 3e-8).report(0.1, 1.0);

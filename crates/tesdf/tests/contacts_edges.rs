@@ -219,8 +219,8 @@ const PROCESSOR: Detection =
 
 #[test]
 fn a_box_stands_on_the_corners_of_the_patch() {
-    // No vertex is on an edge of the other box: it may have the normal of either side. A corner of the patch has a
-    // contact of a vertex of one of the boxes, which may be 5e-5 above it.
+    // No vertex is on an edge of the other box: it may have the normal of either side. A corner of
+    // the patch has a contact of a vertex of one of the boxes, which may be 5e-5 above it.
     let near = 5e-5 + 1e-9;
     let shift = DVec3::new(0.031, 0.0217, 0.0);
     assert_eq!(

@@ -26,8 +26,8 @@ const PAST_THE_MIDDLE: f64 = 0.5;
 /// Maximum number of normals that are tried as directions of a pair.
 const TRIALS: usize = 32;
 
-/// The normals of the vertices, edges or faces of the meshes of a scene, and their vertices, in the frames of
-/// the meshes.
+/// The normals of the vertices, edges or faces of the meshes of a scene, and their vertices, in the
+/// frames of the meshes.
 #[derive(Clone, Debug)]
 pub struct Surfaces(BTreeMap<ShapeId, Surface>);
 
@@ -58,7 +58,8 @@ impl Surfaces {
         Self(scene.shapes().filter_map(of_shape).collect())
     }
 
-    /// The contacts that act. `is_deep` tells whether a contact is that of a deep pair. The instances of
+    /// The contacts that act. `is_deep` tells whether a contact is that of a deep pair. The
+    /// instances of
     /// `scene` have the poses at which the contacts were found.
     pub fn acting(
         &self,
@@ -105,8 +106,8 @@ impl Surfaces {
         own().map_or(-1.0, |normal: DVec3| normal.dot(contact.normal))
     }
 
-    /// The direction in which a pair that is past the middle pushes its first instance. `pushes` are the
-    /// directions, depths and cosines of its penetrating contacts.
+    /// The direction in which a pair that is past the middle pushes its first instance. `pushes`
+    /// are the directions, depths and cosines of its penetrating contacts.
     fn direction(&self, scene: &Scene, pair: [InstanceId; 2], pushes: &[(DVec3, f64, f64)]) -> Option<DVec3> {
         let deepest = |along: bool| {
             let of_side = pushes.iter().filter(|(.., cosine)| match along {
@@ -169,7 +170,8 @@ fn normals_of_faces(asset: &TeSdf) -> Vec<DVec3> {
     normals
 }
 
-/// The mean of the normals of the faces that have a side of a face, as a unit vector, by 3 × face + side.
+/// The mean of the normals of the faces that have a side of a face, as a unit vector, by 3 × face +
+/// side.
 fn normals_of_edges(asset: &TeSdf) -> Vec<DVec3> {
     let edge = |[p, q]: [u32; 2]| [p.min(q), p.max(q)];
     let sides = |face: usize| {

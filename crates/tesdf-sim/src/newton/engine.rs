@@ -128,8 +128,8 @@ impl Newton {
         states
     }
 
-    /// The options of a detection. Within a step, gravity acts on one body of a pair while contacts hold
-    /// the other, so it counts for all pairs.
+    /// The options of a detection. Within a step, gravity acts on one body of a pair while contacts
+    /// hold the other, so it counts for all pairs.
     fn options_of(&self, step: &Step) -> CollideOptions {
         let speculative_time = self.options.speculation * step.h;
         let fall = speculative_time * step.h * self.system.gravity.length();

@@ -142,9 +142,10 @@ impl<'a> Gaps<'a> {
             row.gap = gap + depth - self.lift(depth, &found);
             row.relaxed_gap = gap + depth;
             if self.mode != Mode::Node {
-                // Where a body crosses an edge, the gap at the beginning is below the plane of the face at
-                // the end. Asking for that way as a velocity, too, drove a nut on. Only bodies that are
-                // moved may ask for a velocity that parts the bodies, so energy is never gained.
+                // Where a body crosses an edge, the gap at the beginning is below the plane of the
+                // face at the end. Asking for that way as a velocity, too, drove a nut on. Only
+                // bodies that are moved may ask for a velocity that parts the bodies, so energy is
+                // never gained.
                 row.relaxed_gap = row.relaxed_gap.max(found.carried.min(0.0));
             }
             Some(row)

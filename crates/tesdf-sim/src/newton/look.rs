@@ -6,7 +6,8 @@ use tesdf::collide::{CollideError, CollideOptions, Contacts, InstanceId, Scene, 
 /// Two instances, the lower id first.
 pub type Pair = (InstanceId, InstanceId);
 
-/// The contacts of one or more detections at the same poses, which looked ahead by different velocities.
+/// The contacts of one or more detections at the same poses, which looked ahead by different
+/// velocities.
 pub struct Look {
     /// For each pair, those of the detection that looked farthest.
     pub contacts: Contacts,

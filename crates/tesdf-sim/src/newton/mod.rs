@@ -17,11 +17,11 @@
 //! flush are those of the faces (`normals.rs`).
 //!
 //! *Friction* is a spring against the slip `h t`, where `t` is the tangential velocity, whose force
-//! ends at the limit `b = μ` × push of the contact. The push is that of the minimisation before, so that
-//! each minimisation is convex (lagged friction: Kaufman et al., *Staggered projections for
-//! frictional contact in multibody systems*, SIGGRAPH Asia 2008). It cannot act across a gap, as the
-//! convex cone of Castro et al. can. The limits stay once they change by less than 0.3 %. Below the
-//! limit the force is raised, too, so a body that sticks does not creep.
+//! ends at the limit `b = μ` × push of the contact. The push is that of the minimisation before, so
+//! that each minimisation is convex (lagged friction: Kaufman et al., *Staggered projections for
+//! frictional contact in multibody systems*, SIGGRAPH Asia 2008). It cannot act across a gap, as
+//! the convex cone of Castro et al. can. The limits stay once they change by less than 0.3 %. Below
+//! the limit the force is raised, too, so a body that sticks does not creep.
 //!
 //! *Joints* (`joints.rs`) are rows `eᵢ + h Jᵢ v = 0`, and *motors* rows whose force stays within their
 //! limit.

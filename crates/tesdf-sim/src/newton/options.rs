@@ -18,10 +18,10 @@ pub struct NewtonOptions {
     /// Number of times that contacts are detected again at the predicted pose: 0, 1, or 2 for more
     /// accuracy.
     pub redetections: u32,
-    /// Distance that contacts keep, as a fraction of the smaller body's diagonal. Where edges cross, the
-    /// gradient of the distance is their common normal as long as they are apart; below, it is that of
-    /// one of the faces, and such a contact is a wall in the way of a nut. Contacts at rest are not
-    /// lifted to it.
+    /// Distance that contacts keep, as a fraction of the smaller body's diagonal. Where edges
+    /// cross, the gradient of the distance is their common normal as long as they are apart; below,
+    /// it is that of one of the faces, and such a contact is a wall in the way of a nut. Contacts
+    /// at rest are not lifted to it.
     pub skin: f64,
     /// Bodies that penetrate deeper than this fraction of the smaller body's diagonal are not
     /// detected again, because linear predictions of a deep overlap add energy. The default is 10

@@ -63,9 +63,9 @@ const ROUNDS_OF_FRICTION: u32 = 16;
 /// Springs do not become stiffer than this factor. More would leave no digits to the masses.
 const STIFFEST: f64 = 1e8;
 
-/// The same while the limits of friction follow: the stiffer the springs, the more the pushes of contacts
-/// that share a load differ from one minimisation to the next. At 1e4 the limits of a gripper that closes
-/// around a brick went on changing by 2 %.
+/// The same while the limits of friction follow: the stiffer the springs, the more the pushes of
+/// contacts that share a load differ from one minimisation to the next. At 1e4 the limits of a
+/// gripper that closes around a brick went on changing by 2 %.
 const STIFFEST_UNSETTLED: f64 = 1e3;
 
 /// The limits of friction have settled when their changes are less than this share of them.

@@ -126,8 +126,8 @@ pub struct JointSection {
     /// the child].
     #[serde(default)]
     pub anchor: Option<[f64; 3]>,
-    /// Axis of a hinge or a slider, or of the cone that limits a ball: any length except 0, world frame,
-    /// with the bodies where they start.
+    /// Axis of a hinge or a slider, or of the cone that limits a ball: any length except 0, world
+    /// frame, with the bodies where they start.
     #[serde(default = "up")]
     pub axis: [f64; 3],
     /// Bounds of a hinge's angle, rad, or of a slider's travel, m, which are 0 at the start. Of a ball:
@@ -255,7 +255,8 @@ pub struct DetectorSection {
     pub contacts_per: ContactsPer,
     /// Number of Frank–Wolfe iterations in the mode `face`.
     pub iterations: u32,
-    /// Tolerance in the modes `exact` and `edge`, as a fraction of the diagonal of the body with the field.
+    /// Tolerance in the modes `exact` and `edge`, as a fraction of the diagonal of the body with
+    /// the field.
     pub tolerance: f64,
     /// Cosine filter of the modes `face` and `exact`.
     pub cos_theta: Option<f64>,

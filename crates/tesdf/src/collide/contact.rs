@@ -7,8 +7,8 @@ use super::{HiddenOverlap, InstanceId};
 
 /// A place where body *a* touches body *b*, in the world's unit and frame.
 ///
-/// *a* is the body that has the face, edge or node. *b* is the body whose signed distance field `φ_b` is
-/// used.
+/// *a* is the body that has the face, edge or node. *b* is the body whose signed distance field
+/// `φ_b` is used.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Contact {
     /// The witness point on `face_a`.
@@ -32,8 +32,8 @@ pub struct Contact {
     pub instance_b: InstanceId,
     /// The touching features. It stays the same from step to step while the same features touch.
     pub feature: FeatureId,
-    /// Whether it is proved that no point of the face or edge is deeper by more than the tolerance. False
-    /// when a search was cut short, and where no bound proves a result of the mode
+    /// Whether it is proved that no point of the face or edge is deeper by more than the tolerance.
+    /// False when a search was cut short, and where no bound proves a result of the mode
     /// [`Face`](super::Mode::Face). A GPU does not compute that bound.
     pub converged: bool,
 }
@@ -150,8 +150,8 @@ pub struct Contacts {
     /// The loss from the reduction, for each pair of instances; empty without reduction.
     pub reductions: Vec<PairReduction>,
     /// Pairs that overlap without a contact that shows it, which happens in the modes
-    /// [`Node`](super::Mode::Node) and [`Edge`](super::Mode::Edge). Sorted by world and instances. Contacts will not keep these
-    /// pairs apart.
+    /// [`Node`](super::Mode::Node) and [`Edge`](super::Mode::Edge). Sorted by world and instances.
+    /// Contacts will not keep these pairs apart.
     pub hidden: Vec<HiddenOverlap>,
 }
 

@@ -5,8 +5,9 @@
 //! the same pose overlap although no surface is inside the other body, so no face shows it either.
 //!
 //! Two searches find such overlaps. Neither changes a contact.
-//! - In node and edge mode, the faces of each body are searched in the field of the other. A face is deeper
-//!   than its deepest corner by at most its [`corner_reach`], so finely meshed faces are skipped.
+//! - In node and edge mode, the faces of each body are searched in the field of the other. A face
+//!   is deeper than its deepest corner by at most its [`corner_reach`], so finely meshed faces are
+//!   skipped.
 //! - In every mode, the centre of a ball inside each body is tested in the field of the other.
 use std::collections::BTreeMap;
 

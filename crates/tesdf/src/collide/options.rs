@@ -79,9 +79,9 @@ pub struct CollideOptions {
     /// Number of Frank–Wolfe iterations of the mode [`Face`](Mode::Face), at most
     /// [`MAX_ITERATIONS`](Self::MAX_ITERATIONS). Each evaluates the field once. The paper uses 16.
     pub iterations: u32,
-    /// Bound of the error of the modes [`Exact`](Mode::Exact) and [`Edge`](Mode::Edge), and of results of the mode
-    /// [`Face`](Mode::Face) that count as converged: a fraction of the diagonal of the field's body,
-    /// or a length in the world's unit.
+    /// Bound of the error of the modes [`Exact`](Mode::Exact) and [`Edge`](Mode::Edge), and of
+    /// results of the mode [`Face`](Mode::Face) that count as converged: a fraction of the diagonal
+    /// of the field's body, or a length in the world's unit.
     pub tolerance: Length,
     /// Contacts are reported up to this signed distance, in the world's unit. It may be wider than
     /// the band of an asset: outside the domain, the face tree answers, also exactly.

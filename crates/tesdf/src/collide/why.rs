@@ -93,7 +93,8 @@ pub struct PolygonReport {
 /// A face of *a*, or a node in node mode; a node or an edge in edge mode.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PartReport {
-    /// The id of the face or node in the user's numbering; of an edge, as [`FeatureId::a`](super::FeatureId::a).
+    /// The id of the face or node in the user's numbering; of an edge, as
+    /// [`FeatureId::a`](super::FeatureId::a).
     pub id: u32,
     /// The result of the broad phase.
     pub broad: BroadVerdict,
