@@ -140,11 +140,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             .body_of(id)
             .map_or("a body".into(), |body| format!("`{}`", loaded.scene.bodies[body].get_ref().name))
     };
-    warn_of_coarse(
-        &coarse,
-        name,
-        "use mode = \"edge\" under [detector], or mode = \"exact\" and contacts_per = \"face\"",
-    );
+    warn_of_coarse(&coarse, name, "use mode = \"edge\" or mode = \"exact\" under [detector]");
     let engine = match device {
         Some(device) => loaded.newton_with(system, device.into_detector()),
         None => loaded.newton(system),

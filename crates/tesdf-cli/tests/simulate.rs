@@ -118,7 +118,10 @@ fn a_hidden_overlap_is_reported_and_meets_no_criterion() {
     let depth = pair["depth"].as_f64().unwrap();
     assert!(depth > 2e-3 && json["deepest_penetration"].as_f64().unwrap() >= depth, "{json}");
     assert!(err.contains("bodies below and above overlapped by") && err.contains("--mode face"), "{err}");
-    assert!(err.contains("of `below` touches `above`") && err.contains("contacts_per = \"face\""), "{err}");
+    assert!(
+        err.contains("of `below` touches `above`") && err.contains("use mode = \"edge\" or mode = \"exact\""),
+        "{err}"
+    );
     // The record has it as well.
     let record = RunRecord::open(folder.path("run")).unwrap();
     assert_eq!(serde_json::to_value(record.hidden_pairs()).unwrap(), json["hidden"]);

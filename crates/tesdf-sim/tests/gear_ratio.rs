@@ -1,7 +1,7 @@
 //! A gear turns another one. Without contacts it does not, and the criterion fails.
+mod support;
+
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
-use std::path::Path;
 use std::sync::OnceLock;
 
 use tesdf::Length;
@@ -9,7 +9,7 @@ use tesdf::collide::{ClearanceOptions, clearance};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::criterion::{GearRatioReport, GearRatioTracker};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
-use tesdf_sim::{Drive, Mass, Motor, RunRecord, Summary, System, simulate};
+use tesdf_sim::{Drive, Mass, Motor, RunRecord, Summary, System};
 
 const PITCH_RADIUS: f64 = 0.02;
 
@@ -18,12 +18,10 @@ fn scene() -> (LoadedScene, System) {
     static SCENE: OnceLock<(LoadedScene, System)> = OnceLock::new();
     SCENE
         .get_or_init(|| {
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/gear-pair.toml");
-            let mut loaded = LoadedScene::read(&path).unwrap();
-            loaded.scene.duration = 1.25;
-            loaded.scene.criterion.gear_ratio.as_mut().unwrap().min_turns = 1.0;
-            let system = loaded.system().unwrap();
-            (loaded, system)
+            support::scene("gear-pair", |loaded| {
+                loaded.scene.duration = 1.25;
+                loaded.scene.criterion.gear_ratio.as_mut().unwrap().min_turns = 1.0;
+            })
         })
         .clone()
 }
@@ -31,8 +29,7 @@ fn scene() -> (LoadedScene, System) {
 fn run(change: impl FnOnce(&mut LoadedScene, &mut System)) -> (RunRecord, Summary) {
     let (mut loaded, mut system) = scene();
     change(&mut loaded, &mut system);
-    let mut engine = loaded.newton(system).unwrap();
-    simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap()
+    support::run(&loaded, system)
 }
 
 /// The names of the failures.
@@ -175,13 +172,13 @@ fn each_failure_has_its_name() {
 
 #[test]
 fn what_does_not_fit_is_refused_with_its_place() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/gear-pair.toml");
+    let path = support::path_of("gear-pair");
     // Cubes are encoded faster.
     let text = std::fs::read_to_string(&path).unwrap().replace("spur_gear_m2_z20.obj", "cube.obj");
     let script = "[[scripts]]\nbody = \"driven\"\nkeyframes = [{ time = 0, torque = [0, 0, 1] }]\n\n[criterion.gear_ratio]";
     let weld = "[[joints]]\nname = \"bond\"\nkind = \"weld\"\nparent = \"driver\"\nchild = \"driven\"\n\n\
         [criterion.gear_ratio]";
-    for (from, to, expected) in [
+    let cases = [
         (
             "driven = \"output\"",
             "driven = \"shaft\"",
@@ -194,11 +191,8 @@ fn what_does_not_fit_is_refused_with_its_place() {
         ("pitch_radius = 0.02", "pitch_radius = -1", "pitch_radius is -1; expected a positive number"),
         ("[criterion.gear_ratio]", script, "a script drives body driven; only contacts may, so take it out"),
         ("[criterion.gear_ratio]", weld, "joint bond holds body driven too; expected the hinge output alone"),
-    ] {
-        assert!(text.contains(from), "{from}");
-        let loaded = LoadedScene::parse(text.replacen(from, to, 1), &path).unwrap();
-        let message = loaded.system().expect_err(expected).to_string();
-        assert!(message.contains(expected) && message.contains("line "), "{message}: expected {expected}");
+    ];
+    for message in support::refused(&text, &path, &cases) {
         assert!(message.contains("criterion.gear_ratio: "), "{message}");
     }
 }

@@ -1,32 +1,24 @@
 //! A frictionless peg slides into its hole and seats. Without contacts it falls through the floor,
 //! and the criterion fails.
-use std::ops::ControlFlow;
-use std::path::Path;
+mod support;
+
 use std::sync::OnceLock;
 
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::criterion::{InsertionReport, InsertionTracker};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
-use tesdf_sim::{State, Summary, System, simulate};
+use tesdf_sim::{State, Summary, System};
 
 /// The peg scene of the repository.
 fn scene() -> (LoadedScene, System) {
     static SCENE: OnceLock<(LoadedScene, System)> = OnceLock::new();
-    SCENE
-        .get_or_init(|| {
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/peg-in-hole.toml");
-            let loaded = LoadedScene::read(&path).unwrap();
-            let system = loaded.system().unwrap();
-            (loaded, system)
-        })
-        .clone()
+    SCENE.get_or_init(|| support::scene("peg-in-hole", |_| ())).clone()
 }
 
 fn run(change: impl FnOnce(&mut LoadedScene)) -> Summary {
     let (mut loaded, system) = scene();
     change(&mut loaded);
-    let mut engine = loaded.newton(system).unwrap();
-    simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap().1
+    support::run(&loaded, system).1
 }
 
 #[test]

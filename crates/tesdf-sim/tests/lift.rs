@@ -1,14 +1,14 @@
 //! A gripper lifts a peg by friction and holds it. Without contacts or friction the peg stays below,
 //! and the criterion fails.
-use std::ops::ControlFlow;
-use std::path::Path;
+mod support;
+
 use std::sync::OnceLock;
 
 use tesdf::collide::Pose;
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::criterion::{LiftReport, LiftTracker};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
-use tesdf_sim::{RunRecord, State, Summary, System, simulate};
+use tesdf_sim::{RunRecord, State, Summary, System};
 
 const LEFT: usize = 2;
 const PEG: usize = 4;
@@ -16,21 +16,13 @@ const PEG: usize = 4;
 /// The gripper scene of the repository.
 fn scene() -> (LoadedScene, System) {
     static SCENE: OnceLock<(LoadedScene, System)> = OnceLock::new();
-    SCENE
-        .get_or_init(|| {
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/gripper-lift.toml");
-            let loaded = LoadedScene::read(&path).unwrap();
-            let system = loaded.system().unwrap();
-            (loaded, system)
-        })
-        .clone()
+    SCENE.get_or_init(|| support::scene("gripper-lift", |_| ())).clone()
 }
 
 fn run(change: impl FnOnce(&mut LoadedScene, &mut System)) -> (RunRecord, Summary) {
     let (mut loaded, mut system) = scene();
     change(&mut loaded, &mut system);
-    let mut engine = loaded.newton(system).unwrap();
-    simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap()
+    support::run(&loaded, system)
 }
 
 /// The names of the failures.
@@ -153,7 +145,7 @@ fn each_failure_has_its_name() {
 
 #[test]
 fn what_does_not_fit_is_refused_with_its_place() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/gripper-lift.toml");
+    let path = support::path_of("gripper-lift");
     // Cubes are encoded faster.
     let text = std::fs::read_to_string(&path)
         .unwrap()
@@ -162,7 +154,7 @@ fn what_does_not_fit_is_refused_with_its_place() {
     let script =
         "[[scripts]]\nbody = \"peg\"\nkeyframes = [{ time = 0, force = [0, 0, 1] }]\n\n[criterion.lift]";
     let joint = "[[joints]]\nname = \"hook\"\nkind = \"ball\"\nchild = \"peg\"\n\n[criterion.lift]";
-    for (from, to, expected) in [
+    let cases = [
         ("body = \"peg\"", "body = \"pig\"", "there is no body pig; the bodies are floor, wrist, left"),
         ("body = \"peg\"", "body = \"wrist\"", "body wrist is kinematic; no contact can lift it"),
         (
@@ -176,11 +168,8 @@ fn what_does_not_fit_is_refused_with_its_place() {
         ("height = 0.05", "height = 0", "height is 0; expected a positive number"),
         ("[criterion.lift]", script, "a script drives body peg; only contacts may, so take it out"),
         ("[criterion.lift]", joint, "joint hook holds body peg; only the fingers may, so take it out"),
-    ] {
-        assert!(text.contains(from), "{from}");
-        let loaded = LoadedScene::parse(text.replacen(from, to, 1), &path).unwrap();
-        let message = loaded.system().expect_err(expected).to_string();
-        assert!(message.contains(expected) && message.contains("line "), "{message}: expected {expected}");
+    ];
+    for message in support::refused(&text, &path, &cases) {
         assert!(message.contains("criterion.lift: "), "{message}");
     }
 }

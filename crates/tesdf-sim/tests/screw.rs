@@ -1,26 +1,24 @@
 //! A frictionless nut turns down its bolt. Without contacts it does not, and the criterion fails.
-use std::ops::ControlFlow;
-use std::path::Path;
+mod support;
+
 use std::sync::OnceLock;
 
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
-use tesdf_sim::{Summary, System, simulate};
+use tesdf_sim::{Summary, System};
 
 /// The bolt-nut scene of the repository, with the coarse bolt and a shorter duration.
 fn scene() -> (LoadedScene, System) {
     static SCENE: OnceLock<(LoadedScene, System)> = OnceLock::new();
     SCENE
         .get_or_init(|| {
-            let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/bolt-nut.toml");
-            let mut loaded = LoadedScene::read(&path).unwrap();
-            let bolt = loaded.scene.bodies[0].get_mut();
-            bolt.mesh = Some("../data/procedural/iso_m16_bolt_6k.obj".into());
-            loaded.scene.duration = 0.06;
-            // An ideal screw makes 0.0083 turns in 60 ms.
-            loaded.scene.criterion.screw.as_mut().unwrap().min_turns = 0.003;
-            loaded.scene.criterion.screw.as_mut().unwrap().min_acceleration = 0.0;
-            let system = loaded.system().unwrap();
-            (loaded, system)
+            support::scene("bolt-nut", |loaded| {
+                let bolt = loaded.scene.bodies[0].get_mut();
+                bolt.mesh = Some("../data/procedural/iso_m16_bolt_6k.obj".into());
+                loaded.scene.duration = 0.06;
+                // An ideal screw makes 0.0083 turns in 60 ms.
+                loaded.scene.criterion.screw.as_mut().unwrap().min_turns = 0.003;
+                loaded.scene.criterion.screw.as_mut().unwrap().min_acceleration = 0.0;
+            })
         })
         .clone()
 }
@@ -28,8 +26,7 @@ fn scene() -> (LoadedScene, System) {
 fn run(change: impl FnOnce(&mut LoadedScene)) -> Summary {
     let (mut loaded, system) = scene();
     change(&mut loaded);
-    let mut engine = loaded.newton(system).unwrap();
-    simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap().1
+    support::run(&loaded, system).1
 }
 
 #[test]

@@ -1,4 +1,6 @@
 //! Friction, joints, motors and scripts of scene files.
+mod support;
+
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -202,11 +204,5 @@ fn what_does_not_fit_is_refused_with_its_place() {
         ),
         ("motor = { drive = { velocity = 0 }, limit = 20 }", "", "the joint has no motor; give it one"),
     ];
-    for (from, to, expected) in cases {
-        assert!(GRIPPER.contains(from), "{from}");
-        let loaded = load(&GRIPPER.replacen(from, to, 1));
-        let message = loaded.system().expect_err(expected).to_string();
-        assert!(message.contains(expected), "{message}: expected {expected}");
-        assert!(message.contains("line "), "{message}");
-    }
+    support::refused(GRIPPER, Path::new("scene.toml"), &cases);
 }

@@ -1,14 +1,12 @@
 //! Bodies that begin deep in each other come apart, also those that are past each other's middle.
-use std::ops::ControlFlow;
-use std::path::Path;
+mod support;
 
+use tesdf_sim::Summary;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
-use tesdf_sim::{Summary, simulate};
 
 /// The pile of the repository with its first `shafts` shafts.
 fn pile(shafts: usize) -> LoadedScene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/pile-of-shafts.toml");
-    let mut loaded = LoadedScene::read(&path).unwrap();
+    let mut loaded = LoadedScene::read(support::path_of("pile-of-shafts")).unwrap();
     loaded.scene.bodies.truncate(1 + shafts);
     loaded
 }
@@ -28,8 +26,7 @@ fn crossing(offset: f64) -> LoadedScene {
 }
 
 fn run(loaded: &LoadedScene) -> Summary {
-    let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
-    simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap().1
+    support::run(loaded, loaded.system().unwrap()).1
 }
 
 #[test]
