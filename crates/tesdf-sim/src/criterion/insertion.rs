@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
 
-use super::shared::{Checks, Penetration, body, free_body, positive};
+use super::shared::{Checks, Penetration, body, free_body, positive, unit};
 use crate::{MassProperties, System};
 
 /// The body moves along the axis until it seats, stays within its clearance on the way, and comes
@@ -98,10 +98,7 @@ impl InsertionCriterion {
     /// # Errors
     /// A message that names the value that was found and the expected range.
     pub fn validate(&self, system: &System) -> Result<(), String> {
-        let axis = DVec3::from_array(self.axis);
-        if (axis.length() - 1.0).abs() > 1e-6 || axis.is_nan() {
-            return Err(format!("axis has length {}; expected 1", axis.length()));
-        }
+        unit(self.axis)?;
         positive([
             ("depth", self.depth),
             ("depth_tolerance", self.depth_tolerance),
@@ -157,7 +154,7 @@ impl InsertionTracker {
     pub fn new(criterion: &InsertionCriterion, system: &System) -> Result<Self, String> {
         criterion.validate(system)?;
         let (body, mass, into) = criterion.find(system)?;
-        let axis = DVec3::from_array(criterion.axis);
+        let axis = unit(criterion.axis)?;
         Ok(Self {
             criterion: criterion.clone(),
             axis,

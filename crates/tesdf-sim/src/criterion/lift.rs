@@ -3,7 +3,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::{CollideError, InstanceId, Pose};
 use tesdf::glam::DVec3;
 
-use super::shared::{Checks, Penetration, body, free_body, positive};
+use super::shared::{Checks, Penetration, body, free_body, positive, unit};
 use crate::joint::{relative, rotation_between};
 use crate::{Mass, MassProperties, State, System};
 
@@ -91,10 +91,7 @@ impl LiftCriterion {
     /// # Errors
     /// A message that names the value that was found and the expected range.
     pub fn validate(&self, system: &System) -> Result<(), String> {
-        let axis = DVec3::from_array(self.axis);
-        if (axis.length() - 1.0).abs() > 1e-6 || axis.is_nan() {
-            return Err(format!("axis has length {}; expected 1", axis.length()));
-        }
+        unit(self.axis)?;
         positive([
             ("height", self.height),
             ("height_tolerance", self.height_tolerance),
@@ -171,7 +168,7 @@ impl LiftTracker {
         };
         let size = size().map_err(|e: CollideError| e.to_string())?;
         Ok(Self {
-            axis: DVec3::from_array(criterion.axis),
+            axis: unit(criterion.axis)?,
             body,
             mass,
             pairs: fingers.iter().map(|&finger| [instance, system.bodies()[finger].instance]).collect(),

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::Pose;
 use tesdf::glam::DVec3;
 
-use super::shared::free_body;
+use super::shared::{free_body, positive, unit};
 use crate::{MassProperties, System};
 
 /// The body moves along a thread: at every step its travel along the axis differs from its number
@@ -62,25 +62,19 @@ pub struct ScrewReport {
 impl ScrewCriterion {
     /// Checks the values, and that the body exists and is free.
     ///
-    ///
     /// # Errors
     /// A message that names the value that was found and the expected range.
     pub fn validate(&self, system: &System) -> Result<(), String> {
-        let axis = DVec3::from_array(self.axis);
-        if (axis.length() - 1.0).abs() > 1e-6 || axis.is_nan() {
-            return Err(format!("axis has length {}; expected 1", axis.length()));
-        }
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        for (key, value, good) in [
-            ("pitch", self.pitch, positive(self.pitch)),
-            ("min_turns", self.min_turns, positive(self.min_turns)),
-            ("backlash", self.backlash, positive(self.backlash)),
-            ("min_acceleration", self.min_acceleration, self.min_acceleration >= 0.0),
-            ("max_energy", self.max_energy, positive(self.max_energy)),
-        ] {
-            if !good {
-                return Err(format!("{key} is {value}; expected a positive number"));
-            }
+        unit(self.axis)?;
+        positive([
+            ("pitch", self.pitch),
+            ("min_turns", self.min_turns),
+            ("backlash", self.backlash),
+            ("max_energy", self.max_energy),
+        ])?;
+        if !(self.min_acceleration >= 0.0 && self.min_acceleration.is_finite()) {
+            let found = self.min_acceleration;
+            return Err(format!("min_acceleration is {found}; expected a number, 0 or greater"));
         }
         self.find(system).map(|_| ())
     }
@@ -124,7 +118,7 @@ impl ScrewTracker {
     pub fn new(criterion: &ScrewCriterion, system: &System) -> Result<Self, String> {
         criterion.validate(system)?;
         let (body, mass) = criterion.find(system)?;
-        let axis = DVec3::from_array(criterion.axis);
+        let axis = unit(criterion.axis)?;
         let last = system.states()[body].pose;
         let gyration = mass.radius_of_gyration(last.rotation.inverse() * axis);
         Ok(Self {

@@ -1,6 +1,7 @@
 //! What several criteria look up and measure.
 use tesdf::Length;
 use tesdf::collide::{ClearanceOptions, CollideError, InstanceId, clearance};
+use tesdf::glam::DVec3;
 
 use crate::{Mass, MassProperties, System};
 
@@ -19,6 +20,15 @@ pub(super) fn free_body(system: &System, name: &str, verb: &str) -> Result<(usiz
         Mass::Free(mass) => Ok((body, mass)),
         Mass::Fixed => Err(format!("body {name} is fixed; no contact can {verb} it")),
         Mass::Kinematic => Err(format!("body {name} is kinematic; no contact can {verb} it")),
+    }
+}
+
+/// The axis, when its length is 1.
+pub(super) fn unit(axis: [f64; 3]) -> Result<DVec3, String> {
+    let axis = DVec3::from_array(axis);
+    match (axis.length() - 1.0).abs() <= 1e-6 {
+        true => Ok(axis),
+        false => Err(format!("axis has length {}; expected 1", axis.length())),
     }
 }
 
