@@ -103,9 +103,10 @@ impl<'a> OrderedPair<'a> {
                 let (face, id) = self.surface.edge_ids(candidate);
                 (self.surface.edge(candidate), face, id)
             }
-            Mode::Node | Mode::Edge => {
-                (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate)
+            Mode::Edge => {
+                (self.surface.node_of_faces(candidate), self.surface.face_of_node(candidate), candidate)
             }
+            Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
             Mode::Face | Mode::Exact => {
                 let face = self.surface.face_id(candidate);
                 (self.surface.face(candidate, &self.field, self.search.reach), face, face)

@@ -42,8 +42,8 @@ pub struct Part {
     count: usize,
     /// The surface lies within this distance of the part.
     pub radius: f64,
-    /// Unit normal; zero for a rounded shape or a part without area. For an edge, the mean of those of
-    /// its faces.
+    /// Unit normal; zero for a rounded shape or a part without area. For an edge, and for a node in
+    /// edge mode, the mean of those of its faces.
     pub normal: DVec3,
     /// The least cosine between the normal and that of a face that has the part.
     pub cosine: f64,
@@ -281,6 +281,19 @@ impl<'a> SurfaceBody<'a> {
                 Part::edge(found.points.map(|p| self.to_field(p)), radius * self.scale, normals.into_iter())
             }
         }
+    }
+
+    /// A candidate node with the mean of the normals of its faces, which rounded shapes do not have.
+    pub fn node_of_faces(&self, node: u32) -> Part {
+        let normal = match self.shape {
+            Shape::Mesh(asset) => {
+                let normal = |&face: &u32| asset.local_triangle(face as usize).normal;
+                asset.faces_at(node).iter().map(normal).sum()
+            }
+            Shape::Box { .. } => Simple::from(self.shape).nodes().0[node as usize].0.signum(),
+            _ => DVec3::ZERO,
+        };
+        Part { normal: (self.linear * normal).normalize_or_zero(), ..self.node(node) }
     }
 
     /// The id of the lowest face that has a candidate edge, and of the edge, in the user's numbering.
