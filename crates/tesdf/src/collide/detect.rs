@@ -1,3 +1,5 @@
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use crate::parallel::*;
 
 use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
@@ -11,6 +13,9 @@ use super::{
 
 /// Number of faces or nodes per task.
 const TASK: usize = 64;
+
+/// For detections that nobody stops.
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// All contacts of a scene up to the contact distance.
 ///
@@ -42,7 +47,24 @@ const TASK: usize = 64;
 /// # }
 /// ```
 pub fn detect(scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-    Ok(of_pairs(&OrderedPair::all(scene, options)?, options))
+    Ok(of_pairs(&OrderedPair::all(scene, options)?, options, &NEVER))
+}
+
+/// As [`detect`], until another thread sets `stop`. What is being computed then is completed: some
+/// faces, or with [`Reduction::Deepest`] and [`Reduction::Spread`] a pair of instances.
+///
+/// # Errors
+/// As [`detect`], and [`CollideError::Stopped`].
+pub fn detect_until(
+    scene: &Scene,
+    options: &CollideOptions,
+    stop: &AtomicBool,
+) -> Result<Contacts, CollideError> {
+    let contacts = of_pairs(&OrderedPair::all(scene, options)?, options, stop);
+    match stop.load(Ordering::Relaxed) {
+        true => Err(CollideError::Stopped),
+        false => Ok(contacts),
+    }
 }
 
 /// The contacts that [`detect`] finds, for a scene whose instances move a little from step to step.
@@ -71,26 +93,32 @@ pub fn detect_pairs(
     scene: &Scene,
     options: &CollideOptions,
 ) -> Result<Contacts, CollideError> {
-    Ok(of_pairs(&OrderedPair::of(pairs, scene, options)?, options))
+    Ok(of_pairs(&OrderedPair::of(pairs, scene, options)?, options, &NEVER))
 }
 
-fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions) -> Contacts {
+/// The contacts of ordered pairs. Once `stop` is set, contacts are missing.
+fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) -> Contacts {
+    let stopped = || stop.load(Ordering::Relaxed);
     match options.reduction {
         Reduction::Deepest(n) => {
-            return few::of_pairs(pairs, options.mode, |pair| deepest::of_pair(pair, n as usize));
+            return few::of_pairs(pairs, options.mode, stop, |pair| deepest::of_pair(pair, n as usize));
         }
         Reduction::Spread(n) => {
-            return few::of_pairs(pairs, options.mode, |pair| spread::of_pair(pair, n as usize));
+            return few::of_pairs(pairs, options.mode, stop, |pair| spread::of_pair(pair, n as usize));
         }
         Reduction::None | Reduction::PerPair(_) => {}
     }
-    let candidates: Vec<Candidates> = pairs.par_iter().map(OrderedPair::candidates).collect();
+    let candidates_of = |pair: &OrderedPair| if stopped() { Candidates::new() } else { pair.candidates() };
+    let candidates: Vec<Candidates> = pairs.par_iter().map(candidates_of).collect();
     let tasks: Vec<(&OrderedPair, &[u32])> = pairs
         .iter()
         .zip(&candidates)
         .flat_map(|(pair, candidates)| candidates.chunks(TASK).map(move |chunk| (pair, chunk)))
         .collect();
-    let found: Vec<Found> = tasks.par_iter().map(|(pair, chunk)| contacts(pair, chunk)).collect();
+    let contacts_of = |(pair, chunk): &(&OrderedPair, &[u32])| {
+        if stopped() { Found::default() } else { contacts(pair, chunk) }
+    };
+    let found: Vec<Found> = tasks.par_iter().map(contacts_of).collect();
     let mut statistics = Statistics {
         instance_pairs: pairs.len(),
         candidates: candidates.iter().map(Vec::len).sum(),
@@ -120,6 +148,6 @@ fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions) -> Contacts {
     let Reduced { contacts, reports, bytes } = reduced(contacts, options.reduction);
     statistics.reduced = all - contacts.len();
     statistics.bytes += bytes;
-    let hidden = hidden::among(pairs, options.mode, &contacts);
+    let hidden = hidden::among(pairs, options.mode, &contacts, stop);
     Contacts::new(contacts, statistics, reports, hidden)
 }

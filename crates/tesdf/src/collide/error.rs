@@ -72,6 +72,9 @@ pub enum CollideError {
         /// The expected value.
         expected: &'static str,
     },
+    /// Another thread asked the detection to stop.
+    #[error("the detection was stopped")]
+    Stopped,
     /// A detector on another device failed.
     #[error("{0}")]
     Device(String),

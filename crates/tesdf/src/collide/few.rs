@@ -1,4 +1,6 @@
 //! Detections that do not find all contacts of a pair of instances.
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use glam::DVec3;
 
 use super::field::ROUNDING;
@@ -9,12 +11,15 @@ use crate::geometry::Aabb;
 use crate::parallel::*;
 
 /// The contacts of ordered pairs, by a search in each pair of instances. The two orders of a pair must
-/// be adjacent.
+/// be adjacent. Once `stop` is set, contacts are missing.
 pub fn of_pairs(
     pairs: &[OrderedPair],
     mode: Mode,
+    stop: &AtomicBool,
     search: impl Fn(&[OrderedPair]) -> OfPair + Sync + Send,
 ) -> Contacts {
+    let search =
+        |pair: &[OrderedPair]| if stop.load(Ordering::Relaxed) { OfPair::default() } else { search(pair) };
     let found: Vec<OfPair> = pairs.par_chunks(2).map(search).collect();
     let mut all = Vec::with_capacity(found.iter().map(|f| f.contacts.len()).sum());
     let mut reports = Vec::new();
@@ -32,11 +37,12 @@ pub fn of_pairs(
     }
     statistics.bytes += size_of_val(pairs) + size_of_val(all.as_slice());
     reports.sort_unstable_by_key(|r| (r.instance_a, r.instance_b));
-    let hidden = hidden::among(pairs, mode, &all);
+    let hidden = hidden::among(pairs, mode, &all, stop);
     Contacts::new(all, statistics, reports, hidden)
 }
 
 /// The contacts of a pair that are kept.
+#[derive(Default)]
 pub struct OfPair {
     /// The contacts, in the order of a detection.
     pub contacts: Vec<Contact>,

@@ -10,6 +10,7 @@
 //!   skipped.
 //! - In every mode, the centre of a ball inside each body is tested in the field of the other.
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::parallel::*;
 use glam::DVec3;
@@ -81,13 +82,22 @@ pub fn hidden_overlaps(
     options: &CollideOptions,
     contacts: &[Contact],
 ) -> Result<Vec<HiddenOverlap>, CollideError> {
-    Ok(among(&OrderedPair::all(scene, options)?, options.mode, contacts))
+    Ok(among(&OrderedPair::all(scene, options)?, options.mode, contacts, &AtomicBool::new(false)))
 }
 
-/// The same for ordered pairs. The two orders of a pair must be adjacent.
-pub fn among(pairs: &[OrderedPair], mode: Mode, contacts: &[Contact]) -> Vec<HiddenOverlap> {
+/// The same for ordered pairs. The two orders of a pair must be adjacent. Once `stop` is set, overlaps
+/// are missing.
+pub fn among(
+    pairs: &[OrderedPair],
+    mode: Mode,
+    contacts: &[Contact],
+    stop: &AtomicBool,
+) -> Vec<HiddenOverlap> {
     let shown = Shown::by(contacts);
     let overlap = |pair: &[OrderedPair]| {
+        if stop.load(Ordering::Relaxed) {
+            return None;
+        }
         let (a, b) = (pair[0].a, pair[0].b);
         let shown = shown.of(a, b);
         let depth = |p: &OrderedPair| {

@@ -90,7 +90,7 @@ pub use candidates::{Candidate, candidates};
 pub use clearance::{Clearance, ClearanceOptions, clearance};
 pub use coarse::{CoarseContact, coarse_contacts};
 pub use contact::{Contact, Contacts, FeatureB, FeatureId, PairReduction, Statistics};
-pub use detect::{detect, detect_pairs, detect_with};
+pub use detect::{detect, detect_pairs, detect_until, detect_with};
 pub use error::CollideError;
 pub use hidden::hidden_overlaps;
 pub use hidden_overlap::HiddenOverlap;
