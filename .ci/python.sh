@@ -25,6 +25,8 @@ rm -rf "$wheels"
 CARGO_PROFILE_DEV_OPT_LEVEL=2 step "$tools/bin/maturin" build --quiet --profile dev --locked -m python/Cargo.toml --out "$wheels"
 step "$python" -m venv --clear "$env"
 step "$env/bin/python" "${pip[@]}" "$wheels"/*.whl -r python/tests/requirements.txt
-step "$env/bin/python" -m pytest python/tests
+# The tests compare contacts with those of the command.
+CARGO_PROFILE_DEV_OPT_LEVEL=2 step cargo build --quiet --locked -p tesdf-cli --bin tesdf
+TESDF_CLI=${CARGO_TARGET_DIR:-$PWD/target}/debug/tesdf step "$env/bin/python" -m pytest python/tests
 # Compares the stubs with the module. The tests use the module as the stubs describe it.
 step "$env/bin/python" -m mypy.stubtest tesdf

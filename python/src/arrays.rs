@@ -39,7 +39,8 @@ impl<'py> Rows<'py> {
     }
 }
 
-/// Converts an array of integers of any type, whose shape must satisfy `fits`.
+/// Converts an array of integers of any type, whose shape must satisfy `fits`. Without numbers, its
+/// type does not matter: numpy makes floats of an empty list.
 ///
 /// # Errors
 /// `ValueError` names the argument, and what was found and expected.
@@ -55,7 +56,7 @@ pub fn integers<'py>(
     if !fits(untyped.shape()) {
         return Err(argument(name, format!("an array of shape {}", array.getattr("shape")?), expected));
     }
-    if !matches!(untyped.dtype().kind(), b'i' | b'u') {
+    if !untyped.is_empty() && !matches!(untyped.dtype().kind(), b'i' | b'u') {
         return Err(argument(name, format!("an array of {}", untyped.dtype()), "integers"));
     }
     array.call_method1("astype", (numpy::dtype::<i64>(py), "C"))?.extract()

@@ -1,6 +1,7 @@
 //! `tesdf.Asset`
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -31,12 +32,21 @@ const CHUNK: usize = 1 << 19;
 /// the interpreter's lock.
 #[pyclass(frozen, module = "tesdf")]
 pub struct Asset {
-    inner: TeSdf,
+    /// Shared with scenes.
+    inner: Arc<TeSdf>,
 }
 
 impl Asset {
     pub fn new(inner: TeSdf) -> Self {
+        Self::of(Arc::new(inner))
+    }
+
+    pub fn of(inner: Arc<TeSdf>) -> Self {
         Self { inner }
+    }
+
+    pub fn shared(&self) -> Arc<TeSdf> {
+        Arc::clone(&self.inner)
     }
 
     /// Calls `fill` for chunks of rows without the interpreter's lock. Python handles signals
@@ -260,7 +270,7 @@ impl Asset {
         }
         let moves: Vec<(u32, DVec3)> = ids.into_iter().zip(positions.iter().copied()).collect();
         let moved = py.detach(|| {
-            let mut asset = self.inner.clone();
+            let mut asset = TeSdf::clone(&self.inner);
             asset.move_vertices(&moves).map(|moved| (asset, moved))
         });
         let (asset, moved) = moved.map_err(|e| Error::Deform(e).raise(py))?;
@@ -281,7 +291,7 @@ impl Asset {
     fn reencode_stale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let pool = pool::shared().map_err(|e| e.raise(py))?;
         let reencoded = py.detach(|| {
-            let mut asset = self.inner.clone();
+            let mut asset = TeSdf::clone(&self.inner);
             pool.install(|| asset.reencode_stale()).map(|reencoded| (asset, reencoded))
         });
         let (asset, found) = reencoded.map_err(|e| Error::Encode(None, e).raise(py))?;

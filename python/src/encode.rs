@@ -10,7 +10,7 @@ use tesdf::encode::{
 use tesdf::{Progress, Stage};
 
 use crate::asset::Asset;
-use crate::errors::{Error, argument};
+use crate::errors::{Error, argument, kind_of};
 use crate::interrupt::cancellable;
 use crate::mesh::MeshInput;
 use crate::pool;
@@ -151,10 +151,9 @@ fn domain_choice(any: &Bound<'_, PyAny>) -> PyResult<DomainChoice> {
     {
         return Ok(choice);
     }
-    any.extract::<PathBuf>().map(DomainChoice::File).map_err(|_| {
-        let found = any.get_type().name().map_or("an object".into(), |name| name.to_string());
-        argument("domain", found, "'bisection', 'gmsh' or a path of tetrahedra")
-    })
+    any.extract::<PathBuf>()
+        .map(DomainChoice::File)
+        .map_err(|_| argument("domain", kind_of(any), "'bisection', 'gmsh' or a path of tetrahedra"))
 }
 
 fn length_or_safe(any: &Bound<'_, PyAny>) -> PyResult<Threshold> {

@@ -8,6 +8,7 @@ use pyo3::exceptions::{
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 use tesdf::asset::AssetError;
+use tesdf::collide::CollideError;
 use tesdf::deform::DeformError;
 use tesdf::domain::ReadTetrahedraError;
 use tesdf::encode::{ChoiceError, DomainError, EncodeError};
@@ -32,6 +33,9 @@ pub enum Error {
     /// The path, if the asset comes from a file.
     Asset(Option<PathBuf>, AssetError),
     Verify(VerifyError),
+    Collide(CollideError),
+    /// The place in the arguments, such as `poses: row 3`.
+    CollideAt(String, CollideError),
     Threads(rayon::ThreadPoolBuildError),
 }
 
@@ -63,6 +67,7 @@ impl Error {
             Self::Choice(_) | Self::Domain(_) | Self::Encode(..) => new(py, "EncodeError", self.text()),
             Self::Deform(_) => new(py, "DeformError", self.text()),
             Self::Asset(..) | Self::Verify(_) => new(py, "AssetError", self.text()),
+            Self::Collide(_) | Self::CollideAt(..) => new(py, "CollideError", self.text()),
             Self::Threads(_) => PyOSError::new_err(self.text()),
         }
     }
@@ -85,6 +90,8 @@ impl Error {
             Self::Asset(_, e @ (AssetError::Io { .. } | AssetError::Save(_))) => e.to_string(),
             Self::Asset(path, e) => at(path, e),
             Self::Verify(e) => e.to_string(),
+            Self::Collide(e) => e.to_string(),
+            Self::CollideAt(at, e) => format!("{at}: {e}"),
             Self::Threads(e) => format!("cannot start threads: {e}"),
         }
     }
@@ -110,4 +117,9 @@ fn new(py: Python<'_>, class: &str, arguments: impl pyo3::PyErrArguments + 'stat
 /// The exception for an invalid argument, with what was found and what was expected.
 pub fn argument(name: &str, found: impl std::fmt::Display, expected: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: {found}; expected {expected}"))
+}
+
+/// The type of an object, for messages.
+pub fn kind_of(any: &Bound<'_, PyAny>) -> String {
+    any.get_type().name().map_or("an object".into(), |name| name.to_string())
 }

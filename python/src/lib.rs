@@ -7,11 +7,17 @@
 mod arrays;
 mod asset;
 mod classes;
+mod contacts;
+mod detection;
 mod encode;
 mod errors;
 mod interrupt;
 mod mesh;
 mod pool;
+mod poses;
+mod scene;
+mod shapes;
+mod why;
 
 /// The compiled part of the package `tesdf`.
 #[pyo3::pymodule]
@@ -22,10 +28,16 @@ mod _native {
     use super::encode::encode;
     #[pymodule_export]
     use super::mesh::{check, repair};
+    #[pymodule_export]
+    use super::scene::{Scene, pair};
 
     /// The face in the answer of a point that is not finite, and of a ray that meets no face.
     #[pymodule_export]
     const NO_FACE: u32 = tesdf::query::Answer::NO_FACE;
+
+    /// The cell of a contact where the face tree or a formula answered.
+    #[pymodule_export]
+    const NO_CELL: u32 = super::contacts::NO_CELL;
 
     #[pymodule_export]
     #[expect(non_upper_case_globals, reason = "Python's name for it")]

@@ -8,7 +8,7 @@ use tesdf::asset::about::Source;
 use tesdf::mesh::{RepairOptions, RepairReport, SolidMesh, TriangleMesh, read};
 
 use crate::arrays::{self, Rows};
-use crate::errors::{Error, argument};
+use crate::errors::{Error, argument, kind_of};
 use crate::{classes, pool};
 
 /// A mesh argument.
@@ -40,8 +40,7 @@ impl MeshInput {
             [any.getattr("vertices")?, any.getattr("faces")?]
         } else {
             any.extract::<[Bound<'_, PyAny>; 2]>().map_err(|_| {
-                let found = any.get_type().name().map_or("an object".into(), |name| name.to_string());
-                argument("mesh", found, "a path, a pair (vertices, faces), or an object that has both")
+                argument("mesh", kind_of(any), "a path, a pair (vertices, faces), or an object that has both")
             })?
         };
         let vertices = Rows::new("vertices", &vertices)?.as_slice()?.to_vec();

@@ -1,4 +1,4 @@
-"""Exact signed distances of triangle meshes, in numpy.
+"""Exact signed distances and contacts of triangle meshes, in numpy.
 
     asset = tesdf.encode("part.stl")                    # a path, (vertices, faces), or a mesh
     answers = asset.query(points)                       # points [N, 3]
@@ -14,35 +14,78 @@
     asset = tesdf.encode("beam.stl", domain="gmsh", deformable=True)
     asset = asset.move_vertices(ids, positions).asset.reencode_stale().asset
 
+    scene = tesdf.Scene()                               # instances share their asset
+    part, floor = scene.add_shape(asset), scene.add_shape(tesdf.Plane())
+    scene.add(floor)
+    ids = scene.add_many(part, poses)                   # poses [N, 7], x y z qx qy qz qw, or [N, 4, 4]
+    contacts = scene.detect(contact_distance=1e-4)      # contacts.point_a, contacts.distance, ...
+    scene.update(ids, poses=poses)                      # and so on
+
+    tesdf.collide(asset, tesdf.Sphere(1.0), pose_b=pose)             # contacts of two bodies
+    tesdf.clearance(asset, asset, pose_b=pose).distance              # exact, with witness points
+    tesdf.time_of_impact(asset, asset, pose_b=pose, velocity_b=velocity)
+
 All lengths are in the mesh's unit, and all ids start from 0. Errors are `MeshError`
-(`NotSolidError` if the mesh has no well-defined inside), `EncodeError`, `DeformError` and
-`AssetError`, which are all `ValueError`s, and `OSError` for files.
+(`NotSolidError` if the mesh has no well-defined inside), `EncodeError`, `DeformError`,
+`AssetError` and `CollideError`, which are all `ValueError`s, and `OSError` for files.
 """
 
-from ._native import NO_FACE, Asset, __version__, check, encode, repair
-from .errors import AssetError, DeformError, EncodeError, MeshError, NotSolidError
-from .reports import CheckReport, Defect, RepairReport, VerifyReport
+from ._native import NO_CELL, NO_FACE, Asset, Scene, __version__, check, encode, repair
+from .bodies import clearance, collide, time_of_impact, why
+from .contacts import CoarseContacts, Contacts, HiddenOverlaps, Instances, Reductions
+from .errors import AssetError, CollideError, DeformError, EncodeError, MeshError, NotSolidError
+from .reports import (
+    CheckReport,
+    Clearance,
+    Defect,
+    DetectionStatistics,
+    Impact,
+    RepairReport,
+    VerifyReport,
+    WhyReport,
+)
 from .results import Answers, Moved, RayHits, Reencoded, Repaired
+from .shapes import Box, Capsule, Plane, Sphere
 
 __all__ = [
+    "NO_CELL",
     "NO_FACE",
     "Answers",
     "Asset",
     "AssetError",
+    "Box",
+    "Capsule",
     "CheckReport",
+    "Clearance",
+    "CoarseContacts",
+    "CollideError",
+    "Contacts",
     "Defect",
     "DeformError",
+    "DetectionStatistics",
     "EncodeError",
+    "HiddenOverlaps",
+    "Impact",
+    "Instances",
     "MeshError",
     "Moved",
     "NotSolidError",
+    "Plane",
     "RayHits",
+    "Reductions",
     "Reencoded",
     "RepairReport",
     "Repaired",
+    "Scene",
+    "Sphere",
     "VerifyReport",
+    "WhyReport",
     "__version__",
     "check",
+    "clearance",
+    "collide",
     "encode",
     "repair",
+    "time_of_impact",
+    "why",
 ]

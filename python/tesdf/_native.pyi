@@ -5,7 +5,9 @@ from typing import Any, Literal, Protocol, Union, final
 import numpy as np
 import numpy.typing as npt
 
-from .reports import Certificate, CheckReport, Inspection, Source, Statistics, VerifyReport
+from .bodies import Shape
+from .contacts import CoarseContacts, Contacts, Instances
+from .reports import Certificate, CheckReport, Clearance, Impact, Inspection, Source, Statistics, VerifyReport, WhyReport
 from .results import Answers, Moved, RayHits, Reencoded, Repaired
 
 class _HasMesh(Protocol):
@@ -17,9 +19,12 @@ class _HasMesh(Protocol):
 _Path = Union[str, PathLike[str]]
 _Mesh = Union[_Path, tuple[npt.ArrayLike, npt.ArrayLike], _HasMesh]
 _Precision = Literal["f64", "f32"]
+_Numbers = Union[float, npt.ArrayLike]
+_Integers = Union[int, npt.ArrayLike]
 
-__all__ = ["NO_FACE", "Asset", "__version__", "check", "encode", "repair"]
+__all__ = ["NO_CELL", "NO_FACE", "Asset", "Scene", "__version__", "check", "encode", "pair", "repair"]
 
+NO_CELL: int
 NO_FACE: int
 __version__: str
 
@@ -79,3 +84,119 @@ class Asset:
     @property
     def sections(self) -> dict[str, npt.NDArray[Any]]: ...
     def __reduce__(self) -> tuple[Callable[[bytes], Asset], tuple[bytes]]: ...
+@final
+class Scene:
+    def __new__(cls) -> Scene: ...
+    def add_shape(self, shape: Shape) -> int: ...
+    def remove_shape(self, shape: int) -> None: ...
+    def add(
+        self,
+        shape: int,
+        pose: npt.ArrayLike | None = None,
+        *,
+        velocity: npt.ArrayLike | None = None,
+        scale: float = 1.0,
+        world: int = 0,
+        memberships: int = 0xFFFFFFFF,
+        filter: int = 0xFFFFFFFF,
+    ) -> int: ...
+    def add_many(
+        self,
+        shape: _Integers,
+        poses: npt.ArrayLike,
+        *,
+        velocities: npt.ArrayLike | None = None,
+        scale: _Numbers = 1.0,
+        world: _Integers = 0,
+        memberships: _Integers = 0xFFFFFFFF,
+        filter: _Integers = 0xFFFFFFFF,
+    ) -> npt.NDArray[np.uint32]: ...
+    def update(
+        self,
+        ids: npt.ArrayLike,
+        *,
+        poses: npt.ArrayLike | None = None,
+        velocities: npt.ArrayLike | None = None,
+        scale: _Numbers | None = None,
+        world: _Integers | None = None,
+        memberships: _Integers | None = None,
+        filter: _Integers | None = None,
+    ) -> None: ...
+    def remove(self, ids: npt.ArrayLike) -> None: ...
+    def exclude(self, pairs: npt.ArrayLike) -> None: ...
+    def include(self, pairs: npt.ArrayLike) -> None: ...
+    @property
+    def excluded(self) -> npt.NDArray[np.uint32]: ...
+    @property
+    def shapes(self) -> dict[int, Shape]: ...
+    @property
+    def instances(self) -> Instances: ...
+    def detect(
+        self,
+        *,
+        mode: Literal["node", "edge", "face", "exact"] = "exact",
+        contacts_per: Literal["cell", "face", "minimum"] = "face",
+        contact_distance: float = 0.0,
+        speculative_time: float = 0.0,
+        cos_theta: float | None = None,
+        iterations: int = 16,
+        tolerance: float | None = None,
+        reduce: int | None = None,
+        deepest: int | None = None,
+        spread: int | None = None,
+        precision: _Precision = "f64",
+        threads: int | None = None,
+    ) -> Contacts: ...
+    def coarse_contacts(
+        self,
+        *,
+        mode: Literal["node", "edge", "face", "exact"] = "exact",
+        contacts_per: Literal["cell", "face", "minimum"] = "face",
+        contact_distance: float = 0.0,
+        speculative_time: float = 0.0,
+        cos_theta: float | None = None,
+        iterations: int = 16,
+        tolerance: float | None = None,
+        reduce: int | None = None,
+        deepest: int | None = None,
+        spread: int | None = None,
+        precision: _Precision = "f64",
+        threads: int | None = None,
+    ) -> CoarseContacts: ...
+    def clearance(self, a: int, b: int, *, tolerance: float | None = None) -> Clearance: ...
+    def time_of_impact(
+        self,
+        a: int,
+        b: int,
+        *,
+        velocity_a: npt.ArrayLike | None = None,
+        velocity_b: npt.ArrayLike | None = None,
+        screw_a: npt.ArrayLike | None = None,
+        screw_b: npt.ArrayLike | None = None,
+        end: float = 1.0,
+        tolerance: float | None = None,
+        iterations: int = 1000,
+    ) -> Impact | None: ...
+    def why(
+        self,
+        a: int,
+        b: int,
+        part: int | None = None,
+        *,
+        mode: Literal["node", "edge", "face", "exact"] = "exact",
+        contacts_per: Literal["cell", "face", "minimum"] = "face",
+        contact_distance: float = 0.0,
+        speculative_time: float = 0.0,
+        cos_theta: float | None = None,
+        iterations: int = 16,
+        tolerance: float | None = None,
+        reduce: int | None = None,
+        deepest: int | None = None,
+        spread: int | None = None,
+        precision: _Precision = "f64",
+        threads: int | None = None,
+    ) -> WhyReport: ...
+    def __len__(self) -> int: ...
+    def __copy__(self) -> Scene: ...
+
+def pair(a: Shape, b: Shape, pose_a: npt.ArrayLike | None, pose_b: npt.ArrayLike | None) -> Scene: ...

@@ -32,3 +32,7 @@ class DeformError(ValueError):
 
 class AssetError(ValueError):
     """A file or bytes are not an asset of this version, or are damaged."""
+
+
+class CollideError(ValueError):
+    """A scene, a detection or a measurement of two bodies is refused. The scene is unchanged."""

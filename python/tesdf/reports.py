@@ -1,4 +1,5 @@
-"""Results of `check`, `repair`, `Asset.inspect` and `Asset.verify`, and the metadata of an asset.
+"""Results of `check`, `repair`, `Asset.inspect` and `Asset.verify`, the metadata of an asset, and
+results for pairs of bodies.
 
 Lengths are in the mesh's unit, and ids start from 0. A float that is not finite is NaN.
 """
@@ -315,6 +316,123 @@ class VerifyReport:
     diagonal: float
     precisions: tuple[PrecisionReport, PrecisionReport]
     """"f32", then "f64" """
+
+
+@dataclass(frozen=True)
+class DetectionStatistics:
+    """Counts of a detection."""
+
+    instance_pairs: int
+    """ordered pairs of instances whose bounds overlap"""
+    candidates: int
+    """faces, edges or vertices that remain after the broad phase; with `deepest` and `spread`, this and
+    all other numbers count what was looked at"""
+    polygons: int
+    """pairs of a face and a cell, or of a vertex and its cell; with one contact per face, faces"""
+    touching: int
+    """contacts within the contact distance"""
+    filtered: int
+    """contacts that the cosine filter dropped, or that are no local minima where those are wanted"""
+    reduced: int
+    """contacts that the reduction dropped"""
+    unconverged: int
+    """contacts whose minimum is not proved to be within the tolerance"""
+    bytes: int
+    """bytes of all contacts and intermediate products"""
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """Signed distance of two bodies, in the unit and frame of the world."""
+
+    distance: float
+    """Positive: the least distance between the surfaces. Negative: the bodies overlap; the lesser of the
+    two least signed distances of one surface to the other body. At most the tolerance above the true value if
+    `converged`"""
+    lower_bound: float
+    """the true value is between this and `distance`"""
+    point_a: Point
+    """witness point on a"""
+    point_b: Point
+    """witness point on b"""
+    normal: Point
+    """unit vector from b to a"""
+    face_a: int
+    face_b: int
+    field: int
+    """the instance whose signed distance field was used"""
+    converged: bool
+    """whether the error is within the tolerance"""
+    overlap: bool
+    """whether the solids share volume, also where their surfaces coincide"""
+
+
+@dataclass(frozen=True)
+class Impact(Clearance):
+    """First impact of two moving bodies: the clearance at its time."""
+
+    time: float
+    """before this time the bodies are apart"""
+    iterations: int
+    """number of steps taken"""
+    touches: bool
+    """whether the bodies touch at `time`. False when the steps were used up: the motion is then known to be
+    free up to `time`"""
+
+
+@dataclass(frozen=True)
+class WhyPolygon:
+    """A face clipped by a cell, a point of a whole face, or a vertex."""
+
+    cell: Optional[int]
+    """None outside of the domain, and in the field of a simple shape"""
+    vertices: tuple[Point, ...]
+    """corners of the clipped polygon"""
+    distance: float
+    """least signed distance"""
+    point: Point
+    """the point with this distance"""
+    face_b: int
+    verdict: str
+    """"contact"; or why it is none: "cell_beyond" and "beyond" the contact distance, "filtered" by the cosine,
+    "descending" where local minima are wanted, or "at_end" of an edge, which is tested as a vertex"""
+    cosine: Optional[float]
+    """of a filtered contact"""
+
+
+@dataclass(frozen=True)
+class WhyPart:
+    """A face, vertex or edge of a."""
+
+    id: int
+    broad: str
+    """"candidate"; or why it was dropped: "pruned_by_tree" or "pruned_by_ball" """
+    bound: Optional[float]
+    """lower bound of its signed distance, if it was dropped"""
+    polygons: tuple[WhyPolygon, ...]
+
+
+@dataclass(frozen=True)
+class WhyReport:
+    """Result of `Scene.why`: one ordered pair, before a reduction."""
+
+    instance_a: int
+    """the instance that has the faces"""
+    instance_b: int
+    """the instance whose field is used"""
+    pair: str
+    """"tested"; or why it was not: "same_instance", "other_worlds", "groups_do_not_meet", "excluded",
+    "both_planes" or "bounds_apart". The rest is reported as if the pair was tested"""
+    contact_distance: float
+    """that of the options plus what velocities add"""
+    bounds_gap: float
+    """distance between the bounds; 0 when they overlap"""
+    total: int
+    """number of faces, vertices or edges of a"""
+    candidates: int
+    """number of these that the broad phase keeps"""
+    parts: tuple[WhyPart, ...]
+    """the requested part; without a request, all candidates"""
 
 
 def from_json(name: str, text: str) -> Any:

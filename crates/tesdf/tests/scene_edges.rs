@@ -1,11 +1,13 @@
 //! Edge cases of scenes: invalid input is an error that names it, and valid input is answered.
 mod support;
 
+use std::sync::atomic::AtomicBool;
+
 use support::bodies::body;
 use tesdf::Length;
 use tesdf::collide::{
     CollideError, CollideOptions, Groups, Instance, InstanceId, Mode, Placement, Pose, Reduction, Scene,
-    Shape, ShapeId, Velocity, detect,
+    Shape, ShapeId, Velocity, detect, detect_until,
 };
 use tesdf::glam::{DQuat, DVec3};
 
@@ -286,4 +288,15 @@ fn a_scaled_instance_equals_a_scaled_shape() {
     }
     let placed = Placement { pose: at(1.0), scale: 2.0 };
     assert_eq!(placed.to_shape(placed.to_world(DVec3::Y)), DVec3::Y);
+}
+
+#[test]
+fn a_detection_can_be_stopped() {
+    let (scene, _) = row(&[0.0, 1.5, 3.0]);
+    for reduction in [Reduction::None, Reduction::PerPair(1), Reduction::Deepest(1), Reduction::Spread(1)] {
+        let options = CollideOptions { reduction, ..CollideOptions::default() };
+        assert_eq!(detect_until(&scene, &options, &AtomicBool::new(false)), detect(&scene, &options));
+        let stopped = detect_until(&scene, &options, &AtomicBool::new(true));
+        assert_eq!(stopped, Err(CollideError::Stopped));
+    }
 }

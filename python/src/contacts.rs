@@ -1,0 +1,121 @@
+//! Contacts as arrays, one for each field.
+use numpy::{Element, IntoPyArray, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use tesdf::collide::{CoarseContact, Contact, Contacts, FeatureB, HiddenOverlap, InstanceId, PairReduction};
+use tesdf::glam::DVec3;
+
+use crate::classes;
+
+/// The cell of a contact that has none.
+pub const NO_CELL: u32 = u32::MAX;
+
+/// The arrays of an object of `tesdf.contacts`, by name.
+pub struct Columns<'py> {
+    py: Python<'py>,
+    named: Bound<'py, PyDict>,
+}
+
+impl<'py> Columns<'py> {
+    /// Without an array.
+    pub fn new(py: Python<'py>) -> Self {
+        Self { py, named: PyDict::new(py) }
+    }
+
+    /// Adds an array of shape `[N]`.
+    pub fn add<T: Element>(self, name: &str, values: impl Iterator<Item = T>) -> PyResult<Self> {
+        self.named.set_item(name, values.collect::<Vec<T>>().into_pyarray(self.py))?;
+        Ok(self)
+    }
+
+    /// Adds an array of shape `[N, W]`.
+    pub fn add_rows<T: Element, const W: usize>(
+        self,
+        name: &str,
+        rows: impl Iterator<Item = [T; W]>,
+    ) -> PyResult<Self> {
+        let flat = rows.collect::<Vec<[T; W]>>().into_flattened();
+        let shape = [flat.len() / W, W];
+        self.named.set_item(name, flat.into_pyarray(self.py).reshape(shape)?)?;
+        Ok(self)
+    }
+
+    /// Adds any other field.
+    pub fn with(self, name: &str, value: Bound<'py, PyAny>) -> PyResult<Self> {
+        self.named.set_item(name, value)?;
+        Ok(self)
+    }
+
+    /// The object of the class `name` of `tesdf.contacts`.
+    pub fn build(self, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.py.import("tesdf.contacts")?.getattr(name)?.call((), Some(&self.named))
+    }
+}
+
+/// An object of `tesdf.Contacts`.
+pub fn contacts<'py>(py: Python<'py>, found: &Contacts) -> PyResult<Bound<'py, PyAny>> {
+    let of = || found.iter();
+    let point = |p: DVec3| p.to_array();
+    let feature_b = |c: &Contact| match c.feature.b {
+        FeatureB::Vertex(vertex) => (0, [vertex, NO_CELL]),
+        FeatureB::Edge(low, high) => (1, [low, high]),
+        FeatureB::Face(face) => (2, [face, NO_CELL]),
+    };
+    Columns::new(py)
+        .add_rows("point_a", of().map(|c| point(c.point_a)))?
+        .add_rows("point_b", of().map(|c| point(c.point_b)))?
+        .add_rows("normal", of().map(|c| point(c.normal)))?
+        .add("distance", of().map(|c| c.distance))?
+        .add("face_a", of().map(|c| c.face_a))?
+        .add("face_b", of().map(|c| c.face_b))?
+        .add("tet_b", of().map(|c| c.tet_b.unwrap_or(NO_CELL)))?
+        .add("instance_a", ids(of().map(|c| c.instance_a)))?
+        .add("instance_b", ids(of().map(|c| c.instance_b)))?
+        .add("feature_a", of().map(|c| c.feature.a))?
+        .add("feature_b_kind", of().map(|c| feature_b(c).0))?
+        .add_rows("feature_b", of().map(|c| feature_b(c).1))?
+        .add("converged", of().map(|c| c.converged))?
+        .with("statistics", classes::report(py, "DetectionStatistics", &found.statistics)?)?
+        .with("reductions", reductions(py, &found.reductions)?)?
+        .with("hidden", hidden(py, &found.hidden)?)?
+        .build("Contacts")
+}
+
+fn reductions<'py>(py: Python<'py>, found: &[PairReduction]) -> PyResult<Bound<'py, PyAny>> {
+    let of = || found.iter();
+    Columns::new(py)
+        .add("instance_a", ids(of().map(|r| r.instance_a)))?
+        .add("instance_b", ids(of().map(|r| r.instance_b)))?
+        .add("contacts", of().map(|r| r.contacts as u64))?
+        .add("kept", of().map(|r| r.kept as u64))?
+        .add("wrench_error", of().map(|r| r.wrench_error))?
+        .add_rows("center", of().map(|r| r.center.to_array()))?
+        .add("length", of().map(|r| r.length))?
+        .add("left_out_above", of().map(|r| r.left_out_above.unwrap_or(f64::NAN)))?
+        .build("Reductions")
+}
+
+fn hidden<'py>(py: Python<'py>, found: &[HiddenOverlap]) -> PyResult<Bound<'py, PyAny>> {
+    let of = || found.iter();
+    Columns::new(py)
+        .add("instance_a", ids(of().map(|h| h.instance_a)))?
+        .add("instance_b", ids(of().map(|h| h.instance_b)))?
+        .add("depth", of().map(|h| h.depth))?
+        .build("HiddenOverlaps")
+}
+
+/// An object of `tesdf.contacts.CoarseContacts`.
+pub fn coarse<'py>(py: Python<'py>, found: &[CoarseContact]) -> PyResult<Bound<'py, PyAny>> {
+    let of = || found.iter();
+    Columns::new(py)
+        .add("instance_a", ids(of().map(|c| c.instance_a)))?
+        .add("instance_b", ids(of().map(|c| c.instance_b)))?
+        .add("face_a", of().map(|c| c.face_a))?
+        .add("corner_reach", of().map(|c| c.corner_reach))?
+        .add("distance", of().map(|c| c.distance))?
+        .build("CoarseContacts")
+}
+
+fn ids(ids: impl Iterator<Item = InstanceId>) -> impl Iterator<Item = u32> {
+    ids.map(|id| id.0)
+}

@@ -1,0 +1,128 @@
+//! Options of a detection, from keywords.
+use std::num::NonZeroUsize;
+
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyString};
+use tesdf::Length;
+use tesdf::collide::{CollideOptions, ContactsPer, Mode, Reduction};
+use tesdf::query::Precision;
+
+use crate::errors::{argument, kind_of};
+
+/// The keywords, in the order of the documentation.
+const NAMES: &str = "mode, contacts_per, contact_distance, speculative_time, cos_theta, iterations, tolerance, reduce, \
+                     deepest, spread, precision or threads";
+
+/// The options of a detection. They have the names and defaults of `tesdf collide`, and those of the
+/// library where the command has none.
+pub struct Keywords {
+    pub options: CollideOptions,
+    pub threads: Option<NonZeroUsize>,
+}
+
+impl Keywords {
+    /// Converts the keywords of `function`.
+    ///
+    /// # Errors
+    /// `TypeError` for an unknown keyword; `ValueError` for a value of another type, an unknown name, and
+    /// keywords that exclude each other. The library checks ranges.
+    pub fn new(function: &str, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut found = Self { options: CollideOptions::default(), threads: None };
+        let mut reduction: Option<(String, Reduction)> = None;
+        for (name, value) in keywords.into_iter().flatten() {
+            let name: String = name.extract()?;
+            let options = &mut found.options;
+            match name.as_str() {
+                "mode" => options.mode = one_of(&name, &value, &MODES)?,
+                "contacts_per" => options.contacts_per = one_of(&name, &value, &CONTACTS_PER)?,
+                "contact_distance" => options.contact_distance = number(&name, &value)?,
+                "speculative_time" => options.speculative_time = number(&name, &value)?,
+                "cos_theta" => options.cos_theta = optional(&name, &value, number)?,
+                "iterations" => options.iterations = count(&name, &value)?,
+                "tolerance" => options.tolerance = tolerance(Some(&value), options.tolerance)?,
+                "precision" => options.precision = one_of(&name, &value, &PRECISIONS)?,
+                "threads" => found.threads = optional(&name, &value, threads)?,
+                "reduce" | "deepest" | "spread" => {
+                    let Some(kept) = optional(&name, &value, count)? else { continue };
+                    if let Some((other, _)) = &reduction {
+                        let found = format!("given together with {other}");
+                        return Err(argument(&name, found, "one of reduce, deepest and spread"));
+                    }
+                    let kind = match name.as_str() {
+                        "reduce" => Reduction::PerPair(kept),
+                        "deepest" => Reduction::Deepest(kept),
+                        _ => Reduction::Spread(kept),
+                    };
+                    reduction = Some((name, kind));
+                }
+                _ => {
+                    let text = format!("{function}() has no keyword '{name}'; expected {NAMES}");
+                    return Err(PyTypeError::new_err(text));
+                }
+            }
+        }
+        found.options.reduction = reduction.map_or(Reduction::None, |(_, kind)| kind);
+        Ok(found)
+    }
+}
+
+const MODES: [(&str, Mode); 4] =
+    [("node", Mode::Node), ("edge", Mode::Edge), ("face", Mode::Face), ("exact", Mode::Exact)];
+
+const CONTACTS_PER: [(&str, ContactsPer); 3] =
+    [("cell", ContactsPer::Cell), ("face", ContactsPer::Face), ("minimum", ContactsPer::Minimum)];
+
+/// The names of precisions.
+const PRECISIONS: [(&str, Precision); 2] = [("f64", Precision::F64), ("f32", Precision::F32)];
+
+/// Converts a length in the world's unit; None is `default`.
+pub fn tolerance(any: Option<&Bound<'_, PyAny>>, default: Length) -> PyResult<Length> {
+    match any {
+        Some(any) if !any.is_none() => number("tolerance", any).map(Length::Absolute),
+        _ => Ok(default),
+    }
+}
+
+/// Converts one of the names of `choices`.
+fn one_of<T: Copy>(name: &str, any: &Bound<'_, PyAny>, choices: &[(&str, T)]) -> PyResult<T> {
+    let text = any.cast::<PyString>().map(|text| text.to_string()).ok();
+    if let Some((_, choice)) = choices.iter().find(|choice| Some(choice.0) == text.as_deref()) {
+        return Ok(*choice);
+    }
+    let found = text.map_or_else(|| kind_of(any), |text| format!("'{text}'"));
+    let quoted = |choices: &[(&str, T)]| {
+        let names: Vec<String> = choices.iter().map(|choice| format!("'{}'", choice.0)).collect();
+        names.join(", ")
+    };
+    let (first, last) = choices.split_at(choices.len() - 1);
+    Err(argument(name, found, &format!("{} or {}", quoted(first), quoted(last))))
+}
+
+fn number(name: &str, any: &Bound<'_, PyAny>) -> PyResult<f64> {
+    any.extract().map_err(|_| argument(name, shown(any), "a number"))
+}
+
+fn count(name: &str, any: &Bound<'_, PyAny>) -> PyResult<u32> {
+    any.extract().map_err(|_| argument(name, shown(any), "an integer from 0 to 2^32 - 1"))
+}
+
+fn threads(name: &str, any: &Bound<'_, PyAny>) -> PyResult<NonZeroUsize> {
+    any.extract().map_err(|_| argument(name, shown(any), "an integer greater than 0"))
+}
+
+fn optional<'py, T>(
+    name: &str,
+    any: &Bound<'py, PyAny>,
+    convert: impl Fn(&str, &Bound<'py, PyAny>) -> PyResult<T>,
+) -> PyResult<Option<T>> {
+    if any.is_none() { Ok(None) } else { convert(name, any).map(Some) }
+}
+
+/// A number as it is, and another object by its type.
+fn shown(any: &Bound<'_, PyAny>) -> String {
+    match any.extract::<f64>() {
+        Ok(_) => any.to_string(),
+        Err(_) => kind_of(any),
+    }
+}

@@ -1,0 +1,189 @@
+//! Poses, velocities and motions from numpy arrays.
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use tesdf::collide::{CollideError, Motion, Pose, Velocity};
+use tesdf::glam::{DMat3, DQuat, DVec3};
+
+use crate::arrays;
+use crate::errors::{Error, argument};
+
+/// How many poses or velocities an argument has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count {
+    /// One, without an axis for rows.
+    One,
+    /// Any number of rows.
+    Rows,
+}
+
+/// A matrix whose rotation deviates from an orthonormal one by at most this is accepted. The
+/// deviation counts as rounding; it is that of the library for the length of a quaternion.
+const UNIT: f64 = 1e-6;
+
+/// Converts poses: translation and unit quaternion, x y z qx qy qz qw, or matrices of 4 × 4.
+///
+/// # Errors
+/// `ValueError` for other shapes; `CollideError` names the row that is not a pose.
+pub fn poses(name: &str, any: &Bound<'_, PyAny>, count: Count) -> PyResult<Vec<Pose>> {
+    let array = floats(any)?;
+    let numbers = array.as_slice()?;
+    let found: Vec<Result<Pose, CollideError>> = match (count, array.shape()) {
+        (Count::One, [7]) | (Count::Rows, [_, 7]) => rows(numbers).map(of_quaternion).collect(),
+        (Count::One, [4, 4]) | (Count::Rows, [_, 4, 4]) => rows(numbers).map(of_matrix).collect(),
+        _ => {
+            let expected = match count {
+                Count::One => "shape (7,), x y z qx qy qz qw, or (4, 4)",
+                Count::Rows => "shape (N, 7), each x y z qx qy qz qw, or (N, 4, 4)",
+            };
+            return Err(shape_error(name, &array, expected));
+        }
+    };
+    let named = |(row, pose): (usize, Result<Pose, CollideError>)| {
+        let at = if count == Count::One { name.to_string() } else { format!("{name}: row {row}") };
+        pose.map_err(|e| Error::CollideAt(at, e).raise(any.py()))
+    };
+    found.into_iter().enumerate().map(named).collect()
+}
+
+/// Converts velocities: linear, then angular in radians, vx vy vz wx wy wz. The scene checks that
+/// they are finite.
+///
+/// # Errors
+/// `ValueError` for other shapes.
+pub fn velocities(name: &str, any: &Bound<'_, PyAny>, count: Count) -> PyResult<Vec<Velocity>> {
+    let array = floats(any)?;
+    match (count, array.shape()) {
+        (Count::One, [6]) | (Count::Rows, [_, 6]) => Ok(rows(array.as_slice()?).map(of_twist).collect()),
+        (Count::One, _) => Err(shape_error(name, &array, "shape (6,), vx vy vz wx wy wz")),
+        (Count::Rows, _) => Err(shape_error(name, &array, "shape (N, 6), each vx vy vz wx wy wz")),
+    }
+}
+
+/// Converts the motion of a body: a velocity of six numbers or a screw of eight, by the command's
+/// names, or neither.
+///
+/// # Errors
+/// `ValueError` for both, or for other shapes. The library checks the numbers.
+pub fn motion(
+    body: char,
+    velocity: Option<&Bound<'_, PyAny>>,
+    screw: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Motion> {
+    match (velocity, screw) {
+        (None, None) => Ok(Motion::Rest),
+        (Some(velocity), None) => {
+            let name = format!("velocity_{body}");
+            let velocities = velocities(&name, velocity, Count::One)?;
+            Ok(velocities.first().map_or(Motion::Rest, |&velocity| Motion::Linear { velocity }))
+        }
+        (None, Some(screw)) => {
+            let array = floats(screw)?;
+            let ([8], &[px, py, pz, ax, ay, az, angular_speed, pitch]) = (array.shape(), array.as_slice()?)
+            else {
+                let expected = "shape (8,), px py pz ax ay az omega pitch";
+                return Err(shape_error(&format!("screw_{body}"), &array, expected));
+            };
+            let [point, axis] = [[px, py, pz], [ax, ay, az]].map(DVec3::from_array);
+            Ok(Motion::Screw { point, axis, angular_speed, pitch })
+        }
+        (Some(_), Some(_)) => {
+            let found = format!("given together with screw_{body}");
+            Err(argument(&format!("velocity_{body}"), found, "one of them"))
+        }
+    }
+}
+
+/// Converts numbers, of which one stands for all rows.
+///
+/// # Errors
+/// `ValueError` names the argument and the shape.
+pub fn numbers(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<f64>> {
+    let array = floats(any)?;
+    match *array.shape() {
+        [] => Ok(vec![array.as_slice()?[0]; rows]),
+        [n] if n == rows => Ok(array.as_slice()?.to_vec()),
+        _ => Err(shape_error(name, &array, &format!("a number, or shape ({rows},): one for each instance"))),
+    }
+}
+
+/// Converts numbers of 32 bits, of which one stands for all rows.
+///
+/// # Errors
+/// `ValueError` names the argument, and the shape or the number.
+pub fn words(name: &str, any: &Bound<'_, PyAny>, rows: usize) -> PyResult<Vec<u32>> {
+    let expected = format!("an integer, or shape ({rows},): one for each instance");
+    let array = arrays::integers(name, any, &expected, |shape| shape.is_empty() || *shape == [rows])?;
+    let word = |&number: &i64| {
+        u32::try_from(number).map_err(|_| argument(name, number, "integers from 0 to 2^32 - 1"))
+    };
+    let words = array.as_slice()?.iter().map(word).collect::<PyResult<Vec<u32>>>()?;
+    Ok(if array.shape().is_empty() { vec![words[0]; rows] } else { words })
+}
+
+/// The seven numbers of a pose.
+pub fn of_pose(pose: &Pose) -> [f64; 7] {
+    let (t, q) = (pose.translation, pose.rotation);
+    [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+}
+
+/// The six numbers of a velocity.
+pub fn of_velocity(velocity: &Velocity) -> [f64; 6] {
+    let Velocity { linear: v, angular: w } = velocity;
+    [v.x, v.y, v.z, w.x, w.y, w.z]
+}
+
+/// Any object that numpy can convert to `float64`.
+fn floats<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>> {
+    let py = any.py();
+    static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    let require = REQUIRE.import(py, "numpy", "require")?;
+    let array = require.call1((any, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))?;
+    Ok(array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?)
+}
+
+fn shape_error(name: &str, array: &PyReadonlyArrayDyn<'_, f64>, expected: &str) -> PyErr {
+    match array.getattr("shape") {
+        Ok(shape) => argument(name, format!("an array of shape {shape}"), expected),
+        Err(e) => e,
+    }
+}
+
+fn rows<const N: usize>(numbers: &[f64]) -> impl Iterator<Item = &[f64; N]> {
+    numbers.as_chunks::<N>().0.iter()
+}
+
+fn of_quaternion(&[x, y, z, i, j, k, w]: &[f64; 7]) -> Result<Pose, CollideError> {
+    Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w))
+}
+
+fn of_twist(&[x, y, z, i, j, k]: &[f64; 6]) -> Velocity {
+    Velocity { linear: DVec3::new(x, y, z), angular: DVec3::new(i, j, k) }
+}
+
+/// A matrix that maps columns: the rotation is its upper left part, the translation its last
+/// column.
+fn of_matrix(m: &[f64; 16]) -> Result<Pose, CollideError> {
+    let refuse = |found: String, expected| Err(CollideError::NotAPose { found, expected });
+    if !m.iter().all(|x| x.is_finite()) {
+        return refuse(format!("matrix {m:?}"), "finite numbers");
+    }
+    let [column_x, column_y, column_z, translation] =
+        [0, 1, 2, 3].map(|c| DVec3::new(m[c], m[4 + c], m[8 + c]));
+    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+        return refuse(
+            format!("last row {:?}", &m[12..]),
+            "[0, 0, 0, 1]: the translation is the last column",
+        );
+    }
+    let rotation = DMat3::from_cols(column_x, column_y, column_z);
+    let deviation = rotation.transpose() * rotation - DMat3::IDENTITY;
+    let deviation = deviation.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+    if deviation > UNIT || rotation.determinant() < 0.0 {
+        return refuse(
+            format!("a matrix that deforms or mirrors: columns {column_x}, {column_y}, {column_z}"),
+            "three unit vectors, at right angles up to 1e-6 and right-handed; `scale` is an argument of its own",
+        );
+    }
+    Pose::new(translation, DQuat::from_mat3(&rotation).normalize())
+}

@@ -1,0 +1,163 @@
+"""Contacts and instances as arrays: one array for each field, and a row for each contact or
+instance. `len` is the number of rows.
+
+Points, normals and lengths are in the frame and unit of the world.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .reports import DetectionStatistics
+
+_Float = npt.NDArray[np.float64]
+_Id = npt.NDArray[np.uint32]
+
+
+class _Rows:
+    def __len__(self) -> int:
+        first = dataclasses.fields(self)[0]  # type: ignore[arg-type]
+        return len(getattr(self, first.name))
+
+    def __repr__(self) -> str:
+        return f"<tesdf.{type(self).__name__}: {len(self)} rows>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Instances(_Rows):
+    """The states of the instances of a scene, in the order of their ids."""
+
+    ids: _Id
+    """[N]"""
+    shape: _Id
+    """[N] id of the shape"""
+    poses: _Float
+    """[N, 7] x y z qx qy qz qw"""
+    velocities: _Float
+    """[N, 6] vx vy vz wx wy wz"""
+    scale: _Float
+    """[N] world units for each unit of the shape"""
+    world: _Id
+    """[N]"""
+    memberships: _Id
+    """[N] the groups to which the instance belongs, as bits"""
+    filter: _Id
+    """[N] the groups that the instance meets, as bits"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Reductions(_Rows):
+    """The loss from the reduction, a row for each pair of instances that touches.
+
+    Take any normal forces on all contacts of a pair, with total size F. Normal forces on the kept contacts with the
+    same total size can replace them. The sums of forces differ by at most `wrench_error` * F, the torques around
+    `center` by at most `wrench_error` * `length` * F.
+    """
+
+    instance_a: _Id
+    """[P] the lower id"""
+    instance_b: _Id
+    """[P] the higher id"""
+    contacts: npt.NDArray[np.uint64]
+    """[P] number of contacts before the reduction; with `deepest` and `spread`, of those found"""
+    kept: npt.NDArray[np.uint64]
+    """[P] number of kept contacts"""
+    wrench_error: _Float
+    """[P] without unit; 0 if all are kept"""
+    center: _Float
+    """[P, 3] centre of a box around the contact points"""
+    length: _Float
+    """[P] greatest distance of a contact point from `center`"""
+    left_out_above: _Float
+    """[P] no contact that was left out has a lower signed distance; NaN if all are kept, and with
+    `reduce`"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HiddenOverlaps(_Rows):
+    """Pairs of instances that overlap without a contact that shows it."""
+
+    instance_a: _Id
+    """[H] the lower id"""
+    instance_b: _Id
+    """[H] the higher id"""
+    depth: _Float
+    """[H] lower bound of the depth"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CoarseContacts(_Rows):
+    """Faces that touch and that are large against the other body: the mode "node" can miss where
+    they touch."""
+
+    instance_a: _Id
+    """[C] the body that has the face"""
+    instance_b: _Id
+    """[C] the body that it touches"""
+    face_a: _Id
+    """[C]"""
+    corner_reach: _Float
+    """[C] greatest distance of a point of the face from its nearest vertex"""
+    distance: _Float
+    """[C] least signed distance of the face"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Contacts(_Rows):
+    """The contacts of a scene, sorted by world, instances, face and cell.
+
+    In each contact, *a* is the body that has the face, edge or vertex, and *b* is the body whose signed
+    distance field is used. Faces are numbered as in the source mesh, from 0.
+    """
+
+    point_a: _Float
+    """[N, 3] witness point on `face_a`"""
+    point_b: _Float
+    """[N, 3] the point of b's surface that is closest to `point_a`"""
+    normal: _Float
+    """[N, 3] unit gradient of b's signed distance at `point_a`; points from b to a"""
+    distance: _Float
+    """[N] signed distance of b at `point_a`; negative where the bodies overlap"""
+    face_a: _Id
+    """[N] face of a; of a vertex or edge, the lowest face that has it"""
+    face_b: _Id
+    """[N] the face of b that is closest to `point_a`"""
+    tet_b: _Id
+    """[N] cell of b, as the index of its word in `sections["domain.nodes"]`; `NO_CELL` where the
+    face tree or a formula answered"""
+    instance_a: _Id
+    """[N] the body that has the face"""
+    instance_b: _Id
+    """[N] the body whose field is used"""
+    feature_a: _Id
+    """[N] face of a; in the mode "node", vertex of a; in the mode "edge", a vertex, or for an edge the
+    number of vertices + 3 * face + side"""
+    feature_b_kind: npt.NDArray[np.uint8]
+    """[N] the closest feature of b: 0 for a vertex, 1 for an edge, 2 for a face"""
+    feature_b: _Id
+    """[N, 2] the vertex or face in the first column, or the two vertices of the edge, the lower id
+    first; the unused number is 2^32 - 1"""
+    converged: npt.NDArray[np.bool_]
+    """[N] whether it is proved that no point of the face or edge is deeper by more than the tolerance"""
+    statistics: DetectionStatistics
+    """of the whole detection"""
+    reductions: Reductions
+    """for each pair of instances; without rows if nothing is reduced"""
+    hidden: HiddenOverlaps
+    """pairs that overlap without a contact that shows it; contacts will not keep them apart. This happens in
+    the modes "node" and "edge", and for bodies in the same pose"""
+
+    def __repr__(self) -> str:
+        overlaps = f", {len(self.hidden)} hidden overlaps" if len(self.hidden) else ""
+        return f"<tesdf.Contacts: {len(self)} contacts{overlaps}>"
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """The arrays with a row for each contact, by name, as for `numpy.savez`."""
+        fields = (field.name for field in dataclasses.fields(self))
+        named = {name: getattr(self, name) for name in fields}
+        return {name: array for name, array in named.items() if isinstance(array, np.ndarray)}
