@@ -14,8 +14,8 @@ use crate::errors::{argument, kind_of};
 const NAMES: &str = "mode, contacts_per, contact_distance, speculative_time, cos_theta, iterations, tolerance, reduce, \
                      deepest, spread, precision or threads";
 
-/// The options of a detection. They have the names and defaults of `tesdf collide`, and those of the
-/// library where the command has none.
+/// The options of a detection. They have the names and defaults of `tesdf collide`, and those of
+/// the library where the command has none.
 pub struct Keywords {
     pub options: CollideOptions,
     pub threads: Option<NonZeroUsize>,

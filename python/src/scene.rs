@@ -26,14 +26,14 @@ use crate::{classes, pool, shapes};
 ///   numbers, x y z qx qy qz qw: the translation and a unit quaternion, whose real part qw comes
 ///   last, as in scene files and on the command line. Or it is a matrix [4, 4] that maps columns,
 ///   with the translation in its last column.
-/// - A velocity has six numbers, vx vy vz wx wy wz: that of the origin of the shape, and the angular
-///   velocity about this origin in radians. It only matters with speculative_time.
+/// - A velocity has six numbers, vx vy vz wx wy wz: that of the origin of the shape, and the
+///   angular velocity about this origin in radians. It only matters with speculative_time.
 /// - Lengths are in the world's unit, which is that of the shapes times the instances' scale.
 /// - Ids of shapes and of instances count from 0 in the order of adding. They are never reused.
 ///
-/// Threads may share a scene. detect works with the state at its call, also when another thread changes
-/// the scene meanwhile. Methods that get arrays do all or nothing: after an error the scene is
-/// unchanged. Errors are CollideError with the library's text, and ValueError for arrays of the
+/// Threads may share a scene. detect works with the state at its call, also when another thread
+/// changes the scene meanwhile. Methods that get arrays do all or nothing: after an error the scene
+/// is unchanged. Errors are CollideError with the library's text, and ValueError for arrays of the
 /// wrong shape.
 #[pyclass(frozen, module = "tesdf")]
 pub struct Scene {
@@ -149,7 +149,8 @@ impl Scene {
         Self { inner: Mutex::default() }
     }
 
-    /// Adds a shape: an Asset, which the scene shares, a Plane, Box, Sphere or Capsule. Returns its id.
+    /// Adds a shape: an Asset, which the scene shares, a Plane, Box, Sphere or Capsule. Returns its
+    /// id.
     fn add_shape(&self, shape: &Bound<'_, PyAny>) -> PyResult<u32> {
         let added = shapes::shape("shape", shape)?;
         self.change(shape.py(), |scene| scene.add_shape(added)).map(|id| id.0)
@@ -166,8 +167,8 @@ impl Scene {
     /// - velocity: [6], vx vy vz wx wy wz; None is rest.
     /// - scale: world units for each unit of the shape.
     /// - world: instances of different worlds never meet.
-    /// - memberships, filter: sets of 32 groups, as bits. Two instances meet when the memberships of
-    ///   each share a bit with the filter of the other.
+    /// - memberships, filter: sets of 32 groups, as bits. Two instances meet when the memberships
+    ///   of each share a bit with the filter of the other.
     #[pyo3(signature = (
         shape, pose = None, *, velocity = None, scale = None, world = None, memberships = None, filter = None
     ), text_signature = "($self, shape, pose=None, *, velocity=None, scale=1.0, world=0, memberships=0xFFFFFFFF, filter=0xFFFFFFFF)")]
@@ -190,8 +191,8 @@ impl Scene {
         self.change(py, |scene| scene.add(instance)).map(|id| id.0)
     }
 
-    /// Adds instances in one call, at the poses [N, 7] or [N, 4, 4]. Returns their ids [N], which are
-    /// consecutive.
+    /// Adds instances in one call, at the poses [N, 7] or [N, 4, 4]. Returns their ids [N], which
+    /// are consecutive.
     ///
     /// shape, scale, world, memberships and filter have one value for all, or one for each, [N].
     /// velocities has the shape [N, 6]. add explains them. An error names the instance by its row.
@@ -223,9 +224,9 @@ impl Scene {
         Ok(PyArray1::from_iter(py, ids.start.0..ids.end.0))
     }
 
-    /// Changes the instances with these ids [N]. An argument that is None changes nothing. poses have
-    /// the shape [N, 7] or [N, 4, 4], velocities [N, 6]; the others have one value for all, or one
-    /// for each. An error names the instance by its id, and a pose by its row.
+    /// Changes the instances with these ids [N]. An argument that is None changes nothing. poses
+    /// have the shape [N, 7] or [N, 4, 4], velocities [N, 6]; the others have one value for all, or
+    /// one for each. An error names the instance by its id, and a pose by its row.
     #[pyo3(signature = (
         ids, *, poses = None, velocities = None, scale = None, world = None, memberships = None, filter = None
     ))]
@@ -299,8 +300,8 @@ impl Scene {
         Ok(found)
     }
 
-    /// The states of all instances in the order of their ids: Instances(ids, shape, poses, velocities,
-    /// scale, world, memberships, filter), copied.
+    /// The states of all instances in the order of their ids: Instances(ids, shape, poses,
+    /// velocities, scale, world, memberships, filter), copied.
     #[getter]
     fn instances<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let scene = self.now();
@@ -319,25 +320,28 @@ impl Scene {
 
     /// All contacts up to the contact distance, as Contacts: arrays with a row for each contact.
     ///
-    /// Both orders of each pair of instances are tested: features of *a* against the signed distance of
-    /// *b*, and vice versa. The rows are sorted by world, instances, face and cell. The bytes do not
-    /// depend on the number of threads. Ctrl-C ends a detection with KeyboardInterrupt.
+    /// Both orders of each pair of instances are tested: features of *a* against the signed
+    /// distance of *b*, and vice versa. The rows are sorted by world, instances, face and cell. The
+    /// bytes do not depend on the number of threads. Ctrl-C ends a detection with
+    /// KeyboardInterrupt.
     ///
-    /// - mode: what is tested of a: "node" (its vertices), "edge" (vertices and convex edges), "face"
-    ///   (faces, by Frank-Wolfe iterations, as in the paper) or "exact" (faces, with the exact minimum).
-    /// - contacts_per: in the modes "face" and "exact", one contact for each "cell" of b that a face
-    ///   meets, as in the paper; or for each "face", with the extremes of flat contact; or of
+    /// - mode: what is tested of a: "node" (its vertices), "edge" (vertices and convex edges),
+    ///   "face" (faces, by Frank-Wolfe iterations, as in the paper) or "exact" (faces, with the
+    ///   exact minimum).
+    /// - contacts_per: in the modes "face" and "exact", one contact for each "cell" of b that a
+    ///   face meets, as in the paper; or for each "face", with the extremes of flat contact; or of
     ///   these only each local "minimum" over the surface.
     /// - contact_distance: contacts are reported up to this signed distance.
     /// - speculative_time: adds to the contact distance what the velocities close within this time.
-    /// - cos_theta: drops a contact of a face when the cosine between the gradient and the face's normal is above
-    ///   -cos_theta. None keeps all.
+    /// - cos_theta: drops a contact of a face when the cosine between the gradient and the face's
+    ///   normal is above -cos_theta. None keeps all.
     /// - iterations: number of Frank-Wolfe iterations in the mode "face".
-    /// - tolerance: largest error in the modes "exact" and "edge", in the world's unit. None is 1e-7 of the
-    ///   diagonal of b.
-    /// - reduce, deepest, spread: at most this many contacts for each pair of instances; only one of them. reduce
-    ///   finds all contacts and keeps those that matter most for forces and torques. deepest finds
-    ///   only the deepest. spread finds contacts that are spread over the places that touch.
+    /// - tolerance: largest error in the modes "exact" and "edge", in the world's unit. None is
+    ///   1e-7 of the diagonal of b.
+    /// - reduce, deepest, spread: at most this many contacts for each pair of instances; only one
+    ///   of them. reduce finds all contacts and keeps those that matter most for forces and
+    ///   torques. deepest finds only the deepest. spread finds contacts that are spread over the
+    ///   places that touch.
     /// - precision: "f64" or "f32", of distances, normals and points.
     /// - threads: number of threads; None is one per core.
     #[pyo3(signature = (**options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None)")]
@@ -391,11 +395,11 @@ impl Scene {
     /// The first time at which two moving instances touch: an Impact, or None if they stay apart
     /// until the end. It is never too late: nothing is sampled.
     ///
-    /// - velocity_a, velocity_b: [6], vx vy vz wx wy wz: velocity of the body's origin, and angular velocity
-    ///   about it in radians. The velocities of the instances are not used.
-    /// - screw_a, screw_b: [8], px py pz ax ay az omega pitch: a point and the direction of the axis,
-    ///   the angular speed in radians, and the travel along the axis for each turn. A body without
-    ///   velocity and screw rests.
+    /// - velocity_a, velocity_b: [6], vx vy vz wx wy wz: velocity of the body's origin, and angular
+    ///   velocity about it in radians. The velocities of the instances are not used.
+    /// - screw_a, screw_b: [8], px py pz ax ay az omega pitch: a point and the direction of the
+    ///   axis, the angular speed in radians, and the travel along the axis for each turn. A body
+    ///   without velocity and screw rests.
     /// - end: the motion is followed from time 0 to this time.
     /// - tolerance: bodies touch when they are at most this far apart, in the world's unit. None is
     ///   1e-6 of the smaller diagonal.
@@ -428,8 +432,9 @@ impl Scene {
         found.map(|impact| classes::report(py, "Impact", &impact)).transpose()
     }
 
-    /// Why contacts of two instances exist or not: what each stage of a detection did with the faces of a (in the
-    /// mode "node" its vertices, in the mode "edge" its vertices and edges) in the field of b. Returns a WhyReport.
+    /// Why contacts of two instances exist or not: what each stage of a detection did with the
+    /// faces of a (in the mode "node" its vertices, in the mode "edge" its vertices and edges) in
+    /// the field of b. Returns a WhyReport.
     ///
     /// part: the face, vertex or edge of a (as face_a or feature_a of a contact). None reports all
     /// candidates. The options are those of detect; the report is that before a reduction.

@@ -43,8 +43,8 @@ def collide(
 ) -> Contacts:
     """The contacts of two bodies, as the instances 0 and 1. As `tesdf collide A B`.
 
-    A body is an `Asset`, `Plane`, `Box`, `Sphere` or `Capsule`. Its pose has seven numbers,
-    x y z qx qy qz qw, or is a matrix [4, 4]; None is the identity. `Scene.detect` explains the options.
+    A body is an `Asset`, `Plane`, `Box`, `Sphere` or `Capsule`. Its pose has seven numbers, x y z
+    qx qy qz qw, or is a matrix [4, 4]; None is the identity. `Scene.detect` explains the options.
     """
     return _native.pair(a, b, pose_a, pose_b).detect(**options)
 

@@ -54,9 +54,9 @@ class Instances(_Rows):
 class Reductions(_Rows):
     """The loss from the reduction, a row for each pair of instances that touches.
 
-    Take any normal forces on all contacts of a pair, with total size F. Normal forces on the kept contacts with the
-    same total size can replace them. The sums of forces differ by at most `wrench_error` * F, the torques around
-    `center` by at most `wrench_error` * `length` * F.
+    Take any normal forces on all contacts of a pair, with total size F. Normal forces on the kept
+    contacts with the same total size can replace them. The sums of forces differ by at most
+    `wrench_error` * F, the torques around `center` by at most `wrench_error` * `length` * F.
     """
 
     instance_a: _Id
@@ -111,8 +111,8 @@ class CoarseContacts(_Rows):
 class Contacts(_Rows):
     """The contacts of a scene, sorted by world, instances, face and cell.
 
-    In each contact, *a* is the body that has the face, edge or vertex, and *b* is the body whose signed
-    distance field is used. Faces are numbered as in the source mesh, from 0.
+    In each contact, *a* is the body that has the face, edge or vertex, and *b* is the body whose
+    signed distance field is used. Faces are numbered as in the source mesh, from 0.
     """
 
     point_a: _Float
@@ -135,22 +135,23 @@ class Contacts(_Rows):
     instance_b: _Id
     """[N] the body whose field is used"""
     feature_a: _Id
-    """[N] face of a; in the mode "node", vertex of a; in the mode "edge", a vertex, or for an edge the
-    number of vertices + 3 * face + side"""
+    """[N] face of a; in the mode "node", vertex of a; in the mode "edge", a vertex, or for an edge
+    the number of vertices + 3 * face + side"""
     feature_b_kind: npt.NDArray[np.uint8]
     """[N] the closest feature of b: 0 for a vertex, 1 for an edge, 2 for a face"""
     feature_b: _Id
     """[N, 2] the vertex or face in the first column, or the two vertices of the edge, the lower id
     first; the unused number is 2^32 - 1"""
     converged: npt.NDArray[np.bool_]
-    """[N] whether it is proved that no point of the face or edge is deeper by more than the tolerance"""
+    """[N] whether it is proved that no point of the face or edge is deeper by more than the
+    tolerance"""
     statistics: DetectionStatistics
     """of the whole detection"""
     reductions: Reductions
     """for each pair of instances; without rows if nothing is reduced"""
     hidden: HiddenOverlaps
-    """pairs that overlap without a contact that shows it; contacts will not keep them apart. This happens in
-    the modes "node" and "edge", and for bodies in the same pose"""
+    """pairs that overlap without a contact that shows it; contacts will not keep them apart. This
+    happens in the modes "node" and "edge", and for bodies in the same pose"""
 
     def __repr__(self) -> str:
         overlaps = f", {len(self.hidden)} hidden overlaps" if len(self.hidden) else ""

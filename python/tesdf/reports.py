@@ -325,8 +325,8 @@ class DetectionStatistics:
     instance_pairs: int
     """ordered pairs of instances whose bounds overlap"""
     candidates: int
-    """faces, edges or vertices that remain after the broad phase; with `deepest` and `spread`, this and
-    all other numbers count what was looked at"""
+    """faces, edges or vertices that remain after the broad phase; with `deepest` and `spread`, this
+    and all other numbers count what was looked at"""
     polygons: int
     """pairs of a face and a cell, or of a vertex and its cell; with one contact per face, faces"""
     touching: int
@@ -346,9 +346,9 @@ class Clearance:
     """Signed distance of two bodies, in the unit and frame of the world."""
 
     distance: float
-    """Positive: the least distance between the surfaces. Negative: the bodies overlap; the lesser of the
-    two least signed distances of one surface to the other body. At most the tolerance above the true value if
-    `converged`"""
+    """Positive: the least distance between the surfaces. Negative: the bodies overlap; the lesser of
+    the two least signed distances of one surface to the other body. At most the tolerance
+    above the true value if `converged`"""
     lower_bound: float
     """the true value is between this and `distance`"""
     point_a: Point
@@ -376,8 +376,8 @@ class Impact(Clearance):
     iterations: int
     """number of steps taken"""
     touches: bool
-    """whether the bodies touch at `time`. False when the steps were used up: the motion is then known to be
-    free up to `time`"""
+    """whether the bodies touch at `time`. False when the steps were used up: the motion is then
+    known to be free up to `time`"""
 
 
 @dataclass(frozen=True)
@@ -394,8 +394,9 @@ class WhyPolygon:
     """the point with this distance"""
     face_b: int
     verdict: str
-    """"contact"; or why it is none: "cell_beyond" and "beyond" the contact distance, "filtered" by the cosine,
-    "descending" where local minima are wanted, or "at_end" of an edge, which is tested as a vertex"""
+    """"contact"; or why it is none: "cell_beyond" and "beyond" the contact distance, "filtered" by
+    the cosine, "descending" where local minima are wanted, or "at_end" of an edge, which is
+    tested as a vertex"""
     cosine: Optional[float]
     """of a filtered contact"""
 
@@ -421,8 +422,9 @@ class WhyReport:
     instance_b: int
     """the instance whose field is used"""
     pair: str
-    """"tested"; or why it was not: "same_instance", "other_worlds", "groups_do_not_meet", "excluded",
-    "both_planes" or "bounds_apart". The rest is reported as if the pair was tested"""
+    """"tested"; or why it was not: "same_instance", "other_worlds", "groups_do_not_meet",
+    "excluded", "both_planes" or "bounds_apart". The rest is reported as if the pair was
+    tested"""
     contact_distance: float
     """that of the options plus what velocities add"""
     bounds_gap: float

@@ -85,8 +85,8 @@ pub fn hidden_overlaps(
     Ok(among(&OrderedPair::all(scene, options)?, options.mode, contacts, &AtomicBool::new(false)))
 }
 
-/// The same for ordered pairs. The two orders of a pair must be adjacent. Once `stop` is set, overlaps
-/// are missing.
+/// The same for ordered pairs. The two orders of a pair must be adjacent. Once `stop` is set,
+/// overlaps are missing.
 pub fn among(
     pairs: &[OrderedPair],
     mode: Mode,
