@@ -8,8 +8,8 @@ use support::bodies::{Placed, RELATIONS, Relation, of_direction, scene};
 use support::per_face::{Detection, block};
 use support::random::Random;
 use tesdf::collide::{
-    CollideOptions, Contact, Contacts, ContactsPer, FeatureB, Instance, Mode, PolygonVerdict, Pose, Scene,
-    Shape, coarse_contacts, detect, why,
+    CollideOptions, Contact, Contacts, ContactsPer, FeatureB, Instance, Mode, Placement, PolygonVerdict,
+    Pose, Scene, Shape, coarse_contacts, detect, why,
 };
 use tesdf::glam::{DQuat, DVec3};
 
@@ -176,7 +176,34 @@ fn bodies_that_are_apart_have_their_least_distance_at_nodes_and_edges() {
     assert!(apart > 60 && between > 1000 && nodes > 1000, "{apart} {between} {nodes}");
 }
 
-/// Each contact of an edge is the least of samples of the edge, or an end of the part that is near.
+/// Compares the contacts of each edge with samples of the edge: none is lower than the lowest contact, or
+/// an end, which has a contact as a node. Returns the number of samples.
+fn compare_with_samples(bodies: &[Placed; 2], reach: f64, samples: u32) -> usize {
+    let size = bodies[0].diagonal().max(bodies[1].diagonal());
+    let all = found(&scene(bodies), reach);
+    let mut count = 0;
+    for [a, b] in [[0, 1], [1, 0]] {
+        let mut lowest: BTreeMap<u32, (f64, [DVec3; 2])> = BTreeMap::new();
+        for contact in of_direction(all.as_slice(), a as u32, b as u32) {
+            if let Some(ends) = edge(&bodies[a], contact) {
+                let known = lowest.entry(contact.feature.a).or_insert((f64::INFINITY, ends));
+                known.0 = known.0.min(contact.distance);
+                assert!(contact.converged, "{contact:?}");
+            }
+        }
+        for (distance, [p, q]) in lowest.into_values() {
+            let own = [p, q].map(|end| bodies[b].distance_by_tree(end));
+            let own = distance.min(own[0]).min(own[1]);
+            for k in 1..samples {
+                let sample = bodies[b].distance_by_tree(p.lerp(q, f64::from(k) / f64::from(samples)));
+                assert!(own <= sample + 2.0 * TOLERANCE * size, "{own} {sample}");
+                count += 1;
+            }
+        }
+    }
+    count
+}
+
 #[test]
 fn each_sharp_edge_has_its_least_distance() {
     let mut random = Random(37);
@@ -185,23 +212,50 @@ fn each_sharp_edge_has_its_least_distance() {
         for relation in [Relation::Touching, Relation::Deep, Relation::Apart, Relation::Touching] {
             let bodies = relation.place(names, &mut random);
             let size = bodies[0].diagonal().max(bodies[1].diagonal());
-            let all = found(&scene(&bodies), size);
-            for [a, b] in [[0, 1], [1, 0]] {
-                let mut lowest: BTreeMap<u32, (f64, [DVec3; 2])> = BTreeMap::new();
-                for contact in of_direction(all.as_slice(), a as u32, b as u32) {
-                    if let Some(ends) = edge(&bodies[a], contact) {
-                        let known = lowest.entry(contact.feature.a).or_insert((f64::INFINITY, ends));
-                        known.0 = known.0.min(contact.distance);
-                    }
-                }
-                for (distance, [p, q]) in lowest.into_values() {
-                    // The ends are contacts as nodes.
-                    let own = [p, q].map(|end| bodies[b].distance_by_tree(end));
-                    let own = distance.min(own[0]).min(own[1]);
-                    for k in 1..64 {
-                        let sample = bodies[b].distance_by_tree(p.lerp(q, f64::from(k) / 64.0));
-                        assert!(own <= sample + 2.0 * TOLERANCE * size, "{relation:?}: {own} {sample}");
-                        count += 1;
+            count += compare_with_samples(&bodies, size, 64);
+        }
+    }
+    assert!(count > 10_000, "{count}");
+}
+
+/// Needles through, in, along and beside a body, with edges from 1e-12 to 100 of its size.
+#[test]
+fn edges_of_needles_have_their_least_distances() {
+    let mut random = Random(43);
+    let mut count = 0;
+    for name in ["cube", "l_bracket", "torus_quads", "shaft_keyway", "bowl_overhang"] {
+        for length in [1e-12, 1e-3, 0.3, 2.0, 100.0] {
+            for _ in 0..4 {
+                let body = Placed::new(name, Placement { pose: Pose::IDENTITY, scale: 1.0 });
+                let size = body.diagonal();
+                let half = 0.5 * size * DVec3::new(length, 1e-3 * length.min(1e-3), 1e-3 * length.min(1e-3));
+                let mut needle = block(-half, half, 1);
+                let translation = body.body.center() + 0.3 * size * random.in_cube();
+                needle.at.pose = Pose { translation, rotation: support::bodies::rotation(&mut random) };
+                count += compare_with_samples(&[needle, body], 0.1 * size, 256);
+            }
+        }
+    }
+    assert!(count > 20_000, "{count}");
+}
+
+/// Needles parallel to the axes of a box have a constant depth over a part, or the same depth below two
+/// sides; others lie in a side, or just above or below it.
+#[test]
+fn edges_of_level_needles_have_their_least_distances() {
+    let half = DVec3::new(0.5, 0.3, 0.2);
+    let thin = DVec3::new(0.35, 1e-7, 1e-7);
+    let mut count = 0;
+    for divisions in [1, 4] {
+        let body = block(-half, half, divisions);
+        for turn in [0.0, 1e-9, 1e-4, 0.3] {
+            for y in [0.0, 0.1, 0.3] {
+                for z in [0.0, 0.1, 0.2 - 1e-6, 0.2, 0.2 + 1e-7, 0.2 + 1e-3] {
+                    for x in [0.0, 0.3, 0.85] {
+                        let mut needle = block(-thin, thin, 1);
+                        let rotation = DQuat::from_rotation_y(turn);
+                        needle.at.pose = Pose { translation: DVec3::new(x, y, z), rotation };
+                        count += compare_with_samples(&[needle, body.clone()], 0.01, 64);
                     }
                 }
             }
@@ -326,4 +380,23 @@ fn why_names_edges_and_their_ends() {
     assert_eq!((one.parts.len(), one.parts[0].id), (1, first.feature.a));
     assert_eq!(one.parts[0].polygons[0].verdict, PolygonVerdict::Contact);
     assert!(why(&scene, &options, ids[0], ids[1], Some(999)).is_err());
+}
+
+/// Two sides of the boxes are flush, so vertices and edges of each box lie on an edge of the other one.
+#[test]
+fn flush_boxes_push_each_other_up_along_their_common_edges() {
+    let half = DVec3::splat(0.05);
+    for divisions in [1, 3] {
+        let mut upper = block(-half, half, divisions);
+        upper.at.pose = Pose::at(DVec3::new(0.031, 0.0, 0.1));
+        let all = found(&scene(&[block(-half, half, divisions), upper]), 1e-6);
+        for contact in all.iter() {
+            assert!(contact.normal.z.abs() > 1.0 - 1e-9, "{contact:?}");
+        }
+        for [a, b] in [[0, 1], [1, 0]] {
+            let at_side =
+                of_direction(all.as_slice(), a, b).filter(|c| (c.point_a.y.abs() - 0.05).abs() < 1e-9);
+            assert!(at_side.count() >= 2);
+        }
+    }
 }

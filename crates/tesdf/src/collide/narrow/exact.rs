@@ -15,7 +15,7 @@ use crate::query::{Faces, Place, Precision, Surroundings};
 /// Nearer to the surface than this (local frame), a polygon may cross it. Where two faces cross,
 /// their computed distance is rarely 0 but about 1e-17, and the sign there may be either. This is
 /// far below any sensible tolerance.
-const CLEAR: f64 = 1e-9;
+pub const CLEAR: f64 = 1e-9;
 
 /// Where a whole face is deeper than this fraction of its radius, branch and bound over it drops the
 /// parts near the surface at once, and finds the deepest point faster than if the face was cut first.
@@ -167,7 +167,7 @@ const MAX_CUTS: usize = 64;
 
 /// A polygon, and the faces that can be nearest to its points. A ball contains the polygon.
 #[derive(Clone, Copy)]
-struct Query<'a> {
+pub struct Query<'a> {
     asset: &'a TeSdf,
     /// For a polygon in the whole field.
     around: Option<&'a Surroundings<'a>>,
@@ -183,7 +183,31 @@ struct Query<'a> {
     reach: f64,
 }
 
-impl Query<'_> {
+impl<'a> Query<'a> {
+    /// A segment in the whole field, which has no list: `none`.
+    pub fn of_segment(
+        around: &'a Surroundings<'a>,
+        none: &'a Faces,
+        polygon: &'a Polygon,
+        tolerance: f64,
+        reach: f64,
+    ) -> Self {
+        let center = polygon.center();
+        Self {
+            asset: around.asset,
+            around: Some(around),
+            place: Place::NotOfDomain,
+            faces: none,
+            polygon,
+            normal: DVec3::ZERO,
+            center,
+            radius: polygon.reach(center),
+            tolerance,
+            slack: 0.0,
+            reach,
+        }
+    }
+
     fn points(&self) -> ArrayVec<DVec3, MAX_VERTICES> {
         self.polygon.points().collect()
     }
@@ -191,7 +215,7 @@ impl Query<'_> {
     /// The least distance between the polygon and a face, within the tolerance, with the nearest
     /// point of the polygon and the face. `likely` is tested first. Infinite, with the centre of
     /// the ball and no face, when all faces are out of reach.
-    fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3, Option<u32>) {
+    pub fn nearest_to_faces(&self, likely: u32) -> (f64, DVec3, Option<u32>) {
         let points = &self.points();
         // Keeps all polygons that may cross the surface.
         let farthest = self.reach.max(0.0) + 2.0 * CLEAR;
@@ -292,6 +316,25 @@ impl Query<'_> {
             Parts::Across(above, below) => Some((above, below)),
             Parts::Above | Parts::Below => None,
         }
+    }
+
+    /// The places where a segment touches faces or passes through them, from 0 at its start to 1 at its
+    /// end, in order, each with a face.
+    pub fn crossings(&self) -> Vec<(f64, u32)> {
+        let points = &self.points();
+        let way = points[points.len() - 1] - points[0];
+        let mut crossings = Vec::new();
+        self.near(CLEAR, &mut |face| {
+            if !self.plane_is_beyond(points, face, CLEAR) {
+                let triangle = self.asset.local_triangle(face as usize);
+                let nearest = polygon_to_triangle(points, self.normal, &triangle, CLEAR);
+                crossings
+                    .extend(nearest.map(|(_, at)| (way.dot(at - points[0]) / way.length_squared(), face)));
+            }
+            CLEAR
+        });
+        crossings.sort_unstable_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        crossings
     }
 
     /// Whether the polygon, which is `distance` from the surface at `point`, only touches it along

@@ -3,6 +3,7 @@ mod branch_and_bound;
 mod exact;
 pub mod extremes;
 mod frank_wolfe;
+mod segment;
 
 use glam::DVec3;
 
@@ -109,9 +110,7 @@ impl Search {
             (Field::Mesh(_), _) => return true,
         };
         let cell = CellField::Whole(around);
-        let polygon = Polygon::new(part.points());
-        let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
-        exact::lowest(&cell, &polygon, part.plane_normal(), self.tolerance, reach, precision)
+        self.exact(&cell, &Polygon::new(part.points()), part, reach)
             .is_some_and(|found| !found.converged || cell.rough(found.point).0 <= reach + ROUNDING)
     }
 
@@ -262,6 +261,17 @@ impl Search {
         Minimum { corner, ..minimum }
     }
 
+    /// The lowest point of a polygon of a part, within the tolerance.
+    fn exact(&self, cell: &CellField, polygon: &Polygon, part: &Part, reach: f64) -> Option<Lowest> {
+        let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
+        match (self.mode, cell, part.points()) {
+            (Mode::Edge, CellField::Whole(around), &[start, end]) => {
+                segment::lowest(around, [start, end], self.tolerance, reach, precision)
+            }
+            _ => exact::lowest(cell, polygon, part.plane_normal(), self.tolerance, reach, precision),
+        }
+    }
+
     fn in_cell(
         &self,
         cell: &CellField,
@@ -276,10 +286,7 @@ impl Search {
             }
             Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true, face: None }),
             Mode::Face => frank_wolfe::lowest(cell, polygon, self.iterations, reach),
-            Mode::Edge | Mode::Exact => {
-                let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
-                exact::lowest(cell, polygon, part.plane_normal(), self.tolerance, reach, precision)
-            }
+            Mode::Edge | Mode::Exact => self.exact(cell, polygon, part, reach),
         }?;
         let Lowest { point, converged, face } = lowest;
         let normal = part.normal;
