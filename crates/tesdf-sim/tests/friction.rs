@@ -8,7 +8,7 @@ use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{MeshFormat, SolidMesh, read_bytes};
 use tesdf_sim::newton::{Newton, NewtonOptions};
-use tesdf_sim::{Dynamics, Mass, MassProperties, State, System, Wrench};
+use tesdf_sim::{Drive, Dynamics, Joint, JointKind, Mass, MassProperties, Motor, State, System, Wrench};
 
 const G: f64 = 9.81;
 
@@ -211,6 +211,50 @@ fn a_wedge_moves_blocks_when_the_balance_says_so() {
         match moves {
             true => assert!(way[0] > 1e-4 && way[1] < -1e-4, "{way:?}"),
             false => assert!(way[0].abs() < 1e-7 && way[1].abs() < 1e-7, "{way:?}"),
+        }
+    }
+}
+
+/// Two fingers, each with a motor of 20 N, hold a part that touches them from the start and nothing
+/// else. The motors have to push with all their force in the first step, however slow their targets
+/// are. Friction then holds 2 μ 20 N.
+#[test]
+fn motors_that_stall_push_with_all_their_force() {
+    let (friction, limit) = (0.5, 20.0);
+    for (velocity, share) in
+        [(1e-2, 0.97), (1e-4, 0.97), (1e-6, 0.97), (1e-8, 0.97), (1e-6, 1.03), (1e-8, 1.03)]
+    {
+        let mut system = System::new(DVec3::new(0.0, 0.0, -G));
+        let shape = Shape::Box { half_extents: DVec3::splat(0.02) };
+        let weight = share * 2.0 * friction * limit;
+        let mass = MassProperties::of_shape(&shape, 1.0, 1000.0).unwrap().with_mass(weight / G).unwrap();
+        let shape = system.add_shape(shape).unwrap();
+        let part = system.add("part", Instance::new(shape, Pose::IDENTITY), Mass::Free(mass)).unwrap();
+        system.set_friction(part, friction).unwrap();
+        let pad = Shape::Box { half_extents: DVec3::new(0.005, 0.03, 0.03) };
+        let mass = MassProperties::of_shape(&pad, 1.0, 2700.0).unwrap();
+        let pad = system.add_shape(pad).unwrap();
+        for side in [-1.0, 1.0] {
+            let pose = Pose::at(side * 0.025 * DVec3::X);
+            let finger = system.add(format!("finger {side}"), Instance::new(pad, pose), Mass::Free(mass));
+            let finger = finger.unwrap();
+            system.set_friction(finger, friction).unwrap();
+            let axis = Pose { rotation: DQuat::from_rotation_arc(DVec3::Z, -side * DVec3::X), ..pose };
+            let slider =
+                Joint::new("slider", JointKind::Slider, (None, finger), [Pose::IDENTITY, pose], axis);
+            let motor = Some(Motor { drive: Drive::Velocity(velocity), limit });
+            system.add_joint(Joint { motor, ..slider }).unwrap();
+        }
+        let mut engine = engine(system);
+        for step in 0..50 {
+            assert!(engine.step(5e-3).unwrap().converged, "target {velocity} m/s, step {step}");
+        }
+        let State { pose, linear, .. } = engine.system().states()[part];
+        if share < 1.0 {
+            assert!(pose.translation.z.abs() < 1e-7, "target {velocity} m/s: {pose:?}");
+        } else {
+            let slides = -G * (1.0 - 1.0 / share) * 0.25;
+            assert!((linear.z / slides - 1.0).abs() < 0.05, "target {velocity} m/s: {linear}, {slides}");
         }
     }
 }

@@ -32,6 +32,7 @@ struct Measure {
     bounds: [f64; 2],
     /// Stiffness of a spring, N/m or N m/rad; `None` where the row is rigid.
     stiffness: Option<f64>,
+    resistance: Resistance,
 }
 
 /// What the row brings to zero at the end of the step.
@@ -80,6 +81,7 @@ fn measures(joint: &Joint, poses: [Pose; 2], h: f64) -> Vec<Measure> {
         error: Error::Position(error),
         bounds: free,
         stiffness: None,
+        resistance: Resistance::Rigid,
     };
     let along = |d: DVec3| rigid(Direction::Along(d), d.dot(way));
     let about = |d: DVec3, turn: DVec3| rigid(Direction::About(d), d.dot(turn));
@@ -111,19 +113,23 @@ fn measures(joint: &Joint, poses: [Pose; 2], h: f64) -> Vec<Measure> {
             JointKind::Hinge => wrapped(coordinate - target),
             _ => coordinate - target,
         };
-        let (error, bounds, stiffness) = match motor.drive {
-            Drive::Velocity(rate) => (Error::Rate(rate), limit, None),
-            Drive::Position(target) => (Error::Position(from(target)), limit, None),
+        let (error, bounds, stiffness, resistance) = match motor.drive {
+            Drive::Velocity(rate) if motor.limit.is_finite() => {
+                (Error::Rate(rate), limit, None, Resistance::Motor)
+            }
+            Drive::Velocity(rate) => (Error::Rate(rate), limit, None, Resistance::Rigid),
+            Drive::Position(target) => (Error::Position(from(target)), limit, None, Resistance::Rigid),
             Drive::Force(force) => {
                 let force = force.clamp(-motor.limit, motor.limit);
-                (Error::Rate(0.0), [force; 2], None)
+                (Error::Rate(0.0), [force; 2], None, Resistance::Rigid)
             }
             // k (x + h ẋ) + d ẋ = (k h + d) (ẋ + k x / (k h + d)), at the end of the step.
             Drive::Spring { rest, stiffness: k, damping: d } => {
-                (Error::Rate(-k * from(rest) / (k * h + d)), limit, Some(k + d / h))
+                let rate = -k * from(rest) / (k * h + d);
+                (Error::Rate(rate), limit, Some(k + d / h), Resistance::Spring)
             }
         };
-        found.push(Measure { direction: axis, error, bounds, stiffness });
+        found.push(Measure { direction: axis, error, bounds, stiffness, resistance });
     }
     found
 }
@@ -160,7 +166,7 @@ fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f6
         relaxed_gap: gap,
         stiffness: measure.stiffness.unwrap_or(STIFFER / (weight * softness)),
         bounds: measure.bounds,
-        resistance: if measure.stiffness.is_some() { Resistance::Spring } else { Resistance::Rigid },
+        resistance: measure.resistance,
         friction: None,
     }
 }

@@ -74,6 +74,10 @@ const LAG: f64 = 3e-3;
 /// Limits of friction below this share of the forces that would stop the bodies do not matter.
 const NO_LIMIT: f64 = 1e-6;
 
+/// A stalled motor may exceed its target by this multiple of the greatest way by which other rows give
+/// way: in the first minimisations, all bodies between two fingers give way under their pushes.
+const EXCESS: f64 = 100.0;
+
 /// A contact is nearly closed when its gap is at most this share of the way by which it differs between
 /// the velocities of the start and those without contacts.
 const NEAR: f64 = 0.1;
@@ -147,8 +151,7 @@ struct Part<'a> {
 
 impl Part<'_> {
     fn start(&self, velocity: Vec<Vector6<f64>>) -> Iterate {
-        let deflections =
-            self.springs.iter().map(|s| s.deflection(&velocity, self.problem.time_step)).collect();
+        let deflections = self.springs.iter().map(|s| s.start(&velocity, self.problem.time_step)).collect();
         let has_friction = self.springs.iter().any(|s| s.friction.is_some());
         let grips = if has_friction { Grips::Follow } else { Grips::Stay };
         Iterate { velocity, deflections, stiffening: 1.0, grips }
@@ -230,15 +233,22 @@ impl Part<'_> {
         if change > 0.0 { change / all.max(least) } else { 0.0 }
     }
 
-    /// Gives each rigid row its present force as the force at zero deflection, and stiffens it.
+    /// Gives each rigid row its present force as the force at zero deflection, and stiffens it. A
+    /// stalled motor that exceeds its target becomes a row again.
     fn raise(&self, at: &mut Iterate) {
         let stiffest = match at.grips {
             Grips::Follow => STIFFEST_UNSETTLED,
             Grips::Stay => STIFFEST,
         };
         let factor = STIFFENING.min(stiffest / at.stiffening);
+        let others = self.springs.iter().zip(&at.deflections).filter(|(_, d)| !d.is_stalled());
+        let worst = others.map(|(s, d)| s.error(d, at.stiffening)[0]).fold(0.0, f64::max);
         for (spring, deflection) in self.springs.iter().zip(&mut at.deflections) {
+            let exceeds = spring.excess(deflection) > EXCESS * worst;
             spring.keep(deflection, at.stiffening, factor, at.grips);
+            if exceeds {
+                deflection.release();
+            }
         }
         at.stiffening *= factor;
     }

@@ -6,6 +6,9 @@ use super::integrate::{pack, unpack};
 use super::linear::BlockMatrix;
 use super::rows::{Friction, Resistance, Row};
 
+/// A motor that exceeds its target by this share does not stall at first.
+const FASTER: f64 = 0.1;
+
 /// A row whose bodies are indices within the island. It has only what a minimisation reads, because
 /// all springs are read many times.
 #[derive(Clone, Debug)]
@@ -36,6 +39,8 @@ pub struct Deflection {
     /// The limit of the friction force, N. It lags: it follows from the push of the contact in the
     /// minimisation before.
     grip: f64,
+    /// The force of a motor that stalls, N or N m; 0 for all others.
+    stall: f64,
 }
 
 /// Whether the limits of friction follow the pushes of the contacts.
@@ -66,6 +71,18 @@ impl Spring {
         Deflection { gap: self.gap + change.gap, slip: way + change.slip, ..Deflection::default() }
     }
 
+    /// The deflection from which a minimisation starts at `velocity`. A motor stalls at first where its
+    /// target is so slow that, as a spring, it would not reach its limit. Its force would build up over
+    /// several minimisations, and a part that is held by this force alone would slip before.
+    pub fn start(&self, velocity: &[Vector6<f64>], h: f64) -> Deflection {
+        let at = self.deflection(velocity, h);
+        let [_, limit] = self.bounds;
+        let is_slow = self.stiffness * self.gap.abs() < limit;
+        let is_faster = at.gap * self.gap <= -FASTER * self.gap * self.gap;
+        let stalls = self.resistance == Resistance::Motor && is_slow && !is_faster;
+        Deflection { stall: if stalls { limit.copysign(-self.gap) } else { 0.0 }, ..at }
+    }
+
     /// What `velocity` adds to the deflection in `h` seconds.
     pub fn change(&self, velocity: &[Vector6<f64>], h: f64) -> Change {
         let slip = |friction: &Friction| {
@@ -92,7 +109,7 @@ impl Spring {
     }
 
     fn is_rigid(&self) -> bool {
-        self.resistance == Resistance::Rigid
+        self.resistance != Resistance::Spring
     }
 
     fn stiffening(&self, stiffening: f64) -> f64 {
@@ -103,6 +120,9 @@ impl Spring {
     /// opposite sign.
     #[inline]
     pub fn force(&self, at: &Deflection, stiffening: f64) -> (f64, f64) {
+        if at.is_stalled() {
+            return (at.stall, 0.0);
+        }
         let stiffness = self.stiffness * self.stiffening(stiffening);
         let [least, most] = self.bounds;
         match -stiffness * at.gap {
@@ -187,6 +207,9 @@ impl Spring {
             return [0.0; 2];
         }
         let force = self.force(at, stiffening).0 / (self.stiffness * stiffening);
+        if at.is_stalled() {
+            return [self.excess(at), force.abs()];
+        }
         let mut error = [(force - at.compression).abs(), force.abs()];
         if let (Some(friction), Some((force, _))) = (&self.friction, self.friction(at, stiffening)) {
             let force = force / (friction.stiffness * stiffening);
@@ -199,6 +222,11 @@ impl Spring {
     pub fn grips(&self, at: &Deflection, stiffening: f64) -> Option<[f64; 2]> {
         let friction = self.friction.as_ref()?;
         Some([friction.coefficient * self.force(at, stiffening).0, at.grip])
+    }
+
+    /// The way by which a stalled motor exceeds its target, m or rad; 0 for all others.
+    pub fn excess(&self, at: &Deflection) -> f64 {
+        if at.is_stalled() { ((at.gap + at.compression) * at.stall.signum()).max(0.0) } else { 0.0 }
     }
 
     /// Keeps the present forces of a rigid row as the forces at zero deflection when all rigid rows
@@ -230,6 +258,17 @@ impl Deflection {
     #[inline]
     pub fn after(&self, change: &Change, share: f64) -> Self {
         Self { gap: self.gap + share * change.gap, slip: self.slip + share * change.slip, ..*self }
+    }
+
+    /// Whether this is a motor that pushes with its limit, whatever its rate.
+    #[inline]
+    pub fn is_stalled(&self) -> bool {
+        self.stall != 0.0
+    }
+
+    /// Makes a stalled motor a row again.
+    pub fn release(&mut self) {
+        self.stall = 0.0;
     }
 
     /// The force that the row keeps, as a compression; used by tests.
