@@ -189,9 +189,9 @@ fn a_cylinder_rests_on_its_end() {
     bodies.rest(0.0, 10.0);
 }
 
-/// The stack of the repository for 0.1 s.
-fn stack_scene(change: impl FnOnce(&mut LoadedScene)) -> Summary {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/stack.toml");
+/// A scene of the repository for 0.1 s.
+fn scene(name: &str, change: impl FnOnce(&mut LoadedScene)) -> Summary {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name);
     let mut loaded = LoadedScene::read(&path).unwrap();
     loaded.scene.duration = 0.1;
     change(&mut loaded);
@@ -200,18 +200,33 @@ fn stack_scene(change: impl FnOnce(&mut LoadedScene)) -> Summary {
 }
 
 #[test]
-fn the_scene_meets_its_criterion_only_with_contacts() {
-    let summary = stack_scene(|_| {});
+fn the_stack_meets_its_criterion_only_with_contacts() {
+    let summary = scene("stack.toml", |_| {});
     assert_eq!(summary.passed, Some(true), "{summary:?}");
     let rest = summary.rest.unwrap();
     assert!(rest.drift > 0.0 && rest.drift < 1e-9, "{rest:?}");
 
-    let summary = stack_scene(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let summary = scene("stack.toml", |loaded| loaded.scene.detector.mode = DetectorMode::Off);
     assert_eq!(summary.passed, Some(false));
     let rest = summary.rest.unwrap();
     assert!(rest.drift > 0.04 && rest.failures[0].contains("drifts by"), "{rest:?}");
 
     // A run that ends before the bodies have settled shows nothing.
-    let summary = stack_scene(|loaded| loaded.scene.criterion.rest.as_mut().unwrap().after = 1.0);
+    let summary = scene("stack.toml", |loaded| loaded.scene.criterion.rest.as_mut().unwrap().after = 1.0);
     assert!(summary.rest.unwrap().failures[0].contains("no step after 1 s"));
+}
+
+/// Bricks in running bond, each on two others, for a second. `tesdf simulate scenes/brick-wall.toml`
+/// runs ten.
+#[test]
+fn the_wall_meets_its_criterion_only_with_contacts() {
+    let summary = scene("brick-wall.toml", |loaded| loaded.scene.duration = 1.0);
+    assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");
+    let rest = summary.rest.unwrap();
+    // A constant force moves a body by the square of the time.
+    assert!(rest.drift < DRIFT * 0.01 && rest.energy_gain < ROUNDING, "{rest:?}");
+
+    let summary = scene("brick-wall.toml", |loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let rest = summary.rest.unwrap();
+    assert!(rest.drift > 0.04 && rest.failures[0].contains("drifts by"), "{rest:?}");
 }
