@@ -28,5 +28,9 @@ step "$env/bin/python" "${pip[@]}" "$wheels"/*.whl -r python/tests/requirements.
 # The tests compare contacts with those of the command.
 CARGO_PROFILE_DEV_OPT_LEVEL=2 step cargo build --quiet --locked -p tesdf-cli --bin tesdf
 TESDF_CLI=${CARGO_TARGET_DIR:-$PWD/target}/debug/tesdf step "$env/bin/python" -m pytest python/tests
+# Each example checks what it shows.
+for example in examples/python/*.py; do
+    step "$env/bin/python" "$example"
+done
 # Compares the stubs with the module. The tests use the module as the stubs describe it.
 step "$env/bin/python" -m mypy.stubtest tesdf

@@ -1,0 +1,256 @@
+"""Contacts in MuJoCo: which bodies meet, what its solver gets, and what bodies do."""
+
+import mujoco
+import numpy as np
+import pytest
+import tesdf
+import tesdf.mujoco
+from conftest import DATA
+
+PARTS = DATA / "procedural"
+
+# The bolt stands on its head, and the nut is threaded on by 4 mm.
+SCREW = f"""
+<mujoco>
+  <option timestep="0.002" integrator="implicitfast" cone="elliptic"/>
+  <size memory="100M"/>
+  <asset>
+    <mesh name="bolt" file="{PARTS}/iso_m16_bolt_6k.obj"/>
+    <mesh name="nut" file="{PARTS}/iso_m16_nut_c100.obj"/>
+  </asset>
+  <worldbody>
+    <body pos="0 0 0.04" quat="0 1 0 0"><geom name="bolt" type="mesh" mesh="bolt" condim="1"/></body>
+    <body name="nut" pos="0 0 0.036" quat="0 1 0 0">
+      <freejoint/>
+      <geom name="nut" type="mesh" mesh="nut" density="7850" condim="1"/>
+    </body>
+  </worldbody>
+</mujoco>"""
+
+CUBE = f"""
+<mujoco>
+  <option timestep="0.002"/>
+  <asset><mesh name="cube" file="{PARTS}/cube.obj" scale="5 5 5"/></asset>
+  <worldbody>
+    <geom name="floor" type="plane" size="1 1 0.1" friction="0.8"/>
+    <geom name="wall" type="box" size="0.01 1 1" pos="-1 0 0"/>
+    <body name="cube" pos="0 0 0.05"><freejoint/><geom name="cube" type="mesh" mesh="cube" friction="0.5 0.01 0.001"/></body>
+  </worldbody>
+</mujoco>"""
+
+
+def model_of(text):
+    model = mujoco.MjModel.from_xml_string(text)
+    return model, mujoco.MjData(model)
+
+
+@pytest.fixture(scope="module")
+def screw():
+    return {
+        "bolt": tesdf.encode(PARTS / "iso_m16_bolt_6k.obj", "fast"),
+        "nut": tesdf.encode(PARTS / "iso_m16_nut_c100.obj", "fast"),
+    }
+
+
+@pytest.fixture(scope="module")
+def cube():
+    return tesdf.encode(PARTS / "cube.obj", "fast")
+
+
+def test_the_nut_turns_down_the_bolt(screw):
+    model, data = model_of(SCREW)
+    contacts = tesdf.mujoco.Contacts(model, screw)
+    mujoco.mj_forward(model, data)
+    nut = model.body("nut").id
+    axes = np.zeros(9)
+    mujoco.mju_quat2Mat(axes, model.body_iquat[nut])
+    inertia = axes.reshape(3, 3)[2] ** 2 @ model.body_inertia[nut]
+    # Travel of an ideal screw of 2 mm pitch.
+    ideal = 9.81 / (1 + inertia / model.body_mass[nut] * (2 * np.pi / 2e-3) ** 2) * 0.2**2 / 2
+    start, turned = data.xpos[nut, 2], 0.0
+    while data.time < 0.2 - 1e-9:
+        contacts.step(model, data)
+        turned += data.qvel[5] * model.opt.timestep / (2 * np.pi)
+    travel = start - data.xpos[nut, 2]
+    assert len(contacts.last) > 1000 and 0.9 < travel / ideal < 1.4
+    # Up to the play of the thread.
+    assert turned > 0.08 and abs(travel - turned * 2e-3) < 1.2e-4, (travel, turned)
+    assert contacts.scene.clearance(0, 1).distance > -1e-6
+    # Without contacts it falls.
+    while data.time < 0.22:
+        mujoco.mj_step(model, data)
+    assert data.qvel[2] < -0.15
+
+
+def test_geoms_are_where_mujoco_has_them():
+    """The compiler moves and turns a mesh; its vertices are back in the coordinates of the file."""
+    model, data = model_of(f"""
+    <mujoco>
+      <asset><mesh name="part" file="{PARTS}/l_bracket.obj" scale="2 2 2"/></asset>
+      <worldbody>
+        <body pos="0.3 -0.1 0.2" euler="20 30 40"><freejoint/><geom name="part" type="mesh" mesh="part" pos="0.1 0 0" euler="5 6 7"/></body>
+        <geom name="ball" type="sphere" size="0.1"/>
+      </worldbody>
+    </mujoco>""")
+    asset = tesdf.encode(PARTS / "l_bracket.obj", "fast")
+    contacts = tesdf.mujoco.Contacts(model, {"part": asset, "ball": None})
+    data.qvel[:] = [1, 2, 3, 4, 5, 6]
+    mujoco.mj_forward(model, data)
+    contacts.detect(model, data)
+    instances = contacts.scene.instances
+    x, y, z, w = instances.poses[0, 3:]
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, np.array([w, x, y, z]))
+    of_file = 2 * asset.vertices @ rotation.reshape(3, 3).T + instances.poses[0, :3]
+    geom = model.geom("part").id
+    of_model = model.mesh_vert @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+    # The compiler keeps f32, and orders vertices in its own way.
+    assert len(of_model) == len(of_file)
+    apart = np.linalg.norm(of_file[:, None] - of_model[None], axis=2)
+    assert apart.min(axis=0).max() < 1e-6 and apart.min(axis=1).max() < 1e-6
+    # The velocity of the origin of the file, from a small step.
+    before, h = instances.poses[0, :3].copy(), 1e-6
+    mujoco.mj_integratePos(model, data.qpos, data.qvel, h)
+    mujoco.mj_forward(model, data)
+    falling = model.opt.gravity * model.opt.timestep
+    contacts.detect(model, data)
+    moved = (contacts.scene.instances.poses[0, :3] - before) / h
+    assert np.allclose(moved + falling, instances.velocities[0, :3], atol=1e-4)
+    assert np.allclose(contacts.scene.instances.poses[1], [0, 0, 0, 0, 0, 0, 1])
+
+
+def test_the_solver_gets_the_contacts_of_the_scene(screw):
+    model, data = model_of(SCREW)
+    contacts = tesdf.mujoco.Contacts(model, screw, contact_distance=3e-4)
+    mujoco.mj_step1(model, data)
+    count = contacts.add(model, data)
+    found, given = contacts.last, data.contact
+    assert count == len(found) == data.ncon > 1000
+    again = contacts.scene.detect(mode="node", contact_distance=3e-4, speculative_time=1.2 * 0.002)
+    for name, array in found.arrays().items():
+        assert (array == getattr(again, name)).all(), name
+    geoms = np.array([model.geom("bolt").id, model.geom("nut").id])
+    assert (given.dist == found.distance).all()
+    assert (given.geom1 == geoms[found.instance_b]).all() and (given.geom2 == geoms[found.instance_a]).all()
+    frames = given.frame.reshape(-1, 3, 3)
+    # From the first geom to the second one, in a right-handed frame.
+    assert (frames[:, 0] == found.normal).all()
+    assert np.allclose(frames @ frames.transpose(0, 2, 1), np.eye(3), atol=1e-12)
+    assert np.allclose(np.linalg.det(frames), 1)
+    assert np.allclose(given.pos, (found.point_a + found.point_b) / 2, atol=0)
+    assert (given.dim == 1).all() and (given.exclude == 0).all()
+    mujoco.mj_makeConstraint(model, data)
+    assert data.nefc == count and (data.contact.efc_address == np.arange(count)).all()
+
+
+def test_a_cube_rests_on_a_plane(cube):
+    model, data = model_of(CUBE)
+    contacts = tesdf.mujoco.Contacts(model, {"cube": cube, "floor": None, "wall": None})
+    mujoco.mj_step1(model, data)
+    assert contacts.add(model, data) == 4 and data.ncon == 4
+    assert np.allclose(data.contact.friction, [0.8, 0.8, 0.01, 0.001, 0.001])
+    while data.time < 0.5:
+        contacts.step(model, data)
+    assert np.allclose(data.qpos, [0, 0, 0.05, 1, 0, 0, 0], atol=1e-6)
+    # Nothing else finds contacts of it.
+    while data.time < 0.6:
+        mujoco.mj_step(model, data)
+    assert data.qpos[2] < 0.03
+
+
+def test_a_push_is_held_up_to_the_limit_of_friction(cube):
+    model, data = model_of(CUBE.replace('"0.8"', '"0.5"'))
+    weight = model.body_mass[model.body("cube").id] * 9.81
+    for share, moves in [(0.4, False), (0.6, True)]:
+        mujoco.mj_resetData(model, data)
+        contacts = tesdf.mujoco.Contacts(model, {"cube": cube, "floor": None})
+        while data.time < 0.2:
+            data.xfrc_applied[1, 0] = share * weight
+            contacts.step(model, data)
+        assert (data.qpos[0] > 1e-3) == moves, data.qpos
+
+
+def test_solref_of_the_model_and_of_the_caller(cube):
+    model, data = model_of(CUBE.replace('type="plane"', 'type="plane" solref="0.03 1"'))
+    for given, expected in [
+        ("model", [0.025, 1]),
+        ((-100.0, -3.0), [-100, -3]),
+        ("rigid", [-0.9 / 0.002**2, -0.9 / 0.002]),
+    ]:
+        mujoco.mj_step1(model, data)
+        tesdf.mujoco.Contacts(model, {"cube": cube, "floor": None}, solref=given).add(model, data)
+        assert np.allclose(data.contact.solref, expected), given
+
+
+def test_bodies_that_do_not_meet(cube):
+    text = """
+    <mujoco>
+      <asset><mesh name="cube" file="{parts}/cube.obj"/></asset>
+      <worldbody>
+        <geom name="fixed" type="mesh" mesh="cube"/>
+        <geom name="fixed2" type="mesh" mesh="cube" pos="0.01 0 0"/>
+        <body name="a"><freejoint/><geom name="a" type="mesh" mesh="cube" pos="0.001 0 0"/>
+          <geom name="a2" type="mesh" mesh="cube" pos="0.002 0 0"/>
+          <body name="b"><joint type="hinge"/><geom name="b" type="mesh" mesh="cube" pos="0 0.001 0"/>
+            <body name="c"><joint type="hinge"/><geom name="c" type="mesh" mesh="cube" pos="0 0.002 0"/></body>
+          </body>
+        </body>
+        <body name="d"><freejoint/><geom name="d" type="mesh" mesh="cube" pos="0 0 0.001"/></body>
+        <body name="e"><freejoint/><geom name="e" type="mesh" mesh="cube" pos="0 0 0.002"/></body>
+      </worldbody>
+      <contact><exclude body1="d" body2="e"/></contact>
+    </mujoco>""".format(parts=PARTS)
+    model, data = model_of(text)
+    names = ["fixed", "fixed2", "a", "a2", "b", "c", "d", "e"]
+    # What MuJoCo itself says of these geoms.
+    mujoco.mj_forward(model, data)
+    pairs = {tuple(sorted(pair)) for pair in data.contact.geom.tolist()}
+    assert len(pairs) == 22
+    contacts = tesdf.mujoco.Contacts(model, dict.fromkeys(names, cube))
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 0
+    found = contacts.detect(model, data)
+    ids = np.array([model.geom(name).id for name in names])
+    ours = {tuple(sorted(pair)) for pair in np.stack([ids[found.instance_a], ids[found.instance_b]], 1).tolist()}
+    assert ours == pairs
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"geoms": {"nut": None, "floor": None}}, "geoms has no asset"),
+        ({"geoms": {"screw": "cube"}}, "there is no geom 'screw'; the named ones are ['floor', 'wall', 'cube']"),
+        ({"geoms": {"floor": "cube"}}, "geom 'floor' is a plane; an asset needs a mesh geom"),
+        ({"geoms": {"cube": "torus"}}, "geom 'cube': its mesh spans"),
+        ({"geoms": {"cube": "cube", "wall": None}, "solref": "soft"}, "solref: 'soft'; expected 'rigid', 'model'"),
+        ({"geoms": {"cube": "cube"}, "solref": (1.0, 2.0, 3.0)}, "expected 'rigid', 'model' or two numbers"),
+    ],
+)
+def test_what_does_not_fit_is_an_error(change, expected, cube, asset):
+    model, _ = model_of(CUBE)
+    assets = {"cube": cube, "torus": asset}
+    geoms = {name: assets.get(value) for name, value in change.pop("geoms").items()}
+    with pytest.raises(ValueError) as error:
+        tesdf.mujoco.Contacts(model, geoms, **change)
+    assert expected in str(error.value)
+
+
+def test_other_errors(cube, screw):
+    model, data = model_of(CUBE)
+    contacts = tesdf.mujoco.Contacts(model, {"cube": cube, "floor": None})
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    with pytest.raises(ValueError, match="RK4"):
+        contacts.step(model, data)
+    model, data = model_of(CUBE.replace('scale="5 5 5"', 'scale="5 5 4"'))
+    with pytest.raises(ValueError, match="scale"):
+        tesdf.mujoco.Contacts(model, {"cube": cube})
+    model, data = model_of(CUBE)
+    mujoco.mj_forward(model, data)
+    with pytest.raises(ValueError, match="mode: 'corner'"):
+        tesdf.mujoco.Contacts(model, {"cube": cube}, mode="corner").detect(model, data)
+    model, data = model_of(SCREW.replace('"100M"', '"1M"'))
+    contacts = tesdf.mujoco.Contacts(model, screw)
+    mujoco.mj_step1(model, data)
+    with pytest.raises(ValueError, match="do not fit the model's memory of 1048576 bytes"):
+        contacts.add(model, data)
+    assert data.ncon == 0
