@@ -26,7 +26,8 @@ CARGO_PROFILE_DEV_OPT_LEVEL=2 step "$tools/bin/maturin" build --quiet --profile 
 step "$python" -m venv --clear "$env"
 step "$env/bin/python" "${pip[@]}" "$wheels"/*.whl -r python/tests/requirements.txt
 # The tests compare contacts with those of the command.
-CARGO_PROFILE_DEV_OPT_LEVEL=2 step cargo build --quiet --locked -p tesdf-cli --bin tesdf
+# With the features of the tests, which take the same crates.
+CARGO_PROFILE_DEV_OPT_LEVEL=2 step cargo build --quiet --locked --workspace $features --bin tesdf
 TESDF_CLI=${CARGO_TARGET_DIR:-$PWD/target}/debug/tesdf step "$env/bin/python" -m pytest python/tests
 # Each example checks what it shows.
 for example in examples/python/*.py; do
