@@ -16,6 +16,7 @@
 //! - [`script`]: keyframes of kinematic bodies, motors and wrenches.
 //! - [`scene_file`]: scenes as TOML files.
 //! - [`criterion`]: what makes a run a success.
+//! - [`Run`]: a run that is made step by step.
 //! - [`record`]: run files.
 //!
 //! Units are SI: metres, kilograms, seconds, radians. Everything is deterministic: on one kind of
@@ -37,5 +38,5 @@ pub use dynamics::{Dynamics, DynamicsError, StepReport};
 pub use joint::{Drive, Joint, JointKind, Motor};
 pub use mass::{MassError, MassProperties};
 pub use record::{HiddenPair, InterruptedRun, RunJournal, RunOrigin, RunRecord};
-pub use simulate::{Moment, PartialRun, SimulateError, Summary, simulate, simulate_from};
+pub use simulate::{Moment, PartialRun, Run, SimulateError, Summary, simulate, simulate_from};
 pub use system::{Body, Mass, State, System, Wrench};

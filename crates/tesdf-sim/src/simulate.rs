@@ -163,85 +163,143 @@ pub fn simulate_from(
     run: PartialRun,
     mut watch: impl FnMut(&Moment<'_>) -> ControlFlow<()>,
 ) -> Result<(RunRecord, Summary), SimulateError> {
-    let h = scene.time_step;
-    let steps = scene.steps()?;
-    let Start { mut trackers, scripts, energy } = replay(scene, engine.system(), &run.record)?;
-    let PartialRun { mut record, mut totals } = run;
-    record.reserve(steps).map_err(|_| LimitError::memory(steps, record.bodies.len()))?;
-    record.plan(Some(steps));
-    for step in record.steps()..steps {
-        let failed = |source| SimulateError::Step { step, source };
-        scripts.drive(engine, step as f64 * h, h).map_err(failed)?;
-        let report = engine.step(h).map_err(failed)?;
-        let (system, time) = (engine.system(), (step + 1) as f64 * h);
-        record.push(time, system);
-        let every = u64::from(scene.record.contacts_every);
-        if every > 0 && step % every == 0 {
-            record.push_contacts(step, engine.contacts(), system);
-        }
-        trackers.observe(system, h);
-        totals.add(&report);
-        record.push_hidden(step, engine.hidden(), system);
-        let moment = Moment { step: step + 1, steps, time, report, system, record: &record };
+    let mut run = Run::new(scene, engine.system(), run)?;
+    while !run.is_complete() {
+        let moment = run.step(engine)?;
         if watch(&moment).is_break() {
-            return Err(SimulateError::Interrupted { steps: step + 1 });
+            return Err(SimulateError::Interrupted { steps: moment.step });
         }
     }
-    record.plan(None);
-    let system = engine.system();
-    let hidden = record.hidden_pairs();
-    let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
-    let mut reports = trackers.report(system, &messages);
-    let passed = reports.passed();
-    let Reports { screw, rest, insertion, lift, gear_ratio, separation } = reports;
-    let sums = totals.summary();
-    let depths = hidden.iter().map(|pair| pair.depth);
-    let (momentum, angular_momentum) = system.momentum();
-    let summary = Summary {
-        momentum: momentum.to_array(),
-        angular_momentum: angular_momentum.to_array(),
-        joint_drift: trackers.drift(system),
-        seconds: steps as f64 * h,
-        kinetic_energy: system.kinetic_energy(),
-        released_energy: energy - system.potential_energy(),
-        passed,
-        screw,
-        rest,
-        insertion,
-        lift,
-        gear_ratio,
-        separation,
-        deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
-        hidden,
-        ..sums
-    };
-    Ok((record, summary))
+    let summary = run.summary(engine.system());
+    Ok((run.into_record(), summary))
 }
 
-/// What a run needs besides its engine.
-struct Start {
-    /// The trackers after the recorded steps.
+/// A run that is made step by step. [`simulate_from`] makes all steps.
+#[derive(Clone, Debug)]
+pub struct Run {
+    record: RunRecord,
+    totals: Totals,
+    /// The trackers after the steps so far.
     trackers: Trackers,
     scripts: Scripts,
     /// Energy at time 0, J.
     energy: f64,
+    time_step: f64,
+    /// Number of steps of the whole run.
+    steps: u64,
+    /// Contacts are recorded every so many steps; 0 records none.
+    contacts_every: u64,
 }
 
-fn replay(scene: &SceneFile, system: &System, record: &RunRecord) -> Result<Start, SimulateError> {
-    let mut system = system.clone();
-    let show = |system: &mut System, step: u64| {
-        let states = record.states(step as usize).unwrap_or_default();
-        system.set_states(states).map_err(|source| SimulateError::Step { step, source })
-    };
-    show(&mut system, 0)?;
-    let energy = system.kinetic_energy() + system.potential_energy();
-    let scripts = Scripts::new(&scene.scripts, &system).map_err(SimulateError::Script)?;
-    let mut trackers = Trackers::new(&scene.criterion, &system).map_err(SimulateError::Criterion)?;
-    for step in 1..=record.steps() {
-        show(&mut system, step)?;
-        trackers.observe(&system, scene.time_step);
+impl Run {
+    /// Continues `run`, a run of `scene`. `system` is that of the engine that will make the steps,
+    /// which must have the states of the last step of `run`.
+    ///
+    /// # Errors
+    /// The scene exceeds a limit, or its criterion or a script does not match.
+    pub fn new(scene: &SceneFile, system: &System, run: PartialRun) -> Result<Self, SimulateError> {
+        let steps = scene.steps()?;
+        let PartialRun { mut record, totals } = run;
+        let mut system = system.clone();
+        let show = |system: &mut System, step: u64| {
+            let states = record.states(step as usize).unwrap_or_default();
+            system.set_states(states).map_err(|source| SimulateError::Step { step, source })
+        };
+        show(&mut system, 0)?;
+        let energy = system.kinetic_energy() + system.potential_energy();
+        let scripts = Scripts::new(&scene.scripts, &system).map_err(SimulateError::Script)?;
+        let mut trackers = Trackers::new(&scene.criterion, &system).map_err(SimulateError::Criterion)?;
+        for step in 1..=record.steps() {
+            show(&mut system, step)?;
+            trackers.observe(&system, scene.time_step);
+        }
+        record.reserve(steps).map_err(|_| LimitError::memory(steps, record.bodies.len()))?;
+        record.plan(Some(steps));
+        let contacts_every = u64::from(scene.record.contacts_every);
+        Ok(Self {
+            record,
+            totals,
+            trackers,
+            scripts,
+            energy,
+            time_step: scene.time_step,
+            steps,
+            contacts_every,
+        })
     }
-    Ok(Start { trackers, scripts, energy })
+
+    /// Makes one step with `engine`. The scene's duration does not limit the number of steps.
+    ///
+    /// # Errors
+    /// [`SimulateError::Step`]; the record then ends before the step.
+    pub fn step<'a>(&'a mut self, engine: &'a mut dyn Dynamics) -> Result<Moment<'a>, SimulateError> {
+        let (step, h) = (self.record.steps(), self.time_step);
+        let failed = |source| SimulateError::Step { step, source };
+        self.scripts.drive(engine, step as f64 * h, h).map_err(failed)?;
+        let report = engine.step(h).map_err(failed)?;
+        let (system, time) = (engine.system(), (step + 1) as f64 * h);
+        self.record.push(time, system);
+        if self.contacts_every > 0 && step % self.contacts_every == 0 {
+            self.record.push_contacts(step, engine.contacts(), system);
+        }
+        self.trackers.observe(system, h);
+        self.totals.add(&report);
+        self.record.push_hidden(step, engine.hidden(), system);
+        Ok(Moment { step: step + 1, steps: self.steps, time, report, system, record: &self.record })
+    }
+
+    /// Whether all steps of the scene's duration are made.
+    pub fn is_complete(&self) -> bool {
+        self.record.steps() >= self.steps
+    }
+
+    /// Number of steps of the scene's duration.
+    pub fn planned_steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// All states so far.
+    pub fn record(&self) -> &RunRecord {
+        &self.record
+    }
+
+    /// All states so far, without the rest of the run. With all steps made, the record is complete.
+    pub fn into_record(mut self) -> RunRecord {
+        if self.is_complete() {
+            self.record.plan(None);
+        }
+        self.record
+    }
+
+    /// Summary of the steps so far. `system` is that of the engine after the last step.
+    pub fn summary(&self, system: &System) -> Summary {
+        let hidden = self.record.hidden_pairs();
+        let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
+        let mut reports = self.trackers.report(system, &messages);
+        let passed = reports.passed();
+        let Reports { screw, rest, insertion, lift, gear_ratio, separation } = reports;
+        let sums = self.totals.summary();
+        let depths = hidden.iter().map(|pair| pair.depth);
+        let (momentum, angular_momentum) = system.momentum();
+        Summary {
+            momentum: momentum.to_array(),
+            angular_momentum: angular_momentum.to_array(),
+            joint_drift: self.trackers.drift(system),
+            seconds: self.record.steps() as f64 * self.time_step,
+            kinetic_energy: system.kinetic_energy(),
+            released_energy: self.energy - system.potential_energy(),
+            passed,
+            screw,
+            rest,
+            insertion,
+            lift,
+            gear_ratio,
+            separation,
+            deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
+            hidden,
+            ..sums
+        }
+    }
 }
 
 /// Sums over the steps of a run.

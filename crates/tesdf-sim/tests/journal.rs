@@ -8,7 +8,7 @@ use std::time::Duration;
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_sim::record::{InterruptedRun, RecordError, RunJournal, RunOrigin, RunRecord};
 use tesdf_sim::scene_file::LoadedScene;
-use tesdf_sim::{PartialRun, SimulateError, Summary, simulate, simulate_from};
+use tesdf_sim::{Dynamics, PartialRun, Run, SimulateError, Summary, simulate, simulate_from};
 
 /// A wedge falls onto a floor and a brick. The criterion follows it as a screw, although it is not
 /// one.
@@ -144,6 +144,24 @@ fn a_run_interrupted_at_any_step_resumes_to_the_same_bytes() {
     // it.
     let (record, _) = bench.run(Some(&bench.open()), None).unwrap();
     assert!(record.to_bytes().unwrap() == expected);
+}
+
+#[test]
+fn a_run_made_step_by_step_is_the_same() {
+    let bench = Bench::new();
+    let (whole, summary) = bench.whole();
+    let mut engine = bench.loaded.newton(bench.system()).unwrap();
+    let run = PartialRun::new(&bench.loaded.scene, engine.system(), String::new());
+    let mut run = Run::new(&bench.loaded.scene, engine.system(), run).unwrap();
+    while !run.is_complete() {
+        assert_eq!(run.record().planned_steps(), Some(STEPS));
+        run.step(&mut engine).unwrap();
+    }
+    assert_eq!(run.planned_steps(), STEPS);
+    assert_eq!(timeless(&run.summary(engine.system())), timeless(&summary));
+    assert_eq!(run.clone().into_record(), whole);
+    // The duration does not limit the steps.
+    assert_eq!(run.step(&mut engine).unwrap().step, STEPS + 1);
 }
 
 #[test]
