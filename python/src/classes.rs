@@ -39,9 +39,18 @@ pub fn repaired(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
 /// An object of class `name` of `tesdf.reports` with the fields of `found`.
 pub fn report<'py>(py: Python<'py>, name: &str, found: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
     static FROM_JSON: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
-    let text = serde_json::to_string(found)
-        .map_err(|e| PyValueError::new_err(format!("the report cannot be handed to Python: {e}")))?;
-    FROM_JSON.import(py, "tesdf.reports", "from_json")?.call1((name, text))
+    FROM_JSON.import(py, "tesdf.reports", "from_json")?.call1((name, json(found)?))
+}
+
+/// A `dict` with the fields of `found`.
+pub fn dict<'py>(py: Python<'py>, found: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
+    static LOADS: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    LOADS.import(py, "json", "loads")?.call1((json(found)?,))
+}
+
+fn json(found: &impl Serialize) -> PyResult<String> {
+    serde_json::to_string(found)
+        .map_err(|e| PyValueError::new_err(format!("the report cannot be handed to Python: {e}")))
 }
 
 /// Fields of `tesdf.CheckReport`.

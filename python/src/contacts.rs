@@ -3,7 +3,6 @@ use numpy::{Element, IntoPyArray, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tesdf::collide::{CoarseContact, Contact, Contacts, FeatureB, HiddenOverlap, InstanceId, PairReduction};
-use tesdf::glam::DVec3;
 
 use crate::classes;
 
@@ -54,17 +53,33 @@ impl<'py> Columns<'py> {
 
 /// An object of `tesdf.Contacts`.
 pub fn contacts<'py>(py: Python<'py>, found: &Contacts) -> PyResult<Bound<'py, PyAny>> {
+    columns(py, found.as_slice())?
+        .with("statistics", classes::report(py, "DetectionStatistics", &found.statistics)?)?
+        .with("reductions", reductions(py, &found.reductions)?)?
+        .with("hidden", hidden(py, &found.hidden)?)?
+        .build("Contacts")
+}
+
+/// An object of `tesdf.contacts.StepContacts`.
+pub fn of_step<'py>(
+    py: Python<'py>,
+    found: &[Contact],
+    overlaps: &[HiddenOverlap],
+) -> PyResult<Bound<'py, PyAny>> {
+    columns(py, found)?.with("hidden", hidden(py, overlaps)?)?.build("StepContacts")
+}
+
+fn columns<'py>(py: Python<'py>, found: &[Contact]) -> PyResult<Columns<'py>> {
     let of = || found.iter();
-    let point = |p: DVec3| p.to_array();
     let feature_b = |c: &Contact| match c.feature.b {
         FeatureB::Vertex(vertex) => (0, [vertex, NO_CELL]),
         FeatureB::Edge(low, high) => (1, [low, high]),
         FeatureB::Face(face) => (2, [face, NO_CELL]),
     };
     Columns::new(py)
-        .add_rows("point_a", of().map(|c| point(c.point_a)))?
-        .add_rows("point_b", of().map(|c| point(c.point_b)))?
-        .add_rows("normal", of().map(|c| point(c.normal)))?
+        .add_rows("point_a", of().map(|c| c.point_a.to_array()))?
+        .add_rows("point_b", of().map(|c| c.point_b.to_array()))?
+        .add_rows("normal", of().map(|c| c.normal.to_array()))?
         .add("distance", of().map(|c| c.distance))?
         .add("face_a", of().map(|c| c.face_a))?
         .add("face_b", of().map(|c| c.face_b))?
@@ -74,11 +89,7 @@ pub fn contacts<'py>(py: Python<'py>, found: &Contacts) -> PyResult<Bound<'py, P
         .add("feature_a", of().map(|c| c.feature.a))?
         .add("feature_b_kind", of().map(|c| feature_b(c).0))?
         .add_rows("feature_b", of().map(|c| feature_b(c).1))?
-        .add("converged", of().map(|c| c.converged))?
-        .with("statistics", classes::report(py, "DetectionStatistics", &found.statistics)?)?
-        .with("reductions", reductions(py, &found.reductions)?)?
-        .with("hidden", hidden(py, &found.hidden)?)?
-        .build("Contacts")
+        .add("converged", of().map(|c| c.converged))
 }
 
 fn reductions<'py>(py: Python<'py>, found: &[PairReduction]) -> PyResult<Bound<'py, PyAny>> {

@@ -85,7 +85,7 @@ pub fn tolerance(any: Option<&Bound<'_, PyAny>>, default: Length) -> PyResult<Le
 }
 
 /// Converts one of the names of `choices`.
-fn one_of<T: Copy>(name: &str, any: &Bound<'_, PyAny>, choices: &[(&str, T)]) -> PyResult<T> {
+pub fn one_of<T: Copy>(name: &str, any: &Bound<'_, PyAny>, choices: &[(&str, T)]) -> PyResult<T> {
     let text = any.cast::<PyString>().map(|text| text.to_string()).ok();
     if let Some((_, choice)) = choices.iter().find(|choice| Some(choice.0) == text.as_deref()) {
         return Ok(*choice);

@@ -15,6 +15,9 @@ use tesdf::encode::{ChoiceError, DomainError, EncodeError};
 use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
 use tesdf::save::SaveError;
 use tesdf::verify::VerifyError;
+use tesdf_sim::SimulateError;
+use tesdf_sim::record::RecordError;
+use tesdf_sim::scene_file::SceneError;
 
 use crate::classes::{self, Checked};
 
@@ -36,6 +39,10 @@ pub enum Error {
     Collide(CollideError),
     /// The place in the arguments, such as `poses: row 3`.
     CollideAt(String, CollideError),
+    Scene(SceneError),
+    Simulate(SimulateError),
+    /// The run file that cannot be written.
+    Record(PathBuf, RecordError),
     Threads(rayon::ThreadPoolBuildError),
 }
 
@@ -45,13 +52,17 @@ impl Error {
         match self {
             Self::Read(_, ReadError::Open { ref source, .. }) => system(source, self.text()),
             Self::Asset(_, AssetError::Io { ref source, .. }) => system(source, self.text()),
-            Self::Asset(_, AssetError::Save(ref refused)) => match refused {
+            Self::Asset(_, AssetError::Save(ref refused))
+            | Self::Record(_, RecordError::Save(ref refused)) => match refused {
                 SaveError::Io { source, .. } => system(source, self.text()),
                 SaveError::ReadOnly { .. } => PyPermissionError::new_err(self.text()),
                 SaveError::NoFolder { .. } => PyFileNotFoundError::new_err(self.text()),
                 SaveError::IsFolder { .. } => PyIsADirectoryError::new_err(self.text()),
                 SaveError::Input { .. } | SaveError::Busy { .. } => PyOSError::new_err(self.text()),
             },
+            Self::Scene(SceneError::Read { ref source, .. }) => system(source, self.text()),
+            Self::Scene(_) => new(py, "SceneError", self.text()),
+            Self::Simulate(_) | Self::Record(..) => new(py, "SimulationError", self.text()),
             Self::Domain(DomainError::Read {
                 source: ReadTetrahedraError::Open { ref source, .. }, ..
             }) => system(source, self.text()),
@@ -92,6 +103,10 @@ impl Error {
             Self::Verify(e) => e.to_string(),
             Self::Collide(e) => e.to_string(),
             Self::CollideAt(at, e) => format!("{at}: {e}"),
+            Self::Scene(e) => e.to_string(),
+            Self::Simulate(e) => e.to_string(),
+            Self::Record(_, e @ RecordError::Save(_)) => e.to_string(),
+            Self::Record(path, e) => format!("{}: {e}", path.display()),
             Self::Threads(e) => format!("cannot start threads: {e}"),
         }
     }

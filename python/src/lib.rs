@@ -17,6 +17,7 @@ mod pool;
 mod poses;
 mod scene;
 mod shapes;
+mod simulation;
 mod why;
 
 /// The compiled part of the package `tesdf`.
@@ -30,6 +31,8 @@ mod _native {
     use super::mesh::{check, repair};
     #[pymodule_export]
     use super::scene::{Scene, pair};
+    #[pymodule_export]
+    use super::simulation::Simulation;
 
     /// The face in the answer of a point that is not finite, and of a ray that meets no face.
     #[pymodule_export]

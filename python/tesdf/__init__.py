@@ -25,15 +25,28 @@
     tesdf.clearance(asset, asset, pose_b=pose).distance              # exact, with witness points
     tesdf.time_of_impact(asset, asset, pose_b=pose, velocity_b=velocity)
 
+    simulation = tesdf.Simulation("scene.toml")         # bodies in motion, as `tesdf simulate`
+    simulation.step()                                   # simulation.poses, simulation.contacts, ...
+    simulation.run()["passed"]                          # to the end; the summary, with the criteria
+
 All lengths are in the mesh's unit, and all ids start from 0. Errors are `MeshError`
 (`NotSolidError` if the mesh has no well-defined inside), `EncodeError`, `DeformError`,
-`AssetError` and `CollideError`, which are all `ValueError`s, and `OSError` for files.
+`AssetError`, `CollideError`, `SceneError` and `SimulationError`, which are all `ValueError`s, and `OSError` for files.
 """
 
-from ._native import NO_CELL, NO_FACE, Asset, Scene, __version__, check, encode, repair
+from ._native import NO_CELL, NO_FACE, Asset, Scene, Simulation, __version__, check, encode, repair
 from .bodies import clearance, collide, time_of_impact, why
-from .contacts import CoarseContacts, Contacts, HiddenOverlaps, Instances, Reductions
-from .errors import AssetError, CollideError, DeformError, EncodeError, MeshError, NotSolidError
+from .contacts import CoarseContacts, Contacts, HiddenOverlaps, Instances, Record, Reductions, StepContacts
+from .errors import (
+    AssetError,
+    CollideError,
+    DeformError,
+    EncodeError,
+    MeshError,
+    NotSolidError,
+    SceneError,
+    SimulationError,
+)
 from .reports import (
     CheckReport,
     Clearance,
@@ -72,12 +85,17 @@ __all__ = [
     "NotSolidError",
     "Plane",
     "RayHits",
+    "Record",
     "Reductions",
     "Reencoded",
     "RepairReport",
     "Repaired",
     "Scene",
+    "SceneError",
+    "Simulation",
+    "SimulationError",
     "Sphere",
+    "StepContacts",
     "VerifyReport",
     "WhyReport",
     "__version__",

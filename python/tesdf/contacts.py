@@ -108,8 +108,8 @@ class CoarseContacts(_Rows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Contacts(_Rows):
-    """The contacts of a scene, sorted by world, instances, face and cell.
+class ContactRows(_Rows):
+    """Arrays with a row for each contact.
 
     In each contact, *a* is the body that has the face, edge or vertex, and *b* is the body whose
     signed distance field is used. Faces are numbered as in the source mesh, from 0.
@@ -145,6 +145,18 @@ class Contacts(_Rows):
     converged: npt.NDArray[np.bool_]
     """[N] whether it is proved that no point of the face or edge is deeper by more than the
     tolerance"""
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """The arrays with a row for each contact, by name, as for `numpy.savez`."""
+        fields = (field.name for field in dataclasses.fields(self))
+        named = {name: getattr(self, name) for name in fields}
+        return {name: array for name, array in named.items() if isinstance(array, np.ndarray)}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Contacts(ContactRows):
+    """The contacts of a scene, sorted by world, instances, face and cell."""
+
     statistics: DetectionStatistics
     """of the whole detection"""
     reductions: Reductions
@@ -157,8 +169,36 @@ class Contacts(_Rows):
         overlaps = f", {len(self.hidden)} hidden overlaps" if len(self.hidden) else ""
         return f"<tesdf.Contacts: {len(self)} contacts{overlaps}>"
 
-    def arrays(self) -> dict[str, npt.NDArray[Any]]:
-        """The arrays with a row for each contact, by name, as for `numpy.savez`."""
-        fields = (field.name for field in dataclasses.fields(self))
-        named = {name: getattr(self, name) for name in fields}
-        return {name: array for name, array in named.items() if isinstance(array, np.ndarray)}
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StepContacts(ContactRows):
+    """The contacts at the beginning of a step of a simulation. Instances are the bodies."""
+
+    hidden: HiddenOverlaps
+    """pairs that overlap without a contact that shows it"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Record(_Rows):
+    """The states of B bodies after 0 to S steps of a simulation, and R recorded contacts."""
+
+    times: _Float
+    """[S + 1] s"""
+    poses: _Float
+    """[S + 1, B, 7] x y z qx qy qz qw, m"""
+    velocities: _Float
+    """[S + 1, B, 6] of the centre of mass, m/s, and angular, rad/s"""
+    contact_steps: npt.NDArray[np.uint64]
+    """the steps whose contacts are recorded, also those without a contact"""
+    steps: npt.NDArray[np.uint64]
+    """[R] the step at whose beginning the contact was found"""
+    points: npt.NDArray[np.float32]
+    """[R, 3] `point_a`, m"""
+    normals: npt.NDArray[np.float32]
+    """[R, 3] from b to a"""
+    distances: npt.NDArray[np.float32]
+    """[R] signed distance, m"""
+    bodies: _Id
+    """[R, 2] the body of the face, and the body of the field"""
+    faces: _Id
+    """[R, 2] face of a, and face of b"""

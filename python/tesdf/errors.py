@@ -36,3 +36,11 @@ class AssetError(ValueError):
 
 class CollideError(ValueError):
     """A scene, a detection or a measurement of two bodies is refused. The scene is unchanged."""
+
+
+class SceneError(ValueError):
+    """A scene file cannot be simulated. The message names its line."""
+
+
+class SimulationError(ValueError):
+    """A step of a simulation failed, or a scene exceeds a limit."""

@@ -1,0 +1,272 @@
+//! `tesdf.Simulation`
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use rayon::ThreadPool;
+use tesdf::Progress;
+use tesdf::collide::Velocity;
+use tesdf_sim::newton::Newton;
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
+use tesdf_sim::{Dynamics, PartialRun, Run, SimulateError, State};
+
+use crate::contacts::{self, Columns};
+use crate::detection::one_of;
+use crate::errors::Error;
+use crate::interrupt::cancellable;
+use crate::poses::{of_pose, of_velocity};
+use crate::{classes, pool};
+
+/// A simulation of the scene in a TOML file, as that of the command `tesdf simulate`, with the same
+/// bits. step and run advance it.
+///
+/// - mode: replaces the mode of the scene's detector: "node", "edge", "face", "exact" or "off".
+/// - time_step, duration: replace those of the scene, in seconds.
+/// - threads: number of threads; None is one per core. The states do not depend on it.
+///
+/// Units are SI: metres, kilograms, seconds, radians. Bodies have the numbers of their order in the
+/// scene, from 0. Meshes of the scene are encoded first, which Ctrl-C ends with KeyboardInterrupt.
+///
+/// Raises OSError if a file cannot be read, and SceneError with the line of the scene.
+#[pyclass(frozen, module = "tesdf")]
+pub struct Simulation {
+    threads: Option<Arc<ThreadPool>>,
+    inner: Mutex<Running>,
+}
+
+struct Running {
+    engine: Newton,
+    run: Run,
+}
+
+const MODES: [(&str, DetectorMode); 5] = [
+    ("node", DetectorMode::Node),
+    ("edge", DetectorMode::Edge),
+    ("face", DetectorMode::Face),
+    ("exact", DetectorMode::Exact),
+    ("off", DetectorMode::Off),
+];
+
+impl Running {
+    /// Reads the scene, encodes its meshes, and begins the run.
+    fn begin(mut loaded: LoadedScene, progress: &Progress) -> Result<Self, Error> {
+        let scene_error = Error::Scene;
+        let system = loaded.system_watched(progress).map_err(scene_error)?;
+        // The run stores the scene's folder, so its meshes are found from any folder.
+        loaded.path = std::path::absolute(&loaded.path)
+            .map_err(|source| scene_error(SceneError::Read { path: loaded.path.clone(), source }))?;
+        let folder = loaded.path.parent().unwrap_or(&loaded.path).to_string_lossy().into_owned();
+        let run = PartialRun::new(&loaded.scene, &system, folder);
+        let engine = loaded.newton(system).map_err(scene_error)?;
+        let run = Run::new(&loaded.scene, engine.system(), run).map_err(Error::Simulate)?;
+        Ok(Self { engine, run })
+    }
+
+    fn states(&self) -> &[State] {
+        self.engine.system().states()
+    }
+}
+
+impl Simulation {
+    fn locked(&self) -> MutexGuard<'_, Running> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Reads the state. Waits for a step of another thread without the interpreter's lock.
+    fn read<T: Send>(&self, py: Python<'_>, read: impl FnOnce(&Running) -> T + Send) -> T {
+        py.detach(|| read(&self.locked()))
+    }
+
+    fn pool(&self, py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
+        match &self.threads {
+            Some(threads) => Ok(Arc::clone(threads)),
+            None => pool::shared().map_err(|e| e.raise(py)),
+        }
+    }
+
+    /// Makes this number of steps, or all that the duration leaves. Ctrl-C ends it between two
+    /// steps.
+    fn advance(
+        &self,
+        py: Python<'_>,
+        count: Option<u64>,
+        progress: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let pool = self.pool(py)?;
+        let stop = AtomicBool::new(false);
+        let (done, planned) = self.read(py, |r| (r.run.record().steps(), r.run.planned_steps()));
+        let done = AtomicU64::new(done);
+        let work = || {
+            pool.install(|| -> Result<(), SimulateError> {
+                let Running { engine, run } = &mut *self.locked();
+                let count = count.unwrap_or(planned.saturating_sub(run.record().steps()));
+                for _ in 0..count {
+                    if stop.load(Ordering::Relaxed) {
+                        break;
+                    }
+                    done.store(run.step(engine)?.step, Ordering::Relaxed);
+                }
+                Ok(())
+            })
+        };
+        let watch = || match progress {
+            Some(progress) => progress.call1((done.load(Ordering::Relaxed), planned)).map(|_| ()),
+            None => Ok(()),
+        };
+        let made = cancellable(py, work, || stop.store(true, Ordering::Relaxed), watch)?;
+        made.map_err(|e| Error::Simulate(e).raise(py))?;
+        watch()
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (scene, *, mode = None, time_step = None, duration = None, threads = None))]
+    fn new(
+        py: Python<'_>,
+        scene: PathBuf,
+        mode: Option<&Bound<'_, PyAny>>,
+        time_step: Option<f64>,
+        duration: Option<f64>,
+        threads: Option<NonZeroUsize>,
+    ) -> PyResult<Self> {
+        let mode = mode.map(|any| one_of("mode", any, &MODES)).transpose()?;
+        let threads = threads.map(|n| pool::of(Some(n))).transpose().map_err(|e| e.raise(py))?;
+        let pool = match &threads {
+            Some(threads) => Arc::clone(threads),
+            None => pool::shared().map_err(|e| e.raise(py))?,
+        };
+        let progress = Progress::default();
+        let work = || {
+            pool.install(|| {
+                let mut loaded = LoadedScene::read(&scene).map_err(Error::Scene)?;
+                let file = &mut loaded.scene;
+                file.detector.mode = mode.unwrap_or(file.detector.mode);
+                file.time_step = time_step.unwrap_or(file.time_step);
+                file.duration = duration.unwrap_or(file.duration);
+                file.steps().map_err(|e| Error::Simulate(e.into()))?;
+                Running::begin(loaded, &progress)
+            })
+        };
+        let running = cancellable(py, work, || progress.cancel(), || Ok(()))?.map_err(|e| e.raise(py))?;
+        Ok(Self { threads, inner: Mutex::new(running) })
+    }
+
+    /// Makes `count` steps. The duration of the scene does not limit their number. Ctrl-C ends it
+    /// between two steps; the steps so far remain.
+    ///
+    /// Raises SimulationError if a step fails. The steps before it remain.
+    #[pyo3(signature = (count = 1))]
+    fn step(&self, py: Python<'_>, count: u64) -> PyResult<()> {
+        self.advance(py, Some(count), None)
+    }
+
+    /// Makes the steps that the duration of the scene leaves. Returns the summary.
+    ///
+    /// progress is called with the number of steps so far and of all steps, about twenty times a
+    /// second. An exception from it ends the run between two steps and is raised.
+    #[pyo3(signature = (*, progress = None))]
+    fn run<'py>(&self, py: Python<'py>, progress: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        self.advance(py, None, progress)?;
+        self.summary(py)
+    }
+
+    /// Summary of the steps so far, with the names of `tesdf simulate --json`: a dict with
+    /// contacts, energies, momenta and the report of each criterion of the scene. passed says
+    /// whether the criteria hold; None if there are none.
+    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let summary = self.read(py, |r| r.run.summary(r.engine.system()));
+        classes::dict(py, &summary)
+    }
+
+    /// Writes the run file of the steps so far, with the bytes of that of the command.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let saved = self.read(py, |r| r.run.clone().into_record().save(&path));
+        saved.map_err(|e| Error::Record(path, e).raise(py))
+    }
+
+    /// All states so far, and recorded contacts: Record(times, poses, velocities, ...), copied.
+    fn record<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let record = self.read(py, |r| r.run.record().clone());
+        let (steps, bodies) = (record.times().len(), record.bodies.len());
+        let each = || (0..steps).flat_map(|step| (0..bodies).map(move |body| (step, body)));
+        let poses = each().filter_map(|(step, body)| record.pose(step, body)).flat_map(|p| of_pose(&p));
+        let velocities = each()
+            .filter_map(|(step, body)| record.velocity(step, body))
+            .flat_map(|[linear, angular]| of_velocity(&Velocity { linear, angular }));
+        let shaped =
+            |numbers: Vec<f64>, width: usize| PyArray1::from_vec(py, numbers).reshape([steps, bodies, width]);
+        let contacts: Vec<_> = record.contacts().collect();
+        let all = || contacts.iter().flat_map(|(_, of_step)| of_step);
+        let of_row = contacts.iter().flat_map(|(step, of_step)| of_step.iter().map(move |_| *step));
+        Columns::new(py)
+            .add("times", record.times().iter().copied())?
+            .with("poses", shaped(poses.collect(), 7)?.into_any())?
+            .with("velocities", shaped(velocities.collect(), 6)?.into_any())?
+            .add("contact_steps", contacts.iter().map(|(step, _)| *step))?
+            .add("steps", of_row)?
+            .add_rows("points", all().map(|c| c.point))?
+            .add_rows("normals", all().map(|c| c.normal))?
+            .add("distances", all().map(|c| c.distance))?
+            .add_rows("bodies", all().map(|c| c.bodies))?
+            .add_rows("faces", all().map(|c| c.faces))?
+            .build("Record")
+    }
+
+    /// Names of the bodies.
+    #[getter]
+    fn bodies(&self, py: Python<'_>) -> Vec<String> {
+        self.read(py, |r| r.run.record().bodies.clone())
+    }
+
+    /// Simulated time, s.
+    #[getter]
+    fn time(&self, py: Python<'_>) -> f64 {
+        self.read(py, |r| r.run.record().times().last().copied().unwrap_or(0.0))
+    }
+
+    /// Number of steps so far.
+    #[getter]
+    fn steps(&self, py: Python<'_>) -> u64 {
+        self.read(py, |r| r.run.record().steps())
+    }
+
+    /// Number of steps of the scene's duration.
+    #[getter]
+    fn planned_steps(&self, py: Python<'_>) -> u64 {
+        self.read(py, |r| r.run.planned_steps())
+    }
+
+    /// Current poses [B, 7] of the bodies' frames, x y z qx qy qz qw.
+    #[getter]
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let poses: Vec<_> = self.read(py, |r| r.states().iter().map(|state| of_pose(&state.pose)).collect());
+        PyArray1::from_slice(py, poses.as_flattened()).reshape([poses.len(), 7])
+    }
+
+    /// Current velocities [B, 6], vx vy vz wx wy wz: of the centre of mass, and angular.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let velocity = |&State { linear, angular, .. }: &State| of_velocity(&Velocity { linear, angular });
+        let velocities: Vec<_> = self.read(py, |r| r.states().iter().map(velocity).collect());
+        PyArray1::from_slice(py, velocities.as_flattened()).reshape([velocities.len(), 6])
+    }
+
+    /// The contacts at the beginning of the last step: StepContacts. They include contacts that the
+    /// motion of the step could close. Instances are the bodies.
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (found, hidden) = self.read(py, |r| (r.engine.contacts().to_vec(), r.engine.hidden().to_vec()));
+        contacts::of_step(py, &found, &hidden)
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        let (bodies, steps, planned) =
+            self.read(py, |r| (r.states().len(), r.run.record().steps(), r.run.planned_steps()));
+        format!("<tesdf.Simulation: {bodies} bodies, step {steps} of {planned}>")
+    }
+}
