@@ -349,7 +349,9 @@ fn look_at<L: Doubles>(shape: &[f64], stride: usize, p: Vector<L>, out: &mut [f6
         regions =
             regions.add(bit::<L>(beside, f64::from(2u8 << k))).add(bit::<L>(beyond, f64::from(16u8 << k)));
     }
-    regions = L::select(has_area, regions, L::splat(f64::from(Regions::FACE.0)));
+    // Rounding gives different sides of an edge from its two ends, and then no region at all.
+    let is_known = L::both(has_area, L::less(zero, regions));
+    regions = L::select(is_known, regions, L::splat(f64::from(Regions::FACE.0)));
 
     distance.store(out, at);
     gradient.store(&mut out[GRADIENT * stride..], stride, at);
