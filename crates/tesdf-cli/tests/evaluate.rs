@@ -219,7 +219,8 @@ fn deep_shafts_come_apart_in_the_quick_figure_8_even_with_truncated_lists() {
 
 #[test]
 fn the_quick_figure_9_has_fewer_queries_at_the_end_of_the_pile() {
-    // Six shafts, because a software driver takes seconds for a detection of more. They do not touch.
+    // Six shafts, because a software driver takes seconds for a detection of more. They do not
+    // touch.
     for (device, shafts) in [("cpu", "24"), ("gpu", "6")] {
         let (_folder, figure) =
             quick_figure("fig9", &["--device", device, "--shafts", shafts, "--repeat", "1"]);

@@ -216,8 +216,8 @@ fn the_stack_meets_its_criterion_only_with_contacts() {
     assert!(summary.rest.unwrap().failures[0].contains("no step after 1 s"));
 }
 
-/// Bricks in running bond, each on two others, for a second. `tesdf simulate scenes/brick-wall.toml`
-/// runs ten.
+/// Bricks in running bond, each on two others, for a second. `tesdf simulate
+/// scenes/brick-wall.toml` runs ten.
 #[test]
 fn the_wall_meets_its_criterion_only_with_contacts() {
     let summary = scene("brick-wall.toml", |loaded| loaded.scene.duration = 1.0);

@@ -176,8 +176,8 @@ fn bodies_that_are_apart_have_their_least_distance_at_nodes_and_edges() {
     assert!(apart > 60 && between > 1000 && nodes > 1000, "{apart} {between} {nodes}");
 }
 
-/// Compares the contacts of each edge with samples of the edge: none is lower than the lowest contact, or
-/// an end, which has a contact as a node. Returns the number of samples.
+/// Compares the contacts of each edge with samples of the edge: none is lower than the lowest
+/// contact, or an end, which has a contact as a node. Returns the number of samples.
 fn compare_with_samples(bodies: &[Placed; 2], reach: f64, samples: u32) -> usize {
     let size = bodies[0].diagonal().max(bodies[1].diagonal());
     let all = found(&scene(bodies), reach);
@@ -239,8 +239,8 @@ fn edges_of_needles_have_their_least_distances() {
     assert!(count > 20_000, "{count}");
 }
 
-/// Needles parallel to the axes of a box have a constant depth over a part, or the same depth below two
-/// sides; others lie in a side, or just above or below it.
+/// Needles parallel to the axes of a box have a constant depth over a part, or the same depth below
+/// two sides; others lie in a side, or just above or below it.
 #[test]
 fn edges_of_level_needles_have_their_least_distances() {
     let half = DVec3::new(0.5, 0.3, 0.2);
@@ -382,7 +382,8 @@ fn why_names_edges_and_their_ends() {
     assert!(why(&scene, &options, ids[0], ids[1], Some(999)).is_err());
 }
 
-/// Two sides of the boxes are flush, so vertices and edges of each box lie on an edge of the other one.
+/// Two sides of the boxes are flush, so vertices and edges of each box lie on an edge of the other
+/// one.
 #[test]
 fn flush_boxes_push_each_other_up_along_their_common_edges() {
     let half = DVec3::splat(0.05);

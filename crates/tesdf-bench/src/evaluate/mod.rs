@@ -1,5 +1,5 @@
-//! `tesdf evaluate table1|table3|table4|fig8|fig9`: measures Tables I, III and IV and Figures 8 and 9
-//! of the paper, next to the paper's figures.
+//! `tesdf evaluate table1|table3|table4|fig8|fig9`: measures Tables I, III and IV and Figures 8 and
+//! 9 of the paper, next to the paper's figures.
 //!
 //! The meshes of the repository (`meshes`) are encoded in a domain with both encoders, with full
 //! and with truncated lists (`measure`). The assets are compared with exact distances on a grid.
@@ -49,11 +49,11 @@ pub enum Table {
     Table3(table3::Args),
     /// Table IV: the same figures for the shaft, with at most 32, 64, ... 288 faces per list
     Table4(TableArgs),
-    /// Figure 8: penetrations in a pile of shafts by frame, with nodes, faces and the exact minimum,
-    /// with full lists and with at most 32 faces per list
+    /// Figure 8: penetrations in a pile of shafts by frame, with nodes, faces and the exact
+    /// minimum, with full lists and with at most 32 faces per list
     Fig8(pile::fig8::Args),
-    /// Figure 9: time of the narrow phase at the start and the end of the pile, with at most 32, 64,
-    /// ... 288 faces per list
+    /// Figure 9: time of the narrow phase at the start and the end of the pile, with at most 32,
+    /// 64, ... 288 faces per list
     Fig9(pile::fig9::Args),
 }
 

@@ -1,6 +1,6 @@
 //! The figures of the paper: H. Ji, Y. Lee, D. Lee, *TE-SDF: Tetra-Encoded Signed Distance Field
-//! for Memory-Efficient and Accurate Collision Detection*, Tables I, III and IV, and Figures 8 and 9.
-//! Memory is in MiB; `docs/paper-map.md` gives the reason. Table III prints it as Mb.
+//! for Memory-Efficient and Accurate Collision Detection*, Tables I, III and IV, and Figures 8 and
+//! 9. Memory is in MiB; `docs/paper-map.md` gives the reason. Table III prints it as Mb.
 
 /// A row of Table I. Pairs are for full lists and for E_max = 32.
 pub struct Table1 {

@@ -123,8 +123,8 @@ impl Detector {
     ///   growing buffer exceeds the limit of the device.
     /// - [`GpuError::Shape`] when a shape cannot be uploaded, or a vertex was moved to an invalid
     ///   position.
-    /// - [`GpuError::Unavailable`] for the mode [`Edge`](Mode::Edge), and when vertices have moved on
-    ///   the device and the scene now has other shapes.
+    /// - [`GpuError::Unavailable`] for the mode [`Edge`](Mode::Edge), and when vertices have moved
+    ///   on the device and the scene now has other shapes.
     /// - [`GpuError::Device`] when the device fails, or a driver stops the loops of a kernel early.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::Off)

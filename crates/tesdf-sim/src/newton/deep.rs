@@ -59,8 +59,7 @@ impl Surfaces {
     }
 
     /// The contacts that act. `is_deep` tells whether a contact is that of a deep pair. The
-    /// instances of
-    /// `scene` have the poses at which the contacts were found.
+    /// instances of `scene` have the poses at which the contacts were found.
     pub fn acting(
         &self,
         scene: &Scene,

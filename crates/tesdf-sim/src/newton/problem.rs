@@ -74,8 +74,9 @@ const LAG: f64 = 3e-3;
 /// Limits of friction below this share of the forces that would stop the bodies do not matter.
 const NO_LIMIT: f64 = 1e-6;
 
-/// A stalled motor may exceed its target by this multiple of the greatest way by which other rows give
-/// way: in the first minimisations, all bodies between two fingers give way under their pushes.
+/// A stalled motor may exceed its target by this multiple of the greatest way by which other rows
+/// give way: in the first minimisations, all bodies between two fingers give way under their
+/// pushes.
 const EXCESS: f64 = 100.0;
 
 /// A contact is nearly closed when its gap is at most this share of the way by which it differs between
@@ -111,9 +112,9 @@ impl<'a> Problem<'a> {
     /// minimises again, until no rigid row gives way and the limits of friction have settled.
     ///
     /// Most contacts stay open, so the minimisation begins with those that are nearly closed. It is
-    /// repeated with the others that its solution closes, until there are none. Contacts may give way by
-    /// the tolerance, so others that are closed by less do not need a repetition: in a wall of bricks,
-    /// where hundreds are open by rounding alone, each repetition closed a few more.
+    /// repeated with the others that its solution closes, until there are none. Contacts may give
+    /// way by the tolerance, so others that are closed by less do not need a repetition: in a wall
+    /// of bricks, where hundreds are open by rounding alone, each repetition closed a few more.
     pub fn minimise(&self, start: Vec<Vector6<f64>>, options: &NewtonOptions) -> Minimum {
         let h = self.time_step;
         let gap = |spring: &Spring, v: &[Vector6<f64>]| spring.gap + h * spring.rate(v);
@@ -157,8 +158,8 @@ impl Part<'_> {
         Iterate { velocity, deflections, stiffening: 1.0, grips }
     }
 
-    /// Returns the number of Newton iterations, whether it converged, and the distance by which rigid
-    /// rows may give way, m.
+    /// Returns the number of Newton iterations, whether it converged, and the distance by which
+    /// rigid rows may give way, m.
     fn raise_forces(&self, at: &mut Iterate, options: &NewtonOptions) -> (u32, bool, f64) {
         let (mut iterations, mut converged) = self.descend(at, options);
         let [_, most] = self.error(at);

@@ -80,8 +80,8 @@ pub enum Resistance {
     Spring,
     /// With the force under which it does not give way.
     Rigid,
-    /// As `Rigid`: a motor that drives a velocity with a finite force. It may begin stalled, with its
-    /// greatest force.
+    /// As `Rigid`: a motor that drives a velocity with a finite force. It may begin stalled, with
+    /// its greatest force.
     Motor,
 }
 

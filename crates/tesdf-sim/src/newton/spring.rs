@@ -71,9 +71,10 @@ impl Spring {
         Deflection { gap: self.gap + change.gap, slip: way + change.slip, ..Deflection::default() }
     }
 
-    /// The deflection from which a minimisation starts at `velocity`. A motor stalls at first where its
-    /// target is so slow that, as a spring, it would not reach its limit. Its force would build up over
-    /// several minimisations, and a part that is held by this force alone would slip before.
+    /// The deflection from which a minimisation starts at `velocity`. A motor stalls at first where
+    /// its target is so slow that, as a spring, it would not reach its limit. Its force would build
+    /// up over several minimisations, and a part that is held by this force alone would slip
+    /// before.
     pub fn start(&self, velocity: &[Vector6<f64>], h: f64) -> Deflection {
         let at = self.deflection(velocity, h);
         let [_, limit] = self.bounds;

@@ -44,8 +44,8 @@ pub struct FeatureId {
     /// Face of a. In the mode [`Node`](super::Mode::Node), the vertex of a.
     ///
     /// In the mode [`Edge`](super::Mode::Edge), vertices have their ids, and edges the numbers from
-    /// the number of vertices on: an edge is the number of vertices + 3 × face + side. The face is the
-    /// lowest that has the edge, and side k goes from its corner k to the next one.
+    /// the number of vertices on: an edge is the number of vertices + 3 × face + side. The face is
+    /// the lowest that has the edge, and side k goes from its corner k to the next one.
     pub a: u32,
     /// The closest feature of b.
     pub b: FeatureB,

@@ -20,8 +20,8 @@ pub struct SurfaceBody<'a> {
     scale: f64,
 }
 
-/// The result of the broad phase: faces, edges or nodes of a surface that can touch, in order. In edge
-/// mode, numbers below that of the nodes are nodes.
+/// The result of the broad phase: faces, edges or nodes of a surface that can touch, in order. In
+/// edge mode, numbers below that of the nodes are nodes.
 pub type Candidates = Vec<u32>;
 
 /// A node or leaf of the face tree.
@@ -283,7 +283,8 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// A candidate node with the mean of the normals of its faces, which rounded shapes do not have.
+    /// A candidate node with the mean of the normals of its faces, which rounded shapes do not
+    /// have.
     pub fn node_of_faces(&self, node: u32) -> Part {
         let normal = match self.shape {
             Shape::Mesh(asset) => {
@@ -296,7 +297,8 @@ impl<'a> SurfaceBody<'a> {
         Part { normal: (self.linear * normal).normalize_or_zero(), ..self.node(node) }
     }
 
-    /// The id of the lowest face that has a candidate edge, and of the edge, in the user's numbering.
+    /// The id of the lowest face that has a candidate edge, and of the edge, in the user's
+    /// numbering.
     pub fn edge_ids(&self, candidate: u32) -> (u32, u32) {
         let (first, edge) = (self.node_count(), candidate - self.node_count());
         let face = self.face_id(edge / 3);
@@ -342,7 +344,8 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// Whether a range of faces contains a face, or in node mode a node; in edge mode, a node or edge.
+    /// Whether a range of faces contains a face, or in node mode a node; in edge mode, a node or
+    /// edge.
     pub fn holds(&self, start: u32, count: u32, candidate: u32, mode: Mode) -> bool {
         match (mode, self.shape) {
             (Mode::Edge, Shape::Mesh(_)) if self.is_edge(candidate) => {

@@ -132,7 +132,8 @@ impl Args {
     }
 }
 
-/// Simulates the pile, detects its first and its last frame with all settings, and prints the times.
+/// Simulates the pile, detects its first and its last frame with all settings, and prints the
+/// times.
 ///
 /// # Errors
 /// The scene or the mesh cannot be read, the device is missing or fails, or the result cannot be
@@ -189,8 +190,8 @@ fn poses(record: &RunRecord, step: usize) -> Result<Vec<Pose>, Failure> {
     poses.ok_or_else(|| Failure::new(format!("the run has no frame {step}")))
 }
 
-/// Detects all settings in turn, again and again, so that other work of the machine slows all of them
-/// down alike.
+/// Detects all settings in turn, again and again, so that other work of the machine slows all of
+/// them down alike.
 fn on_processor(mut frames: Vec<Frames>, repeat: u32, rows: &mut [Row], bar: &Bar) -> Result<(), Failure> {
     let options = face_tes();
     let mut times = vec![Vec::new(); rows.len()];

@@ -1,8 +1,8 @@
 //! Figures 8 and 9: deep penetrations in a pile of shafts, and the time of the narrow phase, by the
 //! greatest length of the lists (Sec. VII-D of the paper).
 //!
-//! `scene` reads the pile and replaces its geometry, `fig8` simulates it, `fig9` detects its contacts
-//! at the beginning and at the end. `plot` draws curves.
+//! `scene` reads the pile and replaces its geometry, `fig8` simulates it, `fig9` detects its
+//! contacts at the beginning and at the end. `plot` draws curves.
 pub mod fig8;
 pub mod fig9;
 mod plot;

@@ -29,7 +29,8 @@ pub struct Plot {
 const SIZE: [f64; 2] = [760.0, 420.0];
 /// Left, top, right and bottom of the area of the curves.
 const AREA: [f64; 4] = [70.0, 20.0, 520.0, 370.0];
-/// Colours that people with any colour vision can tell apart (Okabe and Ito), then again with dashes.
+/// Colours that people with any colour vision can tell apart (Okabe and Ito), then again with
+/// dashes.
 const COLOURS: [&str; 6] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
 
 impl Plot {

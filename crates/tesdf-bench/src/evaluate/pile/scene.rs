@@ -72,8 +72,8 @@ impl Pile {
         system.add_shape(shape).map_err(Failure::new)
     }
 
-    /// Simulates the pile. The criterion of the scene is not measured on the way, because the fields
-    /// of `system` may be truncated.
+    /// Simulates the pile. The criterion of the scene is not measured on the way, because the
+    /// fields of `system` may be truncated.
     ///
     /// # Errors
     /// A step fails.

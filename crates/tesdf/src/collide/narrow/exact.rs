@@ -318,8 +318,8 @@ impl<'a> Query<'a> {
         }
     }
 
-    /// The places where a segment touches faces or passes through them, from 0 at its start to 1 at its
-    /// end, in order, each with a face.
+    /// The places where a segment touches faces or passes through them, from 0 at its start to 1 at
+    /// its end, in order, each with a face.
     pub fn crossings(&self) -> Vec<(f64, u32)> {
         let points = &self.points();
         let way = points[points.len() - 1] - points[0];

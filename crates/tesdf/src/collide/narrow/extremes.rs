@@ -248,7 +248,8 @@ impl<'a> Patch<'a> {
     fn take(&self, point: DVec3, corner: Option<u8>) -> Option<Minimum> {
         let normal = self.part.normal;
         let value = |p: DVec3| self.field.opposing(p, normal, self.search.precision);
-        // The normal of an edge is oblique to its faces, and the other body may oppose either of them.
+        // The normal of an edge is oblique to its faces, and the other body may oppose either of
+        // them.
         let opposes = OPPOSES * self.part.cosine;
         let holds = |v: &FieldValue| {
             v.distance <= self.limit && (normal == DVec3::ZERO || v.gradient.dot(normal) < opposes)

@@ -1,12 +1,12 @@
 //! The least signed distance over an edge.
 //!
-//! Outside the solid it is the least distance between the edge and a face, in closed form. An edge that
-//! passes through the surface is divided there, and only its parts inside are searched. Inside, the
-//! depth is the minimum of the distances to the faces, each a convex function of the place on the edge.
-//! Over a part of the edge, such a function lies below the line through its values at the ends. The
-//! greatest minimum of these lines bounds the depth. The search evaluates the field where this bound is
-//! attained. Either a face is nearest there that has no line yet, or the bound is the depth up to the
-//! curvature of the distances.
+//! Outside the solid it is the least distance between the edge and a face, in closed form. An edge
+//! that passes through the surface is divided there, and only its parts inside are searched.
+//! Inside, the depth is the minimum of the distances to the faces, each a convex function of the
+//! place on the edge. Over a part of the edge, such a function lies below the line through its
+//! values at the ends. The greatest minimum of these lines bounds the depth. The search evaluates
+//! the field where this bound is attained. Either a face is nearest there that has no line yet, or
+//! the bound is the depth up to the curvature of the distances.
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
@@ -157,8 +157,8 @@ impl Piece {
         self.lines.iter().any(|line| line.face == face)
     }
 
-    /// Adds a line. If there are too many, it takes the place of the one that is highest at a share of
-    /// the part.
+    /// Adds a line. If there are too many, it takes the place of the one that is highest at a share
+    /// of the part.
     fn add(&mut self, line: Line, share: f64) {
         if !self.lines.is_full() {
             return self.lines.push(line);
@@ -206,8 +206,8 @@ impl<'a> Search<'a> {
         if t == 1.0 { end } else { start + t * (end - start) }
     }
 
-    /// The value at a place. Where `f32` shows that it is not the best, the distance is only a lower
-    /// bound.
+    /// The value at a place. Where `f32` shows that it is not the best, the distance is only a
+    /// lower bound.
     fn stop(&mut self, t: f64) -> Stop {
         self.evaluations += 1;
         let p = self.at(t);
@@ -238,8 +238,8 @@ impl<'a> Search<'a> {
         bound < self.best.0 - self.tolerance && bound <= self.reach
     }
 
-    /// Searches the parts inside. `crossings` are the places where the edge passes through the surface,
-    /// in order, with the face there; `likely` is a face that may be nearest.
+    /// Searches the parts inside. `crossings` are the places where the edge passes through the
+    /// surface, in order, with the face there; `likely` is a face that may be nearest.
     fn inside(mut self, crossings: &[(f64, u32)], likely: u32) -> Lowest {
         let mut start = self.ends[0];
         let through = crossings.iter().map(|&(t, face)| Stop { t, distance: -CLEAR, face });
@@ -321,8 +321,8 @@ impl<'a> Search<'a> {
         self.divide(&piece, stop, 0.5);
     }
 
-    /// Divides a part where it enters and leaves the space over the face that is nearest at `stop`, as
-    /// the distance to the face is linear there; otherwise at `stop`.
+    /// Divides a part where it enters and leaves the space over the face that is nearest at `stop`,
+    /// as the distance to the face is linear there; otherwise at `stop`.
     fn divide(&mut self, piece: &Piece, stop: Stop, share: f64) {
         let mut stops: ArrayVec<Stop, 4> = [piece.stops[0]].into_iter().collect();
         let kinks = self.kinks(piece, stop.face);
