@@ -195,11 +195,8 @@ fn of_tolerance(
         }
     }
     // The next tolerance has another mesh of this body.
-    let changing = match scenario {
-        Scenario::BoltNut => &geometries[0],
-        Scenario::PegInHole => &geometries[1],
-    };
-    table.voxels.extend(grids.release(changing));
+    let changing = geometries.iter().filter(|geometry| geometry.body == scenario.fitted());
+    table.voxels.extend(changing.flat_map(|geometry| grids.release(geometry)));
     Ok(geometries)
 }
 

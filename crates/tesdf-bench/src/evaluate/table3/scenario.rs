@@ -39,6 +39,14 @@ impl Scenario {
         }
     }
 
+    /// Name of the body that gives the fit its tolerance.
+    pub fn fitted(self) -> &'static str {
+        match self {
+            Self::BoltNut => "nut",
+            Self::PegInHole => "hole",
+        }
+    }
+
     /// Tolerances, µm: those of the paper, and a tighter one.
     pub fn tolerances(self) -> [u32; 4] {
         match self {
@@ -75,9 +83,10 @@ impl Scenario {
             .map_err(|e| Failure::new(e).hint("give the folder `scenes` of the repository to --scenes"))?;
         let missing = |what: &str| Failure::new(format!("{}: it has no {what}", path.display()));
         let clearance = f64::from(tolerance) * 1e-6;
-        let (fitted, mesh) = match self {
-            Self::BoltNut => ("nut", format!("iso_m16_nut_c{tolerance}.obj")),
-            Self::PegInHole => ("hole", format!("lobed_hole_c{tolerance}.obj")),
+        let fitted = self.fitted();
+        let mesh = match self {
+            Self::BoltNut => format!("iso_m16_nut_c{tolerance}.obj"),
+            Self::PegInHole => format!("lobed_hole_c{tolerance}.obj"),
         };
         if !loaded.scene.bodies.iter().any(|body| body.get_ref().name == fitted) {
             return Err(missing(&format!("body {fitted}")));
