@@ -7,9 +7,6 @@
 //! values at the ends. The greatest minimum of these lines bounds the depth. The search evaluates
 //! the field where this bound is attained. Either a face is nearest there that has no line yet, or
 //! the bound is the depth up to the curvature of the distances.
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
@@ -19,6 +16,7 @@ use crate::TeSdf;
 use crate::collide::field::{CellField, ROUNDING};
 use crate::collide::field_value::FieldValue;
 use crate::collide::polygon::Polygon;
+use crate::collide::queue::Queue;
 use crate::query::{Faces, Precision, Surroundings};
 
 /// Number of evaluations after which a search gives up.
@@ -128,24 +126,6 @@ struct Piece {
     lines: ArrayVec<Line, LINES>,
 }
 
-impl PartialEq for Piece {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other) == Ordering::Equal
-    }
-}
-impl Eq for Piece {}
-impl PartialOrd for Piece {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Piece {
-    fn cmp(&self, other: &Self) -> Ordering {
-        // The heap returns the lowest bound first.
-        other.bound.total_cmp(&self.bound)
-    }
-}
-
 impl Piece {
     /// The place at a share of the part.
     fn t(&self, share: f64) -> f64 {
@@ -180,7 +160,8 @@ struct Search<'a> {
     best: (f64, DVec3),
     evaluations: usize,
     ends: [Stop; 2],
-    open: BinaryHeap<Piece>,
+    /// The parts that are still to be searched, by their bounds.
+    open: Queue<Piece>,
 }
 
 impl<'a> Search<'a> {
@@ -194,7 +175,7 @@ impl<'a> Search<'a> {
     ) -> Self {
         let (length, best) = (points[0].distance(points[1]), (f64::INFINITY, points[0]));
         let ends = [0.0, 1.0].map(|t| Stop { t, distance: f64::NEG_INFINITY, face: 0 });
-        let (evaluations, open) = (0, BinaryHeap::new());
+        let (evaluations, open) = (0, Queue::new());
         let mut search =
             Self { asset, cell, points, length, tolerance, reach, precision, best, evaluations, ends, open };
         search.ends = [0.0, 1.0].map(|t| search.stop(t));
@@ -276,7 +257,7 @@ impl<'a> Search<'a> {
             }
         }
         if self.is_open(piece.bound) {
-            self.open.push(piece);
+            self.open.push(piece.bound, piece);
         }
     }
 
@@ -355,7 +336,7 @@ impl<'a> Search<'a> {
         }
         for part in parts {
             if self.is_open(part.bound) {
-                self.open.push(part);
+                self.open.push(part.bound, part);
             }
         }
     }
