@@ -46,7 +46,6 @@ class _Geom:
     """A geom that takes part, and the pose of its shape's frame in that of the geom."""
 
     id: int
-    name: str
     shape: _Shape
     scale: float
     rotation: _Float
@@ -151,7 +150,7 @@ class Contacts:
         if count == 0:
             return 0
         data.ncon = before + 1
-        bytes_each = data.contact.dist.strides[0] or data.contact.dist.itemsize
+        bytes_each = data.contact.dist.strides[0]
         # Half of the memory has to be left for the constraints.
         if (before + count) * bytes_each * 2 > data.narena:
             data.ncon = before
@@ -166,10 +165,10 @@ class Contacts:
     def detect(self, model: mj.MjModel, data: mj.MjData) -> Found:
         """Finds contacts at the positions and velocities of `data`, without adding them."""
         poses = np.zeros((len(self._geoms), 4, 4))
-        poses[:, :3, :3] = data.geom_xmat[self._ids].reshape(-1, 3, 3) @ self._rotations
-        centers = data.geom_xpos[self._ids]
-        arms = np.einsum("nij,nj->ni", data.geom_xmat[self._ids].reshape(-1, 3, 3), self._translations)
-        poses[:, :3, 3] = centers + arms
+        axes = data.geom_xmat[self._ids].reshape(-1, 3, 3)
+        arms = np.einsum("nij,nj->ni", axes, self._translations)
+        poses[:, :3, :3] = axes @ self._rotations
+        poses[:, :3, 3] = data.geom_xpos[self._ids] + arms
         poses[:, 3, 3] = 1.0
         moved = np.zeros((len(self._geoms), 6))
         for row, geom in zip(moved, self._geoms):
@@ -278,13 +277,13 @@ def _geom(model: mj.MjModel, name: str, asset: Asset | None) -> _Geom:
         return _mesh(model, number, name, asset)
     size = model.geom_size[number]
     if kind == mj.mjtGeom.mjGEOM_PLANE:
-        return _Geom(number, name, Plane(), 1.0, *identity)
+        return _Geom(number, Plane(), 1.0, *identity)
     if kind == mj.mjtGeom.mjGEOM_BOX:
-        return _Geom(number, name, Box(tuple(size)), 1.0, *identity)
+        return _Geom(number, Box(tuple(size)), 1.0, *identity)
     if kind == mj.mjtGeom.mjGEOM_SPHERE:
-        return _Geom(number, name, Sphere(size[0]), 1.0, *identity)
+        return _Geom(number, Sphere(size[0]), 1.0, *identity)
     if kind == mj.mjtGeom.mjGEOM_CAPSULE:
-        return _Geom(number, name, Capsule(size[1], size[0]), 1.0, *identity)
+        return _Geom(number, Capsule(size[1], size[0]), 1.0, *identity)
     raise ValueError(f"geom {name!r} is a {_word(kind)}; without an asset, expected a plane, box, sphere or capsule")
 
 
@@ -312,7 +311,7 @@ def _mesh(model: mj.MjModel, number: int, name: str, asset: Asset) -> _Geom:
             "the mesh, in the unit of the model or with the mesh's scale"
         )
     # x_geom = R^T (x_file - pos).
-    return _Geom(number, name, asset, float(scales[0]), rotation.T, -rotation.T @ model.mesh_pos[mesh])
+    return _Geom(number, asset, float(scales[0]), rotation.T, -rotation.T @ model.mesh_pos[mesh])
 
 
 def _excluded(model: mj.MjModel, geoms: list[_Geom]) -> Iterator[tuple[int, int]]:
