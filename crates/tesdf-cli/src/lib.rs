@@ -19,7 +19,9 @@ pub mod collide;
 pub mod completions;
 pub mod devices;
 pub mod encode;
+pub mod export;
 pub mod inspect;
+mod open_run;
 pub mod part;
 pub mod query;
 pub mod render;
@@ -81,6 +83,8 @@ pub enum Command {
     Simulate(simulate::Args),
     /// Draw a scene of one or more bodies as a PNG picture
     Render(render::Args),
+    /// Write a run as an animated GLB file, for Blender, three.js and others
+    Export(export::Args),
     /// Measure Table I or IV of the paper, next to the paper's figures
     Evaluate(evaluate::Args),
     /// Print a completion script for a shell
@@ -129,6 +133,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),
+        Command::Export(args) => export::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Completions(args) => completions::run(args),
     }

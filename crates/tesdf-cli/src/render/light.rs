@@ -1,8 +1,8 @@
 //! Shading: two lamps and the sky, with shadows and ambient occlusion.
 use tesdf::glam::{DVec3, Vec3};
+use tesdf_playback::{Linear, linear};
 
 use super::camera::Camera;
-use super::colour::{Linear, linear};
 use super::stage::{Met, Part, Stage};
 
 /// Reach of ambient occlusion, as a fraction of the scene's diagonal.

@@ -6,10 +6,8 @@
 //! give shadows and ambient occlusion.
 mod body;
 mod camera;
-mod colour;
 mod cut;
 mod light;
-mod normals;
 mod overlay;
 mod picture;
 mod run_file;
@@ -23,11 +21,11 @@ use tesdf::save::Destination;
 
 pub use body::{BodyName, body_name, open};
 pub use camera::View;
-pub use colour::{Linear, linear, of_body};
 pub use cut::{Cut, HalfSpace};
 pub use overlay::ContactMark;
 pub use picture::{Scenery, render};
 pub use stage::{Drawn, Exposure};
+pub use tesdf_playback::{Linear, linear, of_body};
 
 use tesdf_terminal::output::{self, Consent};
 use tesdf_terminal::parse;

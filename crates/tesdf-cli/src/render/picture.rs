@@ -1,10 +1,10 @@
 use rayon::prelude::*;
 use tesdf::collide::Shape;
 use tesdf::glam::{DVec2, DVec3};
+use tesdf_playback::{Linear, linear, srgb};
 use tiny_skia::{Pixmap, PremultipliedColorU8};
 
 use super::camera::{Camera, View};
-use super::colour::{Linear, linear, srgb};
 use super::cut::Cut;
 use super::light::Lights;
 use super::stage::{Drawn, Part, Stage};

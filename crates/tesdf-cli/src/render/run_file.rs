@@ -1,18 +1,15 @@
 //! The bodies of a recorded run at one of its steps.
 use std::path::Path;
 
-use tesdf::Progress;
 use tesdf::collide::Placement;
 use tesdf::glam::Vec3;
 use tesdf::save::Destination;
 use tesdf_sim::record::RecordedContact;
-use tesdf_sim::scene_file::{LoadedScene, SceneError};
+use tesdf_terminal::progress::interrupt_flag;
+use tesdf_terminal::report::Failure;
 
 use super::{Args, ContactMark, Posed};
-use crate::simulate::replace_geometries;
-use tesdf_terminal::progress::{interrupt_flag, watched};
-use tesdf_terminal::report::Failure;
-use tesdf_terminal::{output, run_file};
+use crate::open_run::{self, OpenRun};
 
 /// Reads a run and opens the geometries of its bodies. Also returns the output file, which must not
 /// be one of these files.
@@ -22,19 +19,9 @@ use tesdf_terminal::{output, run_file};
 /// drawn.
 pub fn posed(args: &Args, run: &Path) -> Result<(Posed, Destination), Failure> {
     let at = |reason: &dyn std::fmt::Display| Failure::new(format!("{}: {reason}", run.display()));
-    let record = run_file::open(run)?;
-    let mut loaded = LoadedScene::of_run(&record, run).map_err(Failure::new)?;
-    replace_geometries(&mut loaded, &args.geometries, run)?;
-    let mut inputs = loaded.geometry_files();
-    inputs.push(run.to_path_buf());
-    let output = output::open(&args.output, &inputs, args.consent)?;
-    let (progress, interrupted) = (Progress::default(), interrupt_flag()?);
-    let system =
-        watched(&progress, &interrupted, || loaded.system_watched(&progress)).map_err(|e| match e {
-            SceneError::Body { name, reason, .. } => at(&format!("body {name}: {reason}"))
-                .hint("the run stores paths, not meshes; give their current place with --geometry BODY=FILE"),
-            e => Failure::new(e),
-        })?;
+    let interrupted = interrupt_flag()?;
+    let OpenRun { record, system, output, .. } =
+        open_run::open(run, &args.geometries, &args.output, args.consent, &interrupted)?;
 
     let end = record.times().last().copied();
     let time = args.time.or(end).ok_or_else(|| at(&"it has no steps"))?;

@@ -6,9 +6,9 @@ use tesdf::collide::{Placement, Shape};
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
 
-use super::colour::Linear;
+use tesdf_playback::{Linear, SmoothNormals};
+
 use super::cut::{Cut, HalfSpace};
-use super::normals::SmoothNormals;
 
 /// A body of a picture.
 #[derive(Clone, Copy, Debug)]

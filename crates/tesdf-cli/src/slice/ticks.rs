@@ -1,11 +1,5 @@
-/// The largest step of 1, 2 or 5 times a power of ten that divides `range`, a positive length, into
-/// at least `count` parts.
-pub fn round_step(range: f64, count: f64) -> f64 {
-    let rough = range / count;
-    let power = 10_f64.powf(rough.log10().floor());
-    let factor = [5.0, 2.0, 1.0].into_iter().find(|f| f * power <= rough * (1.0 + 1e-9)).unwrap_or(1.0);
-    factor * power
-}
+//! Round steps and labels of axes.
+pub use tesdf_playback::round_step;
 
 /// Formats `value` with the decimals that a multiple of `step` needs, and with a true minus sign.
 pub fn label(value: f64, step: f64) -> String {

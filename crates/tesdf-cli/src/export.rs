@@ -1,0 +1,77 @@
+//! `tesdf export RUN -o run.glb`: a recorded run as an animated GLB file.
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use tesdf_playback::{Frames, GlbOptions, Playback, glb};
+use tesdf_terminal::output::{self, Consent};
+use tesdf_terminal::parse;
+use tesdf_terminal::progress::interrupt_flag;
+use tesdf_terminal::report::{self, Failure, Outcome};
+
+use crate::open_run::{self, OpenRun};
+
+/// Arguments of `tesdf export`.
+#[derive(clap::Args, Debug)]
+pub struct Args {
+    /// The run, which `tesdf simulate` wrote
+    pub run: PathBuf,
+    /// Output GLB file; an existing file is replaced, a pipe or device is written to
+    #[arg(short, long, value_name = "GLB")]
+    pub output: PathBuf,
+    /// Whether a read-only output is replaced.
+    #[command(flatten)]
+    pub consent: Consent,
+    /// Which steps are played.
+    #[command(flatten)]
+    pub frames: FrameArgs,
+    /// Seconds of the run in each second of the animation: 0.1 is slow motion
+    #[arg(long, value_name = "FACTOR", value_parser = parse::factor, default_value = "1", allow_hyphen_values = true)]
+    pub speed: f64,
+    /// Replace the geometry of a body of the run by a .tesdf file, or by a mesh, which is encoded;
+    /// may be given several times
+    #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry)]
+    pub geometries: Vec<(String, PathBuf)>,
+}
+
+/// Which steps of a run are played.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub struct FrameArgs {
+    /// Take every N-th step, and the last one [default: so that there are at most 1000]
+    #[arg(long, value_name = "N", conflicts_with = "fps")]
+    pub every: Option<NonZeroUsize>,
+    /// Take the steps nearest to this many times in each second of the run
+    #[arg(long, value_name = "FRAMES", value_parser = parse::factor, allow_hyphen_values = true)]
+    pub fps: Option<f64>,
+}
+
+impl FrameArgs {
+    /// The chosen frames.
+    pub fn frames(self) -> Frames {
+        match (self.every, self.fps) {
+            (Some(every), _) => Frames::Every(every),
+            (None, Some(rate)) => Frames::PerSecond(rate),
+            (None, None) => Frames::default(),
+        }
+    }
+}
+
+/// Writes the run as a GLB file.
+///
+/// # Errors
+/// The run or a geometry cannot be opened, a state is not valid, or the file cannot be written.
+pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    let interrupted = interrupt_flag()?;
+    let OpenRun { record, system, output, .. } =
+        open_run::open(&args.run, &args.geometries, &args.output, args.consent, &interrupted)?;
+    let at = |e| Failure::new(format!("{}: {e}", args.run.display()));
+    let run = Playback::new(&record, &system, args.frames.frames()).map_err(at)?;
+    let bytes = glb(&run, &GlbOptions { speed: args.speed }).map_err(at)?;
+    output::write(&output, &bytes)?;
+    report::table(&[
+        ("animation", args.output.display().to_string()),
+        ("bodies", run.bodies.len().to_string()),
+        ("frames", format!("{} of {} states", run.steps.len(), record.times().len())),
+        ("size", format!("{:.2} MB", bytes.len() as f64 / 1e6)),
+    ])?;
+    Ok(Outcome::Good)
+}

@@ -1,0 +1,30 @@
+//! Playback of recorded runs.
+//!
+//! ```text
+//! RunRecord, System ──Playback::new──▶ Playback ──glb──▶ run.glb
+//! ```
+//!
+//! - [`Playback`]: the bodies of a run at chosen steps, with their meshes.
+//! - [`Frames`]: which steps these are.
+//! - [`glb()`]: an animated GLB file, which Blender, three.js and others play.
+//!
+//! Units are SI: metres, seconds. Everything is deterministic: the same run gives the same bytes.
+#![warn(missing_docs)]
+
+mod colour;
+mod error;
+mod frames;
+mod glb;
+mod mesh;
+mod normals;
+mod playback;
+mod simple;
+
+pub use colour::{Linear, linear, of_body, srgb};
+pub use error::PlaybackError;
+pub use frames::Frames;
+pub use glb::{GlbOptions, glb};
+pub use mesh::Mesh;
+pub use normals::SmoothNormals;
+pub use playback::{DrawnBody, Part, Playback};
+pub use simple::round_step;
