@@ -29,6 +29,8 @@ step "$env/bin/python" "${pip[@]}" "$wheels"/*.whl -r python/tests/requirements.
 # With the features of the tests, which take the same crates.
 CARGO_PROFILE_DEV_OPT_LEVEL=2 step cargo build --quiet --locked --workspace $features --bin tesdf
 TESDF_CLI=${CARGO_TARGET_DIR:-$PWD/target}/debug/tesdf step "$env/bin/python" -m pytest python/tests
+# Otherwise Ray reports its use to its makers.
+export RAY_USAGE_STATS_ENABLED=0
 # Each example checks what it shows.
 for example in examples/python/*.py; do
     step "$env/bin/python" "$example"

@@ -1,6 +1,5 @@
 //! `tesdf encode MESH -o FILE`: encodes a mesh.
-use std::num::NonZeroU32;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
@@ -8,8 +7,7 @@ use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::asset::about::{Source, Statistics};
 use tesdf::domain::tetrahedra_files;
-use tesdf::encode::{Domain, DomainChoice, EncodeOptions, Encoder, Method, Threshold};
-use tesdf::geometry::Aabb;
+use tesdf::encode::{Domain, DomainChoice, EncodeChoices, EncodeOptions, Encoder, Method};
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 use tesdf::{Certificate, Progress, TeSdf};
 
@@ -17,11 +15,11 @@ use tesdf_terminal::device::{self, Choice};
 use tesdf_terminal::output::Consent;
 use tesdf_terminal::progress::{interrupt_flag, watched};
 use tesdf_terminal::report::{self, Failure, Outcome};
-use tesdf_terminal::{mesh_file, output, parse};
+use tesdf_terminal::{mesh_file, output};
 
 mod choices;
 
-pub use choices::{EncoderChoice, Preset};
+pub use choices::{ChoiceArgs, EncoderChoice, Preset};
 
 /// Arguments of `tesdf encode`.
 #[derive(clap::Args, Debug)]
@@ -34,49 +32,12 @@ pub struct Args {
     /// Whether a read-only output is replaced.
     #[command(flatten)]
     pub consent: Consent,
-    /// Division of the space in and around the solid into tetrahedra: `bisection` needs no other
-    /// program, `gmsh` runs Gmsh, and a FILE (.msh, .node, .ele, .vtu) has tetrahedra that conform
-    /// to the mesh's faces
-    #[arg(long, value_name = "bisection|gmsh|FILE", default_value = "bisection")]
-    pub domain: DomainChoice,
-    /// Method that finds the closest faces of each tetrahedron [default: certified, or the
-    /// preset's]
-    #[arg(long, value_enum)]
-    pub encoder: Option<EncoderChoice>,
-    /// Trade-off between memory, query speed and encoding time
-    #[arg(long, value_enum, default_value_t = Preset::Default)]
-    pub preset: Preset,
-    /// Resolution Q of the sampled encoder: an edge of a tetrahedron has Q + 1 samples [default:
-    /// 32]
-    #[arg(long, value_name = "Q")]
-    pub resolution: Option<u32>,
-    /// Threshold of the sampled encoder: a face is listed if it is at most this length farther than
-    /// the closest face at a sample; `safe` is large enough that no needed face is missing
-    #[arg(long, value_name = "LENGTH|safe", value_parser = choices::threshold)]
-    pub threshold: Option<Threshold>,
+    /// The options of the encoder.
+    #[command(flatten)]
+    pub choices: ChoiceArgs,
     /// Where samples are evaluated
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("samples are looked at"))]
     pub device: Choice,
-    /// Truncate each list to this number of faces; the faces that are needed nearest to the surface
-    /// stay
-    #[arg(long, value_name = "N")]
-    pub e_max: Option<NonZeroU32>,
-    /// Prepare the lists for moving vertices; needs a conforming domain
-    #[arg(long)]
-    pub deformable: bool,
-    /// Keep the tetrahedra of a conforming domain as they are, without bisecting them
-    #[arg(long)]
-    pub plain: bool,
-    /// Width of the encoded band around the mesh's bounding box, in the mesh's unit [default: 5 %
-    /// of its diagonal]
-    #[arg(long, value_name = "LENGTH", value_parser = parse::length, allow_hyphen_values = true)]
-    pub band: Option<f64>,
-    /// A box that is encoded as well, in the mesh's unit; may be given several times
-    #[arg(long = "region", value_name = "x0 y0 z0 x1 y1 z1", value_parser = parse::region, allow_hyphen_values = true)]
-    pub regions: Vec<Aabb>,
-    /// Name of the mesh's unit; it is recorded in the file and scales nothing
-    #[arg(long, value_name = "NAME")]
-    pub unit: Option<String>,
     /// Number of threads; the file does not depend on it [default: one per core]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -133,7 +94,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let source = Source::of_file(&args.mesh, load.source_blake3.clone());
     let interrupted = interrupt_flag()?;
     let progress = Progress::default();
-    let choices = args.choices();
+    let choices = args.choices.choices();
     let options = choices.options().map_err(Failure::new)?;
     if options.method == Method::Certified && args.device != Choice::Processor {
         return Err(Failure::new("--device only applies to the sampled encoder; add --encoder sampled"));
@@ -141,33 +102,44 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let sampler = args.device.sampler()?;
     let encoded = watched(&progress, &interrupted, || {
         pool.install(|| {
-            let tetrahedra = choices.tetrahedra(&solid, &progress).map_err(Failure::new)?;
-            let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
-            Encoder::new()
-                .options(options)
-                .domain(domain)
-                .source(source)
-                .sampler(&*sampler)
-                .progress(&progress)
-                .encode(&solid)
-                .map_err(|e| at(&e))
+            let encoder =
+                Encoder::new().options(options).source(source).sampler(&*sampler).progress(&progress);
+            encode(&solid, &args.mesh, &choices, encoder, &progress)
         })
     });
     if interrupted.load(Ordering::Relaxed) {
         return Err(Failure::new(format!("interrupted; {} is unchanged", args.output.display())));
     }
-    let asset: TeSdf = encoded?;
+    let asset = encoded?;
     output::write(&output, &asset.to_bytes().map_err(Failure::new)?)?;
     let seconds = start.elapsed().as_secs_f64();
     print(args, &load, solid.warnings(), &asset, seconds)?;
     Ok(Outcome::Good)
 }
 
+/// Encodes the solid of the mesh file `path` in the domain of `choices`. The error message names the
+/// file.
+///
+/// # Errors
+/// Gmsh or the file of tetrahedra gives no domain, an option does not apply to the solid, or
+/// `progress` was cancelled.
+pub(crate) fn encode(
+    solid: &SolidMesh,
+    path: &Path,
+    choices: &EncodeChoices,
+    encoder: Encoder<'_>,
+    progress: &Progress,
+) -> Result<TeSdf, Failure> {
+    let tetrahedra = choices.tetrahedra(solid, progress).map_err(Failure::new)?;
+    let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
+    encoder.domain(domain).encode(solid).map_err(|e| Failure::new(format!("{}: {e}", path.display())))
+}
+
 impl Args {
     /// All files that the command reads.
     fn inputs(&self) -> Vec<PathBuf> {
         let mut inputs = tesdf::mesh::files(&self.mesh);
-        if let DomainChoice::File(path) = &self.domain {
+        if let DomainChoice::File(path) = &self.choices.domain {
             inputs.extend(tetrahedra_files(path));
         }
         inputs

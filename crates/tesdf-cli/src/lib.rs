@@ -2,9 +2,9 @@
 //!
 //! Stdout carries only a command's result; notes, warnings, errors and progress go to stderr. With
 //! `-o /dev/stdout`, stdout carries only the bytes of the output. The exit code is 0 when the
-//! command did its work. It is 1 when a mesh or file has defects (`check`, `repair`, `verify`) or a
-//! run does not meet its criterion (`simulate`). It is 2 for bad usage or input, an output that
-//! cannot be written, too little memory, and Ctrl-C.
+//! command did its work. It is 1 when a mesh or file has defects (`check`, `repair`, `verify`,
+//! `encode-all`) or a run does not meet its criterion (`simulate`). It is 2 for bad usage or input,
+//! an output that cannot be written, too little memory, and Ctrl-C.
 #![warn(missing_docs)]
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,6 +19,7 @@ pub mod collide;
 pub mod completions;
 pub mod devices;
 pub mod encode;
+pub mod encode_all;
 pub mod export;
 pub mod inspect;
 mod open_run;
@@ -56,6 +57,8 @@ pub enum Command {
     Part(part::Args),
     /// Encode a mesh into a .tesdf file
     Encode(encode::Args),
+    /// Encode all meshes of a folder or a list, each into a .tesdf file
+    EncodeAll(encode_all::Args),
     /// Print signed distance, gradient and closest point at the points of a CSV file
     Query(query::Args),
     /// Print the contents of a .tesdf file
@@ -122,6 +125,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Repair(args) => repair::run(args),
         Command::Part(args) => part::run(args),
         Command::Encode(args) => encode::run(args),
+        Command::EncodeAll(args) => encode_all::run(args),
         Command::Query(args) => query::run(args),
         Command::Inspect(args) => inspect::run(args),
         Command::Verify(args) => verify::run(args),

@@ -3,12 +3,12 @@ mod proof;
 
 use std::num::NonZeroU64;
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use serde::Serialize;
 use tesdf::TeSdf;
-use tesdf::asset::{AssetError, Container, layout};
+use tesdf::asset::AssetError;
 use tesdf::verify::{PrecisionReport, ProveReport, VerifyError, VerifyOptions, VerifyReport, Worst, verify};
 
 use tesdf_terminal::asset_file;
@@ -66,7 +66,7 @@ struct Report {
 /// A damaged `.tesdf` file is not an error but a result, with exit code 1.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let file = args.file.display().to_string();
-    let asset = match open_intact(&args.file) {
+    let asset = match asset_file::open_intact(&args.file) {
         Ok(asset) => asset,
         Err(
             e @ (AssetError::Io { .. }
@@ -136,15 +136,6 @@ fn uninterrupted(interrupted: &AtomicBool) -> Result<(), Failure> {
         true => Err(Failure::new("interrupted; there is no result")),
         false => Ok(()),
     }
-}
-
-/// Opens a file after its checksums: all other checks then read the bytes that were written.
-fn open_intact(path: &Path) -> Result<TeSdf, AssetError> {
-    // The file is opened once, because a pipe gives its bytes once, and a file could be replaced
-    // between two reads.
-    let container = Container::open(path, &layout::SECTIONS)?;
-    container.verify_checksums()?;
-    TeSdf::from_container(container)
 }
 
 fn finish(args: &Args, report: Report) -> Result<Outcome, Failure> {

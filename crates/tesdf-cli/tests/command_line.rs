@@ -94,9 +94,9 @@ fn negative_numbers_are_values_and_not_options() {
     .unwrap() else {
         panic!()
     };
-    assert_eq!(args.regions.len(), 2);
-    assert_eq!(args.regions[0].min.to_array(), [-1.0, -2.0, -3.0]);
-    assert_eq!((args.band, args.preset), (Some(0.0), encode::Preset::Compact));
+    assert_eq!(args.choices.regions.len(), 2);
+    assert_eq!(args.choices.regions[0].min.to_array(), [-1.0, -2.0, -3.0]);
+    assert_eq!((args.choices.band, args.choices.preset), (Some(0.0), encode::Preset::Compact));
     let Parsed::Slice(args) =
         parse(&["slice", "a/b.tesdf", "-o", "p.png", "--axis", "x", "--offset", "-2.5e-1"]).unwrap()
     else {
@@ -114,10 +114,10 @@ fn defaults_are_the_documented_ones() {
     assert_eq!((args.file, args.samples, args.json), (PathBuf::from("f.tesdf"), 10_000, false));
     let Parsed::Encode(args) = parse(&["encode", "m", "-o", "f"]).unwrap() else { panic!() };
     assert_eq!(
-        (&args.domain, args.encoder, args.preset),
+        (&args.choices.domain, args.choices.encoder, args.choices.preset),
         (&DomainChoice::Bisection, None, encode::Preset::Default)
     );
-    assert_eq!(args.choices().options().unwrap(), EncodeOptions::default());
+    assert_eq!(args.choices.choices().options().unwrap(), EncodeOptions::default());
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn options_of_the_encoders() {
         let Parsed::Encode(args) = parse(&[&["encode", "m", "-o", "f"], more].concat()).unwrap() else {
             panic!()
         };
-        (args.domain.clone(), args.choices().options())
+        (args.choices.domain.clone(), args.choices.choices().options())
     };
     let (domain, paper) = options(&["--preset", "paper", "--domain", "gmsh", "--plain", "--e-max", "32"]);
     assert_eq!(domain, DomainChoice::Gmsh);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use tesdf::TeSdf;
-use tesdf::asset::AssetError;
+use tesdf::asset::{AssetError, Container, layout};
 use tesdf::base::unit::is_same_unit;
 use tesdf::geometry::Aabb;
 
@@ -16,6 +16,18 @@ use crate::report::{self, Failure};
 /// The same errors as [`TeSdf::open`].
 pub fn open(path: &Path) -> Result<TeSdf, Failure> {
     TeSdf::open(path).map_err(|e| failure(path, &e))
+}
+
+/// Opens an asset after its checksums: all other checks then read the bytes that were written.
+///
+/// # Errors
+/// The same errors as [`TeSdf::open`], and [`AssetError::Checksum`].
+pub fn open_intact(path: &Path) -> Result<TeSdf, AssetError> {
+    // The file is opened once, because a pipe gives its bytes once, and a file could be replaced
+    // between two reads.
+    let container = Container::open(path, &layout::SECTIONS)?;
+    container.verify_checksums()?;
+    TeSdf::from_container(container)
 }
 
 /// Assets by path, so a file that is named twice is opened once.

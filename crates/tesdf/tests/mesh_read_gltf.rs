@@ -3,7 +3,7 @@ mod sample;
 
 use sample::{DATA_URI, glb, json, tetrahedron_buffer};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{LoadedMesh, MeshFormat, read, read_bytes};
+use tesdf::mesh::{LoadedMesh, MeshFormat, read, read_bytes, source_blake3};
 
 const NODE: &str = r#"{"mesh":0}"#;
 
@@ -33,6 +33,7 @@ fn embedded_and_external_buffers_agree() {
     assert_eq!(external.mesh, embedded.mesh);
     let only_json = blake3::hash(&std::fs::read(&path).unwrap());
     assert_ne!(external.report.source_blake3, only_json.to_hex().as_str(), "the buffer is hashed too");
+    assert_eq!(source_blake3(&path).unwrap(), external.report.source_blake3);
 }
 
 #[test]

@@ -24,6 +24,24 @@ fn destination(path: &Path) -> Result<Destination, SaveError> {
 }
 
 #[test]
+fn writers_of_one_file_do_not_stop_each_other() {
+    let folder = folder();
+    let path = folder.path().join("a.tesdf");
+    let write = |writer: u8| (0..50).for_each(|_| save_atomic(&path, &[writer; 1000]).unwrap());
+    std::thread::scope(|scope| {
+        for writer in 0..4 {
+            let write = &write;
+            scope.spawn(move || write(writer));
+        }
+        for _ in 0..200 {
+            let Ok(found) = fs::read(&path) else { continue };
+            assert!(found.len() == 1000 && found.iter().all(|byte| *byte == found[0]));
+        }
+    });
+    assert_eq!(names(folder.path()), ["a.tesdf"]);
+}
+
+#[test]
 fn saving_replaces_whole_files_and_leaves_no_part_files() {
     let folder = folder();
     let path = folder.path().join("a.tesdf");

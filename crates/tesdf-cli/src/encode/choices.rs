@@ -1,10 +1,55 @@
-//! Converts arguments to the library's options.
-use clap::ValueEnum;
-use tesdf::encode::{Deformation, EncodeChoices, Refinement, Threshold};
-use tesdf::geometry::Aabb;
+//! The options of the encoder, which `encode` and `encode-all` share.
+use std::num::NonZeroU32;
 
-use super::Args;
+use clap::ValueEnum;
+use tesdf::encode::{Deformation, DomainChoice, EncodeChoices, Refinement, Threshold};
+use tesdf::geometry::Aabb;
 use tesdf_terminal::parse;
+
+/// The options of the encoder.
+#[derive(clap::Args, Debug)]
+pub struct ChoiceArgs {
+    /// Division of the space in and around the solid into tetrahedra: `bisection` needs no other
+    /// program, `gmsh` runs Gmsh, and a FILE (.msh, .node, .ele, .vtu) has tetrahedra that conform
+    /// to the mesh's faces
+    #[arg(long, value_name = "bisection|gmsh|FILE", default_value = "bisection")]
+    pub domain: DomainChoice,
+    /// Method that finds the closest faces of each tetrahedron [default: certified, or the
+    /// preset's]
+    #[arg(long, value_enum)]
+    pub encoder: Option<EncoderChoice>,
+    /// Trade-off between memory, query speed and encoding time
+    #[arg(long, value_enum, default_value_t = Preset::Default)]
+    pub preset: Preset,
+    /// Resolution Q of the sampled encoder: an edge of a tetrahedron has Q + 1 samples [default:
+    /// 32]
+    #[arg(long, value_name = "Q")]
+    pub resolution: Option<u32>,
+    /// Threshold of the sampled encoder: a face is listed if it is at most this length farther than
+    /// the closest face at a sample; `safe` is large enough that no needed face is missing
+    #[arg(long, value_name = "LENGTH|safe", value_parser = threshold)]
+    pub threshold: Option<Threshold>,
+    /// Truncate each list to this number of faces; the faces that are needed nearest to the surface
+    /// stay
+    #[arg(long, value_name = "N")]
+    pub e_max: Option<NonZeroU32>,
+    /// Prepare the lists for moving vertices; needs a conforming domain
+    #[arg(long)]
+    pub deformable: bool,
+    /// Keep the tetrahedra of a conforming domain as they are, without bisecting them
+    #[arg(long)]
+    pub plain: bool,
+    /// Width of the encoded band around the mesh's bounding box, in the mesh's unit [default: 5 %
+    /// of its diagonal]
+    #[arg(long, value_name = "LENGTH", value_parser = parse::length, allow_hyphen_values = true)]
+    pub band: Option<f64>,
+    /// A box that is encoded as well, in the mesh's unit; may be given several times
+    #[arg(long = "region", value_name = "x0 y0 z0 x1 y1 z1", value_parser = parse::region, allow_hyphen_values = true)]
+    pub regions: Vec<Aabb>,
+    /// Name of the mesh's unit; it is recorded in the file and scales nothing
+    #[arg(long, value_name = "NAME")]
+    pub unit: Option<String>,
+}
 
 /// Methods that find the closest faces of a tetrahedron.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -55,7 +100,7 @@ impl From<Preset> for tesdf::encode::Preset {
     }
 }
 
-impl Args {
+impl ChoiceArgs {
     /// The options for the library.
     pub fn choices(&self) -> EncodeChoices {
         let numbers = |r: &Aabb| [r.min.x, r.min.y, r.min.z, r.max.x, r.max.y, r.max.z];

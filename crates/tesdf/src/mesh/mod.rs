@@ -16,7 +16,9 @@ pub(crate) use check::coordinate_in_range;
 pub use check::{BoundaryLoop, CheckReport, check};
 pub use defect::{Defect, DefectKind, Severity};
 pub(crate) use read::text;
-pub use read::{LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, files, read, read_bytes};
+pub use read::{
+    LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, files, read, read_bytes, source_blake3,
+};
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, repair};
 pub use solid::{NotSolid, ReadSolidError, SolidMesh};
 pub use topology::{Edge, EdgeUse, Topology};

@@ -189,6 +189,34 @@ fn files_of(path: &Path) -> Vec<PathBuf> {
     std::iter::once(path.to_path_buf()).chain(buffers).collect()
 }
 
+/// BLAKE3, in hexadecimal, of the bytes of all [`files`] that [`read`] opens for `path`:
+/// [`LoadReport::source_blake3`], without the time that reading a mesh takes.
+///
+/// # Errors
+/// [`ReadError::Open`]: one of the files cannot be read.
+///
+/// # Example
+///
+/// ```
+/// use tesdf::mesh;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let folder = tempfile::tempdir()?;
+/// # let path = folder.path().join("part.obj");
+/// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
+/// assert_eq!(mesh::source_blake3(&path)?, mesh::read(&path)?.report.source_blake3);
+/// # Ok(())
+/// # }
+/// ```
+pub fn source_blake3(path: impl AsRef<Path>) -> Result<String, ReadError> {
+    let mut hasher = blake3::Hasher::new();
+    for path in files_of(path.as_ref()) {
+        let bytes = input::read(&path).map_err(|source| ReadError::Open { path, source })?;
+        hasher.update(&bytes);
+    }
+    Ok(hasher.finalize().to_hex().to_string())
+}
+
 /// Reads a mesh from bytes in memory. The buffers of a glTF file must be in these bytes too.
 pub fn read_bytes(bytes: &[u8], format: MeshFormat) -> Result<LoadedMesh, ReadError> {
     parse(bytes, format, None)

@@ -1,6 +1,8 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
@@ -24,7 +26,7 @@ impl Part {
     /// Creates an empty file in the folder of `target`, which must not be a link. Part files of
     /// ended processes are removed first.
     pub(super) fn new(target: &Path, name: &Path) -> Result<Self, SaveError> {
-        if is_locked(target) {
+        if is_growing(target) {
             return Err(SaveError::Busy { path: name.to_path_buf() });
         }
         let folder = folder_of(target);
@@ -143,6 +145,20 @@ fn keep_owner_and_mode(file: &File, replaced: &fs::Metadata) -> io::Result<()> {
 #[cfg(not(unix))]
 fn keep_owner_and_mode(_: &File, _: &fs::Metadata) -> io::Result<()> {
     Ok(())
+}
+
+/// Whether a living process keeps a lock on the file. A file that another process has just renamed
+/// is locked for a moment, and a growing file as long as it grows.
+fn is_growing(path: &Path) -> bool {
+    const WAITS: u32 = 50;
+    const WAIT: Duration = Duration::from_millis(10);
+    (0..WAITS).all(|_| {
+        let locked = is_locked(path);
+        if locked {
+            thread::sleep(WAIT);
+        }
+        locked
+    })
 }
 
 /// Whether a living process holds a lock on the file.

@@ -1,0 +1,174 @@
+//! Encodes one of many meshes.
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde::Serialize;
+use tesdf::asset::FORMAT_VERSION;
+use tesdf::asset::about::Source;
+use tesdf::encode::{DomainChoice, EncodeChoices, EncodeOptions, Encoder};
+use tesdf::mesh::{LoadedMesh, SolidMesh};
+use tesdf::save::save_atomic;
+use tesdf::{Certificate, Progress, TeSdf};
+
+use super::meshes::Mesh;
+use crate::encode::encode;
+use tesdf_terminal::report::Failure;
+use tesdf_terminal::{asset_file, mesh_file};
+
+/// The work on each mesh.
+#[derive(Debug)]
+pub struct Job {
+    choices: EncodeChoices,
+    options: EncodeOptions,
+    output: PathBuf,
+}
+
+/// What became of a mesh in this run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum State {
+    /// Encoded now.
+    Encoded,
+    /// Its asset was there and whole.
+    Present,
+    /// There is no asset, because of an error.
+    Failed,
+}
+
+/// The result for a mesh.
+#[derive(Debug)]
+pub struct Done {
+    pub state: State,
+    pub seconds: f64,
+    /// The asset, or the error message.
+    pub result: Result<Asset, String>,
+}
+
+/// An asset in the output folder.
+#[derive(Clone, Debug, Serialize)]
+pub struct Asset {
+    /// BLAKE3 of the mesh file, in hex.
+    mesh_blake3: String,
+    /// Name of the asset's file.
+    asset: String,
+    /// Size of the asset's file.
+    pub bytes: u64,
+    faces: usize,
+    certificate: Certificate,
+}
+
+/// The asset that a mesh gets.
+struct Expected {
+    source: Source,
+    name: String,
+    path: PathBuf,
+}
+
+impl Job {
+    /// # Errors
+    /// The choices exclude each other.
+    pub fn new(choices: EncodeChoices, output: &Path) -> Result<Self, Failure> {
+        let options = choices.options().map_err(Failure::new)?;
+        Ok(Self { choices, options, output: output.to_path_buf() })
+    }
+
+    /// The options of the encoder.
+    pub fn options(&self) -> &EncodeOptions {
+        &self.options
+    }
+
+    /// The name of the domain.
+    pub fn domain(&self) -> &'static str {
+        match self.choices.domain {
+            DomainChoice::Bisection => "bisection",
+            DomainChoice::Gmsh => "gmsh",
+            DomainChoice::File(_) => "file",
+        }
+    }
+
+    /// Encodes a mesh, unless its asset is there. Nothing that is wrong with the mesh stops the
+    /// caller, not even a mistake in the encoder.
+    pub fn run(&self, mesh: &Mesh, stop: &Progress) -> Done {
+        let start = Instant::now();
+        let result = catch_unwind(AssertUnwindSafe(|| self.asset(mesh, stop))).unwrap_or_else(|panic| {
+            let found = message(&*panic);
+            Err(Failure::new(format!("{}: tesdf has a bug: {found}; please report it", mesh.path.display())))
+        });
+        let (state, result) = match result {
+            Ok((state, asset)) => (state, Ok(asset)),
+            Err(failure) => (State::Failed, Err(failure.message)),
+        };
+        Done { state, seconds: start.elapsed().as_secs_f64(), result }
+    }
+
+    fn asset(&self, mesh: &Mesh, stop: &Progress) -> Result<(State, Asset), Failure> {
+        let path = &mesh.path;
+        if let Some(reason) = &mesh.unreadable {
+            return Err(Failure::new(reason));
+        }
+        // A pipe would give its bytes once, and they are read twice.
+        if path.exists() && !path.is_file() {
+            return Err(Failure::new(format!("{} is not a file; expected a mesh file", path.display())));
+        }
+        let hash = tesdf::mesh::source_blake3(path).map_err(|e| Failure::new(e.in_file(path)))?;
+        let expected = self.expected(Source::of_file(path, hash));
+        if let Some(asset) = self.present(&expected) {
+            return Ok((State::Present, asset));
+        }
+        let LoadedMesh { mesh: surface, report, .. } = mesh_file::read(path)?;
+        if report.source_blake3 != expected.source.blake3 {
+            let found = format!("{} changed while it was read; encode it again", path.display());
+            return Err(Failure::new(found));
+        }
+        let solid = SolidMesh::new(surface).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+        let encoder =
+            Encoder::new().options(self.options.clone()).source(expected.source.clone()).progress(stop);
+        let asset = encode(&solid, path, &self.choices, encoder, stop)?;
+        let bytes = asset.to_bytes().map_err(Failure::new)?;
+        save_atomic(&expected.path, &bytes).map_err(Failure::new)?;
+        Ok((State::Encoded, expected.asset(&asset, bytes.len())))
+    }
+
+    /// The asset of the mesh file `source`. Its name is a hash of all that its bytes depend on:
+    /// the mesh, the name of its file (which the asset records), the options and the version. So
+    /// one name stands for one sequence of bytes.
+    fn expected(&self, source: Source) -> Expected {
+        let mut hasher = blake3::Hasher::new();
+        let options = serde_json::to_string(&self.options).unwrap_or_default();
+        let version = format!("{} {FORMAT_VERSION}", env!("CARGO_PKG_VERSION"));
+        for part in [&version, self.domain(), &options, &source.name, &source.blake3] {
+            // The length keeps two parts apart.
+            hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
+        }
+        let name = format!("{}.tesdf", &hasher.finalize().to_hex()[..32]);
+        Expected { path: self.output.join(&name), source, name }
+    }
+
+    /// The asset if it is there and whole.
+    fn present(&self, expected: &Expected) -> Option<Asset> {
+        let asset = asset_file::open_intact(&expected.path).ok()?;
+        let about = asset.about();
+        let same = about.source == expected.source && about.options == self.options;
+        same.then(|| expected.asset(&asset, asset.as_bytes().len()))
+    }
+}
+
+impl Expected {
+    fn asset(&self, asset: &TeSdf, bytes: usize) -> Asset {
+        let about = asset.about();
+        Asset {
+            mesh_blake3: self.source.blake3.clone(),
+            asset: self.name.clone(),
+            bytes: bytes as u64,
+            faces: about.statistics.faces,
+            certificate: about.certificate().clone(),
+        }
+    }
+}
+
+fn message(panic: &dyn Any) -> String {
+    let text = panic.downcast_ref::<&str>().map(ToString::to_string);
+    text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it panicked".into())
+}
