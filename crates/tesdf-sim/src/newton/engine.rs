@@ -8,6 +8,7 @@ use tesdf::collide::{CollideError, CollideOptions, Contact, Contacts, HiddenOver
 use super::NewtonOptions;
 use super::deep::Surfaces;
 use super::gaps::Gaps;
+use super::geometric::Motion;
 use super::integrate::{free_velocity, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
@@ -175,28 +176,37 @@ impl Newton {
 
     /// Minimises the problem of every island from `start`. A body without rows keeps its target
     /// velocity.
-    fn solve(&self, step: &mut Step, rows: &[Row], gap: Gap, start: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
+    fn solve(
+        &self,
+        step: &mut Step,
+        motion: &Motion,
+        rows: &[Row],
+        gap: Gap,
+        start: &[Vector6<f64>],
+    ) -> (Vec<Vector6<f64>>, Vec<f64>) {
         let islands = islands(step.free.len(), rows);
-        let minimum = |island: &Island| self.solve_island(step, island, rows, gap, start);
+        let minimum = |island: &Island| self.solve_island(step, motion, island, rows, gap, start);
         // One thread computes each minimum, and they are collected in order: the bits do not depend
         // on the number of threads.
         let minima: Vec<Minimum> = islands.par_iter().map(minimum).collect();
-        let mut velocities = step.target.clone();
+        let (mut velocities, mut forces) = (motion.target.clone(), vec![0.0; rows.len()]);
         let report = &mut step.report;
         report.islands = islands.len();
         let mut slowest = 0;
         for (island, minimum) in islands.iter().zip(minima) {
             island.bodies.iter().zip(minimum.velocity).for_each(|(&k, v)| velocities[k] = v);
+            island.rows.iter().zip(minimum.forces).for_each(|(&k, force)| forces[k] = force);
             slowest = slowest.max(minimum.iterations);
             report.converged &= minimum.converged;
         }
         report.iterations += slowest;
-        velocities
+        (velocities, forces)
     }
 
     fn solve_island(
         &self,
         step: &Step,
+        motion: &Motion,
         island: &Island,
         rows: &[Row],
         gap: Gap,
@@ -214,9 +224,9 @@ impl Newton {
             (row, gap)
         };
         let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
-        let bodies = island.bodies.iter().map(|&k| &step.free[k]).collect();
+        let inertia = island.bodies.iter().map(|&k| motion.inertia[k]).collect();
         let rows = island.rows.iter().map(|&k| local(rows[k].clone()));
-        Problem::new(bodies, of(&step.target), rows, step.h).minimise(of(start), &self.options)
+        Problem::new(inertia, of(&motion.target), rows, step.h).minimise(of(start), &self.options)
     }
 
     /// Detects as far ahead as the velocities of `ahead` move the bodies.
@@ -315,7 +325,14 @@ impl Newton {
         }
         let mut rows = [contact_rows.as_slice(), &joints].concat();
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
-        let mut velocities = self.solve(step, &rows, Gap::Position, &start);
+        let plain = Motion::new(&step.free, &step.target);
+        let mut motion = plain.clone();
+        let (mut velocities, mut forces) = self.solve(step, &motion, &rows, Gap::Position, &start);
+        let at_start = vec![Vector6::zeros(); step.free.len()];
+        if let Some(stiffened) = plain.stiffened(&rows, &forces, &at_start, step.h) {
+            motion = stiffened;
+            (velocities, forces) = self.solve(step, &motion, &rows, Gap::Position, &start);
+        }
         if rows.iter().any(|row| !stays(row)) {
             let beginning = self.gaps(step).beginning(contacts, &found);
             for _ in 0..self.options.redetections {
@@ -333,14 +350,16 @@ impl Newton {
                 next.retain(|row| !stays(row));
                 next.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
                 next.extend_from_slice(&joints);
+                motion =
+                    plain.stiffened(&rows, &forces, &velocities, step.h).unwrap_or_else(|| plain.clone());
                 rows = next;
                 let joints = rows.len() - joints.len()..;
                 predict(&mut rows[joints], &self.gaps(step).bodies(), &poses, &velocities, step.h);
-                velocities = self.solve(step, &rows, Gap::Position, &velocities);
+                (velocities, forces) = self.solve(step, &motion, &rows, Gap::Position, &velocities);
             }
         }
         let carried = match rows.iter().any(|row| row.relaxed_gap > row.gap) {
-            true => self.solve(step, &rows, Gap::Relaxed, &velocities),
+            true => self.solve(step, &motion, &rows, Gap::Relaxed, &velocities).0,
             false => velocities.clone(),
         };
         Ok([velocities, carried])

@@ -56,12 +56,15 @@ fn root(parent: &mut [usize], mut k: usize) -> usize {
 mod tests {
     use nalgebra::Vector6;
 
+    use glam::DVec3;
+
     use super::*;
     use crate::newton::rows::Resistance;
 
     fn row(a: Option<usize>, b: Option<usize>) -> Row {
         let side = |k: Option<usize>| k.map(|k| (k, Vector6::zeros()));
         Row {
+            arms: [DVec3::ZERO; 2],
             sides: [side(a), side(b)],
             gap: 0.0,
             relaxed_gap: 0.0,

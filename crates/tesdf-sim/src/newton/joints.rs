@@ -141,8 +141,8 @@ fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f6
         Direction::About(d) => pack(DVec3::ZERO, d),
     };
     // The rate that kinematic bodies add.
-    let mut rate = 0.0;
-    let sides = [(Some(joint.child), 1.0), (joint.parent, -1.0)].map(|(body, sign)| {
+    let (mut rate, mut arms) = (0.0, [DVec3::ZERO; 2]);
+    let sides = [(0, Some(joint.child), 1.0), (1, joint.parent, -1.0)].map(|(k, body, sign)| {
         let body = body?;
         let state = &system.states()[body];
         match system.bodies()[body].mass {
@@ -152,7 +152,11 @@ fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f6
                 rate += sign * jacobian(state.pose.translation).dot(&velocity);
                 None
             }
-            Mass::Free(mass) => Some((free_of[body]?, sign * jacobian(state.pose.to_world(mass.center)))),
+            Mass::Free(mass) => {
+                let center = state.pose.to_world(mass.center);
+                arms[k] = point - center;
+                Some((free_of[body]?, sign * jacobian(center)))
+            }
         }
     });
     let weight = Row::weight(&sides, free);
@@ -162,6 +166,7 @@ fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f6
     };
     Row {
         sides,
+        arms,
         gap,
         relaxed_gap: gap,
         stiffness: measure.stiffness.unwrap_or(STIFFER / (weight * softness)),

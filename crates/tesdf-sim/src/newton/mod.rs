@@ -36,6 +36,7 @@
 mod deep;
 mod engine;
 mod gaps;
+mod geometric;
 mod integrate;
 mod islands;
 mod joints;

@@ -5,17 +5,17 @@
 //! method of multipliers (Hestenes, *Multiplier and gradient methods*, 1969; Powell, *A method for
 //! nonlinear constraints in minimization problems*, 1969), until no contact gives way: each spring
 //! gets a compression that it keeps without giving way, the compression of the minimum before.
-use nalgebra::Vector6;
+use nalgebra::{Matrix6, Vector6};
 
 use super::NewtonOptions;
 use super::linear::{BlockMatrix, Pattern, dot};
-use super::rows::{FreeBody, Row};
+use super::rows::Row;
 use super::spring::{Change, Deflection, Grips, Spring};
 
 /// The function `½ |v − target|²_M + Σ energy of the springs` of the velocities `v`.
 #[derive(Debug)]
-pub struct Problem<'a> {
-    bodies: Vec<&'a FreeBody>,
+pub struct Problem {
+    inertia: Vec<Matrix6<f64>>,
     target: Vec<Vector6<f64>>,
     springs: Vec<Spring>,
     pattern: Pattern,
@@ -27,6 +27,8 @@ pub struct Problem<'a> {
 pub struct Minimum {
     /// Velocities of the bodies of the island.
     pub velocity: Vec<Vector6<f64>>,
+    /// The force of each row along its sides, N or N m.
+    pub forces: Vec<f64>,
     /// Number of Newton iterations.
     pub iterations: u32,
     /// Whether every minimisation reached the tolerance, and the limits of friction have settled.
@@ -87,11 +89,11 @@ const NEAR: f64 = 0.1;
 /// friction, so its root is usually found after a few.
 const LINE_SEARCH: usize = 60;
 
-impl<'a> Problem<'a> {
+impl Problem {
     /// `target` has one velocity per body, in the order of `bodies`. Each row comes with its gap,
     /// and refers to bodies by their index in `bodies`.
     pub fn new(
-        bodies: Vec<&'a FreeBody>,
+        inertia: Vec<Matrix6<f64>>,
         target: Vec<Vector6<f64>>,
         rows: impl Iterator<Item = (Row, f64)>,
         time_step: f64,
@@ -101,11 +103,11 @@ impl<'a> Problem<'a> {
             [Some((a, _)), Some((b, _))] => Some((a.min(b), a.max(b))),
             _ => None,
         };
-        let pattern = Pattern::new(bodies.len(), springs.iter().filter_map(pair).collect());
+        let pattern = Pattern::new(inertia.len(), springs.iter().filter_map(pair).collect());
         for spring in &mut springs {
             spring.pair = pair(spring).and_then(|(a, b)| pattern.pair(a, b));
         }
-        Self { bodies, target, springs, pattern, time_step }
+        Self { inertia, target, springs, pattern, time_step }
     }
 
     /// Minimises from `start`. Where rows are rigid or have friction, raises their forces and
@@ -128,9 +130,10 @@ impl<'a> Problem<'a> {
             let springs = self.springs.iter().zip(&near).filter_map(|(spring, near)| near.then_some(spring));
             let part = Part { problem: self, springs: springs.collect() };
             // The forces are found anew, so that they do not depend on the contacts before.
-            let mut at = part.start(velocity);
+            let mut at = part.start(velocity.clone());
             let (more, converged, slack) = part.raise_forces(&mut at, options);
-            (velocity, iterations) = (at.velocity, iterations + more);
+            iterations += more;
+            velocity = at.velocity.clone();
             let mut is_complete = true;
             for (near, spring) in near.iter_mut().zip(&self.springs).filter(|(near, _)| !**near) {
                 let gap = gap(spring, &velocity);
@@ -138,7 +141,9 @@ impl<'a> Problem<'a> {
                 is_complete &= gap >= -slack;
             }
             if is_complete {
-                return Minimum { velocity, iterations, converged };
+                let mut acting = part.forces(&at).into_iter();
+                let forces = near.iter().map(|near| if *near { acting.next().unwrap_or(0.0) } else { 0.0 });
+                return Minimum { velocity, forces: forces.collect(), iterations, converged };
             }
         }
     }
@@ -146,7 +151,7 @@ impl<'a> Problem<'a> {
 
 /// The problem with some of its springs.
 struct Part<'a> {
-    problem: &'a Problem<'a>,
+    problem: &'a Problem,
     springs: Vec<&'a Spring>,
 }
 
@@ -156,6 +161,11 @@ impl Part<'_> {
         let has_friction = self.springs.iter().any(|s| s.friction.is_some());
         let grips = if has_friction { Grips::Follow } else { Grips::Stay };
         Iterate { velocity, deflections, stiffening: 1.0, grips }
+    }
+
+    /// The force of each row along its sides, N or N m.
+    fn forces(&self, at: &Iterate) -> Vec<f64> {
+        self.springs.iter().zip(&at.deflections).map(|(s, d)| s.force(d, at.stiffening).0).collect()
     }
 
     /// Returns the number of Newton iterations, whether it converged, and the distance by which
@@ -226,10 +236,10 @@ impl Part<'_> {
         let [change, all] = grips.fold([0.0; 2], |[a, b], [next, now]| [a + (next - now).abs(), b + next]);
         let stop = self
             .problem
-            .bodies
+            .inertia
             .iter()
             .zip(&self.problem.target)
-            .map(|(body, v)| (body.inertia * v).fixed_rows::<3>(0).norm());
+            .map(|(inertia, v)| (inertia * v).fixed_rows::<3>(0).norm());
         let least = NO_LIMIT * stop.sum::<f64>() / self.problem.time_step;
         if change > 0.0 { change / all.max(least) } else { 0.0 }
     }
@@ -262,16 +272,16 @@ impl Part<'_> {
             spring.force(&deflection, 1.0).0 * -deflection.gap
         };
         let motion =
-            self.problem.bodies.iter().zip(&self.problem.target).map(|(body, v)| v.dot(&(body.inertia * v)));
+            self.problem.inertia.iter().zip(&self.problem.target).map(|(inertia, v)| v.dot(&(inertia * v)));
         motion.sum::<f64>() + self.springs.iter().map(energy).sum::<f64>()
     }
 
     /// The negative gradient.
     fn force(&self, at: &Iterate) -> Vec<Vector6<f64>> {
         let of_body =
-            |((body, v), target): ((&&FreeBody, &Vector6<f64>), &Vector6<f64>)| body.inertia * (target - v);
+            |((inertia, v), target): ((&Matrix6<f64>, &Vector6<f64>), &Vector6<f64>)| inertia * (target - v);
         let mut force: Vec<_> =
-            self.problem.bodies.iter().zip(&at.velocity).zip(&self.problem.target).map(of_body).collect();
+            self.problem.inertia.iter().zip(&at.velocity).zip(&self.problem.target).map(of_body).collect();
         for (spring, deflection) in self.springs.iter().zip(&at.deflections) {
             spring.push(deflection, at.stiffening, self.problem.time_step, &mut force);
         }
@@ -279,10 +289,7 @@ impl Part<'_> {
     }
 
     fn direction(&self, at: &Iterate, force: &[Vector6<f64>]) -> Option<Vec<Vector6<f64>>> {
-        let mut hessian = BlockMatrix::new(
-            &self.problem.pattern,
-            self.problem.bodies.iter().map(|body| body.inertia).collect(),
-        );
+        let mut hessian = BlockMatrix::new(&self.problem.pattern, self.problem.inertia.clone());
         let h2 = self.problem.time_step * self.problem.time_step;
         for (spring, deflection) in self.springs.iter().zip(&at.deflections) {
             spring.stiffen(deflection, at.stiffening, h2, &mut hessian);
@@ -293,10 +300,10 @@ impl Part<'_> {
     /// The step length along `direction` at which the derivative is zero. The derivative increases.
     fn line_search(&self, at: &Iterate, direction: &[Vector6<f64>], changes: &[Change]) -> f64 {
         let (mut constant, mut linear) = (0.0, 0.0);
-        for (((body, v), target), d) in
-            self.problem.bodies.iter().zip(&at.velocity).zip(&self.problem.target).zip(direction)
+        for (((inertia, v), target), d) in
+            self.problem.inertia.iter().zip(&at.velocity).zip(&self.problem.target).zip(direction)
         {
-            let momentum = body.inertia * d;
+            let momentum = inertia * d;
             constant += momentum.dot(&(v - target));
             linear += momentum.dot(d);
         }
@@ -339,11 +346,11 @@ mod tests {
     use tesdf::collide::Pose;
 
     use super::*;
-    use crate::newton::rows::Resistance;
+    use crate::newton::rows::{FreeBody, Resistance};
     use crate::{MassProperties, State};
 
     /// A chain of bodies with random rows; some rows connect a body to a fixed body.
-    fn random_problem(free: &[FreeBody], h: f64, seed: u64) -> Problem<'_> {
+    fn random_problem(free: &[FreeBody], h: f64, seed: u64) -> Problem {
         let random = &mut fastrand::Rng::with_seed(seed);
         let mut number = || random.f64() - 0.5;
         let mut vector = || Vector6::from_fn(|_, _| number());
@@ -356,13 +363,15 @@ mod tests {
             let sides = [Some((a, vector())), other];
             let (stiffness, resistance) = (30.0 / (h * h), Resistance::Spring);
             let bounds = [0.0, f64::INFINITY];
-            let row = Row { sides, gap, relaxed_gap: gap, stiffness, bounds, resistance, friction: None };
+            let arms = [DVec3::ZERO; 2];
+            let row =
+                Row { sides, arms, gap, relaxed_gap: gap, stiffness, bounds, resistance, friction: None };
             rows.push((row, gap));
         }
-        Problem::new(free.iter().collect(), target, rows.into_iter(), h)
+        Problem::new(free.iter().map(|body| body.inertia).collect(), target, rows.into_iter(), h)
     }
 
-    fn whole<'a>(problem: &'a Problem<'a>) -> Part<'a> {
+    fn whole<'a>(problem: &'a Problem) -> Part<'a> {
         Part { problem, springs: problem.springs.iter().collect() }
     }
 

@@ -42,6 +42,9 @@ pub struct Row {
     /// Up to two free bodies: the index of each in the list of free bodies, and the derivative of
     /// the gap by its velocity.
     pub sides: [Option<(usize, Vector6<f64>)>; 2],
+    /// The vectors from the centres of mass of the two sides to the point where the force acts, m.
+    /// Zero for a torque.
+    pub arms: [DVec3; 2],
     /// Gap at the beginning of the step, with the motion of kinematic bodies in the step, m or rad.
     pub gap: f64,
     /// The gap without the correction that pushes penetrating bodies apart.
@@ -63,8 +66,6 @@ pub struct Row {
 pub struct Friction {
     /// Unit normal of the tangent plane.
     pub normal: DVec3,
-    /// The vectors from the centres of mass of the two sides to the contact, m.
-    pub arms: [DVec3; 2],
     /// Coefficient of friction.
     pub coefficient: f64,
     /// Stiffness of sticking, N/m.
@@ -135,7 +136,6 @@ impl Row {
             let weight = |t: DVec3| Self::weight(&[side(0, t), side(1, -t)], free);
             Friction {
                 normal: contact.normal,
-                arms: points.map(|point| point.map_or(DVec3::ZERO, |(_, arm)| arm)),
                 coefficient,
                 stiffness: 2.0 / ((weight(tangents.0) + weight(tangents.1)) * softness),
                 way: DVec3::ZERO,
@@ -143,6 +143,7 @@ impl Row {
         };
         (weight > 0.0).then(|| Self {
             sides,
+            arms: points.map(|point| point.map_or(DVec3::ZERO, |(_, arm)| arm)),
             gap: contact.distance,
             relaxed_gap: contact.distance,
             stiffness: 1.0 / (weight * softness),

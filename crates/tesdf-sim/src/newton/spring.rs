@@ -14,6 +14,8 @@ const FASTER: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub struct Spring {
     pub sides: [Option<(usize, Vector6<f64>)>; 2],
+    /// As [`Row::arms`].
+    pub arms: [DVec3; 2],
     /// The gap that counts: with the correction of a penetration, or without.
     pub gap: f64,
     /// The pair of the two bodies in the pattern of the matrix.
@@ -60,8 +62,8 @@ pub struct Change {
 impl Spring {
     /// The spring of a row with this gap; the pattern is not known yet.
     pub fn new(row: &Row, gap: f64) -> Self {
-        let Row { sides, stiffness, bounds, resistance, friction, .. } = *row;
-        Self { sides, gap, pair: None, stiffness, bounds, resistance, friction: friction.map(Box::new) }
+        let Row { sides, arms, stiffness, bounds, resistance, friction, .. } = *row;
+        Self { sides, arms, gap, pair: None, stiffness, bounds, resistance, friction: friction.map(Box::new) }
     }
 
     /// The deflection at `velocity`, when no force is kept yet.
@@ -93,7 +95,7 @@ impl Spring {
                     linear + angular.cross(arm)
                 })
             };
-            let [a, b] = [0, 1].map(|k| of_side((&self.sides[k], friction.arms[k])));
+            let [a, b] = [0, 1].map(|k| of_side((&self.sides[k], self.arms[k])));
             h * (a - b).reject_from_normalized(friction.normal)
         };
         Change { gap: h * self.rate(velocity), slip: self.friction.as_deref().map_or(DVec3::ZERO, slip) }
@@ -168,10 +170,10 @@ impl Spring {
         if force != 0.0 {
             self.sides.iter().flatten().for_each(|(body, j)| forces[*body].axpy(h * force, j, 1.0));
         }
-        if let (Some(friction), Some((force, _))) = (&self.friction, self.friction(at, stiffening)) {
+        if let Some((force, _)) = self.friction(at, stiffening) {
             for (k, sign) in [(0, h), (1, -h)] {
                 if let Some((body, _)) = self.sides[k] {
-                    forces[body] += pack(sign * force, friction.arms[k].cross(sign * force));
+                    forces[body] += pack(sign * force, self.arms[k].cross(sign * force));
                 }
             }
         }
@@ -183,8 +185,8 @@ impl Spring {
         if stiffness > 0.0 {
             matrix.add(&self.sides, self.pair, h2 * stiffness);
         }
-        if let (Some(friction), Some((_, derivative))) = (&self.friction, self.friction(at, stiffening)) {
-            let point = |k: usize| self.sides[k].map(|(body, _)| (body, friction.arms[k]));
+        if let Some((_, derivative)) = self.friction(at, stiffening) {
+            let point = |k: usize| self.sides[k].map(|(body, _)| (body, self.arms[k]));
             matrix.add_point([point(0), point(1)], self.pair, h2 * derivative);
         }
     }
