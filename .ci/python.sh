@@ -28,6 +28,8 @@ step "$env/bin/python" "${pip[@]}" "$wheels"/*.whl -r python/tests/requirements.
 # The tests compare contacts with those of the command.
 # With the features of the tests, which take the same crates.
 CARGO_PROFILE_DEV_OPT_LEVEL=2 step cargo build --quiet --locked --workspace $features --bin tesdf
+# Warp compiles its kernels once, which takes a minute.
+export WARP_CACHE_PATH=$PWD/target/python/warp
 TESDF_CLI=${CARGO_TARGET_DIR:-$PWD/target}/debug/tesdf step "$env/bin/python" -m pytest python/tests
 # Otherwise Ray reports its use to its makers.
 export RAY_USAGE_STATS_ENABLED=0
