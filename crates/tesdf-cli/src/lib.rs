@@ -31,6 +31,7 @@ pub mod simulate;
 pub mod slice;
 pub mod toi;
 pub mod verify;
+pub mod view;
 pub mod why;
 
 use tesdf_bench::{detection, evaluate};
@@ -86,6 +87,8 @@ pub enum Command {
     Simulate(simulate::Args),
     /// Draw a scene of one or more bodies as a PNG picture
     Render(render::Args),
+    /// Write a page that plays a run in a browser, with its contacts
+    View(view::Args),
     /// Write a run as an animated GLB file, for Blender, three.js and others
     Export(export::Args),
     /// Measure Table I or IV of the paper, next to the paper's figures
@@ -137,6 +140,7 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),
+        Command::View(args) => view::run(args),
         Command::Export(args) => export::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Completions(args) => completions::run(args),

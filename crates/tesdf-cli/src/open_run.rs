@@ -17,6 +17,8 @@ use crate::simulate::replace_geometries;
 pub struct OpenRun {
     /// The run.
     pub record: RunRecord,
+    /// Its scene.
+    pub loaded: LoadedScene,
     /// The bodies, with their geometries.
     pub system: System,
     /// The output file, which is none of the files that were read.
@@ -51,5 +53,5 @@ pub fn open(
             }
             e => Failure::new(e),
         })?;
-    Ok(OpenRun { record, system, output })
+    Ok(OpenRun { record, loaded, system, output })
 }

@@ -1,4 +1,4 @@
-//! `tesdf export`
+//! `tesdf export` and `tesdf view`
 mod folder;
 
 use folder::Folder;
@@ -67,4 +67,39 @@ fn what_cannot_be_exported_is_refused() {
         assert!(err.contains(expected), "{args:?}: {err}");
     }
     assert_eq!(folder.names(), ["drop.toml", "run", "text"]);
+}
+
+#[test]
+fn a_run_becomes_a_page() {
+    let folder = simulated();
+    let text = folder.good(&["view", "run", "-o", "page.html"]);
+    assert!(text.contains("21 of 21 states") && text.contains("at most 6 in a frame"), "{text}");
+    let page = std::fs::read_to_string(folder.path("page.html")).unwrap();
+    assert!(page.contains("<title>run</title>") && page.contains(r#""name":"\u003c/script> & ball""#));
+    assert_eq!(page.matches("</script>").count(), 3, "the name of a body ends no script");
+    assert_eq!(page.matches("</html>").count(), 1);
+    for address in ["http:", "https:", "//cdn", "src="] {
+        let found = page.lines().find(|line| line.contains(address));
+        assert_eq!(found, None, "a page asks for nothing");
+    }
+    folder.good(&["view", "run", "-o", "again.html"]);
+    assert!(page == std::fs::read_to_string(folder.path("again.html")).unwrap());
+
+    let text = folder.good(&[
+        "view",
+        "run",
+        "-o",
+        "few.html",
+        "--every",
+        "5",
+        "--contacts",
+        "0",
+        "--title",
+        "A <b> & c",
+    ]);
+    assert!(text.contains("5 of 21 states") && text.contains("none drawn"), "{text}");
+    let page = std::fs::read_to_string(folder.path("few.html")).unwrap();
+    assert!(page.contains("<h1>A &lt;b> &amp; c</h1>") && page.contains(r#""contacts":null"#));
+    let (code, _, err) = folder.tesdf(&["view", "run", "-o", "run"]);
+    assert!(code == Some(2) && err.contains("is the input run itself"), "{err}");
 }

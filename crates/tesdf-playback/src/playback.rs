@@ -176,7 +176,7 @@ impl<'a> Playback<'a> {
 }
 
 /// A pose of the record, checked: a run file may have been made by hand.
-fn pose(record: &RunRecord, step: usize, body: usize) -> Result<Pose, PlaybackError> {
+pub(crate) fn pose(record: &RunRecord, step: usize, body: usize) -> Result<Pose, PlaybackError> {
     let failure = |reason: String| {
         let body = record.bodies.get(body).cloned().unwrap_or_default();
         PlaybackError::State { body, step, reason }

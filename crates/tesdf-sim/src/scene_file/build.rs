@@ -102,6 +102,13 @@ impl LoadedScene {
         })
     }
 
+    /// How the scene detects contacts, as [`newton`](Self::newton) does but for the motion within a
+    /// step; `None` in the mode `off`.
+    pub fn detection(&self, system: &System) -> Option<CollideOptions> {
+        let section = &self.scene.detector;
+        (section.mode != DetectorMode::Off).then(|| collide_options(section, system))
+    }
+
     /// Faces that touch in the states of `system`, and that the scene's mode, where it is `node`, can
     /// miss.
     ///

@@ -1,0 +1,82 @@
+"use strict";
+// Decodes the run: its description as JSON, and its numbers, which are deflated and in base64.
+
+// Inflates the numbers. Each array of 32-bit words is stored as differences of successive words,
+// first the lowest bytes of all of them, then the next ones.
+async function readNumbers(text) {
+  const deflated = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  const stream = new Blob([deflated]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  let offset = 0;
+  return (length) => {
+    const words = new Uint32Array(length);
+    let word = 0;
+    for (let i = 0; i < length; i++) {
+      const at = offset + i;
+      word += bytes[at] | (bytes[at + length] << 8) | (bytes[at + 2 * length] << 16) | (bytes[at + 3 * length] << 24);
+      words[i] = word;
+    }
+    offset += 4 * length;
+    return words;
+  };
+}
+
+const floats = (words) => new Float32Array(words.buffer);
+
+// The run with its arrays. They are in the order in which the file was written.
+async function readRun() {
+  const run = JSON.parse(document.getElementById("run").textContent);
+  const take = await readNumbers(document.getElementById("data").textContent);
+  for (const mesh of run.meshes) {
+    mesh.positions = floats(take(3 * mesh.vertices));
+    mesh.normals = new Int16Array(take(mesh.vertices).buffer);
+    mesh.indices = take(mesh.corners);
+  }
+  const frames = run.times.length;
+  for (const body of run.bodies) {
+    body.track = floats(take(7 * frames));
+  }
+  if (run.contacts) {
+    const { contacts } = run;
+    contacts.starts = take(frames + 1);
+    contacts.found = take(frames);
+    contacts.deepest = floats(take(frames));
+    const count = contacts.starts[frames];
+    contacts.points = floats(take(3 * count));
+    contacts.normals = new Int16Array(take(count).buffer);
+    contacts.distances = floats(take(count));
+  }
+  return run;
+}
+
+// The unit vector of a point of the octahedron, two numbers of 16 bits.
+function ofOctahedron(x, y) {
+  x /= 32767;
+  y /= 32767;
+  const z = 1 - Math.abs(x) - Math.abs(y);
+  if (z < 0) {
+    [x, y] = [(1 - Math.abs(y)) * (x < 0 ? -1 : 1), (1 - Math.abs(x)) * (y < 0 ? -1 : 1)];
+  }
+  const length = Math.hypot(x, y, z);
+  return [x / length, y / length, z / length];
+}
+
+// Pose of a body between two frames: position relative to the centre of the run, and quaternion.
+function poseAt(body, frames, frame, share) {
+  const track = body.track;
+  const next = Math.min(frame + 1, frames - 1);
+  const value = (k) => track[k * frames + frame] * (1 - share) + track[k * frames + next] * share;
+  const position = [value(0), value(1), value(2)];
+  const turn = [value(3), value(4), value(5), value(6)];
+  const length = Math.hypot(...turn) || 1;
+  return { position, turn: turn.map((q) => q / length) };
+}
+
+// A length with its unit, in three digits.
+function lengthText(metres) {
+  const size = Math.abs(metres);
+  const units = [[1, "m"], [1e-3, "mm"], [1e-6, "µm"], [1e-9, "nm"]];
+  const [unit, name] = units.find(([unit]) => size >= 0.9995 * unit) ?? [1e-9, "nm"];
+  const number = metres / unit;
+  return size < 5e-12 ? "0" : `${+number.toPrecision(3)} ${name}`.replace("-", "−");
+}
