@@ -15,9 +15,9 @@ use tesdf::encode::{ChoiceError, DomainError, EncodeError};
 use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
 use tesdf::save::SaveError;
 use tesdf::verify::VerifyError;
-use tesdf_sim::SimulateError;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::SceneError;
+use tesdf_sim::{DynamicsError, SimulateError};
 
 use crate::classes::{self, Checked};
 
@@ -41,6 +41,7 @@ pub enum Error {
     CollideAt(String, CollideError),
     Scene(SceneError),
     Simulate(SimulateError),
+    Dynamics(DynamicsError),
     /// The run file that cannot be written.
     Record(PathBuf, RecordError),
     Threads(rayon::ThreadPoolBuildError),
@@ -62,7 +63,9 @@ impl Error {
             },
             Self::Scene(SceneError::Read { ref source, .. }) => system(source, self.text()),
             Self::Scene(_) => new(py, "SceneError", self.text()),
-            Self::Simulate(_) | Self::Record(..) => new(py, "SimulationError", self.text()),
+            Self::Simulate(_) | Self::Dynamics(_) | Self::Record(..) => {
+                new(py, "SimulationError", self.text())
+            }
             Self::Domain(DomainError::Read {
                 source: ReadTetrahedraError::Open { ref source, .. }, ..
             }) => system(source, self.text()),
@@ -105,6 +108,7 @@ impl Error {
             Self::CollideAt(at, e) => format!("{at}: {e}"),
             Self::Scene(e) => e.to_string(),
             Self::Simulate(e) => e.to_string(),
+            Self::Dynamics(e) => e.to_string(),
             Self::Record(_, e @ RecordError::Save(_)) => e.to_string(),
             Self::Record(path, e) => format!("{}: {e}", path.display()),
             Self::Threads(e) => format!("cannot start threads: {e}"),

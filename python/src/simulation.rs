@@ -5,24 +5,31 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use rayon::ThreadPool;
 use tesdf::Progress;
 use tesdf::collide::Velocity;
+use tesdf::glam::DVec3;
 use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
-use tesdf_sim::{Dynamics, PartialRun, Run, SimulateError, State};
+use tesdf_sim::{
+    Drive, Dynamics, DynamicsError, Joint, Motor, PartialRun, Run, SimulateError, State, System, Wrench,
+};
 
 use crate::contacts::{self, Columns};
 use crate::detection::one_of;
-use crate::errors::Error;
+use crate::errors::{Error, argument, kind_of};
 use crate::interrupt::cancellable;
-use crate::poses::{of_pose, of_velocity};
+use crate::poses::{Count, of_pose, of_velocity, poses, velocities};
 use crate::{classes, pool};
 
-/// A simulation of the scene in a TOML file, as that of the command `tesdf simulate`, with the same
-/// bits. step and run advance it.
+/// A simulation of a scene, as that of the command `tesdf simulate`, with the same bits. step and run
+/// advance it.
 ///
+/// - scene: path of a TOML file, or a dict with the keys of such a file. Paths in a dict are relative to
+///   the current folder, and arrays may be those of numpy.
 /// - mode: replaces the mode of the scene's detector: "node", "edge", "face", "exact" or "off".
 /// - time_step, duration: replace those of the scene, in seconds.
 /// - threads: number of threads; None is one per core. The states do not depend on it.
@@ -40,6 +47,34 @@ pub struct Simulation {
 struct Running {
     engine: Newton,
     run: Run,
+}
+
+/// Where a scene comes from.
+enum Source {
+    File(PathBuf),
+    Json(serde_json::Value),
+}
+
+impl Source {
+    fn new(any: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Ok(path) = any.extract() {
+            return Ok(Self::File(path));
+        }
+        let expected = "a path, or a dict with the keys of a scene file";
+        let Ok(dict) = any.cast::<PyDict>() else {
+            return Err(PyTypeError::new_err(format!("scene: {}; expected {expected}", kind_of(any))));
+        };
+        let text: String = dict.py().import("tesdf.scenes")?.getattr("to_json")?.call1((dict,))?.extract()?;
+        let json = serde_json::from_str(&text).map_err(|e| argument("scene", e, "finite numbers"))?;
+        Ok(Self::Json(json))
+    }
+
+    fn read(&self) -> Result<LoadedScene, SceneError> {
+        match self {
+            Self::File(path) => LoadedScene::read(path),
+            Self::Json(json) => LoadedScene::of_json(json.clone(), "<scene>"),
+        }
+    }
 }
 
 const MODES: [(&str, DetectorMode); 5] = [
@@ -87,6 +122,16 @@ impl Simulation {
         }
     }
 
+    /// Changes the engine between two steps.
+    fn change(
+        &self,
+        py: Python<'_>,
+        change: impl FnOnce(&mut Newton) -> Result<(), DynamicsError> + Send,
+    ) -> PyResult<()> {
+        let changed = py.detach(|| change(&mut self.locked().engine));
+        changed.map_err(|e| Error::Dynamics(e).raise(py))
+    }
+
     /// Makes this number of steps, or all that the duration leaves. Ctrl-C ends it between two
     /// steps.
     fn advance(
@@ -122,13 +167,29 @@ impl Simulation {
     }
 }
 
+/// The number of a body or joint, given by its name or number.
+fn index_of(what: &str, any: &Bound<'_, PyAny>, names: &[String]) -> PyResult<usize> {
+    let expected = || match names {
+        [] => format!("nothing: the scene has no {what}"),
+        _ => format!("a number from 0 to {}, or one of {}", names.len() - 1, names.join(", ")),
+    };
+    let found = match any.extract::<String>() {
+        Ok(name) => names.iter().position(|n| *n == name).ok_or(format!("'{name}'")),
+        Err(_) => match any.extract::<usize>() {
+            Ok(number) => Some(number).filter(|&number| number < names.len()).ok_or(number.to_string()),
+            Err(_) => Err(any.repr().map_or_else(|_| kind_of(any), |text| text.to_string())),
+        },
+    };
+    found.map_err(|found| argument(what, found, &expected()))
+}
+
 #[pymethods]
 impl Simulation {
     #[new]
     #[pyo3(signature = (scene, *, mode = None, time_step = None, duration = None, threads = None))]
     fn new(
         py: Python<'_>,
-        scene: PathBuf,
+        scene: &Bound<'_, PyAny>,
         mode: Option<&Bound<'_, PyAny>>,
         time_step: Option<f64>,
         duration: Option<f64>,
@@ -141,9 +202,10 @@ impl Simulation {
             None => pool::shared().map_err(|e| e.raise(py))?,
         };
         let progress = Progress::default();
+        let scene = Source::new(scene)?;
         let work = || {
             pool.install(|| {
-                let mut loaded = LoadedScene::read(&scene).map_err(Error::Scene)?;
+                let mut loaded = scene.read().map_err(Error::Scene)?;
                 let file = &mut loaded.scene;
                 file.detector.mode = mode.unwrap_or(file.detector.mode);
                 file.time_step = time_step.unwrap_or(file.time_step);
@@ -239,6 +301,104 @@ impl Simulation {
     #[getter]
     fn planned_steps(&self, py: Python<'_>) -> u64 {
         self.read(py, |r| r.run.planned_steps())
+    }
+
+    /// Names of the joints.
+    #[getter]
+    fn joints(&self, py: Python<'_>) -> Vec<String> {
+        self.read(py, |r| r.engine.system().joints().iter().map(|joint| joint.name.clone()).collect())
+    }
+
+    /// Current coordinates [J] of the joints: the angle of a hinge, rad within ±pi, the travel of a
+    /// slider, m, the angle by which a ball is bent, rad; 0 for a weld.
+    #[getter]
+    fn coordinates<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let coordinate = |joint: &Joint, states: &[State]| joint.coordinate(System::poses_of(joint, states));
+        let coordinates: Vec<f64> = self.read(py, |r| {
+            r.engine.system().joints().iter().map(|joint| coordinate(joint, r.states())).collect()
+        });
+        PyArray1::from_vec(py, coordinates)
+    }
+
+    /// Sets the motor of a joint, given by its name or number, from the next step on. It drives one of
+    ///
+    /// - velocity: a rate, rad/s or m/s.
+    /// - position: the coordinate at the end of the step, rad or m.
+    /// - force: a torque, N m, or force, N.
+    /// - spring: (rest, stiffness, damping), in rad, N m/rad, N m s/rad or m, N/m, N s/m.
+    ///
+    /// limit is the greatest force, N, or torque, N m. Without a drive the joint has no motor. A script
+    /// of the scene that drives the same joint replaces the motor in each step.
+    ///
+    /// Raises SimulationError if the joint is no hinge or slider, or if a number is out of range.
+    #[pyo3(signature = (joint, *, velocity = None, position = None, force = None, spring = None, limit = f64::INFINITY))]
+    #[allow(clippy::too_many_arguments, reason = "they are keywords")]
+    fn set_motor(
+        &self,
+        py: Python<'_>,
+        joint: &Bound<'_, PyAny>,
+        velocity: Option<f64>,
+        position: Option<f64>,
+        force: Option<f64>,
+        spring: Option<[f64; 3]>,
+        limit: f64,
+    ) -> PyResult<()> {
+        let drives = [
+            velocity.map(Drive::Velocity),
+            position.map(Drive::Position),
+            force.map(Drive::Force),
+            spring.map(|[rest, stiffness, damping]| Drive::Spring { rest, stiffness, damping }),
+        ];
+        let drives: Vec<Drive> = drives.into_iter().flatten().collect();
+        if drives.len() > 1 {
+            let found = format!("{} of velocity, position, force and spring", drives.len());
+            return Err(argument("joint", found, "at most one of them"));
+        }
+        let motor = drives.first().map(|&drive| Motor { drive, limit });
+        let joint = index_of("joint", joint, &self.joints(py))?;
+        self.change(py, |engine| engine.set_motor(joint, motor))
+    }
+
+    /// Sets the force [3], N, on the centre of mass and the torque [3], N m, that act on a body from
+    /// the next step on, in the world frame. The body is given by its name or number. They have no effect
+    /// on fixed and kinematic bodies. A script of the scene for the same body replaces them in each step.
+    #[pyo3(signature = (body, *, force = [0.0; 3], torque = [0.0; 3]))]
+    fn set_wrench(
+        &self,
+        py: Python<'_>,
+        body: &Bound<'_, PyAny>,
+        force: [f64; 3],
+        torque: [f64; 3],
+    ) -> PyResult<()> {
+        let [force, torque] = [force, torque].map(DVec3::from_array);
+        let body = index_of("body", body, &self.bodies(py))?;
+        self.change(py, |engine| engine.set_wrench(body, Wrench { force, torque }))
+    }
+
+    /// Sets the pose [7], x y z qx qy qz qw, or [4, 4], and the velocity [6], vx vy vz wx wy wz, of a body,
+    /// given by its name or number. What is None stays. For a kinematic body this is its motion in
+    /// the next steps.
+    #[pyo3(signature = (body, *, pose = None, velocity = None))]
+    fn set_state(
+        &self,
+        py: Python<'_>,
+        body: &Bound<'_, PyAny>,
+        pose: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let pose = pose.map(|any| poses("pose", any, Count::One)).transpose()?;
+        let velocity = velocity.map(|any| velocities("velocity", any, Count::One)).transpose()?;
+        let body = index_of("body", body, &self.bodies(py))?;
+        self.change(py, |engine| {
+            let mut state = engine.system().states()[body];
+            if let Some(&pose) = pose.iter().flatten().next() {
+                state.pose = pose;
+            }
+            if let Some(&Velocity { linear, angular }) = velocity.iter().flatten().next() {
+                (state.linear, state.angular) = (linear, angular);
+            }
+            engine.set_state(body, state)
+        })
     }
 
     /// Current poses [B, 7] of the bodies' frames, x y z qx qy qz qw.

@@ -26,6 +26,7 @@
     tesdf.time_of_impact(asset, asset, pose_b=pose, velocity_b=velocity)
 
     simulation = tesdf.Simulation("scene.toml")         # bodies in motion, as `tesdf simulate`
+    simulation.set_motor("slide", velocity=0.1)         # set_wrench, set_state
     simulation.step()                                   # simulation.poses, simulation.contacts, ...
     simulation.run()["passed"]                          # to the end; the summary, with the criteria
 

@@ -203,7 +203,7 @@ class Scene:
 class Simulation:
     def __new__(
         cls,
-        scene: _Path,
+        scene: _Path | dict[str, Any],
         *,
         mode: Literal["node", "edge", "face", "exact", "off"] | None = None,
         time_step: float | None = None,
@@ -215,6 +215,20 @@ class Simulation:
     def summary(self) -> dict[str, Any]: ...
     def save(self, path: _Path) -> None: ...
     def record(self) -> Record: ...
+    def set_motor(
+        self,
+        joint: str | int,
+        *,
+        velocity: float | None = None,
+        position: float | None = None,
+        force: float | None = None,
+        spring: Sequence[float] | None = None,
+        limit: float = ...,
+    ) -> None: ...
+    def set_wrench(self, body: str | int, *, force: Sequence[float] = ..., torque: Sequence[float] = ...) -> None: ...
+    def set_state(
+        self, body: str | int, *, pose: npt.ArrayLike | None = None, velocity: npt.ArrayLike | None = None
+    ) -> None: ...
     @property
     def bodies(self) -> list[str]: ...
     @property
@@ -223,6 +237,10 @@ class Simulation:
     def steps(self) -> int: ...
     @property
     def planned_steps(self) -> int: ...
+    @property
+    def joints(self) -> list[str]: ...
+    @property
+    def coordinates(self) -> npt.NDArray[np.float64]: ...
     @property
     def poses(self) -> npt.NDArray[np.float64]: ...
     @property

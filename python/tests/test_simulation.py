@@ -107,6 +107,100 @@ def test_errors(scene, tmp_path):
         tesdf.Simulation(scene)
 
 
+SLIDER = {
+    "time_step": 1e-3,
+    "duration": 0.1,
+    "gravity": [0, 0, 0],
+    "bodies": [
+        {"name": "rail", "shape": {"box": {"half_extents": [0.1, 0.01, 0.01]}}, "kinematic": True},
+        {"name": "car", "shape": {"sphere": {"radius": 0.01}}, "mass": 2.0, "translation": np.array([0, 0, 0.05])},
+        {"name": "ball", "shape": {"sphere": {"radius": 0.01}}, "mass": 0.5, "translation": np.array([0, 0, 1])},
+    ],
+    "joints": [{"name": "slide", "kind": "slider", "parent": "rail", "child": "car", "axis": [1, 0, 0]}],
+}
+
+
+def test_a_scene_of_a_dict_is_that_of_the_file(tmp_path):
+    with open(tmp_path / "scene.toml", "w") as file:
+        file.write(SCENE)
+    toml = {
+        "time_step": 1e-3,
+        "duration": 0.12,
+        "bodies": [
+            {"name": "floor", "shape": "plane", "fixed": True},
+            {
+                "name": "box",
+                "shape": {"box": {"half_extents": np.array([0.05, 0.04, 0.03])}},
+                "density": 1000,
+                "translation": (0, 0, np.float64(0.035)),
+            },
+        ],
+        "record": {"contacts_every": 2},
+        "criterion": {"rest": {"after": 0.1, "max_drift": 1e-4, "max_energy_gain": 1e-6}},
+    }
+    one, other = tesdf.Simulation(toml), tesdf.Simulation(tmp_path / "scene.toml")
+    assert one.run()["passed"] and other.run()["passed"]
+    assert np.array_equal(one.record().poses, other.record().poses)
+
+
+def test_motors_wrenches_and_states_are_set_between_steps():
+    simulation = tesdf.Simulation(SLIDER)
+    assert simulation.joints == ["slide"] and simulation.coordinates.tolist() == [0]
+    simulation.set_motor("slide", velocity=0.5)
+    simulation.step(10)
+    assert simulation.coordinates[0] == pytest.approx(0.005) and simulation.velocities[1, 0] == pytest.approx(0.5)
+    # 3 N on 2 kg for 10 ms.
+    simulation.set_motor(0, force=3.0)
+    simulation.step(10)
+    assert simulation.velocities[1, 0] == pytest.approx(0.515)
+    simulation.set_motor("slide")
+    simulation.step(10)
+    assert simulation.velocities[1, 0] == pytest.approx(0.515)
+    simulation.set_motor("slide", position=0.02, limit=1e4)
+    simulation.step(2)
+    assert simulation.coordinates[0] == pytest.approx(0.02)
+    simulation.set_motor("slide", spring=(0.02, 1e3, 1e2))
+    simulation.step(500)
+    assert simulation.coordinates[0] == pytest.approx(0.02, abs=1e-6)
+    simulation.set_wrench("ball", force=[1, 0, 0], torque=[0, 0, 1e-3])
+    simulation.step(100)
+    spin = 1e-3 * 0.1 / (0.4 * 0.5 * 0.01**2)
+    assert simulation.velocities[2] == pytest.approx([0.2, 0, 0, 0, 0, spin], abs=1e-9)
+    simulation.set_wrench(2)
+    simulation.set_state("ball", pose=[1, 2, 3, 0, 0, 0, 1])
+    simulation.set_state("rail", velocity=[0, 1, 0, 0, 0, 0])
+    simulation.step(10)
+    assert simulation.poses[2] == pytest.approx([1.002, 2, 3, 0, 0, *simulation.poses[2, 5:]])
+    # The car follows its rail.
+    assert simulation.poses[0, 1] == pytest.approx(0.01) and simulation.poses[1, 1] == pytest.approx(0.01, abs=1e-6)
+
+
+def test_errors_of_what_is_set():
+    simulation = tesdf.Simulation(SLIDER)
+    with pytest.raises(ValueError, match="joint: 'slid'; expected a number from 0 to 0, or one of slide"):
+        simulation.set_motor("slid", velocity=1.0)
+    with pytest.raises(ValueError, match="body: 3; expected a number from 0 to 2, or one of rail, car, ball"):
+        simulation.set_wrench(3)
+    with pytest.raises(ValueError, match="joint: 2 of velocity, position, force and spring; expected at most one"):
+        simulation.set_motor("slide", velocity=1.0, force=1.0)
+    with pytest.raises(tesdf.SimulationError, match="joint slide: "):
+        simulation.set_motor("slide", velocity=1.0, limit=-1.0)
+    with pytest.raises(tesdf.SimulationError, match=r"body 2 \(ball\)"):
+        simulation.set_wrench("ball", force=[np.nan, 0, 0])
+    with pytest.raises(tesdf.CollideError, match="pose: "):
+        simulation.set_state("ball", pose=[0, 0, 0, 0, 0, 0, 2])
+    with pytest.raises(tesdf.SceneError, match="bodies: entry 1: unknown field `masss`"):
+        tesdf.Simulation({**SLIDER, "bodies": [SLIDER["bodies"][0], {"name": "x", "masss": 1}]})
+    with pytest.raises(tesdf.SceneError, match="<scene>, body ball: "):
+        tesdf.Simulation({**SLIDER, "joints": [], "bodies": [{**SLIDER["bodies"][2], "mass": -1.0}]})
+    with pytest.raises(tesdf.SceneError, match="bodies: missing; expected a list of bodies"):
+        tesdf.Simulation({"time_step": 1e-3})
+    with pytest.raises(TypeError, match="scene: a value of type object"):
+        tesdf.Simulation({"bodies": object()})
+    with pytest.raises(TypeError, match="scene: int; expected a path, or a dict"):
+        tesdf.Simulation(3)
+
+
 def test_an_exception_of_progress_ends_a_run(scene):
     simulation = tesdf.Simulation(scene, duration=1000)
 

@@ -137,7 +137,7 @@ impl LoadedScene {
         let body = &self.scene.bodies[body];
         SceneError::Body {
             path: self.path.clone(),
-            line: self.line(body.span().start),
+            line: (!self.text.is_empty()).then(|| self.line(body.span().start)),
             name: body.get_ref().name.clone(),
             reason,
         }

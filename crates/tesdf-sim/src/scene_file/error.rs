@@ -33,12 +33,12 @@ pub enum SceneError {
         reason: String,
     },
     /// A body is invalid.
-    #[error("{}, line {line}, body {name}: {reason}", .path.display())]
+    #[error("{}{}, body {name}: {reason}", .path.display(), .line.map(|line| format!(", line {line}")).unwrap_or_default())]
     Body {
         /// The scene file.
         path: PathBuf,
-        /// Line where the body begins, from 1.
-        line: usize,
+        /// Line where the body begins, from 1; `None` when the scene comes from JSON.
+        line: Option<usize>,
         /// Name of the body.
         name: String,
         /// What was found and what was expected.

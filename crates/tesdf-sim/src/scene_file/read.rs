@@ -16,7 +16,8 @@ pub struct LoadedScene {
     pub scene: SceneFile,
     /// The path of the file.
     pub path: PathBuf,
-    text: String,
+    /// Empty when the scene comes from JSON.
+    pub(super) text: String,
 }
 
 impl LoadedScene {
@@ -51,8 +52,8 @@ impl LoadedScene {
         Ok(Self { scene, path: path.to_path_buf(), text })
     }
 
-    /// The scene that is stored in a run, where `run` is the path of the run file. Errors of bodies
-    /// name the run and line 1, because the run does not keep the lines of the scene file.
+    /// The scene that is stored in a run, where `run` is the path of the run file. Errors
+    /// name no line, because the run does not keep the text of the scene file.
     ///
     /// # Errors
     /// [`SceneError::Parse`] when the run holds no scene.
@@ -61,18 +62,43 @@ impl LoadedScene {
     }
 
     fn of_record(record: &RunRecord, run: &Path) -> Result<Self, SceneError> {
-        let no_scene =
-            |e| SceneError::Parse { path: run.to_path_buf(), message: format!("the scene in it: {e}") };
-        // `Spanned` can only be read from TOML.
-        let mut json = record.scene.clone();
-        let bodies = json.get_mut("bodies").map(serde_json::Value::take).unwrap_or_default();
-        let bodies: Vec<BodySection> = serde_json::from_value(bodies).map_err(no_scene)?;
-        json["bodies"] = serde_json::Value::Array(Vec::new());
-        let mut scene: SceneFile = serde_json::from_value(json).map_err(no_scene)?;
-        scene.bodies = bodies.into_iter().map(|body| Spanned::new(0..0, body)).collect();
         let path =
             run.file_name().map_or_else(|| run.to_path_buf(), |name| Path::new(&record.folder).join(name));
-        Ok(Self { scene, path, text: String::new() })
+        Self::parse_json(record.scene.clone(), path).map_err(|e| match e {
+            SceneError::Parse { message, .. } => {
+                SceneError::Parse { path: run.to_path_buf(), message: format!("the scene in it: {message}") }
+            }
+            e => e,
+        })
+    }
+
+    /// A scene with the keys of a scene file. Paths in it are relative to the folder of `path`, and
+    /// errors name `path`.
+    ///
+    /// # Errors
+    /// [`SceneError::Parse`] when a key or a value is not that of a scene file.
+    pub fn of_json(scene: serde_json::Value, path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        Self::parse_json(scene, path.as_ref().to_path_buf())
+    }
+
+    fn parse_json(mut json: serde_json::Value, path: PathBuf) -> Result<Self, SceneError> {
+        let refuse = |message: String| SceneError::Parse { path: path.clone(), message };
+        // `Spanned` can only be read from TOML.
+        let bodies = match json.get_mut("bodies").map(serde_json::Value::take) {
+            Some(serde_json::Value::Array(bodies)) => bodies,
+            found => {
+                return Err(refuse(format!("bodies: {}; expected a list of bodies", kind(found.as_ref()))));
+            }
+        };
+        let read = |(k, body): (usize, serde_json::Value)| {
+            let body: BodySection =
+                serde_json::from_value(body).map_err(|e| refuse(format!("bodies: entry {k}: {e}")))?;
+            Ok(Spanned::new(0..0, body))
+        };
+        let bodies = bodies.into_iter().enumerate().map(read).collect::<Result<_, SceneError>>()?;
+        json["bodies"] = serde_json::Value::Array(Vec::new());
+        let scene: SceneFile = serde_json::from_value(json).map_err(|e| refuse(e.to_string()))?;
+        Ok(Self { scene: SceneFile { bodies, ..scene }, path, text: String::new() })
     }
 
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
@@ -129,5 +155,18 @@ impl LoadedScene {
             (table, line) = (value.get_ref().as_table(), Some(self.line(name.span().start)));
         }
         line
+    }
+}
+
+/// What a value is, for messages.
+fn kind(value: Option<&serde_json::Value>) -> &'static str {
+    match value {
+        None => "missing",
+        Some(serde_json::Value::Null) => "null",
+        Some(serde_json::Value::Bool(_)) => "true or false",
+        Some(serde_json::Value::Number(_)) => "a number",
+        Some(serde_json::Value::String(_)) => "a string",
+        Some(serde_json::Value::Array(_)) => "a list",
+        Some(serde_json::Value::Object(_)) => "an object",
     }
 }
