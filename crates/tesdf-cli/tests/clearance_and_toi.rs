@@ -220,4 +220,12 @@ fn benchmarks_of_clearances_and_pairs_print_their_figures() {
     assert!(text.contains("3 pairs, 3 overlap, 0 not converged"), "{text}");
     let text = folder.good(&["bench", "heap", "--bodies", "20", "--steps", "2"]);
     assert_eq!(text.lines().filter(|line| line.starts_with("| 20 |")).count(), 4, "{text}");
+    let poses = [[0.5, 0.5, 1.5, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0]];
+    let bytes: Vec<u8> = poses.as_flattened().iter().flat_map(|x: &f64| x.to_le_bytes()).collect();
+    folder.write("poses", &bytes);
+    let worlds = json(&folder, &["bench", "worlds", "c.tesdf", "c.tesdf", "--poses", "poses"]);
+    assert!(worlds["contacts"].as_u64() > Some(0) && worlds["least"].as_f64() < Some(0.0), "{worlds}");
+    folder.write("poses", &bytes[1..]);
+    let (code, _, error) = folder.tesdf(&["bench", "worlds", "c.tesdf", "c.tesdf", "--poses", "poses"]);
+    assert!(code == Some(2) && error.contains("111 bytes; expected a multiple of 56"), "{error}");
 }

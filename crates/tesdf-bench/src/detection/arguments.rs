@@ -3,7 +3,7 @@ use std::path::PathBuf;
 
 use clap::ValueEnum;
 use serde::Serialize;
-use tesdf::collide::ContactsPer;
+use tesdf::collide::{ContactsPer, Mode};
 use tesdf_terminal::device::{self, Choice};
 use tesdf_terminal::parse;
 
@@ -86,6 +86,17 @@ pub enum ModeName {
     Face,
     /// The faces, with the exact minimum
     Exact,
+}
+
+impl From<ModeName> for Mode {
+    fn from(name: ModeName) -> Self {
+        match name {
+            ModeName::Node => Self::Node,
+            ModeName::Edge => Self::Edge,
+            ModeName::Face => Self::Face,
+            ModeName::Exact => Self::Exact,
+        }
+    }
 }
 
 /// Threads that process a polygon.

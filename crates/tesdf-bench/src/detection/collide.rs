@@ -2,9 +2,9 @@
 use std::time::Instant;
 
 use tesdf::EncodeOptions;
-use tesdf::collide::{CollideOptions, Mode, Reduction, detect};
+use tesdf::collide::{CollideOptions, Reduction, detect};
 
-use super::arguments::{Args, ModeName};
+use super::arguments::Args;
 use super::frames::Frames;
 use super::report::{Counts, PHASES, Report, Spread, ms, text};
 use tesdf_terminal::report::{self as output, Failure, Outcome};
@@ -18,12 +18,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let options = EncodeOptions { max_entries: args.e_max, ..args.preset.options() };
     let mut frames = Frames::read(&args.source, args.frames, args.worlds, &options)?;
     let contact_distance = args.contact_distance.or(frames.contact_distance).unwrap_or(0.0);
-    let mode = match args.mode {
-        ModeName::Node => Mode::Node,
-        ModeName::Edge => Mode::Edge,
-        ModeName::Face => Mode::Face,
-        ModeName::Exact => Mode::Exact,
-    };
     let options = CollideOptions {
         contact_distance,
         contacts_per: args.contacts_per,
@@ -35,7 +29,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
             (.., Some(k)) => Reduction::Spread(k),
             (None, None, None) => Reduction::None,
         },
-        ..CollideOptions::with_mode(mode)
+        ..CollideOptions::with_mode(args.mode.into())
     };
     options.validate().map_err(Failure::new)?;
     let mut report = Report {

@@ -8,6 +8,7 @@ mod heap;
 pub(crate) mod on_device;
 mod poses;
 pub(crate) mod report;
+mod worlds;
 
 use tesdf_terminal::report::{Failure, Outcome};
 
@@ -28,6 +29,9 @@ enum Benchmark {
     Heap(heap::Args),
     /// Write a file of poses with overlapping bodies, from a seed
     Poses(poses::Args),
+    /// Detect the contacts of many worlds of two bodies, as `scripts/python_worlds.py` does; print
+    /// JSON
+    Worlds(worlds::Args),
 }
 
 /// Runs a benchmark.
@@ -40,5 +44,6 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         Benchmark::Clearance(args) => clearance::run(args),
         Benchmark::Heap(args) => heap::run(args),
         Benchmark::Poses(args) => poses::run(args),
+        Benchmark::Worlds(args) => worlds::run(args),
     }
 }
