@@ -35,11 +35,10 @@ class Placed:
 
 
 class Detector:
-    """Finds the contacts of the same shapes in each of `worlds` worlds.
+    """Finds the contacts of shapes, each in its world. Shape i is the instance i of the scene.
 
-    The instance of shape i in world w is w * len(shapes) + i. The default mode is "node", the
-    default contact distance 0.5 % of the smallest diagonal of an asset. `excluded` has pairs of
-    shapes that do not meet.
+    The default mode is "node", the default contact distance 0.5 % of the smallest diagonal of an
+    asset. `excluded` has pairs of shapes that do not meet.
     """
 
     scene: Scene
@@ -48,12 +47,10 @@ class Detector:
     def __init__(
         self,
         shapes: Sequence[Placed],
+        world: npt.NDArray[Any],
         excluded: Iterable[tuple[int, int]],
-        worlds: int,
         options: Mapping[str, Any],
     ) -> None:
-        self.shapes = list(shapes)
-        self.worlds = worlds
         self.last = None
         self._rotations = np.array([shape.rotation for shape in shapes])
         self._translations = np.array([shape.translation for shape in shapes])
@@ -64,7 +61,6 @@ class Detector:
                 for shape in shapes
                 if isinstance(shape.shape, Asset)
             )
-        count = len(shapes)
         self.scene = Scene()
         ids: dict[int, int] = {}
         for shape in shapes:
@@ -73,30 +69,28 @@ class Detector:
                 ids[key] = self.scene.add_shape(shape.shape)
         groups = np.array([_ASSETS if isinstance(shape.shape, Asset) else _SIMPLE for shape in shapes])
         self.scene.add_many(
-            np.tile([ids[id(shape.shape)] for shape in shapes], worlds),
-            np.tile([0.0, 0, 0, 0, 0, 0, 1], (worlds * count, 1)),
-            scale=np.tile([shape.scale for shape in shapes], worlds),
-            world=np.repeat(np.arange(worlds), count),
-            memberships=np.tile(groups, worlds),
-            filter=np.tile(np.where(groups == _SIMPLE, _ASSETS, _ASSETS | _SIMPLE), worlds),
+            [ids[id(shape.shape)] for shape in shapes],
+            np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(shapes), 1)),
+            scale=[shape.scale for shape in shapes],
+            world=world,
+            memberships=groups,
+            filter=np.where(groups == _SIMPLE, _ASSETS, _ASSETS | _SIMPLE),
         )
         pairs = np.array(list(excluded), dtype=np.uint32).reshape(-1, 2)
         if len(pairs):
-            of_worlds = np.arange(worlds, dtype=np.uint32)[:, None, None] * np.uint32(count)
-            self.scene.exclude((of_worlds + pairs).reshape(-1, 2))
+            self.scene.exclude(pairs)
 
     def detect(
         self, rotations: Float, positions: Float, linear: Float, angular: Float, time_step: float
     ) -> Found:
-        """Finds contacts. Each array has a row for each instance: the rotation [3, 3] and position of
+        """Finds contacts. Each array has a row for each shape: the rotation [3, 3] and position of
         the engine's frame, and its linear and angular velocity, in the world's frame."""
-        rotations = rotations.reshape(self.worlds, -1, 3, 3)
-        arms = np.einsum("wnij,nj->wni", rotations, self._translations).reshape(-1, 3)
+        rotations, angular = rotations.reshape(-1, 3, 3), angular.reshape(-1, 3)
+        arms = np.einsum("nij,nj->ni", rotations, self._translations)
         poses = np.zeros((len(arms), 4, 4))
-        poses[:, :3, :3] = (rotations @ self._rotations).reshape(-1, 3, 3)
+        poses[:, :3, :3] = rotations @ self._rotations
         poses[:, :3, 3] = positions.reshape(-1, 3) + arms
         poses[:, 3, 3] = 1.0
-        angular = angular.reshape(-1, 3)
         velocities = np.hstack([linear.reshape(-1, 3) + np.cross(angular, arms), angular])
         self.scene.update(np.arange(len(arms), dtype=np.uint32), poses=poses, velocities=velocities)
         self.last = self.scene.detect(**{"speculative_time": _STEPS_AHEAD * time_step, **self._options})

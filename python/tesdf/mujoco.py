@@ -63,7 +63,7 @@ class Contacts:
         self._solref = checked_solref(solref)
         self._geoms = Geoms(model, geoms)
         self._ids = self._geoms.ids
-        self._detector = Detector(self._geoms.shapes, self._geoms.excluded, 1, options)
+        self._detector = Detector(self._geoms.shapes, np.zeros(len(geoms), int), self._geoms.excluded, options)
 
     @property
     def last(self) -> Found | None:

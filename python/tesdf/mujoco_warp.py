@@ -76,7 +76,14 @@ class Contacts:
         self._bodies = model.geom_bodyid[self._ids]
         self._roots = model.body_rootid[self._bodies]
         self._with_asset = self._ids[[asset is not None for asset in geoms.values()]]
-        self._detector = Detector(self._geoms.shapes, self._geoms.excluded, nworld, options)
+        self._worlds = nworld
+        count = len(self._ids)
+        self._detector = Detector(
+            self._geoms.shapes * nworld,
+            np.repeat(np.arange(nworld), count),
+            [(w * count + a, w * count + b) for w in range(nworld) for a, b in self._geoms.excluded],
+            options,
+        )
 
     @property
     def last(self) -> Found | None:
@@ -168,9 +175,9 @@ class Contacts:
         )
 
     def _check(self, m: mjw.Model, d: mjw.Data) -> None:
-        if d.nworld != self._detector.worlds:
+        if d.nworld != self._worlds:
             raise ValueError(
-                f"the data has {d.nworld} worlds, but the contacts {self._detector.worlds}; give Contacts nworld={d.nworld}"
+                f"the data has {d.nworld} worlds, but the contacts {self._worlds}; give Contacts nworld={d.nworld}"
             )
         if m.opt.integrator not in _INTEGRATORS:
             name = mjw.IntegratorType(m.opt.integrator).name
@@ -238,11 +245,11 @@ class Contacts:
         """The parameters of each kind of contact, and the kind of each contact."""
         kinds, kind = np.unique(np.column_stack([world, geoms]), axis=0, return_inverse=True)
         each = {
-            name: _of_each_geom(getattr(m, "geom_" + name), self._detector.worlds)
+            name: _of_each_geom(getattr(m, "geom_" + name), self._worlds)
             for name in ("solmix", "friction", "solref", "solimp")
         }
         same = {
-            name: np.tile(getattr(m, "geom_" + name).numpy(), self._detector.worlds) for name in ("priority", "condim")
+            name: np.tile(getattr(m, "geom_" + name).numpy(), self._worlds) for name in ("priority", "condim")
         }
         first, second = (kinds[:, 0] * m.ngeom + kinds[:, k] for k in (1, 2))
         steps = _array(m.opt.timestep)
