@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Builds the wheel of the Python package and tests it in a clean virtual environment. It needs the
-# network, or pip's cache. Some tests run Gmsh.
+# network, or pip's cache. Some tests run Gmsh and Chromium.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
 . .ci/gmsh.sh
+. .ci/chromium.sh
 
 python=${PYTHON:-python3}
 if ! "$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))' 2>/dev/null; then

@@ -15,6 +15,7 @@ use tesdf::encode::{ChoiceError, DomainError, EncodeError};
 use tesdf::mesh::{MeshError, NotSolid, ReadError, RepairError};
 use tesdf::save::SaveError;
 use tesdf::verify::VerifyError;
+use tesdf_playback::PlaybackError;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::SceneError;
 use tesdf_sim::{DynamicsError, SimulateError};
@@ -42,8 +43,11 @@ pub enum Error {
     Scene(SceneError),
     Simulate(SimulateError),
     Dynamics(DynamicsError),
-    /// The run file that cannot be written.
+    /// The run file that cannot be read or written.
     Record(PathBuf, RecordError),
+    Playback(PlaybackError),
+    /// The run file, and a name that none of its bodies has.
+    NoBody(PathBuf, String),
     Threads(rayon::ThreadPoolBuildError),
 }
 
@@ -61,9 +65,10 @@ impl Error {
                 SaveError::IsFolder { .. } => PyIsADirectoryError::new_err(self.text()),
                 SaveError::Input { .. } | SaveError::Busy { .. } => PyOSError::new_err(self.text()),
             },
-            Self::Scene(SceneError::Read { ref source, .. }) => system(source, self.text()),
-            Self::Scene(_) => new(py, "SceneError", self.text()),
-            Self::Simulate(_) | Self::Dynamics(_) | Self::Record(..) => {
+            Self::Scene(SceneError::Read { ref source, .. })
+            | Self::Record(_, RecordError::Read { ref source, .. }) => system(source, self.text()),
+            Self::Scene(_) | Self::NoBody(..) => new(py, "SceneError", self.text()),
+            Self::Simulate(_) | Self::Dynamics(_) | Self::Record(..) | Self::Playback(_) => {
                 new(py, "SimulationError", self.text())
             }
             Self::Domain(DomainError::Read {
@@ -109,8 +114,10 @@ impl Error {
             Self::Scene(e) => e.to_string(),
             Self::Simulate(e) => e.to_string(),
             Self::Dynamics(e) => e.to_string(),
-            Self::Record(_, e @ RecordError::Save(_)) => e.to_string(),
+            Self::Record(_, e @ (RecordError::Save(_) | RecordError::Read { .. })) => e.to_string(),
             Self::Record(path, e) => format!("{}: {e}", path.display()),
+            Self::Playback(e) => e.to_string(),
+            Self::NoBody(path, body) => format!("{}: there is no body {body}", path.display()),
             Self::Threads(e) => format!("cannot start threads: {e}"),
         }
     }

@@ -13,6 +13,7 @@ mod encode;
 mod errors;
 mod interrupt;
 mod mesh;
+mod playback;
 mod pool;
 mod poses;
 mod scene;
@@ -29,6 +30,8 @@ mod _native {
     use super::encode::encode;
     #[pymodule_export]
     use super::mesh::{check, repair};
+    #[pymodule_export]
+    use super::playback::{export, view};
     #[pymodule_export]
     use super::scene::{Scene, pair};
     #[pymodule_export]

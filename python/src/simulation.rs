@@ -15,7 +15,8 @@ use tesdf::glam::DVec3;
 use tesdf_sim::newton::Newton;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{
-    Drive, Dynamics, DynamicsError, Joint, Motor, PartialRun, Run, SimulateError, State, System, Wrench,
+    Drive, Dynamics, DynamicsError, Joint, Motor, PartialRun, Run, RunRecord, SimulateError, State, System,
+    Wrench,
 };
 
 use crate::contacts::{self, Columns};
@@ -113,6 +114,13 @@ impl Simulation {
     /// Reads the state. Waits for a step of another thread without the interpreter's lock.
     fn read<T: Send>(&self, py: Python<'_>, read: impl FnOnce(&Running) -> T + Send) -> T {
         py.detach(|| read(&self.locked()))
+    }
+
+    /// The run so far, and its bodies. Waits for a step of another thread, so the caller must not hold
+    /// the interpreter's lock.
+    pub fn so_far(&self) -> (RunRecord, System) {
+        let running = self.locked();
+        (running.run.record().clone(), running.engine.system().clone())
     }
 
     fn pool(&self, py: Python<'_>) -> PyResult<Arc<ThreadPool>> {

@@ -29,13 +29,14 @@
     simulation.set_motor("slide", velocity=0.1)         # set_wrench, set_state
     simulation.step()                                   # simulation.poses, simulation.contacts, ...
     simulation.run()["passed"]                          # to the end; the summary, with the criteria
+    tesdf.view(simulation, "page.html")                 # plays it in a browser; tesdf.export for a GLB file
 
 All lengths are in the mesh's unit, and all ids start from 0. Errors are `MeshError`
 (`NotSolidError` if the mesh has no well-defined inside), `EncodeError`, `DeformError`,
 `AssetError`, `CollideError`, `SceneError` and `SimulationError`, which are all `ValueError`s, and `OSError` for files.
 """
 
-from ._native import NO_CELL, NO_FACE, Asset, Scene, Simulation, __version__, check, encode, repair
+from ._native import NO_CELL, NO_FACE, Asset, Scene, Simulation, __version__, check, encode, export, repair, view
 from .bodies import clearance, collide, time_of_impact, why
 from .contacts import CoarseContacts, Contacts, HiddenOverlaps, Instances, Record, Reductions, StepContacts
 from .errors import (
@@ -104,7 +105,9 @@ __all__ = [
     "clearance",
     "collide",
     "encode",
+    "export",
     "repair",
     "time_of_impact",
+    "view",
     "why",
 ]

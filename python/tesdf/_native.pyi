@@ -1,4 +1,4 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import Any, Literal, Protocol, Union, final
 
@@ -22,7 +22,7 @@ _Precision = Literal["f64", "f32"]
 _Numbers = Union[float, npt.ArrayLike]
 _Integers = Union[int, npt.ArrayLike]
 
-__all__ = ["NO_CELL", "NO_FACE", "Asset", "Scene", "Simulation", "__version__", "check", "encode", "pair", "repair"]
+__all__ = ["NO_CELL", "NO_FACE", "Asset", "Scene", "Simulation", "__version__", "check", "encode", "export", "pair", "repair", "view"]
 
 NO_CELL: int
 NO_FACE: int
@@ -248,4 +248,23 @@ class Simulation:
     @property
     def contacts(self) -> StepContacts: ...
 
+def export(
+    run: _Path | Simulation,
+    path: _Path,
+    *,
+    every: int | None = None,
+    fps: float | None = None,
+    speed: float = 1.0,
+    geometries: Mapping[str, _Path] | None = None,
+) -> None: ...
+def view(
+    run: _Path | Simulation,
+    path: _Path,
+    *,
+    every: int | None = None,
+    fps: float | None = None,
+    contacts: int = 128,
+    title: str | None = None,
+    geometries: Mapping[str, _Path] | None = None,
+) -> None: ...
 def pair(a: Shape, b: Shape, pose_a: npt.ArrayLike | None, pose_b: npt.ArrayLike | None) -> Scene: ...

@@ -23,8 +23,9 @@ pub struct Playback<'a> {
     pub steps: Vec<usize>,
     /// Time of each of these steps, s.
     pub times: Vec<f64>,
-    /// The middle of the run, m, world frame. Its coordinates are exact in 32-bit floats. Positions
-    /// are stored relative to it, so that a run far from the origin keeps its precision.
+    /// The middle of the run, m, world frame. Positions are stored relative to it, so that a run far
+    /// from the origin keeps its precision. Its coordinates are decimals with as few digits as a
+    /// 32-bit float needs: a file has them as such, and a reader in 64 bits finds them exactly.
     pub centre: DVec3,
     /// Bounds of the bodies except planes, m, world frame, over the whole run. What moves farther than
     /// 1.5 extents beyond the bounds at the beginning is not in them.
@@ -100,7 +101,7 @@ impl<'a> Playback<'a> {
             run.bodies.push(DrawnBody { name: body.name.clone(), part, scale: instance.scale, colour });
         }
         run.bounds = run.find_bounds(&shapes)?;
-        run.centre = run.bounds.center().as_vec3().as_dvec3();
+        run.centre = run.bounds.center().map(shortest);
         for body in 0..run.bodies.len() {
             if let Part::Floor(at) = &mut run.bodies[body].part {
                 let pose = pose(record, 0, body)?;
@@ -198,6 +199,11 @@ fn key(shape: &Shape) -> (u8, [u64; 3]) {
         Shape::Sphere { radius } => (3, [radius.to_bits(), 0, 0]),
         Shape::Capsule { half_height, radius } => (4, [half_height.to_bits(), radius.to_bits(), 0]),
     }
+}
+
+/// The shortest decimal that the nearest 32-bit float is read from.
+fn shortest(x: f64) -> f64 {
+    (x as f32).to_string().parse().unwrap_or(x)
 }
 
 fn mesh_of(shape: &Shape) -> Mesh {

@@ -37,6 +37,9 @@ class Camera {
     this.elevation = ELEVATION;
     this.target = [0, 0, 0];
     this.distance = 1;
+    // Shares of the width at the left and of the height at the bottom that controls cover. The target
+    // is in the middle of the rest.
+    this.covered = [0, 0];
   }
 
   get axes() {
@@ -46,8 +49,8 @@ class Camera {
   // Moves the camera, without turning it, so that it sees these points.
   fit(points, aspect) {
     const { right, up, forward } = this.axes;
-    const usable = HALF_VIEW * (1 - 2 * MARGIN);
-    const slopes = [[right, usable * aspect], [up, usable]];
+    const usable = this.covered.map((share) => HALF_VIEW * (1 - share) * (1 - 2 * MARGIN));
+    const slopes = [[right, usable[0] * aspect], [up, usable[1]]];
     // In each direction, the camera lies behind the planes through the points that bound the view.
     const middle = [0, 0];
     const back = slopes.map(([axis, slope], k) => {
@@ -89,9 +92,10 @@ class Camera {
     const d = this.distance;
     const matrix = [];
     for (let k = 0; k < 3; k++) {
-      matrix.push(right[k] / (HALF_VIEW * aspect), up[k] / HALF_VIEW, a * forward[k], forward[k]);
+      const [x, y] = this.covered.map((share) => share * forward[k]);
+      matrix.push(right[k] / (HALF_VIEW * aspect) + x, up[k] / HALF_VIEW + y, a * forward[k], forward[k]);
     }
-    return matrix.concat([0, 0, a * d + b, d]);
+    return matrix.concat([this.covered[0] * d, this.covered[1] * d, a * d + b, d]);
   }
 
   // The point relative to the target at a place of the picture, from -1 to 1, and this depth, 0 to 1.
@@ -100,7 +104,8 @@ class Camera {
     const near = Math.max(this.distance - reach, 0.02 * this.distance);
     const far = this.distance + reach;
     const away = (2 * far * near) / (far + near - (2 * depth - 1) * (far - near));
-    const across = sum(right.map((r) => r * x * HALF_VIEW * aspect * away), up, y * HALF_VIEW * away);
+    const [u, v] = [x - this.covered[0], y - this.covered[1]];
+    const across = sum(right.map((r) => r * u * HALF_VIEW * aspect * away), up, v * HALF_VIEW * away);
     return sum(across, forward, away - this.distance);
   }
 }

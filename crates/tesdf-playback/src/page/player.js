@@ -26,7 +26,17 @@ class Player {
 
   fit() {
     const { clientWidth, clientHeight } = this.canvas;
+    this.leaveRoom();
     this.camera.fit(this.corners, clientWidth / Math.max(clientHeight, 1));
+    this.show();
+  }
+
+  // Keeps the target in the middle of what the controls leave free, unless they cover too much.
+  leaveRoom() {
+    const { clientWidth, clientHeight } = this.canvas;
+    const left = element("panel").getBoundingClientRect().right / clientWidth;
+    const bottom = 1 - element("player").getBoundingClientRect().top / clientHeight;
+    this.camera.covered = [left, bottom].map((share) => (share < 0.4 ? share : 0));
     this.show();
   }
 
@@ -174,7 +184,7 @@ class Player {
       this.scene.showContacts = event.target.checked;
       this.show();
     });
-    addEventListener("resize", () => this.show());
+    addEventListener("resize", () => this.leaveRoom());
     addEventListener("keydown", (event) => this.key(event));
     this.canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     this.canvas.addEventListener("webglcontextrestored", () => location.reload());

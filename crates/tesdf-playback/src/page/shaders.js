@@ -29,13 +29,13 @@ uniform highp sampler2DShadow shadowMap;
 uniform mat4 lampView;
 uniform float lampStep;
 float lit(vec3 p, vec3 n) {
-  vec3 q = (lampView * vec4(p + 1.5 * lampStep * n, 1.0)).xyz * 0.5 + 0.5;
+  vec3 q = (lampView * vec4(p + 2.2 * lampStep * n, 1.0)).xyz * 0.5 + 0.5;
   if (any(lessThan(q, vec3(0.0))) || any(greaterThan(q, vec3(1.0)))) return 1.0;
   float sum = 0.0;
   vec2 texel = 1.0 / vec2(textureSize(shadowMap, 0));
   for (int x = -1; x <= 1; x++)
     for (int y = -1; y <= 1; y++)
-      sum += texture(shadowMap, vec3(q.xy + 1.3 * vec2(x, y) * texel, q.z - 0.0006));
+      sum += texture(shadowMap, vec3(q.xy + 1.3 * vec2(x, y) * texel, q.z - 0.0008));
   return sum / 9.0;
 }`;
 

@@ -1,0 +1,185 @@
+//! `tesdf.export` and `tesdf.view`
+use std::collections::BTreeMap;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use pyo3::prelude::*;
+use tesdf::Progress;
+use tesdf::save::{Destination, SaveError, SaveOptions};
+use tesdf_playback::{ContactOptions, Frames, GlbOptions, Playback, glb, page};
+use tesdf_sim::scene_file::LoadedScene;
+use tesdf_sim::{RunRecord, System};
+
+use crate::errors::{Error, argument, kind_of};
+use crate::interrupt::cancellable;
+use crate::pool;
+use crate::simulation::Simulation;
+
+// A constant in a signature would be "..." for readers in Python.
+const _: () = assert!(ContactOptions::MOST == 128);
+
+/// Writes a run as an animated GLB file, which Blender, three.js and others play.
+///
+/// - run: the path of a run of `tesdf simulate` or Simulation.save, or a Simulation, whose steps so
+///   far are taken.
+/// - path: the file.
+/// - every: every N-th step and the last one are played. fps: the steps nearest to this many times
+///   in each second of the run. Without both, at most 1000 steps are.
+/// - speed: seconds of the run in each second of the animation.
+/// - geometries: files in place of the meshes that the run names: a dict of names of bodies and
+///   paths. Not for a Simulation, which has its meshes.
+///
+/// Each body is a node with its name; lengths are metres, and y is up, as glTF wants it. The same run
+/// gives the bytes of `tesdf export`.
+///
+/// Raises OSError if a file cannot be read or written, SceneError if a mesh is missing, and
+/// SimulationError if the run cannot be played.
+#[pyfunction]
+#[pyo3(signature = (run, path, *, every = None, fps = None, speed = 1.0, geometries = None))]
+pub fn export(
+    py: Python<'_>,
+    run: &Bound<'_, PyAny>,
+    path: PathBuf,
+    every: Option<NonZeroUsize>,
+    fps: Option<f64>,
+    speed: f64,
+    geometries: Option<BTreeMap<String, PathBuf>>,
+) -> PyResult<()> {
+    let frames = frames(every, fps)?;
+    write(py, run, geometries, &path, |source, _| {
+        let run = Playback::new(&source.record, &source.system, frames).map_err(Error::Playback)?;
+        glb(&run, &GlbOptions { speed }).map_err(Error::Playback)
+    })
+}
+
+/// Writes a page that plays a run in a browser, with its contacts. The page is one file that needs
+/// no server and asks for nothing.
+///
+/// - run: the path of a run of `tesdf simulate` or Simulation.save, or a Simulation, whose steps so
+///   far are taken.
+/// - path: the file.
+/// - every: every N-th step and the last one are played. fps: the steps nearest to this many times
+///   in each second of the run. Without both, at most 1000 steps are.
+/// - contacts: at most this many contacts of a frame are drawn, the deepest ones of each place.
+///   Contacts that the run has not recorded are detected again, which Ctrl-C ends.
+/// - title: heading of the page; None is the name of the run.
+/// - geometries: files in place of the meshes that the run names: a dict of names of bodies and
+///   paths. Not for a Simulation, which has its meshes.
+///
+/// The same run gives the bytes of `tesdf view`.
+///
+/// Raises OSError if a file cannot be read or written, SceneError if a mesh is missing, and
+/// SimulationError if the run cannot be played.
+#[pyfunction]
+#[pyo3(signature = (
+    run, path, *, every = None, fps = None, contacts = 128, title = None, geometries = None
+))]
+#[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+pub fn view(
+    py: Python<'_>,
+    run: &Bound<'_, PyAny>,
+    path: PathBuf,
+    every: Option<NonZeroUsize>,
+    fps: Option<f64>,
+    contacts: usize,
+    title: Option<String>,
+    geometries: Option<BTreeMap<String, PathBuf>>,
+) -> PyResult<()> {
+    let frames = frames(every, fps)?;
+    write(py, run, geometries, &path, |source, stop| {
+        let Source { record, system, loaded, name, .. } = source;
+        let run = Playback::new(record, system, frames).map_err(Error::Playback)?;
+        let detection = loaded.detection(system).filter(|_| contacts > 0);
+        let options = ContactOptions { detection, most: contacts };
+        let contacts = run.contacts(system, &options, stop, |_| {}).map_err(Error::Playback)?;
+        let title = title.as_deref().unwrap_or(name);
+        Ok(page(&run, contacts.as_deref(), title).map_err(Error::Playback)?.into_bytes())
+    })
+}
+
+fn frames(every: Option<NonZeroUsize>, fps: Option<f64>) -> PyResult<Frames> {
+    match (every, fps) {
+        (Some(every), None) => Ok(Frames::Every(every)),
+        (None, Some(rate)) => Ok(Frames::PerSecond(rate)),
+        (None, None) => Ok(Frames::default()),
+        (Some(_), Some(_)) => Err(argument("every", "fps is given, too", "one of both")),
+    }
+}
+
+/// A run with the geometries of its bodies.
+struct Source {
+    record: RunRecord,
+    system: System,
+    loaded: LoadedScene,
+    /// Name for the heading.
+    name: String,
+    /// The files that were read, none of which may be the output.
+    inputs: Vec<PathBuf>,
+}
+
+impl Source {
+    fn open(path: &Path, geometries: &BTreeMap<String, PathBuf>, progress: &Progress) -> Result<Self, Error> {
+        let record = RunRecord::open(path).map_err(|e| Error::Record(path.to_path_buf(), e))?;
+        let mut loaded = LoadedScene::of_run(&record, path).map_err(Error::Scene)?;
+        for (body, file) in geometries {
+            // Paths in a scene are relative to its folder, but these to the current folder.
+            let file = std::path::absolute(file).unwrap_or_else(|_| file.clone());
+            if !loaded.replace_geometry(body, file) {
+                return Err(Error::NoBody(path.to_path_buf(), body.clone()));
+            }
+        }
+        let system = loaded.system_watched(progress).map_err(Error::Scene)?;
+        let name = path.file_stem().map_or(String::new(), |name| name.to_string_lossy().into_owned());
+        let mut inputs = loaded.geometry_files();
+        inputs.push(path.to_path_buf());
+        Ok(Self { record, system, loaded, name, inputs })
+    }
+
+    fn of_simulation(record: RunRecord, system: System) -> Result<Self, Error> {
+        let loaded = LoadedScene::of_run(&record, "").map_err(Error::Scene)?;
+        Ok(Self { record, system, loaded, name: "run".into(), inputs: Vec::new() })
+    }
+}
+
+/// Makes a file of a run on another thread, which Ctrl-C ends, and writes it.
+fn write(
+    py: Python<'_>,
+    run: &Bound<'_, PyAny>,
+    geometries: Option<BTreeMap<String, PathBuf>>,
+    path: &Path,
+    make: impl FnOnce(&Source, &AtomicBool) -> Result<Vec<u8>, Error> + Send,
+) -> PyResult<()> {
+    let pool = pool::shared().map_err(|e| e.raise(py))?;
+    let (progress, stop) = (Progress::default(), AtomicBool::new(false));
+    let simulation = run.cast::<Simulation>().ok().map(|simulation| simulation.get());
+    let file: Option<PathBuf> = run.extract().ok();
+    if simulation.is_none() && file.is_none() {
+        return Err(argument("run", kind_of(run), "a path or a Simulation"));
+    }
+    if simulation.is_some() && geometries.is_some() {
+        return Err(argument("geometries", "given for a Simulation", "None: it has its meshes"));
+    }
+    let geometries = geometries.unwrap_or_default();
+    let work = || {
+        pool.install(|| {
+            let source = match (simulation, file) {
+                (Some(simulation), _) => {
+                    let (record, system) = simulation.so_far();
+                    Source::of_simulation(record, system)?
+                }
+                (None, file) => Source::open(&file.unwrap_or_default(), &geometries, &progress)?,
+            };
+            let inputs: Vec<&Path> = source.inputs.iter().map(PathBuf::as_path).collect();
+            let refused = |e: SaveError| Error::Record(path.to_path_buf(), e.into());
+            let options = SaveOptions { inputs: &inputs, ..SaveOptions::default() };
+            let output = Destination::new(path, &options).map_err(refused)?;
+            output.write(&make(&source, &stop)?).map_err(refused)
+        })
+    };
+    let cancel = || {
+        progress.cancel();
+        stop.store(true, Ordering::Relaxed);
+    };
+    cancellable(py, work, cancel, || Ok(()))?.map_err(|e| e.raise(py))
+}
