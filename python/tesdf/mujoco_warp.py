@@ -185,7 +185,9 @@ class Contacts:
         if m.opt.enableflags & mjw.EnableBit.SLEEP:
             raise ValueError("the model lets bodies sleep, which only MJWarp's own contacts can end; switch sleep off")
         if np.isin(m.nxn_geom_pair_filtered.numpy(), self._with_asset).any():
-            raise ValueError("the model of MJWarp still finds contacts of these geoms; call put_model after Contacts(model, …)")
+            raise ValueError(
+                "the model of MJWarp still finds contacts of these geoms; call put_model after Contacts(model, …)"
+            )
 
     def _check_rows(self, d: mjw.Data) -> None:
         rows = _array(d.nefc)
@@ -198,8 +200,8 @@ class Contacts:
         dropped = (d.overflow.numpy() & int(mjw.OverflowType.NJMAX_NNZ)) != 0
         if dropped.any():
             raise ValueError(
-                f"the constraints of world {int(dropped.argmax())} have more than njmax_nnz = {d.njmax_nnz} numbers that are "
-                "not zero; make the data with make_data(…, njmax_nnz=njmax * model.nv)"
+                f"the constraints of world {int(dropped.argmax())} have more than njmax_nnz = {d.njmax_nnz} numbers that "
+                "are not zero; make the data with make_data(…, njmax_nnz=njmax * model.nv)"
             )
 
     def _rows(self, m: mjw.Model, found: Found) -> dict[str, Any]:

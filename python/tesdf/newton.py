@@ -60,7 +60,9 @@ class NarrowPhase(nt.geometry.NarrowPhase):  # type: ignore[misc, unused-ignore]
         self, pipeline: nt.CollisionPipeline, assets: Mapping[str, Asset], **options: Unpack[DetectOptions]
     ) -> None:
         if pipeline.deterministic:
-            raise ValueError("the pipeline is deterministic or matches contacts, which needs keys of Newton; switch both off")
+            raise ValueError(
+                "the pipeline is deterministic or matches contacts, which needs keys of Newton; switch both off"
+            )
         # What the pipeline has built, buffers included; Newton's own tests extend it in this way.
         self.__dict__ = pipeline.narrow_phase.__dict__
         model = pipeline.model
@@ -77,7 +79,9 @@ class NarrowPhase(nt.geometry.NarrowPhase):  # type: ignore[misc, unused-ignore]
         excluded, start = [], 0
         for inside in rows:
             a, b = np.triu_indices(len(inside), 1)
-            still = (bodies[inside][a] == bodies[inside][b]) | ((worlds[inside][a] < 0) & (worlds[inside][b] < 0) & (start > 0))
+            of_all = worlds[inside] < 0
+            # Two shapes of all worlds meet in the first one only.
+            still = (bodies[inside][a] == bodies[inside][b]) | (of_all[a] & of_all[b] & (start > 0))
             excluded.append(np.stack([a, b], 1)[still] + start)
             start += len(inside)
         self._tesdf_instances = numbers[of_instances]
