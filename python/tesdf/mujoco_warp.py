@@ -103,6 +103,8 @@ class Contacts:
         """
         self._check(m, d)
         if m.opt.disableflags & _WITHOUT_CONTACTS:
+            # The solver reads the rows of contacts, which are those of an earlier step.
+            d.nacon.zero_()
             mjw.step(m, d)
             return
         m.opt.run_collision_detection = False
