@@ -53,6 +53,7 @@ def main():
     parser.add_argument("--rust", required=True, help="the program tesdf")
     parser.add_argument("--worlds", type=int, default=1000, help="number of worlds; default 1000")
     parser.add_argument("--rounds", type=int, default=3, help="number of rounds of Rust and Python; the best counts; default 3")
+    parser.add_argument("--modes", nargs="+", default=["node", "exact"], help="what is tested; default node exact")
     args = parser.parse_args()
     cores = len(os.sched_getaffinity(0))
     random = np.random.default_rng(1)
@@ -68,7 +69,7 @@ def main():
         for file, mesh in zip(files, ("lobed_hole_c100", "lobed_peg")):
             tesdf.encode(ROOT / "data" / "procedural" / f"{mesh}.obj", "fast").save(file)
         poses.tofile(files[2])
-        for mode in ("node", "exact"):
+        for mode in args.modes:
             for threads in dict.fromkeys((1, cores)):
                 options = ["--poses", files[2], "--mode", mode, "--contact-distance", str(DISTANCE), "--passes", str(PASSES)]
                 turns = [
