@@ -45,6 +45,7 @@ class Geoms:
         for number, asset in zip(numbers, geoms.values()):
             if asset is not None:
                 model.geom_contype[number] = model.geom_conaffinity[number] = 0
+                _weigh(model, number)
 
 
 @dataclass(frozen=True)
@@ -118,6 +119,17 @@ def _number(model: mj.MjModel, name: str) -> int:
         names = (mj.mj_id2name(model, mj.mjtObj.mjOBJ_GEOM, k) for k in range(model.ngeom))
         raise ValueError(f"there is no geom {name!r}; the named ones are {[n for n in names if n]}")
     return int(number)
+
+
+def _weigh(model: mj.MjModel, number: int) -> None:
+    """MuJoCo chooses the stiffness of a contact by the inverse masses of its bodies, which it takes at their
+    centres of mass. That of a body on a hinge through its centre is zero up to rounding, so its contacts become
+    so stiff that the solver fails: a pair of gears flew apart. Such a body gets the inverse mass at the border of
+    its geom."""
+    weight = model.body_invweight0[model.geom_bodyid[number]]
+    at_border = weight[1] * model.geom_rbound[number] ** 2
+    if weight[0] < 1e-6 * at_border:
+        weight[0] = at_border
 
 
 def _placed(model: mj.MjModel, number: int, name: str, asset: Asset | None) -> Placed:

@@ -43,7 +43,7 @@ pub struct Row {
     /// the gap by its velocity.
     pub sides: [Option<(usize, Vector6<f64>)>; 2],
     /// The vectors from the centres of mass of the two sides to the point where the force acts, m.
-    /// Zero for a torque.
+    /// Of no account for a torque.
     pub arms: [DVec3; 2],
     /// Gap at the beginning of the step, with the motion of kinematic bodies in the step, m or rad.
     pub gap: f64,
