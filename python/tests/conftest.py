@@ -9,10 +9,39 @@ import tesdf
 DATA = Path(__file__).resolve().parents[2] / "data"
 sys.path[:0] = [str(DATA), str(DATA / "reference")]
 
+PARTS = DATA / "procedural"
+
+# The bolt stands on its head, and the nut is threaded on by 4 mm.
+SCREW = f"""
+<mujoco>
+  <option timestep="0.002" integrator="implicitfast" cone="elliptic"/>
+  <size memory="100M"/>
+  <asset>
+    <mesh name="bolt" file="{PARTS}/iso_m16_bolt_6k.obj"/>
+    <mesh name="nut" file="{PARTS}/iso_m16_nut_c100.obj"/>
+  </asset>
+  <worldbody>
+    <body pos="0 0 0.04" quat="0 1 0 0"><geom name="bolt" type="mesh" mesh="bolt" condim="1"/></body>
+    <body name="nut" pos="0 0 0.036" quat="0 1 0 0">
+      <freejoint/>
+      <geom name="nut" type="mesh" mesh="nut" density="7850" condim="1"/>
+    </body>
+  </worldbody>
+</mujoco>"""
+
 TETRAHEDRON = (
     np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float),
     np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]),
 )
+
+
+@pytest.fixture(scope="session")
+def screw():
+    """the assets of SCREW, by the names of its geoms"""
+    return {
+        "bolt": tesdf.encode(PARTS / "iso_m16_bolt_6k.obj", "fast"),
+        "nut": tesdf.encode(PARTS / "iso_m16_nut_c100.obj", "fast"),
+    }
 
 
 @pytest.fixture(scope="session")

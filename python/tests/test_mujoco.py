@@ -5,27 +5,7 @@ import numpy as np
 import pytest
 import tesdf
 import tesdf.mujoco
-from conftest import DATA
-
-PARTS = DATA / "procedural"
-
-# The bolt stands on its head, and the nut is threaded on by 4 mm.
-SCREW = f"""
-<mujoco>
-  <option timestep="0.002" integrator="implicitfast" cone="elliptic"/>
-  <size memory="100M"/>
-  <asset>
-    <mesh name="bolt" file="{PARTS}/iso_m16_bolt_6k.obj"/>
-    <mesh name="nut" file="{PARTS}/iso_m16_nut_c100.obj"/>
-  </asset>
-  <worldbody>
-    <body pos="0 0 0.04" quat="0 1 0 0"><geom name="bolt" type="mesh" mesh="bolt" condim="1"/></body>
-    <body name="nut" pos="0 0 0.036" quat="0 1 0 0">
-      <freejoint/>
-      <geom name="nut" type="mesh" mesh="nut" density="7850" condim="1"/>
-    </body>
-  </worldbody>
-</mujoco>"""
+from conftest import PARTS, SCREW
 
 CUBE = f"""
 <mujoco>
@@ -42,14 +22,6 @@ CUBE = f"""
 def model_of(text):
     model = mujoco.MjModel.from_xml_string(text)
     return model, mujoco.MjData(model)
-
-
-@pytest.fixture(scope="module")
-def screw():
-    return {
-        "bolt": tesdf.encode(PARTS / "iso_m16_bolt_6k.obj", "fast"),
-        "nut": tesdf.encode(PARTS / "iso_m16_nut_c100.obj", "fast"),
-    }
 
 
 @pytest.fixture(scope="module")

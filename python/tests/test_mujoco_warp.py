@@ -8,26 +8,7 @@ import tesdf
 import tesdf.mujoco
 import tesdf.mujoco_warp
 import warp as wp
-from conftest import DATA
-
-PARTS = DATA / "procedural"
-
-SCREW = f"""
-<mujoco>
-  <option timestep="0.002" integrator="implicitfast" cone="elliptic"/>
-  <size memory="100M"/>
-  <asset>
-    <mesh name="bolt" file="{PARTS}/iso_m16_bolt_6k.obj"/>
-    <mesh name="nut" file="{PARTS}/iso_m16_nut_c100.obj"/>
-  </asset>
-  <worldbody>
-    <body pos="0 0 0.04" quat="0 1 0 0"><geom name="bolt" type="mesh" mesh="bolt" condim="1"/></body>
-    <body name="nut" pos="0 0 0.036" quat="0 1 0 0">
-      <freejoint/>
-      <geom name="nut" type="mesh" mesh="nut" density="7850" condim="1"/>
-    </body>
-  </worldbody>
-</mujoco>"""
+from conftest import PARTS, SCREW
 
 # The ball and the floor meet by MJWarp's own contacts.
 CUBE = f"""
@@ -47,13 +28,9 @@ def cube():
     return tesdf.encode(PARTS / "cube.obj", "fast")
 
 
-def test_the_nut_turns_down_the_bolt_in_the_world_with_gravity():
+def test_the_nut_turns_down_the_bolt_in_the_world_with_gravity(screw):
     model = mujoco.MjModel.from_xml_string(SCREW)
-    assets = {
-        "bolt": tesdf.encode(PARTS / "iso_m16_bolt_6k.obj", "fast"),
-        "nut": tesdf.encode(PARTS / "iso_m16_nut_c100.obj", "fast"),
-    }
-    contacts = tesdf.mujoco_warp.Contacts(model, assets, nworld=2)
+    contacts = tesdf.mujoco_warp.Contacts(model, screw, nworld=2)
     m = mjw.put_model(model)
     d = mjw.make_data(model, nworld=2, nconmax=6000, njmax=6000)
     m.opt.gravity = wp.array([[0, 0, 0], [0, 0, -9.81]], dtype=wp.vec3)

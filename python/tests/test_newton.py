@@ -7,19 +7,9 @@ import pytest
 import tesdf
 import tesdf.newton
 import warp as wp
-from conftest import DATA
 
-PARTS = DATA / "procedural"
 STEP = 0.002
 FLIPPED = (1.0, 0.0, 0.0, 0.0)
-
-
-@pytest.fixture(scope="module")
-def assets():
-    return {
-        "bolt": tesdf.encode(PARTS / "iso_m16_bolt_6k.obj", "fast"),
-        "nut": tesdf.encode(PARTS / "iso_m16_nut_c100.obj", "fast"),
-    }
 
 
 def mesh(asset):
@@ -54,7 +44,7 @@ def rotation(q):
     return np.array(wp.quat_to_matrix(wp.quat(*map(float, q)))).reshape(3, 3)
 
 
-def test_the_pipeline_gets_the_contacts_of_the_scene(assets, monkeypatch):
+def test_the_pipeline_gets_the_contacts_of_the_scene(screw, monkeypatch):
     others = []
 
     def of_newton(self, **arguments):
@@ -64,9 +54,9 @@ def test_the_pipeline_gets_the_contacts_of_the_scene(assets, monkeypatch):
         arguments["writer_data"].contact_count.fill_(count)
 
     monkeypatch.setattr(newton.geometry.NarrowPhase, "launch_custom_write", of_newton)
-    model = model_of(assets, 2, with_ball=True)
+    model = model_of(screw, 2, with_ball=True)
     pipeline = pipeline_of(model)
-    pipeline.narrow_phase = tesdf.newton.NarrowPhase(pipeline, assets)
+    pipeline.narrow_phase = tesdf.newton.NarrowPhase(pipeline, screw)
     contacts, state = pipeline.contacts(), model.state()
     velocities = state.body_qd.numpy()
     velocities[0] = [0, 0.01, -0.02, 0, 0, 3]
@@ -102,8 +92,8 @@ def test_the_pipeline_gets_the_contacts_of_the_scene(assets, monkeypatch):
     assert np.allclose(velocity, [*linear, *velocities[0, 3:]], atol=1e-6)
 
 
-def test_the_nuts_turn_down_their_bolts(assets):
-    model = model_of(assets, 2)
+def test_the_nuts_turn_down_their_bolts(screw):
+    model = model_of(screw, 2)
     solver = newton.solvers.SolverMuJoCo(
         model,
         use_mujoco_contacts=False,
@@ -114,7 +104,7 @@ def test_the_nuts_turn_down_their_bolts(assets):
         nconmax=6000,
     )
     pipeline = pipeline_of(model)
-    pipeline.narrow_phase = tesdf.newton.NarrowPhase(pipeline, assets)
+    pipeline.narrow_phase = tesdf.newton.NarrowPhase(pipeline, screw)
     contacts, control = pipeline.contacts(), model.control()
     before, after = model.state(), model.state()
     inertia, mass = model.body_inertia.numpy()[0][2, 2], model.body_mass.numpy()[0]
@@ -134,25 +124,25 @@ def test_the_nuts_turn_down_their_bolts(assets):
     assert pipeline.narrow_phase.scene.clearance(2, 3).distance > -1e-6
 
 
-def test_what_does_not_fit_is_an_error(assets):
-    model = model_of(assets, 1)
+def test_what_does_not_fit_is_an_error(screw):
+    model = model_of(screw, 1)
     pipeline = pipeline_of(model, room=100)
     narrow = tesdf.newton.NarrowPhase
-    pipeline.narrow_phase = narrow(pipeline, assets)
+    pipeline.narrow_phase = narrow(pipeline, screw)
     contacts = pipeline.contacts()
     with pytest.raises(ValueError, match=r"contacts, but the pipeline has room for 100; .*rigid_contact_max="):
         pipeline.collide(model.state(), contacts, dt=STEP)
     with pytest.raises(ValueError, match=r"there is no shape 'screw'; the labels are \['bolt'"):
-        narrow(pipeline, {"screw": assets["nut"]})
+        narrow(pipeline, {"screw": screw["nut"]})
     with pytest.raises(ValueError, match="shape 'nut': its mesh spans"):
-        narrow(pipeline, {"nut": assets["bolt"]})
+        narrow(pipeline, {"nut": screw["bolt"]})
     with pytest.raises(ValueError, match="assets is empty"):
         narrow(pipeline, {})
-    others = model_of(assets, 1, with_ball=True)
+    others = model_of(screw, 1, with_ball=True)
     with pytest.raises(ValueError, match="shape 'ball' is a sphere; an asset needs a mesh shape"):
-        narrow(pipeline_of(others), {"ball": assets["nut"]})
+        narrow(pipeline_of(others), {"ball": screw["nut"]})
     ordered = newton.CollisionPipeline(model, rigid_contact_max=100, deterministic=True)
     with pytest.raises(ValueError, match="the pipeline is deterministic"):
-        narrow(ordered, assets)
+        narrow(ordered, screw)
     with pytest.raises(ValueError, match="time_step: 0; expected more than 0"):
         tesdf.newton.rigid(0)
