@@ -326,12 +326,11 @@ impl Newton {
         let mut rows = [contact_rows.as_slice(), &joints].concat();
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let plain = Motion::new(&step.free, &step.target);
-        let mut motion = plain.clone();
-        let (mut velocities, mut forces) = self.solve(step, &motion, &rows, Gap::Position, &start);
+        let (mut velocities, mut forces) = self.solve(step, &plain, &rows, Gap::Position, &start);
         let at_start = vec![Vector6::zeros(); step.free.len()];
-        if let Some(stiffened) = plain.stiffened(&rows, &forces, &at_start, step.h) {
-            motion = stiffened;
-            (velocities, forces) = self.solve(step, &motion, &rows, Gap::Position, &start);
+        let mut stiffened = plain.stiffened(&rows, &forces, &at_start, step.h);
+        if let Some(motion) = &stiffened {
+            (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &start);
         }
         if rows.iter().any(|row| !stays(row)) {
             let beginning = self.gaps(step).beginning(contacts, &found);
@@ -350,16 +349,19 @@ impl Newton {
                 next.retain(|row| !stays(row));
                 next.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
                 next.extend_from_slice(&joints);
-                motion =
-                    plain.stiffened(&rows, &forces, &velocities, step.h).unwrap_or_else(|| plain.clone());
+                stiffened = plain.stiffened(&rows, &forces, &velocities, step.h);
                 rows = next;
                 let joints = rows.len() - joints.len()..;
                 predict(&mut rows[joints], &self.gaps(step).bodies(), &poses, &velocities, step.h);
-                (velocities, forces) = self.solve(step, &motion, &rows, Gap::Position, &velocities);
+                let motion = stiffened.as_ref().unwrap_or(&plain);
+                (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &velocities);
             }
         }
         let carried = match rows.iter().any(|row| row.relaxed_gap > row.gap) {
-            true => self.solve(step, &motion, &rows, Gap::Relaxed, &velocities).0,
+            true => {
+                let motion = stiffened.as_ref().unwrap_or(&plain);
+                self.solve(step, motion, &rows, Gap::Relaxed, &velocities).0
+            }
             false => velocities.clone(),
         };
         Ok([velocities, carried])

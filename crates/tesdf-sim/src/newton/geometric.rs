@@ -34,8 +34,8 @@ impl Motion {
         Self { inertia: free.iter().map(|body| body.inertia).collect(), target: target.to_vec() }
     }
 
-    /// The same motion with the geometric stiffness of `forces` along `rows`, N or N m, in a step of `h`
-    /// seconds. The rows were found at the poses that the velocities of `found_at` lead to. Returns
+    /// The same motion with the geometric stiffness of `forces` along `rows`, N or N m, in a step of
+    /// `h` seconds. The rows were found at the poses that the velocities of `found_at` lead to. Returns
     /// `None` where the stiffness of no body matters.
     pub fn stiffened(&self, rows: &[Row], forces: &[f64], found_at: &[Vector6<f64>], h: f64) -> Option<Self> {
         let mut stiffness = vec![0.0; self.inertia.len()];

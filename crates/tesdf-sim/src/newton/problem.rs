@@ -130,10 +130,10 @@ impl Problem {
             let springs = self.springs.iter().zip(&near).filter_map(|(spring, near)| near.then_some(spring));
             let part = Part { problem: self, springs: springs.collect() };
             // The forces are found anew, so that they do not depend on the contacts before.
-            let mut at = part.start(velocity.clone());
+            let mut at = part.start(velocity);
             let (more, converged, slack) = part.raise_forces(&mut at, options);
             iterations += more;
-            velocity = at.velocity.clone();
+            velocity = std::mem::take(&mut at.velocity);
             let mut is_complete = true;
             for (near, spring) in near.iter_mut().zip(&self.springs).filter(|(near, _)| !**near) {
                 let gap = gap(spring, &velocity);
