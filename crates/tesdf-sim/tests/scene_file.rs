@@ -54,6 +54,49 @@ fn a_scene_file_gives_its_system() {
 }
 
 #[test]
+fn copies_are_placed_by_the_one_before() {
+    let chain = r#"
+time_step = 1e-3
+duration = 0.05
+
+[[bodies]]
+name = "link"
+shape = { sphere = { radius = 0.01 } }
+mass = 0.1
+translation = [0, 0, 1]
+rotation = [0, 0.707106781186548, 0, 0.707106781186548]
+# Along its own x, which is -z of the world, and a quarter turn about it.
+copies = { count = 5, translation = [0.5, 0, 0], rotation = [0.707106781186548, 0, 0, 0.707106781186548] }
+
+[[joints]]
+name = "first"
+kind = "weld"
+child = "link0"
+"#;
+    let loaded = load(chain).unwrap();
+    let system = loaded.system().unwrap();
+    let names: Vec<&str> = system.bodies().iter().map(|body| body.name.as_str()).collect();
+    assert_eq!(names, ["link0", "link1", "link2", "link3", "link4"]);
+    for (k, state) in system.states().iter().enumerate() {
+        let below = DVec3::new(0.0, 0.0, 1.0 - 0.5 * k as f64);
+        assert!(state.pose.translation.abs_diff_eq(below, 1e-14), "copy {k} is at {}", state.pose.translation);
+        assert!((state.pose.rotation.length() - 1.0).abs() < 1e-15);
+        let across = state.pose.rotation * DVec3::Y;
+        let expected = [DVec3::Y, DVec3::X, DVec3::NEG_Y, DVec3::NEG_X, DVec3::Y][k];
+        assert!(across.abs_diff_eq(expected, 1e-13), "copy {k} has y along {across}");
+    }
+    // A run keeps the scene with all its bodies.
+    let json = serde_json::to_value(&loaded.scene).unwrap();
+    assert_eq!(LoadedScene::of_json(json, "chain.toml").unwrap().scene.bodies.len(), 5);
+    let too_many = refusal(&chain.replace("count = 5", "count = 65537"));
+    assert!(too_many.contains("line 5, body link: copies.count is 65537; expected 1 to 65536"), "{too_many}");
+    let none = refusal(&chain.replace("count = 5", "count = 0"));
+    assert!(none.contains("copies.count is 0"), "{none}");
+    let turned = refusal(&chain.replace("rotation = [0.707106781186548, 0, 0,", "rotation = [1, 0, 0,"));
+    assert!(turned.contains("body link: copies: "), "{turned}");
+}
+
+#[test]
 fn errors_name_the_line_and_the_body() {
     let change = |from: &str, to: &str| {
         assert!(DROP.contains(from));

@@ -134,13 +134,7 @@ impl LoadedScene {
     }
 
     fn body_error(&self, body: usize, reason: String) -> SceneError {
-        let body = &self.scene.bodies[body];
-        SceneError::Body {
-            path: self.path.clone(),
-            line: (!self.text.is_empty()).then(|| self.line(body.span().start)),
-            name: body.get_ref().name.clone(),
-            reason,
-        }
+        self.error_at(&self.scene.bodies[body], reason)
     }
 }
 

@@ -16,6 +16,12 @@
 //! density = 7850               # kg/m³; or mass = 0.1
 //! translation = [0, 0, 0.05]   # of the mesh's origin; rotation = [x, y, z, w]
 //!
+//! [[bodies]]
+//! name = "link"                # link0 to link9
+//! mesh = "link.obj"
+//! density = 7850
+//! # The next one in the frame of the one before: turned by 90° about x.
+//! copies = { count = 10, translation = [0.029, 0, 0], rotation = [0.707106781186548, 0, 0, 0.707106781186548] }
 //! friction = 0.2               # with another body: the geometric mean of both
 //!
 //! [[joints]]
@@ -41,6 +47,7 @@
 
 mod build;
 mod connect;
+mod copies;
 mod error;
 mod limits;
 mod read;
@@ -52,6 +59,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::ContactsPer;
 use toml::Spanned;
 
+pub use copies::CopiesSection;
 pub use error::SceneError;
 pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
@@ -153,6 +161,9 @@ fn earth() -> [f64; 3] {
 pub struct BodySection {
     /// Name, unique in the scene.
     pub name: String,
+    /// Places the body many times. A loaded scene has each copy as a body of its own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub copies: Option<CopiesSection>,
     /// Path of a `.tesdf` file.
     #[serde(default)]
     pub asset: Option<PathBuf>,

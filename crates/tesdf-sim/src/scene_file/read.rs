@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::DeTable;
 
+use super::copies::expand;
 use super::{BodySection, MAX_BODIES, SceneError, SceneFile};
 use crate::RunRecord;
 
@@ -49,7 +50,15 @@ impl LoadedScene {
             path: path.to_path_buf(),
             message: e.to_string().trim_end().to_string(),
         })?;
-        Ok(Self { scene, path: path.to_path_buf(), text })
+        Self { scene, path: path.to_path_buf(), text }.with_copies()
+    }
+
+    /// The scene with each copy of a body as a body of its own.
+    fn with_copies(mut self) -> Result<Self, SceneError> {
+        match expand(std::mem::take(&mut self.scene.bodies)) {
+            Ok(bodies) => Ok(Self { scene: SceneFile { bodies, ..self.scene }, ..self }),
+            Err((body, reason)) => Err(self.error_at(&body, reason)),
+        }
     }
 
     /// The scene that is stored in a run, where `run` is the path of the run file. Errors
@@ -98,7 +107,7 @@ impl LoadedScene {
         let bodies = bodies.into_iter().enumerate().map(read).collect::<Result<_, SceneError>>()?;
         json["bodies"] = serde_json::Value::Array(Vec::new());
         let scene: SceneFile = serde_json::from_value(json).map_err(|e| refuse(e.to_string()))?;
-        Ok(Self { scene: SceneFile { bodies, ..scene }, path, text: String::new() })
+        Self { scene: SceneFile { bodies, ..scene }, path, text: String::new() }.with_copies()
     }
 
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
@@ -131,6 +140,16 @@ impl LoadedScene {
     /// Line number, from 1, of a byte of the text.
     pub(super) fn line(&self, byte: usize) -> usize {
         1 + self.text.bytes().take(byte).filter(|&b| b == b'\n').count()
+    }
+
+    /// An error of a body of the scene.
+    pub(super) fn error_at(&self, body: &Spanned<BodySection>, reason: String) -> SceneError {
+        SceneError::Body {
+            path: self.path.clone(),
+            line: (!self.text.is_empty()).then(|| self.line(body.span().start)),
+            name: body.get_ref().name.clone(),
+            reason,
+        }
     }
 
     /// Joins the scene's folder and a path of the scene.
