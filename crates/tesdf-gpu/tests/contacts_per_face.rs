@@ -75,6 +75,11 @@ fn a_border_ahead_of_a_peg_is_no_minimum() {
 }
 
 #[test]
+fn the_sides_of_a_bend_are_walls() {
+    DEVICE.sides_of_a_bend_are_walls();
+}
+
+#[test]
 fn a_box_stands_on_the_corners_of_the_patch() {
     for per in [ContactsPer::Face, ContactsPer::Minimum] {
         assert_eq!(DEVICE.box_stands_on_the_corners_of_the_patch(per), 0, "all searches converge");

@@ -32,6 +32,15 @@ fn a_chain_holds_a_heavy_end_the_same_on_any_number_of_threads() {
     assert_eq!(summary, on(2));
 }
 
+/// The only minimum of the distance between two links is the bottom of a bend. Without the contacts of
+/// the faces beside it the links slip out of each other.
+#[test]
+fn a_chain_of_faces_holds_a_heavy_end_that_swings() {
+    let summary = chain(|loaded| loaded.scene.detector.mode = DetectorMode::Exact);
+    assert_eq!(summary.passed, Some(true), "{summary:?}");
+    assert!(summary.kinetic_energy > 0.1 && summary.kinetic_energy < summary.released_energy, "{summary:?}");
+}
+
 #[test]
 fn without_contacts_the_chain_falls_apart() {
     let summary = chain(|loaded| loaded.scene.detector.mode = DetectorMode::Off);

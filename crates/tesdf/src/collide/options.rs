@@ -38,8 +38,9 @@ pub enum ContactsPer {
     Face,
     /// A local minimum of the signed distance over the surface of body *a*: the contacts of
     /// [`Face`](Self::Face), without those beside which the surface is lower, where the distance
-    /// falls by more than 0.1 per unit of length. As planes, these would stop bodies that have room.
-    /// Each is followed by a lower one, so the deepest contact remains.
+    /// falls by more than 0.1 per unit of length. As planes, these would stop bodies that have room;
+    /// those that are walls all the same, as the sides of a groove, stay. Each that is left out is
+    /// followed by a lower one, so the deepest contact remains.
     Minimum,
 }
 

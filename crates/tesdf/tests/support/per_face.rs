@@ -171,6 +171,25 @@ impl Detection<'_> {
         }
     }
 
+    /// Two links of a chain lie in the bends of each other. The faces beside the nearest one are no
+    /// minima, but each link would have to go through them to slip sideways, so they have contacts.
+    pub fn sides_of_a_bend_are_walls(&self) {
+        let quarter = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        // Short of tight, and off the middle.
+        let next = Pose::new(DVec3::new(0.028_9, 3.7e-4, 2.3e-4), quarter).expect("a unit quaternion");
+        let links = [Pose::IDENTITY, next].map(|pose| Placed::new("chain_link", Placement { pose, scale: 1.0 }));
+        let scene = scene(&links);
+        let contacts_per = ContactsPer::Minimum;
+        let options = CollideOptions { contacts_per, contact_distance: 2e-4, ..CollideOptions::default() };
+        let found = (self.detect)(&scene, &options);
+        for side in [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
+            let holds = |(a, b, sign): (u32, u32, f64)| {
+                of_direction(found.as_slice(), a, b).any(|c| sign * c.normal.dot(side) > 0.15)
+            };
+            assert!([(0, 1, 1.0), (1, 0, -1.0)].into_iter().any(holds), "no contact pushes the first link along {side}");
+        }
+    }
+
     /// The contacts hold the upper body up: the normals of the nearest contacts are vertical, and each
     /// corner of the patch has a contact nearby. Beside the patch, faces are farther away, with other
     /// normals.
