@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 import tesdf
 import tesdf.mujoco
+from tesdf._mujoco_model import weigh
 
 PARTS = Path(__file__).resolve().parents[1] / "data" / "procedural"
 
@@ -53,38 +54,32 @@ SCENES = {
 }
 
 
-def model_of(scene, by, folder):
-    """The text of the model, and the seconds of the decomposition."""
-    assets, bodies, seconds = "", "", 0.0
-    for name, file, pose, joint in scene["bodies"]:
-        kind = "sdf" if by == "sdf" else "mesh"
-        parts = [PARTS / file]
-        if by == "coacd":
-            start = time.perf_counter()
-            parts = decomposed(PARTS / file, folder / name)
-            seconds += time.perf_counter() - start
+def model_of(scene, by, encoded, folder):
+    """The text of the model."""
+    assets, bodies = "", ""
+    kind = "sdf" if by == "sdf" else "mesh"
+    for (name, file, pose, joint), asset in zip(scene["bodies"], encoded):
+        parts = decomposed(asset, folder / name) if by == "coacd" else [PARTS / file]
         geoms = ""
         for k, part in enumerate(parts):
             assets += f'<mesh name="{name}{k}" file="{part}"/>\n'
             geom = name if len(parts) == 1 else f"{name}{k}"
             geoms += f'<geom name="{geom}" type="{kind}" mesh="{name}{k}" density="7850" condim="1"/>\n'
         bodies += f'<body name="{name}" {pose}>{joint}{geoms}</body>\n'
-    text = f"""<mujoco>
+    return f"""<mujoco>
   <option timestep="0.001" gravity="{scene["gravity"]}" integrator="implicitfast" cone="elliptic"/>
   <size memory="200M"/>
   <asset>{assets}</asset>
   <worldbody>{bodies}</worldbody>
   <actuator>{scene["actuator"]}</actuator>
 </mujoco>"""
-    return text, seconds
 
 
-def decomposed(mesh, folder):
+def decomposed(asset, folder):
     import coacd
 
-    vertices, faces = read_obj(mesh)
     coacd.set_log_level("error")
-    parts = coacd.run_coacd(coacd.Mesh(vertices, faces), seed=0)
+    parts = coacd.run_coacd(coacd.Mesh(asset.vertices, asset.faces), seed=0)
     folder.mkdir()
     files = []
     for k, (corners, triangles) in enumerate(parts):
@@ -94,17 +89,10 @@ def decomposed(mesh, folder):
     return files
 
 
-def read_obj(path):
-    lines = [line.split() for line in path.read_text().splitlines()]
-    vertices = [[float(x) for x in line[1:4]] for line in lines if line and line[0] == "v"]
-    faces = [[int(x.split("/")[0]) - 1 for x in line[1:4]] for line in lines if line and line[0] == "f"]
-    return np.array(vertices), np.array(faces)
-
-
 def run(name, by, report):
     """Runs a case, and writes what is known so far into `report`."""
     scene = SCENES[name]
-    found = {"scene": name, "by": by}
+    found = {}
 
     def tell(**more):
         found.update(more, memory=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
@@ -117,15 +105,10 @@ def run(name, by, report):
     encoding = time.perf_counter() - start
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     start = time.perf_counter()
-    text, _ = model_of(scene, by, folder)
-    model = mujoco.MjModel.from_xml_string(text)
+    model = mujoco.MjModel.from_xml_string(model_of(scene, by, assets, folder))
     for geom in range(model.ngeom):
-        # A gear on a hinge through its centre of mass has no inverse mass there, and its contacts are too
-        # stiff for MuJoCo's solver. tesdf.mujoco mends it, so it is mended for all.
-        weight = model.body_invweight0[model.geom_bodyid[geom]]
-        at_border = weight[1] * model.geom_rbound[geom] ** 2
-        if weight[0] < 1e-6 * at_border:
-            weight[0] = at_border
+        # tesdf.mujoco.Contacts does so, too; here all get it.
+        weigh(model, geom)
     tell(build=time.perf_counter() - start + (encoding if by == "tesdf" else 0), geoms=model.ngeom, before=before)
     data = mujoco.MjData(model)
     ours = None

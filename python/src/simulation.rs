@@ -26,11 +26,11 @@ use crate::interrupt::cancellable;
 use crate::poses::{Count, of_pose, of_velocity, poses, velocities};
 use crate::{classes, pool};
 
-/// A simulation of a scene, as that of the command `tesdf simulate`, with the same bits. step and run
-/// advance it.
+/// A simulation of a scene, as that of the command `tesdf simulate`, with the same bits. step and
+/// run advance it.
 ///
-/// - scene: path of a TOML file, or a dict with the keys of such a file. Paths in a dict are relative to
-///   the current folder, and arrays may be those of numpy.
+/// - scene: path of a TOML file, or a dict with the keys of such a file. Paths in a dict are relative
+///   to the current folder, and arrays may be those of numpy.
 /// - mode: replaces the mode of the scene's detector: "node", "edge", "face", "exact" or "off".
 /// - time_step, duration: replace those of the scene, in seconds.
 /// - threads: number of threads; None is one per core. The states do not depend on it.
@@ -70,10 +70,10 @@ impl Source {
         Ok(Self::Json(json))
     }
 
-    fn read(&self) -> Result<LoadedScene, SceneError> {
+    fn read(self) -> Result<LoadedScene, SceneError> {
         match self {
             Self::File(path) => LoadedScene::read(path),
-            Self::Json(json) => LoadedScene::of_json(json.clone(), "<scene>"),
+            Self::Json(json) => LoadedScene::of_json(json, "<scene>"),
         }
     }
 }
@@ -328,15 +328,16 @@ impl Simulation {
         PyArray1::from_vec(py, coordinates)
     }
 
-    /// Sets the motor of a joint, given by its name or number, from the next step on. It drives one of
+    /// Sets the motor of a joint, given by its name or number, from the next step on. It drives one
+    /// of
     ///
     /// - velocity: a rate, rad/s or m/s.
     /// - position: the coordinate at the end of the step, rad or m.
     /// - force: a torque, N m, or force, N.
     /// - spring: (rest, stiffness, damping), in rad, N m/rad, N m s/rad or m, N/m, N s/m.
     ///
-    /// limit is the greatest force, N, or torque, N m. Without a drive the joint has no motor. A script
-    /// of the scene that drives the same joint replaces the motor in each step.
+    /// limit is the greatest force, N, or torque, N m. Without a drive the joint has no motor. A
+    /// script of the scene that drives the same joint replaces the motor in each step.
     ///
     /// Raises SimulationError if the joint is no hinge or slider, or if a number is out of range.
     #[pyo3(signature = (joint, *, velocity = None, position = None, force = None, spring = None, limit = f64::INFINITY))]
@@ -368,8 +369,9 @@ impl Simulation {
     }
 
     /// Sets the force [3], N, on the centre of mass and the torque [3], N m, that act on a body from
-    /// the next step on, in the world frame. The body is given by its name or number. They have no effect
-    /// on fixed and kinematic bodies. A script of the scene for the same body replaces them in each step.
+    /// the next step on, in the world frame. The body is given by its name or number. They have no
+    /// effect on fixed and kinematic bodies. A script of the scene for the same body replaces them
+    /// in each step.
     #[pyo3(signature = (body, *, force = [0.0; 3], torque = [0.0; 3]))]
     fn set_wrench(
         &self,
@@ -383,9 +385,9 @@ impl Simulation {
         self.change(py, |engine| engine.set_wrench(body, Wrench { force, torque }))
     }
 
-    /// Sets the pose [7], x y z qx qy qz qw, or [4, 4], and the velocity [6], vx vy vz wx wy wz, of a body,
-    /// given by its name or number. What is None stays. For a kinematic body this is its motion in
-    /// the next steps.
+    /// Sets the pose [7], x y z qx qy qz qw, or [4, 4], and the velocity [6], vx vy vz wx wy wz, of a
+    /// body, given by its name or number. What is None stays. For a kinematic body this is its
+    /// motion in the next steps.
     #[pyo3(signature = (body, *, pose = None, velocity = None))]
     fn set_state(
         &self,

@@ -18,6 +18,13 @@ Float = npt.NDArray[np.float64]
 # The bits of shapes with an asset and of simple shapes. The engine finds the contacts of two simple ones.
 _ASSETS, _SIMPLE = 1, 2
 
+# Impedance of a contact with the stiffness "rigid": the share of the constraint that is enforced. A
+# higher one makes the nut of the tests neither faster nor its overlaps smaller.
+_IMPEDANCE = 0.9
+
+RIGID_SOLIMP = (_IMPEDANCE, _IMPEDANCE, 1e-3, 0.5, 2.0)
+"""solimp of MuJoCo with `rigid_solref`"""
+
 # Contacts are found as far ahead as motion can close in this many time steps.
 _STEPS_AHEAD = 1.2
 
@@ -95,6 +102,18 @@ class Detector:
         self.scene.update(np.arange(len(arms), dtype=np.uint32), poses=poses, velocities=velocities)
         self.last = self.scene.detect(**{"speculative_time": _STEPS_AHEAD * time_step, **self._options})
         return self.last
+
+
+def rigid_solref(time_step: Float) -> Float:
+    """[..., 2], the solref of MuJoCo with which a gap closes within one time step, and not sooner, and an
+    overlap of one is gone in the next."""
+    return -_IMPEDANCE * np.stack([time_step**-2.0, time_step**-1.0], -1)
+
+
+def check_bounds(label: str, of_mesh: Float, of_asset: Float, hint: str) -> None:
+    """Raises ValueError if the bounds [2, 3] of the engine's mesh are not those of the asset."""
+    if np.abs(of_mesh - of_asset).max() > 1e-5 * np.linalg.norm(np.ptp(of_mesh, axis=0)):
+        raise ValueError(f"{label}: its mesh spans {of_mesh.tolist()}, but the asset {of_asset.tolist()}; {hint}")
 
 
 def frames(normals: Float) -> Float:

@@ -17,16 +17,12 @@ except ImportError:
     ) from None
 
 from . import Asset, Box, Capsule, Plane, Sphere
-from ._coupling import Float, Placed
+from ._coupling import RIGID_SOLIMP, Float, Placed, check_bounds, rigid_solref
 
-__all__ = ["Geoms", "Integer", "Parameters", "Properties", "Solref", "checked_solref", "combine", "mj", "stiffness"]
+__all__ = ["Geoms", "Integer", "Parameters", "Properties", "Solref", "checked_solref", "combine", "mj", "stiffness", "weigh"]
 
 Solref = Union[Literal["rigid", "model"], tuple[float, float]]
 Integer = npt.NDArray[np.int64]
-
-# Impedance of a contact with solref="rigid": the share of the constraint that is enforced. A higher
-# one makes the nut of the tests neither faster nor its overlaps smaller.
-_IMPEDANCE = 0.9
 
 
 class Geoms:
@@ -45,7 +41,7 @@ class Geoms:
         for number, asset in zip(numbers, geoms.values()):
             if asset is not None:
                 model.geom_contype[number] = model.geom_conaffinity[number] = 0
-                _weigh(model, number)
+                weigh(model, number)
 
 
 @dataclass(frozen=True)
@@ -94,8 +90,7 @@ def stiffness(given: Solref, time_step: float | npt.NDArray[Any], of_model: Para
         return of_model
     if given == "rigid":
         step = np.broadcast_to(time_step, len(of_model.condim))
-        solref = -_IMPEDANCE * np.stack([step**-2.0, step**-1.0], 1)
-        solimp = np.tile([_IMPEDANCE, _IMPEDANCE, 1e-3, 0.5, 2.0], (len(step), 1))
+        solref, solimp = rigid_solref(step), np.tile(RIGID_SOLIMP, (len(step), 1))
     else:
         solref = np.tile(given, (len(of_model.condim), 1))
         solimp = of_model.solimp
@@ -121,7 +116,7 @@ def _number(model: mj.MjModel, name: str) -> int:
     return int(number)
 
 
-def _weigh(model: mj.MjModel, number: int) -> None:
+def weigh(model: mj.MjModel, number: int) -> None:
     """MuJoCo chooses the stiffness of a contact by the inverse masses of its bodies, which it takes at their
     centres of mass. That of a body on a hinge through its centre is zero up to rounding, so its contacts become
     so stiff that the solver fails: a pair of gears flew apart. Such a body gets the inverse mass at the border of
@@ -168,12 +163,8 @@ def _mesh(model: mj.MjModel, number: int, name: str, asset: Asset) -> Placed:
     start = model.mesh_vertadr[mesh]
     vertices = model.mesh_vert[start : start + model.mesh_vertnum[mesh]] @ rotation.T + model.mesh_pos[mesh]
     of_mesh = np.array([vertices.min(axis=0), vertices.max(axis=0)])
-    of_asset = asset.bounds * scales[0]
-    if np.abs(of_mesh - of_asset).max() > 1e-5 * np.linalg.norm(np.ptp(of_mesh, axis=0)):
-        raise ValueError(
-            f"geom {name!r}: its mesh spans {of_mesh.tolist()}, but the asset {of_asset.tolist()}; encode the file of "
-            "the mesh, in the unit of the model or with the mesh's scale"
-        )
+    hint = "encode the file of the mesh, in the unit of the model or with the mesh's scale"
+    check_bounds(f"geom {name!r}", of_mesh, asset.bounds * scales[0], hint)
     # x_geom = R^T (x_file - pos).
     return Placed(asset, float(scales[0]), rotation.T, -rotation.T @ model.mesh_pos[mesh])
 

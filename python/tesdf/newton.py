@@ -23,7 +23,7 @@ except ImportError:
     raise ImportError("tesdf.newton needs the package newton: pip install 'newton[sim]>=1.8'") from None
 
 from . import Asset, Contacts as Found, Scene
-from ._coupling import Detector, Float, Placed
+from ._coupling import RIGID_SOLIMP, Detector, Float, Placed, check_bounds, rigid_solref
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from .bodies import DetectOptions
 
 _IDENTITY = np.array([0.0, 0, 0, 0, 0, 0, 1])
-
-# Impedance of a contact that `rigid` describes: the share of the constraint that is enforced.
-_IMPEDANCE = 0.9
 
 
 class NarrowPhase(nt.geometry.NarrowPhase):  # type: ignore[misc, unused-ignore]
@@ -182,9 +179,9 @@ def rigid(time_step: float) -> dict[str, Any]:
     if not time_step > 0:
         raise ValueError(f"time_step: {time_step}; expected more than 0")
     return {
-        "mujoco:solref": (-_IMPEDANCE / time_step**2, -_IMPEDANCE / time_step),
+        "mujoco:solref": tuple(rigid_solref(np.float64(time_step)).tolist()),
         "mujoco:solref_mode": 1,  # as given, rather than from stiffness and damping of the material
-        "mujoco:geom_solimp": (_IMPEDANCE, _IMPEDANCE, 1e-3, 0.5, 2.0),
+        "mujoco:geom_solimp": RIGID_SOLIMP,
     }
 
 
@@ -211,11 +208,7 @@ def _placed(model: nt.Model, number: int, asset: Asset) -> Placed:
         raise ValueError(f"shape {label!r}: its scale is {scales}; expected one positive number three times")
     vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
     of_mesh = np.array([vertices.min(axis=0), vertices.max(axis=0)])
-    if np.abs(of_mesh - asset.bounds).max() > 1e-5 * np.linalg.norm(np.ptp(of_mesh, axis=0)):
-        raise ValueError(
-            f"shape {label!r}: its mesh spans {of_mesh.tolist()}, but the asset {asset.bounds.tolist()}; encode the "
-            "vertices of the mesh"
-        )
+    check_bounds(f"shape {label!r}", of_mesh, asset.bounds, "encode the vertices of the mesh")
     return Placed(asset, float(scales[0]), np.eye(3), np.zeros(3))
 
 
