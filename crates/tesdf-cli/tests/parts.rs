@@ -43,6 +43,27 @@ fn the_defaults_are_those_of_the_library() {
     }
 }
 
+/// `data/parts/parts.tsv` has the command of each mesh of the folder.
+#[test]
+fn the_meshes_of_scenes_are_made_by_their_commands() {
+    let folder = Folder::new();
+    let data = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/parts");
+    let table = std::fs::read_to_string(data.join("parts.tsv")).unwrap();
+    let rows: Vec<(&str, &str)> = table.lines().skip(1).map(|row| row.split_once('\t').unwrap()).collect();
+    let files = std::fs::read_dir(&data).unwrap().count();
+    assert_eq!(rows.len(), files - 1, "each mesh has one row");
+    for (file, command) in rows {
+        let args: Vec<&str> = command.split(' ').skip(1).chain(["-o", file]).collect();
+        folder.good(&args);
+        let [made, kept] = [folder.path(file), data.join(file)].map(|path| SolidMesh::read(path).unwrap());
+        assert_eq!(made.mesh().faces(), kept.mesh().faces(), "{file}");
+        // Sines may differ in the last bit between systems.
+        let vertices = made.mesh().vertices().iter().zip(kept.mesh().vertices());
+        let moved = vertices.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        assert!(moved < 1e-12, "{file}: {moved:e} m");
+    }
+}
+
 #[test]
 fn a_part_is_written_described_and_encoded() {
     let folder = Folder::new();

@@ -5,7 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::criterion::{
-    GearRatioReport, InsertionReport, JointDrift, LiftReport, Reports, RestReport, ScrewReport,
+    GearRatioReport, HoistReport, InsertionReport, JointDrift, LiftReport, Reports, RestReport, ScrewReport,
     SeparationReport, Trackers,
 };
 use crate::scene_file::{LimitError, SceneFile};
@@ -76,6 +76,8 @@ pub struct Summary {
     pub gear_ratio: Option<GearRatioReport>,
     /// Result of the separation criterion, if the scene has one.
     pub separation: Option<SeparationReport>,
+    /// Result of the hoist criterion, if the scene has one.
+    pub hoist: Option<HoistReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
 }
@@ -277,7 +279,7 @@ impl Run {
         let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
         let mut reports = self.trackers.report(system, &messages);
         let passed = reports.passed();
-        let Reports { screw, rest, insertion, lift, gear_ratio, separation } = reports;
+        let Reports { screw, rest, insertion, lift, gear_ratio, separation, hoist } = reports;
         let sums = self.totals.summary();
         let depths = hidden.iter().map(|pair| pair.depth);
         let (momentum, angular_momentum) = system.momentum();
@@ -295,6 +297,7 @@ impl Run {
             lift,
             gear_ratio,
             separation,
+            hoist,
             deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
             hidden,
             ..sums

@@ -79,7 +79,11 @@ child = "link0"
     assert_eq!(names, ["link0", "link1", "link2", "link3", "link4"]);
     for (k, state) in system.states().iter().enumerate() {
         let below = DVec3::new(0.0, 0.0, 1.0 - 0.5 * k as f64);
-        assert!(state.pose.translation.abs_diff_eq(below, 1e-14), "copy {k} is at {}", state.pose.translation);
+        assert!(
+            state.pose.translation.abs_diff_eq(below, 1e-14),
+            "copy {k} is at {}",
+            state.pose.translation
+        );
         assert!((state.pose.rotation.length() - 1.0).abs() < 1e-15);
         let across = state.pose.rotation * DVec3::Y;
         let expected = [DVec3::Y, DVec3::X, DVec3::NEG_Y, DVec3::NEG_X, DVec3::Y][k];

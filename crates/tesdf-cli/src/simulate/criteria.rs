@@ -1,7 +1,7 @@
 //! What the summary of a run says of the scene's criteria.
 use tesdf_sim::Summary;
 use tesdf_sim::criterion::{
-    GearRatioReport, InsertionReport, LiftReport, RestReport, ScrewReport, SeparationReport,
+    GearRatioReport, HoistReport, InsertionReport, LiftReport, RestReport, ScrewReport, SeparationReport,
 };
 use tesdf_terminal::report;
 
@@ -9,7 +9,7 @@ type Rows = Vec<(&'static str, String)>;
 
 /// The rows of all criteria.
 pub fn rows(summary: &Summary) -> Rows {
-    let Summary { screw, rest, insertion, lift, gear_ratio, separation, .. } = summary;
+    let Summary { screw, rest, insertion, lift, gear_ratio, separation, hoist, .. } = summary;
     [
         screw.as_ref().map(screw_rows),
         rest.as_ref().map(rest_rows),
@@ -17,6 +17,7 @@ pub fn rows(summary: &Summary) -> Rows {
         lift.as_ref().map(lift_rows),
         gear_ratio.as_ref().map(gear_ratio_rows),
         separation.as_ref().map(separation_rows),
+        hoist.as_ref().map(hoist_rows),
     ]
     .into_iter()
     .flatten()
@@ -145,4 +146,22 @@ fn verdict_rows(failures: &[String]) -> Rows {
     let not_met = failures.iter().map(|failure| ("not met", failure.clone()));
     let verdict = if failures.is_empty() { "passed" } else { "not passed" };
     not_met.chain([("criterion", verdict.into())]).collect()
+}
+
+fn hoist_rows(hoist: &HoistReport) -> Rows {
+    let HoistReport { rise, wound, turns, tilt, unlinked, penetration, measurements, .. } = hoist;
+    let mut rows = vec![
+        ("hoist", format!("{:.2} mm, {:.2} mm of chain wound in {turns:.3} turns", 1e3 * rise, 1e3 * wound)),
+        ("level", format!("at most {:.3} mrad of tilt", 1e3 * tilt)),
+        ("links", format!("{unlinked} times two neighbours were not linked")),
+        (
+            "clearance",
+            format!(
+                "at most {:.2} µm of penetration, in {measurements} exact measurements",
+                1e6 * penetration
+            ),
+        ),
+    ];
+    rows.extend(verdict_rows(&hoist.failures));
+    rows
 }

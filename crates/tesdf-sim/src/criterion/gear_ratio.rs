@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::collide::InstanceId;
 use tesdf::glam::DVec3;
 
-use super::shared::{Checks, Penetration, positive};
+use super::shared::{Checks, Penetration, angle, positive};
 use crate::joint::wrapped;
 use crate::{Drive, Joint, JointKind, Mass, Motor, System};
 
@@ -272,12 +272,6 @@ impl GearRatioTracker {
             failures,
         }
     }
-}
-
-/// The angle of a hinge, rad within ±π.
-fn angle(system: &System, joint: usize) -> f64 {
-    let joint = &system.joints()[joint];
-    joint.coordinate(System::poses_of(joint, system.states()))
 }
 
 /// The speed of a hinge, rad/s.

@@ -1,13 +1,16 @@
 //! Success criteria of a run.
 mod gear_ratio;
+mod hoist;
 mod insertion;
 mod lift;
+mod linking;
 mod rest;
 mod screw;
 mod separation;
 mod shared;
 
 pub use gear_ratio::{GearRatioCriterion, GearRatioReport, GearRatioTracker};
+pub use hoist::{HoistChain, HoistCriterion, HoistLink, HoistReport, HoistTracker};
 pub use insertion::{InsertionCriterion, InsertionReport, InsertionTracker};
 pub use lift::{LiftCriterion, LiftReport, LiftTracker};
 pub use rest::{RestCriterion, RestReport, RestTracker};
@@ -37,13 +40,14 @@ pub(crate) struct Trackers {
     lift: Option<LiftTracker>,
     gear_ratio: Option<GearRatioTracker>,
     separation: Option<SeparationTracker>,
+    hoist: Option<HoistTracker>,
     drift: JointDrift,
 }
 
 impl Trackers {
     /// Trackers that start from the current state of `system`.
     pub(crate) fn new(section: &CriterionSection, system: &System) -> Result<Self, String> {
-        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation } = section;
+        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation, hoist } = section;
         Ok(Self {
             screw: screw.as_ref().map(|screw| ScrewTracker::new(screw, system)).transpose()?,
             rest: rest.as_ref().map(|rest| RestTracker::new(rest, system)).transpose()?,
@@ -54,6 +58,7 @@ impl Trackers {
             lift: lift.as_ref().map(|lift| LiftTracker::new(lift, system)).transpose()?,
             gear_ratio: gear_ratio.as_ref().map(|gears| GearRatioTracker::new(gears, system)).transpose()?,
             separation: separation.as_ref().map(|of| SeparationTracker::new(of, system)).transpose()?,
+            hoist: hoist.as_ref().map(|hoist| HoistTracker::new(hoist, system)).transpose()?,
             drift: JointDrift::default(),
         })
     }
@@ -78,6 +83,9 @@ impl Trackers {
         if let Some(separation) = &mut self.separation {
             separation.observe(system, time_step);
         }
+        if let Some(hoist) = &mut self.hoist {
+            hoist.observe(system, time_step);
+        }
         for joint in system.joints() {
             let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
             self.drift.distance = self.drift.distance.max(distance);
@@ -99,6 +107,7 @@ impl Trackers {
             lift: self.lift.as_ref().map(|lift| lift.report(system)),
             gear_ratio: self.gear_ratio.as_ref().map(GearRatioTracker::report),
             separation: self.separation.as_ref().map(SeparationTracker::report),
+            hoist: self.hoist.as_ref().map(HoistTracker::report),
         };
         reports.failures_mut().for_each(|of_one| of_one.extend_from_slice(failures));
         reports
@@ -114,6 +123,7 @@ pub(crate) struct Reports {
     pub(crate) lift: Option<LiftReport>,
     pub(crate) gear_ratio: Option<GearRatioReport>,
     pub(crate) separation: Option<SeparationReport>,
+    pub(crate) hoist: Option<HoistReport>,
 }
 
 impl Reports {
@@ -124,13 +134,14 @@ impl Reports {
     }
 
     fn failures_mut(&mut self) -> impl Iterator<Item = &mut Vec<String>> {
-        let Self { screw, rest, insertion, lift, gear_ratio, separation } = self;
+        let Self { screw, rest, insertion, lift, gear_ratio, separation, hoist } = self;
         let screw = screw.as_mut().map(|screw| &mut screw.failures);
         let rest = rest.as_mut().map(|rest| &mut rest.failures);
         let insertion = insertion.as_mut().map(|insertion| &mut insertion.failures);
         let lift = lift.as_mut().map(|lift| &mut lift.failures);
         let gear_ratio = gear_ratio.as_mut().map(|gears| &mut gears.failures);
         let separation = separation.as_mut().map(|separation| &mut separation.failures);
-        [screw, rest, insertion, lift, gear_ratio, separation].into_iter().flatten()
+        let hoist = hoist.as_mut().map(|hoist| &mut hoist.failures);
+        [screw, rest, insertion, lift, gear_ratio, separation, hoist].into_iter().flatten()
     }
 }

@@ -1,6 +1,5 @@
 //! Bodies that begin deep in each other come apart.
 use serde::{Deserialize, Serialize};
-use tesdf::collide::{InstanceId, instance_pairs};
 
 use super::shared::{Penetration, positive};
 use crate::{Mass, System};
@@ -107,10 +106,7 @@ impl SeparationTracker {
 
     fn measure(&mut self, system: &System) {
         let mut penetration = Penetration::default();
-        match overlapping(system) {
-            Ok(pairs) => penetration.measure(system, &pairs, self.criterion.tolerance),
-            Err(reason) => penetration.unmeasured.push(reason),
-        }
+        penetration.measure_all(system, self.criterion.tolerance);
         self.measured.push((self.time, penetration));
     }
 
@@ -139,13 +135,4 @@ impl SeparationTracker {
         }
         report
     }
-}
-
-/// The pairs of instances whose bounds overlap at the current states.
-fn overlapping(system: &System) -> Result<Vec<[InstanceId; 2]>, String> {
-    let mut system = system.clone();
-    let states = system.states().to_vec();
-    let scene = system.scene_at(&states).map_err(|e| e.to_string())?;
-    let pairs = instance_pairs(scene, 0.0, 0.0).map_err(|e| e.to_string())?;
-    Ok(pairs.iter().map(|pair| [pair.first, pair.second]).collect())
 }

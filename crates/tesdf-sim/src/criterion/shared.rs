@@ -1,6 +1,6 @@
 //! What several criteria look up and measure.
 use tesdf::Length;
-use tesdf::collide::{ClearanceOptions, CollideError, InstanceId, clearance};
+use tesdf::collide::{ClearanceOptions, CollideError, InstanceId, clearance, instance_pairs};
 use tesdf::glam::DVec3;
 
 use crate::{Mass, MassProperties, System};
@@ -94,6 +94,15 @@ impl Penetration {
         }
     }
 
+    /// Measures the clearance of all pairs whose bounds overlap at the current states, to `tolerance`
+    /// metres.
+    pub(super) fn measure_all(&mut self, system: &System, tolerance: f64) {
+        match overlapping(system) {
+            Ok(pairs) => self.measure(system, &pairs, tolerance),
+            Err(reason) => self.unmeasured.push(reason),
+        }
+    }
+
     /// The failures, when at most `allowed` metres of penetration are.
     pub(super) fn failures(&self, allowed: f64) -> Vec<String> {
         let mut failures: Vec<String> =
@@ -110,4 +119,19 @@ impl Penetration {
         }
         failures
     }
+}
+
+/// The pairs of instances whose bounds overlap at the current states.
+fn overlapping(system: &System) -> Result<Vec<[InstanceId; 2]>, String> {
+    let mut system = system.clone();
+    let states = system.states().to_vec();
+    let scene = system.scene_at(&states).map_err(|e| e.to_string())?;
+    let pairs = instance_pairs(scene, 0.0, 0.0).map_err(|e| e.to_string())?;
+    Ok(pairs.iter().map(|pair| [pair.first, pair.second]).collect())
+}
+
+/// The angle of a hinge, rad within ±π.
+pub(super) fn angle(system: &System, joint: usize) -> f64 {
+    let joint = &system.joints()[joint];
+    joint.coordinate(System::poses_of(joint, system.states()))
 }

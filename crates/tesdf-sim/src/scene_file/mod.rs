@@ -65,7 +65,8 @@ pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
 
 use crate::criterion::{
-    GearRatioCriterion, InsertionCriterion, LiftCriterion, RestCriterion, ScrewCriterion, SeparationCriterion,
+    GearRatioCriterion, HoistCriterion, InsertionCriterion, LiftCriterion, RestCriterion, ScrewCriterion,
+    SeparationCriterion,
 };
 use crate::newton::NewtonOptions;
 use crate::script::Script;
@@ -314,4 +315,6 @@ pub struct CriterionSection {
     pub gear_ratio: Option<GearRatioCriterion>,
     /// Bodies that begin deep in each other must come apart.
     pub separation: Option<SeparationCriterion>,
+    /// Chains on spools must hoist a body.
+    pub hoist: Option<HoistCriterion>,
 }

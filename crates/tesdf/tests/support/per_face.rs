@@ -177,7 +177,8 @@ impl Detection<'_> {
         let quarter = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
         // Short of tight, and off the middle.
         let next = Pose::new(DVec3::new(0.028_9, 3.7e-4, 2.3e-4), quarter).expect("a unit quaternion");
-        let links = [Pose::IDENTITY, next].map(|pose| Placed::new("chain_link", Placement { pose, scale: 1.0 }));
+        let links =
+            [Pose::IDENTITY, next].map(|pose| Placed::new("chain_link", Placement { pose, scale: 1.0 }));
         let scene = scene(&links);
         let contacts_per = ContactsPer::Minimum;
         let options = CollideOptions { contacts_per, contact_distance: 2e-4, ..CollideOptions::default() };
@@ -186,7 +187,10 @@ impl Detection<'_> {
             let holds = |(a, b, sign): (u32, u32, f64)| {
                 of_direction(found.as_slice(), a, b).any(|c| sign * c.normal.dot(side) > 0.15)
             };
-            assert!([(0, 1, 1.0), (1, 0, -1.0)].into_iter().any(holds), "no contact pushes the first link along {side}");
+            assert!(
+                [(0, 1, 1.0), (1, 0, -1.0)].into_iter().any(holds),
+                "no contact pushes the first link along {side}"
+            );
         }
     }
 
