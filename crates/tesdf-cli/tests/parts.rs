@@ -53,7 +53,13 @@ fn the_meshes_of_scenes_are_made_by_their_commands() {
     let files = std::fs::read_dir(&data).unwrap().count();
     assert_eq!(rows.len(), files - 1, "each mesh has one row");
     for (file, command) in rows {
-        let args: Vec<&str> = command.split(' ').skip(1).chain(["-o", file]).collect();
+        // Every second piece between quotes is one argument.
+        let pieces = command.split('"').enumerate();
+        let args = pieces.flat_map(|(k, piece)| match k % 2 {
+            0 => piece.split_whitespace().collect(),
+            _ => vec![piece],
+        });
+        let args: Vec<&str> = args.skip(1).chain(["-o", file]).collect();
         folder.good(&args);
         let [made, kept] = [folder.path(file), data.join(file)].map(|path| SolidMesh::read(path).unwrap());
         assert_eq!(made.mesh().faces(), kept.mesh().faces(), "{file}");

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::criterion::{
     GearRatioReport, HoistReport, InsertionReport, JointDrift, LiftReport, Reports, RestReport, ScrewReport,
-    SeparationReport, Trackers,
+    SeparationReport, Trackers, TransmissionReport,
 };
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
@@ -78,6 +78,8 @@ pub struct Summary {
     pub separation: Option<SeparationReport>,
     /// Result of the hoist criterion, if the scene has one.
     pub hoist: Option<HoistReport>,
+    /// Result of the transmission criterion, if the scene has one.
+    pub transmission: Option<TransmissionReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
 }
@@ -279,7 +281,7 @@ impl Run {
         let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
         let mut reports = self.trackers.report(system, &messages);
         let passed = reports.passed();
-        let Reports { screw, rest, insertion, lift, gear_ratio, separation, hoist } = reports;
+        let Reports { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission } = reports;
         let sums = self.totals.summary();
         let depths = hidden.iter().map(|pair| pair.depth);
         let (momentum, angular_momentum) = system.momentum();
@@ -298,6 +300,7 @@ impl Run {
             gear_ratio,
             separation,
             hoist,
+            transmission,
             deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
             hidden,
             ..sums

@@ -73,7 +73,8 @@ fn without_contacts_the_platform_falls() {
 fn a_drum_that_is_too_thick_breaks_the_chains() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("spool.ply");
-    let spool = Spool { drum_diameter: 160e-3, drum_length: 90e-3, flange_diameter: 170e-3, ..Spool::DEFAULT };
+    let spool =
+        Spool { drum_diameter: 160e-3, drum_length: 90e-3, flange_diameter: 170e-3, ..Spool::DEFAULT };
     write(&file, spool.mesh(Resolution::Segments(96)).unwrap().mesh()).unwrap();
     let (_, summary) = run(|loaded| {
         for name in ["spool_a", "spool_b", "spool_c"] {
@@ -99,13 +100,18 @@ fn what_is_no_hoist_is_refused() {
         ("body = \"platform\"", "body = \"platfrom\"", "there is no body platfrom"),
         ("body = \"platform\"", "body = \"a3\"", "joint last_a holds link a9"),
         ("spool = \"spool_b\", links", "spool = \"spol\", links", "there is no joint spol"),
-        ("spool = \"spool_b\", links", "spool = \"last_b\", links", "joint last_b is no hinge"),
+        (
+            "spool = \"spool_b\", links",
+            "spool = \"last_b\", links",
+            "joint last_b is a weld; expected a hinge",
+        ),
         ("links = \"c\"", "links = \"d\"", "0 links are named d0, d1, …; expected at least 2"),
         ("links = \"c\"", "links = \"b\"", "joint first_b holds link b0"),
         ("[criterion.hoist]", weld, "joint held holds body platform"),
         ("[criterion.hoist]", link, "joint held holds link a3"),
         ("min_rise = 0.02", "min_rise = 0", "min_rise is 0; expected a positive number"),
         ("pitch = 0.029", "pitch = -1", "link.pitch is -1; expected a positive number"),
+        ("pitch = 0.029", "pitch = 0.035", "link.pitch is 0.035; expected more than half"),
     ];
     support::refused(&text, &support::path_of("chained-sam"), &cases);
 }

@@ -1,7 +1,8 @@
 //! What the summary of a run says of the scene's criteria.
 use tesdf_sim::Summary;
 use tesdf_sim::criterion::{
-    GearRatioReport, HoistReport, InsertionReport, LiftReport, RestReport, ScrewReport, SeparationReport,
+    EngagedReport, GearRatioReport, HoistReport, InsertionReport, LiftReport, RestReport, ScrewReport,
+    SeparationReport, TransmissionReport,
 };
 use tesdf_terminal::report;
 
@@ -9,7 +10,7 @@ type Rows = Vec<(&'static str, String)>;
 
 /// The rows of all criteria.
 pub fn rows(summary: &Summary) -> Rows {
-    let Summary { screw, rest, insertion, lift, gear_ratio, separation, hoist, .. } = summary;
+    let Summary { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, .. } = summary;
     [
         screw.as_ref().map(screw_rows),
         rest.as_ref().map(rest_rows),
@@ -18,6 +19,7 @@ pub fn rows(summary: &Summary) -> Rows {
         gear_ratio.as_ref().map(gear_ratio_rows),
         separation.as_ref().map(separation_rows),
         hoist.as_ref().map(hoist_rows),
+        transmission.as_ref().map(transmission_rows),
     ]
     .into_iter()
     .flatten()
@@ -163,5 +165,23 @@ fn hoist_rows(hoist: &HoistReport) -> Rows {
         ),
     ];
     rows.extend(verdict_rows(&hoist.failures));
+    rows
+}
+
+fn transmission_rows(transmission: &TransmissionReport) -> Rows {
+    let TransmissionReport { gears, neutral, penetration, measurements, .. } = transmission;
+    let of_gear = |gear: &EngagedReport| {
+        let ratio = gear.ratio.map_or("none".into(), |ratio| format!("{ratio:.6}"));
+        format!("{ratio} in {:.2} turns, error {:.1} µm", gear.turns, 1e6 * gear.transmission_error)
+    };
+    let mut rows: Vec<_> = gears.iter().map(|gear| ("ratio", of_gear(gear))).collect();
+    rows.extend(neutral.iter().map(|[input, output]| {
+        ("neutral", format!("{output:.5} turns of the output, {input:.2} of the input"))
+    }));
+    rows.push((
+        "clearance",
+        format!("at most {:.2} µm of penetration, in {measurements} exact measurements", 1e6 * penetration),
+    ));
+    rows.extend(verdict_rows(&transmission.failures));
     rows
 }

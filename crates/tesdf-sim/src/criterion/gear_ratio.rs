@@ -3,11 +3,9 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 use tesdf::collide::InstanceId;
-use tesdf::glam::DVec3;
 
-use super::shared::{Checks, Penetration, angle, positive};
-use crate::joint::wrapped;
-use crate::{Drive, Joint, JointKind, Mass, Motor, System};
+use super::shared::{Checks, Hinge, Penetration, positive};
+use crate::{Drive, Mass, Motor, System};
 
 /// A gear on a hinge turns a gear on another hinge at the ratio of their teeth, by contact alone.
 ///
@@ -96,40 +94,28 @@ impl GearRatioCriterion {
             ("check_every", self.check_every),
         ])?;
         let [_, driven] = self.find(system)?;
-        Ok(&system.bodies()[system.joints()[driven].child].name)
+        Ok(&system.bodies()[driven.child(system)].name)
     }
 
-    /// The numbers of the two joints.
-    fn find(&self, system: &System) -> Result<[usize; 2], String> {
-        let joints = system.joints();
-        let names = || joints.iter().map(|j| j.name.as_str()).collect::<Vec<_>>().join(", ");
-        let hinge = |name: &str| {
-            let found = joints.iter().position(|j| j.name == name);
-            let found =
-                found.ok_or_else(|| format!("there is no joint {name}; the joints are {}", names()))?;
-            match joints[found].kind {
-                JointKind::Hinge => Ok(found),
-                kind => Err(format!("joint {name} is a {kind:?}; expected a hinge").to_lowercase()),
-            }
-        };
-        let [driver, driven] = [hinge(&self.driver)?, hinge(&self.driven)?];
-        let [a, b] = [driver, driven].map(|joint| joints[joint].child);
-        let body = &system.bodies()[b];
-        if a == b {
+    /// The two hinges.
+    fn find(&self, system: &System) -> Result<[Hinge; 2], String> {
+        let hinges @ [driver, driven] =
+            &[Hinge::new(system, &self.driver)?, Hinge::new(system, &self.driven)?];
+        let body = &system.bodies()[driven.child(system)];
+        if driver.child(system) == driven.child(system) {
             return Err(format!("both hinges turn body {}; expected two gears", body.name));
         }
         if !matches!(body.mass, Mass::Free(_)) {
             return Err(format!("body {} is not free; no contact can turn it", body.name));
         }
-        let holds = |joint: &Joint| joint.child == b || joint.parent == Some(b);
-        if let Some((_, other)) = joints.iter().enumerate().find(|&(k, j)| k != driven && holds(j)) {
+        if let Some(other) = driven.others(system).next() {
             return Err(format!(
-                "joint {} holds body {} too; expected the hinge {} alone",
-                other.name, body.name, self.driven
+                "joint {other} holds body {} too; expected the hinge {} alone",
+                body.name, self.driven
             ));
         }
-        match joints[driven].motor {
-            None | Some(Motor { drive: Drive::Force(_), .. }) => Ok([driver, driven]),
+        match driven.motor(system) {
+            None | Some(Motor { drive: Drive::Force(_), .. }) => Ok(hinges.clone()),
             Some(Motor { drive, .. }) => Err(format!(
                 "the motor of joint {} has the drive {drive:?}; expected none, or the torque of the load",
                 self.driven
@@ -142,12 +128,10 @@ impl GearRatioCriterion {
 #[derive(Clone, Debug)]
 pub struct GearRatioTracker {
     criterion: GearRatioCriterion,
-    joints: [usize; 2],
+    hinges: [Hinge; 2],
     pair: [InstanceId; 2],
     /// Torque of the load, N m.
     load: f64,
-    /// Angles of the hinges within ±π.
-    last: [f64; 2],
     /// Angles of the hinges since `settled`, rad; `None` before.
     angles: Option<[f64; 2]>,
     /// Bounds of the transmission error, rad of the driven gear.
@@ -167,16 +151,15 @@ impl GearRatioTracker {
     /// The same errors as [`GearRatioCriterion::validate`].
     pub fn new(criterion: &GearRatioCriterion, system: &System) -> Result<Self, String> {
         criterion.validate(system)?;
-        let joints = criterion.find(system)?;
-        let load = match system.joints()[joints[1]].motor {
+        let hinges = criterion.find(system)?;
+        let load = match hinges[1].motor(system) {
             Some(Motor { drive: Drive::Force(torque), .. }) => torque,
             _ => 0.0,
         };
         Ok(Self {
-            joints,
-            pair: joints.map(|joint| system.bodies()[system.joints()[joint].child].instance),
+            pair: hinges.each_ref().map(|hinge| system.bodies()[hinge.child(system)].instance),
+            hinges,
             load,
-            last: joints.map(|joint| angle(system, joint)),
             angles: None,
             error: [0.0; 2],
             speeds: [0.0; 2],
@@ -190,14 +173,8 @@ impl GearRatioTracker {
     /// Records the state after a step of `time_step` seconds.
     pub fn observe(&mut self, system: &System, time_step: f64) {
         self.time += time_step;
-        let now = self.joints.map(|joint| angle(system, joint));
-        let speeds @ [driver, driven] = self.joints.map(|joint| speed(system, joint));
-        // Whole turns are those of the speed: without contacts, the load makes the driven gear fast.
-        let turned = [0, 1].map(|k| {
-            let way = speeds[k] * time_step;
-            way + wrapped(now[k] - self.last[k] - way)
-        });
-        self.last = now;
+        let [driver, driven] = self.hinges.each_ref().map(|hinge| hinge.speed(system));
+        let turned = self.hinges.each_mut().map(|hinge| hinge.turned(system, time_step));
         if self.checks.due(time_step) {
             self.penetration.measure(system, &[self.pair], 1e-2 * self.criterion.max_penetration);
         }
@@ -272,14 +249,4 @@ impl GearRatioTracker {
             failures,
         }
     }
-}
-
-/// The speed of a hinge, rad/s.
-fn speed(system: &System, joint: usize) -> f64 {
-    let joint = &system.joints()[joint];
-    let states = system.states();
-    let [parent, child] =
-        [joint.parent, Some(joint.child)].map(|body| body.map_or(DVec3::ZERO, |body| states[body].angular));
-    let [_, frame] = joint.frames_in_world(System::poses_of(joint, states));
-    (frame.rotation * DVec3::Z).dot(child - parent)
 }

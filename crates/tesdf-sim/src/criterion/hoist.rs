@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 use tesdf::glam::{DVec2, DVec3};
 
 use super::linking::linking_number;
-use super::shared::{Checks, Penetration, angle, free_body, positive, unit};
-use crate::joint::wrapped;
+use super::shared::{Checks, Hinge, Penetration, free_body, positive, unit};
 use crate::{Joint, JointKind, MassProperties, System};
 
 /// Chains that are wound on spools hoist a body. The links hold each other by contact alone: of each
@@ -92,7 +91,7 @@ pub struct HoistReport {
 /// A chain by the numbers of its joint and bodies.
 #[derive(Clone, Debug)]
 struct Chain {
-    spool: usize,
+    spool: Hinge,
     links: Vec<usize>,
 }
 
@@ -100,10 +99,15 @@ impl HoistLink {
     /// Number of segments of a half circle.
     const SEGMENTS: usize = 16;
 
-    /// The length of chain that a turn by 1 rad winds, m. A flat link touches the drum in its middle,
-    /// and the next link joins the ends of two flat ones, so each takes the angle 2 atan(pitch / 2 r).
+    /// The length of chain that a turn by 1 rad winds, m.
+    ///
+    /// A link that lies flat touches the drum in its middle, at `radius`. The wires of the links beside it
+    /// pull at the ends of its centre line, and between two flat links the chain is straight.
     fn wound_per_radian(&self, radius: f64) -> f64 {
-        self.pitch / (2.0 * (self.pitch / (2.0 * radius)).atan())
+        let flat = self.straight / 2.0 + self.bend_radius;
+        let between = self.pitch - flat;
+        let ends = radius.hypot(flat);
+        self.pitch / ((flat / radius).atan() + (between / ends).asin())
     }
 
     /// The corners of the centre line, in the link's frame.
@@ -139,6 +143,13 @@ impl HoistCriterion {
             ("link.bend_radius", self.link.bend_radius),
             ("link.pitch", self.link.pitch),
         ])?;
+        let HoistLink { straight, bend_radius, pitch } = self.link;
+        if !(pitch > straight / 2.0 + bend_radius && pitch < straight + 2.0 * bend_radius) {
+            return Err(format!(
+                "link.pitch is {pitch}; expected more than half of the length of the centre line, and less than the length, {}",
+                straight + 2.0 * bend_radius
+            ));
+        }
         self.find(system).map(|_| ())
     }
 
@@ -163,14 +174,7 @@ impl HoistCriterion {
 
 impl HoistChain {
     fn find(&self, system: &System, body: usize) -> Result<Chain, String> {
-        let joints = system.joints();
-        let names = || joints.iter().map(|j| j.name.as_str()).collect::<Vec<_>>().join(", ");
-        let spool = joints.iter().position(|joint| joint.name == self.spool);
-        let spool =
-            spool.ok_or_else(|| format!("there is no joint {}; the joints are {}", self.spool, names()))?;
-        if joints[spool].kind != JointKind::Hinge {
-            return Err(format!("joint {} is no hinge; expected that of a spool", self.spool));
-        }
+        let spool = Hinge::new(system, &self.spool)?;
         let link = |k: usize| {
             let name = format!("{}{k}", self.links);
             system.bodies().iter().position(|body| body.name == name)
@@ -180,7 +184,7 @@ impl HoistChain {
             let (count, name) = (links.len(), &self.links);
             return Err(format!("{count} links are named {name}0, {name}1, …; expected at least 2"));
         };
-        let ends = [(first, joints[spool].child), (last, body)];
+        let ends = [(first, spool.child(system)), (last, body)];
         for &link in &links {
             for (_, joint) in joints_of(system, link) {
                 let is_end = ends.contains(&(link, other(joint, link)));
@@ -219,8 +223,8 @@ pub struct HoistTracker {
     /// Position of the centre of mass, and the direction of the axis in the body's frame, at the
     /// beginning.
     start: (DVec3, DVec3),
-    /// The angle of each spool within ±π, and the angle since the beginning, rad.
-    angles: Vec<[f64; 2]>,
+    /// The angle by which each spool has turned, rad.
+    angles: Vec<f64>,
     rise: f64,
     tilt: f64,
     checks: Checks,
@@ -245,7 +249,7 @@ impl HoistTracker {
             mass,
             centre_line: criterion.link.centre_line(),
             start: (pose.to_world(mass.center), pose.rotation.inverse() * axis),
-            angles: chains.iter().map(|chain| [angle(system, chain.spool), 0.0]).collect(),
+            angles: vec![0.0; chains.len()],
             chains,
             rise: 0.0,
             tilt: 0.0,
@@ -261,10 +265,8 @@ impl HoistTracker {
         let pose = system.states()[self.body].pose;
         self.rise = (pose.to_world(self.mass.center) - self.start.0).dot(self.axis);
         self.tilt = self.tilt.max((pose.rotation * self.start.1).angle_between(self.axis));
-        for ([last, turned], chain) in self.angles.iter_mut().zip(&self.chains) {
-            let now = angle(system, chain.spool);
-            *turned += wrapped(now - *last);
-            *last = now;
+        for (turned, chain) in self.angles.iter_mut().zip(&mut self.chains) {
+            *turned += chain.spool.turned(system, time_step);
         }
         if self.checks.due(time_step) {
             self.penetration.measure_all(system, 1e-2 * self.criterion.max_penetration);
@@ -287,7 +289,7 @@ impl HoistTracker {
     /// Compares the run so far with the criterion.
     pub fn report(&self) -> HoistReport {
         let HoistCriterion { link, winding_radius, min_rise, rise_tolerance, max_tilt, .. } = self.criterion;
-        let angle = self.angles.iter().map(|[_, turned]| turned).sum::<f64>() / self.angles.len() as f64;
+        let angle = self.angles.iter().sum::<f64>() / self.angles.len() as f64;
         let wound = link.wound_per_radian(winding_radius) * angle;
         let mut failures = self.penetration.failures(self.criterion.max_penetration);
         let mut demand = |met: bool, text: String| {

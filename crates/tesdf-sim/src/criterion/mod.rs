@@ -8,6 +8,7 @@ mod rest;
 mod screw;
 mod separation;
 mod shared;
+mod transmission;
 
 pub use gear_ratio::{GearRatioCriterion, GearRatioReport, GearRatioTracker};
 pub use hoist::{HoistChain, HoistCriterion, HoistLink, HoistReport, HoistTracker};
@@ -16,6 +17,9 @@ pub use lift::{LiftCriterion, LiftReport, LiftTracker};
 pub use rest::{RestCriterion, RestReport, RestTracker};
 pub use screw::{ScrewCriterion, ScrewReport, ScrewTracker, screw_acceleration};
 pub use separation::{SeparationCriterion, SeparationReport, SeparationTracker};
+pub use transmission::{
+    EngagedGear, EngagedReport, TransmissionCriterion, TransmissionReport, TransmissionTracker,
+};
 
 use serde::Serialize;
 
@@ -41,13 +45,15 @@ pub(crate) struct Trackers {
     gear_ratio: Option<GearRatioTracker>,
     separation: Option<SeparationTracker>,
     hoist: Option<HoistTracker>,
+    transmission: Option<TransmissionTracker>,
     drift: JointDrift,
 }
 
 impl Trackers {
     /// Trackers that start from the current state of `system`.
     pub(crate) fn new(section: &CriterionSection, system: &System) -> Result<Self, String> {
-        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation, hoist } = section;
+        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission } =
+            section;
         Ok(Self {
             screw: screw.as_ref().map(|screw| ScrewTracker::new(screw, system)).transpose()?,
             rest: rest.as_ref().map(|rest| RestTracker::new(rest, system)).transpose()?,
@@ -59,6 +65,10 @@ impl Trackers {
             gear_ratio: gear_ratio.as_ref().map(|gears| GearRatioTracker::new(gears, system)).transpose()?,
             separation: separation.as_ref().map(|of| SeparationTracker::new(of, system)).transpose()?,
             hoist: hoist.as_ref().map(|hoist| HoistTracker::new(hoist, system)).transpose()?,
+            transmission: transmission
+                .as_ref()
+                .map(|gears| TransmissionTracker::new(gears, system))
+                .transpose()?,
             drift: JointDrift::default(),
         })
     }
@@ -86,6 +96,9 @@ impl Trackers {
         if let Some(hoist) = &mut self.hoist {
             hoist.observe(system, time_step);
         }
+        if let Some(transmission) = &mut self.transmission {
+            transmission.observe(system, time_step);
+        }
         for joint in system.joints() {
             let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
             self.drift.distance = self.drift.distance.max(distance);
@@ -108,6 +121,7 @@ impl Trackers {
             gear_ratio: self.gear_ratio.as_ref().map(GearRatioTracker::report),
             separation: self.separation.as_ref().map(SeparationTracker::report),
             hoist: self.hoist.as_ref().map(HoistTracker::report),
+            transmission: self.transmission.as_ref().map(TransmissionTracker::report),
         };
         reports.failures_mut().for_each(|of_one| of_one.extend_from_slice(failures));
         reports
@@ -124,6 +138,7 @@ pub(crate) struct Reports {
     pub(crate) gear_ratio: Option<GearRatioReport>,
     pub(crate) separation: Option<SeparationReport>,
     pub(crate) hoist: Option<HoistReport>,
+    pub(crate) transmission: Option<TransmissionReport>,
 }
 
 impl Reports {
@@ -134,7 +149,7 @@ impl Reports {
     }
 
     fn failures_mut(&mut self) -> impl Iterator<Item = &mut Vec<String>> {
-        let Self { screw, rest, insertion, lift, gear_ratio, separation, hoist } = self;
+        let Self { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission } = self;
         let screw = screw.as_mut().map(|screw| &mut screw.failures);
         let rest = rest.as_mut().map(|rest| &mut rest.failures);
         let insertion = insertion.as_mut().map(|insertion| &mut insertion.failures);
@@ -142,6 +157,7 @@ impl Reports {
         let gear_ratio = gear_ratio.as_mut().map(|gears| &mut gears.failures);
         let separation = separation.as_mut().map(|separation| &mut separation.failures);
         let hoist = hoist.as_mut().map(|hoist| &mut hoist.failures);
-        [screw, rest, insertion, lift, gear_ratio, separation, hoist].into_iter().flatten()
+        let transmission = transmission.as_mut().map(|gears| &mut gears.failures);
+        [screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission].into_iter().flatten()
     }
 }

@@ -3,7 +3,8 @@ use tesdf::Length;
 use tesdf::collide::{ClearanceOptions, CollideError, InstanceId, clearance, instance_pairs};
 use tesdf::glam::DVec3;
 
-use crate::{Mass, MassProperties, System};
+use crate::joint::wrapped;
+use crate::{Joint, JointKind, Mass, MassProperties, Motor, System};
 
 /// The number of the body of this name.
 pub(super) fn body(system: &System, name: &str) -> Result<usize, String> {
@@ -130,8 +131,69 @@ fn overlapping(system: &System) -> Result<Vec<[InstanceId; 2]>, String> {
     Ok(pairs.iter().map(|pair| [pair.first, pair.second]).collect())
 }
 
+/// A hinge whose turns are counted.
+#[derive(Clone, Debug)]
+pub(super) struct Hinge {
+    /// The number of the joint.
+    joint: usize,
+    /// The angle within ±π at the last step, rad.
+    last: f64,
+}
+
+impl Hinge {
+    /// The hinge of this name, from the current state on.
+    pub(super) fn new(system: &System, name: &str) -> Result<Self, String> {
+        let joints = system.joints();
+        let names = || joints.iter().map(|j| j.name.as_str()).collect::<Vec<_>>().join(", ");
+        let joint = joints.iter().position(|j| j.name == name);
+        let joint = joint.ok_or_else(|| format!("there is no joint {name}; the joints are {}", names()))?;
+        match joints[joint].kind {
+            JointKind::Hinge => Ok(Self { joint, last: angle(system, joint) }),
+            kind => Err(format!("joint {name} is a {kind:?}; expected a hinge").to_lowercase()),
+        }
+    }
+
+    /// The body that it turns.
+    pub(super) fn child(&self, system: &System) -> usize {
+        system.joints()[self.joint].child
+    }
+
+    /// What drives it.
+    pub(super) fn motor(&self, system: &System) -> Option<Motor> {
+        system.joints()[self.joint].motor
+    }
+
+    /// The names of the other joints that hold the body that it turns.
+    pub(super) fn others<'a>(&self, system: &'a System) -> impl Iterator<Item = &'a str> {
+        let (own, body) = (self.joint, self.child(system));
+        let holds = move |joint: &Joint| joint.child == body || joint.parent == Some(body);
+        let others = system.joints().iter().enumerate().filter(move |&(k, joint)| k != own && holds(joint));
+        others.map(|(_, joint)| joint.name.as_str())
+    }
+
+    /// The speed, rad/s.
+    pub(super) fn speed(&self, system: &System) -> f64 {
+        let joint = &system.joints()[self.joint];
+        let states = system.states();
+        let [parent, child] = [joint.parent, Some(joint.child)]
+            .map(|body| body.map_or(DVec3::ZERO, |body| states[body].angular));
+        let [_, frame] = joint.frames_in_world(System::poses_of(joint, states));
+        (frame.rotation * DVec3::Z).dot(child - parent)
+    }
+
+    /// The angle by which it has turned in a step of `time_step` seconds, rad. Whole turns are those of
+    /// the speed: without contacts, a load makes a shaft fast.
+    pub(super) fn turned(&mut self, system: &System, time_step: f64) -> f64 {
+        let now = angle(system, self.joint);
+        let way = self.speed(system) * time_step;
+        let turned = way + wrapped(now - self.last - way);
+        self.last = now;
+        turned
+    }
+}
+
 /// The angle of a hinge, rad within ±π.
-pub(super) fn angle(system: &System, joint: usize) -> f64 {
+fn angle(system: &System, joint: usize) -> f64 {
     let joint = &system.joints()[joint];
     joint.coordinate(System::poses_of(joint, system.states()))
 }

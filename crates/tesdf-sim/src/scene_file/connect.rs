@@ -31,7 +31,7 @@ impl LoadedScene {
 
     /// Checks that the criteria match the bodies, joints and scripts.
     pub(super) fn check_criteria(&self, system: &System) -> Result<(), SceneError> {
-        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation, hoist } =
+        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission } =
             &self.scene.criterion;
         let free = |body: &str| match self.scene.scripts.iter().any(|s| s.body.as_deref() == Some(body)) {
             true => Err(format!("a script drives body {body}; only contacts may, so take it out")),
@@ -45,6 +45,7 @@ impl LoadedScene {
             ("lift", lift.as_ref().map(of)),
             ("gear_ratio", gear_ratio.as_ref().map(|c| free(c.validate(system)?))),
             ("separation", separation.as_ref().map(|c| c.validate(system))),
+            ("transmission", transmission.as_ref().map(|c| free(c.validate(system)?))),
             ("hoist", hoist.as_ref().map(|c| c.validate(system).and_then(|()| free(&c.body)))),
         ];
         for (name, check) in checks {

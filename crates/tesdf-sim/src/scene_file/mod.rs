@@ -66,7 +66,7 @@ pub use read::LoadedScene;
 
 use crate::criterion::{
     GearRatioCriterion, HoistCriterion, InsertionCriterion, LiftCriterion, RestCriterion, ScrewCriterion,
-    SeparationCriterion,
+    SeparationCriterion, TransmissionCriterion,
 };
 use crate::newton::NewtonOptions;
 use crate::script::Script;
@@ -317,4 +317,6 @@ pub struct CriterionSection {
     pub separation: Option<SeparationCriterion>,
     /// Chains on spools must hoist a body.
     pub hoist: Option<HoistCriterion>,
+    /// A gearbox must turn its output shaft at the ratio of each gear.
+    pub transmission: Option<TransmissionCriterion>,
 }

@@ -1,0 +1,109 @@
+//! A gearbox turns its output shaft by contact alone.
+mod support;
+
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
+use tesdf_sim::{RunRecord, Summary};
+
+/// The first gear of the scene of the repository, with scripts of a second: it engages and drives the
+/// output.
+fn text() -> String {
+    let text = std::fs::read_to_string(support::path_of("engine-transmission")).unwrap();
+    let (bodies, _) = text.split_once("# Between the gears").expect("the comment above the scripts");
+    let is_of_first = |block: &&str| {
+        let name = block.lines().find_map(|line| line.strip_prefix("name = \"")).unwrap_or_default();
+        !name.trim_end_matches('"').ends_with(['2', '3', '4', '5'])
+    };
+    let bodies = bodies.split("\n[[").filter(is_of_first).collect::<Vec<_>>().join("\n[[");
+    let (before, rest) = bodies.split_once("gears = [").expect("the criterion");
+    let (_, after) = rest.split_once("min_turns = 10\n").expect("the end of the lists");
+    format!(
+        r#"{before}gears = [{{ ratio = -0.5, from = 0.5, to = 1, pitch_radius = 0.05 }}]
+neutral = [[0, 0.05]]
+min_turns = 0.1
+{after}
+[[scripts]]
+joint = "input"
+keyframes = [{{ time = 0, target = 0.2 }}, {{ time = 0.25, target = 0.2 }}, {{ time = 0.45, target = 4 }}]
+
+[[scripts]]
+joint = "fork1"
+interpolation = "step"
+keyframes = [{{ time = 0, target = 0 }}, {{ time = 0.05, target = -0.04 }}]
+"#
+    )
+    .replacen("check_every = 0.5", "check_every = 0.25", 1)
+}
+
+fn run(change: impl FnOnce(&mut LoadedScene)) -> (RunRecord, Summary) {
+    let mut loaded = LoadedScene::parse(text(), support::path_of("engine-transmission")).unwrap();
+    loaded.scene.duration = 1.0;
+    change(&mut loaded);
+    let system = loaded.system().unwrap();
+    let (record, mut summary) = support::run(&loaded, system);
+    (summary.detection_ms, summary.solution_ms) = (0.0, 0.0);
+    (record, summary)
+}
+
+fn failures(summary: &Summary) -> String {
+    summary.transmission.as_ref().unwrap().failures.join("\n")
+}
+
+#[test]
+fn a_gear_engages_and_drives_the_same_on_any_number_of_threads() {
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| run(|_| {}))
+    };
+    let (record, summary) = on(2);
+    assert_eq!(summary.passed, Some(true), "{summary:?}");
+    let (other, again) = on(1);
+    assert_eq!(again, summary);
+    assert_eq!(other.states(200), record.states(200));
+}
+
+#[test]
+fn without_contacts_nothing_turns() {
+    let (_, summary) = run(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let failures = failures(&summary);
+    assert!(failures.contains("ratio: ") && failures.contains("turns: "), "{failures}");
+}
+
+/// A pair of gears of 20 and 40 teeth has the ratio; one of 24 and 36 has not.
+#[test]
+fn wrong_gears_have_another_ratio() {
+    let (driver, gear) = ("../data/parts/driver_z24.ply", "../data/parts/gear_z36.ply");
+    let (_, summary) = run(|loaded| {
+        assert!(loaded.replace_geometry("driver1", driver) && loaded.replace_geometry("gear1", gear));
+    });
+    let failures = failures(&summary);
+    assert!(failures.contains("ratio: -0.6"), "{failures}");
+}
+
+#[test]
+fn what_is_no_gearbox_is_refused() {
+    // The shapes are of no account.
+    let text = text()
+        .lines()
+        .map(|line| match line.starts_with("mesh = ") {
+            true => "shape = { sphere = { radius = 0.001 } }\n".into(),
+            false => format!("{line}\n"),
+        })
+        .collect::<String>();
+    let weld = "[[joints]]\nname = \"held\"\nkind = \"weld\"\nchild = \"output\"\n\n[criterion.transmission]";
+    let cases = [
+        ("input = \"input\"", "input = \"inptu\"", "there is no joint inptu"),
+        ("input = \"input\"", "input = \"fork1\"", "joint fork1 is a slider; expected a hinge"),
+        ("input = \"input\"", "input = \"output\"", "both hinges turn body output"),
+        ("ratio = -0.5", "ratio = 0", "ratio is 0; expected a finite number other than 0"),
+        ("to = 1,", "to = 0.4,", "gears: from 0.5 to 0.4 s; expected a later end than beginning"),
+        ("neutral = [[0, 0.05]]", "neutral = [[1, 1]]", "neutral: from 1 to 1 s"),
+        ("min_turns = 0.1", "min_turns = 0", "min_turns is 0; expected a positive number"),
+        (
+            "velocity = 0 }, limit = 0.2",
+            "velocity = 1 }, limit = 0.2",
+            "expected none, a torque, or the velocity 0",
+        ),
+        ("[criterion.transmission]", weld, "joint held holds body output too"),
+    ];
+    support::refused(&text, &support::path_of("engine-transmission"), &cases);
+}
