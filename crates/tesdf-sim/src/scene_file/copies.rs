@@ -21,13 +21,14 @@ pub struct CopiesSection {
     pub rotation: [f64; 4],
 }
 
+/// A body whose copies are not valid, and what is wrong with them.
+pub(super) type Refused = (Box<Spanned<BodySection>>, String);
+
 /// The bodies with all copies.
 ///
 /// # Errors
-/// The body at fault, and what is wrong with its copies.
-pub(super) fn expand(
-    bodies: Vec<Spanned<BodySection>>,
-) -> Result<Vec<Spanned<BodySection>>, (Box<Spanned<BodySection>>, String)> {
+/// The body at fault.
+pub(super) fn expand(bodies: Vec<Spanned<BodySection>>) -> Result<Vec<Spanned<BodySection>>, Refused> {
     let mut expanded = Vec::with_capacity(bodies.len());
     for body in bodies {
         match copies(body.get_ref(), expanded.len()) {
