@@ -179,7 +179,7 @@ def rigid(time_step: float) -> dict[str, Any]:
     if not time_step > 0:
         raise ValueError(f"time_step: {time_step}; expected more than 0")
     return {
-        "mujoco:solref": tuple(rigid_solref(np.float64(time_step)).tolist()),
+        "mujoco:solref": tuple(rigid_solref(np.array(time_step)).tolist()),
         "mujoco:solref_mode": 1,  # as given, rather than from stiffness and damping of the material
         "mujoco:geom_solimp": RIGID_SOLIMP,
     }
