@@ -162,8 +162,8 @@ impl HoistCriterion {
         let chains: Vec<Chain> =
             self.chains.iter().map(|chain| chain.find(system, body)).collect::<Result<_, _>>()?;
         let last = |link| chains.iter().any(|chain| chain.links.last() == Some(&link));
-        match joints_of(system, body).find(|(_, joint)| !last(other(joint, body))) {
-            Some((_, joint)) => Err(format!(
+        match joints_of(system, body).find(|joint| !last(other(joint, body))) {
+            Some(joint) => Err(format!(
                 "joint {} holds body {}; only the last links of the chains may, so take it out",
                 joint.name, self.body
             )),
@@ -186,7 +186,7 @@ impl HoistChain {
         };
         let ends = [(first, spool.child(system)), (last, body)];
         for &link in &links {
-            for (_, joint) in joints_of(system, link) {
+            for joint in joints_of(system, link) {
                 let is_end = ends.contains(&(link, other(joint, link)));
                 if !is_end || joint.kind != JointKind::Weld {
                     return Err(format!(
@@ -202,8 +202,8 @@ impl HoistChain {
     }
 }
 
-fn joints_of(system: &System, body: usize) -> impl Iterator<Item = (usize, &Joint)> {
-    system.joints().iter().enumerate().filter(move |(_, j)| j.child == body || j.parent == Some(body))
+fn joints_of(system: &System, body: usize) -> impl Iterator<Item = &Joint> {
+    system.joints().iter().filter(move |j| j.child == body || j.parent == Some(body))
 }
 
 /// The other body of a joint; its child if that is the world.
