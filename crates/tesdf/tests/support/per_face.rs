@@ -1,5 +1,5 @@
 //! Contacts per face: what holds for them on every device.
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use tesdf::collide::{
@@ -101,16 +101,19 @@ impl Detection<'_> {
         let mut counts = [minima.len(), 0];
         for [a, b] in [[0, 1], [1, 0]] {
             let of = |contacts| of_direction(contacts, a as u32, b as u32);
-            let bits = |c: &Contact| c.point_a.to_array().map(f64::to_bits);
-            let places: BTreeSet<_> = of(all.as_slice()).map(bits).collect();
-            let kept: BTreeSet<_> = of(minima.as_slice()).map(bits).collect();
-            assert!(kept.is_subset(&places), "a contact that no face has");
+            // On a device, the contacts of two faces at one vertex differ by rounding.
+            let is_among = |others: &[Contact], c: &Contact| {
+                others.iter().any(|other| other.point_a.distance(c.point_a) <= self.point * size)
+            };
+            let places: Vec<_> = of(all.as_slice()).copied().collect();
+            let kept: Vec<_> = of(minima.as_slice()).copied().collect();
+            assert!(kept.iter().all(|c| is_among(&places, c)), "a contact that no face has");
             let least = |contacts| of(contacts).map(|c| c.distance).fold(f64::INFINITY, f64::min);
             let [deepest, of_minima] = [least(all.as_slice()), least(minima.as_slice())];
             let is_kept = of_minima == deepest || of_minima <= deepest + self.distance * size;
             assert!(is_kept, "{mode:?}: {of_minima} instead of {deepest}");
             let near = (1e-3 * size).max(self.point * size);
-            let dropped: Vec<_> = of(all.as_slice()).filter(|c| !kept.contains(&bits(c))).collect();
+            let dropped: Vec<_> = places.iter().filter(|c| !is_among(&kept, c)).collect();
             counts[1] += dropped.len();
             for c in dropped.iter().step_by(1 + dropped.len() / 24) {
                 let lower = self.lowest_sample(&bodies[a], &bodies[b], c.point_a, near);
