@@ -1,9 +1,11 @@
 //! The frames of a benchmark, from a scene, a run or a file of poses.
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::btree_map::Entry;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use tempfile::TempDir;
 use tesdf::collide::{Instance, InstanceId, Pose, Scene};
 use tesdf::encode::{EncodeOptions, Encoder};
 use tesdf::glam::{DQuat, DVec3};
@@ -53,7 +55,11 @@ impl Frames {
         frames.in_worlds(worlds)
     }
 
-    fn of_scene(loaded: &LoadedScene) -> Result<Self, Failure> {
+    /// The bodies of a scene, where they begin.
+    ///
+    /// # Errors
+    /// A mesh cannot be read or encoded.
+    pub fn of_scene(loaded: &LoadedScene) -> Result<Self, Failure> {
         let interrupted = interrupt_flag()?;
         let progress = Progress::default();
         let system =
@@ -92,6 +98,13 @@ impl Frames {
             return Err(named(&found));
         }
         let folder = path.parent().unwrap_or(Path::new(""));
+        if let Some(scene) = &file.scene {
+            let mut loaded = LoadedScene::read(folder.join(scene)).map_err(Failure::new)?;
+            let _assets = encode_meshes(&mut loaded, options)?;
+            let start = Self::of_scene(&loaded)?;
+            let poses = file.poses(start.poses[0].len(), max_frames).map_err(|e| named(&e))?;
+            return Ok(Self { poses, contact_distance: Some(file.contact_distance), ..start });
+        }
         let mut scene = Scene::new();
         let (mut shapes, mut opened) = (Vec::new(), BTreeMap::new());
         let interrupted = interrupt_flag()?;
@@ -105,16 +118,8 @@ impl Frames {
             opened.insert(file, shape);
             shapes.push(shape);
         }
-        let pose = |[x, y, z, i, j, k, w]: [f64; 7]| {
-            Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| named(&e))
-        };
-        let frames = file.frames.into_iter().take(max_frames).map(|f| f.into_iter().map(pose).collect());
-        let poses: Vec<Vec<Pose>> = frames.collect::<Result<_, _>>()?;
-        let count = file.instances.len();
-        if let Some((k, f)) = poses.iter().enumerate().find(|(_, f)| f.len() != count) {
-            return Err(named(&format!("frame {k} has {} poses; expected {count}", f.len())));
-        }
-        let first = poses.first().ok_or_else(|| named(&"no frame"))?;
+        let poses = file.poses(file.instances.len(), max_frames).map_err(|e| named(&e))?;
+        let first = &poses[0];
         for (&(body, world), &pose) in file.instances.iter().zip(first) {
             let shape = *shapes.get(body).ok_or_else(|| {
                 named(&format!("an instance of body {body}; expected one of {}", shapes.len()))
@@ -158,6 +163,57 @@ impl Frames {
         let poses: Vec<(InstanceId, Pose)> = ids.into_iter().zip(self.poses[frame].iter().copied()).collect();
         self.scene.set_poses(&poses).map_err(Failure::new)
     }
+}
+
+impl PoseFile {
+    /// The poses of at most `max_frames` frames, each with `count` bodies; at least one frame.
+    ///
+    /// # Errors
+    /// What is wrong, in words.
+    pub fn poses(&self, count: usize, max_frames: usize) -> Result<Vec<Vec<Pose>>, String> {
+        let pose = |&[x, y, z, i, j, k, w]: &[f64; 7]| {
+            Pose::new(DVec3::new(x, y, z), DQuat::from_xyzw(i, j, k, w)).map_err(|e| e.to_string())
+        };
+        let of_frame = |(k, frame): (usize, &Vec<[f64; 7]>)| match frame.len() == count {
+            true => frame.iter().map(pose).collect(),
+            false => Err(format!("frame {k} has {} poses; expected {count}", frame.len())),
+        };
+        let frames = self.frames.iter().take(max_frames).enumerate().map(of_frame);
+        match frames.collect::<Result<Vec<_>, String>>()? {
+            none if none.is_empty() => Err("no frame".into()),
+            frames => Ok(frames),
+        }
+    }
+}
+
+/// Encodes the meshes of a scene with `options`, each once. The assets are files in a folder that is
+/// removed when it is dropped.
+///
+/// # Errors
+/// A mesh cannot be read or encoded, or there is no folder for temporary files.
+pub fn encode_meshes(loaded: &mut LoadedScene, options: &EncodeOptions) -> Result<TempDir, Failure> {
+    let folder = TempDir::new().map_err(|e| {
+        Failure::new(format!("no temporary folder: {e}"))
+            .hint("set TMPDIR to a folder that can be written to")
+    })?;
+    let interrupted = interrupt_flag()?;
+    let scene_folder = loaded.path.parent().unwrap_or(Path::new("")).to_path_buf();
+    let mut encoded: BTreeMap<PathBuf, PathBuf> = BTreeMap::new();
+    for body in &mut loaded.scene.bodies {
+        let body = body.get_mut();
+        let Some(mesh) = body.mesh.take() else { continue };
+        let number = encoded.len();
+        let asset = match encoded.entry(scene_folder.join(mesh)) {
+            Entry::Occupied(asset) => asset.into_mut(),
+            Entry::Vacant(entry) => {
+                let asset = folder.path().join(format!("{number}.tesdf"));
+                geometry(entry.key(), options, &interrupted)?.save(&asset).map_err(Failure::new)?;
+                entry.insert(asset)
+            }
+        };
+        body.asset = Some(asset.clone());
+    }
+    Ok(folder)
 }
 
 /// Opens a `.tesdf` file, or encodes a mesh.

@@ -7,6 +7,7 @@ mod heap;
 #[cfg(feature = "gpu")]
 pub(crate) mod on_device;
 mod poses;
+mod record;
 pub(crate) mod report;
 mod worlds;
 
@@ -29,6 +30,8 @@ enum Benchmark {
     Heap(heap::Args),
     /// Write a file of poses with overlapping bodies, from a seed
     Poses(poses::Args),
+    /// Keep some poses of a run in a small file, for measurements on other machines
+    Record(record::Args),
     /// Detect the contacts of many worlds of two bodies, as `scripts/python_worlds.py` does; print
     /// JSON
     Worlds(worlds::Args),
@@ -44,6 +47,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         Benchmark::Clearance(args) => clearance::run(args),
         Benchmark::Heap(args) => heap::run(args),
         Benchmark::Poses(args) => poses::run(args),
+        Benchmark::Record(args) => record::run(args),
         Benchmark::Worlds(args) => worlds::run(args),
     }
 }

@@ -70,6 +70,8 @@ pub fn fill(
 pub struct FaceTes {
     /// Median device time, ms.
     pub narrow_ms: f64,
+    /// Mean device times of the broad, middle and narrow phase, ms.
+    pub phases_ms: [f64; 3],
     pub wall_ms: Spread,
     /// With evaluations and distances.
     pub counts: Counts,
@@ -92,7 +94,9 @@ pub fn face_tes(
     let mut detector = Detector::new(device, &frames.scene, counting).map_err(Failure::new)?;
     let counts = measure(frames, &mut detector, options, 1)?.counts;
     let narrow = measured.stages.iter().filter(|stage| stage.phase == "NP");
-    Ok(FaceTes { narrow_ms: narrow.map(|stage| stage.ms.median).sum(), wall_ms: measured.wall_ms, counts })
+    let narrow_ms = narrow.map(|stage| stage.ms.median).sum();
+    let phases_ms = measured.phases().map(|(_, ms)| ms);
+    Ok(FaceTes { narrow_ms, phases_ms, wall_ms: measured.wall_ms, counts })
 }
 
 struct Measured {

@@ -19,9 +19,15 @@ pub struct PoseFile {
     pub tesdf_poses: u32,
     /// Contacts are detected up to this signed distance.
     pub contact_distance: f64,
+    /// The scene file whose bodies these poses are of, relative to the folder of this file. Then
+    /// `bodies` and `instances` are empty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<PathBuf>,
     /// The bodies: mesh files or `.tesdf` files, relative to the folder of this file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bodies: Vec<PathBuf>,
     /// For each instance, its body and its world.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub instances: Vec<(usize, u32)>,
     /// For each frame and instance: the translation and the unit quaternion x y z w.
     pub frames: Vec<Vec<[f64; 7]>>,
@@ -93,6 +99,7 @@ impl Scene {
         let file = |bodies: &[&str], instances, contact_distance, frames| PoseFile {
             tesdf_poses: VERSION,
             contact_distance,
+            scene: None,
             bodies: bodies.iter().map(|name| data.join(name)).collect(),
             instances,
             frames,
@@ -138,7 +145,8 @@ const SHAFTS: f64 = 0.24;
 /// The same for a pile.
 const PILE: f64 = 0.144;
 
-fn pose(p: DVec3, q: DQuat) -> [f64; 7] {
+/// A pose as the file has it.
+pub fn pose(p: DVec3, q: DQuat) -> [f64; 7] {
     [p.x, p.y, p.z, q.x, q.y, q.z, q.w]
 }
 

@@ -1,10 +1,11 @@
-//! `tesdf evaluate table1|table3|table4|fig8|fig9`: measures Tables I, III and IV and Figures 8 and
+//! `tesdf evaluate table1|table2|table3|table4|fig8|fig9`: measures Tables I to IV and Figures 8 and
 //! 9 of the paper, next to the paper's figures.
 //!
 //! The meshes of the repository (`meshes`) are encoded in a domain with both encoders, with full
 //! and with truncated lists (`measure`). The assets are compared with exact distances on a grid.
-//! The rows (`table1`, `table4`) are printed as Markdown, CSV or JSON. Table III simulates two scenes
-//! with voxel grids and with encoded meshes (`table3`). The figures simulate a pile of shafts with
+//! The rows (`table1`, `table4`) are printed as Markdown, CSV or JSON. Table II detects the contacts
+//! of recorded poses (`table2`). Table III simulates two scenes with voxel grids and with encoded
+//! meshes (`table3`). The figures simulate a pile of shafts with
 //! truncated lists, and detect its contacts (`pile`).
 mod deformed;
 mod detector;
@@ -15,6 +16,7 @@ mod output;
 mod paper;
 mod pile;
 mod table1;
+mod table2;
 mod table3;
 mod table4;
 
@@ -44,6 +46,9 @@ pub enum Table {
     /// Table I: memory, largest error and bands of several meshes, with full lists and with at most
     /// 32 faces per list
     Table1(TableArgs),
+    /// Table II: memory, times of the broad, middle and narrow phase, and narrow-phase queries of the
+    /// scenarios, in recorded poses
+    Table2(table2::Args),
     /// Table III: a nut on its bolt and a peg in its hole, simulated with voxel grids of several
     /// resolutions and with encoded meshes; success or the kind of failure, and memory
     Table3(table3::Args),
@@ -154,6 +159,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     match &args.table {
         Table::Table1(args) => table1::run(args, &Sink::open(&args.output, "table1", &args.mesh_files())?)?,
         Table::Table4(args) => table4::run(args, &Sink::open(&args.output, "table4", &args.mesh_files())?)?,
+        Table::Table2(args) => table2::run(args)?,
         Table::Table3(args) => table3::run(args)?,
         Table::Fig8(args) => pile::fig8::run(args)?,
         Table::Fig9(args) => pile::fig9::run(args)?,

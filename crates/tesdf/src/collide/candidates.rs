@@ -1,7 +1,9 @@
 use crate::parallel::*;
 use glam::DVec3;
 
+use super::detect::tasks;
 use super::ordered_pair::OrderedPair;
+use super::surface::Candidates;
 use super::{CollideError, CollideOptions, InstanceId, Scene};
 
 /// A face (or node) of one body within a cell of another body: a problem for the narrow phase.
@@ -49,4 +51,35 @@ fn of_pair(pair: &OrderedPair) -> Vec<Candidate> {
         });
     }
     found
+}
+
+/// Number of faces, edges or nodes that the broad phase leaves. For the time of the broad phase:
+/// the work of [`detect`](super::detect()) up to there, on the same threads.
+///
+/// # Errors
+/// As [`detect`](super::detect()).
+pub fn count_faces(scene: &Scene, options: &CollideOptions) -> Result<usize, CollideError> {
+    let pairs = OrderedPair::all(scene, options)?;
+    Ok(broad_phase(&pairs).iter().map(Vec::len).sum())
+}
+
+/// Number of [`candidates`], without the polygons. For the time of the broad and the middle phase.
+///
+/// # Errors
+/// As [`detect`](super::detect()).
+pub fn count_polygons(scene: &Scene, options: &CollideOptions) -> Result<usize, CollideError> {
+    let pairs = OrderedPair::all(scene, options)?;
+    let of_task = |(pair, chunk): &(&OrderedPair, &[u32])| {
+        let mut polygons = 0;
+        for &candidate in *chunk {
+            let (part, ..) = pair.part(candidate);
+            pair.search.polygons(&pair.field, &part, &mut |_| polygons += 1);
+        }
+        polygons
+    };
+    Ok(tasks(&pairs, &broad_phase(&pairs)).par_iter().map(of_task).sum())
+}
+
+fn broad_phase(pairs: &[OrderedPair]) -> Vec<Candidates> {
+    pairs.par_iter().map(OrderedPair::candidates).collect()
 }

@@ -96,6 +96,17 @@ pub fn detect_pairs(
     Ok(of_pairs(&OrderedPair::of(pairs, scene, options)?, options, &NEVER))
 }
 
+/// The candidates of ordered pairs, in tasks for threads.
+pub fn tasks<'p, 's>(
+    pairs: &'p [OrderedPair<'s>],
+    candidates: &'p [Candidates],
+) -> Vec<(&'p OrderedPair<'s>, &'p [u32])> {
+    let of_pair = |(pair, candidates): (&'p OrderedPair<'s>, &'p Candidates)| {
+        candidates.chunks(TASK).map(move |chunk| (pair, chunk))
+    };
+    pairs.iter().zip(candidates).flat_map(of_pair).collect()
+}
+
 /// The contacts of ordered pairs. Once `stop` is set, contacts are missing.
 fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) -> Contacts {
     let stopped = || stop.load(Ordering::Relaxed);
@@ -110,11 +121,7 @@ fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) 
     }
     let candidates_of = |pair: &OrderedPair| if stopped() { Candidates::new() } else { pair.candidates() };
     let candidates: Vec<Candidates> = pairs.par_iter().map(candidates_of).collect();
-    let tasks: Vec<(&OrderedPair, &[u32])> = pairs
-        .iter()
-        .zip(&candidates)
-        .flat_map(|(pair, candidates)| candidates.chunks(TASK).map(move |chunk| (pair, chunk)))
-        .collect();
+    let tasks = tasks(pairs, &candidates);
     let contacts_of = |(pair, chunk): &(&OrderedPair, &[u32])| {
         if stopped() { Found::default() } else { contacts(pair, chunk) }
     };

@@ -74,6 +74,7 @@ mod why;
 #[doc(hidden)]
 pub mod internal {
     pub use super::ahead::Ahead;
+    pub use super::candidates::{count_faces, count_polygons};
     pub use super::field::ROUNDING;
     pub use super::found::kept_at_vertices;
     pub use super::greatest_minimum::greatest_minimum;
