@@ -1,6 +1,6 @@
 //! Progress bars on stderr, and Ctrl-C.
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -51,11 +51,17 @@ impl Drop for Bar {
     }
 }
 
-/// Returns a flag that the first Ctrl-C sets. The second Ctrl-C ends the process at once.
+/// Returns a flag that the first Ctrl-C sets, the same flag each time. The second Ctrl-C ends the
+/// process at once.
 ///
 /// # Errors
-/// The system refuses the handler, or a handler is already installed.
+/// The system refuses the handler, or another handler is already installed.
 pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
+    static FLAG: Mutex<Option<Arc<AtomicBool>>> = Mutex::new(None);
+    let mut installed = FLAG.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(flag) = &*installed {
+        return Ok(Arc::clone(flag));
+    }
     let flag = Arc::new(AtomicBool::new(false));
     let seen = Arc::clone(&flag);
     ctrlc::set_handler(move || {
@@ -66,7 +72,7 @@ pub fn interrupt_flag() -> Result<Arc<AtomicBool>, Failure> {
         }
     })
     .map_err(|e| Failure::new(format!("cannot handle Ctrl-C: {e}")))?;
-    Ok(flag)
+    Ok(Arc::clone(installed.insert(flag)))
 }
 
 /// Runs `work` while another thread draws its progress and passes Ctrl-C on to it.

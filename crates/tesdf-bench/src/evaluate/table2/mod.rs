@@ -24,8 +24,8 @@ pub struct Args {
     #[arg(long, alias = "scene", value_enum, value_delimiter = ',')]
     pub scenarios: Option<Vec<Scenario>>,
     /// Folder of the recorded poses; `tesdf bench record` makes them of runs
-    #[arg(long, value_name = "FOLDER", default_value = "data/poses")]
-    pub poses: PathBuf,
+    #[arg(long, value_name = "FOLDER", default_value = "data/recordings")]
+    pub recordings: PathBuf,
     /// Maximum number of frames of a scenario [default: all; with --quick 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: Option<u32>,
@@ -116,7 +116,7 @@ impl Args {
     }
 
     fn file(&self, scenario: Scenario) -> PathBuf {
-        self.poses.join(scenario.name()).with_extension("json")
+        self.recordings.join(scenario.name()).with_extension("json")
     }
 
     fn frames(&self) -> usize {
@@ -136,9 +136,9 @@ impl Args {
 pub fn run(args: &Args) -> Result<(), Failure> {
     let scenarios = args.scenarios();
     if scenarios.is_empty() {
-        let folder = args.poses.display();
+        let folder = args.recordings.display();
         return Err(Failure::new(format!("{folder}: there are no recorded poses"))
-            .hint("give the folder `data/poses` of the repository to --poses"));
+            .hint("give the folder `data/recordings` of the repository to --recordings"));
     }
     let files: Vec<PathBuf> = scenarios.iter().map(|&scenario| args.file(scenario)).collect();
     let sink = Sink::open(&args.output, "table2", &files)?;
