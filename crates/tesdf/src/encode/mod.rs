@@ -12,6 +12,7 @@
 mod assemble;
 mod attempts;
 pub(crate) mod candidates;
+mod cell_signs;
 mod chains;
 mod choices;
 mod doubles;

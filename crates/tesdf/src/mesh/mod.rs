@@ -3,6 +3,7 @@ mod check;
 mod count;
 mod defect;
 mod polygon;
+mod presented;
 mod read;
 mod repair;
 mod solid;
@@ -13,9 +14,10 @@ mod winding;
 mod write;
 
 pub(crate) use check::coordinate_in_range;
-pub use check::{BoundaryLoop, CheckReport, check};
+pub use check::{BoundaryLoop, CheckReport, check, check_for};
 pub use defect::{Defect, DefectKind, Severity};
 pub(crate) use read::text;
+pub(crate) use presented::{Presented, Telling};
 pub use read::{
     LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, files, read, read_bytes, source_blake3,
 };

@@ -9,6 +9,7 @@ use super::{
     regions::{self, Sample},
 };
 use crate::{
+    base::InsideRule,
     geometry::{Aabb, Triangle, perturbed_orientation},
     mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, WindingNumber, topology::Edge},
 };
@@ -32,10 +33,10 @@ pub(super) struct Meetings<'a> {
 
 /// The winding numbers in front of a face and behind it, at a place.
 #[derive(Clone, Copy)]
-struct Sides {
-    place: DVec3,
-    front: i32,
-    behind: i32,
+pub(super) struct Sides {
+    pub place: DVec3,
+    pub front: i32,
+    pub behind: i32,
 }
 
 impl Sides {
@@ -46,6 +47,10 @@ impl Sides {
     fn greatest(&self) -> i32 {
         self.front.max(self.behind)
     }
+
+    fn has_odd(&self) -> bool {
+        self.front % 2 != 0 || self.behind % 2 != 0
+    }
 }
 
 /// The least and greatest winding number of a closed mesh, and the places where it is negative or
@@ -54,6 +59,7 @@ pub(super) fn winding_defects(
     mesh: &TriangleMesh,
     topology: &Topology,
     meetings: &Meetings,
+    rule: InsideRule,
 ) -> ([i32; 2], Vec<Defect>) {
     let winding = WindingNumber::new(mesh);
     let mut without_area = vec![false; mesh.faces().len()];
@@ -62,16 +68,19 @@ pub(super) fn winding_defects(
     let excluded = |f: u32| without_area[f as usize] || !others.of(f).is_empty();
 
     let mut range = [0, 0];
+    let mut any_odd = false;
     let mut defects = Vec::new();
     let mut above_one: Vec<(u32, i32)> = Vec::new();
     let mut record = |face: u32, least: &Sides, greatest: &Sides, extent: &str| {
         let (low, high) = (least.least(), greatest.greatest());
         range = [range[0].min(low), range[1].max(high)];
+        any_odd |= least.has_odd() || greatest.has_odd();
         if low < 0 {
             let side = if least.front == low { "in front of" } else { "behind" };
             let message = format!(
                 "the winding number is {low} {side} face {face}{extent}: the surface is folded or inside out there, and \
-                 the place counts as outside"
+                 the place counts as {}",
+                if rule.holds(low) { "inside" } else { "outside" }
             );
             let defect = Defect::new(DefectKind::NegativeWinding, Severity::Warning, least.place, message);
             defects.push(defect.faces([face]));
@@ -93,18 +102,33 @@ pub(super) fn winding_defects(
     }
 
     if let Some(&(face, value)) = above_one.iter().max_by_key(|&&(f, w)| (w, std::cmp::Reverse(f))) {
+        let inside = match rule {
+            InsideRule::Winding => "is where it is 1 or more",
+            InsideRule::Odd => "is where it is odd",
+            _ => "is where it is not 0",
+        };
         let message = format!(
             "the winding number is {value} next to face {face}: solids overlap, or a cavity is inside out; \
-             inside is where it is 1 or more"
+             inside {inside}. Distances inside refer to inner walls, too, unless the surface is `boundary`"
         );
         let faces: Vec<u32> = above_one.iter().map(|&(f, _)| f).collect();
         let defect =
             Defect::new(DefectKind::WindingAboveOne, Severity::Warning, centroid(mesh, face), message);
         defects.push(defect.faces(faces));
     }
-    if range[1] < 1 {
-        let why = if range[0] < 0 { "the surface is inside out" } else { "it encloses nothing" };
-        let message = format!("no place has a winding number of 1 or more: the mesh has no inside, {why}");
+    let has_inside = match rule {
+        InsideRule::Winding => range[1] >= 1,
+        InsideRule::Odd => any_odd,
+        _ => range != [0, 0],
+    };
+    if !has_inside {
+        let (expected, why) = match rule {
+            InsideRule::Winding if range[0] < 0 => ("of 1 or more", "the surface is inside out"),
+            InsideRule::Winding => ("of 1 or more", "it encloses nothing"),
+            InsideRule::Odd => ("that is odd", "every place is enclosed an even number of times"),
+            _ => ("other than 0", "it encloses nothing"),
+        };
+        let message = format!("no place has a winding number {expected}: the mesh has no inside, {why}");
         defects.push(Defect::new(DefectKind::NoInside, Severity::Error, mesh.bounds().center(), message));
     }
     (range, defects)

@@ -17,6 +17,8 @@ pub const FARTHEST: f64 = 64.0;
 pub struct Surface {
     /// Distinct positions.
     pub points: Vec<DVec3>,
+    /// For each vertex of the file, the index of its position.
+    place_of: Vec<u32>,
     /// Corners of the faces, as indices into `points`.
     pub faces: Vec<[u32; 3]>,
     /// The faces themselves.
@@ -61,7 +63,17 @@ impl Surface {
             (middle, face.corners.iter().map(|p| p.distance(middle)).fold(0.0, f64::max))
         };
         let balls = triangles.iter().map(ball).collect();
-        Ok(Self { points, faces, triangles, balls, error: rounding(4.0 * FARTHEST) })
+        Ok(Self { points, place_of, faces, triangles, balls, error: rounding(4.0 * FARTHEST) })
+    }
+
+    /// The indices into `points` of the corners of a face of the file.
+    pub fn places(&self, face: [u32; 3]) -> [u32; 3] {
+        face.map(|v| self.place_of[v as usize])
+    }
+
+    /// The corners of further faces of the file.
+    pub fn sign_triangles(&self, faces: &[[u32; 3]]) -> Vec<[DVec3; 3]> {
+        faces.iter().map(|&f| self.places(f).map(|v| self.points[v as usize])).collect()
     }
 
     /// The faces among `faces` that can be closest to a point within `radius` of `center`.
