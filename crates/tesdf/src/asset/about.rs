@@ -67,11 +67,18 @@ pub(crate) enum Signs {
     /// By the labels of its cells, and by the rule of its certificate in crossing cells, over its
     /// faces and its sign faces.
     Rule,
+    /// The same, and some faces have the inside in front of them in places, or may have it.
+    RuleUnoriented,
     /// The distance to the faces has no sign. Half of the thickness is subtracted.
     Sheet,
 }
 
 impl Signs {
+    /// Whether a rule is evaluated at points.
+    pub fn are_by_rule(self) -> bool {
+        matches!(self, Self::Rule | Self::RuleUnoriented)
+    }
+
     /// The metadata key of an asset that tells the sign in another way than [`Cells`](Self::Cells).
     const KEY: &str = super::header::RULE;
 
@@ -82,6 +89,7 @@ impl Signs {
             Self::Cells if inside.surface == SurfaceFaces::All => None,
             Self::Cells => Some("cells"),
             Self::Rule => Some("rule"),
+            Self::RuleUnoriented => Some("rule-unoriented"),
             Self::Sheet => Some("sheet"),
         }
     }
@@ -92,15 +100,21 @@ impl Signs {
         let signs = match metadata.get(Self::KEY).map(String::as_str) {
             None | Some("cells") => Self::Cells,
             Some("rule") => Self::Rule,
+            Some("rule-unoriented") => Self::RuleUnoriented,
             Some("sheet") => Self::Sheet,
             Some(other) => {
-                let reason = format!("{} is {}; expected cells, rule or sheet", Self::KEY, super::error::shown(other));
+                let reason = format!(
+                    "{} is {}; expected cells, rule, rule-unoriented or sheet",
+                    Self::KEY,
+                    super::error::shown(other)
+                );
                 return Err(AssetError::header(reason));
             }
         };
         let half = inside.rule.half_thickness();
         if is_sheet != (signs == Self::Sheet) || is_sheet && !(half.is_finite() && half > 0.0) {
-            let reason = format!("the certificate's rule {} does not fit the key {}", inside.rule.name(), Self::KEY);
+            let reason =
+                format!("the certificate's rule {} does not fit the key {}", inside.rule.name(), Self::KEY);
             return Err(AssetError::header(reason));
         }
         Ok(signs)
@@ -135,7 +149,8 @@ impl About {
             ("certificate".into(), json(serde_json::to_string(&self.certificate))),
             ("statistics".into(), json(serde_json::to_string(&self.statistics))),
         ]);
-        metadata.extend(self.signs.text(self.certificate.inside()).map(|text| (Signs::KEY.into(), text.into())));
+        metadata
+            .extend(self.signs.text(self.certificate.inside()).map(|text| (Signs::KEY.into(), text.into())));
         metadata
     }
 

@@ -142,7 +142,7 @@ impl TeSdf {
             .transpose()?;
         let mut asset = Self {
             sign_faces,
-            is_by_rule: about.signs == Signs::Rule,
+            is_by_rule: about.signs.are_by_rule(),
             half_thickness: about.certificate().inside().rule.half_thickness() * frame.scale,
             sign_rule: OnceLock::new(),
             about,
@@ -217,8 +217,7 @@ impl TeSdf {
             self.sign_rule.get_or_init(|| {
                 let sign_faces = self.sign_faces.as_deref().unwrap_or(&[]);
                 let faces = [&*self.faces, sign_faces].concat();
-                let position =
-                    |v: u32| self.frame.to_local(DVec3::from_array(self.vertices[v as usize]));
+                let position = |v: u32| self.frame.to_local(DVec3::from_array(self.vertices[v as usize]));
                 SignRule::new(self.inside().rule, &faces, position)
             })
         })
@@ -233,6 +232,25 @@ impl TeSdf {
                 self.inside().rule.name()
             )
         })
+    }
+
+    /// Why contacts with the asset are not known; `None` when they are.
+    pub(crate) fn without_contacts(&self) -> Option<(&'static str, &'static str)> {
+        match self.about.signs {
+            Signs::Sheet => Some((
+                "its faces have a thickness, which contacts do not know yet",
+                "a solid: give the sheet its thickness as faces, or close it with `tesdf repair --fill-holes`",
+            )),
+            _ if self.about.certificate().jumps() => Some((
+                "its signed distance jumps in the holes of the mesh",
+                "a closed mesh, as `tesdf repair --fill-holes` makes it",
+            )),
+            Signs::RuleUnoriented => Some((
+                "some of its faces have the inside in front of them in one place and behind them in another",
+                "faces that look outward: cut overlaps off with `tesdf repair --union`, or use the rule `winding`",
+            )),
+            Signs::Cells | Signs::Rule => None,
+        }
     }
 
     pub(crate) fn about_mut(&mut self) -> &mut About {
@@ -412,7 +430,7 @@ impl TeSdf {
             return wrong(layout::TETRAHEDRA, reason.into());
         }
         let Some(faces) = self.sign_faces.as_deref() else { return Ok(()) };
-        if self.about.signs != Signs::Rule {
+        if !self.is_by_rule {
             return wrong(layout::SIGN_FACES, "the asset has no rule that counts them".into());
         }
         if let Some(i) = faces.iter().position(|c| c.iter().any(|&k| k as usize >= v)) {
@@ -420,7 +438,10 @@ impl TeSdf {
         }
         if faces.len() > layout::MAX_FACES - f {
             let most = layout::MAX_FACES;
-            return wrong(layout::SIGN_FACES, format!("{} faces beside {f}; expected {most} in all", faces.len()));
+            return wrong(
+                layout::SIGN_FACES,
+                format!("{} faces beside {f}; expected {most} in all", faces.len()),
+            );
         }
         Ok(())
     }

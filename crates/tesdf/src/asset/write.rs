@@ -5,7 +5,9 @@ use std::path::Path;
 
 use super::container::{Placed, shape_of};
 use super::error::shown;
-use super::header::{BEFORE_CHECKSUM, DIGITS, LENGTH_FIELD, MAGIC, MAX_HEADER, RULE, SECTION_CHECKSUM, Shape};
+use super::header::{
+    BEFORE_CHECKSUM, DIGITS, LENGTH_FIELD, MAGIC, MAX_HEADER, RULE, SECTION_CHECKSUM, Shape,
+};
 use super::{AssetError, Container, FORMAT_VERSION, FORMAT_VERSION_OF_RULES, Section, TeSdf};
 
 pub use crate::save::save_atomic;

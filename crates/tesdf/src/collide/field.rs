@@ -382,7 +382,11 @@ impl TeSdf {
             }
             let outward = if value.distance < 0.0 { closest.point - p } else { p - closest.point };
             let gradient = match on_surface {
-                true => self.local_triangle(face as usize).normal,
+                true => self.outward(
+                    self.local_triangle(face as usize).normal,
+                    closest.point,
+                    4.0 * tie.max(ON_SURFACE_F64),
+                ),
                 false => outward.normalize_or_zero(),
             };
             let (own, other) = (gradient.dot(normal), best.gradient.dot(normal));

@@ -47,7 +47,15 @@ impl Shape {
     pub fn validate(&self) -> Result<(), CollideError> {
         let positive = |x: f64| SIZE.contains(&x);
         let (shape, found, good) = match *self {
-            Self::Mesh(_) | Self::Plane => return Ok(()),
+            Self::Mesh(ref asset) => {
+                return match asset.without_contacts() {
+                    None => Ok(()),
+                    Some((found, expected)) => {
+                        Err(CollideError::Shape { shape: "mesh", found: found.into(), expected })
+                    }
+                };
+            }
+            Self::Plane => return Ok(()),
             Self::Box { half_extents: h } => {
                 ("box", format!("half extents {h}"), h.to_array().into_iter().all(positive))
             }

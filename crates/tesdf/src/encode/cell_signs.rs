@@ -37,8 +37,7 @@ impl SignFaces {
     /// Whether one of the faces comes within the padding of a cell.
     fn any_in(&self, cell: &Cell) -> bool {
         let (reach, mut any) = (Aabb::of(&cell.corners), false);
-        let meets =
-            |&f: &u32| triangle_meets_tetrahedron(&self.triangles[f as usize], &cell.corners, PAD);
+        let meets = |&f: &u32| triangle_meets_tetrahedron(&self.triangles[f as usize], &cell.corners, PAD);
         self.tree.visit(|bounds| bounds.overlaps(reach), |faces| any |= faces.iter().any(meets));
         any
     }

@@ -1,8 +1,8 @@
 use std::borrow::Cow;
 
 use super::assemble::assemble;
-use super::cell_signs::{CellSigns, SignFaces};
 use super::attempts::{EFFORT_PER_FACE, refine, refine_within_effort};
+use super::cell_signs::{CellSigns, SignFaces};
 use super::effort::Effort;
 use super::error::EncodeError;
 use super::hints::{Simplicity, sign_hints};
@@ -46,7 +46,6 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
     }
     let diagonal = mesh.diagonal();
     let frame = LocalFrame::of(mesh.bounds());
-    validated_inside(solid, &presented, &domain, options)?;
     let band = validated(options, &domain, diagonal)? * frame.scale;
     if mesh.faces().len() > layout::MAX_FACES {
         return Err(EncodeError::TooLarge {
@@ -57,6 +56,8 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
     }
     let local = local_mesh(mesh, frame)?;
     let signs = cell_signs(solid, &presented, &local);
+    let jumps = matches!(&signs, CellSigns::Rule(rule, _) if rule.jumps());
+    validated_inside(solid, &presented, jumps, &domain, options)?;
     let regions: Vec<Aabb> = options
         .region_boxes()
         .map(|r| Aabb { min: frame.to_local(r.min), max: frame.to_local(r.max) })
@@ -176,7 +177,7 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
     let mut certificate =
         Certificate::new(encoder, domain.name().into(), diagonal, roots.cube.side(), proved);
     certificate.inside = *solid.inside();
-    certificate.jumps = matches!(&signs, CellSigns::Rule(rule, _) if rule.jumps());
+    certificate.jumps = jumps;
     let about = about::About {
         source: source.clone(),
         options: EncodeOptions { inside: *solid.inside(), ..options.clone() },
@@ -184,6 +185,7 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
         signs: match presented.telling {
             Telling::Winding => Signs::Cells,
             Telling::Rule => Signs::Rule,
+            Telling::RuleUnoriented => Signs::RuleUnoriented,
             Telling::Sheet => Signs::Sheet,
         },
         statistics: statistics(&trees, &labels, &roots.cells, mesh, frame),
@@ -215,22 +217,15 @@ const FLOOR: f64 = 6.0;
 const FULL: f64 = 0.75;
 
 /// What tells the sides of the cells. `local` has the presented faces in the local frame.
-fn cell_signs(
-    solid: &SolidMesh,
-    presented: &Presented,
-    local: &TriangleMesh,
-) -> CellSigns {
+fn cell_signs(solid: &SolidMesh, presented: &Presented, local: &TriangleMesh) -> CellSigns {
     match presented.telling {
         Telling::Winding => CellSigns::Winding(WindingNumber::new(local)),
         Telling::Sheet => CellSigns::Unsigned,
-        Telling::Rule => {
+        Telling::Rule | Telling::RuleUnoriented => {
             let position = |v: u32| local.vertices()[v as usize];
             let faces = [local.faces(), &presented.sign_faces].concat();
             let triangles = presented.sign_faces.iter().map(|f| f.map(position)).collect();
-            CellSigns::Rule(
-                SignRule::new(solid.inside().rule, &faces, position),
-                SignFaces::new(triangles),
-            )
+            CellSigns::Rule(SignRule::new(solid.inside().rule, &faces, position), SignFaces::new(triangles))
         }
     }
 }
@@ -239,6 +234,7 @@ fn cell_signs(
 fn validated_inside(
     solid: &SolidMesh,
     presented: &Presented,
+    jumps: bool,
     domain: &Domain,
     options: &EncodeOptions,
 ) -> Result<(), EncodeError> {
@@ -256,7 +252,7 @@ fn validated_inside(
             "a positive length, at most 8 times the diagonal of the mesh",
         );
     }
-    if surface == SurfaceFaces::Boundary && (presented.telling == Telling::Sheet || !solid.is_closed()) {
+    if surface == SurfaceFaces::Boundary && (presented.telling == Telling::Sheet || jumps) {
         return wrong(
             "surface",
             "boundary, of a mesh without an exact inside".into(),

@@ -99,6 +99,11 @@ impl GeneralizedWinding {
         self.edges.is_empty()
     }
 
+    /// The winding number of the faces, which is that of the mesh where it is closed.
+    pub fn into_faces(self) -> WindingNumber {
+        self.faces
+    }
+
     /// The generalised winding number at `x + (e, e^2, e^3)` with an infinitesimal `e > 0`. It is 0
     /// for NaN.
     pub fn at(&self, x: DVec3) -> Generalized {

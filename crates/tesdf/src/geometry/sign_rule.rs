@@ -23,9 +23,10 @@ impl SignRule {
     /// The rule for these faces. `position` gives the position of a vertex.
     pub fn new(rule: InsideRule, faces: &[[u32; 3]], position: impl Fn(u32) -> DVec3) -> Self {
         let number = match rule {
-            InsideRule::Generalized => {
-                Number::Real(Box::new(GeneralizedWinding::new(faces, position)))
-            }
+            InsideRule::Generalized => match GeneralizedWinding::new(faces, position) {
+                winding if winding.is_closed() => Number::Integer(winding.into_faces()),
+                winding => Number::Real(Box::new(winding)),
+            },
             _ => {
                 let triangles = faces.iter().map(|f| f.map(&position)).collect();
                 Number::Integer(WindingNumber::of_triangles(triangles))

@@ -20,7 +20,7 @@ pub(crate) use faces::face_flaws;
 pub(crate) use intersections::self_intersections;
 pub(crate) use range::{coordinate_in_range, out_of_range};
 pub(crate) use t_junctions::{TJunctions, t_junctions};
-pub(crate) use winding::height;
+pub(crate) use winding::{FaceClass, Survey, height};
 
 /// The result of [`check`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -109,6 +109,11 @@ pub fn check(mesh: &TriangleMesh) -> CheckReport {
 /// [`Generalized`](InsideRule::Generalized) and [`Sheet`](InsideRule::Sheet) take any mesh whose
 /// coordinates are in the accepted range. All other defects are warnings then.
 pub fn check_for(mesh: &TriangleMesh, rule: InsideRule) -> CheckReport {
+    check_and_survey(mesh, rule).0
+}
+
+/// As [`check_for`], with the winding numbers on the sides of all faces, where they were found.
+pub(crate) fn check_and_survey(mesh: &TriangleMesh, rule: InsideRule) -> (CheckReport, Option<Survey>) {
     let topology = Topology::new(mesh.faces());
     let bounds = mesh.bounds();
     let mut report = CheckReport {
@@ -124,7 +129,7 @@ pub fn check_for(mesh: &TriangleMesh, rule: InsideRule) -> CheckReport {
         defects: out_of_range(mesh),
     };
     if !report.defects.is_empty() {
-        return report;
+        return (report, None);
     }
     let closed = topology.is_closed();
     let strict = !closed && rule.needs_closed();
@@ -143,10 +148,12 @@ pub fn check_for(mesh: &TriangleMesh, rule: InsideRule) -> CheckReport {
     defects.extend(intersections::defects(mesh, &pairs, lenient));
     // When pairs are missing, unknown faces could cut a patch.
     let is_sheet = matches!(rule, InsideRule::Sheet { .. });
+    let mut survey = None;
     if closed && !is_sheet && pairs.len() < intersections::max_pairs(mesh) {
         let meetings = winding::Meetings { flaws: &flaws, intersections: &pairs, touching: &touching };
-        let (range, found) = winding::winding_defects(mesh, &topology, &meetings, rule);
+        let (range, found, sides) = winding::winding_defects(mesh, &topology, &meetings, rule);
         report.winding = Some(range);
+        survey = Some(sides);
         defects.extend(found);
     }
     defects.extend(range::scale_defects(mesh));
@@ -157,7 +164,7 @@ pub fn check_for(mesh: &TriangleMesh, rule: InsideRule) -> CheckReport {
     }
     report.boundary_loops = edges::boundary_loops(mesh, &topology);
     report.encodable = !report.defects.iter().any(|d| d.severity == Severity::Error);
-    report
+    (report, survey)
 }
 
 impl CheckReport {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::count::count;
 use super::{
     CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, ReadError, Severity, Topology, TriangleMesh,
-    check_for, read,
+    check_and_survey, presented::Presentation, read,
 };
 use crate::base::{Inside, InsideRule};
 
@@ -30,8 +30,7 @@ pub struct SolidMesh {
     warnings: Vec<Defect>,
     simple: bool,
     inside: Inside,
-    winding: Option<[i32; 2]>,
-    closed: bool,
+    presentation: Presentation,
 }
 
 impl SolidMesh {
@@ -64,8 +63,8 @@ impl SolidMesh {
     pub(crate) fn load(path: &Path, inside: Inside) -> Result<(Self, LoadReport), ReadSolidError> {
         let LoadedMesh { mesh, report, .. } =
             read(path).map_err(|source| ReadSolidError::Read { path: path.to_owned(), source })?;
-        let solid =
-            Self::with_inside(mesh, inside).map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
+        let solid = Self::with_inside(mesh, inside)
+            .map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
         Ok((solid, report))
     }
 
@@ -121,16 +120,21 @@ impl SolidMesh {
     /// # }
     /// ```
     pub fn with_inside(mesh: TriangleMesh, inside: Inside) -> Result<Self, NotSolid> {
-        let report = check_for(&mesh, inside.rule);
+        let (report, survey) = check_and_survey(&mesh, inside.rule);
         if !report.encodable {
             let repairable = super::repair(&mesh, &super::RepairOptions::default())
                 .is_ok_and(|repaired| repaired.report.encodable);
-            return Err(NotSolid { rules: other_rules(&mesh, &report), report: Box::new(report), repairable });
+            return Err(NotSolid {
+                rules: other_rules(&mesh, &report),
+                report: Box::new(report),
+                repairable,
+            });
         }
         let simple = report.is_simple();
-        let closed = Topology::new(mesh.faces()).is_closed();
-        let (warnings, winding) = (report.defects, report.winding);
-        Ok(Self { mesh, warnings, simple, inside, winding, closed })
+        let (mut warnings, winding) = (report.defects, report.winding);
+        let presentation = Presentation::new(&mesh, inside, winding, survey);
+        warnings.extend(presentation.partly_buried(&mesh));
+        Ok(Self { mesh, warnings, simple, inside, presentation })
     }
 
     /// What is inside, and which faces are the surface.
@@ -138,14 +142,8 @@ impl SolidMesh {
         &self.inside
     }
 
-    /// Whether every directed edge is used as often as its reverse.
-    pub(crate) fn is_closed(&self) -> bool {
-        self.closed
-    }
-
-    /// Least and greatest winding number; `None` when they are unknown.
-    pub(crate) fn winding(&self) -> Option<[i32; 2]> {
-        self.winding
+    pub(super) fn presentation(&self) -> &Presentation {
+        &self.presentation
     }
 
     /// The mesh.
@@ -287,6 +285,8 @@ fn way_on(rule: InsideRule) -> &'static str {
             ". `--inside generalized` takes it as the solid that its faces enclose for the most part (generalised \
              winding number)"
         }
-        InsideRule::Sheet { .. } => ". `--inside sheet --thickness T` takes its faces as sheets of a thickness",
+        InsideRule::Sheet { .. } => {
+            ". `--inside sheet --thickness T` takes its faces as sheets of a thickness"
+        }
     }
 }

@@ -64,7 +64,7 @@ impl TeSdf {
     /// The normal of the surface at a point of it, so that it points outward. Winding numbers tell the
     /// direction of the faces only where inside is where they are 1 or more. `step` is the distance
     /// on both sides at which the side is looked up.
-    pub(super) fn outward(&self, normal: DVec3, at: DVec3, step: f64) -> DVec3 {
+    pub(crate) fn outward(&self, normal: DVec3, at: DVec3, step: f64) -> DVec3 {
         let Some(rule) = self.sign_rule() else { return normal };
         let [front, behind] = [1.0, -1.0].map(|s| rule.side(at + s * step * normal));
         if front == Side::Inside && behind == Side::Outside { -normal } else { normal }

@@ -118,7 +118,7 @@ pub fn verify(
     // Where cells tell the sign, they tell that of the winding number.
     let rule = match asset.about().signs {
         Signs::Cells => InsideRule::Winding,
-        Signs::Rule | Signs::Sheet => asset.inside().rule,
+        _ => asset.inside().rule,
     };
     let all = all_faces(asset)?;
     if rule.needs_closed() && !Topology::new(all.faces()).is_closed() {

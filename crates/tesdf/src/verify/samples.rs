@@ -106,12 +106,7 @@ const TRIES: usize = 64;
 const DEEPEST_OF: usize = 4;
 
 impl<'a> Sampler<'a> {
-    pub(super) fn new(
-        asset: &'a TeSdf,
-        mesh: &'a TriangleMesh,
-        sign: &'a TrueSign,
-        seed: u64,
-    ) -> Self {
+    pub(super) fn new(asset: &'a TeSdf, mesh: &'a TriangleMesh, sign: &'a TrueSign, seed: u64) -> Self {
         let diagonal = mesh.diagonal();
         // Relative to the diagonal, so that areas do not underflow.
         let areas = Weighted::new((0..mesh.faces().len()).map(|f| {

@@ -30,10 +30,7 @@ const KINDS: [CellKind; 6] = [
 ///
 /// The expected values are the least distance over all faces of the surface, and the side by the rule
 /// of `solid`, over all faces of its mesh. They use neither the lists nor the face tree.
-pub(crate) fn self_check(
-    asset: &TeSdf,
-    solid: &SolidMesh,
-) -> Result<Option<(Precision, Worst)>, MeshError> {
+pub(crate) fn self_check(asset: &TeSdf, solid: &SolidMesh) -> Result<Option<(Precision, Worst)>, MeshError> {
     let (mesh, _) = mesh_of(asset)?;
     let truth = BruteForce::new(&mesh, mesh.diagonal());
     let sign = TrueSign::new(solid.mesh().clone(), solid.inside().rule);

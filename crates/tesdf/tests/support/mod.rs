@@ -4,6 +4,7 @@
 #![allow(dead_code, reason = "each test program uses its own part")]
 
 pub mod bodies;
+pub mod brute_inside;
 pub mod cells;
 pub mod lowest;
 pub mod meshes;

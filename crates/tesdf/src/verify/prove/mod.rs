@@ -148,7 +148,13 @@ pub fn prove(
     let triangles: Vec<_> = surface.triangles.iter().map(|t| t.corners).collect();
     let counted = [triangles.as_slice(), &sign_faces].concat();
     let side = asset.cube.side().max(1.0);
-    let signs = Signs { asset, surface: &surface, rays: Rays::new(&counted), sign_faces: &sign_faces, gap: MISSED * side };
+    let signs = Signs {
+        asset,
+        surface: &surface,
+        rays: Rays::new(&counted),
+        sign_faces: &sign_faces,
+        gap: MISSED * side,
+    };
 
     let certificate = asset.about().certificate();
     let diagonal = asset.bounds().extent().length();

@@ -32,13 +32,15 @@ impl Signs<'_> {
     pub fn fault(&self, word: u32, cell: &Cell, node: Node, list: &[u32], near: &[u32]) -> Option<Fault> {
         let fault = self.located(word, cell).or_else(|| match self.asset.about().signs {
             about::Signs::Cells => self.label(cell, node),
-            about::Signs::Rule => self.label_of_rule(cell, node),
+            about::Signs::Rule | about::Signs::RuleUnoriented => self.label_of_rule(cell, node),
             about::Signs::Sheet => self.label_of_sheet(cell, node),
         });
         let is_told = match self.asset.about().signs {
             about::Signs::Cells => true,
             // Other cells leave the side to the rule, at each point.
-            about::Signs::Rule => matches!(node, Node::Listed(Label::Inside | Label::Outside, _)),
+            about::Signs::Rule | about::Signs::RuleUnoriented => {
+                matches!(node, Node::Listed(Label::Inside | Label::Outside, _))
+            }
             about::Signs::Sheet => false,
         };
         if !is_told {
@@ -117,7 +119,8 @@ impl Signs<'_> {
             !are_apart(&corners, &local, self.gap, error)
         });
         comes_in.then(|| {
-            let reason = "a face that counts for the sign may pass through the cell, whose label says that none does";
+            let reason =
+                "a face that counts for the sign may pass through the cell, whose label says that none does";
             Fault::undecided(Claim::Sign, reason).at(self.asset, middle)
         })
     }
