@@ -4,112 +4,17 @@ mod support;
 
 use proptest::prelude::*;
 use support::brute_inside::BruteInside;
+use support::parts::Turn::{Inward, Outward};
+use support::parts::{Parts, bowl, moebius};
 use support::random::Random;
 use tesdf::TeSdf;
 use tesdf::asset::{FORMAT_VERSION, FORMAT_VERSION_OF_RULES};
-use tesdf::base::{Inside, InsideRule};
+use tesdf::base::{Inside, InsideRule, SurfaceFaces};
 use tesdf::encode::{EncodeError, Encoder, Preset};
-use tesdf::glam::{DMat3, DVec3};
+use tesdf::glam::DVec3;
 use tesdf::mesh::{DefectKind, SolidMesh, TriangleMesh};
 use tesdf::query::Precision;
 use tesdf::verify::{ProveOptions, VerifyOptions, prove, verify};
-
-/// Faces from parts, which share no vertices.
-#[derive(Clone, Default)]
-struct Parts {
-    vertices: Vec<DVec3>,
-    faces: Vec<[u32; 3]>,
-}
-
-/// Whether the faces of a part look outward.
-#[derive(Clone, Copy, PartialEq)]
-enum Turn {
-    Outward,
-    Inward,
-}
-
-impl Parts {
-    fn add(mut self, vertices: &[DVec3], faces: &[[u32; 3]], turn: Turn) -> Self {
-        let first = self.vertices.len() as u32;
-        self.vertices.extend(vertices);
-        self.faces.extend(faces.iter().map(|f| {
-            let [a, b, c] = f.map(|v| v + first);
-            if turn == Turn::Outward { [a, b, c] } else { [a, c, b] }
-        }));
-        self
-    }
-
-    fn cube(self, low: DVec3, edge: f64, turn: Turn) -> Self {
-        self.add(&corners(low, edge), &sides(&[0, 1, 2, 3, 4, 5]), turn)
-    }
-
-    /// A cube without the side at its greatest z.
-    fn open_cube(self, low: DVec3, edge: f64, turn: Turn) -> Self {
-        self.add(&corners(low, edge), &sides(&[0, 2, 3, 4, 5]), turn)
-    }
-
-    fn mesh(self) -> TriangleMesh {
-        TriangleMesh::new(self.vertices, self.faces).expect("valid ids")
-    }
-
-    /// The mesh turned about a general axis.
-    fn turned(self) -> Self {
-        let turn = DMat3::from_rotation_x(0.3) * DMat3::from_rotation_y(0.7) * DMat3::from_rotation_z(1.1);
-        Self { vertices: self.vertices.into_iter().map(|v| turn * v).collect(), ..self }
-    }
-}
-
-fn corners(low: DVec3, edge: f64) -> Vec<DVec3> {
-    let corner = |k: u32| low + edge * DVec3::new((k & 1).into(), (k >> 1 & 1).into(), (k >> 2).into());
-    (0..8).map(corner).collect()
-}
-
-/// Two faces for each side of a cube: low z, high z, low y, high y, low x, high x.
-fn sides(which: &[usize]) -> Vec<[u32; 3]> {
-    let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    which
-        .iter()
-        .flat_map(|&k| [[quads[k][0], quads[k][1], quads[k][2]], [quads[k][0], quads[k][2], quads[k][3]]])
-        .collect()
-}
-
-/// A sphere of rings, from its south pole up to the ring `rings` of `n`.
-fn bowl(n: u32, rings: u32) -> Parts {
-    let mut vertices = vec![DVec3::NEG_Z];
-    for ring in 1..=rings {
-        let polar = std::f64::consts::PI * f64::from(ring) / f64::from(n);
-        for k in 0..2 * n {
-            let around = std::f64::consts::PI * f64::from(k) / f64::from(n);
-            vertices.push(DVec3::new(polar.sin() * around.cos(), polar.sin() * around.sin(), -polar.cos()));
-        }
-    }
-    let at = |ring: u32, k: u32| 1 + (ring - 1) * 2 * n + k % (2 * n);
-    let mut faces = Vec::new();
-    for k in 0..2 * n {
-        faces.push([0, at(1, k + 1), at(1, k)]);
-        for ring in 1..rings {
-            faces.push([at(ring, k), at(ring, k + 1), at(ring + 1, k)]);
-            faces.push([at(ring, k + 1), at(ring + 1, k + 1), at(ring + 1, k)]);
-        }
-    }
-    Parts { vertices, faces }
-}
-
-fn moebius(n: u32) -> Parts {
-    let vertices = (0..n).flat_map(|i| {
-        let around = 2.0 * std::f64::consts::PI * f64::from(i) / f64::from(n);
-        let across = DVec3::new(around.cos(), around.sin(), 0.0) * (0.5 * around).cos()
-            + DVec3::Z * (0.5 * around).sin();
-        let middle = 2.0 * DVec3::new(around.cos(), around.sin(), 0.0);
-        [middle - 0.5 * across, middle + 0.5 * across]
-    });
-    let faces = (0..n).flat_map(|i| {
-        let (a, b) = (2 * i, 2 * i + 1);
-        let (c, d) = if i + 1 < n { (a + 2, a + 3) } else { (1, 0) };
-        [[a, b, c], [b, d, c]]
-    });
-    Parts { vertices: vertices.collect(), faces: faces.collect() }
-}
 
 fn encode(mesh: &TriangleMesh, rule: InsideRule) -> TeSdf {
     let solid = SolidMesh::with_inside(mesh.clone(), Inside::new(rule)).expect("a solid");
@@ -187,7 +92,6 @@ fn assert_rule(mesh: &TriangleMesh, rule: InsideRule, n: usize) -> TeSdf {
 }
 
 use InsideRule::{Generalized, Nonzero, Odd, Sheet, Winding};
-use Turn::{Inward, Outward};
 
 /// Overlapping cubes, one of them inside out, coincident faces, and a cavity.
 fn mixed() -> TriangleMesh {
@@ -240,7 +144,8 @@ fn open_meshes_by_the_generalized_winding_number() {
         let asset = assert_rule(&mesh, Generalized, 100);
         assert!(asset.about().certificate().jumps());
         assert_eq!(asset.container().version(), FORMAT_VERSION_OF_RULES);
-        assert!(asset.is_inside(mesh.bounds().center() - 0.2 * mesh.bounds().extent() * DVec3::Z));
+        let points = points(&mesh, 200, 1);
+        assert!(points.iter().any(|&p| asset.is_inside(p)) && !points.iter().all(|&p| asset.is_inside(p)));
     }
 }
 
@@ -270,7 +175,11 @@ fn degenerate_meshes_have_distances_under_the_generalized_rule_and_as_sheets() {
         faces: vec![[0, 1, 2], [0, 1, 3], [0, 1, 4]],
     };
     for mesh in [triangle, twice, folded, flat, soup, fan, moebius(12)].map(Parts::mesh) {
-        assert_rule(&mesh, Generalized, 60);
+        // Two faces that look against each other enclose nothing.
+        match SolidMesh::with_inside(mesh.clone(), Generalized.into()) {
+            Ok(_) => drop(assert_rule(&mesh, Generalized, 60)),
+            Err(refusal) => assert_eq!((mesh.faces().len(), refusal.rules().len()), (2, 1)),
+        }
         let sheet = assert_rule(&mesh, Sheet { thickness: 0.1 }, 60);
         assert_eq!(sheet.container().version(), FORMAT_VERSION_OF_RULES);
         let on = mesh.triangle(0).iter().sum::<DVec3>() / 3.0;
@@ -336,6 +245,81 @@ fn options_that_do_not_fit_are_refused() {
         let error = Encoder::new().encode(&solid).expect_err("no thickness");
         assert!(matches!(error, EncodeError::Option { option: "thickness", .. }), "{error}");
     }
+}
+
+/// The asset of a mesh whose surface is the boundary. Compares it with brute force, for which the
+/// surface is the faces of the asset.
+fn assert_boundary(mesh: &TriangleMesh, rule: InsideRule, n: usize) -> TeSdf {
+    let inside = Inside { rule, surface: SurfaceFaces::Boundary };
+    let solid = SolidMesh::with_inside(mesh.clone(), inside).expect("a solid");
+    let asset = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
+    let ids: Vec<u32> = (0..asset.face_count()).map(|at| asset.face_id(at)).collect();
+    for (at, &id) in ids.iter().enumerate() {
+        let [mut stored, mut own] = [asset.face_vertices(at), mesh.faces()[id as usize]];
+        stored.sort_unstable();
+        own.sort_unstable();
+        assert_eq!(stored, own, "face {id}");
+    }
+    // Whether a face is surface, from points beside it: off the face by 1e-6, all over it.
+    let brute = BruteInside::of_all(mesh, rule);
+    let mut random = Random(3);
+    for face in 0..mesh.faces().len() as u32 {
+        let [a, b, c] = mesh.triangle(face as usize);
+        let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
+        let is_between = (0..200).any(|_| {
+            let [u, v, w] = random.weights::<3>();
+            let on = u * a + v * b + w * c;
+            let beside = [1.0, -1.0].map(|s| on + s * 1e-6 * normal);
+            // Another face between the point and the face would tell nothing.
+            let others = (0..mesh.faces().len() as u32).filter(|&f| f != face);
+            let others = BruteInside::new(mesh, rule, others);
+            let alone = others.distance(on) > 1e-5 || others.distance(on) < 1e-9;
+            alone && brute.is_inside(beside[0]) != brute.is_inside(beside[1])
+        });
+        assert_eq!(ids.contains(&face), is_between, "face {face}");
+    }
+    assert_exact(mesh, &asset, &BruteInside::new(mesh, rule, ids.into_iter()), n);
+    asset
+}
+
+#[test]
+fn the_boundary_leaves_out_faces_within_the_solid() {
+    // Nested, apart, and cubes that share a side: the boundary is of whole faces.
+    let nested = Parts::default().cube(DVec3::ZERO, 4.0, Outward).cube(DVec3::ONE, 1.0, Outward);
+    let nested =
+        nested.cube(DVec3::new(4.0, 0.0, 0.0), 4.0, Outward).cube(DVec3::splat(9.0), 1.0, Inward).mesh();
+    for (rule, faces) in [(Winding, 20), (Nonzero, 32)] {
+        let asset = assert_boundary(&nested, rule, 60);
+        assert_eq!((asset.face_count(), asset.container().sections().count()), (faces, 11), "{rule:?}");
+        assert_eq!(asset.container().version(), FORMAT_VERSION_OF_RULES);
+    }
+    // An odd number counts the nested cube as a cavity.
+    assert_eq!(assert_boundary(&nested, Odd, 60).face_count(), 44);
+}
+
+#[test]
+fn faces_partly_within_the_solid_stay_and_the_sign_counts_all_faces() {
+    let mesh =
+        Parts::default().cube(DVec3::ZERO, 2.0, Outward).cube(DVec3::new(1.0, 0.5, 0.25), 1.5, Outward);
+    let mesh = mesh.cube(DVec3::new(1.25, 0.75, 0.5), 0.5, Outward).mesh();
+    let inside = Inside { rule: Winding, surface: SurfaceFaces::Boundary };
+    let solid = SolidMesh::with_inside(mesh.clone(), inside).expect("a solid");
+    let partly = |d: &&tesdf::mesh::Defect| d.kind == DefectKind::PartlyBuried;
+    assert_eq!(solid.warnings().iter().filter(partly).count(), 1, "{:?}", solid.warnings());
+    let asset = assert_boundary(&mesh, Winding, 120);
+    assert!(asset.face_count() < mesh.faces().len());
+    assert_boundary(&mixed(), Nonzero, 60);
+    assert_boundary(&mixed(), Odd, 60);
+    // The depth in the middle of the overlap is that of the union, as far as walls are left out.
+    let spheres = Parts {
+        vertices: bowl(10, 10).vertices.iter().map(|&v| v + 0.7 * DVec3::X).collect(),
+        ..bowl(10, 10)
+    };
+    let spheres = bowl(10, 10).add(&spheres.vertices, &spheres.faces, Outward).mesh();
+    let asset = assert_boundary(&spheres, Winding, 40);
+    let middle = DVec3::new(0.35, 0.0, 0.0);
+    let [boundary, all] = [asset.signed_distance(middle), encode(&spheres, Winding).signed_distance(middle)];
+    assert!(boundary < -0.8 && all > -0.7, "{boundary} {all}");
 }
 
 proptest! {

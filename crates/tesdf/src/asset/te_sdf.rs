@@ -234,22 +234,31 @@ impl TeSdf {
         })
     }
 
+    /// Bounds of the solid, in the unit of the mesh: those of the mesh, and half of the thickness of a
+    /// sheet around them.
+    pub(crate) fn bounds_of_solid(&self) -> Aabb {
+        self.bounds.grown(self.half_thickness * self.frame.inverse_scale())
+    }
+
+    /// Whether the faces stand for their winding number: inside is where it is 1 or more, so they
+    /// enclose the solid.
+    #[doc(hidden)]
+    pub fn faces_enclose_the_solid(&self) -> bool {
+        self.about.signs == Signs::Cells
+    }
+
     /// Why contacts with the asset are not known; `None` when they are.
     pub(crate) fn without_contacts(&self) -> Option<(&'static str, &'static str)> {
         match self.about.signs {
-            Signs::Sheet => Some((
-                "its faces have a thickness, which contacts do not know yet",
-                "a solid: give the sheet its thickness as faces, or close it with `tesdf repair --fill-holes`",
-            )),
             _ if self.about.certificate().jumps() => Some((
                 "its signed distance jumps in the holes of the mesh",
-                "a closed mesh, as `tesdf repair --fill-holes` makes it",
+                "a closed mesh, as `tesdf repair --fill-holes` makes it, or sheets (`--inside sheet`)",
             )),
             Signs::RuleUnoriented => Some((
                 "some of its faces have the inside in front of them in one place and behind them in another",
                 "faces that look outward: cut overlaps off with `tesdf repair --union`, or use the rule `winding`",
             )),
-            Signs::Cells | Signs::Rule => None,
+            Signs::Cells | Signs::Rule | Signs::Sheet => None,
         }
     }
 

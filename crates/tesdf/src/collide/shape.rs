@@ -75,7 +75,7 @@ impl Shape {
     /// Bounds in the shape's frame; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         match self {
-            Self::Mesh(asset) => asset.bounds(),
+            Self::Mesh(asset) => asset.bounds_of_solid(),
             simple => Simple::from(simple).bounds(),
         }
     }

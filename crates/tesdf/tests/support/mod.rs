@@ -8,6 +8,7 @@ pub mod brute_inside;
 pub mod cells;
 pub mod lowest;
 pub mod meshes;
+pub mod parts;
 pub mod per_face;
 pub mod points;
 pub mod random;

@@ -134,8 +134,9 @@ pub fn prove(
     options: &ProveOptions,
     progress: impl Fn(f64) -> ControlFlow<()> + Sync,
 ) -> Result<ProveReport, ProveError> {
-    let surface = Surface::new(&asset.vertices, &asset.faces, asset.frame)?;
-    let sign_faces = surface.sign_triangles(asset.sign_faces.as_deref().unwrap_or(&[]));
+    let sign_faces = asset.sign_faces.as_deref().unwrap_or(&[]);
+    let surface = Surface::new(&asset.vertices, [&asset.faces, sign_faces], asset.frame)?;
+    let sign_faces = surface.sign_triangles(sign_faces);
     let signs_of = asset.about().signs;
     if !asset.about().certificate().jumps() && signs_of != about::Signs::Sheet {
         check_closed(asset, &surface)?;

@@ -177,9 +177,10 @@ impl Signs<'_> {
     pub fn beyond_cube(&self) -> Option<Fault> {
         let (low, side) = (self.asset.cube.origin(), self.asset.cube.side());
         let is_beyond = |p: &DVec3| !(p.cmpge(low).all() && p.cmple(low + side).all());
-        let at = self.surface.points.iter().find(|p| is_beyond(p))?;
+        let mut corners = self.surface.triangles.iter().flat_map(|t| t.corners);
+        let at = corners.find(|p| is_beyond(p))?;
         let reason = "a vertex lies outside of the cube, where every query says outside";
-        Some(Fault::refuted(Claim::Sign, reason).at(self.asset, *at))
+        Some(Fault::refuted(Claim::Sign, reason).at(self.asset, at))
     }
 }
 

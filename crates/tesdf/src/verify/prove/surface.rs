@@ -30,17 +30,29 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The mesh of an asset.
+    /// The mesh of an asset. `faces` are those of the surface, then those that count for the sign
+    /// only. Vertices that none of them uses do not matter.
     ///
     /// # Errors
     /// [`ProveError::Frame`] when mapping a vertex to the local frame rounds it, or the vertex lies
     /// farther than [`FARTHEST`] from the origin.
-    pub fn new(vertices: &[[f64; 3]], faces: &[[u32; 3]], frame: LocalFrame) -> Result<Self, ProveError> {
+    pub fn new(
+        vertices: &[[f64; 3]],
+        [faces, sign_faces]: [&[[u32; 3]]; 2],
+        frame: LocalFrame,
+    ) -> Result<Self, ProveError> {
+        let mut is_used = vec![false; vertices.len()];
+        let corners = faces.iter().chain(sign_faces).flatten();
+        corners.for_each(|&v| is_used[v as usize] = true);
         let is_exact = |v: DVec3| (0..3).all(|k| difference(v[k], frame.offset[k]).1 == 0.0);
         let mut places = HashMap::new();
         let mut points = Vec::new();
         let mut place_of = Vec::with_capacity(vertices.len());
         for (vertex, &v) in vertices.iter().enumerate() {
+            if !is_used[vertex] {
+                place_of.push(u32::MAX);
+                continue;
+            }
             let v = DVec3::from_array(v);
             let p = frame.to_local(v);
             let back = p / frame.scale;
