@@ -5,8 +5,10 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use pyo3::types::PyString;
 use tesdf::encode::{
-    Deformation, Domain, DomainChoice, EncodeChoices, Encoder, MethodChoice, Preset, Refinement, Threshold,
+    Deformation, Domain, DomainChoice, EncodeChoices, Encoder, MethodChoice, Preset, Refinement, RuleChoice,
+    Threshold,
 };
+use tesdf::base::SurfaceFaces;
 use tesdf::{Progress, Stage};
 
 use crate::asset::Asset;
@@ -41,6 +43,13 @@ use crate::pool;
 ///   diagonal, and no layer with "gmsh".
 /// - regions: boxes [R, 6] that are encoded as well, each min x y z, max x y z.
 /// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing.
+/// - inside: the rule that says what is inside. "winding": a winding number of 1 or more, "nonzero":
+///   other than 0, "odd": odd; these need a closed mesh. "generalized": a generalised winding number
+///   of 1/2 or more in absolute value; for open meshes. "sheet": nearer to a face than half of the
+///   thickness; for any faces.
+/// - thickness: that of a sheet, in the mesh's unit.
+/// - surface: the faces to which distances refer: "all", or "boundary", the faces between inside and
+///   outside.
 /// - threads: number of threads; None is one per core. The bytes of the asset do not depend on it.
 /// - progress: called with the stage ("refine", "tighten", "assemble") and the completed fraction
 ///   of it, 0 to 1, about twenty times a second. An exception from it ends the encoding and is
@@ -52,7 +61,8 @@ use crate::pool;
 #[pyfunction]
 #[pyo3(signature = (
     mesh, preset = "default", *, domain = None, encoder = None, resolution = None, threshold = None, e_max = None,
-    deformable = false, plain = false, band = None, regions = None, unit = None, threads = None, progress = None
+    deformable = false, plain = false, band = None, regions = None, unit = None, inside = "winding", thickness = None,
+    surface = "all", threads = None, progress = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn encode(
@@ -69,6 +79,9 @@ pub fn encode(
     band: Option<f64>,
     regions: Option<Vec<[f64; 6]>>,
     unit: Option<String>,
+    inside: &str,
+    thickness: Option<f64>,
+    surface: &str,
     threads: Option<NonZeroUsize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Asset> {
@@ -84,6 +97,9 @@ pub fn encode(
         band,
         regions: regions.unwrap_or_default(),
         unit,
+        rule: named_rule(inside)?,
+        thickness,
+        surface: named_surface(surface)?,
     };
     let options = choices.options().map_err(|e| Error::Choice(e).raise(py))?;
 
@@ -92,7 +108,7 @@ pub fn encode(
     let state = Progress::default();
     let work = || {
         pool.install(|| {
-            let (solid, path, source) = input.load()?.solid()?;
+            let (solid, path, source) = input.load()?.solid(options.inside)?;
             let tetrahedra = choices.tetrahedra(&solid, &state).map_err(Error::Domain)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
             Encoder::new()
@@ -119,6 +135,19 @@ pub fn encode(
     let encoded = cancellable(py, work, || state.cancel(), watch)?.map_err(|e| e.raise(py))?;
     watch()?;
     Ok(Asset::new(encoded))
+}
+
+fn named_rule(name: &str) -> PyResult<RuleChoice> {
+    let expected = "'winding', 'nonzero', 'odd', 'generalized' or 'sheet'";
+    name.parse().map_err(|_| argument("inside", format!("'{name}'"), expected))
+}
+
+fn named_surface(name: &str) -> PyResult<SurfaceFaces> {
+    match name {
+        "all" => Ok(SurfaceFaces::All),
+        "boundary" => Ok(SurfaceFaces::Boundary),
+        _ => Err(argument("surface", format!("'{name}'"), "'all' or 'boundary'")),
+    }
 }
 
 fn named_preset(name: &str) -> PyResult<Preset> {

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyString;
 use serde::Serialize;
 use tesdf::asset::about::Source;
+use tesdf::base::Inside;
 use tesdf::mesh::{RepairOptions, RepairReport, SolidMesh, TriangleMesh, read};
 
 use crate::arrays::{self, Rows};
@@ -66,9 +67,9 @@ impl MeshInput {
 }
 
 impl Loaded {
-    /// Checks that the mesh is a solid. Returns it with the path and the source.
-    pub fn solid(self) -> Result<(SolidMesh, Option<PathBuf>, Source), Error> {
-        match SolidMesh::new(self.mesh) {
+    /// Checks that the mesh is a solid under a rule. Returns it with the path and the source.
+    pub fn solid(self, inside: Inside) -> Result<(SolidMesh, Option<PathBuf>, Source), Error> {
+        match SolidMesh::with_inside(self.mesh, inside) {
             Ok(solid) => Ok((solid, self.path, self.source)),
             Err(e) => Err(Error::NotSolid(self.path, e)),
         }

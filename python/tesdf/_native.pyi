@@ -44,6 +44,9 @@ def encode(
     band: float | None = None,
     regions: Sequence[Sequence[float]] | None = None,
     unit: str | None = None,
+    inside: Literal["winding", "nonzero", "odd", "generalized", "sheet"] = "winding",
+    thickness: float | None = None,
+    surface: Literal["all", "boundary"] = "all",
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,
 ) -> Asset: ...

@@ -134,6 +134,11 @@ class Certificate:
     chains: Optional[int]
     """largest weight of a chain of shared features (rule C) in the proof of a list, at most 400;
     None if nothing is proved"""
+    inside: Any = None
+    """the rule that says what is inside and the faces that are the surface; None is the winding
+    number and all faces"""
+    jumps: bool = False
+    """whether the sign changes in holes of an open mesh, where the distance is not 0"""
 
 
 @dataclass(frozen=True)

@@ -47,12 +47,16 @@ pub struct Args {
 }
 
 fn exactness(certificate: &Certificate) -> String {
-    match (certificate.delta_of_diagonal(), certificate.exactness_distance()) {
+    let exact = match (certificate.delta_of_diagonal(), certificate.exactness_distance()) {
         (Some(delta), None) => format!("to {delta:.1e} of the diagonal, proven"),
         (Some(delta), Some(within)) => {
             format!("to {delta:.1e} of the diagonal up to {within:.4e} from the surface, proven")
         }
         (None, _) => "not proven: faces between samples may be missing".into(),
+    };
+    match certificate.jumps() {
+        true => format!("{exact}; the sign changes in holes of the mesh, where the distance is not 0"),
+        false => exact,
     }
 }
 
@@ -87,15 +91,15 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let start = Instant::now();
     let LoadedMesh { mesh, report: load, .. } = mesh_file::read(&args.mesh)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.mesh.display()));
-    let solid = pool.install(|| SolidMesh::new(mesh)).map_err(|e| at(&e))?;
+    let choices = args.choices.choices();
+    let options = choices.options().map_err(Failure::new)?;
+    let solid = pool.install(|| SolidMesh::with_inside(mesh, options.inside)).map_err(|e| at(&e))?;
     load.notes.iter().for_each(|note| report::warning(note));
     warn(solid.warnings());
 
     let source = Source::of_file(&args.mesh, load.source_blake3.clone());
     let interrupted = interrupt_flag()?;
     let progress = Progress::default();
-    let choices = args.choices.choices();
-    let options = choices.options().map_err(Failure::new)?;
     if options.method == Method::Certified && args.device != Choice::Processor {
         return Err(Failure::new("--device only applies to the sampled encoder; add --encoder sampled"));
     }
@@ -199,6 +203,7 @@ fn print(
         ("file", format!("{output}, {}, {bytes_per_face:.0} per face", report::size(bytes))),
         ("cells", format!("{cells}, of which {} with a list", statistics.listed_cells)),
         ("lists", format!("{mean:.1} faces on average, at most {}", statistics.longest_list)),
+        ("inside", about.certificate().inside().to_string()),
         ("exact", exactness(about.certificate())),
         ("time", format!("{seconds:.1} s")),
     ])

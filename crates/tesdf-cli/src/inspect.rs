@@ -2,7 +2,6 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use tesdf::asset::FORMAT_VERSION;
 use tesdf::asset::about::{Source, Statistics};
 use tesdf::encode::EncodeOptions;
 use tesdf::inspect::{InspectOptions, Inspection, inspect};
@@ -45,7 +44,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let about = asset.about();
     let report = Report {
         file: args.file.display().to_string(),
-        format_version: FORMAT_VERSION,
+        format_version: asset.container().version(),
         unit: about.options.unit.as_deref(),
         found: &found,
         source: &about.source,
@@ -59,6 +58,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         report::table(&rows(&report))?;
     }
     Ok(Outcome::Good)
+}
+
+fn inside(certificate: &Certificate) -> String {
+    let jumps = if certificate.jumps() { "; the sign changes in holes of the mesh, where the distance is not 0" } else { "" };
+    format!("{}{jumps}", certificate.inside())
 }
 
 fn rows(report: &Report) -> Vec<(String, String)> {
@@ -84,6 +88,7 @@ fn rows(report: &Report) -> Vec<(String, String)> {
         ("", String::new()),
         ("mesh", format!("{}, {}", count(counts.faces, "face"), count(counts.vertices, "vertex"))),
         ("diagonal", length(statistics.diagonal)),
+        ("inside", inside(certificate)),
         (
             "cells with a list",
             format!("{}, {} of them at the surface", counts.listed_cells, counts.crossing_cells),

@@ -30,6 +30,15 @@ pub enum MassError {
     /// The shape is a half space.
     #[error("a plane has no finite mass; make the body fixed")]
     Plane,
+    /// The faces of the mesh do not enclose the solid.
+    #[error(
+        "the inside of the mesh is by the rule `{rule}`, whose volume its faces do not give; make the body fixed, or \
+         encode it with another rule"
+    )]
+    Rule {
+        /// The rule.
+        rule: &'static str,
+    },
     /// The mesh encloses no positive volume.
     #[error("the mesh encloses {volume:e} m³; a free body needs a closed mesh whose faces point outward")]
     NoVolume {
@@ -46,9 +55,13 @@ impl MassProperties {
     /// counts twice, and a volume inside an inverted surface counts as negative.
     ///
     /// # Errors
-    /// A density that is not positive, a plane, or a mesh without volume.
+    /// A density that is not positive, a plane, a mesh whose faces do not enclose the solid, or a mesh
+    /// without volume.
     pub fn of_shape(shape: &Shape, scale: f64, density: f64) -> Result<Self, MassError> {
         let unit = match shape {
+            Shape::Mesh(asset) if !asset.faces_enclose_the_solid() => {
+                return Err(MassError::Rule { rule: asset.inside().rule.name() });
+            }
             Shape::Mesh(asset) => Self::of_triangles((0..asset.face_count()).map(|f| asset.face_corners(f)))?,
             Shape::Plane => return Err(MassError::Plane),
             Shape::Box { half_extents: h } => {

@@ -2,7 +2,8 @@
 use std::num::NonZeroU32;
 
 use clap::ValueEnum;
-use tesdf::encode::{Deformation, DomainChoice, EncodeChoices, Refinement, Threshold};
+use tesdf::base::SurfaceFaces;
+use tesdf::encode::{Deformation, DomainChoice, EncodeChoices, Refinement, RuleChoice, Threshold};
 use tesdf::geometry::Aabb;
 use tesdf_terminal::parse;
 
@@ -49,6 +50,61 @@ pub struct ChoiceArgs {
     /// Name of the mesh's unit; it is recorded in the file and scales nothing
     #[arg(long, value_name = "NAME")]
     pub unit: Option<String>,
+    /// Rule that says what is inside
+    #[arg(long, value_enum, value_name = "RULE", default_value_t = Rule::Winding)]
+    pub inside: Rule,
+    /// Thickness of a sheet, in the mesh's unit
+    #[arg(long, value_name = "LENGTH", value_parser = parse::length)]
+    pub thickness: Option<f64>,
+    /// Faces to which distances refer
+    #[arg(long, value_enum, value_name = "FACES", default_value_t = SurfaceChoice::All)]
+    pub surface: SurfaceChoice,
+}
+
+/// Rules that say what is inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Rule {
+    /// A winding number of 1 or more; the mesh must be closed
+    Winding,
+    /// A winding number other than 0: takes shells that are inside out; the mesh must be closed
+    Nonzero,
+    /// An odd winding number: overlaps of two solids are outside; the mesh must be closed
+    Odd,
+    /// A generalised winding number of 1/2 or more in absolute value; for open meshes, whose distance
+    /// jumps in the holes
+    Generalized,
+    /// Nearer to a face than half of a thickness; for sheets, and any other faces
+    Sheet,
+}
+
+/// Faces to which distances refer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SurfaceChoice {
+    /// All faces
+    All,
+    /// Faces between inside and outside; faces within the solid are left out
+    Boundary,
+}
+
+impl From<Rule> for RuleChoice {
+    fn from(rule: Rule) -> Self {
+        match rule {
+            Rule::Winding => Self::Winding,
+            Rule::Nonzero => Self::Nonzero,
+            Rule::Odd => Self::Odd,
+            Rule::Generalized => Self::Generalized,
+            Rule::Sheet => Self::Sheet,
+        }
+    }
+}
+
+impl From<SurfaceChoice> for SurfaceFaces {
+    fn from(choice: SurfaceChoice) -> Self {
+        match choice {
+            SurfaceChoice::All => Self::All,
+            SurfaceChoice::Boundary => Self::Boundary,
+        }
+    }
 }
 
 /// Methods that find the closest faces of a tetrahedron.
@@ -116,6 +172,9 @@ impl ChoiceArgs {
             band: self.band,
             regions: self.regions.iter().map(numbers).collect(),
             unit: self.unit.clone(),
+            rule: self.inside.into(),
+            thickness: self.thickness,
+            surface: self.surface.into(),
         }
     }
 }

@@ -122,7 +122,7 @@ impl Job {
             let found = format!("{} changed while it was read; encode it again", path.display());
             return Err(Failure::new(found));
         }
-        let solid = SolidMesh::new(surface).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+        let solid = SolidMesh::with_inside(surface, self.options.inside).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
         let encoder =
             Encoder::new().options(self.options.clone()).source(expected.source.clone()).progress(stop);
         let asset = encode(&solid, path, &self.choices, encoder, stop)?;

@@ -6,7 +6,8 @@ use tesdf::collide::{
     CoarseContact, CollideError, CollideOptions, Contacts, Instance, Mode, Pose, Scene, Shape, ShapeId,
     Velocity, coarse_contacts, detect,
 };
-use tesdf::encode::{EncodeError, EncodeFileError, Encoder, Preset};
+use tesdf::base::Inside;
+use tesdf::encode::{EncodeChoices, EncodeError, EncodeFileError, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::{Length, Progress, TeSdf};
 
@@ -180,7 +181,7 @@ enum ShapeFailure {
 
 /// The shapes of files, by path: bodies share them.
 #[derive(Default)]
-struct Shapes(BTreeMap<PathBuf, ShapeId>);
+struct Shapes(BTreeMap<(PathBuf, String), ShapeId>);
 
 impl Shapes {
     fn get(
@@ -194,14 +195,15 @@ impl Shapes {
             (Some(file), None, None) | (None, Some(file), None) => {
                 let file = scene.resolve(file);
                 // A file that is reached by several paths is opened only once.
-                let key = file.canonicalize().unwrap_or_else(|_| file.clone());
+                let inside = inside(body).map_err(ShapeFailure::Reason)?;
+                let key = (file.canonicalize().unwrap_or_else(|_| file.clone()), inside.to_string());
                 if let Some(&shape) = self.0.get(&key) {
                     return Ok(shape);
                 }
                 let opened = match body.asset {
                     Some(_) => TeSdf::open(&file)
                         .map_err(|e| ShapeFailure::Reason(format!("{}: {e}", file.display())))?,
-                    None => encode_mesh(&file, progress)?,
+                    None => encode_mesh(&file, inside, progress)?,
                 };
                 let shape = add_shape(system, Shape::Mesh(Arc::new(opened)))?;
                 self.0.insert(key, shape);
@@ -227,8 +229,24 @@ fn add_shape(system: &mut System, shape: Shape) -> Result<ShapeId, ShapeFailure>
     system.add_shape(shape).map_err(|e| ShapeFailure::Reason(e.to_string()))
 }
 
-fn encode_mesh(file: &Path, progress: &Progress) -> Result<TeSdf, ShapeFailure> {
-    let encoder = Encoder::new().preset(Preset::Fast).progress(progress);
+/// What is inside of the mesh of a body.
+fn inside(body: &BodySection) -> Result<Inside, String> {
+    let BodySection { inside, thickness, surface, .. } = body;
+    if body.mesh.is_none() && (inside.is_some() || thickness.is_some() || surface.is_some()) {
+        return Err("inside, thickness and surface are of a mesh that the scene encodes; an asset has its own".into());
+    }
+    let rule = inside.as_deref().map(str::parse).transpose();
+    let choices = EncodeChoices {
+        rule: rule.map_err(|e| format!("inside is {}; {e}", inside.as_deref().unwrap_or_default()))?.unwrap_or_default(),
+        thickness: *thickness,
+        surface: surface.unwrap_or_default(),
+        ..EncodeChoices::default()
+    };
+    choices.inside().map_err(|e| e.to_string())
+}
+
+fn encode_mesh(file: &Path, inside: Inside, progress: &Progress) -> Result<TeSdf, ShapeFailure> {
+    let encoder = Encoder::new().preset(Preset::Fast).inside(inside).progress(progress);
     encoder.encode_file(file).map_err(|e| match e {
         EncodeFileError::Encode { source: EncodeError::Cancelled, .. } => ShapeFailure::Cancelled,
         e => ShapeFailure::Reason(e.to_string()),

@@ -56,6 +56,7 @@ mod units;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use tesdf::base::SurfaceFaces;
 use tesdf::collide::ContactsPer;
 use toml::Spanned;
 
@@ -171,6 +172,16 @@ pub struct BodySection {
     /// Path of a mesh file, which is encoded with the preset `fast` when the scene is loaded.
     #[serde(default)]
     pub mesh: Option<PathBuf>,
+    /// What is inside of the mesh of `mesh`: `winding`, `nonzero`, `odd`, `generalized` or `sheet`. The
+    /// default is `winding`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inside: Option<String>,
+    /// Thickness of the mesh as a sheet, in the unit of the mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thickness: Option<f64>,
+    /// The surface of the mesh: `all` faces, or the `boundary` between inside and outside.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceFaces>,
     /// A simple shape.
     #[serde(default)]
     pub shape: Option<ShapeSection>,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::AssetError;
 use super::options::EncodeOptions;
-use crate::base::{Certificate, Written};
+use crate::base::{Certificate, Inside, InsideRule, SurfaceFaces, Written};
 
 /// The file that a mesh came from.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -57,6 +57,70 @@ pub struct Statistics {
     pub volume_weighted_list: f64,
 }
 
+/// How an asset tells the sign.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Signs {
+    /// By the labels of its cells, and by the winding number of its faces in crossing cells: inside
+    /// is where it is 1 or more.
+    #[default]
+    Cells,
+    /// By the labels of its cells, and by the rule of its certificate in crossing cells, over its
+    /// faces and its sign faces.
+    Rule,
+    /// The same, and some faces have the inside in front of them in places, or may have it.
+    RuleUnoriented,
+    /// The distance to the faces has no sign. Half of the thickness is subtracted.
+    Sheet,
+}
+
+impl Signs {
+    /// Whether a rule is evaluated at points.
+    pub fn are_by_rule(self) -> bool {
+        matches!(self, Self::Rule | Self::RuleUnoriented)
+    }
+
+    /// The metadata key of an asset that tells the sign in another way than [`Cells`](Self::Cells).
+    const KEY: &str = super::header::RULE;
+
+    /// The value of the key. Where faces are left out, ids of faces have gaps, which a reader of
+    /// version 1 refuses.
+    fn text(self, inside: &Inside) -> Option<&'static str> {
+        match self {
+            Self::Cells if inside.surface == SurfaceFaces::All => None,
+            Self::Cells => Some("cells"),
+            Self::Rule => Some("rule"),
+            Self::RuleUnoriented => Some("rule-unoriented"),
+            Self::Sheet => Some("sheet"),
+        }
+    }
+
+    fn read(metadata: &BTreeMap<String, String>, certificate: &Certificate) -> Result<Self, AssetError> {
+        let inside = certificate.inside();
+        let is_sheet = matches!(inside.rule, InsideRule::Sheet { .. });
+        let signs = match metadata.get(Self::KEY).map(String::as_str) {
+            None | Some("cells") => Self::Cells,
+            Some("rule") => Self::Rule,
+            Some("rule-unoriented") => Self::RuleUnoriented,
+            Some("sheet") => Self::Sheet,
+            Some(other) => {
+                let reason = format!(
+                    "{} is {}; expected cells, rule, rule-unoriented or sheet",
+                    Self::KEY,
+                    super::error::shown(other)
+                );
+                return Err(AssetError::header(reason));
+            }
+        };
+        let half = inside.rule.half_thickness();
+        if is_sheet != (signs == Self::Sheet) || is_sheet && !(half.is_finite() && half > 0.0) {
+            let reason =
+                format!("the certificate's rule {} does not fit the key {}", inside.rule.name(), Self::KEY);
+            return Err(AssetError::header(reason));
+        }
+        Ok(signs)
+    }
+}
+
 /// Everything that an asset says about itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct About {
@@ -67,6 +131,7 @@ pub struct About {
     pub(crate) certificate: Certificate,
     /// The counts of the encoding.
     pub statistics: Statistics,
+    pub(crate) signs: Signs,
 }
 
 impl About {
@@ -78,12 +143,15 @@ impl About {
     /// The metadata of a container, with one JSON text for each key.
     pub fn to_metadata(&self) -> BTreeMap<String, String> {
         let json = |v: serde_json::Result<String>| v.unwrap_or_default();
-        BTreeMap::from([
+        let mut metadata = BTreeMap::from([
             ("source".into(), json(serde_json::to_string(&self.source))),
             ("options".into(), json(serde_json::to_string(&self.options))),
             ("certificate".into(), json(serde_json::to_string(&self.certificate))),
             ("statistics".into(), json(serde_json::to_string(&self.statistics))),
-        ])
+        ]);
+        metadata
+            .extend(self.signs.text(self.certificate.inside()).map(|text| (Signs::KEY.into(), text.into())));
+        metadata
     }
 
     /// Reads the metadata of a container.
@@ -91,10 +159,12 @@ impl About {
     /// # Errors
     /// Names the key that is missing, or whose text does not parse.
     pub fn from_metadata(metadata: &BTreeMap<String, String>) -> Result<Self, AssetError> {
+        let certificate = read::<Written>(metadata, "certificate")?.into();
         Ok(Self {
+            signs: Signs::read(metadata, &certificate)?,
             source: read(metadata, "source")?,
             options: read(metadata, "options")?,
-            certificate: read::<Written>(metadata, "certificate")?.into(),
+            certificate,
             statistics: read(metadata, "statistics")?,
         })
     }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use memmap2::Mmap;
 
 use super::header::{self, SECTION_CHECKSUM, Shape};
-use super::{AssetError, Presence, Section, SectionSpec};
+use super::{AssetError, FORMAT_VERSION_OF_RULES, Presence, Section, SectionSpec};
 use crate::input;
 
 #[cfg(target_endian = "big")]
@@ -40,6 +40,7 @@ pub struct Container {
     header_end: usize,
     /// Position of the digits of the header's checksum.
     pub(super) digits: usize,
+    version: u32,
 }
 
 #[derive(Debug)]
@@ -124,7 +125,7 @@ impl Container {
 
     fn new(storage: Storage, table: &[SectionSpec]) -> Result<Self, AssetError> {
         let bytes = storage.bytes();
-        let (digits, header_end) = header::read_prefix(bytes)?;
+        let header::Prefix { version, digits, end: header_end } = header::read_prefix(bytes)?;
         let header::Header { mut metadata, entries } =
             header::parse(&bytes[header::LENGTH_FIELD..header_end])?;
         let mut sections: Vec<Placed> = Vec::with_capacity(table.len());
@@ -194,7 +195,19 @@ impl Container {
                 super::error::shown(key)
             )));
         }
-        Ok(Self { storage: Arc::new(storage), metadata, sections, header_end, digits })
+        if (version == FORMAT_VERSION_OF_RULES) != metadata.contains_key(header::RULE) {
+            let only = format!(
+                "version {version}: files of version {FORMAT_VERSION_OF_RULES}, and no others, have the metadata key {}",
+                header::RULE
+            );
+            return Err(AssetError::header(only));
+        }
+        Ok(Self { storage: Arc::new(storage), metadata, sections, header_end, digits, version })
+    }
+
+    /// The version of the file format.
+    pub fn version(&self) -> u32 {
+        self.version
     }
 
     /// The metadata of the caller, as given to [`write_container`](super::write_container).

@@ -33,7 +33,7 @@ pub enum AssetError {
         next: &'static str,
     },
     /// The file has a version that this build does not read.
-    #[error("file-format version {found}; this build reads version {}; {}", super::FORMAT_VERSION, next_for_version(.found))]
+    #[error("file-format version {found}; this build reads versions {} and {}; {}", super::FORMAT_VERSION, super::FORMAT_VERSION_OF_RULES, next_for_version(.found))]
     Version {
         /// The version found, as written in the file.
         found: String,
@@ -94,7 +94,7 @@ fn bytes_follow(extra: &u64) -> String {
 
 fn next_for_version(found: &str) -> &'static str {
     match found.parse::<u32>() {
-        Ok(v) if v > super::FORMAT_VERSION => "a newer tesdf wrote it, update tesdf",
+        Ok(v) if v > super::FORMAT_VERSION_OF_RULES => "a newer tesdf wrote it, update tesdf",
         _ => "encode the mesh again",
     }
 }

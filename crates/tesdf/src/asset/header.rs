@@ -10,7 +10,7 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use super::error::shown;
-use super::{AssetError, FORMAT_VERSION};
+use super::{AssetError, FORMAT_VERSION, FORMAT_VERSION_OF_RULES};
 
 /// Number of bytes of the length field.
 pub(super) const LENGTH_FIELD: usize = 8;
@@ -24,6 +24,9 @@ pub(super) const BEFORE_CHECKSUM: &str = r#"","checksum":""#;
 pub(super) const DIGITS: usize = 64;
 /// Metadata keys with this prefix hold the checksums of sections.
 pub(super) const SECTION_CHECKSUM: &str = "checksum.";
+/// The metadata key that says how the sign is told. Files of [`FORMAT_VERSION_OF_RULES`] have it,
+/// other files do not.
+pub(super) const RULE: &str = "inside";
 
 /// A header as parsed. Only its syntax was checked.
 pub(super) struct Header {
@@ -56,8 +59,17 @@ impl fmt::Display for Shape {
     }
 }
 
-/// Checks magic and version. Returns the place of the checksum's digits and the end of the header.
-pub(super) fn read_prefix(bytes: &[u8]) -> Result<(usize, usize), AssetError> {
+/// The start of a file.
+pub(super) struct Prefix {
+    pub version: u32,
+    /// The place of the checksum's digits.
+    pub digits: usize,
+    /// The end of the header.
+    pub end: usize,
+}
+
+/// Checks magic and version.
+pub(super) fn read_prefix(bytes: &[u8]) -> Result<Prefix, AssetError> {
     let after = bytes.get(LENGTH_FIELD..).unwrap_or_default();
     let seen = after.len().min(MAGIC.len());
     if after[..seen] != MAGIC.as_bytes()[..seen] || bytes.is_empty() {
@@ -83,9 +95,10 @@ pub(super) fn read_prefix(bytes: &[u8]) -> Result<(usize, usize), AssetError> {
             AssetError::header("the version is not a number of at most 20 digits")
         });
     };
-    if version != FORMAT_VERSION.to_string() {
+    let known = [FORMAT_VERSION, FORMAT_VERSION_OF_RULES];
+    let Some(number) = known.into_iter().find(|known| version == known.to_string()) else {
         return Err(AssetError::Version { found: shown(version) });
-    }
+    };
     let mut field = [0; LENGTH_FIELD];
     field.copy_from_slice(&bytes[..LENGTH_FIELD]);
     let length = u64::from_le_bytes(field);
@@ -105,7 +118,7 @@ pub(super) fn read_prefix(bytes: &[u8]) -> Result<(usize, usize), AssetError> {
             "the checksum does not follow the version; another tool rewrote the file, encode the mesh again",
         ));
     }
-    Ok((digits, end))
+    Ok(Prefix { version: number, digits, end })
 }
 
 fn could_be_length(bytes: &[u8]) -> bool {

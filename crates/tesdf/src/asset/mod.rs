@@ -54,5 +54,8 @@ pub use te_sdf::TeSdf;
 #[cfg(feature = "encode")]
 pub use write::{save_atomic, write_container};
 
-/// The version of the file format that this build writes. It reads only this version.
+/// The version of the file format for assets whose sign is that of the winding number. Most are.
 pub const FORMAT_VERSION: u32 = 1;
+/// The version for assets whose sign needs more: a rule that is evaluated over all faces, or a
+/// thickness. Apart from this it is version 1. A build reads these two versions.
+pub const FORMAT_VERSION_OF_RULES: u32 = 2;

@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::base::Length;
+use crate::base::{Inside, InsideRule, Length};
 use crate::geometry::Aabb;
 
 /// A set of options by name: a balance of memory and speed, or the options of the paper.
@@ -143,6 +143,14 @@ pub struct EncodeOptions {
     /// Groups in which lists are read. `None`: a query pays for each face of a list.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub groups: Option<Groups>,
+    /// What is inside, and which faces are the surface. [`Encoder::encode_file`] makes the
+    /// [`SolidMesh`] with it; a solid that is passed to [`Encoder::encode`] brings its own.
+    ///
+    /// [`Encoder::encode`]: crate::encode::Encoder::encode
+    /// [`Encoder::encode_file`]: crate::encode::Encoder::encode_file
+    /// [`SolidMesh`]: crate::mesh::SolidMesh
+    #[serde(default, skip_serializing_if = "Inside::is_default")]
+    pub inside: Inside,
 }
 
 impl EncodeOptions {
@@ -163,6 +171,7 @@ impl EncodeOptions {
             refinement: Refinement::None,
             deformation: Deformation::None,
             groups: None,
+            inside: Inside::new(InsideRule::Winding),
         }
     }
 

@@ -3,7 +3,7 @@ use std::sync::OnceLock;
 
 use glam::DVec3;
 
-use super::about::About;
+use super::about::{About, Signs};
 use super::cell_bounds::CellBounds;
 use super::conforming::Conforming;
 use super::entries::Entries;
@@ -13,10 +13,10 @@ use super::faces_at::FacesAt;
 use super::inner_ball::InnerBall;
 use super::layout::{self, List, Node, PALETTE_SIZE, SignHints, TreeChild};
 use super::motion::Motion;
-use super::{AssetError, Container, Section, SharedSection};
-use crate::base::Isa;
+use super::{AssetError, Container, FORMAT_VERSION, Section, SharedSection};
+use crate::base::{Inside, Isa};
 use crate::domain::{DomainCube, MAX_DEPTH};
-use crate::geometry::{Aabb, AabbTree, LocalFrame, Triangle};
+use crate::geometry::{Aabb, AabbTree, LocalFrame, SignRule, Triangle};
 
 /// A Tetra-Encoded Signed Distance Field: an encoded mesh, immutable, shared by all its users.
 ///
@@ -49,6 +49,14 @@ pub struct TeSdf {
     pub(crate) faces: SharedSection<[u32; 3]>,
     pub(crate) face_ids: SharedSection<u32>,
     pub(crate) sign_hints: SharedSection<u16>,
+    /// Faces that count for the sign only.
+    pub(crate) sign_faces: Option<SharedSection<[u32; 3]>>,
+    /// Whether a rule tells the side of points without a list.
+    pub(crate) is_by_rule: bool,
+    /// Half of the thickness of a sheet, in the local frame; otherwise 0.
+    pub(crate) half_thickness: f64,
+    /// Decides the side where cells do not; made on first use.
+    sign_rule: OnceLock<SignRule>,
     pub(crate) nodes: SharedSection<u32>,
     pub(crate) lists: SharedSection<u8>,
     pub(crate) palette_starts: SharedSection<u32>,
@@ -127,7 +135,16 @@ impl TeSdf {
             .is_some()
             .then(|| container.shared_section(layout::PALETTES_HIGH.name))
             .transpose()?;
+        let sign_faces = container
+            .section::<[u32; 3]>(layout::SIGN_FACES.name)?
+            .is_some()
+            .then(|| container.shared_section(layout::SIGN_FACES.name))
+            .transpose()?;
         let mut asset = Self {
+            sign_faces,
+            is_by_rule: about.signs.are_by_rule(),
+            half_thickness: about.certificate().inside().rule.half_thickness() * frame.scale,
+            sign_rule: OnceLock::new(),
             about,
             frame,
             cube,
@@ -161,6 +178,7 @@ impl TeSdf {
         };
         asset.check_mesh()?;
         asset.conforming = Conforming::open(&asset.container, asset.placed())?;
+        asset.check_signs()?;
         asset.check_lists()?;
         asset.check_tree()?;
         let middle = asset.cube.middle();
@@ -186,6 +204,62 @@ impl TeSdf {
     /// Name of the unit of the mesh, if it was recorded; see [`unit`](crate::base::unit).
     pub fn unit(&self) -> Option<&str> {
         self.about.options.unit.as_deref().map(str::trim).filter(|unit| !unit.is_empty())
+    }
+
+    /// What is inside of the asset, and which faces of its mesh are the surface.
+    pub fn inside(&self) -> &Inside {
+        self.about.certificate().inside()
+    }
+
+    /// The rule that decides the side where cells do not; `None` when the winding number does.
+    pub(crate) fn sign_rule(&self) -> Option<&SignRule> {
+        self.is_by_rule.then(|| {
+            self.sign_rule.get_or_init(|| {
+                let sign_faces = self.sign_faces.as_deref().unwrap_or(&[]);
+                let faces = [&*self.faces, sign_faces].concat();
+                let position = |v: u32| self.frame.to_local(DVec3::from_array(self.vertices[v as usize]));
+                SignRule::new(self.inside().rule, &faces, position)
+            })
+        })
+    }
+
+    /// Why kernels on other devices cannot read the asset; `None` when they can.
+    #[doc(hidden)]
+    pub fn unsupported_on_devices(&self) -> Option<String> {
+        (self.about.signs != Signs::Cells).then(|| {
+            format!(
+                "its inside is by the rule `{}`, which kernels do not evaluate; detect on the processor",
+                self.inside().rule.name()
+            )
+        })
+    }
+
+    /// Bounds of the solid, in the unit of the mesh: those of the mesh, and half of the thickness of a
+    /// sheet around them.
+    pub(crate) fn bounds_of_solid(&self) -> Aabb {
+        self.bounds.grown(self.half_thickness * self.frame.inverse_scale())
+    }
+
+    /// Whether the faces stand for their winding number: inside is where it is 1 or more, so they
+    /// enclose the solid.
+    #[doc(hidden)]
+    pub fn faces_enclose_the_solid(&self) -> bool {
+        self.about.signs == Signs::Cells
+    }
+
+    /// Why contacts with the asset are not known; `None` when they are.
+    pub(crate) fn without_contacts(&self) -> Option<(&'static str, &'static str)> {
+        match self.about.signs {
+            _ if self.about.certificate().jumps() => Some((
+                "its signed distance jumps in the holes of the mesh",
+                "a closed mesh, as `tesdf repair --fill-holes` makes it, or sheets (`--inside sheet`)",
+            )),
+            Signs::RuleUnoriented => Some((
+                "some of its faces have the inside in front of them in one place and behind them in another",
+                "faces that look outward: cut overlaps off with `tesdf repair --union`, or use the rule `winding`",
+            )),
+            Signs::Cells | Signs::Rule | Signs::Sheet => None,
+        }
     }
 
     pub(crate) fn about_mut(&mut self) -> &mut About {
@@ -357,6 +431,30 @@ impl TeSdf {
         }
     }
 
+    /// Checks what the sign is told by.
+    fn check_signs(&self) -> Result<(), AssetError> {
+        let (f, v) = (self.faces.len(), self.vertices.len());
+        if self.about.signs != Signs::Cells && self.conforming.is_some() {
+            let reason = "a conforming domain, whose cells tell the side; expected the bisection domain";
+            return wrong(layout::TETRAHEDRA, reason.into());
+        }
+        let Some(faces) = self.sign_faces.as_deref() else { return Ok(()) };
+        if !self.is_by_rule {
+            return wrong(layout::SIGN_FACES, "the asset has no rule that counts them".into());
+        }
+        if let Some(i) = faces.iter().position(|c| c.iter().any(|&k| k as usize >= v)) {
+            return wrong(layout::SIGN_FACES, format!("face {i} uses {:?} of {v} vertices", faces[i]));
+        }
+        if faces.len() > layout::MAX_FACES - f {
+            let most = layout::MAX_FACES;
+            return wrong(
+                layout::SIGN_FACES,
+                format!("{} faces beside {f}; expected {most} in all", faces.len()),
+            );
+        }
+        Ok(())
+    }
+
     fn check_mesh(&self) -> Result<(), AssetError> {
         let (f, v) = (self.faces.len(), self.vertices.len());
         if f == 0 || f > layout::MAX_FACES {
@@ -369,8 +467,10 @@ impl TeSdf {
         if let Some(i) = self.faces.iter().position(|c| c.iter().any(|&k| k as usize >= v)) {
             return wrong(layout::FACES, format!("face {i} uses {:?} of {v} vertices", self.faces[i]));
         }
-        if let Some(i) = self.face_ids.iter().position(|&id| id as usize >= f) {
-            return wrong(layout::FACE_IDS, format!("entry {i} is {} of {f} faces", self.face_ids[i]));
+        // Ids have gaps where faces of the source mesh are no surface.
+        let ids = if self.container.version() == FORMAT_VERSION { f } else { layout::MAX_FACES };
+        if let Some(i) = self.face_ids.iter().position(|&id| id as usize >= ids) {
+            return wrong(layout::FACE_IDS, format!("entry {i} is {} of {ids} faces", self.face_ids[i]));
         }
         for (spec, n) in
             [(layout::FACE_IDS, self.face_ids.len()), (layout::SIGN_HINTS, self.sign_hints.len())]

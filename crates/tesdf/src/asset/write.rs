@@ -5,8 +5,10 @@ use std::path::Path;
 
 use super::container::{Placed, shape_of};
 use super::error::shown;
-use super::header::{BEFORE_CHECKSUM, DIGITS, LENGTH_FIELD, MAGIC, MAX_HEADER, SECTION_CHECKSUM, Shape};
-use super::{AssetError, Container, FORMAT_VERSION, Section, TeSdf};
+use super::header::{
+    BEFORE_CHECKSUM, DIGITS, LENGTH_FIELD, MAGIC, MAX_HEADER, RULE, SECTION_CHECKSUM, Shape,
+};
+use super::{AssetError, Container, FORMAT_VERSION, FORMAT_VERSION_OF_RULES, Section, TeSdf};
 
 pub use crate::save::save_atomic;
 
@@ -69,7 +71,8 @@ impl Container {
 /// bytes.
 ///
 /// `metadata` has the keys of the caller. This function adds `format`, `version`, `checksum` and
-/// `checksum.*`.
+/// `checksum.*`. The version is that of rules ([`FORMAT_VERSION_OF_RULES`]) when there is the key
+/// `inside`.
 ///
 /// # Errors
 /// A section is given twice or does not have whole rows, a metadata key is reserved, or the header
@@ -131,7 +134,8 @@ fn is_reserved(key: &str) -> bool {
 /// Makes the length field, the JSON and the padding, with the checksum of the header in place.
 fn write_header(metadata: &BTreeMap<String, String>, lines: &[Line<'_>]) -> Result<Vec<u8>, AssetError> {
     let quoted = |s: &str| serde_json::Value::from(s).to_string();
-    let mut json = format!("{MAGIC}{FORMAT_VERSION}{BEFORE_CHECKSUM}{}\"", "0".repeat(DIGITS));
+    let version = if metadata.contains_key(RULE) { FORMAT_VERSION_OF_RULES } else { FORMAT_VERSION };
+    let mut json = format!("{MAGIC}{version}{BEFORE_CHECKSUM}{}\"", "0".repeat(DIGITS));
     for (key, value) in metadata {
         json += &format!(",{}:{}", quoted(key), quoted(value));
     }
@@ -154,7 +158,7 @@ fn write_header(metadata: &BTreeMap<String, String>, lines: &[Line<'_>]) -> Resu
     }
     let mut bytes = (json.len() as u64).to_le_bytes().to_vec();
     bytes.extend_from_slice(json.as_bytes());
-    let at = LENGTH_FIELD + MAGIC.len() + FORMAT_VERSION.to_string().len() + BEFORE_CHECKSUM.len();
+    let at = LENGTH_FIELD + MAGIC.len() + version.to_string().len() + BEFORE_CHECKSUM.len();
     let digest = header_checksum(&bytes, at);
     bytes[at..at + DIGITS].copy_from_slice(digest.as_bytes());
     Ok(bytes)

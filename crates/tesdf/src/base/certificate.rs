@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use super::Chains;
+use super::{Chains, Inside};
 
 /// The certificate of an asset: what the encoder proved of its lists.
 ///
@@ -19,6 +19,14 @@ pub struct Certificate {
     truncated: bool,
     exactness_distance: Option<f64>,
     chains: Option<u32>,
+    #[serde(skip_serializing_if = "Inside::is_default")]
+    pub(crate) inside: Inside,
+    #[serde(skip_serializing_if = "is_false")]
+    pub(crate) jumps: bool,
+}
+
+fn is_false(flag: &bool) -> bool {
+    !flag
 }
 
 /// A certificate as a file stores it.
@@ -32,13 +40,36 @@ pub(crate) struct Written {
     exactness_distance: Option<f64>,
     #[serde(default)]
     chains: Option<u32>,
+    #[serde(default)]
+    inside: Inside,
+    #[serde(default)]
+    jumps: bool,
 }
 
 impl From<Written> for Certificate {
     fn from(written: Written) -> Self {
-        let Written { encoder, domain, delta, delta_of_diagonal, truncated, exactness_distance, chains } =
-            written;
-        Self { encoder, domain, delta, delta_of_diagonal, truncated, exactness_distance, chains }
+        let Written {
+            encoder,
+            domain,
+            delta,
+            delta_of_diagonal,
+            truncated,
+            exactness_distance,
+            chains,
+            inside,
+            jumps,
+        } = written;
+        Self {
+            encoder,
+            domain,
+            delta,
+            delta_of_diagonal,
+            truncated,
+            exactness_distance,
+            chains,
+            inside,
+            jumps,
+        }
     }
 }
 
@@ -76,6 +107,8 @@ impl Certificate {
             truncated: false,
             exactness_distance: None,
             chains: None,
+            inside: Inside::default(),
+            jumps: false,
         };
         unproved.with(proved)
     }
@@ -136,5 +169,17 @@ impl Certificate {
     /// nothing is proved, or the version that wrote the file did not count chains.
     pub fn chains(&self) -> Option<u32> {
         self.chains
+    }
+
+    /// What is inside, and which faces are the surface.
+    pub fn inside(&self) -> &Inside {
+        &self.inside
+    }
+
+    /// Whether the signed distance jumps between its positive and its negative value somewhere: in
+    /// the holes of an open mesh whose inside is by the generalised winding number. Distances are
+    /// exact there, too.
+    pub fn jumps(&self) -> bool {
+        self.jumps
     }
 }

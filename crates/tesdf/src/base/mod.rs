@@ -3,6 +3,7 @@
 //! This module uses no other module.
 mod certificate;
 mod chains;
+mod inside;
 mod isa;
 mod length;
 mod progress;
@@ -12,6 +13,7 @@ pub mod unit;
 pub use certificate::Certificate;
 pub(crate) use certificate::{Proved, Written};
 pub(crate) use chains::Chains;
+pub use inside::{Inside, InsideRule, SurfaceFaces};
 pub use isa::Isa;
 pub use length::Length;
 pub(crate) use length::four_digits;

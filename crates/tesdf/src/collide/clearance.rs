@@ -262,8 +262,8 @@ impl<'a> Pair<'a> {
         };
         let Order { surface, field } = &orders[order];
         let gradient = lowest.value.gradient;
-        let on_surface = field.to_world(lowest.point - lowest.radius * gradient);
-        let on_field = field.to_world(lowest.value.closest_point);
+        let points = field.surface_points(lowest.point, lowest.radius, &lowest.value);
+        let [on_surface, on_field] = points.map(|p| field.to_world(p));
         let away = field.rotate(gradient);
         let (face_surface, (face_field, _)) = (surface.face_id(lowest.face), field.names(&lowest.value));
         let (point_a, point_b, normal, face_a, face_b, field) = match surfaces[order] {

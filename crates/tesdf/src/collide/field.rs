@@ -167,6 +167,13 @@ impl<'a> FieldBody<'a> {
         }
     }
 
+    /// How far the surface of the body lies from the points where the field is 0: half of the
+    /// thickness of a sheet, whose field is the distance to its faces; otherwise 0. In the field's
+    /// frame.
+    pub fn half_thickness(&self) -> f64 {
+        if let Field::Mesh(asset) = self.field { asset.half_thickness } else { 0.0 }
+    }
+
     /// Whether all values are exact up to rounding, inside the body, too.
     pub fn has_exact_lists(&self) -> bool {
         !matches!(self.field, Field::Mesh(asset) if !asset.has_exact_lists())
@@ -181,6 +188,13 @@ impl<'a> FieldBody<'a> {
     pub fn least_within(&self, p: DVec3, radius: f64) -> f64 {
         let (distance, slack) = self.rough(p);
         distance - slack - radius
+    }
+
+    /// The nearest points of a part's surface and of the body's surface, where the part's core is at
+    /// `point` and has this radius, the thickness of the body included. All in the field's frame.
+    pub fn surface_points(&self, point: DVec3, radius: f64, value: &FieldValue) -> [DVec3; 2] {
+        let half = self.half_thickness();
+        [point - (radius - half) * value.gradient, value.closest_point + half * value.gradient]
     }
 
     /// Radius of a ball inside, in the field's frame; see [`Shape::inner_ball`].
@@ -373,7 +387,8 @@ impl TeSdf {
         near: impl FnOnce(&mut dyn FnMut(u32, Closest)),
     ) -> FieldValue {
         let limit = value.distance.abs() + tie;
-        // On the surface the gradients are the normals of the faces.
+        // On the surface the gradients are the normals of the faces, and of a sheet those of both of
+        // its sides.
         let on_surface = is_on_surface(&value, tie);
         let (mut best, mut id) = (value, self.face_ids[value.position as usize]);
         near(&mut |face, closest| {
@@ -381,10 +396,17 @@ impl TeSdf {
                 return;
             }
             let outward = if value.distance < 0.0 { closest.point - p } else { p - closest.point };
-            let gradient = match on_surface {
-                true => self.local_triangle(face as usize).normal,
+            let mut gradient = match on_surface {
+                true => self.outward(
+                    self.local_triangle(face as usize).normal,
+                    closest.point,
+                    4.0 * tie.max(ON_SURFACE_F64),
+                ),
                 false => outward.normalize_or_zero(),
             };
+            if on_surface && self.half_thickness > 0.0 && gradient.dot(normal) > 0.0 {
+                gradient = -gradient;
+            }
             let (own, other) = (gradient.dot(normal), best.gradient.dot(normal));
             let face_id = self.face_ids[face as usize];
             let is_better = own < other - TIE || (own < other + TIE && face_id < id);

@@ -115,7 +115,7 @@ impl<'a> OrderedPair<'a> {
     }
 
     /// Why a minimum of a candidate is no contact, if it is none: Eq. (10), which does not apply to
-    /// rounded shapes, because they have normals in all directions; or a lower point beside it.
+    /// rounded shapes and sheets, because they have normals in all directions; or a lower point beside it.
     pub fn dropped(&self, part: &Part, candidate: u32, minimum: &Minimum) -> Option<Dropped> {
         match self.options.mode {
             Mode::Node => return None,
@@ -127,7 +127,10 @@ impl<'a> OrderedPair<'a> {
         }
         let gradient = minimum.value.gradient;
         let cosine = gradient.dot(part.normal);
-        if part.points().len() == 3 && self.options.cos_theta.is_some_and(|cos| cosine > -cos) {
+        if part.points().len() == 3
+            && !self.surface.is_sheet()
+            && self.options.cos_theta.is_some_and(|cos| cosine > -cos)
+        {
             return Some(Dropped::ByCosine(cosine));
         }
         let Minimum { point, is_lowest, .. } = *minimum;
@@ -163,9 +166,10 @@ impl<'a> OrderedPair<'a> {
     pub fn contact(&self, part: &Part, minimum: &Minimum, face_a: u32, feature: u32) -> Contact {
         let Minimum { point, value, cell, converged, .. } = *minimum;
         let (face_b, feature_b) = self.field.names(&value);
+        let [point_a, point_b] = self.field.surface_points(point, part.radius, &value);
         Contact {
-            point_a: self.field.to_world(point - part.radius * value.gradient),
-            point_b: self.field.to_world(value.closest_point),
+            point_a: self.field.to_world(point_a),
+            point_b: self.field.to_world(point_b),
             normal: self.field.rotate(value.gradient),
             distance: (value.distance - part.radius) * self.field.unit(),
             face_a,

@@ -47,7 +47,15 @@ impl Shape {
     pub fn validate(&self) -> Result<(), CollideError> {
         let positive = |x: f64| SIZE.contains(&x);
         let (shape, found, good) = match *self {
-            Self::Mesh(_) | Self::Plane => return Ok(()),
+            Self::Mesh(ref asset) => {
+                return match asset.without_contacts() {
+                    None => Ok(()),
+                    Some((found, expected)) => {
+                        Err(CollideError::Shape { shape: "mesh", found: found.into(), expected })
+                    }
+                };
+            }
+            Self::Plane => return Ok(()),
             Self::Box { half_extents: h } => {
                 ("box", format!("half extents {h}"), h.to_array().into_iter().all(positive))
             }
@@ -67,7 +75,7 @@ impl Shape {
     /// Bounds in the shape's frame; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         match self {
-            Self::Mesh(asset) => asset.bounds(),
+            Self::Mesh(asset) => asset.bounds_of_solid(),
             simple => Simple::from(simple).bounds(),
         }
     }

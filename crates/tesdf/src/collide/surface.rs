@@ -18,6 +18,9 @@ pub struct SurfaceBody<'a> {
     shift: DVec3,
     /// Field units per unit of the shape.
     scale: f64,
+    /// How far the surfaces lie from the faces and the field's zero: half of the thicknesses of both
+    /// bodies, where they are sheets. In the field's frame.
+    around: f64,
 }
 
 /// The result of the broad phase: faces, edges or nodes of a surface that can touch, in order. In
@@ -92,7 +95,12 @@ impl<'a> SurfaceBody<'a> {
         let unit = placement.scale / field.unit();
         let rotate = |axis: DVec3| field.rotate_back(placement.pose.rotation * axis) * unit;
         let linear = DMat3::from_cols(rotate(DVec3::X), rotate(DVec3::Y), rotate(DVec3::Z));
-        Self { shape, linear, shift, scale: unit }
+        let own = if let Shape::Mesh(asset) = shape {
+            asset.half_thickness * asset.frame.inverse_scale() * unit
+        } else {
+            0.0
+        };
+        Self { shape, linear, shift, scale: unit, around: own + field.half_thickness() }
     }
 
     /// From the shape's frame to the field's frame.
@@ -170,28 +178,33 @@ impl<'a> SurfaceBody<'a> {
     pub fn face(&self, face: u32, field: &FieldBody, reach: f64) -> Part {
         match self.shape {
             Shape::Mesh(asset) => {
-                Part::new(&asset.face_corners(face as usize).map(|p| self.to_field(p)), 0.0)
+                Part::new(&asset.face_corners(face as usize).map(|p| self.to_field(p)), self.around)
             }
             Shape::Plane => {
                 // Only the part over or under the field's body matters.
                 let (center, radius) = field.ball();
                 let center = self.linear.transpose() * (center - self.shift) / (self.scale * self.scale);
                 let square = plane_square(center, (radius + reach) / self.scale);
-                Part::new(&square[face as usize % 2].map(|p| self.to_field(p)), 0.0)
+                Part::new(&square[face as usize % 2].map(|p| self.to_field(p)), self.around)
             }
             simple => {
                 let (parts, radius) = Simple::from(simple).parts();
                 let points: Vec<DVec3> = parts[face as usize].iter().map(|&p| self.to_field(p)).collect();
-                Part::new(&points, radius * self.scale)
+                Part::new(&points, radius * self.scale + self.around)
             }
         }
+    }
+
+    /// Whether the faces are those of a sheet, which has a surface on both sides of them.
+    pub fn is_sheet(&self) -> bool {
+        matches!(self.shape, Shape::Mesh(asset) if asset.half_thickness > 0.0)
     }
 
     /// The corners of a face, or of the core of a rounded shape, whose surface lies within the radius.
     /// A segment has two equal corners.
     pub fn triangle(&self, face: u32, field: &FieldBody) -> ([DVec3; 3], f64) {
         match self.shape {
-            Shape::Mesh(asset) => (asset.face_corners(face as usize).map(|p| self.to_field(p)), 0.0),
+            Shape::Mesh(asset) => (asset.face_corners(face as usize).map(|p| self.to_field(p)), self.around),
             _ => {
                 let part = self.face(face, field, 0.0);
                 let points = part.points();
@@ -252,11 +265,12 @@ impl<'a> SurfaceBody<'a> {
     pub fn node(&self, node: u32) -> Part {
         match self.shape {
             Shape::Mesh(asset) => {
-                Part::new(&[self.to_field(DVec3::from_array(asset.vertices[node as usize]))], 0.0)
+                let at = DVec3::from_array(asset.vertices[node as usize]);
+                Part::new(&[self.to_field(at)], self.around)
             }
             simple => {
                 let (nodes, radius) = Simple::from(simple).nodes();
-                Part::new(&[self.to_field(nodes[node as usize].0)], radius * self.scale)
+                Part::new(&[self.to_field(nodes[node as usize].0)], radius * self.scale + self.around)
             }
         }
     }
@@ -272,13 +286,14 @@ impl<'a> SurfaceBody<'a> {
                 let faces = asset.faces_beside(face, side).chain([face]);
                 let normals: Vec<DVec3> =
                     faces.map(|f| self.linear * asset.local_triangle(f).normal).collect();
-                Part::edge(points, 0.0, normals.into_iter())
+                Part::edge(points, self.around, normals.into_iter())
             }
             simple => {
                 let (edges, radius) = Simple::from(simple).edges();
                 let found = edges.iter().find(|e| e.id == edge).unwrap_or(&edges[0]);
                 let normals = found.normals.map(|n| self.linear * n);
-                Part::edge(found.points.map(|p| self.to_field(p)), radius * self.scale, normals.into_iter())
+                let radius = radius * self.scale + self.around;
+                Part::edge(found.points.map(|p| self.to_field(p)), radius, normals.into_iter())
             }
         }
     }
@@ -410,7 +425,7 @@ impl<'a> SurfaceBody<'a> {
             Branch {
                 child: children[side],
                 center: self.to_field(asset.frame.to_world(0.5 * (low + high) + asset.cube.middle())),
-                radius: 0.5 * (high - low).length() * asset.frame.inverse_scale() * self.scale,
+                radius: 0.5 * (high - low).length() * asset.frame.inverse_scale() * self.scale + self.around,
             }
         })
     }
@@ -512,7 +527,7 @@ impl FieldBody<'_> {
     /// Bounds of the body, in the field's frame; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         match self.field {
-            Field::Mesh(asset) => asset.local_bounds(),
+            Field::Mesh(asset) => asset.local_bounds().grown(asset.half_thickness),
             Field::Simple(simple) => simple.bounds(),
         }
     }
@@ -520,7 +535,7 @@ impl FieldBody<'_> {
     /// A ball around the body, in the field's frame; infinite for a plane.
     fn ball(&self) -> (DVec3, f64) {
         let bounds = match self.field {
-            Field::Mesh(asset) => asset.local_bounds(),
+            Field::Mesh(asset) => asset.local_bounds().grown(asset.half_thickness),
             Field::Simple(Simple::Box(half)) => Aabb { min: -half, max: half },
             Field::Simple(Simple::Round { half_height, radius }) => {
                 return (DVec3::ZERO, half_height + radius);

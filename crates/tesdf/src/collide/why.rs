@@ -259,7 +259,7 @@ impl Stages<'_> {
             cell: polygon.cell,
             vertices: polygon.polygon.points().map(|p| field.to_world(p)).collect(),
             distance: (minimum.value.distance - part.radius) * unit,
-            point: field.to_world(minimum.point - part.radius * minimum.value.gradient),
+            point: field.to_world(field.surface_points(minimum.point, part.radius, &minimum.value)[0]),
             face_b: field.names(&minimum.value).0,
             verdict,
         };

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use super::{Deformation, EncodeOptions, Method, Preset, Refinement, Sampling, Threshold};
-use crate::base::{Length, Progress};
+use crate::base::{Inside, InsideRule, Length, Progress, SurfaceFaces};
 #[cfg(feature = "gmsh")]
 use crate::domain::gmsh::{GmshError, GmshOptions, tetrahedralise_and_report};
 use crate::domain::{ConformingError, ConformingMesh, ReadTetrahedraError, read_tetrahedra};
@@ -48,6 +48,38 @@ pub enum MethodChoice {
     Sampled,
 }
 
+/// Rules of what is inside, by the names that the commands give them. See [`InsideRule`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RuleChoice {
+    /// [`InsideRule::Winding`]
+    #[default]
+    Winding,
+    /// [`InsideRule::Nonzero`]
+    Nonzero,
+    /// [`InsideRule::Odd`]
+    Odd,
+    /// [`InsideRule::Generalized`]
+    Generalized,
+    /// [`InsideRule::Sheet`], which needs a thickness.
+    Sheet,
+}
+
+impl FromStr for RuleChoice {
+    type Err = String;
+
+    /// The name of a rule.
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(match text {
+            "winding" => Self::Winding,
+            "nonzero" => Self::Nonzero,
+            "odd" => Self::Odd,
+            "generalized" => Self::Generalized,
+            "sheet" => Self::Sheet,
+            _ => return Err("expected winding, nonzero, odd, generalized or sheet".into()),
+        })
+    }
+}
+
 /// What a user may choose. `None` stands for the value of the preset.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EncodeChoices {
@@ -74,6 +106,12 @@ pub struct EncodeChoices {
     pub regions: Vec<[f64; 6]>,
     /// Name of the unit of the mesh. Nothing is scaled.
     pub unit: Option<String>,
+    /// What is inside.
+    pub rule: RuleChoice,
+    /// The thickness of a sheet, in the unit of the mesh.
+    pub thickness: Option<f64>,
+    /// Which faces are the surface.
+    pub surface: SurfaceFaces,
 }
 
 /// Choices that exclude each other.
@@ -95,6 +133,15 @@ pub enum ChoiceError {
         "plain: the bisection domain is nothing but bisections; choose the domain `gmsh` or a file of tetrahedra"
     )]
     PlainBisection,
+    /// A sheet without a thickness.
+    #[error("inside `sheet`: a sheet needs its thickness, in the unit of the mesh; give one")]
+    NoThickness,
+    /// A thickness of something that is not a sheet.
+    #[error("thickness: only the faces of a sheet have one; choose inside `sheet`, or leave it out")]
+    NotASheet,
+    /// The boundary of a sheet.
+    #[error("surface `boundary`: a sheet has no faces between inside and outside; leave it out")]
+    BoundaryOfSheet,
 }
 
 /// Why the tetrahedra of the chosen domain could not be made.
@@ -159,6 +206,7 @@ impl EncodeChoices {
         if matches!(self.domain, DomainChoice::File(_)) && (self.band.is_some() || !self.regions.is_empty()) {
             return Err(ChoiceError::BesidesFile);
         }
+        let inside = self.inside()?;
         let refinement = match (&self.domain, self.refinement) {
             (DomainChoice::Bisection, Some(Refinement::None)) => return Err(ChoiceError::PlainBisection),
             (DomainChoice::Bisection, _) => Refinement::ByCost,
@@ -172,8 +220,29 @@ impl EncodeChoices {
             band: self.band.map_or(of_preset.band, Length::Absolute),
             regions: self.regions.clone(),
             unit: self.unit.clone(),
+            inside,
             ..of_preset
         })
+    }
+
+    /// What is inside, for [`SolidMesh::with_inside`].
+    ///
+    /// # Errors
+    /// [`ChoiceError`]: choices that exclude each other.
+    pub fn inside(&self) -> Result<Inside, ChoiceError> {
+        let rule = match (self.rule, self.thickness) {
+            (RuleChoice::Sheet, Some(thickness)) => InsideRule::Sheet { thickness },
+            (RuleChoice::Sheet, None) => return Err(ChoiceError::NoThickness),
+            (_, Some(_)) => return Err(ChoiceError::NotASheet),
+            (RuleChoice::Winding, None) => InsideRule::Winding,
+            (RuleChoice::Nonzero, None) => InsideRule::Nonzero,
+            (RuleChoice::Odd, None) => InsideRule::Odd,
+            (RuleChoice::Generalized, None) => InsideRule::Generalized,
+        };
+        if self.rule == RuleChoice::Sheet && self.surface == SurfaceFaces::Boundary {
+            return Err(ChoiceError::BoundaryOfSheet);
+        }
+        Ok(Inside { rule, surface: self.surface })
     }
 
     /// Makes or reads the tetrahedra of a conforming domain. Returns `None` for the bisection

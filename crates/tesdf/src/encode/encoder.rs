@@ -5,7 +5,7 @@ use super::pipeline::{self, Request};
 use super::sampled::Processor;
 use super::{Domain, EncodeError, EncodeOptions, Preset, Sampler, Source};
 use crate::asset::TeSdf;
-use crate::base::{Length, Progress};
+use crate::base::{Inside, Length, Progress};
 use crate::mesh::{ReadSolidError, SolidMesh};
 
 /// Encodes solids.
@@ -102,6 +102,14 @@ impl<'a> Encoder<'a> {
         Self { unit: Some(unit.into()), ..self }
     }
 
+    /// Sets what is inside of meshes that [`encode_file`](Self::encode_file) reads. A solid that is
+    /// passed to [`encode`](Self::encode) brings its own rule. It replaces
+    /// [`EncodeOptions::inside`].
+    pub fn inside(self, inside: impl Into<Inside>) -> Self {
+        let options = EncodeOptions { inside: inside.into(), ..self.options };
+        Self { options, ..self }
+    }
+
     /// Sets the domain, from which the cells come. The default is [`Domain::Bisection`].
     pub fn domain(self, domain: Domain<'a>) -> Self {
         Self { domain, ..self }
@@ -180,7 +188,7 @@ impl<'a> Encoder<'a> {
     }
 
     fn encode_path(&self, path: &Path) -> Result<TeSdf, EncodeFileError> {
-        let (solid, report) = SolidMesh::load(path)?;
+        let (solid, report) = SolidMesh::load(path, self.options.inside)?;
         let source = Source::of_file(path, report.source_blake3);
         let at = |source| EncodeFileError::Encode { path: path.to_owned(), source };
         self.encode_from(&solid, &source).map_err(at)

@@ -29,6 +29,11 @@ pub enum EncodeError {
         /// The largest number that the format can name.
         limit: usize,
     },
+    /// The surface has no face.
+    #[error(
+        "no face lies between inside and outside, so there is no surface; encode with all faces as the surface"
+    )]
+    NoSurface,
     /// Everywhere in the domain, lists name many faces that are near each other, and no bisection
     /// makes them shorter.
     #[error(

@@ -3,6 +3,7 @@
 use crate::parallel::*;
 
 use super::assemble::collect;
+use super::cell_signs::CellSigns;
 use super::error::EncodeError;
 use super::filter::{PAD, Scratch};
 use super::holds::holds;
@@ -17,7 +18,6 @@ use crate::asset::layout::Label;
 use crate::base::{Chains, Progress, Side, Stage};
 use crate::domain::Cell;
 use crate::geometry::{AabbTree, triangle_meets_tetrahedron};
-use crate::mesh::WindingNumber;
 
 /// What the lists are made from.
 pub struct Lists<'a> {
@@ -63,13 +63,13 @@ struct Found {
 }
 
 impl Lists<'_> {
-    /// Finishes the lists and labels the cells. `winding` labels the cells of the bisection domain.
+    /// Finishes the lists and labels the cells. `signs` labels the cells of the bisection domain.
     /// `sampler` is for the sampled encoder.
     pub fn finish(
         &self,
         trees: &mut [Tree],
         roots: &Roots,
-        winding: &WindingNumber,
+        signs: &CellSigns,
         sampler: &dyn Sampler,
         progress: &Progress,
     ) -> Result<Finished, EncodeError> {
@@ -119,13 +119,7 @@ impl Lists<'_> {
                 let label = match (&leaf, roots.sides.get(root)) {
                     (Leaf::Outside, _) | (_, Some(Side::Outside)) => Label::Outside,
                     (_, Some(Side::Inside)) => Label::Inside,
-                    (_, None) => match (crosses, winding.at_perturbed(cell.centroid())) {
-                        // The number is read back as an `i32`: it is negative where the surface is
-                        // inside out.
-                        (true, w) => Label::Crossing(w as u32),
-                        (false, w) if w >= 1 => Label::Inside,
-                        _ => Label::Outside,
-                    },
+                    (_, None) => signs.label(&cell, crosses),
                 };
                 Some((label, exact_within, proof))
             })

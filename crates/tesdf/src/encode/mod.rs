@@ -12,6 +12,7 @@
 mod assemble;
 mod attempts;
 pub(crate) mod candidates;
+mod cell_signs;
 mod chains;
 mod choices;
 mod doubles;
@@ -46,7 +47,7 @@ pub use crate::asset::about::Source;
 pub use crate::asset::options::{
     Deformation, EncodeOptions, Groups, Method, Preset, Refinement, Sampling, Threshold,
 };
-pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, MethodChoice};
+pub use choices::{ChoiceError, DomainChoice, DomainError, EncodeChoices, MethodChoice, RuleChoice};
 pub use encoder::{EncodeFileError, Encoder};
 pub use error::EncodeError;
 pub use roots::Domain;

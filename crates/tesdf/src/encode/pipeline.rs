@@ -1,5 +1,8 @@
+use std::borrow::Cow;
+
 use super::assemble::assemble;
 use super::attempts::{EFFORT_PER_FACE, refine, refine_within_effort};
+use super::cell_signs::{CellSigns, SignFaces};
 use super::effort::Effort;
 use super::error::EncodeError;
 use super::hints::{Simplicity, sign_hints};
@@ -12,11 +15,11 @@ use super::surface::{Surface, Touching};
 use super::tighten::Levels;
 use super::{Deformation, EncodeOptions, Method, Refinement, Source, Threshold};
 use crate::asset::layout::{self, TREE_LEAF, TreeChild};
-use crate::asset::{Section, TeSdf, about, write_container};
-use crate::base::{Certificate, Length, Progress, Proved, Stage};
+use crate::asset::{Section, TeSdf, about, about::Signs, write_container};
+use crate::base::{Certificate, Inside, InsideRule, Length, Progress, Proved, Stage, SurfaceFaces};
 use crate::domain::{Cell, DomainCube, MAX_DEPTH};
-use crate::geometry::{Aabb, AabbTree, Child, LocalFrame};
-use crate::mesh::{MeshError, SolidMesh, TriangleMesh, WindingNumber};
+use crate::geometry::{Aabb, AabbTree, Child, LocalFrame, SignRule};
+use crate::mesh::{MeshError, Presented, SolidMesh, Telling, TriangleMesh, WindingNumber};
 use crate::verify::self_check;
 
 /// The input of an encoding, in addition to the solid.
@@ -36,7 +39,11 @@ pub struct Request<'a> {
 /// Encodes a solid; see [`Encoder::encode`](super::Encoder::encode).
 pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError> {
     let Request { domain, source, options, sampler, progress } = *request;
-    let mesh = solid.mesh();
+    let presented = solid.presented()?;
+    let mesh = &*presented.mesh;
+    if mesh.faces().is_empty() {
+        return Err(EncodeError::NoSurface);
+    }
     let diagonal = mesh.diagonal();
     let frame = LocalFrame::of(mesh.bounds());
     let band = validated(options, &domain, diagonal)? * frame.scale;
@@ -48,7 +55,9 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
         });
     }
     let local = local_mesh(mesh, frame)?;
-    let winding = WindingNumber::new(&local);
+    let signs = cell_signs(solid, &presented, &local);
+    let jumps = matches!(&signs, CellSigns::Rule(rule, _) if rule.jumps());
+    validated_inside(solid, &presented, jumps, &domain, options)?;
     let regions: Vec<Aabb> = options
         .region_boxes()
         .map(|r| Aabb { min: frame.to_local(r.min), max: frame.to_local(r.max) })
@@ -87,7 +96,7 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
         band,
         bounds: local.bounds(),
         regions: &regions,
-        inside: &|p| winding.at(p) >= 1,
+        inside: &|p| signs.is_inside(p),
         max_depth: MAX_DEPTH,
         progress,
         effort: &unlimited,
@@ -109,10 +118,10 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
     let lists =
         Lists { surface: &surface, tree: &tree, options, scale: frame.scale, kept_within: fit_within };
     let Finished { labels, exact_within, proof } =
-        lists.finish(&mut trees, &roots, &winding, sampler, progress)?;
+        lists.finish(&mut trees, &roots, &signs, sampler, progress)?;
 
     progress.begin(Stage::Assemble, 1);
-    let simplicity = if solid.is_simple() { Simplicity::Simple } else { Simplicity::Involved };
+    let simplicity = if presented.is_simple { Simplicity::Simple } else { Simplicity::Involved };
     let hints = sign_hints(&surface, &tree, simplicity);
     let mut position = vec![0u32; tree.order().len()];
     for (at, &face) in tree.order().iter().enumerate() {
@@ -128,11 +137,13 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
     let placed = [offset.x, offset.y, offset.z, frame.scale, origin.x, origin.y, origin.z, roots.cube.side()];
     let low: Vec<u16> = forest.palettes.iter().map(|&f| f as u16).collect();
     let high: Vec<u8> = forest.palettes.iter().map(|&f| (f >> 16) as u8).collect();
+    let of_source = |face: &u32| presented.ids.as_ref().map_or(*face, |ids| ids[*face as usize]);
+    let face_ids: Vec<u32> = tree.order().iter().map(of_source).collect();
     let (tree_boxes, tree_children) = face_tree(&tree, &roots.cube);
     let mut sections = vec![
         Section::new(layout::VERTICES, &vertices),
         Section::new(layout::FACES, &faces),
-        Section::new(layout::FACE_IDS, tree.order()),
+        Section::new(layout::FACE_IDS, &face_ids),
         Section::new(layout::SIGN_HINTS, &hints),
         Section::new(layout::FRAME, &placed),
         Section::new(layout::NODES, &forest.nodes),
@@ -152,6 +163,9 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
         sections.push(Section::new(layout::DOMAIN_VERTICES, &own));
         sections.push(Section::new(layout::TETRAHEDRA, &roots.tetrahedra));
     }
+    if !presented.sign_faces.is_empty() {
+        sections.push(Section::new(layout::SIGN_FACES, &presented.sign_faces));
+    }
     if faces.len() > 1 << 16 {
         sections.push(Section::new(layout::PALETTES_HIGH, &high));
     }
@@ -160,17 +174,26 @@ pub fn encode(solid: &SolidMesh, request: &Request) -> Result<TeSdf, EncodeError
         Method::Sampled(_) => sampler.name(),
     };
     let proved = Proved { within: exact_within / frame.scale, chains: proof };
-    let certificate = Certificate::new(encoder, domain.name().into(), diagonal, roots.cube.side(), proved);
+    let mut certificate =
+        Certificate::new(encoder, domain.name().into(), diagonal, roots.cube.side(), proved);
+    certificate.inside = *solid.inside();
+    certificate.jumps = jumps;
     let about = about::About {
         source: source.clone(),
-        options: options.clone(),
+        options: EncodeOptions { inside: *solid.inside(), ..options.clone() },
         certificate,
+        signs: match presented.telling {
+            Telling::Winding => Signs::Cells,
+            Telling::Rule => Signs::Rule,
+            Telling::RuleUnoriented => Signs::RuleUnoriented,
+            Telling::Sheet => Signs::Sheet,
+        },
         statistics: statistics(&trees, &labels, &roots.cells, mesh, frame),
     };
     let bytes = write_container(&sections, &about.to_metadata())?;
     let asset = TeSdf::from_bytes(&bytes)?;
     if asset.about().certificate().delta().is_some()
-        && let Some((precision, worst)) = self_check(&asset)?
+        && let Some((precision, worst)) = self_check(&asset, solid)?
     {
         return Err(EncodeError::SelfCheck { precision, worst: Box::new(worst) });
     }
@@ -192,6 +215,60 @@ const FLOOR: f64 = 6.0;
 /// The same where lists are read in groups, as a share of a group: tightening makes such a list
 /// shorter, and merging fills it again.
 const FULL: f64 = 0.75;
+
+/// What tells the sides of the cells. `local` has the presented faces in the local frame.
+fn cell_signs(solid: &SolidMesh, presented: &Presented, local: &TriangleMesh) -> CellSigns {
+    match presented.telling {
+        Telling::Winding => CellSigns::Winding(WindingNumber::new(local)),
+        Telling::Sheet => CellSigns::Unsigned,
+        Telling::Rule | Telling::RuleUnoriented => {
+            let position = |v: u32| local.vertices()[v as usize];
+            let faces = [local.faces(), &presented.sign_faces].concat();
+            let triangles = presented.sign_faces.iter().map(|f| f.map(position)).collect();
+            CellSigns::Rule(SignRule::new(solid.inside().rule, &faces, position), SignFaces::new(triangles))
+        }
+    }
+}
+
+/// Checks that the rule of a solid, its surface, the domain and the options fit each other.
+fn validated_inside(
+    solid: &SolidMesh,
+    presented: &Presented,
+    jumps: bool,
+    domain: &Domain,
+    options: &EncodeOptions,
+) -> Result<(), EncodeError> {
+    let wrong = |option, found: String, expected| Err(EncodeError::Option { option, found, expected });
+    let Inside { rule, surface } = *solid.inside();
+    if options.inside != Inside::default() && options.inside != *solid.inside() {
+        return wrong("inside", options.inside.to_string(), "the rule that the solid was made with");
+    }
+    if let InsideRule::Sheet { thickness } = rule
+        && !(thickness > 0.0 && thickness <= MAX_SIZE * presented.mesh.diagonal())
+    {
+        return wrong(
+            "thickness",
+            thickness.to_string(),
+            "a positive length, at most 8 times the diagonal of the mesh",
+        );
+    }
+    if surface == SurfaceFaces::Boundary && (presented.telling == Telling::Sheet || jumps) {
+        return wrong(
+            "surface",
+            "boundary, of a mesh without an exact inside".into(),
+            "all: an open mesh and a sheet have no faces that are surely inside",
+        );
+    }
+    let all_as_they_are = presented.telling == Telling::Winding && matches!(presented.mesh, Cow::Borrowed(_));
+    if matches!(domain, Domain::Conforming(_)) && !all_as_they_are {
+        return wrong(
+            "inside",
+            format!("{}, in a conforming domain", rule.name()),
+            "the bisection domain for a rule that the winding number of the faces does not tell",
+        );
+    }
+    Ok(())
+}
 
 fn validated(options: &EncodeOptions, domain: &Domain, diagonal: f64) -> Result<f64, EncodeError> {
     let band = options.band.resolve(diagonal);
@@ -282,8 +359,8 @@ fn face_tree(tree: &AabbTree, cube: &DomainCube) -> (Vec<[f32; 12]>, Vec<[u32; 2
     };
     let mut nodes = tree.nodes().to_vec();
     if let (bounds, Child::Leaf { start, end }) = tree.root() {
-        // A tree that is a single leaf is written as a node with two leaves. A closed mesh has at
-        // least two faces.
+        // A tree that is a single leaf is written as a node with two leaves. Of a single face, both
+        // leaves have the face.
         let half = start + (end - start) / 2;
         nodes.push([(bounds, Child::Leaf { start, end: half }), (bounds, Child::Leaf { start: half, end })]);
     }

@@ -18,6 +18,7 @@ use crate::parallel::*;
 use glam::DVec3;
 
 use crate::TeSdf;
+use crate::asset::about::Signs;
 use crate::mesh::{MeshError, Topology};
 use crate::query::{Place, Precision};
 use crate::verify::mesh_of;
@@ -68,6 +69,9 @@ pub enum EvaluateError {
     /// The mesh in an asset is not closed, so it has no inside.
     #[error("the mesh in the asset is not closed: the directed edges do not balance, so nothing has a sign")]
     NotClosed,
+    /// The inside of an asset is not that of the winding number of its faces.
+    #[error("the inside of an asset is by a rule that the grid does not know; use `tesdf verify`")]
+    Rule,
 }
 
 /// Compares each asset with the exact signed distance of its mesh, in `f64`, at all grid points
@@ -90,6 +94,9 @@ pub fn evaluate(
     }
     let grid = Grid::of(assets, options.fineness)?;
     let (mesh, _) = mesh_of(first)?;
+    if assets.iter().any(|asset| asset.about().signs != Signs::Cells) {
+        return Err(EvaluateError::Rule);
+    }
     if !Topology::new(mesh.faces()).is_closed() {
         return Err(EvaluateError::NotClosed);
     }

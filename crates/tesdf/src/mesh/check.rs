@@ -2,6 +2,8 @@ use std::{collections::BTreeMap, fmt};
 
 use serde::Serialize;
 
+use crate::base::InsideRule;
+
 use super::count::count;
 use super::{Defect, DefectKind, Severity, Topology, TriangleMesh};
 
@@ -18,7 +20,7 @@ pub(crate) use faces::face_flaws;
 pub(crate) use intersections::self_intersections;
 pub(crate) use range::{coordinate_in_range, out_of_range};
 pub(crate) use t_junctions::{TJunctions, t_junctions};
-pub(crate) use winding::height;
+pub(crate) use winding::{FaceClass, Survey, height};
 
 /// The result of [`check`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -40,7 +42,7 @@ pub struct CheckReport {
     /// Least and greatest winding number found; `None` when it is not an integer everywhere or was
     /// not tested.
     pub winding: Option<[i32; 2]>,
-    /// Whether the mesh has a well-defined inside, that is, no defect is an error.
+    /// Whether the mesh can be encoded: it has a well-defined inside, that is, no defect is an error.
     pub encodable: bool,
     /// All defects, sorted by kind.
     pub defects: Vec<Defect>,
@@ -98,6 +100,20 @@ pub(crate) const T_JUNCTION_TOLERANCE: f64 = 1e-9;
 /// million pairs of faces intersect, and more than two per face, the mesh gets one error without a
 /// list of the pairs, and winding numbers are not tested.
 pub fn check(mesh: &TriangleMesh) -> CheckReport {
+    check_for(mesh, InsideRule::Winding)
+}
+
+/// As [`check`], for another rule of what is inside: whether the mesh can be encoded under it, and
+/// on which side its warnings count.
+///
+/// [`Generalized`](InsideRule::Generalized) and [`Sheet`](InsideRule::Sheet) take any mesh whose
+/// coordinates are in the accepted range. All other defects are warnings then.
+pub fn check_for(mesh: &TriangleMesh, rule: InsideRule) -> CheckReport {
+    check_and_survey(mesh, rule).0
+}
+
+/// As [`check_for`], with the winding numbers on the sides of all faces, where they were found.
+pub(crate) fn check_and_survey(mesh: &TriangleMesh, rule: InsideRule) -> (CheckReport, Option<Survey>) {
     let topology = Topology::new(mesh.faces());
     let bounds = mesh.bounds();
     let mut report = CheckReport {
@@ -113,10 +129,11 @@ pub fn check(mesh: &TriangleMesh) -> CheckReport {
         defects: out_of_range(mesh),
     };
     if !report.defects.is_empty() {
-        return report;
+        return (report, None);
     }
     let closed = topology.is_closed();
-    let lenient = if closed { Severity::Warning } else { Severity::Error };
+    let strict = !closed && rule.needs_closed();
+    let lenient = if strict { Severity::Error } else { Severity::Warning };
     let defects = &mut report.defects;
 
     let junctions = t_junctions(mesh.vertices(), &topology, T_JUNCTION_TOLERANCE * report.diagonal);
@@ -130,17 +147,24 @@ pub fn check(mesh: &TriangleMesh) -> CheckReport {
     let pairs = self_intersections(mesh, &flaws.without_area(), &touching);
     defects.extend(intersections::defects(mesh, &pairs, lenient));
     // When pairs are missing, unknown faces could cut a patch.
-    if closed && pairs.len() < intersections::max_pairs(mesh) {
+    let is_sheet = matches!(rule, InsideRule::Sheet { .. });
+    let mut survey = None;
+    if closed && !is_sheet && pairs.len() < intersections::max_pairs(mesh) {
         let meetings = winding::Meetings { flaws: &flaws, intersections: &pairs, touching: &touching };
-        let (range, found) = winding::winding_defects(mesh, &topology, &meetings);
+        let (range, found, sides) = winding::winding_defects(mesh, &topology, &meetings, rule);
         report.winding = Some(range);
+        survey = Some(sides);
         defects.extend(found);
     }
     defects.extend(range::scale_defects(mesh));
     defects.sort_by_key(|d| d.kind);
+    if !rule.needs_closed() {
+        let any_mesh = defects.iter_mut().filter(|d| !matches!(d.kind, DefectKind::NoInside));
+        any_mesh.filter(|d| d.severity == Severity::Error).for_each(|d| d.severity = Severity::Warning);
+    }
     report.boundary_loops = edges::boundary_loops(mesh, &topology);
     report.encodable = !report.defects.iter().any(|d| d.severity == Severity::Error);
-    report
+    (report, survey)
 }
 
 impl CheckReport {

@@ -66,6 +66,8 @@ pub enum DefectKind {
     NoInside,
     /// A place with a winding number above 1: solids overlap, or a cavity is inside out.
     WindingAboveOne,
+    /// A face that is a part of the surface, and lies partly within the solid.
+    PartlyBuried,
     /// A face whose height is less than a millionth of its longest edge.
     NeedleFace,
     /// The mesh is so far from the origin that 32-bit floats would move its vertices by more than
@@ -130,6 +132,7 @@ impl fmt::Display for DefectKind {
             Self::NegativeWinding => "places with a negative winding number",
             Self::NoInside => "meshes without an inside",
             Self::WindingAboveOne => "places with a winding number above 1",
+            Self::PartlyBuried => "faces partly within the solid",
             Self::NeedleFace => "needle faces",
             Self::FarFromOrigin => "meshes far from the origin",
             Self::ExtremeScale => "meshes of extreme scale",

@@ -3,6 +3,7 @@ mod check;
 mod count;
 mod defect;
 mod polygon;
+mod presented;
 mod read;
 mod repair;
 mod solid;
@@ -12,9 +13,10 @@ mod weld;
 mod winding;
 mod write;
 
-pub(crate) use check::coordinate_in_range;
-pub use check::{BoundaryLoop, CheckReport, check};
+pub use check::{BoundaryLoop, CheckReport, check, check_for};
+pub(crate) use check::{FaceClass, Survey, check_and_survey, coordinate_in_range};
 pub use defect::{Defect, DefectKind, Severity};
+pub(crate) use presented::{Presented, Telling};
 pub(crate) use read::text;
 pub use read::{
     LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, files, read, read_bytes, source_blake3,

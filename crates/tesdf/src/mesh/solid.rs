@@ -4,18 +4,24 @@ use std::path::{Path, PathBuf};
 
 use super::count::count;
 use super::{
-    CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, ReadError, Severity, TriangleMesh, check, read,
+    CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, ReadError, Severity, Topology, TriangleMesh,
+    check_and_survey, presented::Presentation, read,
 };
+use crate::base::{Inside, InsideRule};
 
 /// A mesh with a well-defined inside. The encoder accepts only this type, and every value of it is
 /// valid.
+///
+/// A mesh and a rule ([`InsideRule`]) make a solid. Without a rule the inside is where the winding
+/// number is 1 or more:
 ///
 /// - Every coordinate and the diagonal are in the accepted range.
 /// - Every directed edge is used as often as its reverse, so the winding number is an integer
 ///   everywhere.
 /// - The winding number is 1 or more somewhere.
 ///
-/// A point is inside where the winding number is 1 or more. The surface may intersect or touch
+/// [`with_inside`](Self::with_inside) takes another rule. Then the last two follow from the rule:
+/// the generalised winding number and a sheet take any mesh. The surface may intersect or touch
 /// itself, be inside out in places, and have faces without area; [`warnings`](Self::warnings) lists
 /// such places.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +29,8 @@ pub struct SolidMesh {
     mesh: TriangleMesh,
     warnings: Vec<Defect>,
     simple: bool,
+    inside: Inside,
+    presentation: Presentation,
 }
 
 impl SolidMesh {
@@ -48,15 +56,15 @@ impl SolidMesh {
     /// # }
     /// ```
     pub fn read(path: impl AsRef<Path>) -> Result<Self, ReadSolidError> {
-        Self::load(path.as_ref()).map(|(solid, _)| solid)
+        Self::load(path.as_ref(), Inside::default()).map(|(solid, _)| solid)
     }
 
-    /// As [`read`](Self::read), and returns the report of reading.
-    pub(crate) fn load(path: &Path) -> Result<(Self, LoadReport), ReadSolidError> {
+    /// As [`read`](Self::read) with a rule, and returns the report of reading.
+    pub(crate) fn load(path: &Path, inside: Inside) -> Result<(Self, LoadReport), ReadSolidError> {
         let LoadedMesh { mesh, report, .. } =
             read(path).map_err(|source| ReadSolidError::Read { path: path.to_owned(), source })?;
-        let solid =
-            Self::new(mesh).map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
+        let solid = Self::with_inside(mesh, inside)
+            .map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
         Ok((solid, report))
     }
 
@@ -84,15 +92,58 @@ impl SolidMesh {
     /// # }
     /// ```
     pub fn new(mesh: TriangleMesh) -> Result<Self, NotSolid> {
-        let report = check(&mesh);
+        Self::with_inside(mesh, Inside::default())
+    }
+
+    /// As [`new`](Self::new), with a rule for what is inside, and which faces are the surface.
+    ///
+    /// # Errors
+    /// [`NotSolid`] has all errors that the mesh has under this rule, and names the rules and the
+    /// repairs that would make it a solid.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::base::{Inside, InsideRule};
+    /// use tesdf::glam::DVec3;
+    /// use tesdf::{Encoder, SolidMesh, TriangleMesh};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // A square, which has no inside by any winding number.
+    /// let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    /// let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]])?;
+    /// let plate = SolidMesh::with_inside(mesh, Inside::new(InsideRule::Sheet { thickness: 0.2 }))?;
+    /// let asset = Encoder::new().encode(&plate)?;
+    /// assert!((asset.signed_distance(DVec3::new(0.5, 0.5, 0.5)) - 0.4).abs() < 1e-12);
+    /// assert!((asset.signed_distance(DVec3::new(0.5, 0.5, 0.0)) + 0.1).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn with_inside(mesh: TriangleMesh, inside: Inside) -> Result<Self, NotSolid> {
+        let (report, survey) = check_and_survey(&mesh, inside.rule);
         if !report.encodable {
             let repairable = super::repair(&mesh, &super::RepairOptions::default())
                 .is_ok_and(|repaired| repaired.report.encodable);
-            return Err(NotSolid { report: Box::new(report), repairable });
+            return Err(NotSolid {
+                rules: other_rules(&mesh, &report),
+                report: Box::new(report),
+                repairable,
+            });
         }
         let simple = report.is_simple();
-        let warnings = report.defects;
-        Ok(Self { mesh, warnings, simple })
+        let (mut warnings, winding) = (report.defects, report.winding);
+        let presentation = Presentation::new(&mesh, inside, winding, survey);
+        warnings.extend(presentation.partly_buried(&mesh));
+        Ok(Self { mesh, warnings, simple, inside, presentation })
+    }
+
+    /// What is inside, and which faces are the surface.
+    pub fn inside(&self) -> &Inside {
+        &self.inside
+    }
+
+    pub(super) fn presentation(&self) -> &Presentation {
+        &self.presentation
     }
 
     /// The mesh.
@@ -152,6 +203,25 @@ impl ReadSolidError {
 pub struct NotSolid {
     report: Box<CheckReport>,
     repairable: bool,
+    rules: Vec<InsideRule>,
+}
+
+/// The rules under which a refused mesh is a solid; a sheet without its thickness.
+fn other_rules(mesh: &TriangleMesh, report: &CheckReport) -> Vec<InsideRule> {
+    let out_of_range = |d: &Defect| d.kind == DefectKind::OutOfRange;
+    if report.defects.iter().any(out_of_range) {
+        return Vec::new();
+    }
+    let is_closed = Topology::new(mesh.faces()).is_closed();
+    let mut rules = Vec::new();
+    match report.winding {
+        Some(winding) if winding != [0, 0] => rules.push(InsideRule::Nonzero),
+        None if is_closed => rules.push(InsideRule::Nonzero),
+        None => rules.push(InsideRule::Generalized),
+        Some(_) => {}
+    }
+    rules.push(InsideRule::Sheet { thickness: 0.0 });
+    rules
 }
 
 impl NotSolid {
@@ -163,6 +233,11 @@ impl NotSolid {
     /// Whether [`repair`](super::repair()) with default options makes the mesh a solid.
     pub fn is_repairable(&self) -> bool {
         self.repairable
+    }
+
+    /// The rules under which the mesh can be encoded as it is. A sheet has no thickness here.
+    pub fn rules(&self) -> &[InsideRule] {
+        &self.rules
     }
 }
 
@@ -196,6 +271,22 @@ impl fmt::Display for NotSolid {
         } else {
             ". `tesdf repair` with default options does not make it encodable: `tesdf check` lists all defects, and \
              `tesdf repair --weld-tolerance` joins vertices that are a given length apart"
-        })
+        })?;
+        self.rules.iter().try_for_each(|rule| f.write_str(way_on(*rule)))
+    }
+}
+
+/// How a rule treats a mesh that is refused under another rule, and its flag.
+fn way_on(rule: InsideRule) -> &'static str {
+    match rule {
+        InsideRule::Winding | InsideRule::Odd => "",
+        InsideRule::Nonzero => ". `--inside nonzero` takes shells that are inside out as solids",
+        InsideRule::Generalized => {
+            ". `--inside generalized` takes it as the solid that its faces enclose for the most part (generalised \
+             winding number)"
+        }
+        InsideRule::Sheet { .. } => {
+            ". `--inside sheet --thickness T` takes its faces as sheets of a thickness"
+        }
     }
 }

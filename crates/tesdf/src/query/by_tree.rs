@@ -79,6 +79,6 @@ impl TeSdf {
     }
 
     fn side_of(&self, point: DVec3) -> Side {
-        if self.is_inside(point) { Side::Inside } else { Side::Outside }
+        if self.half_thickness == 0.0 && self.is_inside(point) { Side::Inside } else { Side::Outside }
     }
 }

@@ -38,6 +38,8 @@ impl TeSdf {
         let closest_point = self.frame.to_world(found.closest_point);
         let (signed_distance, gradient) = length_and_direction(point - closest_point);
         let face = self.face_ids[found.position as usize];
+        let half = self.half_thickness * self.frame.inverse_scale();
+        let (signed_distance, closest_point) = (signed_distance - half, closest_point + half * gradient);
         Answer { signed_distance, gradient, closest_point, face }
     }
 }

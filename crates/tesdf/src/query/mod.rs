@@ -72,7 +72,6 @@ pub use ray::RayHit;
 pub(crate) use surroundings::Surroundings;
 
 use crate::TeSdf;
-use crate::asset::layout::Label;
 use crate::base::Side;
 use crate::geometry::{Closest, Feature};
 use far::is_near;
@@ -145,6 +144,9 @@ pub(crate) struct Found {
 pub(crate) const ON_SURFACE_F64: f64 = 5e-10;
 /// The same for `f32` storage: about ten times its rounding.
 const ON_SURFACE_F32: f64 = 1e-6;
+/// Where a rule tells the side, the side of the surface is looked up at this many times the distance
+/// below which a point counts as on it.
+const BESIDE: f64 = 4.0;
 /// Faces that share an edge are at most this far from a point of the edge.
 const TOUCHING: f64 = 1e-12;
 
@@ -268,15 +270,23 @@ impl TeSdf {
         self.query_f32(point).signed_distance
     }
 
-    /// Whether the winding number at `point` is 1 or more, by exact predicates. Points on the
-    /// surface may count as either; points that are not finite are outside.
+    /// Whether `point` is inside by the rule of the asset ([`inside`](Self::inside)), by exact
+    /// predicates. Points on the surface may count as either; points that are not finite are
+    /// outside.
+    ///
+    /// For a sheet, and where the generalised winding number of an open mesh is 1/2, this is exact up
+    /// to rounding.
     pub fn is_inside(&self, point: DVec3) -> bool {
-        let local = self.frame.to_local(point);
-        match self.locate(local) {
-            Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => true,
-            Place::Listed { label: Label::Crossing(_), .. } => self.winding_in_cell(local) >= 1,
-            _ => false,
+        if self.half_thickness > 0.0 {
+            return self.signed_distance(point) < 0.0;
         }
+        let local = self.frame.to_local(point);
+        local.is_finite() && self.side_at(local, self.locate(local)) == Side::Inside
+    }
+
+    /// The side of a finite point of a place, by winding number where the place does not tell it.
+    fn side_at(&self, local: DVec3, place: Place) -> Side {
+        self.side_of_place(place).unwrap_or_else(|| self.exact_side(local))
     }
 
     /// Number of faces and nodes that a query at `point` reads, in `f32`.
@@ -339,14 +349,8 @@ impl TeSdf {
     pub(crate) fn found_exactly(&self, local: DVec3) -> Found {
         let place = self.locate(local);
         match place {
-            Place::Listed { label, .. } if !self.has_exact_lists() => {
-                let inside = match label {
-                    Label::Inside => true,
-                    Label::Outside => false,
-                    Label::Crossing(_) => self.winding_in_cell(local) >= 1,
-                };
-                let far = Place::Far(if inside { Side::Inside } else { Side::Outside });
-                self.found_at(local, far, Precision::F32)
+            Place::Listed { .. } if !self.has_exact_lists() => {
+                self.found_at(local, Place::Far(self.side_at(local, place)), Precision::F32)
             }
             _ => self.found_at(local, place, Precision::F32),
         }
@@ -368,10 +372,12 @@ impl TeSdf {
     /// Converts from the local frame to the mesh's frame.
     #[inline(always)]
     fn to_answer(&self, found: Found) -> Answer {
+        // Half of the thickness is 0 unless the asset is a sheet.
+        let half = self.half_thickness;
         Answer {
-            signed_distance: found.signed_distance * self.frame.inverse_scale(),
+            signed_distance: (found.signed_distance - half) * self.frame.inverse_scale(),
             gradient: found.gradient,
-            closest_point: self.frame.to_world(found.closest_point),
+            closest_point: self.frame.to_world(found.closest_point + half * found.gradient),
             face: self.face_ids[found.position as usize],
         }
     }
@@ -403,17 +409,13 @@ impl TeSdf {
             0 => triangle.closest_in_plane(relative),
             edge => triangle.closest_on_edge(edge as usize - 1, relative),
         };
-        let side = match place {
-            Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
-            Place::Listed { label: Label::Crossing(_), .. } => {
-                let height = triangle.normal.dot(relative - triangle.corners[0]);
-                hinted_side(record.hints(), closest.feature, height).unwrap_or_else(|| self.exact_side(local))
-            }
-            _ => Side::Outside,
-        };
+        let side = self.side_of_place(place).unwrap_or_else(|| {
+            let height = triangle.normal.dot(relative - triangle.corners[0]);
+            hinted_side(record.hints(), closest.feature, height).unwrap_or_else(|| self.exact_side(local))
+        });
         let on_surface = |d: f64| match place {
             _ if d >= ON_SURFACE_F32 => None,
-            _ => Some(triangle.normal),
+            _ => Some(self.outward(triangle.normal, local, BESIDE * ON_SURFACE_F32)),
         };
         self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
     }
@@ -463,18 +465,18 @@ impl TeSdf {
             Place::Listed { .. } => self.nearest_in_list_f64(faces, local, seen),
             _ => self.nearest_in_tree_f64(local, seen),
         };
-        let side = match place {
-            Place::Listed { label: Label::Inside, .. } | Place::Far(Side::Inside) => Side::Inside,
-            Place::Listed { label: Label::Crossing(_), .. } if closest.distance > 0.0 => {
-                self.side_in_cell(local, position, &closest)
-            }
-            _ => Side::Outside,
-        };
-        let on_surface = |d: f64| match place {
-            _ if d >= ON_SURFACE_F64 => None,
-            Place::Listed { .. } => Some(self.pseudonormal(faces, position, &closest)),
-            // A cell without a list, because no list was worth its bytes, may touch the surface.
-            _ => Some(self.face_normal(position)),
+        let side = self.side_of_place(place).unwrap_or_else(|| match closest.distance > 0.0 {
+            true => self.side_in_cell(local, position, &closest),
+            false => Side::Outside,
+        });
+        let on_surface = |d: f64| {
+            let normal = match place {
+                _ if d >= ON_SURFACE_F64 => return None,
+                Place::Listed { .. } => self.pseudonormal(faces, position, &closest),
+                // A cell without a list, because no list was worth its bytes, may touch the surface.
+                _ => self.face_normal(position),
+            };
+            Some(self.outward(normal, closest.point, BESIDE * ON_SURFACE_F64))
         };
         self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
     }

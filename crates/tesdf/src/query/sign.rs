@@ -1,7 +1,7 @@
 use glam::DVec3;
 
 use super::ON_SURFACE_F64;
-use super::locate::Faces;
+use super::locate::{Faces, Place};
 use crate::TeSdf;
 use crate::asset::layout::{Label, SignHint, SignHints};
 use crate::base::Side;
@@ -39,10 +39,35 @@ impl TeSdf {
             .unwrap_or_else(|| self.exact_side(local))
     }
 
+    /// The side of all points of a place; `None` when they differ.
+    #[inline]
+    pub(super) fn side_of_place(&self, place: Place) -> Option<Side> {
+        match place {
+            Place::Listed { label: Label::Inside, .. } => Some(Side::Inside),
+            Place::Listed { label: Label::Outside, .. } => Some(Side::Outside),
+            Place::Listed { label: Label::Crossing(_), .. } => None,
+            Place::Far(_) | Place::NotOfDomain if self.is_by_rule => None,
+            Place::Far(side) => Some(side),
+            Place::NotOfDomain => Some(Side::Outside),
+        }
+    }
+
     /// The side by winding number. Exact.
     #[cold]
     pub(super) fn exact_side(&self, local: DVec3) -> Side {
+        if let Some(rule) = self.sign_rule() {
+            return rule.side(local);
+        }
         if self.winding_in_cell(local) >= 1 { Side::Inside } else { Side::Outside }
+    }
+
+    /// The normal of the surface at a point of it, so that it points outward. Winding numbers tell the
+    /// direction of the faces only where inside is where they are 1 or more. `step` is the distance
+    /// on both sides at which the side is looked up.
+    pub(crate) fn outward(&self, normal: DVec3, at: DVec3, step: f64) -> DVec3 {
+        let Some(rule) = self.sign_rule() else { return normal };
+        let [front, behind] = [1.0, -1.0].map(|s| rule.side(at + s * step * normal));
+        if front == Side::Inside && behind == Side::Outside { -normal } else { normal }
     }
 
     /// Winding number in a crossing cell: the number at its centroid plus the crossings on the

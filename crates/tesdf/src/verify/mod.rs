@@ -9,6 +9,7 @@ mod compare;
 mod prove;
 mod samples;
 mod self_check;
+mod true_sign;
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,8 +19,9 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::TeSdf;
-use crate::base::Certificate;
-use crate::mesh::{MeshError, Topology, TriangleMesh, WindingNumber};
+use crate::asset::about::Signs;
+use crate::base::{Certificate, InsideRule};
+use crate::mesh::{MeshError, Topology, TriangleMesh};
 use crate::query::Precision;
 use brute_force::BruteForce;
 use compare::Comparison;
@@ -28,6 +30,7 @@ pub use prove::{Claim, Fault, ProveError, ProveOptions, ProveReport, Tally, Verd
 pub use samples::PointClass;
 use samples::Sampler;
 pub(crate) use self_check::self_check;
+use true_sign::{TrueSign, signed, unshifted};
 
 /// Number and seed of the points of [`verify`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -112,15 +115,21 @@ pub fn verify(
     if !(diagonal.is_finite() && diagonal > 0.0) {
         return Err(VerifyError::Diagonal(diagonal));
     }
-    if !Topology::new(mesh.faces()).is_closed() {
+    // Where cells tell the sign, they tell that of the winding number.
+    let rule = match asset.about().signs {
+        Signs::Cells => InsideRule::Winding,
+        _ => asset.inside().rule,
+    };
+    let all = all_faces(asset)?;
+    if rule.needs_closed() && !Topology::new(all.faces()).is_closed() {
         return Err(VerifyError::NotClosed);
     }
     let certificate = asset.about().certificate();
-    let winding = WindingNumber::new(&mesh);
-    let sampler = Sampler::new(asset, &mesh, &winding, options.seed);
-    let mut place = vec![None; ids.len()];
+    let sign = TrueSign::new(all, rule);
+    let sampler = Sampler::new(asset, &mesh, &sign, options.seed);
+    let mut place = vec![None; ids.iter().max().map_or(0, |id| *id as usize + 1)];
     ids.iter().enumerate().for_each(|(at, &id)| place[id as usize] = Some(at));
-    let truth = Truth { faces: BruteForce::new(&mesh, diagonal), place, winding: &winding, mesh: &mesh };
+    let truth = Truth { faces: BruteForce::new(&mesh, diagonal), place, sign: &sign };
     let samples = options.samples as u64;
     let done = AtomicUsize::new(0);
     let parts = (0..samples.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
@@ -155,13 +164,18 @@ pub(crate) fn mesh_of(asset: &TeSdf) -> Result<(TriangleMesh, Vec<u32>), MeshErr
     Ok((TriangleMesh::new(vertices, asset.faces.to_vec())?, asset.face_ids.to_vec()))
 }
 
+/// The faces of the surface, and those that count for the sign only.
+fn all_faces(asset: &TeSdf) -> Result<TriangleMesh, MeshError> {
+    let vertices = asset.vertices.iter().map(|&v| DVec3::from_array(v)).collect();
+    TriangleMesh::new(vertices, [&*asset.faces, asset.sign_faces.as_deref().unwrap_or(&[])].concat())
+}
+
 /// The reference for comparisons.
 struct Truth<'a> {
     faces: BruteForce,
     /// For each face id of the source, its index in `faces`.
     place: Vec<Option<usize>>,
-    winding: &'a WindingNumber,
-    mesh: &'a TriangleMesh,
+    sign: &'a TrueSign,
 }
 
 struct Found {
@@ -183,16 +197,16 @@ impl Found {
     fn add(&mut self, asset: &TeSdf, truth: &Truth, index: u64, p: DVec3) {
         let class = PointClass::of_index(index);
         let distance = truth.faces.distance(p);
-        let winding = truth.winding.at_perturbed(p);
+        let inside = truth.sign.is_inside(p);
         // Nearer than this bound, rounding could put the point on the surface, where the other
         // method may return either number.
         if index.is_multiple_of(BRUTE_FORCE_EVERY) && distance > self.comparisons[1].promise().distance(p) {
             self.brute_force += 1;
-            self.disagreements += usize::from(WindingNumber::brute_force(truth.mesh, p) != winding);
+            self.disagreements += usize::from(truth.sign.disagrees(p));
         }
-        let expected = if winding >= 1 { -distance } else { distance };
         for comparison in &mut self.comparisons {
-            let answer = asset.query_with(p, comparison.precision());
+            let answer = unshifted(asset, asset.query_with(p, comparison.precision()));
+            let expected = signed(distance, inside, &answer);
             // Vector from the closest point of the face that the answer names.
             let place = truth.place.get(answer.face as usize).copied().flatten();
             let offset = place.map(|at| truth.faces.offset(at, p));

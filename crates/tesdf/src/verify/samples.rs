@@ -1,10 +1,11 @@
 use glam::DVec3;
 use serde::Serialize;
 
+use super::true_sign::TrueSign;
 use crate::TeSdf;
 use crate::asset::CellKind;
 use crate::geometry::{Aabb, Triangle};
-use crate::mesh::{TriangleMesh, WindingNumber};
+use crate::mesh::TriangleMesh;
 use crate::sampling::{Random, Weighted};
 
 /// Classes of the points that are compared with brute force.
@@ -90,7 +91,7 @@ impl PointClass {
 pub(super) struct Sampler<'a> {
     asset: &'a TeSdf,
     mesh: &'a TriangleMesh,
-    winding: &'a WindingNumber,
+    sign: &'a TrueSign,
     seed: u64,
     bounds: Aabb,
     diagonal: f64,
@@ -105,12 +106,7 @@ const TRIES: usize = 64;
 const DEEPEST_OF: usize = 4;
 
 impl<'a> Sampler<'a> {
-    pub(super) fn new(
-        asset: &'a TeSdf,
-        mesh: &'a TriangleMesh,
-        winding: &'a WindingNumber,
-        seed: u64,
-    ) -> Self {
+    pub(super) fn new(asset: &'a TeSdf, mesh: &'a TriangleMesh, sign: &'a TrueSign, seed: u64) -> Self {
         let diagonal = mesh.diagonal();
         // Relative to the diagonal, so that areas do not underflow.
         let areas = Weighted::new((0..mesh.faces().len()).map(|f| {
@@ -123,7 +119,7 @@ impl<'a> Sampler<'a> {
                 cells.push(cell.corners);
             }
         });
-        Self { asset, mesh, winding, seed, bounds: mesh.bounds(), diagonal, areas, cells }
+        Self { asset, mesh, sign, seed, bounds: mesh.bounds(), diagonal, areas, cells }
     }
 
     pub(super) fn point(&self, index: u64) -> DVec3 {
@@ -192,7 +188,7 @@ impl<'a> Sampler<'a> {
         let mut best = (0.0, None);
         for _ in 0..TRIES {
             let p = random.in_box(self.bounds);
-            if self.winding.at_perturbed(p) >= 1 {
+            if self.sign.is_inside(p) == Some(true) {
                 let depth = self.asset.signed_distance_f32(p).abs();
                 if depth > best.0 {
                     best = (depth, Some(p));

@@ -4,10 +4,11 @@ use glam::DVec3;
 
 use super::brute_force::BruteForce;
 use super::compare::{Comparison, Worst};
+use super::true_sign::{TrueSign, signed, unshifted};
 use super::{PointClass, mesh_of};
 use crate::TeSdf;
 use crate::asset::CellKind;
-use crate::mesh::{MeshError, WindingNumber};
+use crate::mesh::{MeshError, SolidMesh};
 use crate::query::Precision;
 use crate::sampling::Random;
 
@@ -27,21 +28,22 @@ const KINDS: [CellKind; 6] = [
 /// Finds an error in an encoding: the point with the largest error of distance or sign, among
 /// points in cells of every kind. `None` when all points are within the promised bounds.
 ///
-/// The expected values are the least distance over all faces and an exact winding number. They use
-/// neither the lists nor the face tree.
-pub(crate) fn self_check(asset: &TeSdf) -> Result<Option<(Precision, Worst)>, MeshError> {
+/// The expected values are the least distance over all faces of the surface, and the side by the rule
+/// of `solid`, over all faces of its mesh. They use neither the lists nor the face tree.
+pub(crate) fn self_check(asset: &TeSdf, solid: &SolidMesh) -> Result<Option<(Precision, Worst)>, MeshError> {
     let (mesh, _) = mesh_of(asset)?;
-    let (truth, winding) = (BruteForce::new(&mesh, mesh.diagonal()), WindingNumber::new(&mesh));
+    let truth = BruteForce::new(&mesh, mesh.diagonal());
+    let sign = TrueSign::new(solid.mesh().clone(), solid.inside().rule);
     let certificate = asset.about().certificate();
-    let signed_distance = |point: DVec3| {
-        let distance = truth.distance(point);
-        (point, if winding.at_perturbed(point) >= 1 { -distance } else { distance })
-    };
-    let expected: Vec<(DVec3, f64)> = points(asset).into_par_iter().map(signed_distance).collect();
+    let points = points(asset).into_par_iter();
+    let expected: Vec<(DVec3, f64, Option<bool>)> =
+        points.map(|p| (p, truth.distance(p), sign.is_inside(p))).collect();
     let mistake = |precision| {
         let mut comparison = Comparison::new(precision, &mesh, certificate);
-        for &(point, expected) in &expected {
-            comparison.add(PointClass::Box, point, expected, &asset.query_with(point, precision), None);
+        for &(point, distance, inside) in &expected {
+            let answer = unshifted(asset, asset.query_with(point, precision));
+            let expected = signed(distance, inside, &answer);
+            comparison.add(PointClass::Box, point, expected, &answer, None);
         }
         Some(precision).zip(comparison.worst_mistake())
     };
@@ -77,7 +79,7 @@ mod tests {
     use crate::asset::layout::{Label, Node};
     use crate::base::Side;
     use crate::encode::Encoder;
-    use crate::mesh::{MeshFormat, SolidMesh, read_bytes};
+    use crate::mesh::{MeshFormat, read_bytes};
 
     #[test]
     fn cells_with_a_wrong_side_are_found() {
@@ -87,7 +89,7 @@ mod tests {
         let mesh = read_bytes(obj.as_bytes(), MeshFormat::Obj).expect("a mesh").mesh;
         let solid = SolidMesh::new(mesh).expect("a solid");
         let mut asset = Encoder::new().encode(&solid).expect("encodes");
-        assert_eq!(self_check(&asset), Ok(None));
+        assert_eq!(self_check(&asset, &solid), Ok(None));
         // Mark all cells as outside.
         let mut nodes = asset.nodes.to_vec();
         for word in &mut nodes {
@@ -98,7 +100,7 @@ mod tests {
             };
         }
         asset.nodes = SharedSection::of_rows(&nodes);
-        let (precision, worst) = self_check(&asset).expect("a mesh").expect("it is wrong");
+        let (precision, worst) = self_check(&asset, &solid).expect("a mesh").expect("it is wrong");
         assert!(precision == Precision::F64 && (worst.found - worst.expected).abs() > 0.01, "{worst:?}");
     }
 }

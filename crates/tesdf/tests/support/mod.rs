@@ -4,9 +4,11 @@
 #![allow(dead_code, reason = "each test program uses its own part")]
 
 pub mod bodies;
+pub mod brute_inside;
 pub mod cells;
 pub mod lowest;
 pub mod meshes;
+pub mod parts;
 pub mod per_face;
 pub mod points;
 pub mod random;

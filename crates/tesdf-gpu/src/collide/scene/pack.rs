@@ -41,7 +41,12 @@ impl Packed {
             row[at..at + 3].copy_from_slice(&sizes.as_vec3().to_array().map(f32::to_bits));
         };
         match shape {
-            Shape::Mesh(asset) => return self.add_mesh(&asset.arrays()),
+            Shape::Mesh(asset) => {
+                return match asset.unsupported_on_devices() {
+                    Some(reason) => Err(reason),
+                    None => self.add_mesh(&asset.arrays()),
+                };
+            }
             Shape::Plane => sizes(shapes::PLANE, DVec3::ZERO),
             Shape::Box { half_extents } => sizes(shapes::BOX, *half_extents),
             Shape::Sphere { radius } => sizes(shapes::ROUND, DVec3::new(0.0, *radius, 0.0)),

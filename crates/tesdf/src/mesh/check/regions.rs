@@ -19,6 +19,15 @@ pub(super) struct Sample {
     pub jump: i32,
 }
 
+/// Sample points in regions of a face.
+#[derive(Debug, Default)]
+pub(super) struct Samples {
+    /// The points.
+    pub samples: Vec<Sample>,
+    /// Whether every region that is wider than the rounding has a point.
+    pub is_complete: bool,
+}
+
 /// Largest number of faces that are used to cut a face. When there are more, evenly chosen faces
 /// are used.
 const CUTS: usize = 1 << 12;
@@ -40,9 +49,9 @@ const LEAF_SIZE: usize = 4;
 /// are rounded, so regions and pieces narrower than `rounding` get no sample. Not all regions get a
 /// sample when more than 4096 faces cut the face, or when there are more than two pieces per
 /// segment and 64 more.
-pub(super) fn samples(mesh: &TriangleMesh, face: u32, others: &[u32], rounding: f64) -> Vec<Sample> {
+pub(super) fn samples(mesh: &TriangleMesh, face: u32, others: &[u32], rounding: f64) -> Samples {
     let corners = mesh.triangle(face as usize);
-    let Some(chart) = Chart::new(corners) else { return Vec::new() };
+    let Some(chart) = Chart::new(corners) else { return Samples::default() };
     let mut segments = Vec::new();
     let mut coplanar = Vec::new();
     for &other in others.iter().step_by(others.len().div_ceil(CUTS).max(1)) {
@@ -61,8 +70,11 @@ pub(super) fn samples(mesh: &TriangleMesh, face: u32, others: &[u32], rounding: 
         let jump = coplanar.iter().filter(|(t, _)| holds(t, q)).map(|(_, turn)| turn).sum::<i32>();
         Sample { point: chart.lift(q), jump: 1 + jump }
     };
-    let beside: Vec<Sample> = beside_cuts(cuts, &chart, rounding).into_iter().map(sample).collect();
-    if beside.is_empty() { vec![sample(chart.middle())] } else { beside }
+    let (points, all_pieces) = beside_cuts(cuts, &chart, rounding);
+    let is_complete = all_pieces && others.len() <= CUTS;
+    let beside: Vec<Sample> = points.into_iter().map(sample).collect();
+    let samples = if beside.is_empty() { vec![sample(chart.middle())] } else { beside };
+    Samples { samples, is_complete }
 }
 
 /// The part of a triangle in the plane of another triangle.
@@ -209,8 +221,8 @@ impl Piece {
     }
 }
 
-/// Points on the face on both sides of the pieces.
-fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
+/// Points on the face on both sides of the pieces, and whether these are all pieces.
+fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> (Vec<DVec2>, bool) {
     let count = cuts.len();
     let mut segments = cuts;
     segments.extend(edges(chart.flat));
@@ -218,7 +230,8 @@ fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
     let boxes: Vec<Aabb> = segments.iter().map(box_of).collect();
     let tree = AabbTree::build(&boxes, LEAF_SIZE);
     let mut pieces = pieces(&segments, count, &tree, &boxes, rounding);
-    let chain = if pieces.len() <= PIECES + 2 * count {
+    let is_complete = pieces.len() <= PIECES + 2 * count;
+    let chain = if is_complete {
         chains(&pieces, rounding)
     } else {
         let every = pieces.len().div_ceil(PIECES + count);
@@ -238,7 +251,7 @@ fn beside_cuts(cuts: Vec<Segment>, chart: &Chart, rounding: f64) -> Vec<DVec2> {
             }
         }
     }
-    best.into_iter().flatten().map(|(_, point)| point).collect()
+    (best.into_iter().flatten().map(|(_, point)| point).collect(), is_complete)
 }
 
 /// The first `count` segments, cut where other segments cross them.

@@ -6,9 +6,10 @@ use glam::DVec3;
 use super::{
     edges::centroid,
     faces::FaceFlaws,
-    regions::{self, Sample},
+    regions::{self, Samples},
 };
 use crate::{
+    base::InsideRule,
     geometry::{Aabb, Triangle, perturbed_orientation},
     mesh::{Defect, DefectKind, Severity, Topology, TriangleMesh, WindingNumber, topology::Edge},
 };
@@ -32,10 +33,10 @@ pub(super) struct Meetings<'a> {
 
 /// The winding numbers in front of a face and behind it, at a place.
 #[derive(Clone, Copy)]
-struct Sides {
-    place: DVec3,
-    front: i32,
-    behind: i32,
+pub(super) struct Sides {
+    pub place: DVec3,
+    pub front: i32,
+    pub behind: i32,
 }
 
 impl Sides {
@@ -46,6 +47,141 @@ impl Sides {
     fn greatest(&self) -> i32 {
         self.front.max(self.behind)
     }
+
+    fn class(&self, rule: InsideRule) -> FaceClass {
+        match (rule.holds(self.front), rule.holds(self.behind)) {
+            (false, true) => FaceClass::Outward,
+            (true, false) => FaceClass::Inward,
+            _ => FaceClass::Buried,
+        }
+    }
+
+    fn has_odd(&self) -> bool {
+        self.front % 2 != 0 || self.behind % 2 != 0
+    }
+}
+
+/// The winding numbers on both sides of all faces of a closed mesh.
+pub(crate) struct Survey {
+    /// Faces that meet no other face, by patches on whose sides the numbers are constant.
+    patches: Vec<SidesOfPatch>,
+    /// Each face that meets others, with the sides of its regions. The first of several faces with
+    /// the same corners represents them all.
+    regions: Vec<(u32, Vec<Sides>)>,
+    /// For each face, the first face with the same corners, and whether it is reversed.
+    first: Vec<(u32, bool)>,
+    /// Whether every region of every face is known, except regions that are narrower than rounding.
+    is_complete: bool,
+}
+
+struct SidesOfPatch {
+    patch: Patch,
+    sides: Sides,
+}
+
+impl Survey {
+    fn new(mesh: &TriangleMesh, topology: &Topology, meetings: &Meetings) -> Self {
+        let winding = WindingNumber::new(mesh);
+        let mut without_area = vec![false; mesh.faces().len()];
+        meetings.flaws.without_area().iter().for_each(|&f| without_area[f as usize] = true);
+        let others = Others::new(meetings, &without_area);
+        let excluded = |f: u32| without_area[f as usize] || !others.of(f).is_empty();
+        let patches = patches(mesh, topology, &winding, excluded)
+            .into_iter()
+            .map(|patch| {
+                let sides = sides(mesh, &winding, patch.face, centroid(mesh, patch.face), 1);
+                SidesOfPatch { patch, sides }
+            })
+            .collect();
+        let (regions, is_complete) = regions(mesh, &winding, &others);
+        Self { patches, regions, first: firsts(meetings.flaws, mesh.faces().len()), is_complete }
+    }
+
+    /// Whether every region of every face is known.
+    pub fn is_complete(&self) -> bool {
+        self.is_complete
+    }
+
+    /// For each face, which of its sides are inside. Faces without area are
+    /// [`Unknown`](FaceClass::Unknown).
+    pub fn classes(&self, rule: InsideRule) -> Vec<FaceClass> {
+        let mut classes = vec![FaceClass::Unknown; self.first.len()];
+        for SidesOfPatch { patch, sides } in &self.patches {
+            let class = sides.class(rule);
+            patch.faces.iter().for_each(|&f| classes[f as usize] = class);
+        }
+        for (face, sides) in &self.regions {
+            let mut of_regions = sides.iter().map(|s| s.class(rule));
+            if let Some(first) = of_regions.next() {
+                classes[*face as usize] = of_regions.fold(first, FaceClass::join);
+            }
+        }
+        for face in 0..classes.len() {
+            let (first, reversed) = self.first[face];
+            if first as usize != face {
+                let class = classes[first as usize];
+                classes[face] = if reversed { class.reversed() } else { class };
+            }
+        }
+        classes
+    }
+}
+
+/// Which sides of a face are inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FaceClass {
+    /// The side behind the face, everywhere.
+    Outward,
+    /// The side in front of the face, everywhere.
+    Inward,
+    /// Both or none, everywhere.
+    Buried,
+    /// The side behind the face somewhere; elsewhere both or none.
+    PartlyOutward,
+    /// The side in front of the face somewhere; elsewhere both or none.
+    PartlyInward,
+    /// The side behind the face somewhere, the side in front of it elsewhere.
+    Mixed,
+    /// Not known.
+    Unknown,
+}
+
+impl FaceClass {
+    fn join(self, other: Self) -> Self {
+        use FaceClass::{Buried, Inward, Mixed, Outward, PartlyInward, PartlyOutward};
+        match (self, other) {
+            _ if self == other => self,
+            (Outward | PartlyOutward | Buried, Outward | PartlyOutward | Buried) => PartlyOutward,
+            (Inward | PartlyInward | Buried, Inward | PartlyInward | Buried) => PartlyInward,
+            _ => Mixed,
+        }
+    }
+
+    fn reversed(self) -> Self {
+        match self {
+            Self::Outward => Self::Inward,
+            Self::Inward => Self::Outward,
+            Self::PartlyOutward => Self::PartlyInward,
+            Self::PartlyInward => Self::PartlyOutward,
+            same => same,
+        }
+    }
+}
+
+/// For each face, the first face with the same corners, and whether it is reversed against it.
+fn firsts(flaws: &FaceFlaws, faces: usize) -> Vec<(u32, bool)> {
+    let mut first: Vec<(u32, bool)> = (0..faces as u32).map(|f| (f, false)).collect();
+    let pairs = flaws.duplicates.iter().map(|p| (p, false));
+    for (&[later, earlier], reversed) in pairs.chain(flaws.reversed_duplicates.iter().map(|p| (p, true))) {
+        first[later as usize] = (earlier, reversed);
+    }
+    // A first face may itself repeat an earlier one.
+    for face in 0..faces {
+        let (of, reversed) = first[face];
+        let (earliest, again) = first[of as usize];
+        first[face] = (earliest, reversed != again);
+    }
+    first
 }
 
 /// The least and greatest winding number of a closed mesh, and the places where it is negative or
@@ -54,14 +190,11 @@ pub(super) fn winding_defects(
     mesh: &TriangleMesh,
     topology: &Topology,
     meetings: &Meetings,
-) -> ([i32; 2], Vec<Defect>) {
-    let winding = WindingNumber::new(mesh);
-    let mut without_area = vec![false; mesh.faces().len()];
-    meetings.flaws.without_area().iter().for_each(|&f| without_area[f as usize] = true);
-    let others = Others::new(meetings, &without_area);
-    let excluded = |f: u32| without_area[f as usize] || !others.of(f).is_empty();
-
+    rule: InsideRule,
+) -> ([i32; 2], Vec<Defect>, Survey) {
+    let survey = Survey::new(mesh, topology, meetings);
     let mut range = [0, 0];
+    let mut any_odd = false;
     let mut defects = Vec::new();
     let mut above_one: Vec<(u32, i32)> = Vec::new();
     let mut record = |face: u32, least: &Sides, greatest: &Sides, extent: &str| {
@@ -71,7 +204,8 @@ pub(super) fn winding_defects(
             let side = if least.front == low { "in front of" } else { "behind" };
             let message = format!(
                 "the winding number is {low} {side} face {face}{extent}: the surface is folded or inside out there, and \
-                 the place counts as outside"
+                 the place counts as {}",
+                if rule.holds(low) { "inside" } else { "outside" }
             );
             let defect = Defect::new(DefectKind::NegativeWinding, Severity::Warning, least.place, message);
             defects.push(defect.faces([face]));
@@ -80,34 +214,54 @@ pub(super) fn winding_defects(
             above_one.push((face, high));
         }
     };
-    for patch in patches(mesh, topology, &winding, excluded) {
-        let extent = match patch.size {
+    for SidesOfPatch { patch, sides } in &survey.patches {
+        let extent = match patch.faces.len() {
             1 => String::new(),
             n => format!(" and the {} connected to it", n - 1),
         };
-        let found = sides(mesh, &winding, patch.face, centroid(mesh, patch.face), 1);
-        record(patch.face, &found, &found, &extent);
+        any_odd |= sides.has_odd();
+        record(patch.face, sides, sides, &extent);
     }
-    for (face, least, greatest) in extremes(mesh, &winding, &others) {
-        record(face, &least, &greatest, "");
+    for (face, sides) in &survey.regions {
+        any_odd |= sides.iter().any(Sides::has_odd);
+        let least = sides.iter().min_by_key(|s| s.least());
+        let greatest = sides.iter().max_by_key(|s| s.greatest());
+        if let (Some(least), Some(greatest)) = (least, greatest) {
+            record(*face, least, greatest, "");
+        }
     }
 
     if let Some(&(face, value)) = above_one.iter().max_by_key(|&&(f, w)| (w, std::cmp::Reverse(f))) {
+        let inside = match rule {
+            InsideRule::Winding => "is where it is 1 or more",
+            InsideRule::Odd => "is where it is odd",
+            _ => "is where it is not 0",
+        };
         let message = format!(
             "the winding number is {value} next to face {face}: solids overlap, or a cavity is inside out; \
-             inside is where it is 1 or more"
+             inside {inside}. Distances inside refer to inner walls, too, unless the surface is `boundary`"
         );
         let faces: Vec<u32> = above_one.iter().map(|&(f, _)| f).collect();
         let defect =
             Defect::new(DefectKind::WindingAboveOne, Severity::Warning, centroid(mesh, face), message);
         defects.push(defect.faces(faces));
     }
-    if range[1] < 1 {
-        let why = if range[0] < 0 { "the surface is inside out" } else { "it encloses nothing" };
-        let message = format!("no place has a winding number of 1 or more: the mesh has no inside, {why}");
+    let has_inside = match rule {
+        InsideRule::Winding => range[1] >= 1,
+        InsideRule::Odd => any_odd,
+        _ => range != [0, 0],
+    };
+    if !has_inside {
+        let (expected, why) = match rule {
+            InsideRule::Winding if range[0] < 0 => ("of 1 or more", "the surface is inside out"),
+            InsideRule::Winding => ("of 1 or more", "it encloses nothing"),
+            InsideRule::Odd => ("that is odd", "every place is enclosed an even number of times"),
+            _ => ("other than 0", "it encloses nothing"),
+        };
+        let message = format!("no place has a winding number {expected}: the mesh has no inside, {why}");
         defects.push(Defect::new(DefectKind::NoInside, Severity::Error, mesh.bounds().center(), message));
     }
-    (range, defects)
+    (range, defects, survey)
 }
 
 /// The winding numbers on both sides of a face at a place of it. From front to back they rise by
@@ -131,8 +285,8 @@ struct Patch {
     /// least. Another face comes within the rounding error of this centroid only when that holds
     /// for every face of the patch.
     face: u32,
-    /// Number of faces.
-    size: usize,
+    /// All faces.
+    faces: Vec<u32>,
 }
 
 fn patches(
@@ -161,7 +315,7 @@ fn patches(
             true => first,
             false => tallest(&mut faces.iter().copied().filter(|&face| alone(face))).unwrap_or(first),
         };
-        Some(Patch { face, size: faces.len() })
+        Some(Patch { face, faces })
     };
     faces.into_iter().filter_map(of).collect()
 }
@@ -184,24 +338,22 @@ fn rounding(mesh: &TriangleMesh) -> f64 {
     ROUNDING * bounds.min.abs().max(bounds.max.abs()).max_element()
 }
 
-/// Each face that meets others, with the places of least and greatest winding number beside its
-/// regions. The first of several faces with the same corners represents them all.
-fn extremes(mesh: &TriangleMesh, winding: &WindingNumber, others: &Others) -> Vec<(u32, Sides, Sides)> {
+/// Each face that meets others, with the winding numbers beside its regions, and whether these are
+/// all regions. The first of several faces with the same corners represents them all.
+fn regions(mesh: &TriangleMesh, winding: &WindingNumber, others: &Others) -> (Vec<(u32, Vec<Sides>)>, bool) {
     let rounding = rounding(mesh);
     let meets = |&f: &u32| !others.of(f).is_empty() && !others.repeats[f as usize];
     let faces: Vec<u32> = (0..mesh.faces().len() as u32).filter(meets).collect();
     let samples = |&face: &u32| (face, regions::samples(mesh, face, others.of(face), rounding));
-    let samples: Vec<(u32, Vec<Sample>)> = faces.par_iter().map(samples).collect();
-    let regions: usize = samples.iter().map(|(_, samples)| samples.len()).sum();
-    let every = regions.div_ceil(REGIONS).max(1);
-    let extremes_of = |(face, samples): &(u32, Vec<Sample>)| {
+    let samples: Vec<(u32, Samples)> = faces.par_iter().map(samples).collect();
+    let count: usize = samples.iter().map(|(_, s)| s.samples.len()).sum();
+    let every = count.div_ceil(REGIONS).max(1);
+    let is_complete = every == 1 && samples.iter().all(|(_, s)| s.is_complete);
+    let sides_of = |(face, Samples { samples, .. }): &(u32, Samples)| {
         let tested = samples.iter().step_by(every);
-        let found: Vec<Sides> = tested.map(|s| sides(mesh, winding, *face, s.point, s.jump)).collect();
-        let least = *found.iter().min_by_key(|s| s.least())?;
-        let greatest = *found.iter().max_by_key(|s| s.greatest())?;
-        Some((*face, least, greatest))
+        (*face, tested.map(|s| sides(mesh, winding, *face, s.point, s.jump)).collect())
     };
-    samples.par_iter().filter_map(extremes_of).collect()
+    (samples.par_iter().map(sides_of).collect(), is_complete)
 }
 
 /// For each face with area, the other faces with area that it meets, ascending.

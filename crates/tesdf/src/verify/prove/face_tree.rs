@@ -1,5 +1,7 @@
 //! Checks that the face tree can find every face: its leaves name each face once, and its boxes
 //! contain the faces below them.
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use super::exact::difference;
@@ -17,9 +19,12 @@ pub fn faults(asset: &TeSdf, triangles: &[[DVec3; 3]]) -> Vec<Fault> {
         let reason = format!("the leaves of the face tree name the face {times} times; expected once");
         check.faults.push(Fault::refuted(Claim::FaceTree, reason).face(asset, face as u32));
     }
-    let mut ids = vec![false; triangles.len()];
+    // A single face is written with its reverse, which has the same id.
+    let mut ids: HashMap<u32, [u32; 3]> = HashMap::new();
     for (face, &id) in (0..).zip(asset.face_ids.iter()) {
-        if std::mem::replace(&mut ids[id as usize], true) {
+        let mut corners = asset.faces[face as usize];
+        corners.sort_unstable();
+        if ids.insert(id, corners).is_some_and(|other| other != corners) {
             let reason = format!("two faces of the file have the id {id}");
             check.faults.push(Fault::refuted(Claim::FaceTree, reason).face(asset, face));
             break;

@@ -42,6 +42,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize};
 use crate::parallel::*;
 
 use crate::TeSdf;
+use crate::asset::about;
 use crate::base::Certificate;
 use crate::domain::Cell;
 pub use report::{Claim, Fault, ProveReport, Tally, Verdict};
@@ -110,7 +111,9 @@ const STACK: usize = 64 << 20;
 /// - For every cell with a list: at each of its points, the list is at most δ farther than the
 ///   nearest of all faces.
 /// - For every cell: its label is the side of all its points, or the faces that pass through it are
-///   in its list.
+///   in its list. Where a rule is evaluated at points, cells whose label says so need no proof. For
+///   the generalised winding number of an open mesh, the bound of the label is that of the encoder;
+///   the rest of the proof is independent.
 /// - For the face tree: its leaves name each face once, and its boxes contain the faces.
 ///
 /// δ is that of the certificate. When the certificate promises nothing, δ is that of the certified
@@ -131,16 +134,28 @@ pub fn prove(
     options: &ProveOptions,
     progress: impl Fn(f64) -> ControlFlow<()> + Sync,
 ) -> Result<ProveReport, ProveError> {
-    let surface = Surface::new(&asset.vertices, &asset.faces, asset.frame)?;
-    check_closed(asset, &surface)?;
+    let sign_faces = asset.sign_faces.as_deref().unwrap_or(&[]);
+    let surface = Surface::new(&asset.vertices, [&asset.faces, sign_faces], asset.frame)?;
+    let sign_faces = surface.sign_triangles(sign_faces);
+    let signs_of = asset.about().signs;
+    if !asset.about().certificate().jumps() && signs_of != about::Signs::Sheet {
+        check_closed(asset, &surface)?;
+    }
     let roots: Vec<Cell> = (0..asset.root_count()).map(|root| asset.root(root)).collect();
     let reach = roots.iter().flat_map(|c| c.corners).map(|p| p.abs().max_element()).fold(0.0, f64::max);
     if reach.is_nan() || reach > surface::FARTHEST {
         return Err(ProveError::Domain { reach });
     }
     let triangles: Vec<_> = surface.triangles.iter().map(|t| t.corners).collect();
+    let counted = [triangles.as_slice(), &sign_faces].concat();
     let side = asset.cube.side().max(1.0);
-    let signs = Signs { asset, surface: &surface, rays: Rays::new(&triangles), gap: MISSED * side };
+    let signs = Signs {
+        asset,
+        surface: &surface,
+        rays: Rays::new(&counted),
+        sign_faces: &sign_faces,
+        gap: MISSED * side,
+    };
 
     let certificate = asset.about().certificate();
     let diagonal = asset.bounds().extent().length();
@@ -167,7 +182,8 @@ pub fn prove(
         return Err(ProveError::Cancelled);
     }
     found.sign(match asset.conforming {
-        None => signs.beyond_cube(),
+        None if signs_of == about::Signs::Cells => signs.beyond_cube(),
+        None => None,
         Some(_) => signs.outside_fault(&roots),
     });
     let of_tree = face_tree::faults(asset, &triangles);
@@ -199,7 +215,9 @@ const MISSED: f64 = 1.0 / (1u64 << 40) as f64;
 /// winding number an integer.
 fn check_closed(asset: &TeSdf, surface: &Surface) -> Result<(), ProveError> {
     let mut balance: HashMap<[u32; 2], (i64, [u32; 2])> = HashMap::new();
-    for (corners, vertices) in surface.faces.iter().zip(asset.faces.iter()) {
+    let sign_faces = asset.sign_faces.as_deref().unwrap_or(&[]);
+    let places = surface.faces.iter().copied().chain(sign_faces.iter().map(|f| surface.places(*f)));
+    for (corners, vertices) in places.zip(asset.faces.iter().chain(sign_faces)) {
         for k in 0..3 {
             let next = (k + 1) % 3;
             let (a, b) = (corners[k], corners[next]);

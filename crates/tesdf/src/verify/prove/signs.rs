@@ -8,15 +8,19 @@ use super::report::{Claim, Fault};
 use super::surface::Surface;
 use super::winding::Rays;
 use crate::TeSdf;
+use crate::asset::about;
 use crate::asset::layout::{Label, Node};
 use crate::base::Side;
 use crate::domain::Cell;
+use crate::geometry::Aabb;
 
 /// Checks the labels of the cells of a bisection domain.
 pub struct Signs<'a> {
     pub asset: &'a TeSdf,
     pub surface: &'a Surface,
     pub rays: Rays<'a>,
+    /// Corners of the faces that are no surface but count for the sign.
+    pub sign_faces: &'a [[DVec3; 3]],
     /// A face this near to a cell counts as passing through it. It is more than the distance by
     /// which a point can miss its cell.
     pub gap: f64,
@@ -26,7 +30,22 @@ impl Signs<'_> {
     /// The fault in the sign of a cell; `None` when it is proved. `near` are the faces near the
     /// cell, `list` is its list.
     pub fn fault(&self, word: u32, cell: &Cell, node: Node, list: &[u32], near: &[u32]) -> Option<Fault> {
-        let fault = self.located(word, cell).or_else(|| self.label(cell, node));
+        let fault = self.located(word, cell).or_else(|| match self.asset.about().signs {
+            about::Signs::Cells => self.label(cell, node),
+            about::Signs::Rule | about::Signs::RuleUnoriented => self.label_of_rule(cell, node),
+            about::Signs::Sheet => self.label_of_sheet(cell, node),
+        });
+        let is_told = match self.asset.about().signs {
+            about::Signs::Cells => true,
+            // Other cells leave the side to the rule, at each point.
+            about::Signs::Rule | about::Signs::RuleUnoriented => {
+                matches!(node, Node::Listed(Label::Inside | Label::Outside, _))
+            }
+            about::Signs::Sheet => false,
+        };
+        if !is_told {
+            return fault.map(|f| f.cell(word));
+        }
         let fault = fault.or_else(|| {
             // In a crossing cell, the sign is counted over the faces of the list.
             let counted: &[u32] =
@@ -62,6 +81,60 @@ impl Signs<'_> {
                 wrong((if inside { "inside" } else { "outside" }).into())
             }
         }
+    }
+
+    /// The label of a cell of an asset whose rule is evaluated at points of other cells.
+    fn label_of_rule(&self, cell: &Cell, node: Node) -> Option<Fault> {
+        let Node::Listed(Label::Inside | Label::Outside, _) = node else { return None };
+        let centroid = cell.centroid();
+        let says = side_of(node);
+        let jumps = self.asset.about().certificate().jumps();
+        let side = match self.asset.sign_rule() {
+            Some(rule) if jumps => rule.side_within(centroid, cell.radius() + self.gap),
+            _ => {
+                let inside = self.asset.inside().rule.holds(self.rays.at(centroid));
+                Some(if inside { Side::Inside } else { Side::Outside })
+            }
+        };
+        if side == Some(says) {
+            return self.sign_face_in(cell);
+        }
+        let reason = format!("the label says {says:?}; the rule says {side:?} at the centroid");
+        let fault = match side {
+            None => Fault::undecided(Claim::Sign, reason),
+            Some(_) => Fault::refuted(Claim::Sign, reason),
+        };
+        Some(fault.at(self.asset, centroid))
+    }
+
+    /// A fault when a face that counts for the sign only comes into a cell with a side.
+    fn sign_face_in(&self, cell: &Cell) -> Option<Fault> {
+        let middle = cell.centroid();
+        let corners = cell.corners.map(|c| c - middle);
+        let radius = corners.iter().map(|c| c.length()).fold(0.0, f64::max);
+        let reach = Aabb::of(&cell.corners).grown(2.0 * self.gap);
+        let comes_in = self.sign_faces.iter().filter(|t| Aabb::of(&t[..]).overlaps(reach)).any(|t| {
+            let local = t.map(|c| c - middle);
+            let error = rounding(local.iter().map(|c| c.length()).fold(radius, f64::max) + radius);
+            !are_apart(&corners, &local, self.gap, error)
+        });
+        comes_in.then(|| {
+            let reason =
+                "a face that counts for the sign may pass through the cell, whose label says that none does";
+            Fault::undecided(Claim::Sign, reason).at(self.asset, middle)
+        })
+    }
+
+    /// The label of a cell of a sheet: everything is outside of the faces.
+    fn label_of_sheet(&self, cell: &Cell, node: Node) -> Option<Fault> {
+        let is_outside = matches!(
+            node,
+            Node::Listed(Label::Outside, _) | Node::Far(Side::Outside) | Node::NotOfDomain | Node::Split(_)
+        );
+        (!is_outside).then(|| {
+            let reason = "the label says that the cell has an inside; expected none in a sheet";
+            Fault::refuted(Claim::Sign, reason).at(self.asset, cell.centroid())
+        })
     }
 
     /// A fault when a face outside `counted` comes into the cell.
@@ -104,9 +177,10 @@ impl Signs<'_> {
     pub fn beyond_cube(&self) -> Option<Fault> {
         let (low, side) = (self.asset.cube.origin(), self.asset.cube.side());
         let is_beyond = |p: &DVec3| !(p.cmpge(low).all() && p.cmple(low + side).all());
-        let at = self.surface.points.iter().find(|p| is_beyond(p))?;
+        let mut corners = self.surface.triangles.iter().flat_map(|t| t.corners);
+        let at = corners.find(|p| is_beyond(p))?;
         let reason = "a vertex lies outside of the cube, where every query says outside";
-        Some(Fault::refuted(Claim::Sign, reason).at(self.asset, *at))
+        Some(Fault::refuted(Claim::Sign, reason).at(self.asset, at))
     }
 }
 

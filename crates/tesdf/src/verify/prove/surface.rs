@@ -17,6 +17,8 @@ pub const FARTHEST: f64 = 64.0;
 pub struct Surface {
     /// Distinct positions.
     pub points: Vec<DVec3>,
+    /// For each vertex of the file, the index of its position.
+    place_of: Vec<u32>,
     /// Corners of the faces, as indices into `points`.
     pub faces: Vec<[u32; 3]>,
     /// The faces themselves.
@@ -28,17 +30,29 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The mesh of an asset.
+    /// The mesh of an asset. `faces` are those of the surface, then those that count for the sign
+    /// only. Vertices that none of them uses do not matter.
     ///
     /// # Errors
     /// [`ProveError::Frame`] when mapping a vertex to the local frame rounds it, or the vertex lies
     /// farther than [`FARTHEST`] from the origin.
-    pub fn new(vertices: &[[f64; 3]], faces: &[[u32; 3]], frame: LocalFrame) -> Result<Self, ProveError> {
+    pub fn new(
+        vertices: &[[f64; 3]],
+        [faces, sign_faces]: [&[[u32; 3]]; 2],
+        frame: LocalFrame,
+    ) -> Result<Self, ProveError> {
+        let mut is_used = vec![false; vertices.len()];
+        let corners = faces.iter().chain(sign_faces).flatten();
+        corners.for_each(|&v| is_used[v as usize] = true);
         let is_exact = |v: DVec3| (0..3).all(|k| difference(v[k], frame.offset[k]).1 == 0.0);
         let mut places = HashMap::new();
         let mut points = Vec::new();
         let mut place_of = Vec::with_capacity(vertices.len());
         for (vertex, &v) in vertices.iter().enumerate() {
+            if !is_used[vertex] {
+                place_of.push(u32::MAX);
+                continue;
+            }
             let v = DVec3::from_array(v);
             let p = frame.to_local(v);
             let back = p / frame.scale;
@@ -61,7 +75,17 @@ impl Surface {
             (middle, face.corners.iter().map(|p| p.distance(middle)).fold(0.0, f64::max))
         };
         let balls = triangles.iter().map(ball).collect();
-        Ok(Self { points, faces, triangles, balls, error: rounding(4.0 * FARTHEST) })
+        Ok(Self { points, place_of, faces, triangles, balls, error: rounding(4.0 * FARTHEST) })
+    }
+
+    /// The indices into `points` of the corners of a face of the file.
+    pub fn places(&self, face: [u32; 3]) -> [u32; 3] {
+        face.map(|v| self.place_of[v as usize])
+    }
+
+    /// The corners of further faces of the file.
+    pub fn sign_triangles(&self, faces: &[[u32; 3]]) -> Vec<[DVec3; 3]> {
+        faces.iter().map(|&f| self.places(f).map(|v| self.points[v as usize])).collect()
     }
 
     /// The faces among `faces` that can be closest to a point within `radius` of `center`.

@@ -1,0 +1,241 @@
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use super::{Aabb, WindingNumber, perturbed_orientation, signed_crossing};
+
+/// The generalised winding number (Jacobson et al. 2013) of any triangles: the sum of their solid
+/// angles divided by 4 pi.
+///
+/// It takes O(log F) for `F` faces and O(B) for `B` edges at which the mesh is open. Triangles from
+/// an *apex* to these edges close the mesh. The closed mesh has an integer winding number, which
+/// exact predicates count. The solid angles of the added triangles are taken away again:
+///
+/// ```text
+/// w(x) = N(x) - C(x)      N: winding number of faces and added triangles, exact
+///                         C: solid angles of the added triangles / 4 pi
+/// ```
+///
+/// `N` and `C` jump at an added triangle, `w` does not. So both are taken at the same point `x + (e,
+/// e^2, e^3)` with an infinitesimal `e > 0`: the sign of the solid angle of a triangle that has `x`
+/// in its plane is that of [`perturbed_orientation`].
+///
+/// Near an edge of an added triangle its solid angle is badly conditioned. Then another apex is
+/// taken; only near an open edge of the mesh all of them are badly conditioned.
+#[derive(Clone, Debug)]
+pub struct GeneralizedWinding {
+    faces: WindingNumber,
+    bounds: Aabb,
+    /// The area of all faces.
+    area: f64,
+    /// Open edges, with the number of times that the closing triangles use them.
+    edges: Vec<[DVec3; 2]>,
+    /// The closing triangles for each apex, from outside of their solid angles to be taken away.
+    /// A triangle that is needed several times is repeated.
+    cones: [Vec<[DVec3; 3]>; APEXES],
+}
+
+const APEXES: usize = 4;
+/// Where the apexes lie: from the mean of the vertices of open edges towards a corner of the bounds
+/// by these shares along x, y, z. The apexes are in general position to each other.
+const TOWARDS: [[f64; 3]; APEXES] =
+    [[0.0, 0.0, 0.0], [0.31, 0.17, 0.23], [0.13, -0.29, 0.19], [-0.27, 0.11, -0.37]];
+/// A cone whose worst triangle is better conditioned than this is taken at once.
+const GOOD: f64 = 1e-2;
+
+/// A value of the generalised winding number.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Generalized {
+    /// The number.
+    pub value: f64,
+    /// A bound of its rounding error. It is infinite on an open edge of the mesh, where the number
+    /// depends on the direction.
+    pub error: f64,
+}
+
+impl GeneralizedWinding {
+    /// Builds the tree over the faces, and finds the edges that close the mesh. `position` gives the
+    /// position of a vertex.
+    pub fn new(faces: &[[u32; 3]], position: impl Fn(u32) -> DVec3) -> Self {
+        let triangles: Vec<[DVec3; 3]> = faces.iter().map(|f| f.map(&position)).collect();
+        let bounds = triangles.iter().map(|t| Aabb::of(t)).fold(Aabb::EMPTY, Aabb::union);
+        let area = triangles.iter().map(|[a, b, c]| 0.5 * (*b - *a).cross(*c - *a).length()).sum();
+        // How many more faces run along an edge from the lower vertex to the higher than back.
+        let mut balance: BTreeMap<[u32; 2], i32> = BTreeMap::new();
+        for corners in faces {
+            for k in 0..3 {
+                let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                if a != b {
+                    *balance.entry([a.min(b), a.max(b)]).or_default() += if a < b { 1 } else { -1 };
+                }
+            }
+        }
+        let mut open: Vec<[u32; 2]> = Vec::new();
+        for ([a, b], times) in balance {
+            // The closing triangles run against the faces.
+            let edge = if times > 0 { [b, a] } else { [a, b] };
+            open.extend(std::iter::repeat_n(edge, times.unsigned_abs() as usize));
+        }
+        let cones = TOWARDS.map(|share| {
+            let mut cone = Vec::with_capacity(open.len());
+            for part in connected(&open) {
+                let corners = part.iter().flat_map(|&e| open[e]).map(&position);
+                let mean = corners.sum::<DVec3>() / (2 * part.len()) as f64;
+                let apex = moved(mean, bounds, share);
+                cone.extend(part.iter().map(|&e| {
+                    let [a, b] = open[e].map(&position);
+                    [a, b, apex]
+                }));
+            }
+            cone
+        });
+        let edges = open.iter().map(|e| e.map(&position)).collect();
+        Self { faces: WindingNumber::of_triangles(triangles), bounds, area, edges, cones }
+    }
+
+    /// Whether the mesh is closed, so that the number is an integer everywhere.
+    pub fn is_closed(&self) -> bool {
+        self.edges.is_empty()
+    }
+
+    /// The winding number of the faces, which is that of the mesh where it is closed.
+    pub fn into_faces(self) -> WindingNumber {
+        self.faces
+    }
+
+    /// The generalised winding number at `x + (e, e^2, e^3)` with an infinitesimal `e > 0`. It is 0
+    /// for NaN.
+    pub fn at(&self, x: DVec3) -> Generalized {
+        if !x.is_finite() {
+            return Generalized { value: 0.0, error: 0.0 };
+        }
+        let mut best = Generalized { value: 0.0, error: f64::INFINITY };
+        // The crossings of the faces depend on the segment only, not on the cone.
+        let crossings = self.faces.at_perturbed(x);
+        let far = self.bounds.contains(x).then(|| self.faces.far_point(x));
+        for cone in &self.cones {
+            let mut integer = crossings;
+            let (mut angles, mut roundings, mut worst) = (0.0, 1.0, 1.0f64);
+            for &triangle in cone {
+                if let Some(far) = far {
+                    integer -= signed_crossing(far, x, triangle);
+                }
+                let (angle, condition) = solid_angle(triangle, x);
+                angles += angle;
+                // The rounding of the sum is that of a number up to all angles so far.
+                roundings += 1.0 / condition + angles.abs();
+                worst = worst.min(condition);
+            }
+            let error = ROUNDING * roundings;
+            if error < best.error || !best.error.is_finite() {
+                best = Generalized { value: f64::from(integer) - angles / (4.0 * PI), error };
+            }
+            if worst > GOOD {
+                break;
+            }
+        }
+        best
+    }
+
+    /// Whether the number at `x` is at least 1/2 or at most -1/2. Nearer to 1/2 than the rounding
+    /// error, the answer is the same for the same point, and may be either.
+    pub fn is_inside(&self, x: DVec3) -> bool {
+        // The solid angle of a face seen from the distance `d` is at most its area / d².
+        let squared = self.bounds.distance_squared(x);
+        if self.area < 0.9 * 2.0 * PI * squared {
+            return false;
+        }
+        self.at(x).value.abs() >= 0.5
+    }
+
+    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are on
+    /// one side. No face may come within `radius` of `x`.
+    ///
+    /// The gradient of the solid angle of a loop is at most the integral of `dl / r²` along the
+    /// loop (Biot and Savart).
+    pub fn side_within(&self, x: DVec3, radius: f64) -> Option<bool> {
+        let Generalized { value, error } = self.at(x);
+        let mut change = 0.0;
+        for &[a, b] in &self.edges {
+            let along = b - a;
+            let t = ((x - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            let apart = (a + t * along).distance(x) * (1.0 - 1e-12) - radius;
+            if apart <= 0.0 {
+                return None;
+            }
+            change += along.length() / (apart * apart);
+        }
+        let change = 1.000_001 * radius * change / (4.0 * PI) + error + DECIDED;
+        let beyond = value.abs() - 0.5;
+        (beyond.abs() > change).then_some(beyond > 0.0)
+    }
+}
+
+/// Bound of the rounding of a solid angle with the condition 1: a dozen roundings of a 64-bit float,
+/// divided by 4 pi, and a factor for safety.
+const ROUNDING: f64 = 4e-15;
+/// A cell is on one side only where the number differs from 1/2 by more than this.
+const DECIDED: f64 = 1e-9;
+
+/// The solid angle of a triangle from `x + (e, e^2, e^3)` (Van Oosterom and Strackee 1983): positive
+/// where the point is behind the triangle. Also its condition, 0 to 1: the error is some roundings
+/// divided by the condition.
+fn solid_angle(triangle: [DVec3; 3], x: DVec3) -> (f64, f64) {
+    // Triangles without area have no solid angle.
+    let side = perturbed_orientation(triangle, x);
+    if side == 0 {
+        return (0.0, 1.0);
+    }
+    let [a, b, c] = triangle.map(|v| v - x);
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let sine = a.dot(b.cross(c)).abs();
+    let cosine = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    let condition = sine.hypot(cosine) / (la * lb * lc);
+    if condition.is_nan() {
+        return (0.0, 0.0);
+    }
+    (f64::from(side) * 2.0 * sine.atan2(cosine), condition.min(1.0))
+}
+
+/// A point moved towards the bounds, so that it stays within them.
+fn moved(p: DVec3, bounds: Aabb, share: [f64; 3]) -> DVec3 {
+    let along = |k: usize| {
+        let to = if share[k] > 0.0 { bounds.max[k] } else { bounds.min[k] };
+        (p[k] + share[k].abs() * (to - p[k])).clamp(bounds.min[k], bounds.max[k])
+    };
+    DVec3::new(along(0), along(1), along(2))
+}
+
+/// The connected parts of a chain of edges, as the numbers of their edges. Parts are ordered by
+/// their first edge.
+fn connected(edges: &[[u32; 2]]) -> Vec<Vec<usize>> {
+    let mut at: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (e, ends) in edges.iter().enumerate() {
+        ends.iter().for_each(|&v| at.entry(v).or_default().push(e));
+    }
+    let mut seen = vec![false; edges.len()];
+    let mut parts = Vec::new();
+    for first in 0..edges.len() {
+        if seen[first] {
+            continue;
+        }
+        seen[first] = true;
+        let mut part = vec![first];
+        let mut next = 0;
+        while next < part.len() {
+            for v in edges[part[next]] {
+                for &e in at.get(&v).map_or(&[][..], Vec::as_slice) {
+                    if !seen[e] {
+                        seen[e] = true;
+                        part.push(e);
+                    }
+                }
+            }
+            next += 1;
+        }
+        part.sort_unstable();
+        parts.push(part);
+    }
+    parts
+}

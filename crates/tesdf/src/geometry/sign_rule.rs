@@ -1,0 +1,65 @@
+use glam::DVec3;
+
+use super::{GeneralizedWinding, WindingNumber};
+use crate::base::{InsideRule, Side};
+
+/// Decides by a rule whether points are inside, over all faces. For assets whose cells do not tell
+/// the sign by the winding number alone.
+#[derive(Clone, Debug)]
+pub struct SignRule {
+    rule: InsideRule,
+    number: Number,
+}
+
+#[derive(Clone, Debug)]
+enum Number {
+    /// Of a closed mesh: an integer.
+    Integer(WindingNumber),
+    /// Of an open mesh.
+    Real(Box<GeneralizedWinding>),
+}
+
+impl SignRule {
+    /// The rule for these faces. `position` gives the position of a vertex.
+    pub fn new(rule: InsideRule, faces: &[[u32; 3]], position: impl Fn(u32) -> DVec3) -> Self {
+        let number = match rule {
+            InsideRule::Generalized => match GeneralizedWinding::new(faces, position) {
+                winding if winding.is_closed() => Number::Integer(winding.into_faces()),
+                winding => Number::Real(Box::new(winding)),
+            },
+            _ => {
+                let triangles = faces.iter().map(|f| f.map(&position)).collect();
+                Number::Integer(WindingNumber::of_triangles(triangles))
+            }
+        };
+        Self { rule, number }
+    }
+
+    /// Whether a point is inside. Exact for closed meshes; on the surface the answer may be either.
+    pub fn is_inside(&self, x: DVec3) -> bool {
+        match &self.number {
+            Number::Integer(winding) => self.rule.holds(winding.at_perturbed(x)),
+            Number::Real(winding) => winding.is_inside(x),
+        }
+    }
+
+    /// The side of a point.
+    pub fn side(&self, x: DVec3) -> Side {
+        if self.is_inside(x) { Side::Inside } else { Side::Outside }
+    }
+
+    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are on
+    /// one side. The sides of faces that come there must not differ.
+    pub fn side_within(&self, x: DVec3, radius: f64) -> Option<Side> {
+        let inside = match &self.number {
+            Number::Integer(_) => self.is_inside(x),
+            Number::Real(winding) => winding.side_within(x, radius)?,
+        };
+        Some(if inside { Side::Inside } else { Side::Outside })
+    }
+
+    /// Whether the sign can change where there is no face.
+    pub fn jumps(&self) -> bool {
+        matches!(self.number, Number::Real(_))
+    }
+}

@@ -1,0 +1,166 @@
+use glam::DVec3;
+
+use super::{Aabb, AabbTree, Child, signed_crossing};
+
+/// The winding number of a triangle mesh, exact and deterministic.
+///
+/// It counts how often the surface goes around a point: 1 inside a simple outward surface, 0
+/// outside, 2 where two such solids overlap, -1 inside an inverted solid. For a closed surface it
+/// is an integer that depends on the surface alone. A surface is closed when every directed edge is
+/// used as often as its reverse. For an open surface the results have no meaning.
+///
+/// The method compares a point with a far point by the crossings of the segment between them
+/// ([`signed_crossing`]). The segment runs along an axis, through the nearest side of the bounds.
+/// It is therefore a box itself, and finding the boxes of the tree that it meets needs no rounding.
+#[derive(Clone, Debug)]
+pub struct WindingNumber {
+    tree: AabbTree,
+    /// Corners of the faces, in tree order.
+    triangles: Vec<[DVec3; 3]>,
+    bounds: Aabb,
+}
+
+const LEAF_SIZE: usize = 4;
+
+impl WindingNumber {
+    /// Builds the tree over triangles.
+    pub fn of_triangles(triangles: Vec<[DVec3; 3]>) -> Self {
+        let boxes: Vec<Aabb> = triangles.iter().map(|t| Aabb::of(t)).collect();
+        let tree = AabbTree::build(&boxes, LEAF_SIZE);
+        let triangles = tree.order().iter().map(|&f| triangles[f as usize]).collect();
+        let bounds = tree.root().0;
+        Self { tree, triangles, bounds }
+    }
+
+    /// Winding number at `x`, which must not be on the surface. On the surface the result may be
+    /// the number on either side or another number. It is 0 for NaN.
+    pub fn at(&self, x: DVec3) -> i32 {
+        if !self.bounds.contains(x) {
+            return 0;
+        }
+        self.crossings(x, self.far_point(x))
+    }
+
+    /// Winding number at `p + (e, e^2, e^3)` with `e > 0` infinitesimal. It is defined for every
+    /// `p`, also on the surface. It is 0 for NaN.
+    pub fn at_perturbed(&self, p: DVec3) -> i32 {
+        let mut sum = 0;
+        self.for_each_crossing_to(p, |_, sign| sum += sign);
+        sum
+    }
+
+    /// `winding(x) - winding(p')` with `p' = p + (e, e^2, e^3)`: the sum of [`signed_crossing`]
+    /// over the faces. `x` must not be on the surface.
+    pub fn crossings(&self, x: DVec3, p: DVec3) -> i32 {
+        let mut sum = 0;
+        self.for_each_crossing(x, p, |_, sign| sum += sign);
+        sum
+    }
+
+    /// The tree over the faces.
+    pub(crate) fn tree(&self) -> &AabbTree {
+        &self.tree
+    }
+
+    /// Calls `crossed` for each face that the segment from the far point to `p + (e, e^2, e^3)`
+    /// crosses, with the change of the winding number there. [`at_perturbed`](Self::at_perturbed)
+    /// adds up these changes.
+    pub(crate) fn for_each_crossing_to(&self, p: DVec3, mut crossed: impl FnMut(u32, i32)) {
+        if self.bounds.contains(p) {
+            self.for_each_crossing(self.far_point(p), p, |face, sign| crossed(face, -sign));
+        }
+    }
+
+    fn for_each_crossing(&self, x: DVec3, p: DVec3, mut crossed: impl FnMut(u32, i32)) {
+        let segment = Segment::new(x, p);
+        let mut stack = vec![self.tree.root()];
+        while let Some((bounds, child)) = stack.pop() {
+            if !segment.may_meet(bounds) {
+                continue;
+            }
+            match child {
+                Child::Node(n) => stack.extend(self.tree.nodes()[n as usize]),
+                Child::Leaf { start, end } => {
+                    for i in start as usize..end as usize {
+                        match signed_crossing(x, p, self.triangles[i]) {
+                            0 => {}
+                            sign => crossed(self.tree.order()[i], sign),
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// A point outside the bounds, from `x` along an axis through the nearest side.
+    pub(crate) fn far_point(&self, x: DVec3) -> DVec3 {
+        let Aabb { min, max } = self.bounds;
+        let step = self.bounds.extent().max_element();
+        let mut best = (f64::INFINITY, x);
+        for axis in 0..3 {
+            // Far from the origin, rounding can swallow the step. The next floating-point number is
+            // then outside too.
+            let up = (max[axis] + step).max(max[axis].next_up());
+            let down = (min[axis] - step).min(min[axis].next_down());
+            for (distance, to) in [(max[axis] - x[axis], up), (x[axis] - min[axis], down)] {
+                if distance < best.0 {
+                    let mut far = x;
+                    far[axis] = to;
+                    best = (distance, far);
+                }
+            }
+        }
+        best.1
+    }
+}
+
+/// A segment, prepared for tests that it misses a box.
+struct Segment {
+    bounds: Aabb,
+    /// Its middle, half of its direction vector, and the absolute values of that half.
+    middle: DVec3,
+    half: DVec3,
+    half_abs: DVec3,
+    /// A bound of the rounding errors of [`may_meet`](Self::may_meet) for boxes that overlap the
+    /// segment's bounds.
+    margin: f64,
+    along_axis: bool,
+}
+
+impl Segment {
+    fn new(x: DVec3, p: DVec3) -> Self {
+        let (middle, half) = (0.5 * (x + p), 0.5 * (p - x));
+        let scale = x.abs().max(p.abs()).max_element();
+        Self {
+            bounds: Aabb::of(&[x, p]),
+            middle,
+            half,
+            half_abs: half.abs(),
+            margin: 1e-14 * scale,
+            along_axis: half.to_array().into_iter().filter(|&h| h != 0.0).count() <= 1,
+        }
+    }
+
+    /// False only when the segment misses the closed box. Separating axes: the axes of the box
+    /// exactly, their cross products with the segment with a margin.
+    fn may_meet(&self, b: Aabb) -> bool {
+        if !self.bounds.overlaps(b) {
+            return false;
+        }
+        if self.along_axis {
+            return true;
+        }
+        let size = 0.5 * b.extent();
+        let to = self.middle - b.center();
+        // Each coordinate of `to`, `size` and `half` has an error of some ulps of the coordinates
+        // of the box or the segment.
+        let margin = self.margin + 1e-14 * b.min.abs().max(b.max.abs()).max_element();
+        let (h, g) = (self.half, self.half_abs);
+        let misses = |i: usize, j: usize| {
+            let reach = size[i] * g[j] + size[j] * g[i];
+            let slack = margin * (g[i] + g[j] + size[i] + size[j] + to[i].abs() + to[j].abs());
+            (to[i] * h[j] - to[j] * h[i]).abs() > reach + slack
+        };
+        !(misses(1, 2) || misses(2, 0) || misses(0, 1))
+    }
+}
