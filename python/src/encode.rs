@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyString;
+use tesdf::base::unit;
 use tesdf::encode::{
     Deformation, Domain, DomainChoice, EncodeChoices, Encoder, MethodChoice, Preset, Refinement, Threshold,
 };
@@ -17,8 +18,8 @@ use crate::pool;
 
 /// Encodes a closed mesh. Ctrl-C ends it with KeyboardInterrupt.
 ///
-/// - mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an
-///   object with attributes of these names.
+/// - mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB, 3MF; STEP, IGES, BREP with Gmsh; USD with
+///   usd-core), a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these names.
 /// - preset: "default" (fast queries), "fast" (fast encoding), "compact" (small) or "gpu" (few
 ///   cells, whose lists fill the 32 threads of a GPU that read them), all exact; "paper" (the
 ///   paper's encoder: sampled, 129 samples along an edge, plain) or "sampled-safe" (sampled with a
@@ -40,7 +41,8 @@ use crate::pool;
 /// - band: width of the encoded layer around the solid, in the mesh's unit. None is 5 % of the
 ///   diagonal, and no layer with "gmsh".
 /// - regions: boxes [R, 6] that are encoded as well, each min x y z, max x y z.
-/// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing.
+/// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing. None is the unit
+///   of the file, if it has one; another unit than that is a warning.
 /// - threads: number of threads; None is one per core. The bytes of the asset do not depend on it.
 /// - progress: called with the stage ("refine", "tighten", "assemble") and the completed fraction
 ///   of it, 0 to 1, about twenty times a second. An exception from it ends the encoding and is
@@ -92,15 +94,18 @@ pub fn encode(
     let state = Progress::default();
     let work = || {
         pool.install(|| {
-            let (solid, path, source) = input.load()?.solid()?;
+            let loaded = input.load()?;
+            let of_file = loaded.unit.clone();
+            let (solid, path, source) = loaded.solid()?;
             let tetrahedra = choices.tetrahedra(&solid, &state).map_err(Error::Domain)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
             Encoder::new()
-                .options(options)
+                .options(options.or_unit(of_file.as_deref()))
                 .domain(domain)
                 .source(source)
                 .progress(&state)
                 .encode(&solid)
+                .map(|asset| (asset, of_file))
                 .map_err(|e| Error::Encode(path, e))
         })
     };
@@ -116,8 +121,11 @@ pub fn encode(
         }
         None => Ok(()),
     };
-    let encoded = cancellable(py, work, || state.cancel(), watch)?.map_err(|e| e.raise(py))?;
+    let (encoded, of_file) = cancellable(py, work, || state.cancel(), watch)?.map_err(|e| e.raise(py))?;
     watch()?;
+    if let Some(found) = unit::conflict(of_file.as_deref(), choices.unit.as_deref()) {
+        py.import("warnings")?.call_method1("warn", (found,))?;
+    }
     Ok(Asset::new(encoded))
 }
 

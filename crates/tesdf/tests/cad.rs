@@ -22,7 +22,8 @@ fn volume(mesh: &TriangleMesh) -> f64 {
 fn distance(p: DVec3) -> f64 {
     let ball = (p.distance(DVec3::new(40.0, 0.0, 0.0)) - 10.0).abs();
     let radius = p.x.hypot(p.y);
-    let (walls, ends) = (f64::min((radius - 3.0).abs(), (radius - 5.0).abs()), f64::min(p.z.abs(), (p.z - 20.0).abs()));
+    let (walls, ends) =
+        (f64::min((radius - 3.0).abs(), (radius - 5.0).abs()), f64::min(p.z.abs(), (p.z - 20.0).abs()));
     ball.min(walls).min(ends)
 }
 
@@ -38,15 +39,21 @@ fn a_step_file_gives_named_solids_in_millimetres() {
     for (part, exact) in parts.iter().zip(exact) {
         let solid = SolidMesh::new(part.mesh.clone()).unwrap();
         assert!(solid.is_simple());
-        assert!((volume(&part.mesh) / exact - 1.0).abs() < 0.02, "{}: {} {exact}", part.name, volume(&part.mesh));
+        assert!(
+            (volume(&part.mesh) / exact - 1.0).abs() < 0.02,
+            "{}: {} {exact}",
+            part.name,
+            volume(&part.mesh)
+        );
     }
+    assert_eq!(loaded.mesh, read(data("machine.step")).unwrap().mesh);
     assert!(SolidMesh::new(loaded.mesh).unwrap().is_simple());
 }
 
 #[test]
 fn the_deviation_is_kept_and_more_triangles_come_from_a_smaller_one() {
     let mut faces = 0;
-    for wanted in [0.5, 0.05, 0.005] {
+    for wanted in [0.5, 0.02] {
         let options = CadOptions { deviation: Length::Absolute(wanted), ..CadOptions::default() };
         let mesh = read_with(data("machine.step"), &options).unwrap().mesh;
         // Measured at the middle of the edges, and here within the triangles, too.
@@ -63,7 +70,8 @@ fn the_deviation_is_kept_and_more_triangles_come_from_a_smaller_one() {
     }
     let options = CadOptions { mesh_size: Length::Absolute(1.0), ..CadOptions::default() };
     let mesh = read_with(data("machine.step"), &options).unwrap().mesh;
-    let longest = (0..mesh.faces().len()).map(|f| mesh.triangle(f)).map(|[a, b, _]| a.distance(b)).fold(0.0, f64::max);
+    let longest =
+        (0..mesh.faces().len()).map(|f| mesh.triangle(f)).map(|[a, b, _]| a.distance(b)).fold(0.0, f64::max);
     assert!(longest < 2.0, "{longest}");
 }
 
@@ -90,14 +98,12 @@ fn iges_and_brep_give_the_same_solids() {
         assert_eq!(parts.len(), 2, "{name}");
         let mut volumes: Vec<_> = parts.iter().map(|part| volume(&part.mesh)).collect();
         volumes.sort_by(f64::total_cmp);
-        assert!((volumes[0] - 1005.3).abs() < 20.0 && (volumes[1] - 4188.8).abs() < 84.0, "{name}: {volumes:?}");
+        assert!(
+            (volumes[0] - 1005.3).abs() < 20.0 && (volumes[1] - 4188.8).abs() < 84.0,
+            "{name}: {volumes:?}"
+        );
         parts.into_iter().for_each(|part| drop(SolidMesh::new(part.mesh).unwrap()));
     }
-}
-
-#[test]
-fn the_same_file_gives_the_same_mesh() {
-    assert_eq!(read(data("machine.step")).unwrap().mesh, read(data("machine.step")).unwrap().mesh);
 }
 
 #[test]
@@ -119,7 +125,10 @@ fn errors_say_what_to_do() {
         std::fs::write(&path, bytes).unwrap();
         let error = read(&path).unwrap_err();
         assert!(
-            matches!(error, ReadError::Cad(CadError::Failed(_) | CadError::Broken { .. }) | ReadError::NoFaces { .. }),
+            matches!(
+                error,
+                ReadError::Cad(CadError::Failed(_) | CadError::Broken { .. }) | ReadError::NoFaces { .. }
+            ),
             "{error:?}"
         );
     }

@@ -5,8 +5,8 @@ use std::path::Path;
 
 /// The order of the modules, as in `docs/architecture.md` and in the documentation of the crate.
 const ORDER: [&str; 17] = [
-    "base", "parallel", "input", "save", "program", "geometry", "sampling", "mesh", "domain", "asset", "query",
-    "verify", "encode", "deform", "collide", "evaluate", "inspect",
+    "base", "parallel", "input", "save", "program", "geometry", "sampling", "mesh", "domain", "asset",
+    "query", "verify", "encode", "deform", "collide", "evaluate", "inspect",
 ];
 /// Shared parts of the unit tests. Every module may use it.
 const FOR_TESTS: &str = "testing";

@@ -18,8 +18,8 @@ pub use check::{BoundaryLoop, CheckReport, check};
 pub use defect::{Defect, DefectKind, Severity};
 pub(crate) use read::text;
 pub use read::{
-    CadError, CadOptions, LoadReport, LoadedMesh, MeshFormat, MeshPart, Origin, Place, ReadError, files, read,
-    read_bytes, read_with, source_blake3,
+    CadError, CadOptions, LoadReport, LoadedMesh, MeshFormat, MeshPart, Origin, Place, ReadError, files,
+    read, read_bytes, read_with, source_blake3,
 };
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, repair};
 pub use solid::{NotSolid, ReadSolidError, SolidMesh};

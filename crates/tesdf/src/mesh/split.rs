@@ -121,7 +121,8 @@ impl<'a> Surroundings<'a> {
         let bounds = |faces: &Vec<u32>| {
             faces.iter().fold(Aabb::EMPTY, |all, &face| all.union(Aabb::of(&mesh.triangle(face as usize))))
         };
-        let vertex = |faces: &Vec<u32>| faces.first().map_or(DVec3::ZERO, |&face| mesh.triangle(face as usize)[0]);
+        let vertex =
+            |faces: &Vec<u32>| faces.first().map_or(DVec3::ZERO, |&face| mesh.triangle(face as usize)[0]);
         let winding = |part: usize| WindingNumber::new(&named(mesh, String::new(), &parts[part]).mesh);
         let outward = (0..parts.len()).filter(|&part| volumes[part] > 0.0).map(|part| (part, winding(part)));
         let vertices = parts.iter().map(vertex).collect();
@@ -133,7 +134,9 @@ impl<'a> Surroundings<'a> {
         let inner = self.bounds[part];
         let is_around = |(outer, winding): &&(usize, WindingNumber)| {
             let outer = self.bounds[*outer];
-            outer.contains(inner.min) && outer.contains(inner.max) && winding.at_perturbed(self.vertices[part]) > 0
+            outer.contains(inner.min)
+                && outer.contains(inner.max)
+                && winding.at_perturbed(self.vertices[part]) > 0
         };
         let around = self.outward.iter().filter(is_around).map(|(outer, _)| *outer);
         around.min_by(|&a, &b| self.volumes[a].total_cmp(&self.volumes[b]).then(a.cmp(&b)))

@@ -53,8 +53,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
         raw.begin_part(instance.name);
         // A NaN in one coordinate would spread to the others, but must be reported for that
         // coordinate.
-        let placed =
-            |p: &glam::DVec3| if p.is_finite() { instance.pose.transform_point3(*p) } else { *p };
+        let placed = |p: &glam::DVec3| if p.is_finite() { instance.pose.transform_point3(*p) } else { *p };
         raw.positions.extend(positions.iter().map(placed));
         for &[a, b, c] in triangles {
             let corners = if mirrored { [a, c, b] } else { [a, b, c] };

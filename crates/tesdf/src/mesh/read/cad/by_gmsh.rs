@@ -86,20 +86,23 @@ fn run(
              (General.MaxZ - General.MinZ)^2)"
         ),
     };
-    // IGES has faces without a common topology.
-    let sew = if format == MeshFormat::Iges {
-        "Geometry.OCCSewFaces = 1;\nGeometry.OCCMakeSolids = 1;\n"
-    } else {
-        ""
+    let import = match format {
+        // It has no unit, and Gmsh refuses one.
+        MeshFormat::Brep => "",
+        // It may have faces without a common topology.
+        MeshFormat::Iges => {
+            "Geometry.OCCTargetUnit = \"MM\";\nGeometry.OCCSewFaces = 1;\nGeometry.OCCMakeSolids = 1;\n"
+        }
+        _ => "Geometry.OCCTargetUnit = \"MM\";\n",
     };
     let script = format!(
         "SetFactory(\"OpenCASCADE\");\nGeneral.NumThreads = 1;\nGeometry.OCCImportLabels = 1;\n\
-         Geometry.OCCTargetUnit = \"MM\";\n{sew}Merge \"{model}\";\nSave \"{NAMES}\";\nBoundingBox;\n\
-         Mesh.MeshSizeMax = {size};\nMesh.MeshSizeFromCurvature = {turn};\nMesh.SaveAll = 1;\n"
+         {import}Merge \"{model}\";\nSave \"{NAMES}\";\nBoundingBox;\n\
+         Mesh.MeshSizeMax = {size};\nMesh.MeshSizeFromCurvature = {turn};\nMesh.SaveAll = 1;\n\
+         Mesh.MshFileVersion = 4.1;\nMesh.Binary = 0;\n"
     );
     fs::write(gmsh.path(SCRIPT), script).map_err(CadError::Folder)?;
-    let arguments =
-        [SCRIPT, "-2", "-order", "2", "-format", "msh41", "-o", RESULT, "-nt", "1", "-v", "4"];
+    let arguments = [SCRIPT, "-2", "-order", "2", "-o", RESULT, "-nt", "1", "-v", "4"];
     let executable = || gmsh.executable().to_path_buf();
     let printed = gmsh.run(&arguments, options.time_limit, &Progress::default()).map_err(|e| match e {
         RunError::NotFound(source) => CadError::NotFound { executable: executable(), source },

@@ -129,11 +129,7 @@ impl File<'_> {
         Ok(())
     }
 
-    fn nodes(
-        &mut self,
-        positions: &mut Vec<DVec3>,
-        ids: &mut HashMap<u64, u32>,
-    ) -> Result<(), CadError> {
+    fn nodes(&mut self, positions: &mut Vec<DVec3>, ids: &mut HashMap<u64, u32>) -> Result<(), CadError> {
         let blocks = self.numbers(4)?[0] as u64;
         for _ in 0..blocks {
             let count = self.numbers(4)?[3] as u64;

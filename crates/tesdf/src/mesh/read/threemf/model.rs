@@ -224,7 +224,10 @@ impl Tag<'_> {
 
     fn needed(&self, name: &str) -> Result<Cow<'_, str>, ReadError> {
         self.text(name)?.ok_or_else(|| {
-            self.error(format!("the attribute {} is missing", shown(name.as_bytes())), "expected it: export the file again")
+            self.error(
+                format!("the attribute {} is missing", shown(name.as_bytes())),
+                "expected it: export the file again",
+            )
         })
     }
 

@@ -101,12 +101,7 @@ impl<'a> Index<'a> {
     }
 
     /// The object that a component of model `from` shows.
-    fn find(
-        &self,
-        from: usize,
-        component: &Component,
-        place: impl Fn() -> String,
-    ) -> Result<Id, ReadError> {
+    fn find(&self, from: usize, component: &Component, place: impl Fn() -> String) -> Result<Id, ReadError> {
         let model = match &component.part {
             None => Some(from),
             Some(part) => self.models.iter().position(|model| model.part == *part),
@@ -120,7 +115,12 @@ impl<'a> Index<'a> {
 
     /// All objects, each after those that it shows.
     fn order(&self) -> Result<Vec<Id>, ReadError> {
-        let all = || self.models.iter().enumerate().flat_map(|(m, model)| (0..model.objects.len()).map(move |o| (m, o)));
+        let all = || {
+            self.models
+                .iter()
+                .enumerate()
+                .flat_map(|(m, model)| (0..model.objects.len()).map(move |o| (m, o)))
+        };
         let mut open: HashMap<Id, usize> = HashMap::new();
         let mut parents: HashMap<Id, Vec<Id>> = HashMap::new();
         for id in all() {
@@ -144,7 +144,11 @@ impl<'a> Index<'a> {
             None => Ok(order),
             Some((m, o)) => {
                 let place = self.models[m].objects[o].place();
-                Err(fault(place, "the object shows itself", "components must form trees: export the file again"))
+                Err(fault(
+                    place,
+                    "the object shows itself",
+                    "components must form trees: export the file again",
+                ))
             }
         }
     }
@@ -166,7 +170,11 @@ impl<'a> Index<'a> {
         for (sum, what) in all.into_iter().zip(["places of objects", "vertices", "corners of faces"]) {
             if sum > MAX_ELEMENTS {
                 let found = format!("the build items show {sum} {what}");
-                return Err(fault("build", found, format!("expected at most {MAX_ELEMENTS}: split the file")));
+                return Err(fault(
+                    "build",
+                    found,
+                    format!("expected at most {MAX_ELEMENTS}: split the file"),
+                ));
             }
         }
         Ok(())
