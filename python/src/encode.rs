@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use pyo3::types::PyString;
+use tesdf::base::SurfaceFaces;
+use tesdf::base::unit;
 use tesdf::encode::{
     Deformation, Domain, DomainChoice, EncodeChoices, Encoder, MethodChoice, Preset, Refinement, RuleChoice,
     Threshold,
 };
-use tesdf::base::SurfaceFaces;
 use tesdf::{Progress, Stage};
 
 use crate::asset::Asset;
@@ -19,8 +20,8 @@ use crate::pool;
 
 /// Encodes a closed mesh. Ctrl-C ends it with KeyboardInterrupt.
 ///
-/// - mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an
-///   object with attributes of these names.
+/// - mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB, 3MF; STEP, IGES, BREP with Gmsh; USD with
+///   usd-core), a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these names.
 /// - preset: "default" (fast queries), "fast" (fast encoding), "compact" (small) or "gpu" (few
 ///   cells, whose lists fill the 32 threads of a GPU that read them), all exact; "paper" (the
 ///   paper's encoder: sampled, 129 samples along an edge, plain) or "sampled-safe" (sampled with a
@@ -42,7 +43,8 @@ use crate::pool;
 /// - band: width of the encoded layer around the solid, in the mesh's unit. None is 5 % of the
 ///   diagonal, and no layer with "gmsh".
 /// - regions: boxes [R, 6] that are encoded as well, each min x y z, max x y z.
-/// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing.
+/// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing. None is the unit
+///   of the file, if it has one; another unit than that is a warning.
 /// - inside: the rule that says what is inside. "winding": a winding number of 1 or more, "nonzero":
 ///   other than 0, "odd": odd; these need a closed mesh. "generalized": a generalised winding number
 ///   of 1/2 or more in absolute value; for open meshes. "sheet": nearer to a face than half of the
@@ -108,15 +110,18 @@ pub fn encode(
     let state = Progress::default();
     let work = || {
         pool.install(|| {
-            let (solid, path, source) = input.load()?.solid(options.inside)?;
+            let loaded = input.load()?;
+            let of_file = loaded.unit.clone();
+            let (solid, path, source) = loaded.solid(options.inside)?;
             let tetrahedra = choices.tetrahedra(&solid, &state).map_err(Error::Domain)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
             Encoder::new()
-                .options(options)
+                .options(options.or_unit(of_file.as_deref()))
                 .domain(domain)
                 .source(source)
                 .progress(&state)
                 .encode(&solid)
+                .map(|asset| (asset, of_file))
                 .map_err(|e| Error::Encode(path, e))
         })
     };
@@ -132,8 +137,11 @@ pub fn encode(
         }
         None => Ok(()),
     };
-    let encoded = cancellable(py, work, || state.cancel(), watch)?.map_err(|e| e.raise(py))?;
+    let (encoded, of_file) = cancellable(py, work, || state.cancel(), watch)?.map_err(|e| e.raise(py))?;
     watch()?;
+    if let Some(found) = unit::conflict(of_file.as_deref(), choices.unit.as_deref()) {
+        py.import("warnings")?.call_method1("warn", (found,))?;
+    }
     Ok(Asset::new(encoded))
 }
 

@@ -14,6 +14,7 @@ mod errors;
 mod interrupt;
 mod mesh;
 mod playback;
+mod polygons;
 mod pool;
 mod poses;
 mod scene;
@@ -32,6 +33,8 @@ mod _native {
     use super::mesh::{check, repair};
     #[pymodule_export]
     use super::playback::{export, view};
+    #[pymodule_export]
+    use super::polygons::polygons;
     #[pymodule_export]
     use super::scene::{Scene, pair};
     #[pymodule_export]

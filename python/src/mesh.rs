@@ -6,17 +6,22 @@ use pyo3::types::PyString;
 use serde::Serialize;
 use tesdf::asset::about::Source;
 use tesdf::base::Inside;
-use tesdf::mesh::{RepairOptions, RepairReport, SolidMesh, TriangleMesh, read};
+use tesdf::mesh::{RepairOptions, RepairReport, SolidMesh, TriangleMesh, read, source_blake3};
 
 use crate::arrays::{self, Rows};
 use crate::errors::{Error, argument, kind_of};
 use crate::{classes, pool};
+
+/// Extensions of USD files.
+const USD: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
 /// A mesh argument.
 pub enum MeshInput {
     /// A file, which is read when the mesh is needed.
     File(PathBuf),
     Arrays(TriangleMesh),
+    /// A USD file, which the package's Python has read.
+    Usd(Box<Loaded>),
 }
 
 /// A mesh, and its file if it has one.
@@ -25,6 +30,8 @@ pub struct Loaded {
     pub path: Option<PathBuf>,
     pub source: Source,
     pub notes: Vec<String>,
+    /// Name of the unit of the file.
+    pub unit: Option<String>,
 }
 
 impl MeshInput {
@@ -35,7 +42,12 @@ impl MeshInput {
     /// fault.
     pub fn new(any: &Bound<'_, PyAny>) -> PyResult<Self> {
         if any.is_instance_of::<PyString>() || any.hasattr("__fspath__")? {
-            return Ok(Self::File(any.extract()?));
+            let path: PathBuf = any.extract()?;
+            let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+            if USD.contains(&extension.as_str()) {
+                return Self::of_usd(any, path);
+            }
+            return Ok(Self::File(path));
         }
         let [vertices, faces] = if any.hasattr("vertices")? && any.hasattr("faces")? {
             [any.getattr("vertices")?, any.getattr("faces")?]
@@ -49,17 +61,37 @@ impl MeshInput {
         TriangleMesh::new(vertices, faces).map(Self::Arrays).map_err(|e| Error::Mesh(e).raise(any.py()))
     }
 
+    /// Reads a USD file by `tesdf.usd`.
+    fn of_usd(any: &Bound<'_, PyAny>, path: PathBuf) -> PyResult<Self> {
+        let py = any.py();
+        let found = py.import("tesdf.usd")?.call_method1("read_usd", (any,))?;
+        let (vertices, faces) = (found.getattr("vertices")?, found.getattr("faces")?);
+        let vertices = Rows::new("vertices", &vertices)?.as_slice()?.to_vec();
+        let mesh = TriangleMesh::new(vertices, corner_ids(&faces)?);
+        let mesh = mesh.map_err(|e| Error::Mesh(e).raise(py))?;
+        let blake3 = source_blake3(&path).map_err(|e| Error::Read(path.clone(), e).raise(py))?;
+        Ok(Self::Usd(Box::new(Loaded {
+            mesh,
+            source: Source::of_file(&path, blake3),
+            path: Some(path),
+            notes: found.getattr("notes")?.extract()?,
+            unit: found.getattr("unit")?.extract()?,
+        })))
+    }
+
     /// Reads the file, if the mesh is in a file.
     pub fn load(self) -> Result<Loaded, Error> {
         match self {
             Self::Arrays(mesh) => {
-                Ok(Loaded { mesh, path: None, source: Source::default(), notes: Vec::new() })
+                Ok(Loaded { mesh, path: None, source: Source::default(), notes: Vec::new(), unit: None })
             }
+            Self::Usd(loaded) => Ok(*loaded),
             Self::File(path) => match read(&path) {
                 Err(e) => Err(Error::Read(path, e)),
                 Ok(loaded) => {
                     let source = Source::of_file(&path, loaded.report.source_blake3);
-                    Ok(Loaded { mesh: loaded.mesh, path: Some(path), source, notes: loaded.report.notes })
+                    let (notes, unit) = (loaded.report.notes, loaded.report.unit);
+                    Ok(Loaded { mesh: loaded.mesh, path: Some(path), source, notes, unit })
                 }
             },
         }
@@ -104,8 +136,8 @@ struct Mended<'a> {
 /// Checks a mesh for defects: those that prevent a well-defined inside, and those that may be
 /// unintended.
 ///
-/// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB), a pair (vertices [V, 3], faces [F, 3]), or an
-/// object with attributes of these names.
+/// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB, 3MF; STEP, IGES, BREP with Gmsh; USD with usd-core),
+/// a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these names.
 ///
 /// Raises OSError or MeshError if the mesh cannot be read. Defects are in the report and raise
 /// nothing.

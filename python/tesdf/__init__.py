@@ -61,6 +61,7 @@ from .reports import (
 )
 from .results import Answers, Moved, RayHits, Reencoded, Repaired
 from .shapes import Box, Capsule, Plane, Sphere
+from .usd import UsdMesh, read_usd
 
 __all__ = [
     "NO_CELL",
@@ -98,6 +99,7 @@ __all__ = [
     "SimulationError",
     "Sphere",
     "StepContacts",
+    "UsdMesh",
     "VerifyReport",
     "WhyReport",
     "__version__",
@@ -106,6 +108,7 @@ __all__ = [
     "collide",
     "encode",
     "export",
+    "read_usd",
     "repair",
     "time_of_impact",
     "view",

@@ -22,12 +22,15 @@ _Precision = Literal["f64", "f32"]
 _Numbers = Union[float, npt.ArrayLike]
 _Integers = Union[int, npt.ArrayLike]
 
-__all__ = ["NO_CELL", "NO_FACE", "Asset", "Scene", "Simulation", "__version__", "check", "encode", "export", "pair", "repair", "view"]
+__all__ = ["NO_CELL", "NO_FACE", "Asset", "Scene", "Simulation", "__version__", "check", "encode", "export", "pair", "polygons", "repair", "view"]
 
 NO_CELL: int
 NO_FACE: int
 __version__: str
 
+def polygons(
+    points: npt.ArrayLike, counts: npt.ArrayLike, corners: npt.ArrayLike
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32], tuple[str, ...]]: ...
 def check(mesh: _Mesh) -> CheckReport: ...
 def repair(mesh: _Mesh, *, weld_tolerance: float | None = None) -> Repaired: ...
 def encode(

@@ -4,14 +4,18 @@ use std::path::PathBuf;
 use serde::Serialize;
 use tesdf::mesh::{CheckReport, LoadReport, RepairOptions, TriangleMesh, check, repair};
 
-use tesdf_terminal::mesh_file;
+use tesdf_terminal::mesh_file::{self, CadArgs};
 use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Arguments of `tesdf check`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Mesh file: STL, OBJ, PLY, OFF, glTF or GLB
+    /// The mesh file.
+    #[arg(help = mesh_file::MESH_HELP)]
     pub mesh: PathBuf,
+    /// How finely CAD files become triangles.
+    #[command(flatten)]
+    pub cad: CadArgs,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
@@ -30,7 +34,7 @@ struct Report<'a> {
 /// # Errors
 /// The mesh cannot be read, or stdout cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    let loaded = mesh_file::read(&args.mesh)?;
+    let loaded = args.cad.read(&args.mesh)?;
     let found = check(&loaded.mesh);
     if args.json {
         let file = args.mesh.display().to_string();

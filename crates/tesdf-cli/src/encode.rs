@@ -6,29 +6,52 @@ use std::time::Instant;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use tesdf::asset::about::{Source, Statistics};
+use tesdf::base::unit;
 use tesdf::domain::tetrahedra_files;
 use tesdf::encode::{Domain, DomainChoice, EncodeChoices, EncodeOptions, Encoder, Method};
 use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
 use tesdf::{Certificate, Progress, TeSdf};
 
 use tesdf_terminal::device::{self, Choice};
+use tesdf_terminal::mesh_file::CadArgs;
+use tesdf_terminal::output;
 use tesdf_terminal::output::Consent;
 use tesdf_terminal::progress::{interrupt_flag, watched};
 use tesdf_terminal::report::{self, Failure, Outcome};
-use tesdf_terminal::{mesh_file, output};
 
 mod choices;
+mod robot;
+mod split;
 
+use crate::encode_all::Batch;
+use crate::encode_all::meshes::Mesh;
 pub use choices::{ChoiceArgs, EncoderChoice, Preset};
+
+const ENCODED_HELP: &str = "Mesh file: STL, OBJ, PLY, OFF, glTF, GLB, 3MF, or STEP, IGES, BREP by the program Gmsh; or a \
+                            robot description, URDF or MJCF, whose collision meshes are all encoded";
 
 /// Arguments of `tesdf encode`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Mesh file: STL, OBJ, PLY, OFF, glTF or GLB
+    /// The mesh file or robot description.
+    #[arg(help = ENCODED_HELP)]
     pub mesh: PathBuf,
-    /// Output file; an existing file is replaced, a pipe or device is written to
-    #[arg(short, long, value_name = "FILE")]
+    /// Output file; an existing file is replaced, a pipe or device is written to. Folder of the
+    /// assets and their manifest with --split and for robot descriptions
+    #[arg(short, long, value_name = "FILE|FOLDER")]
     pub output: PathBuf,
+    /// Encode each object of the file into an asset of its own, with its name: objects of OBJ, 3MF and
+    /// glTF, solids of STEP, IGES, BREP and ASCII STL; where a file has fewer than two of them, its
+    /// connected components
+    #[arg(long)]
+    pub split: bool,
+    /// How finely CAD files become triangles.
+    #[command(flatten)]
+    pub cad: CadArgs,
+    /// Where `package://NAME/` of a URDF file leads; may be given several times [default:
+    /// ROS_PACKAGE_PATH, AMENT_PREFIX_PATH, and folders above the file]
+    #[arg(long = "package", value_name = "NAME=PATH", value_parser = robot::package)]
+    pub packages: Vec<(String, PathBuf)>,
     /// Whether a read-only output is replaced.
     #[command(flatten)]
     pub consent: Consent,
@@ -82,6 +105,18 @@ struct Report<'a> {
 /// The mesh cannot be read or has no well-defined inside, an option does not apply to it, the file
 /// cannot be written, or Ctrl-C was pressed. The output file is then unchanged.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
+    if let Some(kind) = robot::kind(&args.mesh)? {
+        return robot::run(args, kind);
+    }
+    if !args.packages.is_empty() {
+        return Err(Failure::new(format!(
+            "--package is of URDF files, and {} is none; leave it out",
+            args.mesh.display()
+        )));
+    }
+    if args.split {
+        return split::run(args);
+    }
     let mut pool = ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         pool = pool.num_threads(threads.into());
@@ -89,12 +124,14 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let pool = pool.build().map_err(|e| Failure::new(format!("cannot start threads: {e}")))?;
     let output = output::open(&args.output, &args.inputs(), args.consent)?;
     let start = Instant::now();
-    let LoadedMesh { mesh, report: load, .. } = mesh_file::read(&args.mesh)?;
+    let LoadedMesh { mesh, report: load, .. } = args.cad.read(&args.mesh)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.mesh.display()));
     let choices = args.choices.choices();
-    let options = choices.options().map_err(Failure::new)?;
+    let options = choices.options().map_err(Failure::new)?.or_unit(load.unit.as_deref());
     let solid = pool.install(|| SolidMesh::with_inside(mesh, options.inside)).map_err(|e| at(&e))?;
     load.notes.iter().for_each(|note| report::warning(note));
+    let conflict = unit::conflict(load.unit.as_deref(), args.choices.unit.as_deref());
+    conflict.iter().for_each(|found| report::warning(found));
     warn(solid.warnings());
 
     let source = Source::of_file(&args.mesh, load.source_blake3.clone());
@@ -140,6 +177,26 @@ pub(crate) fn encode(
 }
 
 impl Args {
+    /// The encoding of several meshes into the folder of the output.
+    fn batch(&self, meshes: Vec<Mesh>) -> Result<Batch<'_>, Failure> {
+        if self.device != Choice::Processor {
+            return Err(Failure::new(
+                "--device is for one mesh; leave it out for --split and robot descriptions",
+            ));
+        }
+        Ok(Batch {
+            meshes,
+            from: &self.mesh,
+            output: &self.output,
+            choices: self.choices.choices(),
+            cad: self.cad.clone(),
+            shard: None,
+            jobs: None,
+            threads: self.threads,
+            json: self.json,
+        })
+    }
+
     /// All files that the command reads.
     fn inputs(&self) -> Vec<PathBuf> {
         let mut inputs = tesdf::mesh::files(&self.mesh);

@@ -61,7 +61,11 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 }
 
 fn inside(certificate: &Certificate) -> String {
-    let jumps = if certificate.jumps() { "; the sign changes in holes of the mesh, where the distance is not 0" } else { "" };
+    let jumps = if certificate.jumps() {
+        "; the sign changes in holes of the mesh, where the distance is not 0"
+    } else {
+        ""
+    };
     format!("{}{jumps}", certificate.inside())
 }
 

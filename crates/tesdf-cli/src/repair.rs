@@ -7,14 +7,16 @@ use tesdf::mesh::{
     write_bytes,
 };
 
+use tesdf_terminal::mesh_file::{self, CadArgs};
 use tesdf_terminal::output::{self, Consent};
+use tesdf_terminal::parse;
 use tesdf_terminal::report::{self, Failure, Outcome};
-use tesdf_terminal::{mesh_file, parse};
 
 /// Arguments of `tesdf repair`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Mesh file: STL, OBJ, PLY, OFF, glTF or GLB
+    /// The mesh file.
+    #[arg(help = mesh_file::MESH_HELP)]
     pub mesh: PathBuf,
     /// Output file: .ply (keeps every digit), .obj or .stl; an existing file is replaced. A pipe or
     /// device is written to, as PLY unless its name has another extension
@@ -27,6 +29,9 @@ pub struct Args {
     /// unit [default: merge bitwise equal positions only]
     #[arg(long, value_name = "T", value_parser = parse::length, allow_hyphen_values = true)]
     pub weld_tolerance: Option<f64>,
+    /// How finely CAD files become triangles.
+    #[command(flatten)]
+    pub cad: CadArgs,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
@@ -52,7 +57,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         None if output.file_path().is_none() => WriteFormat::Ply,
         _ => WriteFormat::of_path(&args.output).map_err(Failure::new)?,
     };
-    let loaded = mesh_file::read(&args.mesh)?;
+    let loaded = args.cad.read(&args.mesh)?;
     let options = RepairOptions { weld_tolerance: args.weld_tolerance, ..RepairOptions::DEFAULT };
     let repaired =
         repair(&loaded.mesh, &options).map_err(|e| Failure::new(format!("{}: {e}", args.mesh.display())))?;

@@ -101,6 +101,8 @@ pub mod inspect;
 #[cfg(feature = "encode")]
 pub mod mesh;
 mod parallel;
+#[cfg(feature = "gmsh")]
+mod program;
 pub mod query;
 #[cfg(feature = "encode")]
 mod sampling;

@@ -103,7 +103,7 @@ fn each_bad_file_reads_or_is_refused_as_listed() {
 }
 
 fn assert_consistent(loaded: &LoadedMesh) {
-    let LoadedMesh { mesh, report, origin } = loaded;
+    let LoadedMesh { mesh, report, origin, .. } = loaded;
     let vertices = mesh.vertices().len();
     assert_eq!(report.vertices_in_file, vertices + report.welded_vertices + report.unused_vertices);
     assert_eq!((origin.vertices.len(), origin.faces.len()), (vertices, mesh.faces().len()));

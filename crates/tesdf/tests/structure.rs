@@ -4,9 +4,9 @@ use std::fs;
 use std::path::Path;
 
 /// The order of the modules, as in `docs/architecture.md` and in the documentation of the crate.
-const ORDER: [&str; 16] = [
-    "base", "parallel", "input", "save", "geometry", "sampling", "mesh", "domain", "asset", "query",
-    "verify", "encode", "deform", "collide", "evaluate", "inspect",
+const ORDER: [&str; 17] = [
+    "base", "parallel", "input", "save", "program", "geometry", "sampling", "mesh", "domain", "asset",
+    "query", "verify", "encode", "deform", "collide", "evaluate", "inspect",
 ];
 /// Shared parts of the unit tests. Every module may use it.
 const FOR_TESTS: &str = "testing";

@@ -8,20 +8,23 @@ use serde::Serialize;
 use tesdf::asset::FORMAT_VERSION;
 use tesdf::asset::about::Source;
 use tesdf::encode::{DomainChoice, EncodeChoices, EncodeOptions, Encoder};
-use tesdf::mesh::{LoadedMesh, SolidMesh};
+use tesdf::glam::DAffine3;
+use tesdf::mesh::{LoadReport, LoadedMesh, MeshError, MeshFormat, SolidMesh, TriangleMesh};
 use tesdf::save::save_atomic;
 use tesdf::{Certificate, Progress, TeSdf};
 
-use super::meshes::Mesh;
+use super::meshes::{Content, Mesh, Placed};
 use crate::encode::encode;
+use tesdf_terminal::asset_file;
+use tesdf_terminal::mesh_file::{self, CadArgs};
 use tesdf_terminal::report::Failure;
-use tesdf_terminal::{asset_file, mesh_file};
 
 /// The work on each mesh.
 #[derive(Debug)]
 pub struct Job {
     choices: EncodeChoices,
     options: EncodeOptions,
+    cad: CadArgs,
     output: PathBuf,
 }
 
@@ -69,9 +72,9 @@ struct Expected {
 impl Job {
     /// # Errors
     /// The choices exclude each other.
-    pub fn new(choices: EncodeChoices, output: &Path) -> Result<Self, Failure> {
+    pub fn new(choices: EncodeChoices, cad: CadArgs, output: &Path) -> Result<Self, Failure> {
         let options = choices.options().map_err(Failure::new)?;
-        Ok(Self { choices, options, output: output.to_path_buf() })
+        Ok(Self { choices, options, cad, output: output.to_path_buf() })
     }
 
     /// The options of the encoder.
@@ -108,27 +111,53 @@ impl Job {
         if let Some(reason) = &mesh.unreadable {
             return Err(Failure::new(reason));
         }
-        // A pipe would give its bytes once, and they are read twice.
-        if path.exists() && !path.is_file() {
-            return Err(Failure::new(format!("{} is not a file; expected a mesh file", path.display())));
-        }
-        let hash = tesdf::mesh::source_blake3(path).map_err(|e| Failure::new(e.in_file(path)))?;
-        let expected = self.expected(Source::of_file(path, hash));
-        if let Some(asset) = self.present(&expected) {
-            return Ok((State::Present, asset));
-        }
-        let LoadedMesh { mesh: surface, report, .. } = mesh_file::read(path)?;
-        if report.source_blake3 != expected.source.blake3 {
+        let (expected, surface, load) = match &mesh.content {
+            Content::File => {
+                let expected = self.expected(Source::of_file(path, hash_of(path)?));
+                if let Some(asset) = self.present(&expected) {
+                    return Ok((State::Present, asset));
+                }
+                let LoadedMesh { mesh: surface, report, .. } = self.read(path)?;
+                (expected, surface, report)
+            }
+            Content::Part(part) => {
+                let label = mesh.entry.part.as_deref().unwrap_or_default();
+                let source = labelled(path, part.load.source_blake3.clone(), Some(label));
+                (self.named(source, &part.asset), part.mesh.clone(), part.load.clone())
+            }
+            Content::Placed(placed) => {
+                hash_of(path)?;
+                let LoadedMesh { mesh: surface, report, .. } = self.read(path)?;
+                let source = labelled(path, report.source_blake3.clone(), placed.label.as_deref());
+                let surface =
+                    placed.apply(surface).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+                let unit = placed.unit.clone().or(report.unit.clone());
+                (self.named(source, &placed.asset), surface, LoadReport { unit, ..report })
+            }
+        };
+        if load.source_blake3 != expected.source.blake3 {
             let found = format!("{} changed while it was read; encode it again", path.display());
             return Err(Failure::new(found));
         }
-        let solid = SolidMesh::with_inside(surface, self.options.inside).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
-        let encoder =
-            Encoder::new().options(self.options.clone()).source(expected.source.clone()).progress(stop);
+        let solid = SolidMesh::with_inside(surface, self.options.inside)
+            .map_err(|e| Failure::new(format!("{}: {e}", mesh.name_in(path))))?;
+        let options = self.options.clone().or_unit(load.unit.as_deref());
+        let encoder = Encoder::new().options(options).source(expected.source.clone()).progress(stop);
         let asset = encode(&solid, path, &self.choices, encoder, stop)?;
         let bytes = asset.to_bytes().map_err(Failure::new)?;
         save_atomic(&expected.path, &bytes).map_err(Failure::new)?;
         Ok((State::Encoded, expected.asset(&asset, bytes.len())))
+    }
+
+    fn read(&self, path: &Path) -> Result<LoadedMesh, Failure> {
+        let is_cad = MeshFormat::of_path(path).is_ok_and(MeshFormat::is_cad);
+        if is_cad { self.cad.read(path) } else { mesh_file::read(path) }
+    }
+
+    /// An asset with a name of its own. It is encoded whether it is there or not, because its name
+    /// does not say with which version and options.
+    fn named(&self, source: Source, name: &str) -> Expected {
+        Expected { path: self.output.join(name), source, name: name.to_owned() }
     }
 
     /// The asset of the mesh file `source`. Its name is a hash of all that its bytes depend on:
@@ -138,7 +167,12 @@ impl Job {
         let mut hasher = blake3::Hasher::new();
         let options = serde_json::to_string(&self.options).unwrap_or_default();
         let version = format!("{} {FORMAT_VERSION}", env!("CARGO_PKG_VERSION"));
-        for part in [&version, self.domain(), &options, &source.name, &source.blake3] {
+        let cad = format!("{:?}", self.cad);
+        let mut parts = vec![&*version, self.domain(), &options, &source.name, &source.blake3];
+        if self.cad.is_given() {
+            parts.push(&cad);
+        }
+        for part in parts {
             // The length keeps two parts apart.
             hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
         }
@@ -150,8 +184,51 @@ impl Job {
     fn present(&self, expected: &Expected) -> Option<Asset> {
         let asset = asset_file::open_intact(&expected.path).ok()?;
         let about = asset.about();
-        let same = about.source == expected.source && about.options == self.options;
+        // Without a unit of the user, it is that of the file.
+        let options = self.options.clone().or_unit(about.options.unit.as_deref());
+        let same = about.source == expected.source && about.options == options;
         same.then(|| expected.asset(&asset, asset.as_bytes().len()))
+    }
+}
+
+/// BLAKE3 of a mesh file.
+fn hash_of(path: &Path) -> Result<String, Failure> {
+    // A pipe would give its bytes once, and they are read twice.
+    if path.exists() && !path.is_file() {
+        return Err(Failure::new(format!("{} is not a file; expected a mesh file", path.display())));
+    }
+    tesdf::mesh::source_blake3(path).map_err(|e| Failure::new(e.in_file(path)))
+}
+
+/// A source whose name says which part, or which transform, of the file it is.
+fn labelled(path: &Path, blake3: String, label: Option<&str>) -> Source {
+    let mut source = Source::of_file(path, blake3);
+    if let Some(label) = label {
+        source.name = format!("{}#{label}", source.name);
+    }
+    source
+}
+
+impl Placed {
+    /// The mesh after the transform. If that mirrors, faces are turned over, so outward stays outward.
+    fn apply(&self, mesh: TriangleMesh) -> Result<TriangleMesh, MeshError> {
+        if self.pose == DAffine3::IDENTITY {
+            return Ok(mesh);
+        }
+        let vertices = mesh.vertices().iter().map(|&p| self.pose.transform_point3(p)).collect();
+        let mirrored = self.pose.matrix3.determinant() < 0.0;
+        let turned = |&[a, b, c]: &[u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+        TriangleMesh::new(vertices, mesh.faces().iter().map(turned).collect())
+    }
+}
+
+impl Mesh {
+    /// The file, and the object in it.
+    fn name_in(&self, path: &Path) -> String {
+        match &self.entry.part {
+            Some(part) => format!("{}: object '{part}'", path.display()),
+            None => path.display().to_string(),
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use tesdf::encode::EncodeOptions;
 
 use super::Shard;
 use super::job::{Asset, Done, Job, State};
-use super::meshes::Mesh;
+use super::meshes::{Details, Mesh};
 use tesdf_terminal::report::Failure;
 
 /// `manifest.json`: all that does not change from run to run.
@@ -25,6 +25,8 @@ pub struct Manifest<'a> {
 #[derive(Serialize)]
 struct Entry<'a> {
     mesh: &'a str,
+    #[serde(flatten)]
+    details: &'a Details,
     #[serde(flatten)]
     asset: Option<&'a Asset>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -55,10 +57,11 @@ impl<'a> Manifest<'a> {
         meshes: &'a [Mesh],
         done: &'a [Done],
     ) -> (Self, Vec<Time<'a>>) {
-        let both = || meshes.iter().map(|mesh| mesh.name.as_str()).zip(done);
-        let entry = |(mesh, done): (&'a str, &'a Done)| {
+        let both = || meshes.iter().zip(done);
+        let entry = |(mesh, done): (&'a Mesh, &'a Done)| {
             let (asset, error) = (done.result.as_ref().ok(), done.result.as_ref().err());
-            Entry { mesh, asset, error: error.map(String::as_str) }
+            let error = error.map(String::as_str);
+            Entry { mesh: &mesh.name, details: &mesh.entry, asset, error }
         };
         let assets = || done.iter().filter_map(|done| done.result.as_ref().ok());
         let manifest = Self {
@@ -72,7 +75,11 @@ impl<'a> Manifest<'a> {
             bytes: assets().map(|asset| asset.bytes).sum(),
             meshes: both().map(entry).collect(),
         };
-        let time = |(mesh, done): (&'a str, &Done)| Time { mesh, state: done.state, seconds: done.seconds };
+        let time = |(mesh, done): (&'a Mesh, &Done)| Time {
+            mesh: &mesh.name,
+            state: done.state,
+            seconds: done.seconds,
+        };
         (manifest, both().map(time).collect())
     }
 

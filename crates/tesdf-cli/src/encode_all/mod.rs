@@ -3,9 +3,10 @@
 //! The name of an asset is a hash of all that its bytes depend on. An asset that is there and whole
 //! is therefore the right one, and the command may be interrupted and run again, also by several
 //! processes on one folder.
+pub(crate) mod file_names;
 mod job;
 mod manifest;
-mod meshes;
+pub(crate) mod meshes;
 mod shard;
 
 use std::fs;
@@ -19,13 +20,14 @@ use std::time::{Duration, Instant};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use tesdf::Progress;
-use tesdf::encode::DomainChoice;
+use tesdf::encode::{DomainChoice, EncodeChoices};
 
 use crate::encode::ChoiceArgs;
 use job::{Done, Job, State};
 use manifest::{Manifest, Times};
 use meshes::Mesh;
 pub use shard::Shard;
+use tesdf_terminal::mesh_file::CadArgs;
 use tesdf_terminal::output::{self, Consent};
 use tesdf_terminal::progress::{Bar, interrupt_flag};
 use tesdf_terminal::report::{self, Failure, Outcome};
@@ -33,7 +35,8 @@ use tesdf_terminal::report::{self, Failure, Outcome};
 /// Arguments of `tesdf encode-all`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Folder of meshes, with its subfolders, or a text file with the path of one mesh on each line
+    /// Folder of meshes, with its subfolders, or a text file with the path of one mesh on each line;
+    /// STEP, IGES and BREP files are only taken from a list
     #[arg(value_name = "FOLDER|LIST")]
     pub meshes: PathBuf,
     /// Folder of the assets and the manifest; it is made if it does not exist
@@ -42,6 +45,9 @@ pub struct Args {
     /// The options of the encoder.
     #[command(flatten)]
     pub choices: ChoiceArgs,
+    /// How finely CAD files become triangles.
+    #[command(flatten)]
+    pub cad: CadArgs,
     /// Encode only one of N parts of the meshes, number I from 1 to N; the path of a mesh decides
     /// its part
     #[arg(long, value_name = "I/N")]
@@ -85,34 +91,72 @@ struct Broken<'a> {
 /// The meshes cannot be listed, options exclude each other, the output folder cannot be written, or
 /// Ctrl-C was pressed. Assets that are complete stay.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
-    if let DomainChoice::File(path) = &args.choices.domain {
-        return Err(Failure::new(format!(
-            "--domain {}: the tetrahedra of a file belong to one mesh; expected bisection or gmsh",
-            path.display()
-        ))
-        .hint("`tesdf encode --domain FILE` encodes that mesh"));
-    }
-    let job = Job::new(args.choices.choices(), &args.output)?;
-    let meshes = meshes::find(&args.meshes, args.shard)?;
-    fs::create_dir_all(&args.output)
-        .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", args.output.display())))?;
-    let [manifest, times] =
-        ["manifest", "times"].map(|name| args.output.join(manifest::file_name(name, args.shard)));
-    let inputs = [args.meshes.clone()];
-    let consent = Consent { force: false };
-    let (to_manifest, to_times) =
-        (output::open(&manifest, &inputs, consent)?, output::open(&times, &inputs, consent)?);
+    let meshes = meshes::find(&args.meshes, args.shard, &args.cad)?;
+    let batch = Batch {
+        meshes,
+        from: &args.meshes,
+        output: &args.output,
+        choices: args.choices.choices(),
+        cad: args.cad.clone(),
+        shard: args.shard,
+        jobs: args.jobs,
+        threads: args.threads,
+        json: args.json,
+    };
+    batch.run(Consent { force: false })
+}
 
-    let start = Instant::now();
-    let threads = args.threads.map_or_else(cores, usize::from);
-    let jobs = args.jobs.map_or(threads, usize::from).min(meshes.len()).max(1);
-    let done = all(&job, &meshes, &pools(threads, jobs)?)?;
-    let (report, record) = Manifest::new(&job, args.shard, &meshes, &done);
-    output::write(&to_manifest, &manifest::to_json(&report)?)?;
-    let seconds = start.elapsed().as_secs_f64();
-    let spent = Times { seconds, threads, jobs, meshes: record };
-    output::write(&to_times, &manifest::to_json(&spent)?)?;
-    print(args, &report, &done, [&manifest, &times], seconds)
+/// Meshes, and how they are encoded.
+pub(crate) struct Batch<'a> {
+    pub meshes: Vec<Mesh>,
+    /// The folder, list, mesh file or robot description that names the meshes.
+    pub from: &'a Path,
+    /// Folder of the assets and the manifest.
+    pub output: &'a Path,
+    pub choices: EncodeChoices,
+    pub cad: CadArgs,
+    pub shard: Option<Shard>,
+    /// Number of meshes that are in memory at the same time.
+    pub jobs: Option<u16>,
+    pub threads: Option<u16>,
+    /// Whether the result is printed as JSON.
+    pub json: bool,
+}
+
+impl Batch<'_> {
+    /// Encodes all meshes whose assets are not there, and writes the manifest.
+    ///
+    /// # Errors
+    /// Options exclude each other, the output folder cannot be written, or Ctrl-C was pressed.
+    pub fn run(&self, consent: Consent) -> Result<Outcome, Failure> {
+        if let DomainChoice::File(path) = &self.choices.domain {
+            return Err(Failure::new(format!(
+                "--domain {}: the tetrahedra of a file belong to one mesh; expected bisection or gmsh",
+                path.display()
+            ))
+            .hint("`tesdf encode --domain FILE` encodes that mesh"));
+        }
+        let job = Job::new(self.choices.clone(), self.cad.clone(), self.output)?;
+        let meshes = &self.meshes;
+        fs::create_dir_all(self.output)
+            .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", self.output.display())))?;
+        let [manifest, times] =
+            ["manifest", "times"].map(|name| self.output.join(manifest::file_name(name, self.shard)));
+        let inputs = [self.from.to_path_buf()];
+        let (to_manifest, to_times) =
+            (output::open(&manifest, &inputs, consent)?, output::open(&times, &inputs, consent)?);
+
+        let start = Instant::now();
+        let threads = self.threads.map_or_else(cores, usize::from);
+        let jobs = self.jobs.map_or(threads, usize::from).min(meshes.len()).max(1);
+        let done = all(&job, meshes, &pools(threads, jobs)?)?;
+        let (report, record) = Manifest::new(&job, self.shard, meshes, &done);
+        output::write(&to_manifest, &manifest::to_json(&report)?)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let spent = Times { seconds, threads, jobs, meshes: record };
+        output::write(&to_times, &manifest::to_json(&spent)?)?;
+        print(self, &report, &done, [&manifest, &times], seconds)
+    }
 }
 
 fn cores() -> usize {
@@ -194,7 +238,7 @@ fn weight(mesh: &Mesh) -> u64 {
 const SHOWN: usize = 10;
 
 fn print(
-    args: &Args,
+    batch: &Batch<'_>,
     manifest: &Manifest<'_>,
     done: &[Done],
     [path, times]: [&Path; 2],
@@ -212,13 +256,13 @@ fn print(
         report::warning(&format!("... {failed} in all; {path} lists them"));
     }
     let bytes = manifest.bytes();
-    if args.json {
+    if batch.json {
         let (manifest, times) = (path.to_string(), times.display().to_string());
         report::json(&Report { manifest, times, encoded, present, failed, bytes, seconds, failures })?;
         return Ok(outcome);
     }
     report::table(&[
-        ("meshes", format!("{} in {}", done.len(), args.meshes.display())),
+        ("meshes", format!("{} in {}", done.len(), batch.from.display())),
         ("encoded", format!("{encoded} now, {present} before")),
         ("failed", failed.to_string()),
         ("size", report::size(usize::try_from(bytes).unwrap_or(usize::MAX))),

@@ -2,11 +2,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tesdf::base::Inside;
 use tesdf::collide::{
     CoarseContact, CollideError, CollideOptions, Contacts, Instance, Mode, Pose, Scene, Shape, ShapeId,
     Velocity, coarse_contacts, detect,
 };
-use tesdf::base::Inside;
 use tesdf::encode::{EncodeChoices, EncodeError, EncodeFileError, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::{Length, Progress, TeSdf};
@@ -233,11 +233,15 @@ fn add_shape(system: &mut System, shape: Shape) -> Result<ShapeId, ShapeFailure>
 fn inside(body: &BodySection) -> Result<Inside, String> {
     let BodySection { inside, thickness, surface, .. } = body;
     if body.mesh.is_none() && (inside.is_some() || thickness.is_some() || surface.is_some()) {
-        return Err("inside, thickness and surface are of a mesh that the scene encodes; an asset has its own".into());
+        return Err(
+            "inside, thickness and surface are of a mesh that the scene encodes; an asset has its own".into(),
+        );
     }
     let rule = inside.as_deref().map(str::parse).transpose();
     let choices = EncodeChoices {
-        rule: rule.map_err(|e| format!("inside is {}; {e}", inside.as_deref().unwrap_or_default()))?.unwrap_or_default(),
+        rule: rule
+            .map_err(|e| format!("inside is {}; {e}", inside.as_deref().unwrap_or_default()))?
+            .unwrap_or_default(),
         thickness: *thickness,
         surface: surface.unwrap_or_default(),
         ..EncodeChoices::default()

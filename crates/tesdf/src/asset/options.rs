@@ -159,6 +159,11 @@ impl EncodeOptions {
     /// The same, with a threshold so wide that no face is missing.
     pub const SAMPLED_SAFE: Self = Self::sampled(Sampling::SAFE);
 
+    /// These options, with the unit of the file of the mesh unless they have a unit.
+    pub fn or_unit(self, of_file: Option<&str>) -> Self {
+        Self { unit: self.unit.or_else(|| of_file.map(str::to_owned)), ..self }
+    }
+
     const fn sampled(sampling: Sampling) -> Self {
         Self {
             band: Length::OfDiagonal(0.05),

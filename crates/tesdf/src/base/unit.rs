@@ -31,9 +31,24 @@ pub fn is_same_unit(a: &str, b: &str) -> bool {
     }
 }
 
+/// A warning, if the user `chosen` another unit than that of the file.
+pub fn conflict(of_file: Option<&str>, chosen: Option<&str>) -> Option<String> {
+    let (of_file, chosen) = (of_file?, chosen?);
+    (!is_same_unit(of_file, chosen)).then(|| {
+        format!("the file is in {of_file}, but the unit {chosen} was given; {chosen} is recorded, and nothing is scaled")
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn another_unit_than_that_of_the_file_is_a_conflict() {
+        assert_eq!(conflict(Some("in"), Some("Inches")), None);
+        assert_eq!((conflict(None, Some("m")), conflict(Some("m"), None)), (None, None));
+        assert!(conflict(Some("in"), Some("mm")).unwrap().contains("the file is in in"));
+    }
 
     #[test]
     fn names_of_one_unit_are_the_same() {

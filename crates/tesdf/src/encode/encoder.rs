@@ -156,12 +156,13 @@ impl<'a> Encoder<'a> {
     /// # }
     /// ```
     pub fn encode(&self, solid: &SolidMesh) -> Result<TeSdf, EncodeError> {
-        self.encode_from(solid, &self.source)
+        self.encode_from(solid, &self.source, None)
     }
 
     /// Reads a mesh file, checks that the mesh is a solid, and encodes it.
     ///
-    /// The asset records the name and the BLAKE3 of the file as its [`Source`]. Warnings about a
+    /// The asset records the name and the BLAKE3 of the file as its [`Source`], and the unit of a file
+    /// that has one, unless [`unit`](Self::unit) was called. Warnings about a
     /// mesh that can be encoded ([`SolidMesh::warnings`]) are not reported.
     ///
     /// # Errors
@@ -177,7 +178,7 @@ impl<'a> Encoder<'a> {
     /// # let folder = tempfile::tempdir()?;
     /// # let path = folder.path().join("part.obj");
     /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
-    /// // STL, OBJ, PLY, OFF, glTF or GLB
+    /// // STL, OBJ, PLY, OFF, glTF, GLB or 3MF
     /// let asset = Encoder::new().preset(Preset::Compact).encode_file(&path)?;
     /// assert_eq!(asset.about().source.name, "part.obj");
     /// # Ok(())
@@ -190,16 +191,22 @@ impl<'a> Encoder<'a> {
     fn encode_path(&self, path: &Path) -> Result<TeSdf, EncodeFileError> {
         let (solid, report) = SolidMesh::load(path, self.options.inside)?;
         let source = Source::of_file(path, report.source_blake3);
+        let unit = report.unit.as_deref();
         let at = |source| EncodeFileError::Encode { path: path.to_owned(), source };
-        self.encode_from(&solid, &source).map_err(at)
+        self.encode_from(&solid, &source, unit).map_err(at)
     }
 
-    fn encode_from(&self, solid: &SolidMesh, source: &Source) -> Result<TeSdf, EncodeError> {
+    fn encode_from(
+        &self,
+        solid: &SolidMesh,
+        source: &Source,
+        unit_of_file: Option<&str>,
+    ) -> Result<TeSdf, EncodeError> {
         let unwatched = Progress::default();
         let request = Request {
             domain: self.domain,
             source,
-            options: &self.resolved(),
+            options: &self.resolved().or_unit(unit_of_file),
             sampler: self.sampler,
             progress: self.progress.unwrap_or(&unwatched),
         };
@@ -231,7 +238,7 @@ impl TeSdf {
     /// # let folder = tempfile::tempdir()?;
     /// # let path = folder.path().join("part.obj");
     /// # std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")?;
-    /// let asset = TeSdf::encode_file(&path)?; // STL, OBJ, PLY, OFF, glTF or GLB
+    /// let asset = TeSdf::encode_file(&path)?; // STL, OBJ, PLY, OFF, glTF, GLB or 3MF
     /// asset.save(path.with_extension("tesdf"))?;
     /// # Ok(())
     /// # }

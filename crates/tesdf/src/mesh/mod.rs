@@ -7,6 +7,7 @@ mod presented;
 mod read;
 mod repair;
 mod solid;
+mod split;
 mod topology;
 mod triangle_mesh;
 mod weld;
@@ -19,10 +20,12 @@ pub use defect::{Defect, DefectKind, Severity};
 pub(crate) use presented::{Presented, Telling};
 pub(crate) use read::text;
 pub use read::{
-    LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, files, read, read_bytes, source_blake3,
+    CadError, CadOptions, LoadReport, LoadedMesh, MeshFormat, MeshPart, Origin, Place, ReadError, files,
+    read, read_bytes, read_with, source_blake3,
 };
 pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, repair};
 pub use solid::{NotSolid, ReadSolidError, SolidMesh};
+pub use split::{NamedMesh, split};
 pub use topology::{Edge, EdgeUse, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};
 pub use winding::WindingNumber;

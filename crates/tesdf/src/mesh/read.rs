@@ -1,4 +1,5 @@
-//! Reads mesh files into a [`TriangleMesh`]: STL, OBJ, PLY, OFF, glTF and GLB.
+//! Reads mesh files into a [`TriangleMesh`]: STL, OBJ, PLY, OFF, glTF, GLB and 3MF, and by the
+//! program Gmsh STEP, IGES and BREP.
 //!
 //! Each format has a parser that turns bytes into polygons with a place (line, byte, accessor) for
 //! each vertex and face. The steps after that are common: index check, finiteness, welding,
@@ -12,6 +13,7 @@
 //! glTF's JSON is parsed and validated by `gltf-json`, which names the path
 //! (`meshes[0].primitives[0].indices`).
 mod assemble;
+mod cad;
 mod error;
 #[cfg(feature = "gltf")]
 mod gltf;
@@ -24,7 +26,13 @@ mod ply;
 mod sniff;
 mod stl;
 pub(crate) mod text;
+#[cfg(feature = "threemf")]
+mod threemf;
+#[cfg(not(feature = "threemf"))]
+#[path = "read/no_threemf.rs"]
+mod threemf;
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -32,6 +40,7 @@ use serde::Serialize;
 use super::TriangleMesh;
 use crate::input;
 use assemble::{Places, RawMesh, assemble};
+pub use cad::{CadError, CadOptions};
 pub use error::{Place, ReadError};
 
 /// A mesh file format that can be read.
@@ -50,11 +59,31 @@ pub enum MeshFormat {
     Gltf,
     /// glTF 2.0 as one binary file.
     Glb,
+    /// 3D Manufacturing Format.
+    #[serde(rename = "3mf")]
+    ThreeMf,
+    /// STEP (ISO 10303-21), by the program Gmsh.
+    Step,
+    /// IGES, by the program Gmsh.
+    Iges,
+    /// The native format of OpenCASCADE, by the program Gmsh.
+    Brep,
 }
 
 impl MeshFormat {
     /// All formats, in the order of messages.
-    pub const ALL: [Self; 6] = [Self::Stl, Self::Obj, Self::Ply, Self::Off, Self::Gltf, Self::Glb];
+    pub const ALL: [Self; 10] = [
+        Self::Stl,
+        Self::Obj,
+        Self::Ply,
+        Self::Off,
+        Self::Gltf,
+        Self::Glb,
+        Self::ThreeMf,
+        Self::Step,
+        Self::Iges,
+        Self::Brep,
+    ];
 
     /// The format that the extension of `path` names, in upper or lower case.
     ///
@@ -65,19 +94,42 @@ impl MeshFormat {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         Self::ALL
             .into_iter()
-            .find(|f| f.extension().eq_ignore_ascii_case(&extension))
+            .find(|f| f.extensions().iter().any(|known| known.eq_ignore_ascii_case(&extension)))
             .ok_or_else(|| ReadError::UnknownExtension { path: path.to_owned() })
     }
 
     /// The file extension, without the dot.
     pub fn extension(self) -> &'static str {
+        self.extensions()[0]
+    }
+
+    /// All extensions that stand for the format.
+    fn extensions(self) -> &'static [&'static str] {
         match self {
-            Self::Stl => "stl",
-            Self::Obj => "obj",
-            Self::Ply => "ply",
-            Self::Off => "off",
-            Self::Gltf => "gltf",
-            Self::Glb => "glb",
+            Self::Stl => &["stl"],
+            Self::Obj => &["obj"],
+            Self::Ply => &["ply"],
+            Self::Off => &["off"],
+            Self::Gltf => &["gltf"],
+            Self::Glb => &["glb"],
+            Self::ThreeMf => &["3mf"],
+            Self::Step => &["step", "stp"],
+            Self::Iges => &["iges", "igs"],
+            Self::Brep => &["brep"],
+        }
+    }
+
+    /// Whether the file has curved surfaces, of which Gmsh makes triangles ([`CadOptions`]).
+    pub fn is_cad(self) -> bool {
+        matches!(self, Self::Step | Self::Iges | Self::Brep)
+    }
+
+    /// The feature of the library that reads the format. All others are always read.
+    fn feature(self) -> &'static str {
+        match self {
+            Self::Step | Self::Iges | Self::Brep => "gmsh",
+            Self::ThreeMf => "threemf",
+            _ => "gltf",
         }
     }
 }
@@ -91,6 +143,10 @@ impl std::fmt::Display for MeshFormat {
             Self::Off => "OFF",
             Self::Gltf => "glTF",
             Self::Glb => "GLB",
+            Self::ThreeMf => "3MF",
+            Self::Step => "STEP",
+            Self::Iges => "IGES",
+            Self::Brep => "BREP",
         })
     }
 }
@@ -102,8 +158,21 @@ pub struct LoadedMesh {
     pub mesh: TriangleMesh,
     /// Statistics and changes.
     pub report: LoadReport,
+    /// The objects that the file has: of OBJ those of `o`, or else the groups of `g`; of ASCII STL
+    /// each `solid`; of glTF each node with a mesh; of 3MF each mesh that a build item shows; of STEP,
+    /// IGES and BREP each solid. Empty for other formats.
+    pub parts: Vec<MeshPart>,
     /// For each vertex and face of the mesh, its source in the file.
     pub origin: Origin,
+}
+
+/// An object of a mesh file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MeshPart {
+    /// Its name in the file. It may be empty, and others may have the same one.
+    pub name: String,
+    /// Its faces in [`LoadedMesh::mesh`], ascending.
+    pub faces: Vec<Range<usize>>,
 }
 
 /// The sources in the file of the vertices and faces of a [`LoadedMesh`].
@@ -133,6 +202,9 @@ pub struct LoadReport {
     pub welded_vertices: usize,
     /// Vertices that are dropped because no face uses them.
     pub unused_vertices: usize,
+    /// Name of the unit of length: of a 3MF file its own, of glTF `m`, of STEP and IGES `mm`, to which
+    /// they are converted. `None` for other formats, which have no unit.
+    pub unit: Option<String>,
     /// Notes for people, one sentence each.
     pub notes: Vec<String>,
     /// BLAKE3 of the file's bytes (and of external glTF buffers, in order), in hexadecimal.
@@ -160,14 +232,23 @@ pub struct LoadReport {
 /// # }
 /// ```
 pub fn read(path: impl AsRef<Path>) -> Result<LoadedMesh, ReadError> {
-    read_path(path.as_ref())
+    read_with(path, &CadOptions::default())
 }
 
-fn read_path(path: &Path) -> Result<LoadedMesh, ReadError> {
+/// The same as [`read`], with options for files of CAD formats ([`MeshFormat::is_cad`]). Other files
+/// are read without them.
+///
+/// # Errors
+/// The same as for [`read`].
+pub fn read_with(path: impl AsRef<Path>, cad: &CadOptions) -> Result<LoadedMesh, ReadError> {
+    read_path(path.as_ref(), cad)
+}
+
+fn read_path(path: &Path, cad: &CadOptions) -> Result<LoadedMesh, ReadError> {
     let format = MeshFormat::of_path(path)?;
     let bytes = input::read(path).map_err(|source| ReadError::Open { path: path.to_owned(), source })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    parse(&bytes, format, Some(folder))
+    parse(&bytes, format, From { folder: Some(folder), cad: Some(cad) })
 }
 
 /// The files that [`read`] opens for `path`: the file itself and the external buffers of a glTF
@@ -218,11 +299,21 @@ pub fn source_blake3(path: impl AsRef<Path>) -> Result<String, ReadError> {
 }
 
 /// Reads a mesh from bytes in memory. The buffers of a glTF file must be in these bytes too.
+///
+/// # Errors
+/// The same as for [`read`], and [`ReadError::FileOnly`]: Gmsh runs for files alone.
 pub fn read_bytes(bytes: &[u8], format: MeshFormat) -> Result<LoadedMesh, ReadError> {
-    parse(bytes, format, None)
+    parse(bytes, format, From { folder: None, cad: None })
 }
 
-fn parse(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<LoadedMesh, ReadError> {
+/// Where the bytes come from.
+struct From<'a> {
+    /// The folder of the file.
+    folder: Option<&'a Path>,
+    cad: Option<&'a CadOptions>,
+}
+
+fn parse(bytes: &[u8], format: MeshFormat, from: From<'_>) -> Result<LoadedMesh, ReadError> {
     if bytes.is_empty() {
         return Err(ReadError::Empty { format });
     }
@@ -233,7 +324,12 @@ fn parse(bytes: &[u8], format: MeshFormat, folder: Option<&Path>) -> Result<Load
         MeshFormat::Obj => obj::parse(bytes),
         MeshFormat::Ply => ply::parse(bytes),
         MeshFormat::Off => off::parse(bytes),
-        MeshFormat::Gltf | MeshFormat::Glb => gltf::parse(bytes, format, folder, &mut hasher),
+        MeshFormat::Gltf | MeshFormat::Glb => gltf::parse(bytes, format, from.folder, &mut hasher),
+        MeshFormat::ThreeMf => threemf::parse(bytes),
+        MeshFormat::Step | MeshFormat::Iges | MeshFormat::Brep => match from.cad {
+            Some(options) => cad::parse(bytes, format, options),
+            None => return Err(ReadError::FileOnly { format }),
+        },
     }?;
     assemble(raw, format, hasher.finalize().to_hex().to_string())
 }

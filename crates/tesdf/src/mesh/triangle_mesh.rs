@@ -87,6 +87,12 @@ impl TriangleMesh {
         Ok(Self { vertices, faces })
     }
 
+    /// A mesh of faces and vertices that were taken from a valid one.
+    pub(super) fn of_part(vertices: Vec<DVec3>, faces: Vec<[u32; 3]>) -> Self {
+        debug_assert!(faces.iter().flatten().all(|&v| (v as usize) < vertices.len()));
+        Self { vertices, faces }
+    }
+
     /// Vertex positions, in the mesh's unit.
     pub fn vertices(&self) -> &[DVec3] {
         &self.vertices

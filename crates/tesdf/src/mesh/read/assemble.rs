@@ -1,7 +1,7 @@
 //! The common steps of all formats, after the bytes have become polygons.
 use glam::DVec3;
 
-use super::{LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError};
+use super::{LoadReport, LoadedMesh, MeshFormat, MeshPart, Origin, Place, ReadError};
 use crate::mesh::polygon::{Shape, triangulate};
 use crate::mesh::weld::weld_equal;
 use crate::mesh::{MeshError, TriangleMesh};
@@ -16,6 +16,12 @@ pub(super) struct RawMesh {
     pub places: Places,
     /// First vertex number of the format; used in messages only.
     pub base: u64,
+    /// Name of the unit of length, where the format or the file states it.
+    pub unit: Option<&'static str>,
+    /// Names of the objects of the file.
+    pub part_names: Vec<String>,
+    /// Runs of polygons: the first polygon, and its object. A run ends where the next one begins.
+    pub part_starts: Vec<(usize, usize)>,
     pub notes: Vec<String>,
 }
 
@@ -57,7 +63,17 @@ fn element(
 
 impl RawMesh {
     pub fn new(places: Places, base: u64) -> Self {
-        Self { positions: Vec::new(), corners: Vec::new(), ends: Vec::new(), places, base, notes: Vec::new() }
+        Self {
+            positions: Vec::new(),
+            corners: Vec::new(),
+            ends: Vec::new(),
+            places,
+            base,
+            unit: None,
+            part_names: Vec::new(),
+            part_starts: Vec::new(),
+            notes: Vec::new(),
+        }
     }
 
     pub fn with_lines(base: u64) -> Self {
@@ -86,6 +102,21 @@ impl RawMesh {
         }
     }
 
+    /// Begins an object. The polygons that follow belong to it.
+    pub fn begin_part(&mut self, name: String) {
+        self.continue_part(self.part_names.len());
+        self.part_names.push(name);
+    }
+
+    /// The polygons that follow belong to the object `part`.
+    pub fn continue_part(&mut self, part: usize) {
+        // An object without polygons leaves no run.
+        if self.part_starts.last().is_some_and(|&(first, _)| first == self.ends.len()) {
+            self.part_starts.pop();
+        }
+        self.part_starts.push((self.ends.len(), part));
+    }
+
     /// Number of corners pushed since the last polygon ended.
     pub fn open_corners(&self) -> usize {
         self.corners.len() - self.ends.last().copied().unwrap_or(0)
@@ -109,7 +140,7 @@ pub(super) fn assemble(
     format: MeshFormat,
     source_blake3: String,
 ) -> Result<LoadedMesh, ReadError> {
-    let RawMesh { positions, corners, ends, places, base, mut notes } = raw;
+    let RawMesh { positions, corners, ends, places, base, unit, part_names, part_starts, mut notes } = raw;
     if ends.is_empty() {
         return Err(ReadError::NoFaces { format, vertices: positions.len() });
     }
@@ -192,14 +223,31 @@ pub(super) fn assemble(
         concave_polygons: counts.concave,
         welded_vertices: positions.len() - unused - welded.positions.len(),
         unused_vertices: unused,
+        unit: unit.map(str::to_owned),
         notes,
         source_blake3,
     };
     Ok(LoadedMesh {
         mesh: TriangleMesh::new(welded.positions, faces)?,
         report,
+        parts: parts(part_names, &part_starts, &face_origin),
         origin: Origin { vertices: welded.first, faces: face_origin },
     })
+}
+
+/// The objects that have faces. `polygons` has for each face its polygon, ascending.
+fn parts(names: Vec<String>, starts: &[(usize, usize)], polygons: &[u32]) -> Vec<MeshPart> {
+    let mut parts: Vec<_> = names.into_iter().map(|name| MeshPart { name, faces: Vec::new() }).collect();
+    let face = |polygon: usize| polygons.partition_point(|&of| (of as usize) < polygon);
+    for (i, &(first, part)) in starts.iter().enumerate() {
+        let end = starts.get(i + 1).map_or(polygons.len(), |&(next, _)| face(next));
+        let run = face(first)..end;
+        if !run.is_empty() {
+            parts[part].faces.push(run);
+        }
+    }
+    parts.retain(|part| !part.faces.is_empty());
+    parts
 }
 
 #[derive(Default)]

@@ -1,7 +1,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use super::MeshFormat;
+use super::{CadError, MeshFormat};
 use crate::mesh::MeshError;
 
 /// A place in a mesh file.
@@ -11,7 +11,7 @@ pub enum Place {
     Line(u64),
     /// An offset into a binary file, 0-based.
     Byte(u64),
-    /// An element of a glTF file, such as `meshes[0].primitives[1]`.
+    /// An element of a glTF or 3MF file, such as `meshes[0].primitives[1]`.
     Element(String),
 }
 
@@ -48,12 +48,22 @@ pub enum ReadError {
     },
     /// The library was built without the feature that reads the format.
     #[error(
-        "{format}: tesdf was built without the feature `gltf`; build it with it, or convert the mesh to PLY"
+        "{format}: tesdf was built without the feature `{}`; build it with it, or convert the mesh to PLY",
+        format.feature()
     )]
     NotBuilt {
         /// The requested format.
         format: MeshFormat,
     },
+    /// The format is read from files alone.
+    #[error("{format}: it is read by the program Gmsh, from a file; write the bytes to a file and read that")]
+    FileOnly {
+        /// The requested format.
+        format: MeshFormat,
+    },
+    /// Gmsh gave no triangles of a CAD file.
+    #[error(transparent)]
+    Cad(#[from] CadError),
     /// There are no bytes.
     #[error("the file is empty (0 bytes); expected {format} data: export or copy it again")]
     Empty {

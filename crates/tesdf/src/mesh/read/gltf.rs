@@ -5,7 +5,7 @@
 //! the GLB header without a check, and its accessor iterators do not say which bytes are missing.
 //!
 //! The reader takes triangles, strips and fans of the default scene with the transforms of the
-//! nodes. Without a default scene it takes the first scene, else all root nodes, else all meshes.
+//! nodes, and takes the names of the nodes. Without a default scene it takes the first scene, else all root nodes, else all meshes.
 //! Buffers may be in the file, in `data:` URIs, or in files next to it. Nodes that mirror flip
 //! their faces, so outward stays outward. Skins and morph targets are not applied.
 mod buffers;
@@ -22,6 +22,7 @@ use json::validation::{Checked, Error as Defect, Validate};
 use super::text::shown;
 use super::{MeshFormat, Place, Places, RawMesh, ReadError, sniff};
 use buffers::Data;
+use scene::Instance;
 
 const EXPORT_AGAIN: &str = "export the file again, or as another format";
 
@@ -38,8 +39,10 @@ pub(super) fn parse(
     let mut reader =
         Reader { data, raw: RawMesh::new(Places::Elements(Vec::new()), 0), skipped: 0, deformable: false };
     let instances = scene::instances(&root, format)?;
-    limits::check(&data, instances.iter().map(|&(mesh, _)| mesh))?;
-    instances.into_iter().try_for_each(|(mesh, pose)| reader.mesh(mesh, &pose))?;
+    limits::check(&data, instances.iter().map(|instance| instance.mesh))?;
+    instances.into_iter().try_for_each(|instance| reader.mesh(&instance))?;
+    // The lengths of glTF are in metres.
+    reader.raw.unit = Some("m");
     if reader.skipped > 0 {
         reader.raw.notes.push(format!("{} primitives of points or lines skipped", reader.skipped));
     }
@@ -186,9 +189,12 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn mesh(&mut self, mesh: usize, pose: &DAffine3) -> Result<(), ReadError> {
+    fn mesh(&mut self, instance: &Instance) -> Result<(), ReadError> {
         let root = self.data.root;
-        for (i, primitive) in root.meshes[mesh].primitives.iter().enumerate() {
+        let Instance { mesh, node, pose } = instance;
+        let names = [node.and_then(|node| root.nodes[node].name.as_ref()), root.meshes[*mesh].name.as_ref()];
+        self.raw.begin_part(names.into_iter().flatten().next().cloned().unwrap_or_default());
+        for (i, primitive) in root.meshes[*mesh].primitives.iter().enumerate() {
             self.primitive(primitive, pose, format!("meshes[{mesh}].primitives[{i}]"))?;
         }
         Ok(())

@@ -1,8 +1,10 @@
 //! Reads Wavefront OBJ as found in practice.
 //!
 //! The reader takes `v` (without weight and colours) and `f` (without texture and normal indices;
-//! indices may be relative). Other statements are skipped. A note names those that may be geometry
+//! indices may be relative), and the names of objects (`o`) or groups (`g`). Other statements are skipped. A note names those that may be geometry
 //! (`l`, `p`, free-form surfaces).
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use super::text::{Lines, integer, malformed, number, shown, without_comment, words};
@@ -25,6 +27,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
     sniff::refuse_other_kinds(bytes, OBJ)?;
     sniff::refuse_binary(bytes, OBJ)?;
     let mut raw = RawMesh::with_lines(1);
+    let mut objects = Objects::new(bytes);
     let mut skipped = Skipped::default();
     let mut lines = Lines::new(bytes);
     let mut joined = Vec::new();
@@ -32,6 +35,9 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
         let line = without_comment(line);
         let Some(keyword) = words(line).next() else { continue };
         let keyword = keyword.strip_suffix(b"\\").unwrap_or(keyword);
+        if matches!(keyword, b"o" | b"g") {
+            objects.begin(&mut raw, line);
+        }
         if NAMED.contains(&keyword) {
             continue;
         }
@@ -62,6 +68,34 @@ pub(super) fn parse(bytes: &[u8]) -> Result<RawMesh, ReadError> {
     }
     raw.notes = skipped.notes();
     Ok(raw)
+}
+
+/// The objects of the file: those of `o`, or without any `o` the groups of `g`. A name that comes
+/// again continues its object.
+struct Objects {
+    keyword: &'static [u8],
+    known: HashMap<Vec<u8>, usize>,
+}
+
+impl Objects {
+    fn new(bytes: &[u8]) -> Self {
+        let has_objects = Lines::new(bytes).any(|(_, line)| words(line).next() == Some(b"o"));
+        Self { keyword: if has_objects { b"o" } else { b"g" }, known: HashMap::new() }
+    }
+
+    fn begin(&mut self, raw: &mut RawMesh, line: &[u8]) {
+        if words(line).next() != Some(self.keyword) {
+            return;
+        }
+        let name = words(line).skip(1).collect::<Vec<_>>().join(&b' ');
+        match self.known.get(&name) {
+            Some(&part) => raw.continue_part(part),
+            None => {
+                raw.begin_part(String::from_utf8_lossy(&name).into_owned());
+                self.known.insert(name, raw.part_names.len() - 1);
+            }
+        }
+    }
 }
 
 /// The line without the trailing backslash; `None` when no backslash continues the line.

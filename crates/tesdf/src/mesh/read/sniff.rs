@@ -12,14 +12,14 @@ const KINDS: &[(&[u8], &str, &str)] = &[
     (b"GIF8", "is a GIF picture", EXPORT),
     (b"%PDF", "is a PDF document", EXPORT),
     (b"\x7FELF", "is a program", EXPORT),
-    (b"PK\x03\x04", "is a ZIP archive (3MF files are too)", "unpack it or export STL, OBJ, PLY, OFF or glTF"),
+    (b"PK\x03\x04", "is a ZIP archive", "unpack it, or give it the extension .3mf if it is a 3MF file"),
     (b"\x1F\x8B", "is compressed by gzip", "unpack it with gunzip"),
     (b"\xFF\xFE", "is UTF-16 text", "save it as UTF-8"),
     (b"\xFE\xFF", "is UTF-16 text", "save it as UTF-8"),
     (b"version https://git-lfs", "is a Git LFS pointer", "fetch the file itself with 'git lfs pull'"),
     (b"<!DOCTYPE", "is a web page", "download the file itself"),
     (b"<html", "is a web page", "download the file itself"),
-    (b"ISO-10303-21", "is a STEP file", "export a triangle mesh from the CAD program"),
+    (b"ISO-10303-21", "is a STEP file", "give it the extension .step"),
     (b"Kaydara FBX", "is an FBX file", "export STL, OBJ, PLY, OFF or glTF"),
 ];
 

@@ -75,7 +75,8 @@ fn parse_ascii(bytes: &[u8]) -> Result<RawMesh, ReadError> {
             return Err(malformed(MeshFormat::Stl, line, found, "expected 'solid' after 'endsolid'"));
         }
         let mut last_line = line;
-        skip_name(&mut words, line, b"facet");
+        let name = solid_name(&mut words, line, b"facet");
+        raw.begin_part(name);
         loop {
             let faces = raw.ends.len();
             let Some((line, word)) = words.next() else {
@@ -83,7 +84,7 @@ fn parse_ascii(bytes: &[u8]) -> Result<RawMesh, ReadError> {
             };
             last_line = line;
             if word.eq_ignore_ascii_case(b"endsolid") {
-                skip_name(&mut words, line, b"solid");
+                solid_name(&mut words, line, b"solid");
                 break;
             }
             let mut next = |expected: &str| match words.next() {
@@ -120,13 +121,21 @@ fn parse_ascii(bytes: &[u8]) -> Result<RawMesh, ReadError> {
     Ok(raw)
 }
 
-/// Skips the name that may follow `solid` or `endsolid` on the same line. Some files are a single
+/// Takes the name that may follow `solid` or `endsolid` on the same line. Some files are a single
 /// line, so the name also ends at `stop`.
-fn skip_name<'a>(words: &mut std::iter::Peekable<impl Iterator<Item = Word<'a>>>, line: u64, stop: &[u8]) {
+fn solid_name<'a>(
+    words: &mut std::iter::Peekable<impl Iterator<Item = Word<'a>>>,
+    line: u64,
+    stop: &[u8],
+) -> String {
     let in_name = |&(n, word): &Word<'_>| {
         n == line && !word.eq_ignore_ascii_case(stop) && !word.eq_ignore_ascii_case(b"endsolid")
     };
-    while words.next_if(in_name).is_some() {}
+    let mut name = Vec::new();
+    while let Some((_, word)) = words.next_if(in_name) {
+        name.push(String::from_utf8_lossy(word));
+    }
+    name.join(" ")
 }
 
 fn keyword((line, word): Word<'_>, expected: &str, face: usize) -> Result<(), ReadError> {

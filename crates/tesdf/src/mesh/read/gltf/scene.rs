@@ -4,10 +4,19 @@ use gltf_json as json;
 
 use super::{MeshFormat, ReadError, decimal, decimals, fault};
 
+/// A mesh at a place in the scene.
+pub(super) struct Instance {
+    pub mesh: usize,
+    /// The node that places it. `None` in a file without nodes.
+    pub node: Option<usize>,
+    pub pose: DAffine3,
+}
+
 /// Meshes with their poses, in the depth-first order of their nodes.
-pub(super) fn instances(root: &json::Root, format: MeshFormat) -> Result<Vec<(usize, DAffine3)>, ReadError> {
+pub(super) fn instances(root: &json::Root, format: MeshFormat) -> Result<Vec<Instance>, ReadError> {
     if root.nodes.is_empty() {
-        return Ok((0..root.meshes.len()).map(|mesh| (mesh, DAffine3::IDENTITY)).collect());
+        let alone = |mesh| Instance { mesh, node: None, pose: DAffine3::IDENTITY };
+        return Ok((0..root.meshes.len()).map(alone).collect());
     }
     let scene = root.scene.map_or(0, |scene| scene.value());
     let roots: Vec<usize> = match root.scenes.get(scene) {
@@ -46,7 +55,7 @@ pub(super) fn instances(root: &json::Root, format: MeshFormat) -> Result<Vec<(us
                 "expected one that keeps the mesh a volume",
             ));
         }
-        found.extend(node.mesh.map(|mesh| (mesh.value(), pose)));
+        found.extend(node.mesh.map(|mesh| Instance { mesh: mesh.value(), node: Some(i), pose }));
         stack.extend(node.children.iter().flatten().rev().map(|child| (child.value(), pose)));
     }
     Ok(found)

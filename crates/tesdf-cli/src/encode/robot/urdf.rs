@@ -1,0 +1,75 @@
+//! The collision meshes of a URDF file.
+use std::path::{Path, PathBuf};
+
+use tesdf::glam::{DAffine3, DVec3};
+use tesdf_terminal::report::Failure;
+
+use super::packages::Packages;
+use super::{MeshUse, parse, read};
+use crate::encode_all::meshes::Use;
+
+/// All uses of meshes by `<collision>` elements, in the order of the file.
+///
+/// # Errors
+/// The file cannot be read or is no URDF, or a mesh has no file name or no valid scale.
+pub(super) fn uses(path: &Path, named: &[(String, PathBuf)]) -> Result<Vec<MeshUse>, Failure> {
+    let text = read(path)?;
+    let document = parse(path, &text)?;
+    let robot = document.root_element();
+    let at = |node: roxmltree::Node<'_, '_>| {
+        format!("{}, line {}", path.display(), document.text_pos_at(node.range().start).row)
+    };
+    if !robot.has_tag_name("robot") {
+        let found = robot.tag_name().name();
+        return Err(Failure::new(format!("{}: found <{found}>; expected <robot> of URDF", at(robot))));
+    }
+    let packages = Packages::new(path, named);
+    let mut found = Vec::new();
+    for link in robot.children().filter(|node| node.has_tag_name("link")) {
+        let name = link.attribute("name").unwrap_or_default();
+        let collisions = link.children().filter(|node| node.has_tag_name("collision"));
+        for (i, collision) in collisions.enumerate() {
+            let mesh = collision
+                .children()
+                .filter(|node| node.has_tag_name("geometry"))
+                .flat_map(|node| node.children())
+                .find(|node| node.has_tag_name("mesh"));
+            let Some(mesh) = mesh else { continue };
+            let Some(reference) = mesh.attribute("filename").map(str::trim).filter(|name| !name.is_empty())
+            else {
+                return Err(Failure::new(format!("{}: <mesh> has no filename; expected one", at(mesh))));
+            };
+            let scale = match mesh.attribute("scale") {
+                None => DVec3::ONE,
+                Some(text) => scale(text).ok_or_else(|| {
+                    Failure::new(format!(
+                        "{}: the scale is '{text}'; expected three numbers other than 0",
+                        at(mesh)
+                    ))
+                })?,
+            };
+            found.push(MeshUse {
+                reference: reference.to_owned(),
+                path: packages.resolve(reference),
+                scale,
+                pose: DAffine3::from_scale(scale),
+                used_by: Use::Urdf {
+                    link: name.to_owned(),
+                    collision: collision.attribute("name").map_or_else(|| i.to_string(), str::to_owned),
+                },
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// Three numbers, or one for all axes, as some files have it.
+fn scale(text: &str) -> Option<DVec3> {
+    let numbers: Option<Vec<f64>> = text.split_whitespace().map(|word| word.parse().ok()).collect();
+    let scale = match numbers?[..] {
+        [all] => DVec3::splat(all),
+        [x, y, z] => DVec3::new(x, y, z),
+        _ => return None,
+    };
+    (scale.is_finite() && scale.cmpne(DVec3::ZERO).all()).then_some(scale)
+}
