@@ -129,3 +129,26 @@ def test_ctrl_c_ends_gmsh(tmp_path):
     gmsh.chmod(0o755)
     body = [*SAYING, "tesdf.encode(sys.argv[1], domain='gmsh', progress=progress)"]
     ended_by_ctrl_c(body, CUBE, environment={"TESDF_GMSH": str(gmsh)})
+
+
+def test_inside():
+    vertices, faces = TETRAHEDRON
+    open_mesh = (vertices, faces[:-1])
+    with pytest.raises(tesdf.NotSolidError, match="--inside generalized"):
+        tesdf.encode(open_mesh)
+    asset = tesdf.encode(open_mesh, "fast", inside="generalized")
+    assert asset.certificate.inside["rule"] == "generalized" and asset.certificate.jumps
+    assert asset.is_inside([[0.25, 0.25, 0.25], [2, 2, 2]]).tolist() == [True, False]
+    sheet = tesdf.encode(open_mesh, "fast", inside="sheet", thickness=0.25)
+    assert sheet.signed_distance([vertices[0]])[0] == pytest.approx(-0.125, abs=1e-12)
+    turned = (vertices, faces[:, ::-1])
+    assert tesdf.encode(turned, inside="nonzero").is_inside([[0.1, 0.1, 0.1]])[0]
+    assert tesdf.encode(TETRAHEDRON).certificate.inside is None
+    for options, says in (
+        ({"inside": "sheet"}, "needs its thickness"),
+        ({"thickness": 1.0}, "only the faces of a sheet"),
+        ({"inside": "outside"}, "expected 'winding'"),
+        ({"surface": "some"}, "expected 'all' or 'boundary'"),
+    ):
+        with pytest.raises(ValueError if "expected" in says else tesdf.EncodeError, match=says):
+            tesdf.encode(TETRAHEDRON, **options)

@@ -334,3 +334,30 @@ fn units_that_differ_need_scales_that_make_them_one() {
         "{error}"
     );
 }
+
+#[test]
+fn a_mesh_is_encoded_with_the_rule_of_its_body() {
+    let folder = tempfile::tempdir().unwrap();
+    let square = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+    std::fs::write(folder.path().join("plate.obj"), square).unwrap();
+    let scene = |body: &str| {
+        let text = format!(
+            "time_step = 1e-3\nduration = 0.05\n[[bodies]]\nname = \"plate\"\nfixed = true\n{body}\n"
+        );
+        LoadedScene::parse(text, &folder.path().join("scene.toml")).unwrap().system()
+    };
+    let system = scene("mesh = \"plate.obj\"\ninside = \"sheet\"\nthickness = 0.2").unwrap();
+    let shape = system.scene().shapes().next().unwrap().1;
+    assert!((shape.signed_distance(DVec3::new(0.5, 0.5, 1.0)) - 0.9).abs() < 1e-12);
+
+    for (body, says) in [
+        ("mesh = \"plate.obj\"", "--inside sheet"),
+        ("mesh = \"plate.obj\"\ninside = \"sheet\"", "needs its thickness"),
+        ("mesh = \"plate.obj\"\ninside = \"all\"", "expected winding, nonzero, odd, generalized or sheet"),
+        ("mesh = \"plate.obj\"\ninside = \"generalized\"", "jumps in the holes"),
+        ("shape = \"plane\"\ninside = \"odd\"", "an asset has its own"),
+    ] {
+        let error = scene(body).unwrap_err().to_string();
+        assert!(error.contains(says), "{body}: {error}");
+    }
+}

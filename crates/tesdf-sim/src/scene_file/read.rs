@@ -122,6 +122,10 @@ impl LoadedScene {
             true => (Some(file), None, None),
             false => (None, Some(file), None),
         };
+        if body.asset.is_some() {
+            // An asset has its own.
+            (body.inside, body.thickness, body.surface) = (None, None, None);
+        }
         true
     }
 

@@ -239,3 +239,88 @@ fn connected(edges: &[[u32; 2]]) -> Vec<Vec<usize>> {
     }
     parts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The sum of the solid angles of all faces / 4 pi.
+    fn by_angles(faces: &[[u32; 3]], vertices: &[DVec3], x: DVec3) -> f64 {
+        let angle = |f: &[u32; 3]| solid_angle(f.map(|v| vertices[v as usize]), x).0;
+        faces.iter().map(angle).sum::<f64>() / (4.0 * PI)
+    }
+
+    fn assert_equal(faces: &[[u32; 3]], vertices: &[DVec3], x: DVec3) {
+        let winding = GeneralizedWinding::new(faces, |v| vertices[v as usize]);
+        let (found, expected) = (winding.at(x), by_angles(faces, vertices, x));
+        let Generalized { value, error } = found;
+        assert!((value - expected).abs() <= 1e-12 + 2.0 * error.min(1.0), "{x}: {found:?} {expected}");
+    }
+
+    /// Bowls, strips, soups, edges of many faces, by points near and far, in planes of faces and of
+    /// closing triangles, on edges and at vertices.
+    #[test]
+    fn the_number_is_the_sum_of_all_solid_angles() {
+        let meshes: [&[[u32; 3]]; 6] = [
+            &[[0, 1, 2]],
+            &[[0, 1, 2], [0, 2, 3]],
+            &[[0, 1, 2], [0, 1, 3], [0, 1, 4]],
+            &[[0, 1, 2], [3, 4, 5]],
+            &[[0, 1, 2], [0, 1, 2], [2, 1, 3], [5, 0, 3]],
+            &[[0, 2, 1], [0, 1, 3], [1, 2, 3]],
+        ];
+        let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+        let vertices: Vec<DVec3> = (0..6).map(corner).collect();
+        for faces in meshes {
+            for k in 0..343 {
+                let lattice = DVec3::new(f64::from(k % 7), f64::from(k / 7 % 7), f64::from(k / 49));
+                let x = 0.25 * lattice - 0.25;
+                for x in [x, x + 1e-5 * DVec3::ONE, x + DVec3::new(0.013, -0.0171, 0.0093)] {
+                    assert_equal(faces, &vertices, x);
+                }
+            }
+        }
+    }
+
+    /// No point of a ball is on another side than the ball.
+    #[test]
+    fn balls_with_a_side_are_on_it() {
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
+        let winding = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        let (mut decided, mut open) = ([0, 0], 0);
+        for k in 0..1000 {
+            let lattice = DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100));
+            let center = 0.13 * lattice + 0.031;
+            // No face comes nearer: they lie in the planes of the axes.
+            let radius = 0.5 * center.min_element();
+            match winding.side_within(center, radius) {
+                None => open += 1,
+                Some(inside) => {
+                    decided[usize::from(inside)] += 1;
+                    for j in 0..8 {
+                        let corner = DVec3::new(f64::from(j & 1), f64::from(j >> 1 & 1), f64::from(j >> 2));
+                        let p = center + radius * (2.0 * corner - 1.0) / 3f64.sqrt();
+                        assert_eq!(winding.is_inside(p), inside, "{center} {radius} {p}");
+                        assert_eq!(by_angles(&faces, &vertices, p).abs() >= 0.5, inside, "{p}");
+                    }
+                }
+            }
+        }
+        assert!(decided.iter().all(|&n| n > 5) && open > 5, "{decided:?} {open}");
+    }
+
+    #[test]
+    fn the_number_of_a_triangle_beside_its_edge() {
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y];
+        for faces in [&[[0, 1, 2]][..], &[[0, 1, 2], [0, 1, 2]], &[[0, 1, 2], [0, 0, 1]]] {
+            for x in [
+                DVec3::new(0.78, 2.7e-10, -8.6e-10),
+                DVec3::new(0.3, -1e-9, 1e-9),
+                DVec3::new(0.2, 0.2, -1e-7),
+            ] {
+                assert_equal(faces, &vertices, x);
+            }
+        }
+    }
+}

@@ -2,8 +2,7 @@
 use std::borrow::Cow;
 
 use super::{
-    Defect, DefectKind, FaceClass, MeshError, Severity, SolidMesh, Survey, Topology, TriangleMesh,
-    check_and_survey,
+    Defect, DefectKind, FaceClass, MeshError, Severity, Survey, Topology, TriangleMesh, check_and_survey,
 };
 use crate::base::{Inside, InsideRule, SurfaceFaces};
 
@@ -138,6 +137,41 @@ impl Presentation {
         })
     }
 
+    /// The faces of the surface of the mesh, and what tells their sides. `is_simple`: all faces are an
+    /// embedded manifold with winding number 0 or 1 everywhere.
+    pub fn of<'a>(&self, solid: &'a TriangleMesh, is_simple: bool) -> Result<Presented<'a>, MeshError> {
+        let Self { telling, faces, is_simple: own, .. } = self;
+        let all = solid.faces();
+        let (mesh, ids) = match faces {
+            Faces::All => match all {
+                // A tree has two leaves at least. A face and its reverse enclose nothing, as one
+                // face does.
+                &[[a, b, c]] => {
+                    let both = vec![[a, b, c], [a, c, b]];
+                    let both = TriangleMesh::new(solid.vertices().to_vec(), both)?;
+                    (Cow::Owned(both), Some(vec![0, 0]))
+                }
+                _ => (Cow::Borrowed(solid), None),
+            },
+            Faces::Some(some) => {
+                let ids = some.iter().map(|(face, _)| *face).collect();
+                (Cow::Owned(part(solid, some)?), Some(ids))
+            }
+        };
+        let sign_faces = match (telling, faces) {
+            (Telling::Rule | Telling::RuleUnoriented, Faces::Some(some)) => {
+                // A face that is turned round counts -1, and twice more as it was: 1 in all.
+                let mut times = vec![1; all.len()];
+                some.iter().for_each(|&(f, turned)| times[f as usize] = if turned { 2 } else { 0 });
+                all.iter().zip(times).flat_map(|(f, n)| std::iter::repeat_n(*f, n)).collect()
+            }
+            _ => Vec::new(),
+        };
+        // The check of a mesh that is presented as it is has told this.
+        let is_simple = *own && (!matches!(faces, Faces::All) || is_simple);
+        Ok(Presented { mesh, ids, telling: *telling, sign_faces, is_simple })
+    }
+
     /// A warning where faces lie only partly between inside and outside.
     pub fn partly_buried(&self, mesh: &TriangleMesh) -> Option<Defect> {
         let first = *self.partly.first()?;
@@ -182,40 +216,4 @@ fn part(mesh: &TriangleMesh, faces: &[(u32, bool)]) -> Result<TriangleMesh, Mesh
         if turned { [a, c, b] } else { [a, b, c] }
     };
     TriangleMesh::new(mesh.vertices().to_vec(), faces.iter().map(turned).collect())
-}
-
-impl SolidMesh {
-    /// The faces of the surface, and what tells their sides.
-    pub(crate) fn presented(&self) -> Result<Presented<'_>, MeshError> {
-        let Presentation { telling, faces, is_simple, .. } = self.presentation();
-        let all = self.mesh().faces();
-        let (mesh, ids) = match faces {
-            Faces::All => match all {
-                // A tree has two leaves at least. A face and its reverse enclose nothing, as one
-                // face does.
-                &[[a, b, c]] => {
-                    let both = vec![[a, b, c], [a, c, b]];
-                    let both = TriangleMesh::new(self.mesh().vertices().to_vec(), both)?;
-                    (Cow::Owned(both), Some(vec![0, 0]))
-                }
-                _ => (Cow::Borrowed(self.mesh()), None),
-            },
-            Faces::Some(some) => {
-                let ids = some.iter().map(|(face, _)| *face).collect();
-                (Cow::Owned(part(self.mesh(), some)?), Some(ids))
-            }
-        };
-        let sign_faces = match (telling, faces) {
-            (Telling::Rule | Telling::RuleUnoriented, Faces::Some(some)) => {
-                // A face that is turned round counts -1, and twice more as it was: 1 in all.
-                let mut times = vec![1; all.len()];
-                some.iter().for_each(|&(f, turned)| times[f as usize] = if turned { 2 } else { 0 });
-                all.iter().zip(times).flat_map(|(f, n)| std::iter::repeat_n(*f, n)).collect()
-            }
-            _ => Vec::new(),
-        };
-        // The check of a mesh that is presented as it is has told this.
-        let is_simple = *is_simple && (!matches!(faces, Faces::All) || self.is_simple());
-        Ok(Presented { mesh, ids, telling: *telling, sign_faces, is_simple })
-    }
 }

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::count::count;
 use super::{
-    CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, ReadError, Severity, Topology, TriangleMesh,
-    check_and_survey, presented::Presentation, read,
+    CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, MeshError, ReadError, Severity, Topology,
+    TriangleMesh, check_and_survey, presented::Presentation, presented::Presented, read,
 };
 use crate::base::{Inside, InsideRule};
 
@@ -142,8 +142,9 @@ impl SolidMesh {
         &self.inside
     }
 
-    pub(super) fn presentation(&self) -> &Presentation {
-        &self.presentation
+    /// The faces of the surface, and what tells their sides.
+    pub(crate) fn presented(&self) -> Result<Presented<'_>, MeshError> {
+        self.presentation.of(&self.mesh, self.simple)
     }
 
     /// The mesh.

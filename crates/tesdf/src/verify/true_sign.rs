@@ -5,6 +5,7 @@ use glam::DVec3;
 
 use crate::TeSdf;
 use crate::base::InsideRule;
+use crate::geometry::perturbed_orientation;
 use crate::mesh::{TriangleMesh, WindingNumber};
 use crate::query::Answer;
 
@@ -53,10 +54,12 @@ impl TrueSign {
 fn generalized(mesh: &TriangleMesh, p: DVec3) -> f64 {
     let scale = 1.0 / mesh.diagonal();
     let angle = |f: usize| {
+        // A face without area has no solid angle, which rounding would not tell beside it.
+        let side = f64::from(perturbed_orientation(mesh.triangle(f), p));
         let [a, b, c] = mesh.triangle(f).map(|v| (v - p) * scale);
         let (la, lb, lc) = (a.length(), b.length(), c.length());
         let cosine = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        2.0 * a.dot(b.cross(c)).atan2(cosine)
+        2.0 * side * a.dot(b.cross(c)).abs().atan2(cosine)
     };
     (0..mesh.faces().len()).map(angle).sum::<f64>() / (4.0 * PI)
 }

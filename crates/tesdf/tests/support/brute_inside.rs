@@ -2,7 +2,7 @@
 use std::f64::consts::PI;
 
 use tesdf::base::InsideRule;
-use tesdf::geometry::Triangle;
+use tesdf::geometry::{Triangle, perturbed_orientation};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{Topology, TriangleMesh, WindingNumber};
 
@@ -42,10 +42,12 @@ impl BruteInside {
     /// Sum of the solid angles of all faces / 4 pi.
     pub fn generalized(&self, p: DVec3) -> f64 {
         let angle = |f: usize| {
+            // A face without area has no solid angle, which rounding would not tell beside it.
+            let side = perturbed_orientation(self.mesh.triangle(f), p);
             let [a, b, c] = self.mesh.triangle(f).map(|v| (v - p) * self.scale);
             let (la, lb, lc) = (a.length(), b.length(), c.length());
             let cosine = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-            2.0 * a.dot(b.cross(c)).atan2(cosine)
+            2.0 * f64::from(side) * a.dot(b.cross(c)).abs().atan2(cosine)
         };
         (0..self.mesh.faces().len()).map(angle).sum::<f64>() / (4.0 * PI)
     }
