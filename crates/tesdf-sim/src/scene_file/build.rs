@@ -8,6 +8,7 @@ use tesdf::collide::{
 };
 use tesdf::encode::{EncodeError, EncodeFileError, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
+use tesdf::mesh::{RepairMode, UnknownRepair};
 use tesdf::{Length, Progress, TeSdf};
 
 use super::read::LoadedScene;
@@ -178,9 +179,9 @@ enum ShapeFailure {
     Reason(String),
 }
 
-/// The shapes of files, by path: bodies share them.
+/// The shapes of files, by path and whether the mesh is repaired: bodies share them.
 #[derive(Default)]
-struct Shapes(BTreeMap<PathBuf, ShapeId>);
+struct Shapes(BTreeMap<(PathBuf, bool), ShapeId>);
 
 impl Shapes {
     fn get(
@@ -193,15 +194,22 @@ impl Shapes {
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
                 let file = scene.resolve(file);
+                let repair = body.repair.as_deref().map_or(Ok(RepairMode::Never), str::parse);
+                let repair = repair.map_err(|e: UnknownRepair| ShapeFailure::Reason(e.to_string()))?;
+                if repair == RepairMode::Auto && body.asset.is_some() {
+                    let reason = "repair = \"auto\": the asset is encoded already; give mesh = \"FILE\" in place of asset";
+                    return Err(ShapeFailure::Reason(reason.into()));
+                }
                 // A file that is reached by several paths is opened only once.
-                let key = file.canonicalize().unwrap_or_else(|_| file.clone());
+                let path = file.canonicalize().unwrap_or_else(|_| file.clone());
+                let key = (path, repair == RepairMode::Auto);
                 if let Some(&shape) = self.0.get(&key) {
                     return Ok(shape);
                 }
                 let opened = match body.asset {
                     Some(_) => TeSdf::open(&file)
                         .map_err(|e| ShapeFailure::Reason(format!("{}: {e}", file.display())))?,
-                    None => encode_mesh(&file, progress)?,
+                    None => encode_mesh(&file, repair, progress)?,
                 };
                 let shape = add_shape(system, Shape::Mesh(Arc::new(opened)))?;
                 self.0.insert(key, shape);
@@ -227,8 +235,8 @@ fn add_shape(system: &mut System, shape: Shape) -> Result<ShapeId, ShapeFailure>
     system.add_shape(shape).map_err(|e| ShapeFailure::Reason(e.to_string()))
 }
 
-fn encode_mesh(file: &Path, progress: &Progress) -> Result<TeSdf, ShapeFailure> {
-    let encoder = Encoder::new().preset(Preset::Fast).progress(progress);
+fn encode_mesh(file: &Path, repair: RepairMode, progress: &Progress) -> Result<TeSdf, ShapeFailure> {
+    let encoder = Encoder::new().preset(Preset::Fast).repair(repair).progress(progress);
     encoder.encode_file(file).map_err(|e| match e {
         EncodeFileError::Encode { source: EncodeError::Cancelled, .. } => ShapeFailure::Cancelled,
         e => ShapeFailure::Reason(e.to_string()),

@@ -171,6 +171,10 @@ pub struct BodySection {
     /// Path of a mesh file, which is encoded with the preset `fast` when the scene is loaded.
     #[serde(default)]
     pub mesh: Option<PathBuf>,
+    /// `auto`: a mesh without a well-defined inside is repaired before it is encoded, if a repair
+    /// works; `never`, the default: it is an error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repair: Option<String>,
     /// A simple shape.
     #[serde(default)]
     pub shape: Option<ShapeSection>,

@@ -6,7 +6,7 @@ use super::sampled::Processor;
 use super::{Domain, EncodeError, EncodeOptions, Preset, Sampler, Source};
 use crate::asset::TeSdf;
 use crate::base::{Length, Progress};
-use crate::mesh::{ReadSolidError, SolidMesh};
+use crate::mesh::{LoadedMesh, ReadSolidError, RepairMode, SolidMesh, read};
 
 /// Encodes solids.
 ///
@@ -36,6 +36,7 @@ pub struct Encoder<'a> {
     unit: Option<String>,
     domain: Domain<'a>,
     source: Source,
+    repair: RepairMode,
     sampler: &'a dyn Sampler,
     progress: Option<&'a Progress>,
 }
@@ -46,6 +47,7 @@ impl fmt::Debug for Encoder<'_> {
             .field("options", &self.resolved())
             .field("domain", &self.domain)
             .field("source", &self.source)
+            .field("repair", &self.repair)
             .field("sampler", &self.sampler.name())
             .field("progress", &self.progress)
             .finish()
@@ -68,6 +70,7 @@ impl<'a> Encoder<'a> {
             unit: None,
             domain: Domain::Bisection,
             source: Source::default(),
+            repair: RepairMode::Never,
             sampler: &Processor,
             progress: None,
         }
@@ -111,6 +114,14 @@ impl<'a> Encoder<'a> {
     /// file instead.
     pub fn source(self, source: Source) -> Self {
         Self { source, ..self }
+    }
+
+    /// Sets whether [`encode_file`](Self::encode_file) repairs a mesh without a well-defined inside
+    /// ([`SolidMesh::repaired`]). The asset records what was changed
+    /// ([`Source::repair`](crate::asset::about::Source::repair)). The default is
+    /// [`RepairMode::Never`].
+    pub fn repair(self, repair: RepairMode) -> Self {
+        Self { repair, ..self }
     }
 
     /// Sets the sampler for [`Method::Sampled`](super::Method::Sampled). The default is the
@@ -180,8 +191,13 @@ impl<'a> Encoder<'a> {
     }
 
     fn encode_path(&self, path: &Path) -> Result<TeSdf, EncodeFileError> {
-        let (solid, report) = SolidMesh::load(path)?;
-        let source = Source::of_file(path, report.source_blake3);
+        let (solid, source) = match self.repair {
+            RepairMode::Never => {
+                let (solid, report) = SolidMesh::load(path)?;
+                (solid, Source::of_file(path, report.source_blake3))
+            }
+            RepairMode::Auto => load_repaired(path)?,
+        };
         let at = |source| EncodeFileError::Encode { path: path.to_owned(), source };
         self.encode_from(&solid, &source).map_err(at)
     }
@@ -204,6 +220,15 @@ impl<'a> Encoder<'a> {
         options.unit = self.unit.clone().or(options.unit);
         options
     }
+}
+
+/// Reads and repairs a mesh. The source says what was changed.
+fn load_repaired(path: &Path) -> Result<(SolidMesh, Source), ReadSolidError> {
+    let LoadedMesh { mesh, report, .. } =
+        read(path).map_err(|source| ReadSolidError::Read { path: path.to_owned(), source })?;
+    let (solid, found) = SolidMesh::repaired(mesh)
+        .map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
+    Ok((solid, Source::of_file(path, report.source_blake3).repaired(found.as_ref())))
 }
 
 impl TeSdf {

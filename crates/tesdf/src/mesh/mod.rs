@@ -19,7 +19,10 @@ pub(crate) use read::text;
 pub use read::{
     LoadReport, LoadedMesh, MeshFormat, Origin, Place, ReadError, files, read, read_bytes, source_blake3,
 };
-pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, repair};
+pub use repair::{
+    AutoRepaired, FillMethod, FilledHole, HoleLeft, LeftReason, RepairError, RepairMode, RepairOptions,
+    RepairReport, Repaired, ShellOrientation, SplitEdge, UnknownRepair, closing_tolerance, repair, repair_auto,
+};
 pub use solid::{NotSolid, ReadSolidError, SolidMesh};
 pub use topology::{Edge, EdgeUse, Topology};
 pub use triangle_mesh::{MeshError, TriangleMesh};

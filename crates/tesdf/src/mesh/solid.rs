@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::count::count;
 use super::{
-    CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, ReadError, Severity, TriangleMesh, check, read,
+    AutoRepaired, CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, ReadError, RepairOptions,
+    Severity, TriangleMesh, check, read, repair_auto,
 };
 
 /// A mesh with a well-defined inside. The encoder accepts only this type, and every value of it is
@@ -63,7 +64,8 @@ impl SolidMesh {
     /// Checks the mesh with [`check`](super::check()).
     ///
     /// # Errors
-    /// [`NotSolid`] has all errors, and says whether repair with default options would help.
+    /// [`NotSolid`] has all errors, and the options of the repair that would help, if one does. Only
+    /// a mesh that is refused costs the time of trying them.
     ///
     /// # Example
     ///
@@ -86,13 +88,43 @@ impl SolidMesh {
     pub fn new(mesh: TriangleMesh) -> Result<Self, NotSolid> {
         let report = check(&mesh);
         if !report.encodable {
-            let repairable = super::repair(&mesh, &super::RepairOptions::default())
-                .is_ok_and(|repaired| repaired.report.encodable);
-            return Err(NotSolid { report: Box::new(report), repairable });
+            let found = repair_auto(&mesh).ok().flatten();
+            let suggestion = found.and_then(|found| found.options);
+            return Err(NotSolid { report: Box::new(report), suggestion });
         }
         let simple = report.is_simple();
         let warnings = report.defects;
         Ok(Self { mesh, warnings, simple })
+    }
+
+    /// As [`new`](Self::new), after [`repair_auto`](super::repair_auto()). Returns what was changed
+    /// as well, or `None` when the mesh is a solid as it is.
+    ///
+    /// # Errors
+    /// [`NotSolid`] when no repair makes the mesh a solid.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::glam::DVec3;
+    /// use tesdf::{SolidMesh, TriangleMesh};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // A tetrahedron without one of its faces.
+    /// let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    /// let open = TriangleMesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3]])?;
+    /// let (solid, changes) = SolidMesh::repaired(open)?;
+    /// assert_eq!(solid.mesh().faces().len(), 4);
+    /// assert_eq!(changes.unwrap().repaired.report.filled_holes.len(), 1);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn repaired(mesh: TriangleMesh) -> Result<(Self, Option<AutoRepaired>), NotSolid> {
+        match repair_auto(&mesh) {
+            Ok(Some(AutoRepaired { options: None, .. })) => Ok((Self::new(mesh)?, None)),
+            Ok(Some(found)) => Ok((Self::new(found.repaired.mesh.clone())?, Some(found))),
+            Ok(None) | Err(_) => Err(NotSolid { report: Box::new(check(&mesh)), suggestion: None }),
+        }
     }
 
     /// The mesh.
@@ -151,7 +183,7 @@ impl ReadSolidError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct NotSolid {
     report: Box<CheckReport>,
-    repairable: bool,
+    suggestion: Option<RepairOptions>,
 }
 
 impl NotSolid {
@@ -162,7 +194,13 @@ impl NotSolid {
 
     /// Whether [`repair`](super::repair()) with default options makes the mesh a solid.
     pub fn is_repairable(&self) -> bool {
-        self.repairable
+        self.suggestion == Some(RepairOptions::DEFAULT)
+    }
+
+    /// The options with which [`repair`](super::repair()) makes the mesh a solid, found by trying:
+    /// [`repair_auto`](super::repair_auto()).
+    pub fn suggestion(&self) -> Option<&RepairOptions> {
+        self.suggestion.as_ref()
     }
 }
 
@@ -191,11 +229,13 @@ impl fmt::Display for NotSolid {
         if kinds.len() > NAMED[0] {
             f.write_str("; and other defects")?;
         }
-        f.write_str(if self.repairable {
-            ". Run `tesdf repair`, which makes it encodable, and encode the result"
-        } else {
-            ". `tesdf repair` with default options does not make it encodable: `tesdf check` lists all defects, and \
-             `tesdf repair --weld-tolerance` joins vertices that are a given length apart"
-        })
+        match &self.suggestion {
+            Some(options) => write!(
+                f,
+                ". `tesdf repair MESH -o FILE.ply{options}` makes it encodable, and so does `--repair auto` while it \
+                 is encoded"
+            ),
+            None => f.write_str(". `tesdf repair` cannot make it encodable: `tesdf check` lists all defects"),
+        }
     }
 }
