@@ -7,6 +7,7 @@ use pyo3::types::PyString;
 use tesdf::encode::{
     Deformation, Domain, DomainChoice, EncodeChoices, Encoder, MethodChoice, Preset, Refinement, Threshold,
 };
+use tesdf::mesh::RepairMode;
 use tesdf::{Progress, Stage};
 
 use crate::asset::Asset;
@@ -41,6 +42,10 @@ use crate::pool;
 ///   diagonal, and no layer with "gmsh".
 /// - regions: boxes [R, 6] that are encoded as well, each min x y z, max x y z.
 /// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing.
+/// - repair: "auto" repairs a mesh without a well-defined inside before it is encoded: the first of
+///   these that makes it encodable, duplicates and T-junctions and orientation, welding of cracks,
+///   filling of holes. The asset records what was changed (asset.source.repair). None refuses such
+///   a mesh.
 /// - threads: number of threads; None is one per core. The bytes of the asset do not depend on it.
 /// - progress: called with the stage ("refine", "tighten", "assemble") and the completed fraction
 ///   of it, 0 to 1, about twenty times a second. An exception from it ends the encoding and is
@@ -52,7 +57,7 @@ use crate::pool;
 #[pyfunction]
 #[pyo3(signature = (
     mesh, preset = "default", *, domain = None, encoder = None, resolution = None, threshold = None, e_max = None,
-    deformable = false, plain = false, band = None, regions = None, unit = None, threads = None, progress = None
+    deformable = false, plain = false, band = None, regions = None, unit = None, repair = None, threads = None, progress = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn encode(
@@ -69,6 +74,7 @@ pub fn encode(
     band: Option<f64>,
     regions: Option<Vec<[f64; 6]>>,
     unit: Option<String>,
+    repair: Option<&str>,
     threads: Option<NonZeroUsize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Asset> {
@@ -86,13 +92,18 @@ pub fn encode(
         unit,
     };
     let options = choices.options().map_err(|e| Error::Choice(e).raise(py))?;
+    let repair = match repair {
+        None => RepairMode::Never,
+        Some("auto") => RepairMode::Auto,
+        Some(other) => return Err(argument("repair", format!("'{other}'"), "'auto' or None")),
+    };
 
     let input = MeshInput::new(mesh)?;
     let pool = pool::of(threads).map_err(|e| e.raise(py))?;
     let state = Progress::default();
     let work = || {
         pool.install(|| {
-            let (solid, path, source) = input.load()?.solid()?;
+            let (solid, path, source) = input.load()?.solid(repair)?;
             let tetrahedra = choices.tetrahedra(&solid, &state).map_err(Error::Domain)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
             Encoder::new()

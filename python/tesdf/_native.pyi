@@ -29,7 +29,13 @@ NO_FACE: int
 __version__: str
 
 def check(mesh: _Mesh) -> CheckReport: ...
-def repair(mesh: _Mesh, *, weld_tolerance: float | None = None) -> Repaired: ...
+def repair(
+    mesh: _Mesh,
+    *,
+    weld_tolerance: float | Literal["auto"] | None = None,
+    orient: bool = False,
+    fill_holes: bool | int | None = None,
+) -> Repaired: ...
 def encode(
     mesh: _Mesh,
     preset: Literal["default", "fast", "compact", "gpu", "paper", "sampled-safe"] = "default",
@@ -44,6 +50,7 @@ def encode(
     band: float | None = None,
     regions: Sequence[Sequence[float]] | None = None,
     unit: str | None = None,
+    repair: Literal["auto"] | None = None,
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,
 ) -> Asset: ...

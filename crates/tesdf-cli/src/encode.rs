@@ -5,10 +5,12 @@ use std::time::Instant;
 
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
-use tesdf::asset::about::{Source, Statistics};
+use tesdf::asset::about::{Repair, Source, Statistics};
 use tesdf::domain::tetrahedra_files;
 use tesdf::encode::{Domain, DomainChoice, EncodeChoices, EncodeOptions, Encoder, Method};
-use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
+use tesdf::mesh::{
+    AutoRepaired, Defect, LoadReport, LoadedMesh, NotSolid, RepairReport, Severity, SolidMesh, TriangleMesh,
+};
 use tesdf::{Certificate, Progress, TeSdf};
 
 use tesdf_terminal::device::{self, Choice};
@@ -19,7 +21,7 @@ use tesdf_terminal::{mesh_file, output};
 
 mod choices;
 
-pub use choices::{ChoiceArgs, EncoderChoice, Preset};
+pub use choices::{ChoiceArgs, EncoderChoice, Preset, RepairChoice};
 
 /// Arguments of `tesdf encode`.
 #[derive(clap::Args, Debug)]
@@ -63,6 +65,8 @@ struct Report<'a> {
     output: String,
     load: &'a LoadReport,
     warnings: &'a [Defect],
+    /// All changes of `--repair auto`; `null` when nothing was repaired.
+    repair: Option<&'a RepairReport>,
     bytes: usize,
     bytes_per_face: f64,
     seconds: f64,
@@ -87,11 +91,14 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let start = Instant::now();
     let LoadedMesh { mesh, report: load, .. } = mesh_file::read(&args.mesh)?;
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.mesh.display()));
-    let solid = pool.install(|| SolidMesh::new(mesh)).map_err(|e| at(&e))?;
+    let (solid, repaired) = pool.install(|| solid(mesh, args.choices.repair)).map_err(|e| at(&e))?;
     load.notes.iter().for_each(|note| report::warning(note));
+    if let Some(found) = &repaired {
+        report::note(&format!("repaired {}", Repair::from(found)));
+    }
     warn(solid.warnings());
 
-    let source = Source::of_file(&args.mesh, load.source_blake3.clone());
+    let source = Source::of_file(&args.mesh, load.source_blake3.clone()).repaired(repaired.as_ref());
     let interrupted = interrupt_flag()?;
     let progress = Progress::default();
     let choices = args.choices.choices();
@@ -113,8 +120,23 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let asset = encoded?;
     output::write(&output, &asset.to_bytes().map_err(Failure::new)?)?;
     let seconds = start.elapsed().as_secs_f64();
-    print(args, &load, solid.warnings(), &asset, seconds)?;
+    let repair = repaired.as_ref().map(|found| &found.repaired.report);
+    print(args, &Before { load: &load, warnings: solid.warnings(), repair }, &asset, seconds)?;
     Ok(Outcome::Good)
+}
+
+/// The solid of a mesh, and the changes if it was repaired.
+///
+/// # Errors
+/// The mesh has no well-defined inside, and no repair was asked for or none works.
+pub(crate) fn solid(
+    mesh: TriangleMesh,
+    repair: Option<RepairChoice>,
+) -> Result<(SolidMesh, Option<AutoRepaired>), NotSolid> {
+    match repair {
+        None => Ok((SolidMesh::new(mesh)?, None)),
+        Some(RepairChoice::Auto) => SolidMesh::repaired(mesh),
+    }
 }
 
 /// Encodes the solid of the mesh file `path` in the domain of `choices`. The error message names the
@@ -165,24 +187,27 @@ fn warn(defects: &[Defect]) {
     }
 }
 
-fn print(
-    args: &Args,
-    load: &LoadReport,
-    warnings: &[Defect],
-    asset: &TeSdf,
-    seconds: f64,
-) -> Result<(), Failure> {
+/// What was found and changed before the encoding.
+struct Before<'a> {
+    load: &'a LoadReport,
+    warnings: &'a [Defect],
+    repair: Option<&'a RepairReport>,
+}
+
+fn print(args: &Args, before: &Before, asset: &TeSdf, seconds: f64) -> Result<(), Failure> {
     let about = asset.about();
     let statistics = &about.statistics;
     let bytes = asset.as_bytes().len();
     let bytes_per_face = bytes as f64 / statistics.faces as f64;
     let [file, output] = [&args.mesh, &args.output].map(|path| path.display().to_string());
     if args.json {
+        let &Before { load, warnings, repair } = before;
         return report::json(&Report {
             file,
             output,
             load,
             warnings,
+            repair,
             bytes,
             bytes_per_face,
             seconds,

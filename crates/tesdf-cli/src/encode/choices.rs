@@ -49,6 +49,19 @@ pub struct ChoiceArgs {
     /// Name of the mesh's unit; it is recorded in the file and scales nothing
     #[arg(long, value_name = "NAME")]
     pub unit: Option<String>,
+    /// Repair a mesh without a well-defined inside as `tesdf repair --auto` does, before it is
+    /// encoded; what was changed is printed and recorded in the file [default: such a mesh is
+    /// refused]
+    #[arg(long, value_enum)]
+    pub repair: Option<RepairChoice>,
+}
+
+/// Repairs before encoding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum RepairChoice {
+    /// The first that makes the mesh encodable: none, duplicates and T-junctions and orientation,
+    /// welding of cracks, filling of holes
+    Auto,
 }
 
 /// Methods that find the closest faces of a tetrahedron.

@@ -6,14 +6,14 @@ use std::time::Instant;
 
 use serde::Serialize;
 use tesdf::asset::FORMAT_VERSION;
-use tesdf::asset::about::Source;
+use tesdf::asset::about::{Repair, Source};
 use tesdf::encode::{DomainChoice, EncodeChoices, EncodeOptions, Encoder};
-use tesdf::mesh::{LoadedMesh, SolidMesh};
+use tesdf::mesh::LoadedMesh;
 use tesdf::save::save_atomic;
 use tesdf::{Certificate, Progress, TeSdf};
 
 use super::meshes::Mesh;
-use crate::encode::encode;
+use crate::encode::{ChoiceArgs, RepairChoice, encode, solid};
 use tesdf_terminal::report::Failure;
 use tesdf_terminal::{asset_file, mesh_file};
 
@@ -21,6 +21,7 @@ use tesdf_terminal::{asset_file, mesh_file};
 #[derive(Debug)]
 pub struct Job {
     choices: EncodeChoices,
+    repair: Option<RepairChoice>,
     options: EncodeOptions,
     output: PathBuf,
 }
@@ -57,6 +58,9 @@ pub struct Asset {
     pub bytes: u64,
     faces: usize,
     certificate: Certificate,
+    /// What `--repair auto` changed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    repair: Option<Repair>,
 }
 
 /// The asset that a mesh gets.
@@ -69,9 +73,10 @@ struct Expected {
 impl Job {
     /// # Errors
     /// The choices exclude each other.
-    pub fn new(choices: EncodeChoices, output: &Path) -> Result<Self, Failure> {
+    pub fn new(args: &ChoiceArgs, output: &Path) -> Result<Self, Failure> {
+        let choices = args.choices();
         let options = choices.options().map_err(Failure::new)?;
-        Ok(Self { choices, options, output: output.to_path_buf() })
+        Ok(Self { choices, repair: args.repair, options, output: output.to_path_buf() })
     }
 
     /// The options of the encoder.
@@ -122,9 +127,10 @@ impl Job {
             let found = format!("{} changed while it was read; encode it again", path.display());
             return Err(Failure::new(found));
         }
-        let solid = SolidMesh::new(surface).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
-        let encoder =
-            Encoder::new().options(self.options.clone()).source(expected.source.clone()).progress(stop);
+        let (solid, repaired) =
+            solid(surface, self.repair).map_err(|e| Failure::new(format!("{}: {e}", path.display())))?;
+        let source = expected.source.clone().repaired(repaired.as_ref());
+        let encoder = Encoder::new().options(self.options.clone()).source(source).progress(stop);
         let asset = encode(&solid, path, &self.choices, encoder, stop)?;
         let bytes = asset.to_bytes().map_err(Failure::new)?;
         save_atomic(&expected.path, &bytes).map_err(Failure::new)?;
@@ -138,7 +144,10 @@ impl Job {
         let mut hasher = blake3::Hasher::new();
         let options = serde_json::to_string(&self.options).unwrap_or_default();
         let version = format!("{} {FORMAT_VERSION}", env!("CARGO_PKG_VERSION"));
-        for part in [&version, self.domain(), &options, &source.name, &source.blake3] {
+        // Without a repair, the name is what it was before there was one.
+        let repair = self.repair.map(|RepairChoice::Auto| "repair auto");
+        let parts = [&version, self.domain(), &options, &source.name, &source.blake3];
+        for part in parts.into_iter().chain(repair) {
             // The length keeps two parts apart.
             hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
         }
@@ -150,7 +159,7 @@ impl Job {
     fn present(&self, expected: &Expected) -> Option<Asset> {
         let asset = asset_file::open_intact(&expected.path).ok()?;
         let about = asset.about();
-        let same = about.source == expected.source && about.options == self.options;
+        let same = about.source.is_same_file(&expected.source) && about.options == self.options;
         same.then(|| expected.asset(&asset, asset.as_bytes().len()))
     }
 }
@@ -164,6 +173,7 @@ impl Expected {
             bytes: bytes as u64,
             faces: about.statistics.faces,
             certificate: about.certificate().clone(),
+            repair: about.source.repair.clone(),
         }
     }
 }

@@ -92,7 +92,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         ))
         .hint("`tesdf encode --domain FILE` encodes that mesh"));
     }
-    let job = Job::new(args.choices.choices(), &args.output)?;
+    let job = Job::new(&args.choices, &args.output)?;
     let meshes = meshes::find(&args.meshes, args.shard)?;
     fs::create_dir_all(&args.output)
         .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", args.output.display())))?;

@@ -1,6 +1,7 @@
 //! What an asset says about itself, stored as JSON in the metadata of the container.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -41,6 +42,30 @@ pub struct Repair {
     pub filled_holes: usize,
     /// Area of the fillings.
     pub filled_area: f64,
+}
+
+impl fmt::Display for Repair {
+    /// One line: the command, and what it changed.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.flags.as_str() {
+            "" => f.write_str("as by `tesdf repair`")?,
+            flags => write!(f, "as by `tesdf repair {flags}`")?,
+        }
+        let counts = [
+            (self.welded_vertices, ["vertex merged", "vertices merged"]),
+            (self.dropped_faces, ["face dropped", "faces dropped"]),
+            (self.split_edges, ["edge split", "edges split"]),
+            (self.reversed_faces, ["face reversed", "faces reversed"]),
+            (self.filled_holes, ["hole filled", "holes filled"]),
+        ];
+        for (number, [one, many]) in counts.into_iter().filter(|(number, _)| *number > 0) {
+            write!(f, "; {number} {}", if number == 1 { one } else { many })?;
+        }
+        match self.filled_holes {
+            0 => Ok(()),
+            _ => write!(f, ", area {:.3e}", self.filled_area),
+        }
+    }
 }
 
 #[cfg(feature = "encode")]

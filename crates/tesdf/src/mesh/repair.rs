@@ -6,6 +6,7 @@ use super::{
     topology::{Topology, has_repeated_corner},
 };
 
+mod around_edge;
 mod auto;
 mod fill;
 mod flat;
@@ -97,26 +98,40 @@ struct Draft {
 /// mesh that is still not encodable is not an error here: [`RepairReport::remaining`] gives the
 /// reasons.
 pub fn repair(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Repaired, RepairError> {
-    let (draft, report) = mend(mesh, options)?;
-    draft.finish(report)
+    close(mesh, options)?.finish(options)
 }
 
-/// The steps of [`repair`], without the check of the result.
-fn mend(mesh: &TriangleMesh, options: &RepairOptions) -> Result<(Draft, RepairReport), RepairError> {
+/// A mesh after the steps that can close it.
+struct Closed {
+    draft: Draft,
+    report: RepairReport,
+    reversed: Vec<bool>,
+}
+
+/// The steps of [`repair`] that can close the mesh: all but the orientation of shells.
+fn close(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Closed, RepairError> {
     let (mut draft, mut report) = join(mesh, options)?;
-    let mut agreed = orient::agree(&mut draft);
+    let orient::Agreed { mut reversed, one_sided } = orient::agree(&mut draft);
     if options.shells == ShellOrientation::All {
-        report.paired_edges = pair::agree_across(&mut draft, &mut agreed);
+        report.paired_edges = pair::agree_across(&mut draft, &one_sided, &mut reversed);
     }
     if let Some(max_edges) = options.fill_holes {
-        let beside = fill::fill(&mut draft, &agreed.one_sided, max_edges, &mut report);
+        let beside = fill::fill(&mut draft, &one_sided, max_edges, &mut report);
         // A new face belongs to the face beside it, and counts as reversed with it.
-        let reversed: Vec<bool> = beside.iter().map(|&face| agreed.reversed[face as usize]).collect();
-        agreed.reversed.extend(reversed);
+        let new: Vec<bool> = beside.iter().map(|&face| reversed[face as usize]).collect();
+        reversed.extend(new);
     }
-    orient::orient(&mut draft, agreed.reversed, options.shells, &mut report);
-    report.unused_vertices = draft.drop_unused() - report.welded_vertices.len();
-    Ok((draft, report))
+    Ok(Closed { draft, report, reversed })
+}
+
+impl Closed {
+    /// Orients the shells, and checks the result.
+    fn finish(self, options: &RepairOptions) -> Result<Repaired, RepairError> {
+        let Self { mut draft, mut report, reversed } = self;
+        orient::orient(&mut draft, reversed, options.shells, &mut report);
+        report.unused_vertices = draft.drop_unused() - report.welded_vertices.len();
+        draft.check(report)
+    }
 }
 
 /// The steps that join faces: all up to the splits at T-junctions.
@@ -178,7 +193,7 @@ impl Draft {
     }
 
     /// Checks the result.
-    fn finish(self, mut report: RepairReport) -> Result<Repaired, RepairError> {
+    fn check(self, mut report: RepairReport) -> Result<Repaired, RepairError> {
         let mesh = TriangleMesh::new(self.vertices, self.faces)?;
         let found = check(&mesh);
         report.encodable = found.encodable;

@@ -3,8 +3,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{
-    Draft, RepairError, RepairOptions, RepairReport, Repaired, ShellOrientation, closing_tolerance,
-    fill::area, mend,
+    Draft, RepairError, RepairOptions, RepairReport, Repaired, ShellOrientation, close, closing_tolerance,
+    fill::area,
 };
 use crate::mesh::TriangleMesh;
 
@@ -69,15 +69,15 @@ pub struct AutoRepaired {
 pub fn repair_auto(mesh: &TriangleMesh) -> Result<Option<AutoRepaired>, RepairError> {
     let untouched = Draft::of(mesh);
     if untouched.is_closed() {
-        let repaired = untouched.finish(RepairReport::default())?;
+        let repaired = untouched.check(RepairReport::default())?;
         if repaired.report.encodable {
             return Ok(Some(AutoRepaired { options: None, repaired }));
         }
     }
     match attempt(mesh, &RepairOptions::DEFAULT) {
-        Ok(Some(found)) => return Ok(Some(found)),
+        Ok(Attempt::Works(found)) => return Ok(Some(found)),
         Err(error @ RepairError::OutOfRange(_)) => return Err(error),
-        Ok(None) | Err(_) => {}
+        Ok(_) | Err(_) => {}
     }
     let weld_tolerance = closing_tolerance(mesh);
     let default = RepairOptions::DEFAULT;
@@ -89,20 +89,39 @@ pub fn repair_auto(mesh: &TriangleMesh) -> Result<Option<AutoRepaired>, RepairEr
         attempts.extend([welded, all(welded), filled(welded), filled(all(welded))]);
     }
     attempts.extend([filled(default), filled(all(default))]);
-    // An attempt may leave no face. The next one does without its step.
-    Ok(attempts.iter().find_map(|options| attempt(mesh, options).ok().flatten()))
+    for options in attempts {
+        // An attempt may leave no face. The next one does without its step.
+        match attempt(mesh, &options) {
+            Ok(Attempt::Works(found)) => return Ok(Some(found)),
+            Ok(Attempt::FillsTooMuch) => return Ok(None),
+            Ok(Attempt::Fails) | Err(_) => {}
+        }
+    }
+    Ok(None)
 }
 
-/// The repaired mesh, if it is encodable.
-fn attempt(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Option<AutoRepaired>, RepairError> {
-    let (draft, report) = mend(mesh, options)?;
-    // The check is long, and a mesh that is not closed does not pass.
-    if !draft.is_closed() || fills_too_much(mesh, &report) {
-        return Ok(None);
+/// What came of an attempt.
+enum Attempt {
+    Works(AutoRepaired),
+    /// The holes are too large, as they are for other options.
+    FillsTooMuch,
+    Fails,
+}
+
+fn attempt(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Attempt, RepairError> {
+    let closed = close(mesh, options)?;
+    if fills_too_much(mesh, &closed.report) {
+        return Ok(Attempt::FillsTooMuch);
     }
-    let repaired = draft.finish(report)?;
-    let found = repaired.report.encodable;
-    Ok(found.then_some(AutoRepaired { options: Some(*options), repaired }))
+    // The rest is long, and a mesh that is not closed does not pass.
+    if !closed.draft.is_closed() {
+        return Ok(Attempt::Fails);
+    }
+    let repaired = closed.finish(options)?;
+    Ok(match repaired.report.encodable {
+        true => Attempt::Works(AutoRepaired { options: Some(*options), repaired }),
+        false => Attempt::Fails,
+    })
 }
 
 fn fills_too_much(mesh: &TriangleMesh, report: &RepairReport) -> bool {

@@ -10,11 +10,13 @@ use super::{
 };
 use crate::{mesh::Topology, parallel::*};
 
-/// Holes with more edges than this are filled ear by ear.
+/// Holes with more edges than this are cut into pieces.
 const DYNAMIC: usize = 300;
+/// Largest number of edges of a piece.
+const PIECE: usize = 100;
 /// Largest number of triangles that dynamic programming looks at in all holes together; it takes
-/// some ten seconds on a thread. Smaller holes come first.
-const LOOKED_AT: u64 = 200_000_000;
+/// some ten seconds on a thread. Smaller holes come first, and the rest is filled ear by ear.
+const LOOKED_AT: usize = 200_000_000;
 
 /// The triangles of a hole.
 struct Filling {
@@ -82,10 +84,16 @@ fn fillings(draft: &Draft, topology: &Topology, holes: &[Hole]) -> Vec<Filling> 
     let plan: Vec<(usize, FillMethod)> = rest
         .into_iter()
         .map(|hole| {
-            let n = holes[hole].vertices.len() as u64;
-            looked_at += n * n * n / 6;
-            let small = n <= DYNAMIC as u64 && looked_at <= LOOKED_AT;
-            (hole, if small { FillMethod::MinimumWeight } else { FillMethod::Ears })
+            let n = holes[hole].vertices.len();
+            let whole = n <= DYNAMIC;
+            // A piece has at least a quarter of its vertices from the loop that was cut last.
+            looked_at += if whole { n.pow(3) / 6 } else { (4 * n / PIECE + 1) * PIECE.pow(3) / 6 };
+            let method = match (looked_at <= LOOKED_AT, whole) {
+                (true, true) => FillMethod::MinimumWeight,
+                (true, false) => FillMethod::Pieces,
+                (false, _) => FillMethod::Ears,
+            };
+            (hole, method)
         })
         .collect();
     let filled = |&(hole, method): &(usize, FillMethod)| {
@@ -109,6 +117,7 @@ fn fill_curved(draft: &Draft, topology: &Topology, hole: &Hole, method: FillMeth
     let of = Loop { points: &points, normals: &normals, is_edge: &is_edge };
     let triangles = match method {
         FillMethod::Ears => of.ears(),
+        FillMethod::Pieces => of.pieces(PIECE),
         FillMethod::Flat | FillMethod::MinimumWeight => of.minimum_weight(),
     };
     triangles.into_iter().map(|t| t.map(|corner| vertices[corner as usize])).collect()

@@ -107,9 +107,13 @@ fn positions(draft: &Draft, vertices: &[u32]) -> Vec<DVec3> {
     vertices.iter().map(|&v| draft.vertices[v as usize]).collect()
 }
 
-/// Whether the outline goes around all points of a loop in its plane.
+/// Whether the outline goes around a loop in its plane. The loop may touch it at vertices.
 fn is_around(outline: &[DVec3], points: &[DVec3]) -> bool {
-    let all = project_with(outline, points);
+    let off: Vec<DVec3> = points.iter().filter(|p| !outline.contains(p)).copied().collect();
+    if off.is_empty() {
+        return false;
+    }
+    let all = project_with(outline, &off);
     let (outline, points) = all.split_at(outline.len());
     let inside = |p: &DVec2| {
         let crosses = |i: usize| {
@@ -149,6 +153,12 @@ fn joined(draft: &Draft, loops: &[&[u32]]) -> Option<Vec<u32>> {
     let mut islands: Vec<&[u32]> = islands.to_vec();
     while !islands.is_empty() {
         let flat = Flat::new(draft, &outline, &islands);
+        if let Some((at, island, from)) = flat.touching(&outline, &islands) {
+            let mut around = islands.remove(island).to_vec();
+            around.rotate_left(from);
+            outline.splice(at..at, around);
+            continue;
+        }
         let pairs = outline.len() * islands.iter().map(|island| island.len()).sum::<usize>();
         if pairs > BRIDGES {
             return None;
@@ -181,6 +191,25 @@ impl Flat {
             points.to_vec()
         };
         Self { outline: outline.to_vec(), islands: islands.iter().map(&mut cut).collect() }
+    }
+
+    /// A vertex where an island touches the outline: its place in the outline, the island, and its
+    /// place there. Where the outline passes the vertex several times, it is the place whose corner
+    /// the island is in.
+    fn touching(&self, outline: &[u32], islands: &[&[u32]]) -> Option<(usize, usize, usize)> {
+        let n = outline.len();
+        islands.iter().enumerate().find_map(|(k, island)| {
+            let from = island.iter().position(|v| outline.contains(v))?;
+            let next = self.islands[k][(from + 1) % island.len()];
+            let at = (0..n).filter(|&at| outline[at] == island[from]).find(|&at| {
+                let [before, here, after] = [at + n - 1, at, at + 1].map(|i| self.outline[i % n]);
+                let left = [orient(before, here, next) > 0.0, orient(here, after, next) > 0.0];
+                // A corner of less than half a turn is to the left of both sides, a larger one to
+                // the left of either.
+                if orient(before, here, after) > 0.0 { left == [true; 2] } else { left != [false; 2] }
+            })?;
+            Some((at, k, from))
+        })
     }
 
     /// The shortest bridge that meets no loop on its way: a vertex of the outline, an island, and a
@@ -279,6 +308,25 @@ mod tests {
         let (groups, area) = filled(&many);
         assert_eq!(groups, [vec![0, 1, 2, 3, 4], vec![5]]);
         assert!((area.unwrap() - slanted(256.0 - 64.0 + 4.0)).abs() < 1e-11);
+    }
+
+    #[test]
+    fn islands_that_touch_the_outline_are_joined_there() {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 0.5 * x);
+        let vertices =
+            vec![p(0.0, 0.0), p(4.0, 0.0), p(4.0, 4.0), p(0.0, 4.0), p(1.0, 2.0), p(2.0, 1.0), p(2.0, 3.0)];
+        let draft = Draft { vertices, faces: Vec::new(), origin: Vec::new() };
+        let hole = |vertices: Vec<u32>| Hole { across: vec![0; vertices.len()], vertices };
+        let holes = [hole(vec![0, 1, 2, 3]), hole(vec![0, 4, 5]), hole(vec![5, 4, 6])];
+        assert_eq!(flat_holes(&draft, &holes[..2]), [[0, 1]]);
+        let triangles = fill_flat(&draft, &[&holes[0].vertices, &holes[1].vertices]).unwrap();
+        assert_eq!(triangles.len(), 5);
+        let double: f64 = triangles
+            .iter()
+            .map(|t| t.map(|v| draft.vertices[v as usize]))
+            .map(|[a, b, c]| (b - a).cross(c - a).z)
+            .sum();
+        assert_eq!(double, 32.0 - 3.0);
     }
 
     #[test]

@@ -92,11 +92,14 @@ fn walk(draft: &Draft, start: u32, next: &mut BTreeMap<u32, Vec<Missing>>, holes
 }
 
 /// The index of the missing edge that comes first around the vertex `at`, clockwise seen from
-/// outside, from the edge along which the loop came from `before`.
+/// outside, from the edge along which the loop came from `before`. Outside is where the faces
+/// across these edges face on average: at the rim of a flat hole, some of them are walls.
 fn first_around(draft: &Draft, [before, at]: [u32; 2], face: u32, edges: &[Missing]) -> usize {
     let position = |v: u32| draft.vertices[v as usize];
-    let normal = unit_normal(draft.triangle(face));
-    let back = position(before) - position(at);
+    let faces = edges.iter().map(|edge| edge.across).chain([face]);
+    let normal: DVec3 = faces.map(|face| unit_normal(draft.triangle(face))).sum();
+    let normal = normal.normalize_or_zero();
+    let back = (position(before) - position(at)).reject_from_normalized(normal);
     let turn = |edge: &Missing| {
         let ahead = position(edge.to) - position(at);
         clockwise(back.dot(ahead), normal.dot(back.cross(ahead)))

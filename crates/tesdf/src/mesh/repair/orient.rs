@@ -2,13 +2,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 
-use super::{Draft, RepairReport, ShellOrientation};
+use super::{Draft, RepairReport, ShellOrientation, around_edge::pairs};
 use crate::{
     geometry::perturbed_orientation,
     mesh::{
         Topology, TriangleMesh, WindingNumber,
         check::{TJunctions, face_flaws, height, self_intersections},
-        topology::DisjointSets,
+        topology::{DisjointSets, EdgeUse},
     },
 };
 
@@ -68,7 +68,7 @@ fn orient_shells(
     report: &mut RepairReport,
 ) {
     let topology = Topology::new(&draft.faces);
-    let (shell, count) = shells(&topology);
+    let (shell, count) = shells(draft, &topology, which);
     let closed = closed_shells(&topology, &shell, count);
     // The faces of the closed shells as a mesh of their own.
     let kept: Vec<u32> =
@@ -132,14 +132,25 @@ fn orient_shells(
 
 /// The shell of each face, and an upper bound of the shell numbers. A shell is a patch of faces
 /// that are connected over edges with two faces. Patches are joined where they balance only
-/// together at an edge with more faces.
-fn shells(topology: &Topology) -> (Vec<u32>, usize) {
+/// together at an edge with more faces: all of them, or with [`ShellOrientation::All`] those of
+/// neighbours around the edge.
+fn shells(draft: &Draft, topology: &Topology, which: ShellOrientation) -> (Vec<u32>, usize) {
     let (patch, count) = topology.components(|edge| edge.face_count() == 2);
     let mut sets = DisjointSets::new(count);
     for edge in topology.edges().iter().filter(|e| e.face_count() > 2) {
-        let balance = balance(topology.uses(edge).iter().map(|u| (patch[u.face as usize], u.forward)));
+        let of = |u: &EdgeUse| patch[u.face as usize];
+        let balance = balance(topology.uses(edge).iter().map(|u| (of(u), u.forward)));
         let unbalanced: Vec<u32> = balance.into_iter().filter(|(_, n)| *n != 0).map(|(p, _)| p).collect();
-        unbalanced.windows(2).for_each(|w| sets.join(w[0], w[1]));
+        let uses: Vec<EdgeUse> =
+            topology.uses(edge).iter().filter(|u| unbalanced.contains(&of(u))).copied().collect();
+        let paired = match which {
+            ShellOrientation::Separate => None,
+            ShellOrientation::All => pairs(draft, edge, &uses),
+        };
+        match paired.filter(|pairs| pairs.iter().all(|[u, v]| u.forward != v.forward)) {
+            Some(pairs) => pairs.iter().for_each(|[u, v]| sets.join(of(u), of(v))),
+            None => unbalanced.windows(2).for_each(|w| sets.join(w[0], w[1])),
+        }
     }
     (patch.into_iter().map(|p| sets.find(p)).collect(), count)
 }

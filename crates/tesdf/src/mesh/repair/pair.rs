@@ -1,18 +1,8 @@
 //! Orients surfaces that are connected only over edges with more than two faces.
 use std::collections::BTreeMap;
 
-use glam::DVec3;
-
-use super::{
-    Draft,
-    holes::around,
-    orient::Agreed,
-    split::open_lengths,
-};
-use crate::mesh::{
-    Topology,
-    topology::{Edge, EdgeUse},
-};
+use super::{Draft, around_edge::pairs, orient::OneSided, split::open_lengths};
+use crate::mesh::{Topology, topology::Edge};
 
 /// For two surfaces, the length of the edges where paired faces agree, and where they disagree.
 type Votes = BTreeMap<[u32; 2], [f64; 2]>;
@@ -25,7 +15,11 @@ type Votes = BTreeMap<[u32; 2], [f64; 2]>;
 /// the unbalanced edges shorter in total.
 ///
 /// Returns the edges at which faces were paired.
-pub(super) fn agree_across(draft: &mut Draft, agreed: &mut Agreed) -> Vec<[u32; 2]> {
+pub(super) fn agree_across(
+    draft: &mut Draft,
+    one_sided: &OneSided,
+    reversed_faces: &mut [bool],
+) -> Vec<[u32; 2]> {
     let topology = Topology::new(&draft.faces);
     if topology.is_closed() {
         return Vec::new();
@@ -36,7 +30,7 @@ pub(super) fn agree_across(draft: &mut Draft, agreed: &mut Agreed) -> Vec<[u32; 
     let many = |edge: &&Edge| edge.face_count() > 2 && edge.face_count().is_multiple_of(2);
     for edge in topology.edges().iter().filter(many) {
         let uses = topology.uses(edge);
-        if uses.iter().any(|u| agreed.one_sided.faces[u.face as usize]) {
+        if uses.iter().any(|u| one_sided.faces[u.face as usize]) {
             continue;
         }
         let Some(pairs) = pairs(draft, edge, uses) else { continue };
@@ -62,41 +56,10 @@ pub(super) fn agree_across(draft: &mut Draft, agreed: &mut Agreed) -> Vec<[u32; 
         return Vec::new();
     }
     draft.faces = faces;
-    for (flag, s) in agreed.reversed.iter_mut().zip(&surface) {
+    for (flag, s) in reversed_faces.iter_mut().zip(&surface) {
         *flag ^= reversed[*s as usize];
     }
     paired
-}
-
-/// Pairs of neighbours around an edge. There are two ways to pair them. The faces agree best in
-/// the chosen way; if they agree equally well in both, the angles within its pairs are smaller.
-/// `None` when a face has no area.
-fn pairs(draft: &Draft, edge: &Edge, uses: &[EdgeUse]) -> Option<Vec<[EdgeUse; 2]>> {
-    let [a, b] = edge.vertices.map(|v| draft.vertices[v as usize]);
-    let axis = (b - a).try_normalize()?;
-    let across = |u: &EdgeUse| {
-        let apex = draft.faces[u.face as usize].into_iter().find(|v| !edge.vertices.contains(v))?;
-        (draft.vertices[apex as usize] - a).reject_from_normalized(axis).try_normalize()
-    };
-    let first = across(&uses[0])?;
-    let side: DVec3 = axis.cross(first);
-    let mut turned: Vec<(f64, EdgeUse)> = Vec::with_capacity(uses.len());
-    for u in uses {
-        let direction = across(u)?;
-        turned.push((around(first.dot(direction), side.dot(direction)), *u));
-    }
-    turned.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.face.cmp(&y.1.face)));
-    let way = |from: usize| {
-        let n = turned.len();
-        let pair = |k: usize| [turned[(from + 2 * k) % n], turned[(from + 2 * k + 1) % n]];
-        let pairs: Vec<[(f64, EdgeUse); 2]> = (0..n / 2).map(pair).collect();
-        let agreeing = pairs.iter().filter(|[u, v]| u.1.forward != v.1.forward).count();
-        let angles: f64 = pairs.iter().map(|[u, v]| (v.0 - u.0).rem_euclid(4.0)).sum();
-        (agreeing, angles, pairs.into_iter().map(|pair| pair.map(|(_, u)| u)).collect())
-    };
-    let (one, other): ((usize, f64, Vec<_>), _) = (way(0), way(1));
-    let better = other.0 > one.0 || other.0 == one.0 && other.1 < one.1;
-    Some(if better { other.2 } else { one.2 })
 }
 
 /// The surfaces to reverse. Of the surfaces that agree with each other afterwards, those with fewer

@@ -98,8 +98,11 @@ pub enum FillMethod {
     /// The triangulation with the smallest of its sharpest folds and then the least area, found by
     /// dynamic programming.
     MinimumWeight,
-    /// One triangle after the other, always the one with the smallest fold, as the hole has too
-    /// many edges for dynamic programming.
+    /// The hole has more than 300 edges. It was cut along short chords into pieces, and each piece
+    /// has its triangulation of minimum weight.
+    Pieces,
+    /// One triangle after the other, always the one with the smallest fold, as the holes have too
+    /// many edges in all for dynamic programming.
     Ears,
 }
 
@@ -108,6 +111,7 @@ impl fmt::Display for FillMethod {
         f.write_str(match self {
             Self::Flat => "flat",
             Self::MinimumWeight => "minimum weight",
+            Self::Pieces => "minimum weight in pieces",
             Self::Ears => "ear by ear",
         })
     }

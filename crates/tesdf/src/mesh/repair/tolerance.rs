@@ -4,6 +4,9 @@ use crate::mesh::{Topology, TriangleMesh};
 
 /// The tolerances that are tried, relative to the diagonal.
 const TRIED: [f64; 7] = [1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4];
+/// The tolerances of [`TRIED`] that show whether there are cracks: the largest one, and one in the
+/// middle, since the largest may destroy details of a mesh.
+const PROBED: [usize; 2] = [6, 3];
 /// Where no tolerance closes all cracks, the least one that closes all but this share of the length
 /// that any of them closes is taken.
 const SHARE_LEFT: f64 = 0.05;
@@ -22,11 +25,19 @@ pub fn closing_tolerance(mesh: &TriangleMesh) -> Option<f64> {
     if without == 0.0 {
         return None;
     }
-    let diagonal = mesh.diagonal();
-    let mut found: Vec<(f64, f64)> = Vec::with_capacity(TRIED.len());
-    for tolerance in TRIED.map(|share| two_digits(share * diagonal)) {
+    let tolerances = TRIED.map(|share| two_digits(share * mesh.diagonal()));
+    let welded = |tolerance: f64| {
         let options = RepairOptions { weld_tolerance: Some(tolerance), ..RepairOptions::DEFAULT };
-        match open_length(mesh, &options) {
+        open_length(mesh, &options)
+    };
+    // A mesh without cracks ends here, after two attempts.
+    let closes = |tolerance: &f64| welded(*tolerance).is_some_and(|l| l < without * (1.0 - NOTHING));
+    if !PROBED.iter().any(|&k| closes(&tolerances[k])) {
+        return None;
+    }
+    let mut found: Vec<(f64, f64)> = Vec::with_capacity(TRIED.len());
+    for tolerance in tolerances {
+        match welded(tolerance) {
             Some(0.0) => return Some(tolerance),
             // Nothing is left of the mesh with this tolerance, and with larger ones.
             None => break,

@@ -15,6 +15,9 @@ use glam::DVec3;
 /// A triangle counts as flat when its height is less than this share of its longest edge.
 const FLAT: f64 = 1e-9;
 
+/// Largest number of ends of chords on each side of a piece that is cut.
+const CHORDS: usize = 1000;
+
 /// A loop that is to be filled.
 pub(super) struct Loop<'a> {
     /// Positions of the vertices.
@@ -55,9 +58,9 @@ impl Weight {
     }
 }
 
-/// 1 less the cosine of the angle between two unit normals.
+/// 1 less the cosine of the angle between two unit normals. Without a normal there is no fold.
 fn fold(a: DVec3, b: DVec3) -> f64 {
-    1.0 - a.dot(b)
+    if a == DVec3::ZERO || b == DVec3::ZERO { 0.0 } else { 1.0 - a.dot(b) }
 }
 
 impl Loop<'_> {
@@ -119,6 +122,50 @@ impl Loop<'_> {
             todo.extend([(m, k), (i, m)]);
         }
         triangles
+    }
+
+    /// Cuts the loop into pieces of at most `most` vertices along short chords, and gives each piece
+    /// its triangulation of least weight. Folds at the chords are not looked at.
+    pub(super) fn pieces(&self, most: usize) -> Vec<[u32; 3]> {
+        let mut triangles = Vec::with_capacity(self.points.len() - 2);
+        let mut todo: Vec<Vec<usize>> = vec![(0..self.points.len()).collect()];
+        while let Some(piece) = todo.pop() {
+            if piece.len() > most {
+                let (i, k) = self.short_chord(&piece);
+                todo.push(piece[i..=k].to_vec());
+                todo.push([&piece[..=i], &piece[k..]].concat());
+                continue;
+            }
+            let points: Vec<DVec3> = piece.iter().map(|&v| self.points[v]).collect();
+            let across = |i: usize| {
+                let (from, to) = (piece[i], piece[(i + 1) % piece.len()]);
+                let is_side = (from + 1) % self.points.len() == to;
+                if is_side { self.normals[from] } else { DVec3::ZERO }
+            };
+            let normals: Vec<DVec3> = (0..piece.len()).map(across).collect();
+            let is_edge = |i: usize, k: usize| (self.is_edge)(piece[i], piece[k]);
+            let part = Loop { points: &points, normals: &normals, is_edge: &is_edge };
+            let named = |t: [u32; 3]| t.map(|corner| piece[corner as usize] as u32);
+            triangles.extend(part.minimum_weight().into_iter().map(named));
+        }
+        triangles
+    }
+
+    /// The shortest chord with at least a quarter of the piece on either side, among at most a
+    /// million chords that are evenly chosen.
+    fn short_chord(&self, piece: &[usize]) -> (usize, usize) {
+        let n = piece.len();
+        let every = n.div_ceil(CHORDS);
+        let mut best = (f64::INFINITY, 0, n / 2);
+        for i in (0..n / 2).step_by(every) {
+            for k in (i + n / 4..(i + n - n / 4).min(n)).step_by(every) {
+                let length = self.points[piece[i]].distance_squared(self.points[piece[k]]);
+                if length < best.0 && !(self.is_edge)(piece[i], piece[k]) {
+                    best = (length, i, k);
+                }
+            }
+        }
+        (best.1, best.2)
     }
 
     /// Cuts off one triangle after the other, always the one of least weight. Time n log n.
@@ -263,6 +310,7 @@ mod tests {
             prop_assert!(weight(&of, &found).fold >= least_fold);
             prop_assert!(area(&found) > 0.0);
             prop_assert_eq!(of.ears().len(), n - 2);
+            prop_assert_eq!(of.pieces(4).len(), n - 2);
         }
     }
 
@@ -295,7 +343,7 @@ mod tests {
         let points =
             [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| DVec3::new(x, y, 0.0));
         let of = Loop { points: &points, normals: &normals, is_edge: &|_, _| false };
-        for triangles in [of.minimum_weight(), of.ears()] {
+        for triangles in [of.minimum_weight(), of.ears(), of.pieces(4)] {
             assert_eq!(weight(&of, &triangles).flaws, 0, "{triangles:?}");
         }
     }
