@@ -6,7 +6,8 @@ use pyo3::types::PyString;
 use serde::Serialize;
 use tesdf::asset::about::Source;
 use tesdf::mesh::{
-    RepairMode, RepairOptions, RepairReport, ShellOrientation, SolidMesh, TriangleMesh, closing_tolerance, read,
+    RepairMode, RepairOptions, RepairReport, ShellOrientation, SolidMesh, TriangleMesh, closing_tolerance,
+    read,
 };
 
 use crate::arrays::{self, Rows};
@@ -152,7 +153,9 @@ fn largest_hole(any: Option<&Bound<'_, PyAny>>) -> PyResult<Option<u32>> {
     }
     match any.extract::<u32>() {
         Ok(edges) if edges >= 3 => Ok(Some(edges)),
-        _ => Err(argument("fill_holes", any.str()?.to_string(), "True, False or a number of edges, 3 or more")),
+        _ => {
+            Err(argument("fill_holes", any.str()?.to_string(), "True, False or a number of edges, 3 or more"))
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use tesdf::mesh::{CheckReport, LoadReport, Topology, TriangleMesh, check, repair_auto};
+use tesdf::mesh::{CheckReport, DefectKind, LoadReport, Topology, TriangleMesh, check, repair_auto};
 
 use tesdf_terminal::mesh_file;
 use tesdf_terminal::report::{self, Failure, Outcome};
@@ -34,55 +34,62 @@ struct Report<'a> {
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let loaded = mesh_file::read(&args.mesh)?;
     let found = check(&loaded.mesh);
-    let command = (!found.encodable).then(|| suggestion(&args.mesh, &loaded.mesh));
+    let way = suggestion(&args.mesh, &loaded.mesh, &found);
     if args.json {
         let file = args.mesh.display().to_string();
-        let suggestion = command.as_ref().map(|found| found.command.clone());
+        let suggestion = way.as_ref().map(|way| way.command.clone());
         report::json(&Report { file, load: &loaded.report, check: &found, suggestion })?;
     } else {
         let text = mesh_file::describe(&args.mesh, &loaded.report);
         report::text(&format!("{text}{found}\n"))?;
     }
-    let Some(command) = command else { return Ok(Outcome::Good) };
-    report::hint(&command.text());
+    if found.encodable {
+        return Ok(Outcome::Good);
+    }
+    report::hint(&next(way.as_ref()));
     Ok(Outcome::NotGood)
 }
 
 /// A way on for a mesh that cannot be encoded as it is.
-struct Suggestion {
+pub struct Suggestion {
     command: String,
     /// Whether the command repairs the mesh.
     repairs: bool,
 }
 
-impl Suggestion {
-    fn text(&self) -> String {
-        match self.repairs {
-            true => format!("{} makes it encodable", self.command),
-            false => format!("no repair makes it encodable; {} encodes it as it is", self.command),
+/// What to do with a mesh that cannot be encoded.
+pub fn next(way: Option<&Suggestion>) -> String {
+    match way {
+        Some(Suggestion { command, repairs: true }) => format!("{command} makes it encodable"),
+        Some(Suggestion { command, repairs: false }) => {
+            format!("no repair makes it encodable; {command} encodes it as it is")
         }
+        None => "no repair makes it encodable; scale or move it in the program that made it".into(),
     }
 }
 
-/// What to do with a mesh that cannot be encoded.
-pub fn next(path: &Path, mesh: &TriangleMesh) -> String {
-    suggestion(path, mesh).text()
-}
-
-/// The repair that makes the mesh encodable, or the rule for its inside that takes it as it is.
-fn suggestion(path: &Path, mesh: &TriangleMesh) -> Suggestion {
+/// The repair that makes a mesh encodable, or the rule for its inside that takes it as it is.
+/// `None` when it is encodable, or no rule takes it.
+pub fn suggestion(path: &Path, mesh: &TriangleMesh, found: &CheckReport) -> Option<Suggestion> {
+    let out_of_range = found.defects.iter().any(|defect| defect.kind == DefectKind::OutOfRange);
+    if found.encodable || out_of_range {
+        return None;
+    }
     let (name, stem) = (path.display(), path.with_extension(""));
     let stem = stem.file_name().unwrap_or_default().display();
     let repaired = repair_auto(mesh).ok().flatten().and_then(|found| found.options);
+    let rule = match found.winding {
+        Some([0, 0]) => "sheet --thickness T",
+        Some(_) => "nonzero",
+        None if Topology::new(mesh.faces()).is_closed() => "nonzero",
+        None => "generalized",
+    };
     let command = match repaired {
         Some(options) if path.extension().is_some_and(|e| e == "ply") => {
             format!("tesdf repair {name} -o {stem}-repaired.ply{options}")
         }
         Some(options) => format!("tesdf repair {name} -o {stem}.ply{options}"),
-        None if Topology::new(mesh.faces()).is_closed() => {
-            format!("tesdf encode {name} -o {stem}.tesdf --inside nonzero")
-        }
-        None => format!("tesdf encode {name} -o {stem}.tesdf --inside generalized"),
+        None => format!("tesdf encode {name} -o {stem}.tesdf --inside {rule}"),
     };
-    Suggestion { command, repairs: repaired.is_some() }
+    Some(Suggestion { command, repairs: repaired.is_some() })
 }

@@ -41,8 +41,8 @@ pub struct Args {
     /// of MAX: no limit]
     #[arg(long, value_name = "MAX", num_args = 0..=1, default_missing_value = "all", value_parser = edges)]
     pub fill_holes: Option<u32>,
-    /// Replace shells that overlap by their outer hull: not built in; the message says what to do
-    /// instead
+    /// Replace shells that overlap by the surface of their union: tesdf cannot do this; the message
+    /// says what to do instead
     #[arg(long)]
     pub union: bool,
     /// Print the result as JSON
@@ -78,7 +78,9 @@ pub fn edges(text: &str) -> Result<u32, String> {
     match text.parse() {
         _ if text == "all" => Ok(u32::MAX),
         Ok(edges) if edges >= 3 => Ok(edges),
-        _ => Err("expected a number of edges, 3 or more, or nothing; give the mesh before this option".into()),
+        _ => {
+            Err("expected a number of edges, 3 or more, or nothing; give the mesh before this option".into())
+        }
     }
 }
 
@@ -127,9 +129,9 @@ impl Args {
 /// The mesh cannot be read or has no valid face, or the result cannot be written.
 pub fn run(args: &Args) -> Result<Outcome, Failure> {
     if args.union {
-        return Err(Failure::new("--union is not built in").hint(
-            "encode the mesh as it is: overlapping shells count as one solid, and only the distances inside it refer \
-             to inner walls; or unite the shells in the program that made the mesh",
+        return Err(Failure::new(format!("{}: --union: tesdf cannot unite shells", args.mesh.display())).hint(
+            "encode the mesh as it is: shells that overlap count as one solid, and only distances inside it refer to \
+             the walls within; or unite them in a program for solids, such as Manifold or Blender",
         ));
     }
     let output = output::open(&args.output, &files(&args.mesh), args.consent)?;
@@ -152,7 +154,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         report::text(&format!("{text}{found}\nwritten to {output}\n"))?;
     }
     if !found.encodable {
-        report::hint(&crate::check::next(&args.mesh, &loaded.mesh));
+        let as_read = check(&loaded.mesh);
+        report::hint(&crate::check::next(
+            crate::check::suggestion(&args.mesh, &loaded.mesh, &as_read).as_ref(),
+        ));
         return Ok(Outcome::NotGood);
     }
     if !format.is_exact() {

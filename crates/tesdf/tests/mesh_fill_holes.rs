@@ -259,7 +259,8 @@ fn one_sided_surfaces_are_left_alone() {
         .collect();
     // The strip closes with a half turn: vertex 10 is vertex 1, vertex 11 is vertex 0.
     let id = |i: u32| if i < 10 { i } else { 11 - i };
-    let faces = (0..10).map(|i| if i % 2 == 0 { [id(i), id(i + 1), id(i + 2)] } else { [id(i + 1), id(i), id(i + 2)] });
+    let faces = (0..10)
+        .map(|i| if i % 2 == 0 { [id(i), id(i + 1), id(i + 2)] } else { [id(i + 1), id(i), id(i + 2)] });
     let strip = TriangleMesh::new(vertices, faces.collect()).unwrap();
     let found = filled(&strip);
     assert_eq!(found.mesh.faces().len(), 10);

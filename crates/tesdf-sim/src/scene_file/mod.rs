@@ -13,6 +13,7 @@
 //! [[bodies]]
 //! name = "nut"
 //! mesh = "nut.obj"             # metres; encoded when the scene is loaded; or asset = "nut.tesdf"
+//! repair = "auto"              # repairs the mesh first, if it needs it; the default is "never"
 //! density = 7850               # kg/m³; or mass = 0.1
 //! translation = [0, 0, 0.05]   # of the mesh's origin; rotation = [x, y, z, w]
 //!

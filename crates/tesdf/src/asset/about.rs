@@ -72,7 +72,8 @@ impl fmt::Display for Repair {
 impl From<&AutoRepaired> for Repair {
     fn from(found: &AutoRepaired) -> Self {
         let report = &found.repaired.report;
-        let dropped = [report.collapsed_faces.len(), report.duplicate_faces.len(), report.vanished_faces.len()];
+        let dropped =
+            [report.collapsed_faces.len(), report.duplicate_faces.len(), report.vanished_faces.len()];
         Self {
             flags: found.options.map_or(String::new(), |options| options.to_string().trim_start().into()),
             welded_vertices: report.welded_vertices.len(),

@@ -21,7 +21,8 @@ pub use read::{
 };
 pub use repair::{
     AutoRepaired, FillMethod, FilledHole, HoleLeft, LeftReason, RepairError, RepairMode, RepairOptions,
-    RepairReport, Repaired, ShellOrientation, SplitEdge, UnknownRepair, closing_tolerance, repair, repair_auto,
+    RepairReport, Repaired, ShellOrientation, SplitEdge, UnknownRepair, closing_tolerance, repair,
+    repair_auto,
 };
 pub use solid::{NotSolid, ReadSolidError, SolidMesh};
 pub use topology::{Edge, EdgeUse, Topology};

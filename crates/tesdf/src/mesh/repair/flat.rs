@@ -257,8 +257,9 @@ mod tests {
     use super::*;
 
     fn square(center: [f64; 2], half: f64, clockwise: bool) -> Vec<DVec3> {
-        let mut corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
-            .map(|[x, y]| DVec3::new(center[0] + half * x, center[1] + half * y, 0.5 * (center[0] + half * x)));
+        let mut corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| {
+            DVec3::new(center[0] + half * x, center[1] + half * y, 0.5 * (center[0] + half * x))
+        });
         if clockwise {
             corners.reverse();
         }

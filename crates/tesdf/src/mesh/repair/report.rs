@@ -141,7 +141,9 @@ impl fmt::Display for LeftReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::TooManyEdges => "more edges than were to be filled",
-            Self::OneSided => "the surface is one-sided, as a Moebius strip is: no filling gives it an inside",
+            Self::OneSided => {
+                "the surface is one-sided, as a Moebius strip is: no filling gives it an inside"
+            }
         })
     }
 }

@@ -1,6 +1,9 @@
 //! Finds the weld tolerance that closes the cracks of a mesh.
 use super::{RepairOptions, join, orient::agree, split::open_lengths};
-use crate::mesh::{Topology, TriangleMesh};
+use crate::{
+    mesh::{Topology, TriangleMesh},
+    parallel::*,
+};
 
 /// The tolerances that are tried, relative to the diagonal.
 const TRIED: [f64; 7] = [1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 3e-5, 1e-4];
@@ -26,18 +29,19 @@ pub fn closing_tolerance(mesh: &TriangleMesh) -> Option<f64> {
         return None;
     }
     let tolerances = TRIED.map(|share| two_digits(share * mesh.diagonal()));
-    let welded = |tolerance: f64| {
-        let options = RepairOptions { weld_tolerance: Some(tolerance), ..RepairOptions::DEFAULT };
+    let welded = |tolerance: &f64| {
+        let options = RepairOptions { weld_tolerance: Some(*tolerance), ..RepairOptions::DEFAULT };
         open_length(mesh, &options)
     };
+    let lengths = |tolerances: &[f64]| -> Vec<Option<f64>> { tolerances.par_iter().map(welded).collect() };
     // A mesh without cracks ends here, after two attempts.
-    let closes = |tolerance: &f64| welded(*tolerance).is_some_and(|l| l < without * (1.0 - NOTHING));
-    if !PROBED.iter().any(|&k| closes(&tolerances[k])) {
+    let closes = |length: Option<f64>| length.is_some_and(|l| l < without * (1.0 - NOTHING));
+    if !lengths(&PROBED.map(|k| tolerances[k])).into_iter().any(closes) {
         return None;
     }
     let mut found: Vec<(f64, f64)> = Vec::with_capacity(TRIED.len());
-    for tolerance in tolerances {
-        match welded(tolerance) {
+    for (tolerance, length) in tolerances.into_iter().zip(lengths(&tolerances)) {
+        match length {
             Some(0.0) => return Some(tolerance),
             // Nothing is left of the mesh with this tolerance, and with larger ones.
             None => break,

@@ -51,10 +51,7 @@ impl Weight {
 
     fn order(&self, other: &Self) -> Ordering {
         let floats = |a: f64, b: f64| a.total_cmp(&b);
-        self.flaws
-            .cmp(&other.flaws)
-            .then(floats(self.fold, other.fold))
-            .then(floats(self.area, other.area))
+        self.flaws.cmp(&other.flaws).then(floats(self.fold, other.fold)).then(floats(self.area, other.area))
     }
 }
 
