@@ -1,13 +1,17 @@
 //! Runs `check` and `repair` on arbitrary meshes. A repair must not add errors to a mesh without
 //! errors. The only exception is a mesh that is thinner than the tolerance for T-junctions: nothing
-//! of it may remain.
+//! of it may remain. Filled meshes are closed where no surface is one-sided, and what `repair_auto`
+//! finds is a solid.
 #![no_main]
 
 mod support;
 
 use libfuzzer_sys::arbitrary::Unstructured;
 use libfuzzer_sys::fuzz_target;
-use tesdf::mesh::{DefectKind, RepairOptions, Severity, SolidMesh, check, repair};
+use tesdf::mesh::{
+    DefectKind, RepairOptions, Severity, ShellOrientation, SolidMesh, Topology, check, closing_tolerance,
+    repair, repair_auto,
+};
 
 fuzz_target!(|data: &[u8]| {
     let mut bytes = Unstructured::new(data);
@@ -27,6 +31,21 @@ fuzz_target!(|data: &[u8]| {
             "repair of {mesh:?} made {:?}",
             after.defects
         );
+    }
+    for shells in [ShellOrientation::Separate, ShellOrientation::All] {
+        let options =
+            RepairOptions { shells, fill_holes: Some(bytes.arbitrary().unwrap_or(u32::MAX)), ..Default::default() };
+        if let Ok(filled) = repair(&mesh, &options) {
+            let closed = Topology::new(filled.mesh.faces()).is_closed();
+            assert!(
+                closed || !filled.report.holes_left.is_empty(),
+                "{options:?} left a hole in {mesh:?} and named none"
+            );
+        }
+    }
+    let _ = closing_tolerance(&mesh);
+    if let Ok(Some(found)) = repair_auto(&mesh) {
+        assert!(SolidMesh::new(found.repaired.mesh).is_ok(), "{:?} of {mesh:?}", found.options);
     }
     let _ = SolidMesh::new(mesh);
 });

@@ -10,6 +10,7 @@ use tesdf::encode::{
     Deformation, Domain, DomainChoice, EncodeChoices, Encoder, MethodChoice, Preset, Refinement, RuleChoice,
     Threshold,
 };
+use tesdf::mesh::RepairMode;
 use tesdf::{Progress, Stage};
 
 use crate::asset::Asset;
@@ -52,6 +53,10 @@ use crate::pool;
 /// - thickness: that of a sheet, in the mesh's unit.
 /// - surface: the faces to which distances refer: "all", or "boundary", the faces between inside and
 ///   outside.
+/// - repair: "auto" repairs a mesh without a well-defined inside before it is encoded: the first of
+///   these that makes it encodable, duplicates and T-junctions and orientation, welding of cracks,
+///   filling of holes. The asset records what was changed (asset.source.repair). None refuses such
+///   a mesh.
 /// - threads: number of threads; None is one per core. The bytes of the asset do not depend on it.
 /// - progress: called with the stage ("refine", "tighten", "assemble") and the completed fraction
 ///   of it, 0 to 1, about twenty times a second. An exception from it ends the encoding and is
@@ -64,7 +69,7 @@ use crate::pool;
 #[pyo3(signature = (
     mesh, preset = "default", *, domain = None, encoder = None, resolution = None, threshold = None, e_max = None,
     deformable = false, plain = false, band = None, regions = None, unit = None, inside = "winding", thickness = None,
-    surface = "all", threads = None, progress = None
+    surface = "all", repair = None, threads = None, progress = None
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn encode(
@@ -84,6 +89,7 @@ pub fn encode(
     inside: &str,
     thickness: Option<f64>,
     surface: &str,
+    repair: Option<&str>,
     threads: Option<NonZeroUsize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Asset> {
@@ -104,6 +110,11 @@ pub fn encode(
         surface: named_surface(surface)?,
     };
     let options = choices.options().map_err(|e| Error::Choice(e).raise(py))?;
+    let repair = match repair {
+        None => RepairMode::Never,
+        Some("auto") => RepairMode::Auto,
+        Some(other) => return Err(argument("repair", format!("'{other}'"), "'auto' or None")),
+    };
 
     let input = MeshInput::new(mesh)?;
     let pool = pool::of(threads).map_err(|e| e.raise(py))?;
@@ -112,7 +123,7 @@ pub fn encode(
         pool.install(|| {
             let loaded = input.load()?;
             let of_file = loaded.unit.clone();
-            let (solid, path, source) = loaded.solid(options.inside)?;
+            let (solid, path, source) = loaded.solid(options.inside, repair)?;
             let tetrahedra = choices.tetrahedra(&solid, &state).map_err(Error::Domain)?;
             let domain = tetrahedra.as_ref().map_or(Domain::Bisection, Domain::Conforming);
             Encoder::new()

@@ -6,7 +6,10 @@ use pyo3::types::PyString;
 use serde::Serialize;
 use tesdf::asset::about::Source;
 use tesdf::base::Inside;
-use tesdf::mesh::{RepairOptions, RepairReport, SolidMesh, TriangleMesh, read, source_blake3};
+use tesdf::mesh::{
+    RepairMode, RepairOptions, RepairReport, ShellOrientation, SolidMesh, TriangleMesh, closing_tolerance,
+    read, source_blake3,
+};
 
 use crate::arrays::{self, Rows};
 use crate::errors::{Error, argument, kind_of};
@@ -99,10 +102,19 @@ impl MeshInput {
 }
 
 impl Loaded {
-    /// Checks that the mesh is a solid under a rule. Returns it with the path and the source.
-    pub fn solid(self, inside: Inside) -> Result<(SolidMesh, Option<PathBuf>, Source), Error> {
-        match SolidMesh::with_inside(self.mesh, inside) {
-            Ok(solid) => Ok((solid, self.path, self.source)),
+    /// Checks that the mesh is a solid under a rule, or makes it one. Returns it with the path and
+    /// the source, which says what was changed.
+    pub fn solid(
+        self,
+        inside: Inside,
+        repair: RepairMode,
+    ) -> Result<(SolidMesh, Option<PathBuf>, Source), Error> {
+        let found = match repair {
+            RepairMode::Never => SolidMesh::with_inside(self.mesh, inside).map(|solid| (solid, None)),
+            RepairMode::Auto => SolidMesh::repaired(self.mesh, inside),
+        };
+        match found {
+            Ok((solid, changes)) => Ok((solid, self.path, self.source.repaired(changes.as_ref()))),
             Err(e) => Err(Error::NotSolid(self.path, e)),
         }
     }
@@ -153,26 +165,71 @@ pub fn check<'py>(py: Python<'py>, mesh: &Bound<'py, PyAny>) -> PyResult<Bound<'
     classes::report(py, "CheckReport", &classes::Checked::of(&report, &notes))
 }
 
-/// Makes a mesh encodable where the repair is unique, and reports every change.
+/// A weld tolerance: a length, or "auto".
+enum Weld {
+    Within(Option<f64>),
+    Auto,
+}
+
+fn weld(any: Option<&Bound<'_, PyAny>>) -> PyResult<Weld> {
+    let Some(any) = any else { return Ok(Weld::Within(None)) };
+    if let Ok(text) = any.cast::<PyString>() {
+        return match &*text.to_cow()? {
+            "auto" => Ok(Weld::Auto),
+            text => Err(argument("weld_tolerance", format!("'{text}'"), "a length, None or 'auto'")),
+        };
+    }
+    any.extract().map(|length| Weld::Within(Some(length)))
+}
+
+/// The largest number of edges of a hole that is filled: `True` stands for all holes.
+fn largest_hole(any: Option<&Bound<'_, PyAny>>) -> PyResult<Option<u32>> {
+    let Some(any) = any else { return Ok(None) };
+    if let Ok(all) = any.extract::<bool>() {
+        return Ok(all.then_some(u32::MAX));
+    }
+    match any.extract::<u32>() {
+        Ok(edges) if edges >= 3 => Ok(Some(edges)),
+        _ => {
+            Err(argument("fill_holes", any.str()?.to_string(), "True, False or a number of edges, 3 or more"))
+        }
+    }
+}
+
+/// Makes a mesh encodable, and reports every change. Without keywords, it changes a mesh only where
+/// the repair is unique.
 ///
 /// mesh: as for check. weld_tolerance: maximum distance of vertices that are merged, in the mesh's
-/// unit; None merges none.
+/// unit; "auto" is the smallest of 1e-7 to 1e-4 of the diagonal that closes the cracks; None merges
+/// none. orient: turns all closed shells outward, or inward if they are cavities, also shells that
+/// meet others. fill_holes: True fills all holes with triangles between their vertices, a number
+/// only holes with at most this number of edges.
 ///
 /// Returns Repaired(vertices, faces, report). A mesh that cannot be encoded after the repair is not
 /// an error: the report gives the reason. Raises OSError or MeshError if the mesh cannot be read or
 /// no face remains.
 #[pyfunction]
-#[pyo3(signature = (mesh, *, weld_tolerance = None))]
+#[pyo3(signature = (mesh, *, weld_tolerance = None, orient = false, fill_holes = None))]
 pub fn repair<'py>(
     py: Python<'py>,
     mesh: &Bound<'py, PyAny>,
-    weld_tolerance: Option<f64>,
+    weld_tolerance: Option<&Bound<'py, PyAny>>,
+    orient: bool,
+    fill_holes: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let input = MeshInput::new(mesh)?;
-    let options = RepairOptions { weld_tolerance, ..RepairOptions::DEFAULT };
+    let (weld, fill_holes) = (weld(weld_tolerance)?, largest_hole(fill_holes)?);
+    let shells = if orient { ShellOrientation::All } else { ShellOrientation::Separate };
     let found = py.detach(|| {
         let Loaded { mesh, path, notes, .. } = input.load()?;
-        let repaired = pool::shared()?.install(|| tesdf::mesh::repair(&mesh, &options));
+        let repaired = pool::shared()?.install(|| {
+            let weld_tolerance = match weld {
+                Weld::Within(length) => length,
+                Weld::Auto => closing_tolerance(&mesh),
+            };
+            let options = RepairOptions { weld_tolerance, shells, fill_holes, ..RepairOptions::DEFAULT };
+            tesdf::mesh::repair(&mesh, &options)
+        });
         Ok((repaired.map_err(|e| Error::Repair(path, e))?, notes))
     });
     let (repaired, notes) = found.map_err(|e: Error| e.raise(py))?;

@@ -32,7 +32,13 @@ def polygons(
     points: npt.ArrayLike, counts: npt.ArrayLike, corners: npt.ArrayLike
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32], tuple[str, ...]]: ...
 def check(mesh: _Mesh) -> CheckReport: ...
-def repair(mesh: _Mesh, *, weld_tolerance: float | None = None) -> Repaired: ...
+def repair(
+    mesh: _Mesh,
+    *,
+    weld_tolerance: float | Literal["auto"] | None = None,
+    orient: bool = False,
+    fill_holes: bool | int | None = None,
+) -> Repaired: ...
 def encode(
     mesh: _Mesh,
     preset: Literal["default", "fast", "compact", "gpu", "paper", "sampled-safe"] = "default",
@@ -50,6 +56,7 @@ def encode(
     inside: Literal["winding", "nonzero", "odd", "generalized", "sheet"] = "winding",
     thickness: float | None = None,
     surface: Literal["all", "boundary"] = "all",
+    repair: Literal["auto"] | None = None,
     threads: int | None = None,
     progress: Callable[[str, float], object] | None = None,
 ) -> Asset: ...

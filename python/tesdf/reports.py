@@ -83,6 +83,29 @@ class SplitEdge:
 
 
 @dataclass(frozen=True)
+class FilledHole:
+    """A hole that was filled with triangles between its vertices."""
+
+    loops: tuple[tuple[int, ...], ...]
+    """vertices around the hole; a flat hole may have islands, whose loops follow that of its
+    outline"""
+    faces: int
+    """number of triangles"""
+    area: float
+    method: str
+    """"flat", "minimum-weight", "pieces" or "ears" """
+
+
+@dataclass(frozen=True)
+class HoleLeft:
+    """A hole that was to be filled, and stays open."""
+
+    vertices: tuple[int, ...]
+    reason: str
+    """"too-many-edges", or "one-sided" for a surface like a Moebius strip"""
+
+
+@dataclass(frozen=True)
 class RepairReport:
     """All changes of `repair`, in their order. Ids refer to the given mesh; in `remaining` and
     `warnings` to the result.
@@ -90,6 +113,8 @@ class RepairReport:
     Its text has the lines of `tesdf repair`.
     """
 
+    weld_tolerance: Optional[float]
+    """None if vertices were not merged by a tolerance"""
     welded_vertices: tuple[tuple[int, int], ...]
     """merged vertices, each with the vertex that replaces it"""
     collapsed_faces: tuple[int, ...]
@@ -102,6 +127,10 @@ class RepairReport:
     reversed_faces: tuple[int, ...]
     crossing_shells: tuple[tuple[int, int], ...]
     """shells that intersect others and keep their orientation: one face of each of two shells"""
+    paired_edges: tuple[tuple[int, int], ...]
+    """edges with more than two faces, which were paired by their angle"""
+    filled_holes: tuple[FilledHole, ...]
+    holes_left: tuple[HoleLeft, ...]
     unused_vertices: int
     """number of vertices that were removed because no face uses them"""
     encodable: bool
@@ -142,11 +171,28 @@ class Certificate:
 
 
 @dataclass(frozen=True)
+class Repair:
+    """A repair of a mesh before it was encoded."""
+
+    flags: str
+    """the flags of `tesdf repair` that make the same changes"""
+    welded_vertices: int
+    dropped_faces: int
+    split_edges: int
+    reversed_faces: int
+    filled_holes: int
+    filled_area: float
+    """in the mesh's unit, squared"""
+
+
+@dataclass(frozen=True)
 class Source:
     """The file that a mesh was read from; empty for a mesh from memory."""
 
     name: str
     blake3: str
+    repair: Optional[Repair] = None
+    """what a repair changed between the file and the mesh"""
 
 
 @dataclass(frozen=True)

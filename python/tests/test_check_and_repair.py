@@ -48,6 +48,40 @@ def test_repair():
     assert "face reversed" in str(report) and str(report).endswith("ok: encodable")
 
 
+def test_holes_are_filled():
+    open_mesh = (VERTICES, FACES[:3])
+    assert not tesdf.repair(open_mesh).report.encodable
+    vertices, faces, report = tesdf.repair(open_mesh, fill_holes=True, orient=True)
+    assert report.encodable and len(faces) == 4
+    (hole,) = report.filled_holes
+    assert isinstance(hole, reports.FilledHole) and hole.method == "flat" and hole.faces == 1
+    assert len(hole.loops) == 1 and len(hole.loops[0]) == 3 and hole.area == pytest.approx(0.5)
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    (left,) = tesdf.repair((square, [[0, 1, 2], [0, 2, 3]]), fill_holes=3).report.holes_left
+    assert left == reports.HoleLeft(vertices=left.vertices, reason="too-many-edges") and len(left.vertices) == 4
+    for wrong in (2, "all", -1):
+        with pytest.raises(ValueError, match="fill_holes: "):
+            tesdf.repair(open_mesh, fill_holes=wrong)
+
+
+def test_encoding_repairs_if_asked():
+    with pytest.raises(tesdf.NotSolidError, match="--fill-holes` makes it encodable"):
+        tesdf.encode((VERTICES, FACES[:3]))
+    asset = tesdf.encode((VERTICES, FACES[:3]), repair="auto")
+    assert asset.source.repair == reports.Repair("--fill-holes", 0, 0, 0, 0, 1, pytest.approx(0.5))
+    assert tesdf.encode(TETRAHEDRON, repair="auto").source.repair is None
+    with pytest.raises(ValueError, match="repair: 'always'; expected 'auto' or None"):
+        tesdf.encode(TETRAHEDRON, repair="always")
+
+
+def test_the_weld_tolerance_is_found():
+    corners = VERTICES[FACES].reshape(-1, 3) + np.random.default_rng(1).uniform(-1e-6, 1e-6, (12, 3))
+    repaired = tesdf.repair((corners, np.arange(12).reshape(-1, 3)), weld_tolerance="auto")
+    assert repaired.report.encodable and 1e-6 < repaired.report.weld_tolerance < 2e-5
+    with pytest.raises(ValueError, match="weld_tolerance: 'some'"):
+        tesdf.repair(TETRAHEDRON, weld_tolerance="some")
+
+
 def test_weld_tolerance():
     corners = VERTICES[FACES].reshape(-1, 3) + np.random.default_rng(1).uniform(-1e-9, 1e-9, (12, 3))
     soup = (corners, np.arange(12).reshape(-1, 3))

@@ -5,11 +5,13 @@ use std::time::Instant;
 
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
-use tesdf::asset::about::{Source, Statistics};
-use tesdf::base::unit;
+use tesdf::asset::about::{Repair, Source, Statistics};
+use tesdf::base::{Inside, unit};
 use tesdf::domain::tetrahedra_files;
 use tesdf::encode::{Domain, DomainChoice, EncodeChoices, EncodeOptions, Encoder, Method};
-use tesdf::mesh::{Defect, LoadReport, LoadedMesh, Severity, SolidMesh};
+use tesdf::mesh::{
+    AutoRepaired, Defect, LoadReport, LoadedMesh, NotSolid, RepairReport, Severity, SolidMesh, TriangleMesh,
+};
 use tesdf::{Certificate, Progress, TeSdf};
 
 use tesdf_terminal::device::{self, Choice};
@@ -25,7 +27,7 @@ mod split;
 
 use crate::encode_all::Batch;
 use crate::encode_all::meshes::Mesh;
-pub use choices::{ChoiceArgs, EncoderChoice, Preset};
+pub use choices::{ChoiceArgs, EncoderChoice, Preset, RepairChoice};
 
 const ENCODED_HELP: &str = "Mesh file: STL, OBJ, PLY, OFF, glTF, GLB, 3MF, or STEP, IGES, BREP by the program Gmsh; or a \
                             robot description, URDF or MJCF, whose collision meshes are all encoded";
@@ -90,6 +92,8 @@ struct Report<'a> {
     output: String,
     load: &'a LoadReport,
     warnings: &'a [Defect],
+    /// All changes of `--repair auto`; `null` when nothing was repaired.
+    repair: Option<&'a RepairReport>,
     bytes: usize,
     bytes_per_face: f64,
     seconds: f64,
@@ -128,13 +132,17 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let at = |e: &dyn std::fmt::Display| Failure::new(format!("{}: {e}", args.mesh.display()));
     let choices = args.choices.choices();
     let options = choices.options().map_err(Failure::new)?.or_unit(load.unit.as_deref());
-    let solid = pool.install(|| SolidMesh::with_inside(mesh, options.inside)).map_err(|e| at(&e))?;
+    let (solid, repaired) =
+        pool.install(|| solid(mesh, options.inside, args.choices.repair)).map_err(|e| at(&e))?;
     load.notes.iter().for_each(|note| report::warning(note));
     let conflict = unit::conflict(load.unit.as_deref(), args.choices.unit.as_deref());
     conflict.iter().for_each(|found| report::warning(found));
+    if let Some(found) = &repaired {
+        report::note(&format!("repaired {}", Repair::from(found)));
+    }
     warn(solid.warnings());
 
-    let source = Source::of_file(&args.mesh, load.source_blake3.clone());
+    let source = Source::of_file(&args.mesh, load.source_blake3.clone()).repaired(repaired.as_ref());
     let interrupted = interrupt_flag()?;
     let progress = Progress::default();
     if options.method == Method::Certified && args.device != Choice::Processor {
@@ -154,8 +162,24 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let asset = encoded?;
     output::write(&output, &asset.to_bytes().map_err(Failure::new)?)?;
     let seconds = start.elapsed().as_secs_f64();
-    print(args, &load, solid.warnings(), &asset, seconds)?;
+    let repair = repaired.as_ref().map(|found| &found.repaired.report);
+    print(args, &Before { load: &load, warnings: solid.warnings(), repair }, &asset, seconds)?;
     Ok(Outcome::Good)
+}
+
+/// The solid of a mesh, and the changes if it was repaired.
+///
+/// # Errors
+/// The mesh has no well-defined inside, and no repair was asked for or none works.
+pub(crate) fn solid(
+    mesh: TriangleMesh,
+    inside: Inside,
+    repair: Option<RepairChoice>,
+) -> Result<(SolidMesh, Option<AutoRepaired>), NotSolid> {
+    match repair {
+        None => Ok((SolidMesh::with_inside(mesh, inside)?, None)),
+        Some(RepairChoice::Auto) => SolidMesh::repaired(mesh, inside),
+    }
 }
 
 /// Encodes the solid of the mesh file `path` in the domain of `choices`. The error message names the
@@ -226,24 +250,27 @@ fn warn(defects: &[Defect]) {
     }
 }
 
-fn print(
-    args: &Args,
-    load: &LoadReport,
-    warnings: &[Defect],
-    asset: &TeSdf,
-    seconds: f64,
-) -> Result<(), Failure> {
+/// What was found and changed before the encoding.
+struct Before<'a> {
+    load: &'a LoadReport,
+    warnings: &'a [Defect],
+    repair: Option<&'a RepairReport>,
+}
+
+fn print(args: &Args, before: &Before, asset: &TeSdf, seconds: f64) -> Result<(), Failure> {
     let about = asset.about();
     let statistics = &about.statistics;
     let bytes = asset.as_bytes().len();
     let bytes_per_face = bytes as f64 / statistics.faces as f64;
     let [file, output] = [&args.mesh, &args.output].map(|path| path.display().to_string());
     if args.json {
+        let &Before { load, warnings, repair } = before;
         return report::json(&Report {
             file,
             output,
             load,
             warnings,
+            repair,
             bytes,
             bytes_per_face,
             seconds,

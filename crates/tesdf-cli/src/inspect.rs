@@ -2,7 +2,7 @@
 use std::path::PathBuf;
 
 use serde::Serialize;
-use tesdf::asset::about::{Source, Statistics};
+use tesdf::asset::about::{Repair, Source, Statistics};
 use tesdf::encode::EncodeOptions;
 use tesdf::inspect::{InspectOptions, Inspection, inspect};
 use tesdf::{Certificate, Length};
@@ -87,6 +87,7 @@ fn rows(report: &Report) -> Vec<(String, String)> {
     let mut rows: Vec<(&str, String)> = vec![
         ("file", format!("{}, format version {}", report.file, report.format_version)),
         ("source", if source.name.is_empty() { "made in memory".into() } else { source.name.clone() }),
+        ("repaired", source.repair.as_ref().map_or("no".into(), Repair::to_string)),
         ("source BLAKE3", if source.blake3.is_empty() { "-".into() } else { source.blake3.clone() }),
         ("unit", report.unit.unwrap_or("not given").into()),
         ("", String::new()),

@@ -33,12 +33,136 @@ fn a_hole_exits_with_1_and_names_its_edges() {
     assert_eq!(code, Some(1), "{err}");
     assert!(out.contains("error: edge 0-1 is open: only face "), "{out}");
     assert!(out.contains("boundary loop 0: 4 edges, length 8"), "{out}");
-    assert!(err.starts_with("hint: the mesh cannot be repaired without guessing"), "{err}");
-    assert!(err.contains("tesdf repair open.obj -o FILE.ply --weld-tolerance T"), "{err}");
+    assert_eq!(err, "hint: tesdf repair open.obj -o open.ply --fill-holes makes it encodable\n");
+    let (_, out, _) = folder.tesdf(&["check", "open.obj", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["suggestion"], "tesdf repair open.obj -o open.ply --fill-holes");
     let (code, out, err) = folder.tesdf(&["repair", "open.obj", "-o", "r.ply"]);
     assert_eq!(code, Some(1));
     assert!(out.contains("not encodable: 4 errors left"), "{out}");
-    assert!(err.contains("hint: --weld-tolerance T"), "{err}");
+    assert!(err.contains("hint: tesdf repair open.obj -o open.ply --fill-holes"), "{err}");
+}
+
+#[test]
+fn the_suggested_command_works() {
+    let folder = Folder::new();
+    folder.write("open.obj", format!("{VERTICES}{}", &FACES[10..]));
+    let near = "v 0 0 2.000003\nv 2 0 2.000003\nv 2 2 2.000003\nv 0 2 2.000003\n";
+    let crack = FACES.replace("f 5 6 7 8", "f 9 10 11 12");
+    folder.write("crack.obj", format!("{VERTICES}{near}{crack}"));
+    for file in ["open.obj", "crack.obj"] {
+        let (_, _, hint) = folder.tesdf(&["check", file]);
+        let command = hint.strip_prefix("hint: tesdf ").and_then(|h| h.split(" makes it").next()).unwrap();
+        let (code, out, err) = folder.tesdf(&command.split(' ').collect::<Vec<_>>());
+        assert_eq!((code, err.as_str()), (Some(0), ""), "{command}: {out}");
+        // `--auto` does the same.
+        let (code, same, _) = folder.tesdf(&["repair", file, "-o", "auto.ply", "--auto", "--json"]);
+        let json: serde_json::Value = serde_json::from_str(&same).unwrap();
+        assert_eq!(code, Some(0));
+        assert!(command.ends_with(json["flags"].as_str().unwrap()), "{command}: {same}");
+        let written = command.split(' ').nth(3).unwrap();
+        assert_eq!(
+            std::fs::read(folder.path("auto.ply")).unwrap(),
+            std::fs::read(folder.path(written)).unwrap()
+        );
+    }
+}
+
+#[test]
+fn holes_are_filled_and_named() {
+    let folder = Folder::new();
+    folder.write("open.obj", format!("{VERTICES}{}", &FACES[10..]));
+    let (code, out, err) = folder.tesdf(&["repair", "open.obj", "-o", "r.ply", "--fill-holes"]);
+    assert_eq!((code, err.as_str()), (Some(0), ""), "{out}");
+    assert!(out.contains("1 hole filled (0-based): 0 3 2 1 (4 edges, flat, area 4.000e0)\n"), "{out}");
+    let (code, out, _) = folder.tesdf(&["repair", "open.obj", "-o", "r.ply", "--json", "--fill-holes", "3"]);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!((code, &json["repair"]["filled_holes"]), (Some(1), &serde_json::json!([])));
+    assert_eq!(json["repair"]["holes_left"][0]["reason"], "too-many-edges");
+    let (code, _, err) = folder.tesdf(&["repair", "--fill-holes", "open.obj", "-o", "r.ply"]);
+    assert_eq!(code, Some(2));
+    assert!(err.contains("give the mesh before this option"), "{err}");
+}
+
+#[test]
+fn the_weld_tolerance_is_found_and_printed() {
+    let folder = Folder::new();
+    let near = "v 0 0 2.000003\nv 2 0 2.000003\nv 2 2 2.000003\nv 0 2 2.000003\n";
+    let faces = FACES.replace("f 5 6 7 8", "f 9 10 11 12");
+    folder.write("crack.obj", format!("{VERTICES}{near}{faces}"));
+    let args = ["repair", "crack.obj", "-o", "r.ply", "--weld-tolerance", "auto"];
+    let (code, out, err) = folder.tesdf(&args);
+    assert_eq!((code, err.as_str()), (Some(0), ""), "{out}");
+    assert!(out.contains("weld tolerance 3.5e-6\n4 vertices merged"), "{out}");
+    let (_, out, _) = folder.tesdf(&[&args[..], &["--json"]].concat());
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["repair"]["weld_tolerance"], 3.5e-6);
+}
+
+#[test]
+fn a_union_is_refused_with_what_to_do_instead() {
+    let folder = Folder::new();
+    folder.write("cube.obj", format!("{VERTICES}{FACES}"));
+    let (code, out, err) = folder.tesdf(&["repair", "cube.obj", "-o", "r.ply", "--union"]);
+    assert_eq!((code, out.as_str()), (Some(2), ""));
+    assert!(
+        err.contains("error: cube.obj: --union: ") && err.contains("hint: encode the mesh as it is"),
+        "{err}"
+    );
+    assert!(!folder.path("r.ply").exists());
+}
+
+#[test]
+fn a_mesh_is_repaired_while_it_is_encoded() {
+    let folder = Folder::new();
+    folder.write("open.obj", format!("{VERTICES}{}", &FACES[10..]));
+    let (code, _, err) = folder.tesdf(&["encode", "open.obj", "-o", "a.tesdf"]);
+    assert_eq!(code, Some(2));
+    assert!(err.contains("--fill-holes` makes it encodable, and so does `--repair auto`"), "{err}");
+    let encode = ["encode", "open.obj", "-o", "a.tesdf", "--repair", "auto"];
+    let (code, out, err) = folder.tesdf(&encode);
+    assert_eq!(code, Some(0), "{err}");
+    assert!(
+        err.contains("note: repaired as by `tesdf repair --fill-holes`; 1 hole filled, area 4.000e0"),
+        "{err}"
+    );
+    assert!(out.contains("12 faces"), "{out}");
+    let (_, out, _) = folder.tesdf(&["inspect", "a.tesdf"]);
+    assert!(out.contains("as by `tesdf repair --fill-holes`; 1 hole filled"), "{out}");
+    let (_, out, _) = folder.tesdf(&["inspect", "a.tesdf", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["source"]["repair"]["filled_holes"], 1);
+    assert_eq!(folder.tesdf(&["verify", "a.tesdf"]).0, Some(0));
+    let (_, out, _) = folder.tesdf(&[&encode[..], &["--json"]].concat());
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    assert_eq!(json["repair"]["filled_holes"][0]["faces"], 2);
+    // A mesh that needs no repair is encoded to the same bytes with the option.
+    folder.write("cube.obj", format!("{VERTICES}{FACES}"));
+    for (name, option) in [("plain.tesdf", &[][..]), ("auto.tesdf", &["--repair", "auto"])] {
+        assert_eq!(folder.tesdf(&[&["encode", "cube.obj", "-o", name][..], option].concat()).0, Some(0));
+    }
+    let bytes = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert_eq!(bytes("plain.tesdf"), bytes("auto.tesdf"));
+}
+
+#[test]
+fn many_meshes_are_repaired_while_they_are_encoded() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("meshes")).unwrap();
+    folder.write("meshes/open.obj", format!("{VERTICES}{}", &FACES[10..]));
+    folder.write("meshes/cube.obj", format!("{VERTICES}{FACES}"));
+    let all = ["encode-all", "meshes", "-o", "out"];
+    assert_eq!(folder.tesdf(&all).0, Some(1));
+    // With the option, all are there, and stay.
+    for _ in 0..2 {
+        let (code, _, err) = folder.tesdf(&[&all[..], &["--repair", "auto"]].concat());
+        assert_eq!(code, Some(0), "{err}");
+        let manifest = std::fs::read_to_string(folder.path("out/manifest.json")).unwrap();
+        let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+        assert_eq!(manifest["failed"], 0);
+        assert_eq!(manifest["meshes"][1]["repair"]["flags"], "--fill-holes");
+        assert!(manifest["meshes"][0].get("repair").is_none());
+    }
 }
 
 #[test]

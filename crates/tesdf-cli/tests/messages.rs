@@ -157,7 +157,8 @@ fn check_points_at_repair_where_it_helps() {
     for (file, expected) in [
         ("bad/flipped_all.obj", "makes it encodable"),
         ("bad/duplicate_faces.obj", "makes it encodable"),
-        ("bad/open_half.obj", "the mesh cannot be repaired without guessing"),
+        ("bad/open_half.obj", "--fill-holes makes it encodable"),
+        ("bad/huge_1e200.obj", "no repair makes it encodable; scale or move it"),
     ] {
         let (code, _, err) = folder.tesdf(&["check", &data(file)]);
         assert_eq!(code, Some(1), "{file}");

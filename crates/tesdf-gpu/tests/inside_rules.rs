@@ -33,7 +33,8 @@ fn scene(asset: TeSdf) -> Scene {
 #[test]
 fn kernels_refuse_rules_that_they_do_not_evaluate() {
     let open = Parts::default().open_cube(DVec3::ZERO, 1.0, Outward).mesh();
-    let overlap = Parts::default().cube(DVec3::ZERO, 1.0, Outward).cube(DVec3::splat(0.4), 1.0, Outward).mesh();
+    let overlap =
+        Parts::default().cube(DVec3::ZERO, 1.0, Outward).cube(DVec3::splat(0.4), 1.0, Outward).mesh();
     let boundary = Inside { rule: InsideRule::Winding, surface: SurfaceFaces::Boundary };
     for asset in [encode(open, InsideRule::Sheet { thickness: 0.1 }.into()), encode(overlap, boundary)] {
         let rule = asset.inside().rule.name();

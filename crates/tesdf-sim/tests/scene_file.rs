@@ -289,6 +289,36 @@ fn cubes(bodies: &str) -> (tempfile::TempDir, LoadedScene) {
 }
 
 #[test]
+fn a_mesh_is_repaired_if_the_body_says_so() {
+    let body = |repair: &str| {
+        format!("[[bodies]]\nname = \"a\"\nmesh = \"open.ply\"\n{repair}\ndensity = 1\nfixed = false\n")
+    };
+    let open = |text: &str| {
+        let (folder, loaded) = cubes(text);
+        let whole = tesdf::mesh::read(folder.path().join("cube.ply")).unwrap().mesh;
+        // The cube without its last side.
+        let faces = whole.faces()[..10].to_vec();
+        let open = TriangleMesh::new(whole.vertices().to_vec(), faces).unwrap();
+        write(folder.path().join("open.ply"), &open).unwrap();
+        loaded.system()
+    };
+    let system = open(&body("repair = \"auto\"")).unwrap();
+    let Mass::Free(mass) = system.bodies()[0].mass else { panic!("the body is fixed") };
+    assert!((mass.mass - 1.0).abs() < 1e-12, "the volume is that of the whole cube: {}", mass.mass);
+    for (repair, expected) in [
+        ("", "--fill-holes` makes it encodable"),
+        ("repair = \"never\"", "--fill-holes` makes it encodable"),
+        ("repair = \"always\"", "repair = 'always'; expected 'auto' or 'never'"),
+    ] {
+        let error = open(&body(repair)).expect_err("it has a hole").to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+    let asset = body("repair = \"auto\"").replace("mesh = \"open.ply\"", "asset = \"mm.tesdf\"");
+    let error = open(&asset).expect_err("it is encoded").to_string();
+    assert!(error.contains("the asset is encoded already"), "{error}");
+}
+
+#[test]
 fn a_mesh_of_a_thousand_bodies_is_loaded_once() {
     let bodies: String = (0..1000)
         .map(|k| {

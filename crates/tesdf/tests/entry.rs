@@ -26,7 +26,7 @@ fn encoding_a_file_equals_encoding_its_solid_and_records_the_file() {
     let by_hand = Encoder::new().source(source).encode(&solid).unwrap();
     assert!(asset.as_bytes() == by_hand.as_bytes());
     // The file replaces another source.
-    let other = Source { name: "another.stl".into(), blake3: String::new() };
+    let other = Source { name: "another.stl".into(), ..Source::default() };
     assert!(Encoder::new().source(other).encode_file(cube()).unwrap().as_bytes() == asset.as_bytes());
 }
 

@@ -26,7 +26,7 @@ fn ball() -> SolidMesh {
 fn small() -> TeSdf {
     let options =
         EncodeOptions { byte_worth: 0.5, band: Length::OfDiagonal(0.3), ..EncodeOptions::default() };
-    let source = Source { name: "ball.obj".into(), blake3: "0".repeat(64) };
+    let source = Source { name: "ball.obj".into(), blake3: "0".repeat(64), repair: None };
     Encoder::new().options(options).source(source.clone()).encode(&ball()).expect("valid options")
 }
 

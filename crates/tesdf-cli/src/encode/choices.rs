@@ -59,6 +59,11 @@ pub struct ChoiceArgs {
     /// Faces to which distances refer
     #[arg(long, value_enum, value_name = "FACES", default_value_t = SurfaceChoice::All)]
     pub surface: SurfaceChoice,
+    /// Repair a mesh without a well-defined inside as `tesdf repair --auto` does, before it is
+    /// encoded; what was changed is printed and recorded in the file [default: such a mesh is
+    /// refused]
+    #[arg(long, value_enum)]
+    pub repair: Option<RepairChoice>,
 }
 
 /// Rules that say what is inside.
@@ -105,6 +110,14 @@ impl From<SurfaceChoice> for SurfaceFaces {
             SurfaceChoice::Boundary => Self::Boundary,
         }
     }
+}
+
+/// Repairs before encoding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum RepairChoice {
+    /// The first that makes the mesh encodable: none, duplicates and T-junctions and orientation,
+    /// welding of cracks, filling of holes
+    Auto,
 }
 
 /// Methods that find the closest faces of a tetrahedron.

@@ -6,15 +6,15 @@ use std::time::Instant;
 
 use serde::Serialize;
 use tesdf::asset::FORMAT_VERSION;
-use tesdf::asset::about::Source;
+use tesdf::asset::about::{Repair, Source};
 use tesdf::encode::{DomainChoice, EncodeChoices, EncodeOptions, Encoder};
 use tesdf::glam::DAffine3;
-use tesdf::mesh::{LoadReport, LoadedMesh, MeshError, MeshFormat, SolidMesh, TriangleMesh};
+use tesdf::mesh::{LoadReport, LoadedMesh, MeshError, MeshFormat, TriangleMesh};
 use tesdf::save::save_atomic;
 use tesdf::{Certificate, Progress, TeSdf};
 
 use super::meshes::{Content, Mesh, Placed};
-use crate::encode::encode;
+use crate::encode::{ChoiceArgs, RepairChoice, encode, solid};
 use tesdf_terminal::asset_file;
 use tesdf_terminal::mesh_file::{self, CadArgs};
 use tesdf_terminal::report::Failure;
@@ -23,6 +23,7 @@ use tesdf_terminal::report::Failure;
 #[derive(Debug)]
 pub struct Job {
     choices: EncodeChoices,
+    repair: Option<RepairChoice>,
     options: EncodeOptions,
     cad: CadArgs,
     output: PathBuf,
@@ -60,6 +61,9 @@ pub struct Asset {
     pub bytes: u64,
     faces: usize,
     certificate: Certificate,
+    /// What `--repair auto` changed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    repair: Option<Repair>,
 }
 
 /// The asset that a mesh gets.
@@ -72,9 +76,10 @@ struct Expected {
 impl Job {
     /// # Errors
     /// The choices exclude each other.
-    pub fn new(choices: EncodeChoices, cad: CadArgs, output: &Path) -> Result<Self, Failure> {
+    pub fn new(args: &ChoiceArgs, cad: CadArgs, output: &Path) -> Result<Self, Failure> {
+        let choices = args.choices();
         let options = choices.options().map_err(Failure::new)?;
-        Ok(Self { choices, options, cad, output: output.to_path_buf() })
+        Ok(Self { choices, repair: args.repair, options, cad, output: output.to_path_buf() })
     }
 
     /// The options of the encoder.
@@ -139,10 +144,11 @@ impl Job {
             let found = format!("{} changed while it was read; encode it again", path.display());
             return Err(Failure::new(found));
         }
-        let solid = SolidMesh::with_inside(surface, self.options.inside)
+        let (solid, repaired) = solid(surface, self.options.inside, self.repair)
             .map_err(|e| Failure::new(format!("{}: {e}", mesh.name_in(path))))?;
+        let source = expected.source.clone().repaired(repaired.as_ref());
         let options = self.options.clone().or_unit(load.unit.as_deref());
-        let encoder = Encoder::new().options(options).source(expected.source.clone()).progress(stop);
+        let encoder = Encoder::new().options(options).source(source).progress(stop);
         let asset = encode(&solid, path, &self.choices, encoder, stop)?;
         let bytes = asset.to_bytes().map_err(Failure::new)?;
         save_atomic(&expected.path, &bytes).map_err(Failure::new)?;
@@ -172,6 +178,8 @@ impl Job {
         if self.cad.is_given() {
             parts.push(&cad);
         }
+        // Without a repair, the name is what it was before there was one.
+        parts.extend(self.repair.map(|RepairChoice::Auto| "repair auto"));
         for part in parts {
             // The length keeps two parts apart.
             hasher.update(&(part.len() as u64).to_le_bytes()).update(part.as_bytes());
@@ -186,7 +194,7 @@ impl Job {
         let about = asset.about();
         // Without a unit of the user, it is that of the file.
         let options = self.options.clone().or_unit(about.options.unit.as_deref());
-        let same = about.source == expected.source && about.options == options;
+        let same = about.source.is_same_file(&expected.source) && about.options == options;
         same.then(|| expected.asset(&asset, asset.as_bytes().len()))
     }
 }
@@ -241,6 +249,7 @@ impl Expected {
             bytes: bytes as u64,
             faces: about.statistics.faces,
             certificate: about.certificate().clone(),
+            repair: about.source.repair.clone(),
         }
     }
 }

@@ -96,7 +96,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         meshes,
         from: &args.meshes,
         output: &args.output,
-        choices: args.choices.choices(),
+        choices: &args.choices,
         cad: args.cad.clone(),
         shard: args.shard,
         jobs: args.jobs,
@@ -113,7 +113,7 @@ pub(crate) struct Batch<'a> {
     pub from: &'a Path,
     /// Folder of the assets and the manifest.
     pub output: &'a Path,
-    pub choices: EncodeChoices,
+    pub choices: &'a ChoiceArgs,
     pub cad: CadArgs,
     pub shard: Option<Shard>,
     /// Number of meshes that are in memory at the same time.
@@ -136,7 +136,7 @@ impl Batch<'_> {
             ))
             .hint("`tesdf encode --domain FILE` encodes that mesh"));
         }
-        let job = Job::new(self.choices.clone(), self.cad.clone(), self.output)?;
+        let job = Job::new(self.choices, self.cad.clone(), self.output)?;
         let meshes = &self.meshes;
         fs::create_dir_all(self.output)
             .map_err(|e| Failure::new(format!("cannot make the folder {}: {e}", self.output.display())))?;

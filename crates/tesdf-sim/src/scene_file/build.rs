@@ -9,6 +9,7 @@ use tesdf::collide::{
 };
 use tesdf::encode::{EncodeChoices, EncodeError, EncodeFileError, Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
+use tesdf::mesh::{RepairMode, UnknownRepair};
 use tesdf::{Length, Progress, TeSdf};
 
 use super::read::LoadedScene;
@@ -179,7 +180,7 @@ enum ShapeFailure {
     Reason(String),
 }
 
-/// The shapes of files, by path: bodies share them.
+/// The shapes of files, by path, what is inside and how the mesh is repaired: bodies share them.
 #[derive(Default)]
 struct Shapes(BTreeMap<(PathBuf, String), ShapeId>);
 
@@ -194,16 +195,23 @@ impl Shapes {
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
                 let file = scene.resolve(file);
+                let repair = body.repair.as_deref().map_or(Ok(RepairMode::Never), str::parse);
+                let repair = repair.map_err(|e: UnknownRepair| ShapeFailure::Reason(e.to_string()))?;
+                if repair == RepairMode::Auto && body.asset.is_some() {
+                    let reason = "repair = \"auto\": the asset is encoded already; give mesh = \"FILE\" in place of asset";
+                    return Err(ShapeFailure::Reason(reason.into()));
+                }
                 // A file that is reached by several paths is opened only once.
                 let inside = inside(body).map_err(ShapeFailure::Reason)?;
-                let key = (file.canonicalize().unwrap_or_else(|_| file.clone()), inside.to_string());
+                let path = file.canonicalize().unwrap_or_else(|_| file.clone());
+                let key = (path, format!("{inside}, {repair:?}"));
                 if let Some(&shape) = self.0.get(&key) {
                     return Ok(shape);
                 }
                 let opened = match body.asset {
                     Some(_) => TeSdf::open(&file)
                         .map_err(|e| ShapeFailure::Reason(format!("{}: {e}", file.display())))?,
-                    None => encode_mesh(&file, inside, progress)?,
+                    None => encode_mesh(&file, inside, repair, progress)?,
                 };
                 let shape = add_shape(system, Shape::Mesh(Arc::new(opened)))?;
                 self.0.insert(key, shape);
@@ -249,8 +257,13 @@ fn inside(body: &BodySection) -> Result<Inside, String> {
     choices.inside().map_err(|e| e.to_string())
 }
 
-fn encode_mesh(file: &Path, inside: Inside, progress: &Progress) -> Result<TeSdf, ShapeFailure> {
-    let encoder = Encoder::new().preset(Preset::Fast).inside(inside).progress(progress);
+fn encode_mesh(
+    file: &Path,
+    inside: Inside,
+    repair: RepairMode,
+    progress: &Progress,
+) -> Result<TeSdf, ShapeFailure> {
+    let encoder = Encoder::new().preset(Preset::Fast).inside(inside).repair(repair).progress(progress);
     encoder.encode_file(file).map_err(|e| match e {
         EncodeFileError::Encode { source: EncodeError::Cancelled, .. } => ShapeFailure::Cancelled,
         e => ShapeFailure::Reason(e.to_string()),

@@ -14,6 +14,7 @@
 //! name = "nut"
 //! mesh = "nut.obj"             # metres; encoded when the scene is loaded; or asset = "nut.tesdf"
 //! # inside = "sheet"           # of the mesh: what is inside; with thickness = 0.001; or surface
+//! repair = "auto"              # repairs the mesh first, if it needs it; the default is "never"
 //! density = 7850               # kg/m³; or mass = 0.1
 //! translation = [0, 0, 0.05]   # of the mesh's origin; rotation = [x, y, z, w]
 //!
@@ -183,6 +184,10 @@ pub struct BodySection {
     /// The surface of the mesh: `all` faces, or the `boundary` between inside and outside.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceFaces>,
+    /// `auto`: a mesh without a well-defined inside is repaired before it is encoded, if a repair
+    /// works; `never`, the default: it is an error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repair: Option<String>,
     /// A simple shape.
     #[serde(default)]
     pub shape: Option<ShapeSection>,

@@ -1,6 +1,7 @@
 //! What an asset says about itself, stored as JSON in the metadata of the container.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -9,6 +10,8 @@ use serde::{Deserialize, Serialize};
 use super::AssetError;
 use super::options::EncodeOptions;
 use crate::base::{Certificate, Inside, InsideRule, SurfaceFaces, Written};
+#[cfg(feature = "encode")]
+use crate::mesh::AutoRepaired;
 
 /// The file that a mesh came from.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,6 +20,70 @@ pub struct Source {
     pub name: String,
     /// BLAKE3 of the bytes of the file, in hex. Empty for a mesh made in memory.
     pub blake3: String,
+    /// What a repair changed between the file and the mesh. `None` for a mesh as it is in the file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repair: Option<Repair>,
+}
+
+/// A repair of a mesh before it was encoded. The lengths and areas are in the unit of the mesh.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Repair {
+    /// The flags of `tesdf repair` that make the same changes; empty without flags.
+    pub flags: String,
+    /// Number of merged vertices.
+    pub welded_vertices: usize,
+    /// Number of faces that were dropped: collapsed, duplicate and vanished ones.
+    pub dropped_faces: usize,
+    /// Number of edges that were split at T-junctions.
+    pub split_edges: usize,
+    /// Number of faces that were reversed.
+    pub reversed_faces: usize,
+    /// Number of holes that were filled.
+    pub filled_holes: usize,
+    /// Area of the fillings.
+    pub filled_area: f64,
+}
+
+impl fmt::Display for Repair {
+    /// One line: the command, and what it changed.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.flags.as_str() {
+            "" => f.write_str("as by `tesdf repair`")?,
+            flags => write!(f, "as by `tesdf repair {flags}`")?,
+        }
+        let counts = [
+            (self.welded_vertices, ["vertex merged", "vertices merged"]),
+            (self.dropped_faces, ["face dropped", "faces dropped"]),
+            (self.split_edges, ["edge split", "edges split"]),
+            (self.reversed_faces, ["face reversed", "faces reversed"]),
+            (self.filled_holes, ["hole filled", "holes filled"]),
+        ];
+        for (number, [one, many]) in counts.into_iter().filter(|(number, _)| *number > 0) {
+            write!(f, "; {number} {}", if number == 1 { one } else { many })?;
+        }
+        match self.filled_holes {
+            0 => Ok(()),
+            _ => write!(f, ", area {:.3e}", self.filled_area),
+        }
+    }
+}
+
+#[cfg(feature = "encode")]
+impl From<&AutoRepaired> for Repair {
+    fn from(found: &AutoRepaired) -> Self {
+        let report = &found.repaired.report;
+        let dropped =
+            [report.collapsed_faces.len(), report.duplicate_faces.len(), report.vanished_faces.len()];
+        Self {
+            flags: found.options.map_or(String::new(), |options| options.to_string().trim_start().into()),
+            welded_vertices: report.welded_vertices.len(),
+            dropped_faces: dropped.iter().sum(),
+            split_edges: report.split_edges.len(),
+            reversed_faces: report.reversed_faces.len(),
+            filled_holes: report.filled_holes.len(),
+            filled_area: report.filled_holes.iter().map(|hole| hole.area).sum(),
+        }
+    }
 }
 
 impl Source {
@@ -24,7 +91,18 @@ impl Source {
     /// [`LoadReport::source_blake3`](crate::mesh::LoadReport::source_blake3) has it.
     pub fn of_file(path: impl AsRef<Path>, blake3: String) -> Self {
         let name = path.as_ref().file_name().unwrap_or_default().to_string_lossy().into_owned();
-        Self { name, blake3 }
+        Self { name, blake3, repair: None }
+    }
+
+    /// The same file, and what a repair changed of its mesh.
+    #[cfg(feature = "encode")]
+    pub fn repaired(self, found: Option<&AutoRepaired>) -> Self {
+        Self { repair: found.map(Into::into), ..self }
+    }
+
+    /// Whether both are the same file. The repairs may differ.
+    pub fn is_same_file(&self, other: &Self) -> bool {
+        (&self.name, &self.blake3) == (&other.name, &other.blake3)
     }
 }
 

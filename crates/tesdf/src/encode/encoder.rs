@@ -6,7 +6,7 @@ use super::sampled::Processor;
 use super::{Domain, EncodeError, EncodeOptions, Preset, Sampler, Source};
 use crate::asset::TeSdf;
 use crate::base::{Inside, Length, Progress};
-use crate::mesh::{ReadSolidError, SolidMesh};
+use crate::mesh::{LoadReport, LoadedMesh, ReadSolidError, RepairMode, SolidMesh, read};
 
 /// Encodes solids.
 ///
@@ -36,6 +36,7 @@ pub struct Encoder<'a> {
     unit: Option<String>,
     domain: Domain<'a>,
     source: Source,
+    repair: RepairMode,
     sampler: &'a dyn Sampler,
     progress: Option<&'a Progress>,
 }
@@ -46,6 +47,7 @@ impl fmt::Debug for Encoder<'_> {
             .field("options", &self.resolved())
             .field("domain", &self.domain)
             .field("source", &self.source)
+            .field("repair", &self.repair)
             .field("sampler", &self.sampler.name())
             .field("progress", &self.progress)
             .finish()
@@ -68,6 +70,7 @@ impl<'a> Encoder<'a> {
             unit: None,
             domain: Domain::Bisection,
             source: Source::default(),
+            repair: RepairMode::Never,
             sampler: &Processor,
             progress: None,
         }
@@ -119,6 +122,14 @@ impl<'a> Encoder<'a> {
     /// file instead.
     pub fn source(self, source: Source) -> Self {
         Self { source, ..self }
+    }
+
+    /// Sets whether [`encode_file`](Self::encode_file) repairs a mesh without a well-defined inside
+    /// ([`SolidMesh::repaired`]). The asset records what was changed
+    /// ([`Source::repair`](crate::asset::about::Source::repair)). The default is
+    /// [`RepairMode::Never`].
+    pub fn repair(self, repair: RepairMode) -> Self {
+        Self { repair, ..self }
     }
 
     /// Sets the sampler for [`Method::Sampled`](super::Method::Sampled). The default is the
@@ -189,8 +200,13 @@ impl<'a> Encoder<'a> {
     }
 
     fn encode_path(&self, path: &Path) -> Result<TeSdf, EncodeFileError> {
-        let (solid, report) = SolidMesh::load(path, self.options.inside)?;
-        let source = Source::of_file(path, report.source_blake3);
+        let (solid, source, report) = match self.repair {
+            RepairMode::Never => {
+                let (solid, report) = SolidMesh::load(path, self.options.inside)?;
+                (solid, Source::of_file(path, report.source_blake3.clone()), report)
+            }
+            RepairMode::Auto => load_repaired(path, self.options.inside)?,
+        };
         let unit = report.unit.as_deref();
         let at = |source| EncodeFileError::Encode { path: path.to_owned(), source };
         self.encode_from(&solid, &source, unit).map_err(at)
@@ -219,6 +235,16 @@ impl<'a> Encoder<'a> {
         options.unit = self.unit.clone().or(options.unit);
         options
     }
+}
+
+/// Reads and repairs a mesh. The source says what was changed.
+fn load_repaired(path: &Path, inside: Inside) -> Result<(SolidMesh, Source, LoadReport), ReadSolidError> {
+    let LoadedMesh { mesh, report, .. } =
+        read(path).map_err(|source| ReadSolidError::Read { path: path.to_owned(), source })?;
+    let (solid, found) = SolidMesh::repaired(mesh, inside)
+        .map_err(|source| ReadSolidError::NotSolid { path: path.to_owned(), source })?;
+    let source = Source::of_file(path, report.source_blake3.clone()).repaired(found.as_ref());
+    Ok((solid, source, report))
 }
 
 impl TeSdf {

@@ -23,7 +23,11 @@ pub use read::{
     CadError, CadOptions, LoadReport, LoadedMesh, MeshFormat, MeshPart, Origin, Place, ReadError, files,
     read, read_bytes, read_with, source_blake3,
 };
-pub use repair::{RepairError, RepairOptions, RepairReport, Repaired, SplitEdge, repair};
+pub use repair::{
+    AutoRepaired, FillMethod, FilledHole, HoleLeft, LeftReason, RepairError, RepairMode, RepairOptions,
+    RepairReport, Repaired, ShellOrientation, SplitEdge, UnknownRepair, closing_tolerance, repair,
+    repair_auto,
+};
 pub use solid::{NotSolid, ReadSolidError, SolidMesh};
 pub use split::{NamedMesh, split};
 pub use topology::{Edge, EdgeUse, Topology};

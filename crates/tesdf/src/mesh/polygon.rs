@@ -63,7 +63,7 @@ pub(super) fn triangulate(corners: &[DVec3], triangles: &mut Vec<[u32; 3]>) -> S
 }
 
 /// Drops the coordinate in which the Newell normal is largest, and keeps counter-clockwise order.
-fn project(corners: &[DVec3]) -> Vec<DVec2> {
+pub(super) fn project(corners: &[DVec3]) -> Vec<DVec2> {
     let origin = corners[0];
     let mut normal = DVec3::ZERO;
     for (i, &p) in corners.iter().enumerate() {
@@ -90,7 +90,8 @@ fn project(corners: &[DVec3]) -> Vec<DVec2> {
     if sign < 0.0 { corners.iter().map(turned).collect() } else { corners.iter().map(pick).collect() }
 }
 
-fn orient(a: DVec2, b: DVec2, c: DVec2) -> f64 {
+/// Positive when the corners are counter-clockwise, 0 when they are on one line; exact.
+pub(super) fn orient(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     let coord = |p: DVec2| Coord { x: p.x, y: p.y };
     orient2d(coord(a), coord(b), coord(c))
 }

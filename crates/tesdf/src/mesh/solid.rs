@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::count::count;
 use super::{
-    CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, MeshError, ReadError, Severity, Topology,
-    TriangleMesh, check_and_survey, presented::Presentation, presented::Presented, read,
+    AutoRepaired, CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, MeshError, ReadError,
+    RepairOptions, Severity, Topology, TriangleMesh, check_and_survey, presented::Presentation,
+    presented::Presented, read, repair_auto,
 };
 use crate::base::{Inside, InsideRule};
 
@@ -71,7 +72,8 @@ impl SolidMesh {
     /// Checks the mesh with [`check`](super::check()).
     ///
     /// # Errors
-    /// [`NotSolid`] has all errors, and says whether repair with default options would help.
+    /// [`NotSolid`] has all errors, and the options of the repair that would help, if one does. Only
+    /// a mesh that is refused costs the time of trying them.
     ///
     /// # Example
     ///
@@ -122,13 +124,8 @@ impl SolidMesh {
     pub fn with_inside(mesh: TriangleMesh, inside: Inside) -> Result<Self, NotSolid> {
         let (report, survey) = check_and_survey(&mesh, inside.rule);
         if !report.encodable {
-            let repairable = super::repair(&mesh, &super::RepairOptions::default())
-                .is_ok_and(|repaired| repaired.report.encodable);
-            return Err(NotSolid {
-                rules: other_rules(&mesh, &report),
-                report: Box::new(report),
-                repairable,
-            });
+            let found = repair_auto(&mesh).ok().flatten();
+            return Err(NotSolid::new(&mesh, report, found.and_then(|found| found.options)));
         }
         let simple = report.is_simple();
         let (mut warnings, winding) = (report.defects, report.winding);
@@ -145,6 +142,45 @@ impl SolidMesh {
     /// The faces of the surface, and what tells their sides.
     pub(crate) fn presented(&self) -> Result<Presented<'_>, MeshError> {
         self.presentation.of(&self.mesh, self.simple)
+    }
+
+    /// As [`with_inside`](Self::with_inside). A mesh that is refused is repaired first, by
+    /// [`repair_auto`](super::repair_auto()). Returns what was changed as well, or `None` when the
+    /// mesh is a solid as it is.
+    ///
+    /// # Errors
+    /// [`NotSolid`] when no repair makes the mesh a solid.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// use tesdf::base::Inside;
+    /// use tesdf::glam::DVec3;
+    /// use tesdf::{SolidMesh, TriangleMesh};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // A tetrahedron without one of its faces.
+    /// let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    /// let open = TriangleMesh::new(vertices, vec![[0, 2, 1], [0, 1, 3], [1, 2, 3]])?;
+    /// let (solid, changes) = SolidMesh::repaired(open, Inside::default())?;
+    /// assert_eq!(solid.mesh().faces().len(), 4);
+    /// assert_eq!(changes.unwrap().repaired.report.filled_holes.len(), 1);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn repaired(mesh: TriangleMesh, inside: Inside) -> Result<(Self, Option<AutoRepaired>), NotSolid> {
+        let (report, _) = check_and_survey(&mesh, inside.rule);
+        if report.encodable {
+            return Ok((Self::with_inside(mesh, inside)?, None));
+        }
+        match repair_auto(&mesh) {
+            Ok(Some(found)) => {
+                let solid = Self::with_inside(found.repaired.mesh.clone(), inside)?;
+                let is_changed = found.options.is_some();
+                Ok((solid, is_changed.then_some(found)))
+            }
+            Ok(None) | Err(_) => Err(NotSolid::new(&mesh, report, None)),
+        }
     }
 
     /// The mesh.
@@ -203,7 +239,7 @@ impl ReadSolidError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct NotSolid {
     report: Box<CheckReport>,
-    repairable: bool,
+    suggestion: Option<RepairOptions>,
     rules: Vec<InsideRule>,
 }
 
@@ -226,6 +262,10 @@ fn other_rules(mesh: &TriangleMesh, report: &CheckReport) -> Vec<InsideRule> {
 }
 
 impl NotSolid {
+    fn new(mesh: &TriangleMesh, report: CheckReport, suggestion: Option<RepairOptions>) -> Self {
+        Self { rules: other_rules(mesh, &report), report: Box::new(report), suggestion }
+    }
+
     /// The full report of the check.
     pub fn report(&self) -> &CheckReport {
         &self.report
@@ -233,7 +273,13 @@ impl NotSolid {
 
     /// Whether [`repair`](super::repair()) with default options makes the mesh a solid.
     pub fn is_repairable(&self) -> bool {
-        self.repairable
+        self.suggestion == Some(RepairOptions::DEFAULT)
+    }
+
+    /// The options with which [`repair`](super::repair()) makes the mesh a solid, found by trying:
+    /// [`repair_auto`](super::repair_auto()).
+    pub fn suggestion(&self) -> Option<&RepairOptions> {
+        self.suggestion.as_ref()
     }
 
     /// The rules under which the mesh can be encoded as it is. A sheet has no thickness here.
@@ -267,12 +313,16 @@ impl fmt::Display for NotSolid {
         if kinds.len() > NAMED[0] {
             f.write_str("; and other defects")?;
         }
-        f.write_str(if self.repairable {
-            ". Run `tesdf repair`, which makes it encodable, and encode the result"
-        } else {
-            ". `tesdf repair` with default options does not make it encodable: `tesdf check` lists all defects, and \
-             `tesdf repair --weld-tolerance` joins vertices that are a given length apart"
-        })?;
+        match &self.suggestion {
+            Some(options) => write!(
+                f,
+                ". `tesdf repair MESH -o FILE.ply{options}` makes it encodable, and so does `--repair auto` while it \
+                 is encoded"
+            )?,
+            None => {
+                f.write_str(". `tesdf repair` cannot make it encodable: `tesdf check` lists all defects")?
+            }
+        }
         self.rules.iter().try_for_each(|rule| f.write_str(way_on(*rule)))
     }
 }

@@ -85,6 +85,12 @@ impl Topology {
         &self.edges
     }
 
+    /// The edge between two vertices, given the lower one first.
+    pub fn edge(&self, vertices: [u32; 2]) -> Option<&Edge> {
+        let found = self.edges.binary_search_by(|edge| edge.vertices.cmp(&vertices)).ok()?;
+        self.edges.get(found)
+    }
+
     /// The faces on an edge of this mesh, ordered by face.
     pub fn uses(&self, edge: &Edge) -> &[EdgeUse] {
         &self.uses[edge.uses.start as usize..edge.uses.end as usize]

@@ -59,7 +59,7 @@ pub(super) fn split(draft: &mut Draft, tolerance: f64, report: &mut RepairReport
 
 /// Two total lengths. The first sums the edges with an odd number of faces, which no orientation of
 /// the faces can balance. The second sums all unbalanced edges, each multiplied by its imbalance.
-fn open_lengths(vertices: &[DVec3], topology: &Topology) -> [f64; 2] {
+pub(super) fn open_lengths(vertices: &[DVec3], topology: &Topology) -> [f64; 2] {
     topology.edges().iter().filter(|e| !e.is_balanced()).fold([0.0, 0.0], |sum, edge| {
         let [a, b] = edge.vertices.map(|v| vertices[v as usize]);
         let times = [edge.face_count() % 2, edge.forward.abs_diff(edge.backward)].map(f64::from);

@@ -1,6 +1,6 @@
 use std::collections::HashMap;
 
-use glam::DVec3;
+use glam::{DVec3, I64Vec3};
 
 use super::Draft;
 
@@ -11,17 +11,22 @@ use super::Draft;
 /// tolerance, and the result depends only on the order of the vertices.
 pub(super) fn weld(draft: &mut Draft, tolerance: f64) -> Vec<[u32; 2]> {
     let largest = draft.vertices.iter().fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
-    // A cell may be larger than the tolerance, so that cell indices fit into 64 bits.
-    let cell = tolerance.max(largest * 2f64.powi(-40));
+    // Most points are near no side of their cell, so few cells are looked at. A cell may be larger,
+    // so that cell indices fit into 64 bits.
+    let cell = (2.0 * tolerance).max(largest * 2f64.powi(-40));
     let key = |p: DVec3| (p / cell).floor().as_i64vec3();
+    // Rounding does not move a point that is within the tolerance out of reach.
+    let reach = DVec3::splat(tolerance * (1.0 + 1e-12) + largest * 4.0 * f64::EPSILON);
     let mut cells: HashMap<_, Vec<u32>> = HashMap::new();
     let mut target: Vec<u32> = (0..draft.vertices.len() as u32).collect();
     let mut merged = Vec::new();
-    let steps = || (0..27).map(|k| glam::I64Vec3::new(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1));
     for (v, &p) in draft.vertices.iter().enumerate() {
-        let at = key(p);
-        let near = steps()
-            .filter_map(|step| cells.get(&(at + step)))
+        let (low, high) = (key(p - reach), key(p + reach));
+        let around = (low.x..=high.x).flat_map(move |x| {
+            (low.y..=high.y).flat_map(move |y| (low.z..=high.z).map(move |z| I64Vec3::new(x, y, z)))
+        });
+        let near = around
+            .filter_map(|at| cells.get(&at))
             .flatten()
             .map(|&u| (draft.vertices[u as usize].distance(p), u))
             .filter(|&(d, _)| d <= tolerance)
@@ -31,7 +36,7 @@ pub(super) fn weld(draft: &mut Draft, tolerance: f64) -> Vec<[u32; 2]> {
                 target[v] = u;
                 merged.push([v as u32, u]);
             }
-            None => cells.entry(at).or_default().push(v as u32),
+            None => cells.entry(key(p)).or_default().push(v as u32),
         }
     }
     draft.faces.iter_mut().flatten().for_each(|v| *v = target[*v as usize]);
