@@ -72,7 +72,7 @@ pub fn of_step<'py>(
 fn columns<'py>(py: Python<'py>, found: &[Contact]) -> PyResult<Columns<'py>> {
     let of = || found.iter();
     let feature_b = |c: &Contact| match c.feature.b {
-        FeatureB::Vertex(vertex) => (0, [vertex, NO_CELL]),
+        FeatureB::Vertex(vertex) => (0u8, [vertex, NO_CELL]),
         FeatureB::Edge(low, high) => (1, [low, high]),
         FeatureB::Face(face) => (2, [face, NO_CELL]),
     };

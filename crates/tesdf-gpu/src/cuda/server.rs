@@ -109,12 +109,17 @@ fn id(index: usize) -> DeviceId {
     DeviceId::new(0, index as u16)
 }
 
+/// The number of the CUDA device of a client. `None` when it is not a CUDA device.
+pub fn number(client: &Client) -> Option<usize> {
+    let device = client.service_id().device;
+    let is_cuda = client.service_id() == ServiceId::of::<CudaServer>(device);
+    is_cuda.then_some(usize::from(device.index_id))
+}
+
 /// Wraps memory of another library as a buffer. `None` when the device is not a CUDA device.
 pub fn from_raw_ptr(client: &Client, pointer: u64, bytes: u64) -> Option<Handle> {
+    number(client)?;
     let device = client.service_id().device;
-    if client.service_id() != ServiceId::of::<CudaServer>(device) {
-        return None;
-    }
     let handle = Handle::new(client.service_id(), StreamId::current(), bytes);
     let memory = handle.memory.clone();
     // Submitted like a launch, so that it comes before later launches.

@@ -16,7 +16,7 @@ use crate::GpuError;
 #[cfg(feature = "cuda")]
 use crate::cuda;
 
-pub use array::DeviceArray;
+pub use array::{DeviceArray, Word};
 pub(crate) use buffer::{Buffer, spread};
 
 /// The environment variable that selects the device when the program does not.
@@ -156,8 +156,9 @@ impl Id {
 
 impl Device {
     /// Opens a device. `asked` is the number of a device in [`devices`], or a part of its name,
-    /// such as `cuda:0`; upper and lower case are equal. With `None` the environment variable
-    /// `TESDF_DEVICE` selects the device. Without this variable the best device is opened.
+    /// such as `cuda:0`; upper and lower case are equal. `wgpu:0` is the first device that is
+    /// reached through wgpu. With `None` the environment variable `TESDF_DEVICE` selects the device.
+    /// Without this variable the best device is opened.
     ///
     /// # Errors
     /// [`GpuError::NoDevice`] when the machine has no device, [`GpuError::NoSuchDevice`] when no
@@ -169,6 +170,11 @@ impl Device {
         let Some(&best) = ids.first() else { return Err(GpuError::NoDevice) };
         let Some(asked) = asked.map(str::to_owned).or(variable) else { return Self::open(best) };
         if let Some(&id) = asked.parse().ok().and_then(|i: usize| ids.get(i)) {
+            return Self::open(id);
+        }
+        let through_wgpu = asked.strip_prefix("wgpu:").and_then(|number| number.parse().ok());
+        if let Some(&id) = through_wgpu.and_then(|i| ids.iter().filter(|id| matches!(id, Id::Wgpu(_))).nth(i))
+        {
             return Self::open(id);
         }
         let names: Vec<String> = ids.iter().map(|id| id.info().name).collect();
@@ -185,6 +191,19 @@ impl Device {
     /// The description of this device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Whether both are the same device, however it was asked for.
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.client.service_id() == other.client.service_id()
+    }
+
+    /// The number of this device in CUDA; `None` for a device that is reached through wgpu.
+    pub fn cuda_number(&self) -> Option<usize> {
+        #[cfg(feature = "cuda")]
+        return cuda::server::number(&self.client);
+        #[cfg(not(feature = "cuda"))]
+        None
     }
 
     /// Waits until all launches are complete.
