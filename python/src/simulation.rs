@@ -201,7 +201,6 @@ fn index_of(what: &str, any: &Bound<'_, PyAny>, names: &[String]) -> PyResult<us
 impl Simulation {
     #[new]
     #[pyo3(signature = (scene, *, mode = None, time_step = None, duration = None, threads = None, device = None), text_signature = "(scene, *, mode=None, time_step=None, duration=None, threads=None, device=\"cpu\")")]
-    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn new(
         py: Python<'_>,
         scene: &Bound<'_, PyAny>,

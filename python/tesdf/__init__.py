@@ -36,7 +36,7 @@
     simulation.set_motor("slide", velocity=0.1)         # set_wrench, set_state
     simulation.step()                                   # simulation.poses, simulation.contacts, ...
     simulation.run()["passed"]                          # to the end; the summary, with the criteria
-    tesdf.view(simulation, "page.html")                 # plays it in a browser; tesdf.export for a GLB file
+    tesdf.view(simulation, "page.html")                 # plays it in a browser; tesdf.export for GLB and rerun
 
 All lengths are in the mesh's unit, and all ids start from 0. Errors are `MeshError`
 (`NotSolidError` if the mesh has no well-defined inside), `EncodeError`, `DeformError`,
@@ -56,7 +56,6 @@ from ._native import (
     check,
     devices,
     encode,
-    export,
     repair,
     view,
 )
@@ -84,6 +83,7 @@ from .errors import (
     SceneError,
     SimulationError,
 )
+from .playback import export
 from .reports import (
     CheckReport,
     Clearance,

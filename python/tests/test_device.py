@@ -10,6 +10,7 @@ import multiprocessing
 import numpy as np
 import pytest
 import tesdf
+from make_reference import sdf  # numpy's brute force over all faces, in data/reference
 from test_contacts import LINKED
 
 DEVICES = ["wgpu:0", "cuda:0"]
@@ -33,6 +34,12 @@ def linked(asset):
 
 def error(points, share=DISTANCE):
     return share * np.maximum(DIAGONAL, np.linalg.norm(points, axis=1))
+
+
+def to_faces(mesh, points, faces):
+    """the distance of each point from a face, by brute force"""
+    vertices, corners = mesh
+    return np.array([abs(sdf(vertices, corners[[face]], [point])[0][0]) for point, face in zip(points, faces)])
 
 
 def test_devices_have_numbers_and_names(linked):
@@ -80,7 +87,7 @@ def test_contacts_at_nodes_are_those_of_the_processor(linked, device):
 
 
 def test_deepest_points_of_faces_are_those_of_the_processor(linked):
-    for options in ({}, {"mode": "face", "contacts_per": "cell"}, {"reduce": 4}):
+    for options in ({"mode": "node", "reduce": 4}, {"mode": "face", "contacts_per": "cell"}):
         expected, found = linked.detect(**options), linked.detect(**options, device="wgpu:0")
         assert abs(expected.distance.min() - found.distance.min()) < 1e-5 * DIAGONAL
         assert len(found.reductions) == len(expected.reductions)
@@ -107,7 +114,7 @@ def test_what_a_device_cannot_do(linked):
         linked.why(0, 1, device="wgpu:0")
 
 
-def test_answers_to_numpy_are_those_of_the_processor(asset, points, device):
+def test_answers_to_numpy_are_those_of_the_processor(asset, torus, points, device):
     points = np.concatenate([points, [[np.nan, 0, 0], [0, np.inf, 0]]])
     expected, found = asset.query(points), asset.query(points, device=device)
     assert [a.dtype for a in found] == [a.dtype for a in expected] and [a.shape for a in found] == [a.shape for a in expected]
@@ -117,12 +124,11 @@ def test_answers_to_numpy_are_those_of_the_processor(asset, points, device):
     assert (np.abs(found.signed_distance - expected.signed_distance)[finite] <= bound).all()
     back = found.closest_point + found.signed_distance[:, None] * found.gradient
     assert (np.linalg.norm(back - points, axis=1)[finite] <= 4 * bound).all()
-    clear = finite & (np.abs(expected.signed_distance) > 1e-3)
-    assert (found.face == expected.face)[clear].mean() > 0.95
+    assert (to_faces(torus, points[finite], found.face[finite]) <= np.abs(found.signed_distance[finite]) + 2 * bound).all()
     assert [len(a) for a in asset.query(np.zeros((0, 3)), device=device)] == [0, 0, 0, 0]
 
 
-def test_answers_stay_with_points_on_the_device(asset, points, device):
+def test_answers_stay_with_points_on_the_device(asset, torus, points, device):
     points = points.astype(np.float32)
     array = tesdf.DeviceArray(points, device)
     assert (array.shape, array.dtype, len(array)) == (points.shape, np.float32, len(points))
@@ -134,8 +140,7 @@ def test_answers_stay_with_points_on_the_device(asset, points, device):
     distance, gradient, closest, row = (part.numpy() for part in found)
     assert (np.abs(distance - expected.signed_distance) <= 2 * error(points)).all()
     assert (np.linalg.norm(closest + distance[:, None] * gradient - points, axis=1) <= 8 * error(points)).all()
-    clear = np.abs(expected.signed_distance) > 1e-3
-    assert (asset.face_ids[row] == expected.face)[clear].mean() > 0.95
+    assert (to_faces(torus, points, asset.face_ids[row]) <= np.abs(distance) + 2 * error(points)).all()
     with pytest.raises(ValueError, match=f"points: an array on .*; expected one on "):
         asset.query(array, device=DEVICES[1 - DEVICES.index(device)])
     for wrong in (np.zeros((4, 2)), np.zeros(3), np.zeros((4, 3), np.uint32)):
@@ -206,7 +211,8 @@ def test_cuda_memory_is_used_in_place(asset, points):
     interface = array.__cuda_array_interface__
     assert interface["shape"] == points.shape and interface["typestr"] == "<f4" and interface["strides"] is None
     # Both protocols give the address of the array itself.
-    tensor = tensor_of(array.__dlpack__())
+    capsule = array.__dlpack__()
+    tensor = tensor_of(capsule)
     assert tensor.data + tensor.byte_offset == interface["data"][0]
     assert (tensor.device_type, tensor.device_id, tensor.code, tensor.bits, tensor.lanes) == (2, 0, 2, 32, 1)
     assert tensor.shape[:2] == list(points.shape) and tensor.strides[:2] == [3, 1]
@@ -218,7 +224,7 @@ def test_cuda_memory_is_used_in_place(asset, points):
     # The owner is asked to wait for its work in the legacy default stream.
     assert by_dlpack.asked[0]["stream"] == 1
     rows = found.face_row
-    assert tensor_of(rows.__dlpack__(max_version=(1, 0)), b"dltensor_versioned") is not None
+    assert '"dltensor_versioned"' in repr(rows.__dlpack__(max_version=(1, 0)))
     assert np.array_equal(np.from_dlpack(rows, device="cpu"), rows.numpy())
 
 
@@ -256,13 +262,14 @@ def test_cuda_memory_that_is_refused(asset, points):
 def test_a_simulation_on_a_device_agrees_with_the_processor():
     box = {"box": {"half_extents": [0.02, 0.02, 0.02]}}
     scene = {
-        "time_step": 2e-3, "duration": 0.06, "detector": {"mode": "face", "contacts_per": "face"},
+        "time_step": 2e-3, "duration": 0.06, "detector": {"mode": "node"},
         "bodies": [{"name": "floor", "shape": "plane", "fixed": True},
                    {"name": "box", "shape": box, "mass": 0.1, "translation": [0, 0, 0.0205]}],
     }
     host, there = tesdf.Simulation(scene), tesdf.Simulation(scene, device="wgpu:0")
     host.run()
-    there.run()
+    for _ in range(30):
+        there.step()
     assert there.steps == host.steps == 30 and len(there.contacts) > 0
     # A micrometre of 0.5 mm of free fall.
     assert np.abs(there.poses - host.poses).max() < 1e-6 and host.poses[1, 2] < 0.02005
@@ -298,14 +305,15 @@ def test_the_coupling_to_mujoco_takes_a_device(tmp_path):
 
 def _detect_in_child(results):
     try:
-        tesdf.collide(tesdf.Sphere(1), tesdf.Sphere(1), device="wgpu:0")
+        tesdf.collide(tesdf.Sphere(1), tesdf.Sphere(1), mode="node", device="wgpu:0")
     except tesdf.DeviceError as e:
         results.put(str(e))
 
 
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_a_forked_process_cannot_use_the_devices_of_its_parent():
-    assert len(tesdf.collide(tesdf.Sphere(1), tesdf.Sphere(1), pose_b=[1.5, 0, 0, 0, 0, 0, 1], device="wgpu:0")) > 0
+    near = [1.5, 0, 0, 0, 0, 0, 1]
+    assert len(tesdf.collide(tesdf.Sphere(1), tesdf.Sphere(1), pose_b=near, mode="node", device="wgpu:0")) > 0
     context = multiprocessing.get_context("fork")
     results = context.Queue()
     child = context.Process(target=_detect_in_child, args=(results,))

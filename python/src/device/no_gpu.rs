@@ -42,7 +42,7 @@ impl Detect for Device {
 
 /// Holds nothing.
 #[derive(Default)]
-pub struct HeldDetector;
+pub struct HeldDetector(());
 
 impl HeldDetector {
     pub fn detect(&self, device: &Device, _: &Scene, _: &CollideOptions) -> Result<Contacts, Error> {
@@ -52,7 +52,7 @@ impl HeldDetector {
 
 /// Holds nothing.
 #[derive(Default)]
-pub struct HeldShapes;
+pub struct HeldShapes(());
 
 /// An array on a device. This package was built without devices.
 #[pyclass(frozen, module = "tesdf")]

@@ -10,6 +10,7 @@ use cubecl::client::Client;
 use cubecl::features::Plane;
 use cubecl::wgpu::{WgpuDevice, WgpuDeviceKind, WgpuRuntime};
 use cubecl_common::device::{Device as _, DeviceId};
+use cubecl_environment::stream::StreamId;
 use cubecl_runtime::runtime::Runtime;
 
 use crate::GpuError;
@@ -21,6 +22,11 @@ pub(crate) use buffer::{Buffer, spread};
 
 /// The environment variable that selects the device when the program does not.
 pub const DEVICE_VARIABLE: &str = "TESDF_DEVICE";
+
+/// The stream of all work of this crate. By default each thread has a stream of its own, and CubeCL
+/// 0.11.3 then loses buffers that one thread has made and another uses ("Memory location points to a
+/// different allocation").
+pub(crate) const STREAM: StreamId = StreamId { value: 0 };
 
 /// The kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,11 +134,15 @@ impl Id {
     }
 
     fn client(self) -> Result<Client, GpuError> {
-        match self {
-            Self::Wgpu(id) => Ok(<WgpuRuntime>::client(&WgpuDevice::from_id(id))),
+        let mut client = match self {
+            Self::Wgpu(id) => <WgpuRuntime>::client(&WgpuDevice::from_id(id)),
             #[cfg(feature = "cuda")]
-            Self::Cuda(index) => cuda::server::client(index),
-        }
+            Self::Cuda(index) => cuda::server::client(index)?,
+        };
+        // SAFETY: the stream only orders launches and copies. In one stream all of them are in the order
+        // of the calls, whichever threads make these.
+        unsafe { client.set_stream(STREAM) };
+        Ok(client)
     }
 
     /// Describes the device. This does not open a CUDA device, because an open device takes some of
