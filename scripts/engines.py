@@ -3,11 +3,14 @@ docs/integrations.md.
 
     python scripts/engines.py mujoco-warp --time-step 0.001 0.002 0.005
     python scripts/engines.py newton --solver XPBD --iterations 20
+    python scripts/engines.py mujoco --shares      # of the time of a step
 
 It needs the wheel of tesdf, and mujoco, mujoco-warp or newton.
 """
 
 import argparse
+import cProfile
+import pstats
 import time
 from pathlib import Path
 
@@ -99,6 +102,21 @@ def in_newton(step, assets, given, options):
     return narrow, acceleration, advance, lambda: (states[0].body_q.numpy()[0, 2], -states[0].body_qd.numpy()[0, 5])
 
 
+def shares(advance, steps):
+    """Prints who takes the time of a step in MuJoCo: its functions, detection in Rust, or the coupling in Python."""
+    profile = cProfile.Profile()
+    profile.enable()
+    for _ in range(steps):
+        advance()
+    profile.disable()
+    found = {"MuJoCo": 0.0, "detection": 0.0, "coupling": 0.0}
+    for (_, _, function), (_, _, own, _, _) in pstats.Stats(profile).stats.items():
+        of_scene = "tesdf.Scene" in function or "tesdf._native" in function
+        found["detection" if of_scene else "MuJoCo" if "mujoco._functions" in function else "coupling"] += own
+    for name, seconds in found.items():
+        print(f"{name}: {seconds / steps * 1e3:.2f} ms a step, {100 * seconds / sum(found.values()):.1f} %")
+
+
 ENGINES = {"mujoco": in_mujoco, "mujoco-warp": in_mujoco_warp, "newton": in_newton}
 
 arguments = argparse.ArgumentParser(description=__doc__.split("\n")[0])
@@ -111,15 +129,22 @@ arguments.add_argument("--iterations", type=int, default=2, help="those of XPBD"
 arguments.add_argument("--torsional", action="store_true", help="with Newton's default torsional and rolling friction")
 arguments.add_argument("--soft", action="store_true", help="with Newton's default stiffness")
 arguments.add_argument("--no-look-ahead", action="store_true", help="without Newton's use_speculative_contacts")
+arguments.add_argument("--shares", action="store_true", help="prints who takes the time of a step, and ends; for mujoco")
 given = arguments.parse_args()
+if given.shares and given.engine != "mujoco":
+    arguments.error("--shares is for mujoco")
 
 assets = {name: tesdf.encode(file, "fast") for name, file in FILES.items()}
 options = {"reduce": given.reduce} if given.reduce else {}
-print("| time step, ms | acceleration / ideal | travel / ideal | deepest, µm | contacts | steps per second |")
+if not given.shares:
+    print("| time step, ms | acceleration / ideal | travel / ideal | deepest, µm | contacts | steps per second |")
 for step in given.time_step:
     contacts, acceleration, advance, state = ENGINES[given.engine](step, assets, given, options)
     count, spins, deepest = round(given.seconds / step), [], 0.0
     advance()  # compiles the kernels
+    if given.shares:
+        shares(advance, count)
+        continue
     began = time.perf_counter()
     for k in range(1, count):
         advance()

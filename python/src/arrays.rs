@@ -23,7 +23,7 @@ impl<'py> Rows<'py> {
         let py = any.py();
         static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
         let require = REQUIRE.import(py, "numpy", "require")?;
-        let array = require.call1((any, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))?;
+        let array = require.call1((on_host(any)?, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))?;
         match array.extract::<PyReadonlyArray2<'py, f64>>() {
             Ok(rows) if rows.shape()[1] == 3 => Ok(Self(rows)),
             _ => {
@@ -39,6 +39,18 @@ impl<'py> Rows<'py> {
     }
 }
 
+/// An object that numpy converts: the array of an object that has its memory by DLPack alone, and any
+/// other object as it is.
+///
+/// # Errors
+/// `BufferError` for memory that is not on the processor.
+pub fn on_host<'py>(any: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    if any.cast::<PyUntypedArray>().is_err() && any.hasattr("__dlpack__")? && !any.hasattr("__array__")? {
+        return any.py().import("numpy")?.call_method1("from_dlpack", (any,));
+    }
+    Ok(any.clone())
+}
+
 /// Converts an array of integers of any type, whose shape must satisfy `fits`. Without numbers, its
 /// type does not matter: numpy makes floats of an empty list.
 ///
@@ -51,7 +63,7 @@ pub fn integers<'py>(
     fits: impl Fn(&[usize]) -> bool,
 ) -> PyResult<PyReadonlyArrayDyn<'py, i64>> {
     let py = any.py();
-    let array = py.import("numpy")?.call_method1("asarray", (any,))?;
+    let array = py.import("numpy")?.call_method1("asarray", (on_host(any)?,))?;
     let untyped = array.cast::<PyUntypedArray>()?;
     if !fits(untyped.shape()) {
         return Err(argument(name, format!("an array of shape {}", array.getattr("shape")?), expected));

@@ -19,7 +19,7 @@ use tesdf::verify::{VerifyOptions, verify};
 use crate::arrays::{self, Rows};
 use crate::errors::{Error, argument};
 use crate::interrupt::cancellable;
-use crate::{classes, pool};
+use crate::{classes, device, pool};
 
 /// Number of points between two checks for Python's signals: less than a second of work.
 const CHUNK: usize = 1 << 19;
@@ -34,6 +34,7 @@ const CHUNK: usize = 1 << 19;
 pub struct Asset {
     /// Shared with scenes.
     inner: Arc<TeSdf>,
+    on_device: device::HeldShapes,
 }
 
 impl Asset {
@@ -42,7 +43,7 @@ impl Asset {
     }
 
     pub fn of(inner: Arc<TeSdf>) -> Self {
-        Self { inner }
+        Self { inner, on_device: device::HeldShapes::default() }
     }
 
     pub fn shared(&self) -> Arc<TeSdf> {
@@ -148,9 +149,23 @@ impl Asset {
     /// With precision "f64" the mesh is used as given, and exact predicates decide the signs. "f32"
     /// is several times faster and exact to 1e-6 of the diagonal. A point that is not finite gets
     /// NaN and NO_FACE.
-    #[pyo3(signature = (points, precision = "f64"))]
-    fn query<'py>(&self, points: &Bound<'py, PyAny>, precision: &str) -> PyResult<Bound<'py, PyAny>> {
-        self.answers(points, precision, Extent::Everywhere)
+    ///
+    /// device: "cpu", "gpu" (what TESDF_DEVICE names, else the best device), or the number of a
+    /// device or a part of its name, such as "cuda:0" (devices lists them). A device computes in
+    /// f32, exact to 2e-6 of the diagonal, whatever precision says. It keeps the asset until a
+    /// query on another device. Points that are on the device, as a DeviceArray or float32 of torch,
+    /// warp or cupy on a CUDA device, are read in place, and the answers stay there: DeviceAnswers.
+    #[pyo3(signature = (points, precision = "f64", *, device = None), text_signature = "($self, points, precision=\"f64\", *, device=\"cpu\")")]
+    fn query<'py>(
+        &self,
+        points: &Bound<'py, PyAny>,
+        precision: &str,
+        device: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        match device::chosen(device)?.or_else(|| device::of_array(points)) {
+            Some(device) => device::query(&self.on_device, &self.inner, points, &device),
+            None => self.answers(points, precision, Extent::Everywhere),
+        }
     }
 
     /// As query, but with NaN and NO_FACE for points outside of the encoded domain. The domain ends

@@ -12,6 +12,13 @@ pub fn answers(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
     CLASS.import(py, "tesdf.results", "Answers")
 }
 
+/// `DeviceAnswers` of `tesdf.results`.
+#[cfg(feature = "gpu")]
+pub fn device_answers(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
+    static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+    CLASS.import(py, "tesdf.results", "DeviceAnswers")
+}
+
 /// `RayHits` of `tesdf.results`.
 pub fn ray_hits(py: Python<'_>) -> PyResult<&Bound<'_, PyType>> {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();

@@ -69,27 +69,91 @@ pub fn of_step<'py>(
     columns(py, found)?.with("hidden", hidden(py, overlaps)?)?.build("StepContacts")
 }
 
+/// The columns of contacts. In Python each is an array.
+#[derive(Default)]
+struct Table {
+    point_a: Vec<[f64; 3]>,
+    point_b: Vec<[f64; 3]>,
+    normal: Vec<[f64; 3]>,
+    distance: Vec<f64>,
+    face_a: Vec<u32>,
+    face_b: Vec<u32>,
+    tet_b: Vec<u32>,
+    instance_a: Vec<u32>,
+    instance_b: Vec<u32>,
+    feature_a: Vec<u32>,
+    feature_b_kind: Vec<u8>,
+    feature_b: Vec<[u32; 2]>,
+    converged: Vec<bool>,
+}
+
+/// Contacts of a block. They stay in the cache while they are spread over the columns; otherwise each
+/// column would read all contacts from memory.
+const BLOCK: usize = 256;
+
+impl Table {
+    fn new(found: &[Contact]) -> Self {
+        let mut table = Self::default();
+        table.reserve(found.len());
+        found.chunks(BLOCK).for_each(|block| table.push(block));
+        table
+    }
+
+    fn reserve(&mut self, rows: usize) {
+        for points in [&mut self.point_a, &mut self.point_b, &mut self.normal] {
+            points.reserve_exact(rows);
+        }
+        for ids in [&mut self.face_a, &mut self.face_b, &mut self.tet_b] {
+            ids.reserve_exact(rows);
+        }
+        for ids in [&mut self.instance_a, &mut self.instance_b, &mut self.feature_a] {
+            ids.reserve_exact(rows);
+        }
+        self.distance.reserve_exact(rows);
+        self.feature_b_kind.reserve_exact(rows);
+        self.feature_b.reserve_exact(rows);
+        self.converged.reserve_exact(rows);
+    }
+
+    fn push(&mut self, block: &[Contact]) {
+        let of = || block.iter();
+        let feature_b = |c: &Contact| match c.feature.b {
+            FeatureB::Vertex(vertex) => (0, [vertex, NO_CELL]),
+            FeatureB::Edge(low, high) => (1, [low, high]),
+            FeatureB::Face(face) => (2, [face, NO_CELL]),
+        };
+        self.point_a.extend(of().map(|c| c.point_a.to_array()));
+        self.point_b.extend(of().map(|c| c.point_b.to_array()));
+        self.normal.extend(of().map(|c| c.normal.to_array()));
+        self.distance.extend(of().map(|c| c.distance));
+        self.face_a.extend(of().map(|c| c.face_a));
+        self.face_b.extend(of().map(|c| c.face_b));
+        self.tet_b.extend(of().map(|c| c.tet_b.unwrap_or(NO_CELL)));
+        self.instance_a.extend(of().map(|c| c.instance_a.0));
+        self.instance_b.extend(of().map(|c| c.instance_b.0));
+        self.feature_a.extend(of().map(|c| c.feature.a));
+        self.feature_b_kind.extend(of().map(|c| feature_b(c).0));
+        self.feature_b.extend(of().map(|c| feature_b(c).1));
+        self.converged.extend(of().map(|c| c.converged));
+    }
+}
+
 fn columns<'py>(py: Python<'py>, found: &[Contact]) -> PyResult<Columns<'py>> {
-    let of = || found.iter();
-    let feature_b = |c: &Contact| match c.feature.b {
-        FeatureB::Vertex(vertex) => (0, [vertex, NO_CELL]),
-        FeatureB::Edge(low, high) => (1, [low, high]),
-        FeatureB::Face(face) => (2, [face, NO_CELL]),
-    };
+    let table = py.detach(|| Table::new(found));
     Columns::new(py)
-        .add_rows("point_a", of().map(|c| c.point_a.to_array()))?
-        .add_rows("point_b", of().map(|c| c.point_b.to_array()))?
-        .add_rows("normal", of().map(|c| c.normal.to_array()))?
-        .add("distance", of().map(|c| c.distance))?
-        .add("face_a", of().map(|c| c.face_a))?
-        .add("face_b", of().map(|c| c.face_b))?
-        .add("tet_b", of().map(|c| c.tet_b.unwrap_or(NO_CELL)))?
-        .add("instance_a", ids(of().map(|c| c.instance_a)))?
-        .add("instance_b", ids(of().map(|c| c.instance_b)))?
-        .add("feature_a", of().map(|c| c.feature.a))?
-        .add("feature_b_kind", of().map(|c| feature_b(c).0))?
-        .add_rows("feature_b", of().map(|c| feature_b(c).1))?
-        .add("converged", of().map(|c| c.converged))
+        .add_rows("point_a", table.point_a.into_iter())?
+        .add_rows("point_b", table.point_b.into_iter())?
+        .add_rows("normal", table.normal.into_iter())?
+        .add("distance", table.distance.into_iter())?
+        .add("face_a", table.face_a.into_iter())?
+        .add("face_b", table.face_b.into_iter())?
+        .add("tet_b", table.tet_b.into_iter())?
+        .add("instance_a", table.instance_a.into_iter())?
+        .add("instance_b", table.instance_b.into_iter())?
+        .add("feature_a", table.feature_a.into_iter())?
+        .add("feature_b_kind", table.feature_b_kind.into_iter())?
+        .add_rows("feature_b", table.feature_b.into_iter())?
+        .add("converged", table.converged.into_iter())
 }
 
 fn reductions<'py>(py: Python<'py>, found: &[PairReduction]) -> PyResult<Bound<'py, PyAny>> {

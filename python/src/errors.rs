@@ -49,6 +49,14 @@ pub enum Error {
     /// The run file, and a name that none of its bodies has.
     NoBody(PathBuf, String),
     Threads(rayon::ThreadPoolBuildError),
+    #[cfg(feature = "gpu")]
+    Device(tesdf_gpu::GpuError),
+    /// This process was forked from one that has used a device.
+    #[cfg(feature = "gpu")]
+    ForkedWithDevice,
+    /// The beginning of the message.
+    #[cfg(not(feature = "gpu"))]
+    BuiltWithoutGpu(String),
 }
 
 impl Error {
@@ -88,6 +96,12 @@ impl Error {
             Self::Asset(..) | Self::Verify(_) => new(py, "AssetError", self.text()),
             Self::Collide(_) | Self::CollideAt(..) => new(py, "CollideError", self.text()),
             Self::Threads(_) => PyOSError::new_err(self.text()),
+            #[cfg(feature = "gpu")]
+            Self::Device(tesdf_gpu::GpuError::Collide(_)) => new(py, "CollideError", self.text()),
+            #[cfg(feature = "gpu")]
+            Self::Device(_) | Self::ForkedWithDevice => new(py, "DeviceError", self.text()),
+            #[cfg(not(feature = "gpu"))]
+            Self::BuiltWithoutGpu(_) => new(py, "DeviceError", self.text()),
         }
     }
 
@@ -119,6 +133,19 @@ impl Error {
             Self::Playback(e) => e.to_string(),
             Self::NoBody(path, body) => format!("{}: there is no body {body}", path.display()),
             Self::Threads(e) => format!("cannot start threads: {e}"),
+            #[cfg(feature = "gpu")]
+            Self::Device(e) => e.to_string(),
+            #[cfg(feature = "gpu")]
+            Self::ForkedWithDevice => {
+                "this process was forked from one that has used a device, which does not work; start it with \
+                 multiprocessing.get_context(\"spawn\")"
+                    .into()
+            }
+            #[cfg(not(feature = "gpu"))]
+            Self::BuiltWithoutGpu(asked) => format!(
+                "{asked}this package was built without the GPU; build it in the repository with \
+                 `pip install ./python -C build-args=\"--features gpu\"`; \"cpu\" is the processor"
+            ),
         }
     }
 }

@@ -9,10 +9,15 @@ mod asset;
 mod classes;
 mod contacts;
 mod detection;
+mod device;
 mod encode;
 mod errors;
+mod given;
 mod interrupt;
+mod kept_pairs;
 mod mesh;
+mod pairs;
+mod patches;
 mod playback;
 mod polygons;
 mod pool;
@@ -28,15 +33,23 @@ mod _native {
     #[pymodule_export]
     use super::asset::Asset;
     #[pymodule_export]
+    use super::device::{DeviceArray, devices};
+    #[pymodule_export]
     use super::encode::encode;
     #[pymodule_export]
+    use super::kept_pairs::InstancePairs;
+    #[pymodule_export]
     use super::mesh::{check, repair};
+    #[pymodule_export]
+    use super::pairs::pair;
+    #[pymodule_export]
+    use super::patches::PatchTracker;
     #[pymodule_export]
     use super::playback::{export, view};
     #[pymodule_export]
     use super::polygons::polygons;
     #[pymodule_export]
-    use super::scene::{Scene, pair};
+    use super::scene::Scene;
     #[pymodule_export]
     use super::simulation::Simulation;
 

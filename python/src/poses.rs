@@ -79,19 +79,48 @@ pub fn motion(
         }
         (None, Some(screw)) => {
             let array = floats(screw)?;
-            let ([8], &[px, py, pz, ax, ay, az, angular_speed, pitch]) = (array.shape(), array.as_slice()?)
-            else {
+            let ([8], Some(screw)) = (array.shape(), rows(array.as_slice()?).next()) else {
                 let expected = "shape (8,), px py pz ax ay az omega pitch";
                 return Err(shape_error(&format!("screw_{body}"), &array, expected));
             };
-            let [point, axis] = [[px, py, pz], [ax, ay, az]].map(DVec3::from_array);
-            Ok(Motion::Screw { point, axis, angular_speed, pitch })
+            Ok(of_screw(screw))
         }
         (Some(_), Some(_)) => {
             let found = format!("given together with screw_{body}");
             Err(argument(&format!("velocity_{body}"), found, "one of them"))
         }
     }
+}
+
+/// Converts the motions of the bodies of this number of pairs, as [`motion`] does that of one. `None`
+/// if neither is given.
+///
+/// # Errors
+/// `ValueError` for both, or for other shapes. The library checks the numbers.
+pub fn motions(
+    body: char,
+    velocities: Option<&Bound<'_, PyAny>>,
+    screws: Option<&Bound<'_, PyAny>>,
+    pairs: usize,
+) -> PyResult<Option<Vec<Motion>>> {
+    let (name, width, any) = match (velocities, screws) {
+        (None, None) => return Ok(None),
+        (Some(any), None) => (format!("velocities_{body}"), 6, any),
+        (None, Some(any)) => (format!("screws_{body}"), 8, any),
+        (Some(_), Some(_)) => {
+            let found = format!("given together with screws_{body}");
+            return Err(argument(&format!("velocities_{body}"), found, "one of them"));
+        }
+    };
+    let array = floats(any)?;
+    if array.shape() != [pairs, width] {
+        return Err(shape_error(&name, &array, &format!("shape ({pairs}, {width}), a row for each pair")));
+    }
+    let numbers = array.as_slice()?;
+    Ok(Some(match width {
+        6 => rows(numbers).map(|row| Motion::Linear { velocity: of_twist(row) }).collect(),
+        _ => rows(numbers).map(of_screw).collect(),
+    }))
 }
 
 /// Converts numbers, of which one stands for all rows.
@@ -138,7 +167,8 @@ fn floats<'py>(any: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, f64>
     let py = any.py();
     static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let require = REQUIRE.import(py, "numpy", "require")?;
-    let array = require.call1((any, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))?;
+    let array =
+        require.call1((arrays::on_host(any)?, numpy::dtype::<f64>(py), ["C_CONTIGUOUS", "ALIGNED"]))?;
     Ok(array.cast_into::<PyArrayDyn<f64>>()?.try_readonly()?)
 }
 
@@ -159,6 +189,11 @@ fn of_quaternion(&[x, y, z, i, j, k, w]: &[f64; 7]) -> Result<Pose, CollideError
 
 fn of_twist(&[x, y, z, i, j, k]: &[f64; 6]) -> Velocity {
     Velocity { linear: DVec3::new(x, y, z), angular: DVec3::new(i, j, k) }
+}
+
+fn of_screw(&[px, py, pz, ax, ay, az, angular_speed, pitch]: &[f64; 8]) -> Motion {
+    let [point, axis] = [[px, py, pz], [ax, ay, az]].map(DVec3::from_array);
+    Motion::Screw { point, axis, angular_speed, pitch }
 }
 
 /// A matrix that maps columns: the rotation is its upper left part, the translation its last

@@ -5,17 +5,19 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use tesdf::base::unit::is_same_unit;
 use tesdf::collide::{
-    self, ClearanceOptions, CollideError, Groups, Instance, InstanceId, Pose, Shape, ShapeId,
-    TimeOfImpactOptions, clearance, coarse_contacts, detect_until, time_of_impact, why,
+    self, ClearanceOptions, CollideError, Instance, InstanceId, Pose, ShapeId, TimeOfImpactOptions,
+    clearance, coarse_contacts, detect_until, time_of_impact, why,
 };
 
 use crate::arrays;
 use crate::contacts::{self, Columns};
 use crate::detection::{self, Keywords};
-use crate::errors::{Error, argument};
+use crate::device::{self, HeldDetector};
+use crate::errors::Error;
+use crate::given::{Given, PerInstance};
 use crate::interrupt::cancellable;
+use crate::pairs::{self, Motions, pairs_of};
 use crate::poses::{self, Count};
 use crate::{classes, pool, shapes};
 
@@ -40,76 +42,7 @@ pub struct Scene {
     /// A computation keeps the scene that it began with. A change then makes a copy, without the
     /// meshes.
     inner: Mutex<Arc<collide::Scene>>,
-}
-
-/// What the arguments of `add` and `update` say about rows of instances.
-struct Given {
-    poses: Option<Vec<Pose>>,
-    velocities: Option<Vec<collide::Velocity>>,
-    scale: Option<Vec<f64>>,
-    world: Option<Vec<u32>>,
-    memberships: Option<Vec<u32>>,
-    filter: Option<Vec<u32>>,
-}
-
-/// Arguments that have one value, or one for each instance.
-struct PerInstance<'a, 'py> {
-    scale: Option<&'a Bound<'py, PyAny>>,
-    world: Option<&'a Bound<'py, PyAny>>,
-    memberships: Option<&'a Bound<'py, PyAny>>,
-    filter: Option<&'a Bound<'py, PyAny>>,
-}
-
-impl Given {
-    fn new(
-        rows: usize,
-        poses: Option<Vec<Pose>>,
-        velocities: Option<Vec<collide::Velocity>>,
-        each: &PerInstance<'_, '_>,
-    ) -> PyResult<Self> {
-        let lengths =
-            [("poses", poses.as_ref().map(Vec::len)), ("velocities", velocities.as_ref().map(Vec::len))];
-        for (name, length) in lengths {
-            if let Some(length) = length
-                && length != rows
-            {
-                return Err(argument(
-                    name,
-                    format!("{length} rows"),
-                    &format!("{rows}, one for each instance"),
-                ));
-            }
-        }
-        let words =
-            |name, any: Option<&Bound<'_, PyAny>>| any.map(|any| poses::words(name, any, rows)).transpose();
-        Ok(Self {
-            poses,
-            velocities,
-            scale: each.scale.map(|any| poses::numbers("scale", any, rows)).transpose()?,
-            world: words("world", each.world)?,
-            memberships: words("memberships", each.memberships)?,
-            filter: words("filter", each.filter)?,
-        })
-    }
-
-    /// `instance` with what is given for `row`.
-    fn row(&self, row: usize, instance: Instance) -> Instance {
-        fn given<T: Copy>(column: &Option<Vec<T>>, row: usize, other: T) -> T {
-            column.as_ref().map_or(other, |column| column[row])
-        }
-        let Groups { memberships, filter } = instance.groups;
-        Instance {
-            pose: given(&self.poses, row, instance.pose),
-            velocity: given(&self.velocities, row, instance.velocity),
-            scale: given(&self.scale, row, instance.scale),
-            world: given(&self.world, row, instance.world),
-            groups: Groups {
-                memberships: given(&self.memberships, row, memberships),
-                filter: given(&self.filter, row, filter),
-            },
-            ..instance
-        }
-    }
+    on_device: HeldDetector,
 }
 
 impl Scene {
@@ -118,11 +51,11 @@ impl Scene {
     }
 
     /// The scene as it is now.
-    fn now(&self) -> Arc<collide::Scene> {
+    pub fn now(&self) -> Arc<collide::Scene> {
         Arc::clone(&self.locked())
     }
 
-    fn change<T>(
+    pub fn change<T>(
         &self,
         py: Python<'_>,
         change: impl FnOnce(&mut collide::Scene) -> Result<T, CollideError>,
@@ -145,8 +78,8 @@ impl Scene {
 impl Scene {
     /// An empty scene.
     #[new]
-    fn new() -> Self {
-        Self { inner: Mutex::default() }
+    pub fn new() -> Self {
+        Self { inner: Mutex::default(), on_device: HeldDetector::default() }
     }
 
     /// Adds a shape: an Asset, which the scene shares, a Plane, Box, Sphere or Capsule. Returns its
@@ -344,14 +277,24 @@ impl Scene {
     ///   places that touch.
     /// - precision: "f64" or "f32", of distances, normals and points.
     /// - threads: number of threads; None is one per core.
-    #[pyo3(signature = (**options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None)")]
+    /// - device: "cpu", "gpu" (what TESDF_DEVICE names, else the best device), or the number of a
+    ///   device or a part of its name, such as "cuda:0"; devices lists them. A device computes in
+    ///   f32 and has no mode "edge"; docs/gpu/design.md says how far its contacts agree with the
+    ///   processor's. It keeps the shapes until a detection on another device. Ctrl-C acts after the
+    ///   detection.
+    #[pyo3(signature = (*, device = None, **options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None, device='cpu')")]
     fn detect<'py>(
         &self,
         py: Python<'py>,
+        device: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let Keywords { options, threads } = Keywords::new("detect", options)?;
         let (scene, pool) = (self.now(), pool::of(threads).map_err(|e| e.raise(py))?);
+        if let Some(device) = device::chosen(device)? {
+            let found = py.detach(|| pool.install(|| self.on_device.detect(&device, &scene, &options)));
+            return contacts::contacts(py, &found.map_err(|e| e.raise(py))?);
+        }
         let stop = AtomicBool::new(false);
         let work = || pool.install(|| detect_until(&scene, &options, &stop));
         let found = cancellable(py, work, || stop.store(true, Ordering::Relaxed), || Ok(()))?;
@@ -390,6 +333,21 @@ impl Scene {
         options.tolerance = detection::tolerance(tolerance, options.tolerance)?;
         let found = self.compute(py, |scene| clearance(scene, InstanceId(a), InstanceId(b), &options))?;
         classes::report(py, "Clearance", &found)
+    }
+
+    /// The clearances of pairs of instances [P, 2], on all threads: Clearances, arrays with a row for
+    /// each pair. Otherwise as clearance; an error names the row. Ctrl-C ends it with
+    /// KeyboardInterrupt.
+    #[pyo3(signature = (pairs, *, tolerance = None))]
+    fn clearances<'py>(
+        &self,
+        py: Python<'py>,
+        pairs: &Bound<'py, PyAny>,
+        tolerance: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut options = ClearanceOptions::default();
+        options.tolerance = detection::tolerance(tolerance, options.tolerance)?;
+        pairs::clearances(py, &self.now(), &pairs_of(pairs)?, &options)
     }
 
     /// The first time at which two moving instances touch: an Impact, or None if they stay apart
@@ -432,6 +390,37 @@ impl Scene {
         found.map(|impact| classes::report(py, "Impact", &impact)).transpose()
     }
 
+    /// The first impacts of pairs of moving instances [P, 2], on all threads: Impacts, arrays with a
+    /// row for each pair, whose time is inf where the bodies stay apart until the end.
+    ///
+    /// velocities_a and velocities_b have the shape [P, 6], screws_a and screws_b [P, 8]; bodies
+    /// without either rest. Otherwise as time_of_impact; an error names the row. Ctrl-C ends it with
+    /// KeyboardInterrupt.
+    #[pyo3(signature = (
+        pairs, *, velocities_a = None, velocities_b = None, screws_a = None, screws_b = None, end = 1.0,
+        tolerance = None, iterations = 1000
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
+    fn times_of_impact<'py>(
+        &self,
+        py: Python<'py>,
+        pairs: &Bound<'py, PyAny>,
+        velocities_a: Option<&Bound<'py, PyAny>>,
+        velocities_b: Option<&Bound<'py, PyAny>>,
+        screws_a: Option<&Bound<'py, PyAny>>,
+        screws_b: Option<&Bound<'py, PyAny>>,
+        end: f64,
+        tolerance: Option<&Bound<'py, PyAny>>,
+        iterations: u32,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let mut options = TimeOfImpactOptions { end, iterations, ..TimeOfImpactOptions::default() };
+        options.tolerance = detection::tolerance(tolerance, options.tolerance)?;
+        let pairs = pairs_of(pairs)?;
+        let motions = |body, velocities, screws| poses::motions(body, velocities, screws, pairs.len());
+        let of = [motions('a', velocities_a, screws_a)?, motions('b', velocities_b, screws_b)?];
+        pairs::impacts(py, &self.now(), &pairs, &Motions { of }, &options)
+    }
+
     /// Why contacts of two instances exist or not: what each stage of a detection did with the
     /// faces of a (in the mode "node" its vertices, in the mode "edge" its vertices and edges) in
     /// the field of b. Returns a WhyReport.
@@ -459,55 +448,11 @@ impl Scene {
 
     /// A copy that shares the assets.
     fn __copy__(&self) -> Self {
-        Self { inner: Mutex::new(self.now()) }
+        Self { inner: Mutex::new(self.now()), on_device: HeldDetector::default() }
     }
 
     fn __repr__(&self) -> String {
         let scene = self.now();
         format!("<tesdf.Scene: {} instances of {} shapes>", scene.instances().len(), scene.shapes().len())
     }
-}
-
-/// A scene of two bodies, as the instances 0 and 1.
-///
-/// Raises ValueError if they are assets in different units.
-#[pyfunction]
-#[pyo3(signature = (a, b, pose_a, pose_b))]
-pub fn pair(
-    py: Python<'_>,
-    a: &Bound<'_, PyAny>,
-    b: &Bound<'_, PyAny>,
-    pose_a: Option<&Bound<'_, PyAny>>,
-    pose_b: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Scene> {
-    let shapes = [shapes::shape("a", a)?, shapes::shape("b", b)?];
-    if let [Shape::Mesh(a), Shape::Mesh(b)] = &shapes
-        && let (Some(a), Some(b)) = (a.unit(), b.unit())
-        && !is_same_unit(a, b)
-    {
-        return Err(argument("b", format!("an asset in {b}, and a is in {a}"), "assets in one unit"));
-    }
-    let poses = [("pose_a", pose_a), ("pose_b", pose_b)];
-    let scene = Scene::new();
-    for (shape, (name, pose)) in shapes.into_iter().zip(poses) {
-        let pose = pose.map(|any| poses::poses(name, any, Count::One)).transpose()?;
-        let pose = pose.map_or(Pose::IDENTITY, |poses| poses[0]);
-        scene.change(py, |scene| {
-            let shape = scene.add_shape(shape)?;
-            scene.add(Instance::new(shape, pose))
-        })?;
-    }
-    Ok(scene)
-}
-
-/// Converts pairs of ids of instances.
-fn pairs_of(any: &Bound<'_, PyAny>) -> PyResult<Vec<[InstanceId; 2]>> {
-    let numbers = arrays::integers("pairs", any, "shape (P, 2)", |shape| matches!(shape, [_, 2]))?;
-    let id = |&number: &i64| {
-        let expected = "ids from 0 to 2^32 - 1 (0-based)";
-        u32::try_from(number)
-            .map(InstanceId)
-            .map_err(|_| argument("pairs", format!("the id {number}"), expected))
-    };
-    numbers.as_slice()?.as_chunks::<2>().0.iter().map(|[a, b]| Ok([id(a)?, id(b)?])).collect()
 }

@@ -21,6 +21,7 @@ use tesdf_sim::{
 
 use crate::contacts::{self, Columns};
 use crate::detection::one_of;
+use crate::device::{self, Device};
 use crate::errors::{Error, argument, kind_of};
 use crate::interrupt::cancellable;
 use crate::poses::{Count, of_pose, of_velocity, poses, velocities};
@@ -34,6 +35,7 @@ use crate::{classes, pool};
 /// - mode: replaces the mode of the scene's detector: "node", "edge", "face", "exact" or "off".
 /// - time_step, duration: replace those of the scene, in seconds.
 /// - threads: number of threads; None is one per core. The states do not depend on it.
+/// - device: where contacts are found, as in Scene.detect.
 ///
 /// Units are SI: metres, kilograms, seconds, radians. Bodies have the numbers of their order in the
 /// scene, from 0. Meshes of the scene are encoded first, which Ctrl-C ends with KeyboardInterrupt.
@@ -88,7 +90,7 @@ const MODES: [(&str, DetectorMode); 5] = [
 
 impl Running {
     /// Reads the scene, encodes its meshes, and begins the run.
-    fn begin(mut loaded: LoadedScene, progress: &Progress) -> Result<Self, Error> {
+    fn begin(mut loaded: LoadedScene, device: Option<Device>, progress: &Progress) -> Result<Self, Error> {
         let scene_error = Error::Scene;
         let system = loaded.system_watched(progress).map_err(scene_error)?;
         // The run stores the scene's folder, so its meshes are found from any folder.
@@ -96,7 +98,11 @@ impl Running {
             .map_err(|source| scene_error(SceneError::Read { path: loaded.path.clone(), source }))?;
         let folder = loaded.path.parent().unwrap_or(&loaded.path).to_string_lossy().into_owned();
         let run = PartialRun::new(&loaded.scene, &system, folder);
-        let engine = loaded.newton(system).map_err(scene_error)?;
+        let engine = match device {
+            Some(device) => loaded.newton_with(system, device.into_detector()),
+            None => loaded.newton(system),
+        };
+        let engine = engine.map_err(scene_error)?;
         let run = Run::new(&loaded.scene, engine.system(), run).map_err(Error::Simulate)?;
         Ok(Self { engine, run })
     }
@@ -194,7 +200,7 @@ fn index_of(what: &str, any: &Bound<'_, PyAny>, names: &[String]) -> PyResult<us
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (scene, *, mode = None, time_step = None, duration = None, threads = None))]
+    #[pyo3(signature = (scene, *, mode = None, time_step = None, duration = None, threads = None, device = None), text_signature = "(scene, *, mode=None, time_step=None, duration=None, threads=None, device=\"cpu\")")]
     fn new(
         py: Python<'_>,
         scene: &Bound<'_, PyAny>,
@@ -202,7 +208,9 @@ impl Simulation {
         time_step: Option<f64>,
         duration: Option<f64>,
         threads: Option<NonZeroUsize>,
+        device: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        let device = device::chosen(device)?;
         let mode = mode.map(|any| one_of("mode", any, &MODES)).transpose()?;
         let threads = threads.map(|n| pool::of(Some(n))).transpose().map_err(|e| e.raise(py))?;
         let pool = match &threads {
@@ -219,7 +227,7 @@ impl Simulation {
                 file.time_step = time_step.unwrap_or(file.time_step);
                 file.duration = duration.unwrap_or(file.duration);
                 file.steps().map_err(|e| Error::Simulate(e.into()))?;
-                Running::begin(loaded, &progress)
+                Running::begin(loaded, device, &progress)
             })
         };
         let running = cancellable(py, work, || progress.cancel(), || Ok(()))?.map_err(|e| e.raise(py))?;

@@ -25,41 +25,77 @@
     tesdf.clearance(asset, asset, pose_b=pose).distance              # exact, with witness points
     tesdf.time_of_impact(asset, asset, pose_b=pose, velocity_b=velocity)
 
+    scene.clearances(pairs).distance                    # of many pairs [P, 2]; times_of_impact
+    kept = tesdf.InstancePairs()                        # kept.detect(scene): less work where most bodies rest
+    tracker = tesdf.PatchTracker()                      # tracker.update(scene, contacts): regions with lasting ids
+
+    tesdf.devices()                                     # GPUs, if the package was built with them
+    scene.detect(device="gpu")                          # and asset.query(points, device="gpu"), Simulation
+
     simulation = tesdf.Simulation("scene.toml")         # bodies in motion, as `tesdf simulate`
     simulation.set_motor("slide", velocity=0.1)         # set_wrench, set_state
     simulation.step()                                   # simulation.poses, simulation.contacts, ...
     simulation.run()["passed"]                          # to the end; the summary, with the criteria
-    tesdf.view(simulation, "page.html")                 # plays it in a browser; tesdf.export for a GLB file
+    tesdf.view(simulation, "page.html")                 # plays it in a browser; tesdf.export for GLB and rerun
 
 All lengths are in the mesh's unit, and all ids start from 0. Errors are `MeshError`
 (`NotSolidError` if the mesh has no well-defined inside), `EncodeError`, `DeformError`,
-`AssetError`, `CollideError`, `SceneError` and `SimulationError`, which are all `ValueError`s, and `OSError` for files.
+`AssetError`, `CollideError`, `DeviceError`, `SceneError` and `SimulationError`, which are all `ValueError`s, and `OSError` for files.
 """
 
-from ._native import NO_CELL, NO_FACE, Asset, Scene, Simulation, __version__, check, encode, export, repair, view
+from ._native import (
+    NO_CELL,
+    NO_FACE,
+    Asset,
+    DeviceArray,
+    InstancePairs,
+    PatchTracker,
+    Scene,
+    Simulation,
+    __version__,
+    check,
+    devices,
+    encode,
+    repair,
+    view,
+)
 from .bodies import clearance, collide, time_of_impact, why
-from .contacts import CoarseContacts, Contacts, HiddenOverlaps, Instances, Record, Reductions, StepContacts
+from .contacts import (
+    Clearances,
+    CoarseContacts,
+    ContactPatches,
+    Contacts,
+    HiddenOverlaps,
+    Impacts,
+    Instances,
+    Record,
+    Reductions,
+    StepContacts,
+)
 from .errors import (
     AssetError,
     CollideError,
     DeformError,
+    DeviceError,
     EncodeError,
     MeshError,
     NotSolidError,
     SceneError,
     SimulationError,
 )
+from .playback import export
 from .reports import (
     CheckReport,
     Clearance,
     Defect,
     DetectionStatistics,
+    Device,
     Impact,
     RepairReport,
     VerifyReport,
     WhyReport,
 )
-from .results import Answers, Moved, RayHits, Reencoded, Repaired
+from .results import Answers, DeviceAnswers, Moved, RayHits, Reencoded, Repaired
 from .shapes import Box, Capsule, Plane, Sphere
 from .usd import UsdMesh, read_usd
 
@@ -73,19 +109,28 @@ __all__ = [
     "Capsule",
     "CheckReport",
     "Clearance",
+    "Clearances",
     "CoarseContacts",
     "CollideError",
+    "ContactPatches",
     "Contacts",
     "Defect",
     "DeformError",
     "DetectionStatistics",
+    "Device",
+    "DeviceAnswers",
+    "DeviceArray",
+    "DeviceError",
     "EncodeError",
     "HiddenOverlaps",
     "Impact",
+    "Impacts",
+    "InstancePairs",
     "Instances",
     "MeshError",
     "Moved",
     "NotSolidError",
+    "PatchTracker",
     "Plane",
     "RayHits",
     "Record",
@@ -106,6 +151,7 @@ __all__ = [
     "check",
     "clearance",
     "collide",
+    "devices",
     "encode",
     "export",
     "read_usd",

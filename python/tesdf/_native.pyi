@@ -1,14 +1,35 @@
 from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
-from typing import Any, Literal, Protocol, Union, final
+from typing import Any, Literal, Protocol, Union, final, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from .bodies import Shape
-from .contacts import CoarseContacts, Contacts, Instances, Record, StepContacts
-from .reports import Certificate, CheckReport, Clearance, Impact, Inspection, Source, Statistics, VerifyReport, WhyReport
-from .results import Answers, Moved, RayHits, Reencoded, Repaired
+from .contacts import (
+    Clearances,
+    CoarseContacts,
+    ContactPatches,
+    ContactRows,
+    Contacts,
+    Impacts,
+    Instances,
+    Record,
+    StepContacts,
+)
+from .reports import (
+    Certificate,
+    CheckReport,
+    Clearance,
+    Device,
+    Impact,
+    Inspection,
+    Source,
+    Statistics,
+    VerifyReport,
+    WhyReport,
+)
+from .results import Answers, DeviceAnswers, Moved, RayHits, Reencoded, Repaired
 
 class _HasMesh(Protocol):
     @property
@@ -22,7 +43,27 @@ _Precision = Literal["f64", "f32"]
 _Numbers = Union[float, npt.ArrayLike]
 _Integers = Union[int, npt.ArrayLike]
 
-__all__ = ["NO_CELL", "NO_FACE", "Asset", "Scene", "Simulation", "__version__", "check", "encode", "export", "pair", "polygons", "repair", "view"]
+_Device = Union[str, int, None]
+
+__all__ = [
+    "NO_CELL",
+    "NO_FACE",
+    "Asset",
+    "DeviceArray",
+    "InstancePairs",
+    "PatchTracker",
+    "Scene",
+    "Simulation",
+    "__version__",
+    "check",
+    "devices",
+    "encode",
+    "export",
+    "pair",
+    "polygons",
+    "repair",
+    "view",
+]
 
 NO_CELL: int
 NO_FACE: int
@@ -32,6 +73,7 @@ def polygons(
     points: npt.ArrayLike, counts: npt.ArrayLike, corners: npt.ArrayLike
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32], tuple[str, ...]]: ...
 def check(mesh: _Mesh) -> CheckReport: ...
+def devices() -> list[Device]: ...
 def repair(
     mesh: _Mesh,
     *,
@@ -68,7 +110,10 @@ class Asset:
     def from_bytes(data: bytes) -> Asset: ...
     def to_bytes(self) -> bytes: ...
     def save(self, path: _Path) -> None: ...
-    def query(self, points: npt.ArrayLike, precision: _Precision = "f64") -> Answers: ...
+    @overload
+    def query(self, points: DeviceArray, precision: _Precision = "f64", *, device: _Device = "cpu") -> DeviceAnswers: ...
+    @overload
+    def query(self, points: npt.ArrayLike, precision: _Precision = "f64", *, device: _Device = "cpu") -> Answers: ...
     def query_in_domain(self, points: npt.ArrayLike, precision: _Precision = "f64") -> Answers: ...
     def signed_distance(self, points: npt.ArrayLike, precision: _Precision = "f64") -> npt.NDArray[np.float64]: ...
     def is_inside(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]: ...
@@ -159,6 +204,7 @@ class Scene:
         spread: int | None = None,
         precision: _Precision = "f64",
         threads: int | None = None,
+        device: _Device = "cpu",
     ) -> Contacts: ...
     def coarse_contacts(
         self,
@@ -177,6 +223,19 @@ class Scene:
         threads: int | None = None,
     ) -> CoarseContacts: ...
     def clearance(self, a: int, b: int, *, tolerance: float | None = None) -> Clearance: ...
+    def clearances(self, pairs: npt.ArrayLike, *, tolerance: float | None = None) -> Clearances: ...
+    def times_of_impact(
+        self,
+        pairs: npt.ArrayLike,
+        *,
+        velocities_a: npt.ArrayLike | None = None,
+        velocities_b: npt.ArrayLike | None = None,
+        screws_a: npt.ArrayLike | None = None,
+        screws_b: npt.ArrayLike | None = None,
+        end: float = 1.0,
+        tolerance: float | None = None,
+        iterations: int = 1000,
+    ) -> Impacts: ...
     def time_of_impact(
         self,
         a: int,
@@ -213,6 +272,60 @@ class Scene:
     def __copy__(self) -> Scene: ...
 
 @final
+class DeviceArray:
+    def __new__(cls, array: npt.ArrayLike, device: _Device = "gpu") -> DeviceArray: ...
+    def numpy(self) -> npt.NDArray[Any]: ...
+    @property
+    def device(self) -> str: ...
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+    @property
+    def dtype(self) -> np.dtype[Any]: ...
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]: ...
+    def __dlpack__(
+        self,
+        *,
+        stream: Any = None,
+        max_version: tuple[int, int] | None = None,
+        dl_device: tuple[int, int] | None = None,
+        copy: bool | None = None,
+    ) -> Any: ...
+    def __dlpack_device__(self) -> tuple[int, int]: ...
+    def __len__(self) -> int: ...
+
+@final
+class InstancePairs:
+    def __new__(cls) -> InstancePairs: ...
+    def detect(
+        self,
+        scene: Scene,
+        *,
+        moved: npt.ArrayLike | None = None,
+        mode: Literal["node", "edge", "face", "exact"] = "exact",
+        contacts_per: Literal["cell", "face", "minimum"] = "face",
+        contact_distance: float = 0.0,
+        speculative_time: float = 0.0,
+        cos_theta: float | None = None,
+        iterations: int = 16,
+        tolerance: float | None = None,
+        reduce: int | None = None,
+        deepest: int | None = None,
+        spread: int | None = None,
+        precision: _Precision = "f64",
+        threads: int | None = None,
+    ) -> Contacts: ...
+    @property
+    def pairs(self) -> npt.NDArray[np.uint32]: ...
+
+@final
+class PatchTracker:
+    def __new__(
+        cls, *, angle: float = 0.5235987755982988, link: float | None = None, points: int = 4
+    ) -> PatchTracker: ...
+    def update(self, scene: Scene, contacts: ContactRows) -> ContactPatches: ...
+
+@final
 class Simulation:
     def __new__(
         cls,
@@ -222,6 +335,7 @@ class Simulation:
         time_step: float | None = None,
         duration: float | None = None,
         threads: int | None = None,
+        device: _Device = "cpu",
     ) -> Simulation: ...
     def step(self, count: int = 1) -> None: ...
     def run(self, *, progress: Callable[[int, int], object] | None = None) -> dict[str, Any]: ...

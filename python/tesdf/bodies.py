@@ -31,6 +31,7 @@ class DetectOptions(TypedDict, total=False):
     spread: int | None
     precision: Literal["f64", "f32"]
     threads: int | None
+    device: str | int | None
 
 
 def collide(

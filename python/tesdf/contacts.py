@@ -108,6 +108,87 @@ class CoarseContacts(_Rows):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Clearances(_Rows):
+    """Signed distances of pairs of bodies, a row for each pair. `tesdf.Clearance` says more."""
+
+    instance_a: _Id
+    """[P]"""
+    instance_b: _Id
+    """[P]"""
+    distance: _Float
+    """[P] least distance between the surfaces; negative where the bodies overlap. At most the
+    tolerance above the true value if `converged`"""
+    lower_bound: _Float
+    """[P] the true value is between this and `distance`"""
+    point_a: _Float
+    """[P, 3] witness point on a"""
+    point_b: _Float
+    """[P, 3] witness point on b"""
+    normal: _Float
+    """[P, 3] unit vector from b to a"""
+    face_a: _Id
+    """[P] face of a with the witness point"""
+    face_b: _Id
+    """[P] face of b with the witness point"""
+    field: _Id
+    """[P] the instance whose signed distance field was used"""
+    converged: npt.NDArray[np.bool_]
+    """[P] whether the error is within the tolerance"""
+    overlap: npt.NDArray[np.bool_]
+    """[P] whether the solids share volume, also where their surfaces coincide"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Impacts(Clearances):
+    """First impacts of pairs of moving bodies: the clearances at their times. Where the bodies stay
+    apart until the end, `time` is inf, the other numbers NaN, and the ids 2^32 - 1."""
+
+    time: _Float
+    """[P] before this time the bodies are apart"""
+    iterations: _Id
+    """[P] number of steps taken"""
+    touches: npt.NDArray[np.bool_]
+    """[P] whether the bodies touch at `time`. False where the steps were used up: the motion is then
+    known to be free up to `time`"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactPatches(_Rows):
+    """Regions in which two bodies touch, a row for each: sorted by instances, those of one pair by
+    distance. Q is the number of all points, N that of the contacts."""
+
+    id: npt.NDArray[np.uint64]
+    """[P] stays the same as long as the region shares a face with that of the detection before; never
+    used again"""
+    age: npt.NDArray[np.uint64]
+    """[P] number of updates since the patch appeared; 0 at its first one"""
+    instance_a: _Id
+    """[P] the lower id"""
+    instance_b: _Id
+    """[P] the higher id"""
+    normal: _Float
+    """[P, 3] mean unit normal, from b to a"""
+    distance: _Float
+    """[P] least signed distance"""
+    area: _Float
+    """[P] of the convex hull of the contacts, seen along the normal; 0 where they lie on a line"""
+    center: _Float
+    """[P, 3] pressure centre: the mean point of the hull, weighted by a pressure that grows with the
+    depth"""
+    patch_of_contact: _Id
+    """[N] the row of each contact's patch"""
+    point_patch: _Id
+    """[Q] the rows of the patches that the points span, ascending; the first point of each is the
+    deepest"""
+    point_id: npt.NDArray[np.uint64]
+    """[Q] stays the same as long as the point keeps its place on one of the two bodies"""
+    point_contact: npt.NDArray[np.uint64]
+    """[Q] the contact of each point"""
+    ended: npt.NDArray[np.uint64]
+    """ids of patches of the detection before that no longer touch, ascending"""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class ContactRows(_Rows):
     """Arrays with a row for each contact.
 

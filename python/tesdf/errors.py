@@ -38,6 +38,10 @@ class CollideError(ValueError):
     """A scene, a detection or a measurement of two bodies is refused. The scene is unchanged."""
 
 
+class DeviceError(ValueError):
+    """A device does not exist or has failed, or the package was built without devices."""
+
+
 class SceneError(ValueError):
     """A scene file cannot be simulated. The message names its line."""
 

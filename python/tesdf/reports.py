@@ -393,6 +393,26 @@ class DetectionStatistics:
 
 
 @dataclass(frozen=True)
+class Device:
+    """A device on which contacts and signed distances can be computed."""
+
+    number: int
+    """its number among the devices of this machine, the best first"""
+    name: str
+    """the name that the driver reports; of CUDA devices it ends with (cuda:0), (cuda:1), ..."""
+    kind: str
+    """discrete GPU, integrated GPU, virtual GPU, software or other"""
+    subgroup_size: tuple[int, int]
+    """smallest and largest number of threads that run in lockstep"""
+    has_subgroup_operations: bool
+    """whether these threads exchange values without shared memory"""
+    max_buffer_bytes: int
+    """size of the largest buffer"""
+    has_timestamps: bool
+    """whether the clock of the device measures the time of each stage"""
+
+
+@dataclass(frozen=True)
 class Clearance:
     """Signed distance of two bodies, in the unit and frame of the world."""
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from .reports import RepairReport
 
 if TYPE_CHECKING:
-    from ._native import Asset
+    from ._native import Asset, DeviceArray
 
 
 class Answers(NamedTuple):
@@ -24,6 +24,21 @@ class Answers(NamedTuple):
     """[N, 3] nearest point on the surface"""
     face: npt.NDArray[np.uint32]
     """[N] id of the nearest face in the source mesh"""
+
+
+class DeviceAnswers(NamedTuple):
+    """One row per point, in the mesh's unit, on the device of the points. A point that is not
+    finite has NaN and `NO_FACE`."""
+
+    signed_distance: DeviceArray
+    """[N] float32, distance to the nearest face, negative inside"""
+    gradient: DeviceArray
+    """[N, 3] float32, unit gradient of the signed distance; points outward"""
+    closest_point: DeviceArray
+    """[N, 3] float32, nearest point on the surface"""
+    face_row: DeviceArray
+    """[N] uint32, row of the nearest face in `Asset.faces`; `Asset.face_ids` has its id in the
+    source mesh"""
 
 
 class RayHits(NamedTuple):

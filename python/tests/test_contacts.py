@@ -314,8 +314,11 @@ def test_signatures_have_the_defaults(linked):
     for method in (linked.detect, linked.why, linked.coarse_contacts):
         parameters = inspect.signature(method).parameters.values()
         defaults = {p.name: p.default for p in parameters if p.kind is p.KEYWORD_ONLY}
-        assert len(defaults) == 12
+        assert len(defaults) == (13 if "device" in defaults else 12)
         assert same(linked.detect(**defaults).distance, expected.distance)
+    assert defaults.keys() < inspect.signature(linked.detect).parameters.keys() >= {"device"}
+    parameters = inspect.signature(tesdf.InstancePairs.detect).parameters
+    assert {name: parameters[name].default for name in defaults} == defaults and len(parameters) == 15
 
 
 def test_bodies_of_two_functions(asset, torus):

@@ -9,6 +9,9 @@ import tesdf.mujoco
 import tesdf.mujoco_warp
 import warp as wp
 from conftest import PARTS, SCREW
+from unoptimised_kernels import unoptimised
+
+unoptimised(wp)
 
 # The ball and the floor meet by MJWarp's own contacts.
 CUBE = f"""

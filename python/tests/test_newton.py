@@ -7,6 +7,9 @@ import pytest
 import tesdf
 import tesdf.newton
 import warp as wp
+from unoptimised_kernels import unoptimised
+
+unoptimised(wp)
 
 STEP = 0.002
 FLIPPED = (1.0, 0.0, 0.0, 0.0)

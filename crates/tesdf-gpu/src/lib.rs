@@ -33,8 +33,8 @@ pub use collide::queries::{DeviceAnswers, WorldAnswer};
 pub use collide::scene::{GpuShapeId, GpuShapes, ShapeBytes};
 pub use collide::{
     Capacities, Counting, Counts, Detector, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes,
-    Memory, Pruning,
+    Memory, Pruning, SharedDetector,
 };
-pub use device::{Device, DeviceArray, DeviceInfo, DeviceKind, devices};
+pub use device::{Device, DeviceArray, DeviceInfo, DeviceKind, Word, devices};
 pub use encode::{DeviceSampler, ROUNDING, SampleCounter, SampleCounts, SamplerLimits};
 pub use error::GpuError;

@@ -75,6 +75,28 @@ fn arrays_get_the_answers_of_a_query() {
     }
 }
 
+/// Each thread uses shapes, points and answers of another one.
+#[test]
+fn threads_share_shapes_and_arrays() {
+    let device = Device::choose(None).expect("a device");
+    let shapes = GpuShapes::upload(&device, &[Shape::Sphere { radius: 1.0 }]).expect("fits");
+    let instances = [(shapes.ids()[0], Placement { pose: Pose::IDENTITY, scale: 1.0 })];
+    let answers = DeviceAnswers::empty(&device, 2).expect("fits");
+    for step in 1..5u8 {
+        let at = f32::from(step);
+        let made = || DeviceArray::upload(&device, &[at, 0.0, 0.0, 0.0, 0.0, at]).expect("fits");
+        let points = std::thread::scope(|scope| scope.spawn(made).join().expect("an array"));
+        let query = || shapes.signed_distances_into(&points, &instances, &answers).expect("fits");
+        std::thread::scope(|scope| scope.spawn(query).join().expect("a query"));
+        let read = || answers.signed_distances.read(&device).expect("answers");
+        let found = std::thread::scope(|scope| scope.spawn(read).join().expect("answers"));
+        assert_eq!(found, [at - 1.0; 2]);
+        let of_host = || shapes.signed_distances(&[DVec3::new(0.0, 3.0, 0.0)], &instances).expect("answers");
+        let found = std::thread::scope(|scope| scope.spawn(of_host).join().expect("answers"));
+        assert_eq!(found[0][0].signed_distance, 2.0);
+    }
+}
+
 #[test]
 fn arrays_that_do_not_fit_are_errors() {
     let device = Device::choose(None).expect("a device");

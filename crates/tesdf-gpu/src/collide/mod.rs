@@ -11,6 +11,7 @@ mod pass;
 pub mod queries;
 mod reduce;
 pub mod scene;
+mod shared;
 mod stages;
 
 use std::collections::BTreeMap;
@@ -31,6 +32,7 @@ use pass::{Parts, parts};
 use scene::instances::Instances;
 use scene::placed::{FieldFrame, Placed};
 use scene::{GpuShapeId, GpuShapes};
+pub use shared::SharedDetector;
 use stages::Timing;
 
 use crate::GpuError;

@@ -32,6 +32,7 @@ use super::memory::{ALIGNMENT, Memory, Storage};
 use super::nvrtc::{architecture, compile};
 use super::source::{Count, least_hardware, properties, source};
 use crate::GpuError;
+use crate::device::STREAM;
 
 /// An indirect launch starts this many blocks for each block that the GPU runs at the same time.
 /// With more than one, the GPU starts the next block as soon as one ends early.
@@ -109,13 +110,18 @@ fn id(index: usize) -> DeviceId {
     DeviceId::new(0, index as u16)
 }
 
+/// The number of the CUDA device of a client. `None` when it is not a CUDA device.
+pub fn number(client: &Client) -> Option<usize> {
+    let device = client.service_id().device;
+    let is_cuda = client.service_id() == ServiceId::of::<CudaServer>(device);
+    is_cuda.then_some(usize::from(device.index_id))
+}
+
 /// Wraps memory of another library as a buffer. `None` when the device is not a CUDA device.
 pub fn from_raw_ptr(client: &Client, pointer: u64, bytes: u64) -> Option<Handle> {
+    number(client)?;
     let device = client.service_id().device;
-    if client.service_id() != ServiceId::of::<CudaServer>(device) {
-        return None;
-    }
-    let handle = Handle::new(client.service_id(), StreamId::current(), bytes);
+    let handle = Handle::new(client.service_id(), STREAM, bytes);
     let memory = handle.memory.clone();
     // Submitted like a launch, so that it comes before later launches.
     DeviceHandle::<CudaServer>::new(device).submit(move |server| server.memory.adopt(memory, pointer));

@@ -10,17 +10,23 @@ use cubecl::client::Client;
 use cubecl::features::Plane;
 use cubecl::wgpu::{WgpuDevice, WgpuDeviceKind, WgpuRuntime};
 use cubecl_common::device::{Device as _, DeviceId};
+use cubecl_environment::stream::StreamId;
 use cubecl_runtime::runtime::Runtime;
 
 use crate::GpuError;
 #[cfg(feature = "cuda")]
 use crate::cuda;
 
-pub use array::DeviceArray;
+pub use array::{DeviceArray, Word};
 pub(crate) use buffer::{Buffer, spread};
 
 /// The environment variable that selects the device when the program does not.
 pub const DEVICE_VARIABLE: &str = "TESDF_DEVICE";
+
+/// The stream of all work of this crate. By default each thread has a stream of its own, and CubeCL
+/// 0.11.3 then loses buffers that one thread has made and another uses ("Memory location points to a
+/// different allocation").
+pub(crate) const STREAM: StreamId = StreamId { value: 0 };
 
 /// The kind of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,11 +134,15 @@ impl Id {
     }
 
     fn client(self) -> Result<Client, GpuError> {
-        match self {
-            Self::Wgpu(id) => Ok(<WgpuRuntime>::client(&WgpuDevice::from_id(id))),
+        let mut client = match self {
+            Self::Wgpu(id) => <WgpuRuntime>::client(&WgpuDevice::from_id(id)),
             #[cfg(feature = "cuda")]
-            Self::Cuda(index) => cuda::server::client(index),
-        }
+            Self::Cuda(index) => cuda::server::client(index)?,
+        };
+        // SAFETY: the stream only orders launches and copies. In one stream all of them are in the order
+        // of the calls, whichever threads make these.
+        unsafe { client.set_stream(STREAM) };
+        Ok(client)
     }
 
     /// Describes the device. This does not open a CUDA device, because an open device takes some of
@@ -156,8 +166,9 @@ impl Id {
 
 impl Device {
     /// Opens a device. `asked` is the number of a device in [`devices`], or a part of its name,
-    /// such as `cuda:0`; upper and lower case are equal. With `None` the environment variable
-    /// `TESDF_DEVICE` selects the device. Without this variable the best device is opened.
+    /// such as `cuda:0`; upper and lower case are equal. `wgpu:0` is the first device that is
+    /// reached through wgpu. With `None` the environment variable `TESDF_DEVICE` selects the device.
+    /// Without this variable the best device is opened.
     ///
     /// # Errors
     /// [`GpuError::NoDevice`] when the machine has no device, [`GpuError::NoSuchDevice`] when no
@@ -169,6 +180,11 @@ impl Device {
         let Some(&best) = ids.first() else { return Err(GpuError::NoDevice) };
         let Some(asked) = asked.map(str::to_owned).or(variable) else { return Self::open(best) };
         if let Some(&id) = asked.parse().ok().and_then(|i: usize| ids.get(i)) {
+            return Self::open(id);
+        }
+        let through_wgpu = asked.strip_prefix("wgpu:").and_then(|number| number.parse().ok());
+        if let Some(&id) = through_wgpu.and_then(|i| ids.iter().filter(|id| matches!(id, Id::Wgpu(_))).nth(i))
+        {
             return Self::open(id);
         }
         let names: Vec<String> = ids.iter().map(|id| id.info().name).collect();
@@ -185,6 +201,19 @@ impl Device {
     /// The description of this device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Whether both are the same device, however it was asked for.
+    pub fn is_same(&self, other: &Self) -> bool {
+        self.client.service_id() == other.client.service_id()
+    }
+
+    /// The number of this device in CUDA; `None` for a device that is reached through wgpu.
+    pub fn cuda_number(&self) -> Option<usize> {
+        #[cfg(feature = "cuda")]
+        return cuda::server::number(&self.client);
+        #[cfg(not(feature = "cuda"))]
+        None
     }
 
     /// Waits until all launches are complete.

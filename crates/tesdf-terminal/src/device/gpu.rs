@@ -1,9 +1,7 @@
 //! Devices of the crate `tesdf-gpu`.
-use std::sync::{Mutex, PoisonError};
-
 use tesdf::collide::{CollideError, CollideOptions, Contacts, Scene};
 use tesdf::encode::Sampler;
-use tesdf_gpu::{Detector, DetectorOptions, DeviceSampler, GpuError};
+use tesdf_gpu::{DeviceSampler, SharedDetector};
 use tesdf_sim::newton::Detect;
 
 use crate::report::Failure;
@@ -35,24 +33,14 @@ impl Device {
 
     /// A detector that finds contacts on this device.
     pub fn into_detector(self) -> impl Detect {
-        DeviceDetector { device: self.0, detector: Mutex::new(None) }
+        DeviceDetector(SharedDetector::new(self.0))
     }
 }
 
-/// A detector that keeps the shapes of its scene on a device. It uploads them with the first scene.
-struct DeviceDetector {
-    device: tesdf_gpu::Device,
-    detector: Mutex<Option<Detector>>,
-}
+struct DeviceDetector(SharedDetector);
 
 impl Detect for DeviceDetector {
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
-        let failed = |e: GpuError| CollideError::Device(e.to_string());
-        let mut held = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
-        let detector = match held.take() {
-            Some(detector) => detector,
-            None => Detector::new(&self.device, scene, DetectorOptions::default()).map_err(failed)?,
-        };
-        held.insert(detector).detect(scene, options).map_err(failed)
+        self.0.detect(scene, options).map_err(|e| CollideError::Device(e.to_string()))
     }
 }

@@ -1,0 +1,55 @@
+"""Files that play runs."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Union
+
+from . import _native
+
+_Path = Union[str, "PathLike[str]"]
+
+
+def export(
+    run: _Path | _native.Simulation,
+    path: _Path,
+    *,
+    every: int | None = None,
+    fps: float | None = None,
+    speed: float = 1.0,
+    geometries: Mapping[str, _Path] | None = None,
+) -> None:
+    """Writes a run as an animation: a GLB file, which Blender, three.js and others play, or, if the path
+    ends with .rrd, a recording for the viewer of rerun.
+
+    - run: the path of a run of `tesdf simulate` or Simulation.save, or a Simulation, whose steps so
+      far are taken.
+    - path: the file.
+    - every: every N-th step and the last one are played. fps: the steps nearest to this many times
+      in each second of the run. Without both, at most 1000 steps are.
+    - speed: seconds of the run in each second of the animation. Not for .rrd, whose viewer has a
+      control of the speed.
+    - geometries: files in place of the meshes that the run names: a dict of names of bodies and
+      paths. Not for a Simulation, which has its meshes.
+
+    Each body is a node or an entity with its name; lengths are metres. In a GLB file y is up, as glTF
+    wants it, and the same run gives the bytes of `tesdf export`. A recording has the frame of the
+    scene and the timeline "time"; it needs the package rerun-sdk. Neither has contacts.
+
+    Raises OSError if a file cannot be read or written, SceneError if a mesh is missing, SimulationError
+    if the run cannot be played, and ImportError without rerun-sdk.
+    """
+    if Path(path).suffix.lower() != ".rrd":
+        _native.export(run, path, every=every, fps=fps, speed=speed, geometries=geometries)
+        return
+    if speed != 1.0:
+        raise ValueError(f"speed: {speed}; expected 1 for a .rrd file, as the viewer of rerun has a control of the speed")
+    from ._rerun import Animation, write
+
+    with tempfile.TemporaryDirectory() as folder:
+        glb = Path(folder, "run.glb")
+        _native.export(run, glb, every=every, fps=fps, geometries=geometries)
+        write(Animation(glb.read_bytes()), Path(path))
