@@ -2,7 +2,8 @@
 //!
 //! A gripper is a kinematic wrist, and fingers on joints whose motors have a velocity as target. It
 //! moves upright. For each task it opens, moves above the part, descends, closes, lifts the part,
-//! carries it above its place, descends, inserts or screws it, opens, and rises:
+//! carries it above its place, descends, inserts or screws it, opens, and rises. At the end it returns to
+//! where it started:
 //!
 //! ```text
 //! open ─▶ above part ─▶ grasp ─▶ close ─▶ lift ─▶ above place ─▶ approach ─▶ insert ─▶ open ─▶ rise
@@ -21,6 +22,9 @@ use crate::script::{Interpolation, Keyframe, Script};
 
 /// The shortest time of a motion, s.
 const SHORTEST: f64 = 0.05;
+
+/// The way above a part or its place on which a gripper descends slowly, m.
+const NEAR: f64 = 0.01;
 
 /// Grippers, and what they do.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -51,6 +55,9 @@ pub struct GripperSection {
     /// Target of the motors once the fingers have closed, m/s. Equal pushes leave a grip free to move
     /// sideways, by no more than this.
     pub hold: f64,
+    /// Target of the motors while the gripper screws, m/s. A finger at the distance r from the axis of a
+    /// tool that turns by ω leaves the part by r ω² h / 2 a second in steps of h, and must come after.
+    pub follow: f64,
     /// Time for the fingers to close or open, s.
     #[serde(default = "half_a_second")]
     pub grasp_time: f64,
@@ -62,9 +69,12 @@ pub struct GripperSection {
     /// Mean speed near a part or its place, m/s.
     #[serde(default = "slow")]
     pub approach_speed: f64,
-    /// Mean angular speed, rad/s.
-    #[serde(default = "half_a_turn")]
+    /// Mean angular speed between two points, rad/s.
+    #[serde(default = "a_radian")]
     pub turn_speed: f64,
+    /// Mean angular speed while it screws, rad/s.
+    #[serde(default = "a_turn")]
+    pub screw_speed: f64,
 }
 
 fn half_a_second() -> f64 {
@@ -79,8 +89,12 @@ fn slow() -> f64 {
     0.03
 }
 
-fn half_a_turn() -> f64 {
-    TAU / 2.0
+fn a_radian() -> f64 {
+    1.0
+}
+
+fn a_turn() -> f64 {
+    TAU
 }
 
 /// A part that a gripper brings to its place.
@@ -150,6 +164,7 @@ pub(crate) fn scripts(
         let arm = arm.ok_or_else(|| at(format!("there is no gripper {}", task.gripper)))?;
         arm.perform(task, &start).map_err(at)?;
     }
+    arms.iter_mut().for_each(Arm::go_home);
     let last = arms.iter().map(|arm| arm.time).fold(0.0, f64::max);
     if last > duration {
         return Err(format!("the tasks take {last:.3} s; expected at most the duration of {duration} s"));
@@ -160,8 +175,8 @@ pub(crate) fn scripts(
 /// A gripper while its tasks are planned.
 struct Arm<'a> {
     gripper: &'a GripperSection,
-    /// Orientation in which the tool starts.
-    upright: DQuat,
+    /// Where the tool starts and ends.
+    home: Pose,
     tool: Pose,
     time: f64,
     wrist: Vec<Keyframe>,
@@ -179,6 +194,7 @@ impl<'a> Arm<'a> {
             ("speed", gripper.speed),
             ("approach_speed", gripper.approach_speed),
             ("turn_speed", gripper.turn_speed),
+            ("screw_speed", gripper.screw_speed),
         ] {
             positive(key, value)?;
         }
@@ -189,10 +205,11 @@ impl<'a> Arm<'a> {
                 gripper.travel_height
             ));
         }
+        let home = Pose { translation: wrist.to_world(tool), ..wrist };
         Ok(Self {
             gripper,
-            upright: wrist.rotation,
-            tool: Pose { translation: wrist.to_world(tool), ..wrist },
+            home,
+            tool: home,
             time: 0.0,
             wrist: vec![Keyframe::default()],
             fingers: vec![Keyframe { target: Some(gripper.open), ..Keyframe::default() }],
@@ -208,7 +225,7 @@ impl<'a> Arm<'a> {
         let (part, into) = (start(&task.part)?, start(&task.into)?);
         let grasp = Pose {
             translation: part.translation + DVec3::from_array(task.grasp),
-            rotation: (DQuat::from_rotation_z(task.grasp_angle) * self.upright).normalize(),
+            rotation: (DQuat::from_rotation_z(task.grasp_angle) * self.home.rotation).normalize(),
         };
         // The tool as the part sees it, as long as it holds the part.
         let held = relative(part, grasp);
@@ -241,20 +258,30 @@ impl<'a> Arm<'a> {
             translation: origin + about * (end.translation - origin) + up * task.approach,
             rotation: (about * end.rotation).normalize(),
         };
-        let GripperSection { close, hold, open, grasp_time, speed, approach_speed, .. } = *self.gripper;
+        let GripperSection { close, hold, follow, open, grasp_time, speed, approach_speed, .. } =
+            *self.gripper;
         self.move_to(self.above(grasp), speed);
-        self.descend(grasp, task.approach);
+        self.descend(grasp);
         self.drive_fingers(close, grasp_time);
         self.drive_fingers(hold, SHORTEST);
         self.move_to(self.above(grasp), speed);
         self.move_to(self.above(begin), speed);
-        self.descend(begin, task.approach);
+        self.descend(begin);
         let pressed = Pose { translation: end.translation - up * task.press, ..end };
-        let seconds = (task.approach / approach_speed).max(turn / self.gripper.turn_speed);
+        if turn > 0.0 {
+            self.drive_fingers(follow, SHORTEST);
+        }
+        let seconds = (task.approach / approach_speed).max(turn / self.gripper.screw_speed);
         self.screw(pressed, -turn, seconds);
         self.drive_fingers(open, grasp_time);
         self.move_to(self.above(pressed), speed);
         Ok(())
+    }
+
+    /// Returns to where the tool started, so that it is out of the way of other grippers.
+    fn go_home(&mut self) {
+        self.move_to(self.above(self.home), self.gripper.speed);
+        self.move_to(self.home, self.gripper.speed);
     }
 
     /// The same orientation at the height of travel.
@@ -271,10 +298,9 @@ impl<'a> Arm<'a> {
         self.push(Keyframe { rotation: Some(tool.rotation.to_array()), ..Keyframe::default() });
     }
 
-    /// Descends fast, and the last part of the way, of at most `slow` metres, at the speed of an
-    /// approach.
-    fn descend(&mut self, tool: Pose, slow: f64) {
-        let near = Pose { translation: tool.translation + DVec3::Z * slow, ..tool };
+    /// Descends fast, and the last part of the way slowly.
+    fn descend(&mut self, tool: Pose) {
+        let near = Pose { translation: tool.translation + DVec3::Z * NEAR, ..tool };
         if near.translation.z < self.tool.translation.z {
             self.move_to(near, self.gripper.speed);
         }

@@ -1,0 +1,228 @@
+//! Grippers put a peg into its hole and a nut onto its bolt.
+mod support;
+
+use std::ops::ControlFlow;
+
+use tesdf::mesh::write;
+use tesdf::save::{Destination, SaveOptions};
+use tesdf_parts::{Nut, Resolution, Size, Thread};
+use tesdf_sim::record::{InterruptedRun, RunJournal, RunOrigin};
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
+use tesdf_sim::{Dynamics, PartialRun, RunRecord, State, Summary, simulate_from};
+
+/// Time in which the short form ends, s.
+const END: f64 = 8.5;
+
+/// The scene of the repository with one peg and one nut. Each gripper does a task.
+fn text() -> String {
+    let text = std::fs::read_to_string(support::path_of("robo-assembly")).unwrap();
+    let (before, tasks) = text.split_once("[[plan.tasks]]").expect("the tasks");
+    let task = |part: &str| {
+        let of_part = |task: &&str| task.contains(&format!("part = \"{part}\""));
+        let task = tasks.split("[[plan.tasks]]").find(of_part).expect(part);
+        format!("[[plan.tasks]]{task}\n")
+    };
+    let mut text = format!("{before}{}{}", task("peg0"), task("nut0").replace("left", "right"));
+    for (from, to) in [
+        ("count = 3", "count = 1"),
+        ("count = 7", "count = 1"),
+        ("translation = [-0.18, 0.06,", "translation = [0.18, 0.06,"),
+        ("translation = [-0.18, -0.06,", "translation = [0.18, -0.06,"),
+        ("duration = 46", "duration = 8.5"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    text
+}
+
+fn load(text: String) -> LoadedScene {
+    LoadedScene::parse(text, support::path_of("robo-assembly")).unwrap()
+}
+
+fn run(change: impl FnOnce(&mut LoadedScene)) -> (RunRecord, Summary) {
+    let mut loaded = load(text());
+    change(&mut loaded);
+    let system = loaded.system().unwrap();
+    support::run(&loaded, system)
+}
+
+fn failures(summary: &Summary) -> String {
+    assert_eq!(summary.passed, Some(false));
+    summary.assembly.as_ref().unwrap().failures.join("\n")
+}
+
+#[test]
+fn a_peg_and_a_nut_are_assembled() {
+    let (_, summary) = run(|_| ());
+    assert_eq!(summary.passed, Some(true), "{summary:?}");
+    let assembly = summary.assembly.as_ref().unwrap();
+    let [peg, nut] = assembly.parts.as_slice() else { panic!("{assembly:?}") };
+    assert_eq!((assembly.assembled, peg.name.as_str(), nut.name.as_str()), (2, "peg0", "nut0"));
+    assert!(nut.turns.unwrap() > 3.0 && nut.pitch_error.unwrap() > 1e-5, "{nut:?}");
+    assert!(assembly.measurements >= 30, "{assembly:?}");
+}
+
+#[test]
+fn without_contacts_or_friction_nothing_is_assembled() {
+    let (_, off) = run(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    let off = failures(&off);
+    assert!(off.contains("depth: peg0") && off.contains("turns: nut0") && off.contains("rest: "), "{off}");
+
+    let (_, slippery) = run(|loaded| {
+        loaded.scene.bodies.iter_mut().for_each(|body| body.get_mut().friction = 0.0);
+        // The grippers have risen without the parts.
+        loaded.scene.duration = 2.5;
+    });
+    let slippery = failures(&slippery);
+    assert!(slippery.contains("depth: peg0") && slippery.contains("turns: nut0"), "{slippery}");
+}
+
+/// A nut of a pitch of 1.5 mm does not go onto a bolt of 2 mm.
+#[test]
+fn a_nut_of_another_pitch_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("nut.ply");
+    let m16 = "M16".parse::<Size>().unwrap();
+    let nut = Nut {
+        thread: Thread { pitch: 1.5e-3, ..m16.thread() },
+        clearance: 1e-4,
+        ..Nut::iso_4032(m16)
+    };
+    write(&file, nut.mesh(Resolution::Segments(48)).unwrap().mesh()).unwrap();
+    let (_, summary) = run(|loaded| assert!(loaded.replace_geometry("nut0", &file)));
+    let assembly = summary.assembly.as_ref().unwrap();
+    assert_eq!(assembly.assembled, 1, "{assembly:?}");
+    let failures = failures(&summary);
+    assert!(failures.contains("nut0") && !failures.contains("peg0"), "{failures}");
+}
+
+/// The states after the first 1.6 s, in which the grippers grasp and lift.
+fn states(threads: usize, killed_at: Option<u64>) -> Vec<State> {
+    const STEPS: u64 = 320;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| {
+        let loaded = load(text());
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("run");
+        let steps = |from: Option<InterruptedRun>, to: u64| {
+            let mut system = loaded.system().unwrap();
+            let origin = RunOrigin::of(&system, "cpu").unwrap();
+            let run = from.as_ref().map_or_else(
+                || PartialRun::new(&loaded.scene, &system, String::new()),
+                |cut| cut.run.clone(),
+            );
+            run.restore(&mut system).unwrap();
+            let mut engine = loaded.newton(system).unwrap();
+            let destination = Destination::new(&file, &SaveOptions::default()).unwrap();
+            let mut journal = None;
+            let _ = simulate_from(&loaded.scene, &mut engine, run, |moment| {
+                let journal = journal.get_or_insert_with(|| {
+                    RunJournal::begin(&destination, moment.record, &origin).unwrap().unwrap()
+                });
+                journal.push(moment.record, &moment.report).unwrap();
+                match moment.step == to {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                }
+            });
+            engine.system().states().to_vec()
+        };
+        match killed_at {
+            None => steps(None, STEPS),
+            Some(at) => {
+                steps(None, at);
+                steps(Some(InterruptedRun::open(&file).unwrap()), STEPS)
+            }
+        }
+    })
+}
+
+#[test]
+fn any_number_of_threads_and_a_resumed_run_give_the_same_states() {
+    let one = states(1, None);
+    let nut = load(text()).scene.bodies.iter().position(|b| b.get_ref().name == "nut0").unwrap();
+    assert!(one[nut].pose.translation.z > 0.03, "{:?}", one[nut]);
+    for threads in [2, 8] {
+        assert_eq!(one, states(threads, None), "{threads} threads");
+    }
+    assert_eq!(one, states(2, Some(250)));
+}
+
+#[test]
+fn what_is_no_assembly_is_refused() {
+    // The shapes are of no account.
+    let text = text()
+        .lines()
+        .map(|line| match line.starts_with("mesh = ") {
+            true => "shape = { sphere = { radius = 0.001 } }\n".into(),
+            false => format!("{line}\n"),
+        })
+        .collect::<String>();
+    let section = "[[criterion.assembly.nuts]]";
+    let script = format!("[[scripts]]\nbody = \"peg0\"\nkeyframes = [{{ time = 0 }}]\n\n{section}");
+    let joint = format!("[[joints]]\nname = \"hook\"\nkind = \"ball\"\nchild = \"nut0\"\n\n{section}");
+    let cases = [
+        ("parts = \"peg\"", "parts = \"pig\"", "there is no body pig0"),
+        ("onto = \"bolt\"", "onto = \"bold\"", "there is no body bold0"),
+        ("parts = \"peg\"", "parts = \"hole\"", "body hole0 is fixed; no contact can hold it"),
+        ("into = \"hole\", count = 1", "into = \"hole\", count = 0", "count of peg is 0"),
+        ("clearance = 1e-4 }]", "clearance = 0 }]", "pegs: clearance is 0; expected a positive number"),
+        ("pitch = 2e-3\nclearance", "pitch = -1\nclearance", "nuts: pitch is -1"),
+        ("check_every = 0.5", "check_every = 0", "check_every is 0; expected a positive number"),
+        (section, &script, "a script drives body peg0; only contacts may, so take it out"),
+        (section, &joint, "joint hook holds body nut0; only contacts may, so take it out"),
+        (
+            "translation = [-0.18, 0.14, 0.01]",
+            "translation = [-0.18, -0.14, 0.04]",
+            "body peg0 starts in its place",
+        ),
+        ("translation = [0.18, 0.06, 0.0248]", "translation = [0.18, -0.06, 0.05]", "body nut0 starts in its place"),
+    ];
+    support::refused(&text, &support::path_of("robo-assembly"), &cases);
+}
+
+#[test]
+fn a_plan_that_does_not_fit_is_refused_with_its_place() {
+    let text = text();
+    let cases = [
+        ("part = \"peg0\"", "part = \"pig\"", "task 1 (pig): there is no body pig; give the name of a body"),
+        ("gripper = \"right\"", "gripper = \"middle\"", "task 2 (nut0): there is no gripper middle"),
+        ("wrist = \"left_wrist\"", "wrist = \"wrist\"", "gripper left: there is no body wrist"),
+        ("name = \"right\"\nwrist", "name = \"left\"\nwrist", "gripper left: the name is used twice"),
+        ("speed = 0.3\n", "speed = 0\n", "gripper left: speed is 0; expected a positive number"),
+        ("pitch = 2e-3 } }", "pitch = 0 } }", "task 2 (nut0): pitch is 0; expected a positive number"),
+        ("approach = 0.03", "approach = nan", "task 1 (peg0): approach is NaN; expected a positive number"),
+        ("press = 1e-3", "press = inf", "press inf; expected finite numbers, m"),
+        ("tool = [0, 0, -0.115]", "tool = [0, 0, nan]", "gripper left: tool"),
+        ("duration = 8.5", "duration = 4", "expected at most the duration of 4 s"),
+    ];
+    for (from, to, expected) in cases {
+        assert!(text.contains(from), "{from}");
+        let refused = LoadedScene::parse(text.replacen(from, to, 1), support::path_of("robo-assembly"));
+        let message = refused.expect_err(expected).to_string();
+        assert!(message.contains(expected) && message.contains("line "), "{message}: expected {expected}");
+    }
+}
+
+/// A plan ends as scripts, so that a run that is read again has no plan to expand.
+#[test]
+fn a_plan_becomes_scripts() {
+    let loaded = load(text());
+    assert_eq!((loaded.scene.plan.as_ref(), loaded.scene.scripts.len()), (None, 6));
+    let wrist = &loaded.scene.scripts[0];
+    assert_eq!(wrist.body.as_deref(), Some("left_wrist"));
+    let times: Vec<f64> = wrist.keyframes.iter().map(|k| k.time).collect();
+    assert!(times.is_sorted_by(|a, b| a < b) && *times.last().unwrap() <= END, "{times:?}");
+    let home = [wrist.keyframes.last().unwrap(), wrist.keyframes.first().unwrap()];
+    assert_eq!(home[0].translation, Some([-0.22, 0.0, 0.235]));
+    assert_eq!(home[1].translation, None);
+    // The right wrist makes five turns clockwise while the nut descends by five pitches.
+    let wrist = &loaded.scene.scripts[3];
+    let turn = wrist.keyframes.iter().position(|k| k.turn.is_some()).unwrap();
+    let heights = [turn - 1, turn].map(|k| wrist.keyframes[k].translation.unwrap()[2]);
+    assert!((heights[0] - heights[1] - 0.01).abs() < 1e-12, "{heights:?}");
+    assert!((wrist.keyframes[turn].turn.unwrap()[2] + 10.0 * std::f64::consts::PI).abs() < 1e-9);
+    let again = LoadedScene::of_json(serde_json::to_value(&loaded.scene).unwrap(), &loaded.path).unwrap();
+    assert_eq!(again.scene.scripts, loaded.scene.scripts);
+}
