@@ -172,6 +172,59 @@ pub(crate) fn scripts(
     Ok(arms.into_iter().flat_map(Arm::into_scripts).collect())
 }
 
+/// Poses of the tool in a task.
+struct Route {
+    /// Where it grasps the part.
+    grasp: Pose,
+    /// Where the part begins to go in, above its place.
+    begin: Pose,
+    /// Where the part is in its place.
+    end: Pose,
+    /// Angle by which it turns clockwise from the begin to the end, seen from above, rad.
+    turn: f64,
+}
+
+impl Route {
+    /// The route of a part that starts at `part` to a place in `into`, for a tool of this orientation.
+    fn new(task: &TaskSection, part: Pose, into: Pose, upright: DQuat) -> Result<Self, String> {
+        positive("approach", task.approach)?;
+        let seat = DVec3::from_array(task.seat);
+        // A part with a thread is turned counter-clockwise by a pitch a turn where it is higher.
+        let (phase, turn) = match task.action {
+            TaskAction::Insert => (0.0, 0.0),
+            TaskAction::Screw { pitch } => {
+                positive("pitch", pitch)?;
+                (TAU * seat.z / pitch, TAU * task.approach / pitch)
+            }
+        };
+        let grasp = Pose {
+            translation: part.translation + DVec3::from_array(task.grasp),
+            rotation: (DQuat::from_rotation_z(task.grasp_angle) * upright).normalize(),
+        };
+        // The tool as the part sees it, as long as it holds the part.
+        let held = relative(part, grasp);
+        let axes = into.rotation * DQuat::from_rotation_z(phase);
+        let placed = Pose { translation: into.to_world(seat), rotation: axes.normalize() };
+        let tool = placed.to_world(held.translation);
+        // The origin of the part stays on the axis; that of the tool may be off it.
+        let about = DQuat::from_rotation_z(turn);
+        let rotation = (placed.rotation * held.rotation).normalize();
+        let begin = Pose {
+            translation: placed.translation + about * (tool - placed.translation) + DVec3::Z * task.approach,
+            rotation: (about * rotation).normalize(),
+        };
+        let end = Pose { translation: tool - DVec3::Z * task.press, rotation };
+        if [grasp, begin, end].iter().any(|pose| !pose.translation.is_finite() || !pose.rotation.is_finite())
+        {
+            return Err(format!(
+                "grasp {:?} m, grasp_angle {} rad, seat {:?} m, press {} m; expected finite numbers",
+                task.grasp, task.grasp_angle, task.seat, task.press
+            ));
+        }
+        Ok(Self { grasp, begin, end, turn })
+    }
+}
+
 /// A gripper while its tasks are planned.
 struct Arm<'a> {
     gripper: &'a GripperSection,
@@ -221,45 +274,11 @@ impl<'a> Arm<'a> {
         task: &TaskSection,
         start: &impl Fn(&str) -> Result<Pose, String>,
     ) -> Result<(), String> {
-        positive("approach", task.approach)?;
-        let (part, into) = (start(&task.part)?, start(&task.into)?);
-        let grasp = Pose {
-            translation: part.translation + DVec3::from_array(task.grasp),
-            rotation: (DQuat::from_rotation_z(task.grasp_angle) * self.home.rotation).normalize(),
-        };
-        // The tool as the part sees it, as long as it holds the part.
-        let held = relative(part, grasp);
-        let place = |seat: DVec3, angle: f64| {
-            let rotation = into.rotation * DQuat::from_rotation_z(angle);
-            let part = Pose { translation: into.to_world(seat), rotation };
-            Pose { translation: part.to_world(held.translation), rotation: rotation * held.rotation }
-        };
-        let seat = DVec3::from_array(task.seat);
-        // A part with a thread that is `approach` higher is turned counter-clockwise, seen from above.
-        let (phase, turn) = match task.action {
-            TaskAction::Insert => (0.0, 0.0),
-            TaskAction::Screw { pitch } => {
-                positive("pitch", pitch)?;
-                (TAU * seat.z / pitch, TAU * task.approach / pitch)
-            }
-        };
-        let end = place(seat, phase);
-        if !end.translation.is_finite() || !end.rotation.is_finite() || !task.press.is_finite() {
-            return Err(format!(
-                "grasp {:?}, seat {:?}, press {}; expected finite numbers, m",
-                task.grasp, task.seat, task.press
-            ));
-        }
-        let up = DVec3::Z;
-        let about = DQuat::from_rotation_z(turn);
-        // The part's origin turns in its place; the tool's point may be off it.
-        let origin = into.to_world(seat);
-        let begin = Pose {
-            translation: origin + about * (end.translation - origin) + up * task.approach,
-            rotation: (about * end.rotation).normalize(),
-        };
-        let GripperSection { close, hold, follow, open, grasp_time, speed, approach_speed, .. } =
-            *self.gripper;
+        let upright = self.home.rotation;
+        let Route { grasp, begin, end, turn } =
+            Route::new(task, start(&task.part)?, start(&task.into)?, upright)?;
+        let GripperSection { close, hold, follow, open, grasp_time, .. } = *self.gripper;
+        let GripperSection { speed, approach_speed, screw_speed, .. } = *self.gripper;
         self.move_to(self.above(grasp), speed);
         self.descend(grasp);
         self.drive_fingers(close, grasp_time);
@@ -267,14 +286,12 @@ impl<'a> Arm<'a> {
         self.move_to(self.above(grasp), speed);
         self.move_to(self.above(begin), speed);
         self.descend(begin);
-        let pressed = Pose { translation: end.translation - up * task.press, ..end };
         if turn > 0.0 {
             self.drive_fingers(follow, SHORTEST);
         }
-        let seconds = (task.approach / approach_speed).max(turn / self.gripper.screw_speed);
-        self.screw(pressed, -turn, seconds);
+        self.screw(end, -turn, (task.approach / approach_speed).max(turn / screw_speed));
         self.drive_fingers(open, grasp_time);
-        self.move_to(self.above(pressed), speed);
+        self.move_to(self.above(end), speed);
         Ok(())
     }
 

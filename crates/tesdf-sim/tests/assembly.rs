@@ -1,14 +1,18 @@
 //! Grippers put a peg into its hole and a nut onto its bolt.
 mod support;
 
+use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
+use tesdf::collide::Pose;
+use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::write;
 use tesdf::save::{Destination, SaveOptions};
 use tesdf_parts::{Nut, Resolution, Size, Thread};
+use tesdf_sim::criterion::{AssemblyReport, AssemblyTracker};
 use tesdf_sim::record::{InterruptedRun, RunJournal, RunOrigin};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
-use tesdf_sim::{Dynamics, PartialRun, RunRecord, State, Summary, simulate_from};
+use tesdf_sim::{Dynamics, PartialRun, RunRecord, State, Summary, System, Wrench, simulate_from};
 
 /// Time in which the short form ends, s.
 const END: f64 = 8.0;
@@ -84,11 +88,7 @@ fn a_nut_of_another_pitch_fails() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("nut.ply");
     let m16 = "M16".parse::<Size>().unwrap();
-    let nut = Nut {
-        thread: Thread { pitch: 1.5e-3, ..m16.thread() },
-        clearance: 1e-4,
-        ..Nut::iso_4032(m16)
-    };
+    let nut = Nut { thread: Thread { pitch: 1.5e-3, ..m16.thread() }, clearance: 1e-4, ..Nut::iso_4032(m16) };
     write(&file, nut.mesh(Resolution::Segments(48)).unwrap().mesh()).unwrap();
     let (_, summary) = run(|loaded| assert!(loaded.replace_geometry("nut0", &file)));
     let assembly = summary.assembly.as_ref().unwrap();
@@ -149,16 +149,107 @@ fn any_number_of_threads_and_a_resumed_run_give_the_same_states() {
     assert_eq!(one, states(2, Some(250)));
 }
 
+/// The short form with balls of 1 mm in place of meshes.
+fn balls() -> String {
+    let line = |line: &str| match line.starts_with("mesh = ") {
+        true => "shape = { sphere = { radius = 0.001 } }\n".into(),
+        false => format!("{line}\n"),
+    };
+    text().lines().map(line).collect()
+}
+
+/// The report of a run in which the peg is in its place and the nut goes down its bolt, changed at each
+/// share of the run.
+fn report(change: impl Fn(&mut System, f64)) -> AssemblyReport {
+    let loaded = load(balls());
+    let mut system = loaded.system().unwrap();
+    let mut tracker =
+        AssemblyTracker::new(loaded.scene.criterion.assembly.as_ref().unwrap(), &system).unwrap();
+    let start = system.states().to_vec();
+    let [peg, hole, nut, bolt] = ["peg0", "hole0", "nut0", "bolt0"].map(|name| find(&system, name));
+    for step in 1..=100 {
+        let share = 0.01 * f64::from(step);
+        let mut states = start.clone();
+        states[peg].pose = Pose::at(states[hole].pose.to_world(DVec3::new(0.0, 0.0, 5e-3)));
+        states[nut].pose = on_thread(states[bolt].pose, -0.016 + 0.008 * share, 0.0);
+        system.set_states(states).unwrap();
+        change(&mut system, share);
+        tracker.observe(&system, 0.01);
+    }
+    tracker.report(&system)
+}
+
+/// A nut at this place of the bolt's axis, turned by `more` than the thread demands.
+fn on_thread(bolt: Pose, z: f64, more: f64) -> Pose {
+    let turn = DQuat::from_rotation_z(TAU * z / 2e-3 + more);
+    Pose { translation: bolt.to_world(DVec3::Z * z), rotation: (bolt.rotation * turn).normalize() }
+}
+
+fn find(system: &System, name: &str) -> usize {
+    system.bodies().iter().position(|body| body.name == name).unwrap()
+}
+
+fn change_state(system: &mut System, name: &str, change: impl FnOnce(&mut State)) {
+    let body = find(system, name);
+    let mut state = system.states()[body];
+    change(&mut state);
+    system.set_state(body, state).unwrap();
+}
+
+#[test]
+fn each_failure_has_its_name() {
+    let names = |report: &AssemblyReport| {
+        report.failures.iter().map(|f| f.split(':').next().unwrap().to_string()).collect::<Vec<_>>()
+    };
+    let good = report(|_, _| ());
+    assert_eq!((good.assembled, names(&good).len()), (2, 0), "{good:?}");
+    // The nut comes a pitch over the tip at z = -12.8 mm, and ends at z = -8 mm.
+    let turns = good.parts[1].turns.unwrap();
+    assert!((turns - 2.4).abs() < 0.05 && good.parts[1].pitch_error.unwrap() < 1e-12, "{good:?}");
+
+    type Change = fn(&mut System, f64);
+    let cases: [(&str, Change); 8] = [
+        ("depth", |s, _| change_state(s, "peg0", |peg| peg.pose.translation.z += 1.1e-4)),
+        ("offset", |s, _| change_state(s, "peg0", |peg| peg.pose.translation.x += 2.1e-4)),
+        ("tilt", |s, _| change_state(s, "peg0", |peg| peg.pose.rotation = DQuat::from_rotation_y(8.1e-3))),
+        ("turns", |s, share| {
+            let bolt = s.states()[find(s, "bolt0")].pose;
+            let z = -0.016 + 0.008 * share.min(0.8);
+            change_state(s, "nut0", |nut| nut.pose = on_thread(bolt, z, 0.0));
+        }),
+        // 5 % too fast: 0.05 × 4.8 mm.
+        ("thread", |s, share| {
+            let bolt = s.states()[find(s, "bolt0")].pose;
+            let z = -0.016 + 0.008 * share;
+            change_state(s, "nut0", |nut| nut.pose = on_thread(bolt, z, 0.05 * TAU * 4.0 * share));
+        }),
+        ("rest", |s, _| change_state(s, "nut0", |nut| nut.linear.y = 2e-4)),
+        // Balls of 1 mm whose centres are 2.9 mm apart.
+        ("release", |s, _| {
+            let nut = s.states()[find(s, "nut0")].pose.translation;
+            change_state(s, "left_finger_1", |finger| finger.pose.translation = nut + DVec3::Y * 2.9e-3);
+        }),
+        ("penetration", |s, share| {
+            let peg = s.states()[find(s, "peg0")].pose.translation;
+            let at = peg + DVec3::Y * if share < 0.5 { 1.985e-3 } else { 1.0 };
+            change_state(s, "left_finger_1", |finger| finger.pose.translation = at);
+        }),
+    ];
+    for (name, change) in cases {
+        let found = report(change);
+        assert_eq!(names(&found), [name], "{found:?}");
+    }
+    let pushed = report(|system, _| {
+        let peg = find(system, "peg0");
+        system.set_wrench(peg, Wrench { force: DVec3::Z, torque: DVec3::ZERO }).unwrap();
+    });
+    assert_eq!(names(&pushed), ["held"], "{pushed:?}");
+}
+
 #[test]
 fn what_is_no_assembly_is_refused() {
     // The shapes are of no account.
-    let text = text()
-        .lines()
-        .map(|line| match line.starts_with("mesh = ") {
-            true => "shape = { sphere = { radius = 0.001 } }\n".into(),
-            false => format!("{line}\n"),
-        })
-        .collect::<String>();
+    let text = balls();
     let section = "[[criterion.assembly.nuts]]";
     let script = format!("[[scripts]]\nbody = \"peg0\"\nkeyframes = [{{ time = 0 }}]\n\n{section}");
     let joint = format!("[[joints]]\nname = \"hook\"\nkind = \"ball\"\nchild = \"nut0\"\n\n{section}");
@@ -177,7 +268,11 @@ fn what_is_no_assembly_is_refused() {
             "translation = [-0.18, -0.14, 0.04]",
             "body peg0 starts in its place",
         ),
-        ("translation = [0.18, 0.06, 0.0248]", "translation = [0.18, -0.06, 0.05]", "body nut0 starts in its place"),
+        (
+            "translation = [0.18, 0.06, 0.0248]",
+            "translation = [0.18, -0.06, 0.05]",
+            "body nut0 starts in its place",
+        ),
     ];
     support::refused(&text, &support::path_of("robo-assembly"), &cases);
 }
@@ -193,7 +288,7 @@ fn a_plan_that_does_not_fit_is_refused_with_its_place() {
         ("speed = 0.3\n", "speed = 0\n", "gripper left: speed is 0; expected a positive number"),
         ("pitch = 2e-3 } }", "pitch = 0 } }", "task 2 (nut0): pitch is 0; expected a positive number"),
         ("approach = 0.03", "approach = nan", "task 1 (peg0): approach is NaN; expected a positive number"),
-        ("press = 1e-3", "press = inf", "press inf; expected finite numbers, m"),
+        ("press = 2e-4", "press = inf", "press inf m; expected finite numbers"),
         ("tool = [0, 0, -0.115]", "tool = [0, 0, nan]", "gripper left: tool"),
         ("duration = 8", "duration = 4", "expected at most the duration of 4 s"),
     ];

@@ -177,7 +177,10 @@ fn a_turn_may_be_more_than_a_whole_one() {
         let pose = record.states(step).unwrap()[0].pose;
         let share = step as f64 / 200.0;
         let expected = tesdf::glam::DQuat::from_axis_angle(axis, share * angle) * start;
-        assert!(pose.rotation.dot(expected).abs() > 1.0 - 1e-12, "step {step}: {pose:?}, expected {expected}");
+        assert!(
+            pose.rotation.dot(expected).abs() > 1.0 - 1e-12,
+            "step {step}: {pose:?}, expected {expected}"
+        );
         assert!(pose.translation.distance(0.05 * share * axis) < 1e-12, "step {step}: {pose:?}");
     }
     assert!(system.states()[0].angular.distance(angle * axis) < 1e-9, "{:?}", system.states()[0]);

@@ -7,7 +7,7 @@ use tesdf::glam::DVec3;
 
 use super::shared::{Checks, Penetration, body, free_body, least_distance, near, positive};
 use crate::joint::{relative, wrapped};
-use crate::{Mass, System};
+use crate::{Joint, Mass, System};
 
 /// Free parts that begin elsewhere end in their places: pegs in holes, nuts on bolts.
 ///
@@ -138,8 +138,8 @@ impl AssemblyCriterion {
         ])?;
         let parts = self.find(system)?;
         for part in &parts {
-            let numbers = |joint: &crate::Joint| joint.child == part.body || joint.parent == Some(part.body);
-            if let Some(joint) = system.joints().iter().find(|joint| numbers(joint)) {
+            let holds = |joint: &&Joint| joint.child == part.body || joint.parent == Some(part.body);
+            if let Some(joint) = system.joints().iter().find(holds) {
                 return Err(format!(
                     "joint {} holds body {}; only contacts may, so take it out",
                     joint.name, part.name
