@@ -2,8 +2,8 @@
 //!
 //! A gripper is a kinematic wrist, and fingers on joints whose motors have a velocity as target. It
 //! moves upright. For each task it opens, moves above the part, descends, closes, lifts the part,
-//! carries it above its place, descends, inserts or screws it, opens, and rises. At the end it returns to
-//! where it started:
+//! carries it above its place, descends, inserts or screws it, opens, and rises. At the end it
+//! returns to where it started:
 //!
 //! ```text
 //! open ─▶ above part ─▶ grasp ─▶ close ─▶ lift ─▶ above place ─▶ approach ─▶ insert ─▶ open ─▶ rise
@@ -52,11 +52,12 @@ pub struct GripperSection {
     pub open: f64,
     /// Target of the motors while the fingers close, m/s.
     pub close: f64,
-    /// Target of the motors once the fingers have closed, m/s. Equal pushes leave a grip free to move
-    /// sideways, by no more than this.
+    /// Target of the motors once the fingers have closed, m/s. Equal pushes leave a grip free to
+    /// move sideways, by no more than this.
     pub hold: f64,
-    /// Target of the motors while the gripper screws, m/s. A finger at the distance r from the axis of a
-    /// tool that turns by ω leaves the part by r ω² h / 2 a second in steps of h, and must come after.
+    /// Target of the motors while the gripper screws, m/s. A finger at the distance r from the axis
+    /// of a tool that turns by ω leaves the part by r ω² h / 2 a second in steps of h, and must
+    /// come after.
     pub follow: f64,
     /// Time for the fingers to close or open, s.
     #[serde(default = "half_a_second")]
@@ -118,8 +119,8 @@ pub struct TaskSection {
     pub seat: [f64; 3],
     /// The way, from above, along which the part is inserted or screwed, m.
     pub approach: f64,
-    /// Distance by which the tool goes deeper than the part's place, m. It loads a gripper that gives
-    /// way.
+    /// Distance by which the tool goes deeper than the part's place, m. It loads a gripper that
+    /// gives way.
     #[serde(default)]
     pub press: f64,
     /// What the gripper does on this way.
@@ -185,7 +186,8 @@ struct Route {
 }
 
 impl Route {
-    /// The route of a part that starts at `part` to a place in `into`, for a tool of this orientation.
+    /// The route of a part that starts at `part` to a place in `into`, for a tool of this
+    /// orientation.
     fn new(task: &TaskSection, part: Pose, into: Pose, upright: DQuat) -> Result<Self, String> {
         positive("approach", task.approach)?;
         let seat = DVec3::from_array(task.seat);

@@ -11,8 +11,8 @@ use crate::{Drive, Dynamics, DynamicsError, Joint, Mass, Motor, State, System, W
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Script {
-    /// Name of a kinematic body; its keyframes have `translation`, and `rotation` or `turn`. Of a free body they
-    /// have `force` and `torque`.
+    /// Name of a kinematic body; its keyframes have `translation`, and `rotation` or `turn`. Of a
+    /// free body they have `force` and `torque`.
     #[serde(default)]
     pub body: Option<String>,
     /// Name of a joint with a motor; its keyframes have `target`.
@@ -25,8 +25,8 @@ pub struct Script {
     pub keyframes: Vec<Keyframe>,
 }
 
-/// The values at a time. A value that is missing is that of the keyframe before, of the first one its
-/// default.
+/// The values at a time. A value that is missing is that of the keyframe before, of the first one
+/// its default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Keyframe {
@@ -43,8 +43,8 @@ pub struct Keyframe {
     /// rotation vector, rad, world frame. It may have any number of turns.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turn: Option<[f64; 3]>,
-    /// Target of the motor, in the unit of its drive: rad/s or m/s, rad or m, N m or N [default: that
-    /// of the motor].
+    /// Target of the motor, in the unit of its drive: rad/s or m/s, rad or m, N m or N [default:
+    /// that of the motor].
     #[serde(default)]
     pub target: Option<f64>,
     /// Force on the centre of mass, N, world frame [default: 0].

@@ -158,8 +158,8 @@ fn balls() -> String {
     text().lines().map(line).collect()
 }
 
-/// The report of a run in which the peg is in its place and the nut goes down its bolt, changed at each
-/// share of the run.
+/// The report of a run in which the peg is in its place and the nut goes down its bolt, changed at
+/// each share of the run.
 fn report(change: impl Fn(&mut System, f64)) -> AssemblyReport {
     let loaded = load(balls());
     let mut system = loaded.system().unwrap();

@@ -154,7 +154,8 @@ fn a_position_motor_follows_its_script() {
     assert!(spin.distance(12.0 * DVec3::Z) < 1e-6, "{spin}");
 }
 
-/// A wrist that makes two and a half turns about a tilted axis, evenly, and moves along it as a screw.
+/// A wrist that makes two and a half turns about a tilted axis, evenly, and moves along it as a
+/// screw.
 #[test]
 fn a_turn_may_be_more_than_a_whole_one() {
     let text = r#"

@@ -11,8 +11,8 @@ use crate::{Joint, Mass, System};
 
 /// Free parts that begin elsewhere end in their places: pegs in holes, nuts on bolts.
 ///
-/// No joint, script or wrench may act on a part. The penetration of each part is measured by the exact
-/// clearance to all bodies near it, not by the detector of the run.
+/// No joint, script or wrench may act on a part. The penetration of each part is measured by the
+/// exact clearance to all bodies near it, not by the detector of the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AssemblyCriterion {
@@ -66,8 +66,8 @@ pub struct PegGroup {
     pub clearance: f64,
 }
 
-/// Nuts with numbers, and the bolt of each. The z axes of a nut and its bolt agree, and the tip of the
-/// bolt is at its z = 0.
+/// Nuts with numbers, and the bolt of each. The z axes of a nut and its bolt agree, and the tip of
+/// the bolt is at its z = 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NutGroup {
@@ -101,7 +101,8 @@ pub struct AssemblyReport {
     /// Number of measurements of the exact clearance of a part.
     pub measurements: usize,
     /// The requirements that the run did not meet; empty when it passed. Each begins with the name
-    /// of the failure and a colon: `depth`, `offset`, `tilt`, `turns`, `thread`, `rest`, `release`, `held` or
+    /// of the failure and a colon: `depth`, `offset`, `tilt`, `turns`, `thread`, `rest`, `release`,
+    /// `held` or
     /// `penetration`.
     pub failures: Vec<String>,
 }
@@ -124,8 +125,8 @@ pub struct PartReport {
 }
 
 impl AssemblyCriterion {
-    /// Checks the values, that the bodies exist, that no joint holds a part, and that no part starts in
-    /// its place. Returns the names of the parts.
+    /// Checks the values, that the bodies exist, that no joint holds a part, and that no part
+    /// starts in its place. Returns the names of the parts.
     ///
     /// # Errors
     /// A message that names the value that was found and the expected range.
@@ -319,7 +320,8 @@ impl Part {
                 failures.push(text);
             }
         };
-        // A part whose origin is at one end tilts by twice the clearance over the length that is guided.
+        // A part whose origin is at one end tilts by twice the clearance over the length that is
+        // guided.
         let (length, allowed) = match self.kind {
             Kind::Peg { depth: guided, .. } => {
                 demand(
