@@ -14,6 +14,7 @@
 //!   [`newton`] is the built-in engine.
 //! - [`Joint`], [`Motor`]: what connects bodies besides contacts.
 //! - [`script`]: keyframes of kinematic bodies, motors and wrenches.
+//! - [`plan`]: tasks of grippers, which become scripts.
 //! - [`scene_file`]: scenes as TOML files.
 //! - [`criterion`]: what makes a run a success.
 //! - [`Run`]: a run that is made step by step.
@@ -28,6 +29,7 @@ mod dynamics;
 mod joint;
 mod mass;
 pub mod newton;
+pub mod plan;
 pub mod record;
 pub mod scene_file;
 pub mod script;

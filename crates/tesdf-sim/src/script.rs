@@ -11,8 +11,8 @@ use crate::{Drive, Dynamics, DynamicsError, Joint, Mass, Motor, State, System, W
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Script {
-    /// Name of a kinematic body; its keyframes have `translation` and `rotation`. Of a free body they
-    /// have `force` and `torque`.
+    /// Name of a kinematic body; its keyframes have `translation`, and `rotation` or `turn`. Of a
+    /// free body they have `force` and `torque`.
     #[serde(default)]
     pub body: Option<String>,
     /// Name of a joint with a motor; its keyframes have `target`.
@@ -25,8 +25,8 @@ pub struct Script {
     pub keyframes: Vec<Keyframe>,
 }
 
-/// The values at a time. A value that is missing is that of the keyframe before, of the first one its
-/// default.
+/// The values at a time. A value that is missing is that of the keyframe before, of the first one
+/// its default.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Keyframe {
@@ -36,11 +36,15 @@ pub struct Keyframe {
     #[serde(default)]
     pub translation: Option<[f64; 3]>,
     /// Orientation of the body: a unit quaternion x y z w [default: that in which the body starts].
-    /// Between keyframes it turns the short way, so a turn needs three keyframes.
+    /// Between keyframes it turns the short way, so a whole turn needs `turn`.
     #[serde(default)]
     pub rotation: Option<[f64; 4]>,
-    /// Target of the motor, in the unit of its drive: rad/s or m/s, rad or m, N m or N [default: that
-    /// of the motor].
+    /// Rotation from the keyframe before, or from where the body starts, in place of `rotation`: a
+    /// rotation vector, rad, world frame. It may have any number of turns.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turn: Option<[f64; 3]>,
+    /// Target of the motor, in the unit of its drive: rad/s or m/s, rad or m, N m or N [default:
+    /// that of the motor].
     #[serde(default)]
     pub target: Option<f64>,
     /// Force on the centre of mass, N, world frame [default: 0].
@@ -78,9 +82,16 @@ struct Track {
 /// One value for each keyframe.
 #[derive(Clone, Debug)]
 enum Values {
-    Poses { body: usize, poses: Vec<Pose> },
+    Poses { body: usize, poses: Vec<Waypoint> },
     Wrenches { body: usize, wrenches: Vec<Wrench> },
     Targets { joint: usize, motor: Motor, targets: Vec<f64> },
+}
+
+/// A pose, and the rotation vector by which the body turns on its way there, rad.
+#[derive(Clone, Copy, Debug)]
+struct Waypoint {
+    pose: Pose,
+    turn: DVec3,
 }
 
 impl Scripts {
@@ -100,7 +111,7 @@ impl Scripts {
         for track in &self.0 {
             match &track.values {
                 Values::Poses { body, poses } => {
-                    let target = track.at(time + h, poses, between);
+                    let target = track.at(time + h, poses, between).pose;
                     let state = engine.system().states()[*body];
                     let linear = (target.translation - state.pose.translation) / h;
                     let angular = rotation_between(state.pose, target) / h;
@@ -184,7 +195,7 @@ impl Script {
         let mass =
             self.body.as_ref().map(|name| body(system, name)).transpose()?.map(|b| system.bodies()[b].mass);
         let expected: &[&str] = match mass {
-            Some(Mass::Kinematic) => &["translation", "rotation"],
+            Some(Mass::Kinematic) => &["translation", "rotation", "turn"],
             Some(Mass::Free(_)) => &["force", "torque"],
             Some(Mass::Fixed) => return Err(fixed()),
             None => &["target"],
@@ -193,6 +204,7 @@ impl Script {
             let given = [
                 ("translation", keyframe.translation.is_some()),
                 ("rotation", keyframe.rotation.is_some()),
+                ("turn", keyframe.turn.is_some()),
                 ("target", keyframe.target.is_some()),
                 ("force", keyframe.force.is_some()),
                 ("torque", keyframe.torque.is_some()),
@@ -209,10 +221,22 @@ impl Script {
         let (mut poses, mut last) = (Vec::new(), start);
         for keyframe in &self.keyframes {
             let translation = keyframe.translation.map_or(last.translation, DVec3::from_array);
-            let rotation = keyframe.rotation.map_or(last.rotation, DQuat::from_array);
-            last = Pose::new(translation, rotation)
-                .map_err(|e| format!("the keyframe at {} s: {e}", keyframe.time))?;
-            poses.push(last);
+            let at = |reason: String| format!("the keyframe at {} s: {reason}", keyframe.time);
+            let given = match (keyframe.rotation, keyframe.turn.map(DVec3::from_array)) {
+                (Some(_), Some(_)) => return Err(at("it has a rotation and a turn; keep one".into())),
+                (_, Some(turn)) if !turn.is_finite() => {
+                    return Err(at(format!("turn {turn}; expected finite numbers, rad")));
+                }
+                (rotation, turn) => (rotation.map(DQuat::from_array), turn),
+            };
+            let rotation = match given {
+                (Some(rotation), _) => rotation,
+                (None, Some(turn)) => (DQuat::from_scaled_axis(turn) * last.rotation).normalize(),
+                (None, None) => last.rotation,
+            };
+            let pose = Pose::new(translation, rotation).map_err(|e| at(e.to_string()))?;
+            poses.push(Waypoint { pose, turn: given.1.unwrap_or_else(|| rotation_between(last, pose)) });
+            last = pose;
         }
         Ok(Values::Poses { body, poses })
     }
@@ -269,9 +293,13 @@ fn joint(system: &System, name: &str) -> Result<usize, String> {
 }
 
 /// The pose at the share `s` of the way.
-fn between(a: Pose, b: Pose, s: f64) -> Pose {
-    let turn = DQuat::from_scaled_axis(s * rotation_between(a, b));
-    Pose { translation: a.translation.lerp(b.translation, s), rotation: (turn * a.rotation).normalize() }
+fn between(a: Waypoint, b: Waypoint, s: f64) -> Waypoint {
+    let turn = DQuat::from_scaled_axis(s * b.turn);
+    let rotation = (turn * a.pose.rotation).normalize();
+    Waypoint {
+        pose: Pose { translation: a.pose.translation.lerp(b.pose.translation, s), rotation },
+        turn: b.turn,
+    }
 }
 
 fn with_target(motor: Motor, target: f64) -> Motor {

@@ -5,8 +5,8 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::criterion::{
-    GearRatioReport, HoistReport, InsertionReport, JointDrift, LiftReport, Reports, RestReport, ScrewReport,
-    SeparationReport, Trackers, TransmissionReport,
+    AssemblyReport, GearRatioReport, HoistReport, InsertionReport, JointDrift, LiftReport, Reports,
+    RestReport, ScrewReport, SeparationReport, Trackers, TransmissionReport,
 };
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
@@ -80,6 +80,8 @@ pub struct Summary {
     pub hoist: Option<HoistReport>,
     /// Result of the transmission criterion, if the scene has one.
     pub transmission: Option<TransmissionReport>,
+    /// Result of the assembly criterion, if the scene has one.
+    pub assembly: Option<AssemblyReport>,
     /// Whether the criteria hold; `None` when the scene has none.
     pub passed: Option<bool>,
 }
@@ -281,7 +283,8 @@ impl Run {
         let messages: Vec<String> = hidden.iter().map(HiddenPair::message).collect();
         let mut reports = self.trackers.report(system, &messages);
         let passed = reports.passed();
-        let Reports { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission } = reports;
+        let Reports { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, assembly } =
+            reports;
         let sums = self.totals.summary();
         let depths = hidden.iter().map(|pair| pair.depth);
         let (momentum, angular_momentum) = system.momentum();
@@ -301,6 +304,7 @@ impl Run {
             separation,
             hoist,
             transmission,
+            assembly,
             deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
             hidden,
             ..sums

@@ -154,6 +154,44 @@ fn a_position_motor_follows_its_script() {
     assert!(spin.distance(12.0 * DVec3::Z) < 1e-6, "{spin}");
 }
 
+/// A wrist that makes two and a half turns about a tilted axis, evenly, and moves along it as a
+/// screw.
+#[test]
+fn a_turn_may_be_more_than_a_whole_one() {
+    let text = r#"
+        time_step = 5e-3
+        duration = 1.0
+        [[bodies]]
+        name = "wrist"
+        shape = { sphere = { radius = 0.02 } }
+        kinematic = true
+        rotation = [0, 0, 0.6, 0.8]
+        [[scripts]]
+        body = "wrist"
+        interpolation = "linear"
+        keyframes = [{ time = 0 }, { time = 1, translation = [0.03, 0, 0.04], turn = [9.42477796076938, 0, 12.566370614359172] }]
+    "#;
+    let (record, _, system) = run(text);
+    let (axis, angle) = (DVec3::new(0.6, 0.0, 0.8), 5.0 * std::f64::consts::PI);
+    let start = tesdf::glam::DQuat::from_xyzw(0.0, 0.0, 0.6, 0.8);
+    for step in [1, 30, 77, 200] {
+        let pose = record.states(step).unwrap()[0].pose;
+        let share = step as f64 / 200.0;
+        let expected = tesdf::glam::DQuat::from_axis_angle(axis, share * angle) * start;
+        assert!(
+            pose.rotation.dot(expected).abs() > 1.0 - 1e-12,
+            "step {step}: {pose:?}, expected {expected}"
+        );
+        assert!(pose.translation.distance(0.05 * share * axis) < 1e-12, "step {step}: {pose:?}");
+    }
+    assert!(system.states()[0].angular.distance(angle * axis) < 1e-9, "{:?}", system.states()[0]);
+    let cases = [
+        ("turn = [9.42", "rotation = [0, 0, 0, 1], turn = [9.42", "it has a rotation and a turn; keep one"),
+        ("turn = [9.42477796076938,", "turn = [inf,", "expected finite numbers, rad"),
+    ];
+    support::refused(text, Path::new("scene.toml"), &cases);
+}
+
 /// A force that is ramped up and cut off.
 #[test]
 fn a_wrench_script_accelerates_a_free_body() {

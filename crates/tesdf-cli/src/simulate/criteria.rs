@@ -1,8 +1,8 @@
 //! What the summary of a run says of the scene's criteria.
 use tesdf_sim::Summary;
 use tesdf_sim::criterion::{
-    EngagedReport, GearRatioReport, HoistReport, InsertionReport, LiftReport, RestReport, ScrewReport,
-    SeparationReport, TransmissionReport,
+    AssemblyReport, EngagedReport, GearRatioReport, HoistReport, InsertionReport, LiftReport, RestReport,
+    ScrewReport, SeparationReport, TransmissionReport,
 };
 use tesdf_terminal::report;
 
@@ -10,7 +10,9 @@ type Rows = Vec<(&'static str, String)>;
 
 /// The rows of all criteria.
 pub fn rows(summary: &Summary) -> Rows {
-    let Summary { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, .. } = summary;
+    let Summary {
+        screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, assembly, ..
+    } = summary;
     [
         screw.as_ref().map(screw_rows),
         rest.as_ref().map(rest_rows),
@@ -20,6 +22,7 @@ pub fn rows(summary: &Summary) -> Rows {
         separation.as_ref().map(separation_rows),
         hoist.as_ref().map(hoist_rows),
         transmission.as_ref().map(transmission_rows),
+        assembly.as_ref().map(assembly_rows),
     ]
     .into_iter()
     .flatten()
@@ -183,5 +186,28 @@ fn transmission_rows(transmission: &TransmissionReport) -> Rows {
         format!("at most {:.2} µm of penetration, in {measurements} exact measurements", 1e6 * penetration),
     ));
     rows.extend(verdict_rows(&transmission.failures));
+    rows
+}
+
+fn assembly_rows(assembly: &AssemblyReport) -> Rows {
+    let AssemblyReport { assembled, parts, penetration, measurements, failures } = assembly;
+    let mut rows = vec![("assembled", format!("{assembled} of {} parts", parts.len()))];
+    rows.extend(parts.iter().map(|part| {
+        let place = format!(
+            "{}: {:.1} µm off the axis, {:.2} mrad of tilt",
+            part.name,
+            1e6 * part.offset,
+            1e3 * part.tilt
+        );
+        let more = match (part.turns, part.pitch_error) {
+            (Some(turns), Some(error)) => {
+                format!("{turns:.3} turns, {:.1} µm between travel and turns × pitch", 1e6 * error)
+            }
+            _ => format!("{:.1} µm above its place", 1e6 * part.depth),
+        };
+        ("part", format!("{place}, {more}"))
+    }));
+    rows.push(clearance_row(*penetration, *measurements));
+    rows.extend(verdict_rows(failures));
     rows
 }

@@ -1,4 +1,5 @@
 //! Success criteria of a run.
+mod assembly;
 mod gear_ratio;
 mod hoist;
 mod insertion;
@@ -10,6 +11,7 @@ mod separation;
 mod shared;
 mod transmission;
 
+pub use assembly::{AssemblyCriterion, AssemblyReport, AssemblyTracker, NutGroup, PartReport, PegGroup};
 pub use gear_ratio::{GearRatioCriterion, GearRatioReport, GearRatioTracker};
 pub use hoist::{HoistChain, HoistCriterion, HoistLink, HoistReport, HoistTracker};
 pub use insertion::{InsertionCriterion, InsertionReport, InsertionTracker};
@@ -46,14 +48,24 @@ pub(crate) struct Trackers {
     separation: Option<SeparationTracker>,
     hoist: Option<HoistTracker>,
     transmission: Option<TransmissionTracker>,
+    assembly: Option<AssemblyTracker>,
     drift: JointDrift,
 }
 
 impl Trackers {
     /// Trackers that start from the current state of `system`.
     pub(crate) fn new(section: &CriterionSection, system: &System) -> Result<Self, String> {
-        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission } =
-            section;
+        let CriterionSection {
+            screw,
+            rest,
+            insertion,
+            lift,
+            gear_ratio,
+            separation,
+            hoist,
+            transmission,
+            assembly,
+        } = section;
         Ok(Self {
             screw: screw.as_ref().map(|screw| ScrewTracker::new(screw, system)).transpose()?,
             rest: rest.as_ref().map(|rest| RestTracker::new(rest, system)).transpose()?,
@@ -69,6 +81,7 @@ impl Trackers {
                 .as_ref()
                 .map(|gears| TransmissionTracker::new(gears, system))
                 .transpose()?,
+            assembly: assembly.as_ref().map(|parts| AssemblyTracker::new(parts, system)).transpose()?,
             drift: JointDrift::default(),
         })
     }
@@ -99,6 +112,9 @@ impl Trackers {
         if let Some(transmission) = &mut self.transmission {
             transmission.observe(system, time_step);
         }
+        if let Some(assembly) = &mut self.assembly {
+            assembly.observe(system, time_step);
+        }
         for joint in system.joints() {
             let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
             self.drift.distance = self.drift.distance.max(distance);
@@ -122,6 +138,7 @@ impl Trackers {
             separation: self.separation.as_ref().map(SeparationTracker::report),
             hoist: self.hoist.as_ref().map(HoistTracker::report),
             transmission: self.transmission.as_ref().map(TransmissionTracker::report),
+            assembly: self.assembly.as_ref().map(|parts| parts.report(system)),
         };
         reports.failures_mut().for_each(|of_one| of_one.extend_from_slice(failures));
         reports
@@ -139,6 +156,7 @@ pub(crate) struct Reports {
     pub(crate) separation: Option<SeparationReport>,
     pub(crate) hoist: Option<HoistReport>,
     pub(crate) transmission: Option<TransmissionReport>,
+    pub(crate) assembly: Option<AssemblyReport>,
 }
 
 impl Reports {
@@ -149,7 +167,8 @@ impl Reports {
     }
 
     fn failures_mut(&mut self) -> impl Iterator<Item = &mut Vec<String>> {
-        let Self { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission } = self;
+        let Self { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, assembly } =
+            self;
         let screw = screw.as_mut().map(|screw| &mut screw.failures);
         let rest = rest.as_mut().map(|rest| &mut rest.failures);
         let insertion = insertion.as_mut().map(|insertion| &mut insertion.failures);
@@ -158,6 +177,9 @@ impl Reports {
         let separation = separation.as_mut().map(|separation| &mut separation.failures);
         let hoist = hoist.as_mut().map(|hoist| &mut hoist.failures);
         let transmission = transmission.as_mut().map(|gears| &mut gears.failures);
-        [screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission].into_iter().flatten()
+        let assembly = assembly.as_mut().map(|parts| &mut parts.failures);
+        [screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission, assembly]
+            .into_iter()
+            .flatten()
     }
 }

@@ -77,28 +77,19 @@ pub(super) struct Penetration {
 impl Penetration {
     /// Measures the clearance of pairs of instances at the current states, to `tolerance` metres.
     pub(super) fn measure(&mut self, system: &System, pairs: &[[InstanceId; 2]], tolerance: f64) {
-        let options = ClearanceOptions { tolerance: Length::Absolute(tolerance) };
-        let measured = || -> Result<f64, CollideError> {
-            // The instances of the system have the poses of the last detection.
-            let mut system = system.clone();
-            let states = system.states().to_vec();
-            let scene = system.scene_at(&states)?;
-            let distance = |&[a, b]: &[InstanceId; 2]| Ok(clearance(scene, a, b, &options)?.distance);
-            pairs.iter().map(distance).try_fold(f64::INFINITY, |least, d| Ok(least.min(d?)))
-        };
-        match measured() {
+        match least_distance(system, pairs, tolerance) {
             Ok(distance) => {
                 self.measurements += 1;
                 self.depth = self.depth.max(-distance);
             }
-            Err(e) => self.unmeasured.push(e.to_string()),
+            Err(reason) => self.unmeasured.push(reason),
         }
     }
 
     /// Measures the clearance of all pairs whose bounds overlap at the current states, to `tolerance`
     /// metres.
     pub(super) fn measure_all(&mut self, system: &System, tolerance: f64) {
-        match overlapping(system) {
+        match near(system, 0.0) {
             Ok(pairs) => self.measure(system, &pairs, tolerance),
             Err(reason) => self.unmeasured.push(reason),
         }
@@ -122,12 +113,31 @@ impl Penetration {
     }
 }
 
-/// The pairs of instances whose bounds overlap at the current states.
-fn overlapping(system: &System) -> Result<Vec<[InstanceId; 2]>, String> {
+/// The least exact clearance of pairs of instances at the current states, m, to `tolerance` metres;
+/// infinite without pairs.
+pub(super) fn least_distance(
+    system: &System,
+    pairs: &[[InstanceId; 2]],
+    tolerance: f64,
+) -> Result<f64, String> {
+    let options = ClearanceOptions { tolerance: Length::Absolute(tolerance) };
+    let measured = || -> Result<f64, CollideError> {
+        // The instances of the system have the poses of the last detection.
+        let mut system = system.clone();
+        let states = system.states().to_vec();
+        let scene = system.scene_at(&states)?;
+        let distance = |&[a, b]: &[InstanceId; 2]| Ok(clearance(scene, a, b, &options)?.distance);
+        pairs.iter().map(distance).try_fold(f64::INFINITY, |least, d| Ok(least.min(d?)))
+    };
+    measured().map_err(|e| e.to_string())
+}
+
+/// The pairs of instances whose bounds come within `distance` metres at the current states.
+pub(super) fn near(system: &System, distance: f64) -> Result<Vec<[InstanceId; 2]>, String> {
     let mut system = system.clone();
     let states = system.states().to_vec();
     let scene = system.scene_at(&states).map_err(|e| e.to_string())?;
-    let pairs = instance_pairs(scene, 0.0, 0.0).map_err(|e| e.to_string())?;
+    let pairs = instance_pairs(scene, distance, 0.0).map_err(|e| e.to_string())?;
     Ok(pairs.iter().map(|pair| [pair.first, pair.second]).collect())
 }
 

@@ -31,8 +31,17 @@ impl LoadedScene {
 
     /// Checks that the criteria match the bodies, joints and scripts.
     pub(super) fn check_criteria(&self, system: &System) -> Result<(), SceneError> {
-        let CriterionSection { screw, rest, insertion, lift, gear_ratio, separation, hoist, transmission } =
-            &self.scene.criterion;
+        let CriterionSection {
+            screw,
+            rest,
+            insertion,
+            lift,
+            gear_ratio,
+            separation,
+            hoist,
+            transmission,
+            assembly,
+        } = &self.scene.criterion;
         let free = |body: &str| match self.scene.scripts.iter().any(|s| s.body.as_deref() == Some(body)) {
             true => Err(format!("a script drives body {body}; only contacts may, so take it out")),
             false => Ok(()),
@@ -46,6 +55,10 @@ impl LoadedScene {
             ("gear_ratio", gear_ratio.as_ref().map(|c| free(c.validate(system)?))),
             ("separation", separation.as_ref().map(|c| c.validate(system))),
             ("transmission", transmission.as_ref().map(|c| free(c.validate(system)?))),
+            (
+                "assembly",
+                assembly.as_ref().map(|c| c.validate(system)?.iter().try_for_each(|part| free(part))),
+            ),
             ("hoist", hoist.as_ref().map(|c| c.validate(system).and_then(|()| free(&c.body)))),
         ];
         for (name, check) in checks {

@@ -68,10 +68,11 @@ pub use limits::{LimitError, MAX_BODIES, MAX_STATE_BYTES, MAX_STEPS};
 pub use read::LoadedScene;
 
 use crate::criterion::{
-    GearRatioCriterion, HoistCriterion, InsertionCriterion, LiftCriterion, RestCriterion, ScrewCriterion,
-    SeparationCriterion, TransmissionCriterion,
+    AssemblyCriterion, GearRatioCriterion, HoistCriterion, InsertionCriterion, LiftCriterion, RestCriterion,
+    ScrewCriterion, SeparationCriterion, TransmissionCriterion,
 };
 use crate::newton::NewtonOptions;
+use crate::plan::PlanSection;
 use crate::script::Script;
 use crate::{JointKind, Motor};
 
@@ -109,6 +110,9 @@ pub struct SceneFile {
     /// What drives kinematic bodies, motors and wrenches in time.
     #[serde(default)]
     pub scripts: Vec<Script>,
+    /// Tasks of grippers. A loaded scene has scripts in their place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<PlanSection>,
 }
 
 /// Friction between two bodies.
@@ -336,4 +340,6 @@ pub struct CriterionSection {
     pub hoist: Option<HoistCriterion>,
     /// A gearbox must turn its output shaft at the ratio of each gear.
     pub transmission: Option<TransmissionCriterion>,
+    /// Parts must end in their places, held by contact alone.
+    pub assembly: Option<AssemblyCriterion>,
 }

@@ -1,11 +1,14 @@
 use std::path::{Path, PathBuf};
 
+use tesdf::collide::Pose;
+use tesdf::glam::{DQuat, DVec3};
 use toml::Spanned;
 use toml::de::DeTable;
 
 use super::copies::expand;
 use super::{BodySection, MAX_BODIES, SceneError, SceneFile};
 use crate::RunRecord;
+use crate::plan::scripts;
 
 /// Maximum size of a scene file: a thousand bytes per body.
 const MAX_TEXT: usize = 1000 * MAX_BODIES;
@@ -50,10 +53,31 @@ impl LoadedScene {
             path: path.to_path_buf(),
             message: e.to_string().trim_end().to_string(),
         })?;
-        Self { scene, path: path.to_path_buf(), text }.with_copies()
+        Self { scene, path: path.to_path_buf(), text }.expanded()
     }
 
-    /// The scene with each copy of a body as a body of its own.
+    /// The scene with each copy of a body as a body of its own, and scripts in place of a plan.
+    fn expanded(self) -> Result<Self, SceneError> {
+        self.with_copies()?.with_scripts()
+    }
+
+    fn with_scripts(mut self) -> Result<Self, SceneError> {
+        let Some(plan) = self.scene.plan.take() else { return Ok(self) };
+        let scripts = scripts(&plan, self.scene.duration, |name| self.start(name))
+            .map_err(|e| self.value("plan", e))?;
+        self.scene.scripts.extend(scripts);
+        Ok(self)
+    }
+
+    /// Where a body starts.
+    fn start(&self, name: &str) -> Result<Pose, String> {
+        let mut bodies = self.scene.bodies.iter().map(Spanned::get_ref);
+        let body = bodies.find(|body| body.name == name);
+        let body = body.ok_or_else(|| format!("there is no body {name}; give the name of a body"))?;
+        let (translation, rotation) = (DVec3::from_array(body.translation), DQuat::from_array(body.rotation));
+        Pose::new(translation, rotation).map_err(|e| format!("body {name}: {e}"))
+    }
+
     fn with_copies(mut self) -> Result<Self, SceneError> {
         match expand(std::mem::take(&mut self.scene.bodies)) {
             Ok(bodies) => Ok(Self { scene: SceneFile { bodies, ..self.scene }, ..self }),
@@ -107,7 +131,7 @@ impl LoadedScene {
         let bodies = bodies.into_iter().enumerate().map(read).collect::<Result<_, SceneError>>()?;
         json["bodies"] = serde_json::Value::Array(Vec::new());
         let scene: SceneFile = serde_json::from_value(json).map_err(|e| refuse(e.to_string()))?;
-        Self { scene: SceneFile { bodies, ..scene }, path, text: String::new() }.with_copies()
+        Self { scene: SceneFile { bodies, ..scene }, path, text: String::new() }.expanded()
     }
 
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
