@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 
 use proptest::prelude::*;
 use tesdf::{
+    base::Inside,
     glam::DVec3,
     mesh::{
         RepairMode, RepairOptions, ShellOrientation, SolidMesh, TriangleMesh, closing_tolerance, read,

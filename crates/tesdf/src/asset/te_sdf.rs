@@ -256,7 +256,7 @@ impl TeSdf {
             )),
             Signs::RuleUnoriented => Some((
                 "some of its faces have the inside in front of them in one place and behind them in another",
-                "faces that look outward: cut overlaps off with `tesdf repair --union`, or use the rule `winding`",
+                "faces that look outward: cut overlaps off in the program that made the mesh, or use the rule `winding`",
             )),
             Signs::Cells | Signs::Rule | Signs::Sheet => None,
         }

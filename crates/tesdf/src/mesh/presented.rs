@@ -177,7 +177,7 @@ impl Presentation {
         let first = *self.partly.first()?;
         let message = format!(
             "face {first}{} lies partly within the solid and stays in the surface as a whole: distances inside may refer to \
-             its inner part; `tesdf repair --union` cuts it off",
+             its inner part",
             match self.partly.len() {
                 1 => String::new(),
                 n => format!(", like {} others,", n - 1),
