@@ -6,8 +6,8 @@ use tesdf::{
     base::Inside,
     glam::DVec3,
     mesh::{
-        RepairMode, RepairOptions, ShellOrientation, SolidMesh, TriangleMesh, closing_tolerance, read,
-        repair, repair_auto,
+        RepairMode, RepairOptions, ShellOrientation, SolidMesh, Topology, TriangleMesh, closing_tolerance,
+        read, repair, repair_auto,
     },
 };
 
@@ -129,7 +129,8 @@ proptest! {
         let options = RepairOptions { weld_tolerance: Some(tolerance), ..RepairOptions::DEFAULT };
         let welded = repair(&torn, &options).unwrap();
         prop_assert!(welded.report.encodable, "{}", welded.report);
-        prop_assert_eq!(welded.mesh.faces().len(), fixed.faces().len());
+        // An edge may be split at a vertex that was not merged, but nothing is lost.
+        prop_assert!(welded.mesh.faces().len() >= fixed.faces().len());
         prop_assert_eq!(closing_tolerance(&fixed), None);
     }
 
@@ -147,6 +148,8 @@ proptest! {
             let options = RepairOptions { fill_holes: Some(u32::MAX), shells, ..RepairOptions::DEFAULT };
             if let Ok(found) = repair(&mesh, &options) {
                 let _ = found.report.to_string();
+                let is_closed = Topology::new(found.mesh.faces()).is_closed();
+                prop_assert!(is_closed || !found.report.holes_left.is_empty(), "{}", found.report);
                 prop_assert_eq!(&repair(&mesh, &options).unwrap(), &found);
             }
         }

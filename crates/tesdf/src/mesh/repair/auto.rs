@@ -75,7 +75,7 @@ pub fn repair_auto(mesh: &TriangleMesh) -> Result<Option<AutoRepaired>, RepairEr
         }
     }
     match attempt(mesh, &RepairOptions::DEFAULT) {
-        Ok(Attempt::Works(found)) => return Ok(Some(found)),
+        Ok(Attempt::Works(found)) => return Ok(Some(*found)),
         Err(error @ RepairError::OutOfRange(_)) => return Err(error),
         Ok(_) | Err(_) => {}
     }
@@ -92,7 +92,7 @@ pub fn repair_auto(mesh: &TriangleMesh) -> Result<Option<AutoRepaired>, RepairEr
     for options in attempts {
         // An attempt may leave no face. The next one does without its step.
         match attempt(mesh, &options) {
-            Ok(Attempt::Works(found)) => return Ok(Some(found)),
+            Ok(Attempt::Works(found)) => return Ok(Some(*found)),
             Ok(Attempt::FillsTooMuch) => return Ok(None),
             Ok(Attempt::Fails) | Err(_) => {}
         }
@@ -102,7 +102,7 @@ pub fn repair_auto(mesh: &TriangleMesh) -> Result<Option<AutoRepaired>, RepairEr
 
 /// What came of an attempt.
 enum Attempt {
-    Works(AutoRepaired),
+    Works(Box<AutoRepaired>),
     /// The holes are too large, as they are for other options.
     FillsTooMuch,
     Fails,
@@ -119,7 +119,7 @@ fn attempt(mesh: &TriangleMesh, options: &RepairOptions) -> Result<Attempt, Repa
     }
     let repaired = closed.finish(options)?;
     Ok(match repaired.report.encodable {
-        true => Attempt::Works(AutoRepaired { options: Some(*options), repaired }),
+        true => Attempt::Works(Box::new(AutoRepaired { options: Some(*options), repaired })),
         false => Attempt::Fails,
     })
 }

@@ -15,7 +15,7 @@ const PROBED: [usize; 2] = [6, 3];
 const SHARE_LEFT: f64 = 0.05;
 /// A tolerance that closes less than this share of the open edges' length closes no crack: it only
 /// merges vertices of short edges.
-const NOTHING: f64 = 1e-3;
+const NOTHING: f64 = 1e-2;
 
 /// The least weld tolerance that closes the cracks of a mesh, in the mesh's unit. Seven
 /// tolerances are tried, from 1e-7 to 1e-4 of the diagonal, rounded to two digits.

@@ -67,7 +67,7 @@ impl Loop<'_> {
         let cross = (b - a).cross(c - a);
         let double = cross.length();
         let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
-        let flat = !(double > FLAT * longest);
+        let flat = double.is_nan() || double <= FLAT * longest;
         let normal = if flat { DVec3::ZERO } else { cross / double };
         (Weight { flaws: u32::from(flat), fold: 0.0, area: 0.5 * double }, normal)
     }
