@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
 
-for set in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf vtu gmsh gltf,collide encode,collide,parallel,gltf,vtu,gmsh; do
+for set in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf threemf vtu gmsh gltf,collide threemf,vtu encode,collide,parallel,gltf,threemf,vtu,gmsh; do
     RUSTFLAGS="-D warnings" step cargo check --quiet --lib -p tesdf --no-default-features --features "$set" --target-dir target/features
 done
 # Not optimised: one test of an error message.

@@ -41,7 +41,7 @@ fn bad_usage_exits_with_2_and_a_reason_on_stderr() {
     for (args, expected) in [
         (&[][..], "Usage: tesdf <COMMAND>"),
         (&["frobnicate"], "error: unrecognized subcommand 'frobnicate'"),
-        (&["encode", "m.stl"], "--output <FILE>"),
+        (&["encode", "m.stl"], "--output <FILE|FOLDER>"),
         (&["encode", "m.stl", "-o", "f", "--quality", "9"], "error: unexpected argument '--quality' found"),
         (
             &["encode", "m.stl", "-o", "f", "--preset", "huge"],

@@ -281,7 +281,10 @@ fn what_cannot_be_done_is_said_before_the_work() {
     folder.write("empty.txt", "\n");
     folder.write("bytes.txt", b"\xff");
     for (args, expected) in [
-        (&["empty", "-o", "out"][..], "error: empty has no mesh; expected STL, OBJ, PLY, OFF, glTF, GLB"),
+        (
+            &["empty", "-o", "out"][..],
+            "error: empty has no mesh; expected STL, OBJ, PLY, OFF, glTF, GLB, 3MF",
+        ),
         (&["empty.txt", "-o", "out"], "error: empty.txt has no mesh"),
         (&["none", "-o", "out"], "error: cannot read none: "),
         (&["bytes.txt", "-o", "out"], "error: cannot read bytes.txt: line 1 is not UTF-8"),

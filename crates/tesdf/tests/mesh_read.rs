@@ -164,7 +164,7 @@ fn all_encodings_of_one_cube_agree() {
 fn extensions_decide_and_unknown_ones_list_the_known() {
     assert_eq!(MeshFormat::of_path(Path::new("a/B.STL")).unwrap(), MeshFormat::Stl);
     assert_eq!(MeshFormat::of_path(Path::new("b.Glb")).unwrap(), MeshFormat::Glb);
-    for name in ["part.step", "part", ".obj"] {
+    for name in ["part.sldprt", "part", ".obj"] {
         let error = read(Path::new(name)).unwrap_err();
         assert!(matches!(error, ReadError::UnknownExtension { .. }));
         assert!(error.to_string().contains(".stl, .obj, .ply, .off, .gltf, .glb"), "{error}");

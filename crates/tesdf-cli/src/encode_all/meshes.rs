@@ -104,7 +104,8 @@ pub fn find(from: &Path, shard: Option<Shard>, cad: &CadArgs) -> Result<Vec<Mesh
         )));
     }
     if all.is_empty() {
-        let known: Vec<_> = MeshFormat::ALL.iter().map(ToString::to_string).collect();
+        let known = MeshFormat::ALL.iter().filter(|format| !format.is_cad());
+        let known: Vec<_> = known.map(ToString::to_string).collect();
         return Err(Failure::new(format!("{} has no mesh; expected {}", from.display(), known.join(", "))));
     }
     let chosen = all.into_iter().filter(|(name, _)| shard.is_none_or(|shard| shard.has(name)));

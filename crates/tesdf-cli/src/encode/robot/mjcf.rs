@@ -64,7 +64,7 @@ fn is_collision_mesh(geom: &Geom) -> bool {
 fn pose(mesh: &mjcf_rs::assets::Mesh, scale: DVec3) -> DAffine3 {
     let (p, q) = (mesh.refpose.translation, mesh.refpose.rotation);
     let reference = DAffine3::from_translation(-DVec3::new(p.x, p.y, p.z));
-    let rotation = DQuat::from_xyzw(q.x, q.y, q.z, q.w);
+    let rotation = DQuat::from_xyzw(q.x, q.y, q.z, q.w).normalize();
     if rotation == DQuat::IDENTITY && reference == DAffine3::IDENTITY {
         return DAffine3::from_scale(scale);
     }

@@ -86,18 +86,17 @@ fn run(
              (General.MaxZ - General.MinZ)^2)"
         ),
     };
-    let import = match format {
-        // It has no unit, and Gmsh refuses one.
-        MeshFormat::Brep => "",
-        // It may have faces without a common topology.
-        MeshFormat::Iges => {
-            "Geometry.OCCTargetUnit = \"MM\";\nGeometry.OCCSewFaces = 1;\nGeometry.OCCMakeSolids = 1;\n"
-        }
-        _ => "Geometry.OCCTargetUnit = \"MM\";\n",
+    let (unit, join) = match format {
+        MeshFormat::Step => ("Geometry.OCCTargetUnit = \"MM\";\n", ""),
+        // OpenCASCADE converts IGES to millimetres by itself. Its faces have curves of their own, and
+        // this command makes one of equal ones. `Geometry.OCCSewFaces` leaves faces that Gmsh 4.15
+        // cannot mesh.
+        MeshFormat::Iges => ("", "Coherence;\n"),
+        _ => ("", ""),
     };
     let script = format!(
         "SetFactory(\"OpenCASCADE\");\nGeneral.NumThreads = 1;\nGeometry.OCCImportLabels = 1;\n\
-         {import}Merge \"{model}\";\nSave \"{NAMES}\";\nBoundingBox;\n\
+         {unit}Merge \"{model}\";\n{join}Save \"{NAMES}\";\nBoundingBox;\n\
          Mesh.MeshSizeMax = {size};\nMesh.MeshSizeFromCurvature = {turn};\nMesh.SaveAll = 1;\n\
          Mesh.MshFileVersion = 4.1;\nMesh.Binary = 0;\n"
     );
@@ -149,7 +148,8 @@ fn names(gmsh: &Gmsh, volumes: usize) -> Vec<String> {
 
 fn assemble(surface: &Surface, names: Vec<String>) -> RawMesh {
     let mut raw = RawMesh::new(Places::Elements(Vec::new()), 0);
-    raw.positions.clone_from(&surface.positions);
+    // The middles of edges are left out.
+    let mut ids = vec![None; surface.positions.len()];
     let mut owned = vec![false; surface.faces.len()];
     let mut names = names.into_iter();
     let mut add = |raw: &mut RawMesh, face: usize, element: String| {
@@ -160,7 +160,13 @@ fn assemble(surface: &Surface, names: Vec<String>) -> RawMesh {
         }
         for &[a, b, c] in &surface.faces[face].triangles {
             let corners = if reversed { [a, c, b] } else { [a, b, c] };
-            raw.corners.extend(corners.map(u64::from));
+            for corner in corners {
+                let id = *ids[corner as usize].get_or_insert_with(|| {
+                    raw.positions.push(surface.positions[corner as usize]);
+                    raw.positions.len() as u64 - 1
+                });
+                raw.corners.push(id);
+            }
             raw.end_face(0);
         }
     };
