@@ -35,17 +35,17 @@ build_tools() {
     fi
 }
 wheel() {
-    step "$tools/bin/maturin" build --quiet --profile dev --locked -m python/Cargo.toml --features "$1" --out "$wheels/$2"
+    # With the optimisation level of the tests.
+    CARGO_PROFILE_DEV_OPT_LEVEL=2 step "$tools/bin/maturin" build --quiet --profile dev --locked -m python/Cargo.toml --features "$1" --out "$wheels/$2"
 }
 
 # Downloads, while the compiler works.
 mkdir -p "$folder"
 environments >"$folder/environments.txt" 2>&1 &
 environments_job=$!
-# With the optimisation level and the features of the tests, so that all crates but one are compiled
-# once. The tests compare contacts with those of the command.
-export CARGO_PROFILE_DEV_OPT_LEVEL=2
-step cargo build --quiet --locked --workspace $features --bin tesdf
+# The tests compare contacts with those of the command. It is built as for its own tests, whose
+# crates have more features, and the wheels with the same crates (`as-in-tests`): each is compiled once.
+step cargo test --quiet --locked --workspace $features --no-run --test command_line
 build_tools
 rm -rf "$wheels"
 wheel as-in-tests,gpu gpu
@@ -65,7 +65,7 @@ tests() {
 }
 in_newton() {
     tests "$newton" python/tests/test_newton.py python/tests/test_no_device.py &&
-        step "$newton/bin/python" examples/python/newton_nut_on_bolt.py &&
+        step "$newton/bin/python" python/tests/unoptimised_kernels.py examples/python/newton_nut_on_bolt.py &&
         # CUDA's replacement is for these tests only: Warp would take it, too.
         LD_LIBRARY_PATH=$cuda_on_cpu tests "$env" python/tests/test_device.py &&
         # Compares the stubs with the module. The tests use the module as the stubs describe it.
@@ -78,6 +78,7 @@ in_mujoco() {
     for example in examples/python/*.py; do
         case $example in
         */newton_*) ;;
+        */mujoco_warp_*) step "$env/bin/python" python/tests/unoptimised_kernels.py "$example" || return ;;
         *) step "$env/bin/python" "$example" || return ;;
         esac
     done

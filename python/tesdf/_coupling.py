@@ -104,6 +104,15 @@ class Detector:
         return self.last
 
 
+def kinds_of(rows: npt.NDArray[Any]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The distinct rows [K, W] of numbers that are not negative, sorted, and for each row its place among them.
+    As `numpy.unique(rows, axis=0)`, which takes ten times as long: it sorts rows as bytes."""
+    rows = rows.astype(np.int64)
+    sizes = rows.max(axis=0, initial=0) + 1
+    _, first, kind = np.unique(np.ravel_multi_index(tuple(rows.T), tuple(sizes)), return_index=True, return_inverse=True)
+    return rows[first], kind.reshape(-1)
+
+
 def rigid_solref(time_step: Float) -> Float:
     """[..., 2], the solref of MuJoCo with which a gap closes within one time step, and not sooner, and an
     overlap of one is gone in the next."""

@@ -75,7 +75,8 @@ def _log(recording: rr.RecordingStream, animation: Animation, number: int, paren
     for key, to in moving.items():
         if (number, key) in animation.tracks:
             times, values = animation.tracks[number, key]
-            columns = rr.Transform3D.columns(**{to: values})
+            named: dict[str, Any] = {to: values}
+            columns = rr.Transform3D.columns(**named)
             rr.send_columns(path, [rr.TimeColumn("time", duration=times.astype(float))], columns, recording=recording)
     if "mesh" in node:
         for part, primitive in enumerate(animation.json["meshes"][node["mesh"]]["primitives"]):

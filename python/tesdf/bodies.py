@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 Shape = Union["_native.Asset", Plane, Box, Sphere, Capsule]
 
 
-class DetectOptions(TypedDict, total=False):
-    """Keywords of `Scene.detect`, which explains them."""
+class WhyOptions(TypedDict, total=False):
+    """Keywords of `Scene.detect` on the processor, which explains them."""
 
     mode: Literal["node", "edge", "face", "exact"]
     contacts_per: Literal["cell", "face", "minimum"]
@@ -31,6 +31,11 @@ class DetectOptions(TypedDict, total=False):
     spread: int | None
     precision: Literal["f64", "f32"]
     threads: int | None
+
+
+class DetectOptions(WhyOptions, total=False):
+    """Keywords of `Scene.detect`, which explains them."""
+
     device: str | int | None
 
 
@@ -104,7 +109,7 @@ def why(
     *,
     pose_a: npt.ArrayLike | None = None,
     pose_b: npt.ArrayLike | None = None,
-    **options: Unpack[DetectOptions],
+    **options: Unpack[WhyOptions],
 ) -> WhyReport:
     """Why contacts of the faces of *a* in the field of *b* exist or not.
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import Asset, Contacts as Found, Scene
-from ._coupling import Detector, frames
+from ._coupling import Detector, frames, kinds_of
 from ._mujoco_model import Geoms, Parameters, Properties, Solref, checked_solref, combine, mj, stiffness
 
 if TYPE_CHECKING:
@@ -128,8 +128,7 @@ class Contacts:
     def _fill(self, model: mj.MjModel, contact: Any, rows: slice, found: Found) -> None:
         # MuJoCo's normal points from the first geom to the second one.
         first, second = found.instance_b, found.instance_a
-        kinds, kind = np.unique(np.stack([first, second], 1), axis=0, return_inverse=True)
-        kind = kind.reshape(-1)
+        kinds, kind = kinds_of(np.stack([first, second], 1))
         each = self._parameters(model, self._ids[kinds[:, 0]], self._ids[kinds[:, 1]])
         contact.dist[rows] = found.distance
         contact.pos[rows] = 0.5 * (found.point_a + found.point_b)

@@ -26,7 +26,7 @@ except ImportError:
     ) from None
 
 from . import Asset, Contacts as Found, Scene
-from ._coupling import Detector, Float, frames
+from ._coupling import Detector, Float, frames, kinds_of
 from ._mujoco_model import Geoms, Integer, Parameters, Properties, Solref, checked_solref, combine, mj, stiffness
 from ._mujoco_warp_kernels import look_ahead
 
@@ -247,7 +247,7 @@ class Contacts:
 
     def _parameters(self, m: mjw.Model, world: Integer, geoms: Integer) -> tuple[Parameters, Integer]:
         """The parameters of each kind of contact, and the kind of each contact."""
-        kinds, kind = np.unique(np.column_stack([world, geoms]), axis=0, return_inverse=True)
+        kinds, kind = kinds_of(np.column_stack([world, geoms]))
         each = {
             name: _of_each_geom(getattr(m, "geom_" + name), self._worlds)
             for name in ("solmix", "friction", "solref", "solimp")
@@ -258,7 +258,7 @@ class Contacts:
         first, second = (kinds[:, 0] * m.ngeom + kinds[:, k] for k in (1, 2))
         steps = _array(m.opt.timestep)
         combined = combine(Properties(**same, **each), first, second)
-        return stiffness(self._solref, steps[kinds[:, 0] % len(steps)], combined), kind.reshape(-1)
+        return stiffness(self._solref, steps[kinds[:, 0] % len(steps)], combined), kind
 
 
 def _array(given: Any) -> Float:

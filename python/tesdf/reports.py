@@ -7,6 +7,7 @@ Lengths are in the mesh's unit, and ids start from 0. A float that is not finite
 from __future__ import annotations
 
 import dataclasses
+import functools
 import json
 import typing
 from dataclasses import dataclass
@@ -513,11 +514,17 @@ def from_json(name: str, text: str) -> Any:
     return _build(globals()[name], json.loads(text))
 
 
+@functools.lru_cache(maxsize=None)
+def _hints(kind: type) -> dict[str, Any]:
+    """The types of the fields. A detection asks for them each time, and finding them takes as long as some contacts."""
+    return typing.get_type_hints(kind)
+
+
 def _build(kind: Any, value: Any) -> Any:
     """`value` as an object of type `kind`. Raises TypeError if the fields differ from those of
     the class."""
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-        hints = typing.get_type_hints(kind)
+        hints = _hints(kind)
         names = {("kind" if key == "class" else key): item for key, item in value.items()}
         return kind(**{key: _build(hints.get(key), item) for key, item in names.items()})
     arguments = typing.get_args(kind)

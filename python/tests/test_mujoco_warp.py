@@ -11,7 +11,7 @@ import warp as wp
 from conftest import PARTS, SCREW
 from unoptimised_kernels import unoptimised
 
-unoptimised(wp)
+unoptimised()
 
 # The ball and the floor meet by MJWarp's own contacts.
 CUBE = f"""

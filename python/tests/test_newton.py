@@ -9,7 +9,7 @@ import tesdf.newton
 import warp as wp
 from unoptimised_kernels import unoptimised
 
-unoptimised(wp)
+unoptimised()
 
 STEP = 0.002
 FLIPPED = (1.0, 0.0, 0.0, 0.0)
