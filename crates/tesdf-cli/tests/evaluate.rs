@@ -117,6 +117,70 @@ fn a_folder_that_cannot_be_made_is_reported_before_the_work() {
 }
 
 #[test]
+fn table_2_counts_the_queries_of_recorded_poses_beside_the_paper() {
+    let folder = Folder::new();
+    let data = meshes();
+    let recordings = format!("{data}/recordings");
+    let args = [
+        "evaluate",
+        "table2",
+        "--scenarios",
+        "peg-in-hole",
+        "--frames",
+        "1",
+        "--repeat",
+        "1",
+        "--preset",
+        "fast",
+    ];
+    folder.good(&[&args[..], &["--recordings", &recordings, "-o", "results"]].concat());
+    let read = |name: &str| std::fs::read_to_string(folder.path(name)).unwrap();
+    let table: Value = serde_json::from_str(&read("results/table2.json")).unwrap();
+    let rows = table["rows"].as_array().unwrap();
+    assert_eq!(rows.iter().map(|r| r["max_entries"].as_u64()).collect::<Vec<_>>(), [Some(32), None]);
+    let mean = |figure: &Value| figure["mean"].as_f64().unwrap();
+    for row in rows {
+        let (cells, faces) = (&row["paper_form"], &row["per_face"]);
+        // A face meets several cells, and not each of them has a contact.
+        assert!(mean(&cells["queries"]) > mean(&faces["queries"]), "{row:#}");
+        assert!(mean(&cells["queries"]) > mean(&cells["contacts"]), "{row:#}");
+        assert!(mean(&faces["contacts"]) > 64.0 && mean(&row["kept"]) == 64.0, "{row:#}");
+        assert!(row["memory"]["assets"].as_u64() > row["memory"]["instances"].as_u64(), "{row:#}");
+    }
+    let account = |row: &Value| row["memory"]["paper_mib"].as_f64().unwrap();
+    assert!(account(&rows[0]) < account(&rows[1]), "truncated lists are smaller");
+    assert_eq!(read("results/table2.csv").lines().count(), 3);
+    assert!(read("results/table2.md").contains("| peg-in-hole | *paper: 32* |"));
+}
+
+#[test]
+fn recordings_are_refused_with_another_scene() {
+    let folder = Folder::new();
+    let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let scene = |name: &str| scenes.join(name).display().to_string();
+    folder.good(&["simulate", &scene("stack.toml"), "--duration", "0.02", "-o", "run.tesrun"]);
+    folder.good(&[
+        "bench",
+        "record",
+        "run.tesrun",
+        "--scene",
+        &scene("stack.toml"),
+        "--frames",
+        "3",
+        "-o",
+        "poses.json",
+    ]);
+    let poses: Value =
+        serde_json::from_str(&std::fs::read_to_string(folder.path("poses.json")).unwrap()).unwrap();
+    assert_eq!(poses["frames"].as_array().unwrap().len(), 3);
+    let other = scene("chain.toml");
+    let (code, _, err) =
+        folder.tesdf(&["bench", "record", "run.tesrun", "--scene", &other, "-o", "other.json"]);
+    assert_eq!(code, Some(2));
+    assert!(err.contains("its bodies are not those of run.tesrun"), "{err}");
+}
+
+#[test]
 fn the_quick_table_3_has_encoded_meshes_that_succeed_beside_voxels_and_the_paper() {
     let scenes = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").display().to_string();
     let folder = Folder::new();

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use support::bodies::{Placed, Relation, of_direction, rotation, scene};
 use support::lowest::{area, clip, sampled};
 use support::random::Random;
+use tesdf::collide::internal::{count_faces, count_polygons};
 use tesdf::collide::{CollideOptions, ContactsPer, Mode, candidates, detect};
 use tesdf::geometry::Aabb;
 use tesdf::glam::DVec3;
@@ -81,8 +82,10 @@ fn compare(a: usize, b: usize, bodies: &[Placed], stride: usize, contact_distanc
         .filter(|c| of_stride(c.face_a))
         .filter_map(|c| c.tet_b.map(|cell| ((c.face_a, cell), c.distance)))
         .collect();
-    let looked_at: BTreeSet<Pair> = candidates(&scene, &options)
-        .expect("a good scene")
+    let all_candidates = candidates(&scene, &options).expect("a good scene");
+    assert_eq!(count_polygons(&scene, &options).expect("a good scene"), all_candidates.len());
+    assert_eq!(count_faces(&scene, &options).expect("a good scene"), found.statistics.candidates);
+    let looked_at: BTreeSet<Pair> = all_candidates
         .iter()
         .filter(|c| (c.instance_a.0, c.instance_b.0) == (a as u32, b as u32) && of_stride(c.face_a))
         .filter_map(|c| c.tet_b.map(|cell| (c.face_a, cell)))

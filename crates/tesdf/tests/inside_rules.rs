@@ -316,10 +316,8 @@ fn faces_partly_within_the_solid_stay_and_the_sign_counts_all_faces() {
     assert_boundary(&mixed(), Nonzero, 60);
     assert_boundary(&mixed(), Odd, 60);
     // Walls within the overlap are left out, so its middle is deeper.
-    let spheres = Parts {
-        vertices: bowl(8, 8).vertices.iter().map(|&v| v + 0.7 * DVec3::X).collect(),
-        ..bowl(8, 8)
-    };
+    let spheres =
+        Parts { vertices: bowl(8, 8).vertices.iter().map(|&v| v + 0.7 * DVec3::X).collect(), ..bowl(8, 8) };
     let spheres = bowl(8, 8).add(&spheres.vertices, &spheres.faces, Outward).mesh();
     let asset = assert_boundary(&spheres, Winding, 40);
     let middle = DVec3::new(0.35, 0.0, 0.0);
