@@ -212,7 +212,7 @@ impl Args {
             meshes,
             from: &self.mesh,
             output: &self.output,
-            choices: self.choices.choices(),
+            choices: &self.choices,
             cad: self.cad.clone(),
             shard: None,
             jobs: None,

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use tesdf::Progress;
-use tesdf::encode::{DomainChoice, EncodeChoices};
+use tesdf::encode::DomainChoice;
 
 use crate::encode::ChoiceArgs;
 use job::{Done, Job, State};
