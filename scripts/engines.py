@@ -103,8 +103,8 @@ def in_newton(step, assets, given, options):
 
 
 def shares(advance, steps):
-    """Prints who takes the time of a step in MuJoCo: its functions, detection in Rust, or the coupling in Python."""
-    profile = cProfile.Profile()
+    """Prints who takes the processor time of a step: MuJoCo, detection in Rust, or the coupling in Python."""
+    profile = cProfile.Profile(time.process_time)
     profile.enable()
     for _ in range(steps):
         advance()
@@ -129,7 +129,7 @@ arguments.add_argument("--iterations", type=int, default=2, help="those of XPBD"
 arguments.add_argument("--torsional", action="store_true", help="with Newton's default torsional and rolling friction")
 arguments.add_argument("--soft", action="store_true", help="with Newton's default stiffness")
 arguments.add_argument("--no-look-ahead", action="store_true", help="without Newton's use_speculative_contacts")
-arguments.add_argument("--shares", action="store_true", help="prints who takes the time of a step, and ends; for mujoco")
+arguments.add_argument("--shares", action="store_true", help="prints who takes the processor time of a step, and ends; for mujoco")
 given = arguments.parse_args()
 if given.shares and given.engine != "mujoco":
     arguments.error("--shares is for mujoco")

@@ -6,6 +6,7 @@ import pytest
 import tesdf
 import tesdf.mujoco
 from conftest import PARTS, SCREW
+from tesdf._coupling import frames, kinds_of
 
 CUBE = f"""
 <mujoco>
@@ -256,3 +257,16 @@ def test_other_errors(cube, screw):
     with pytest.raises(ValueError, match="do not fit the model's memory of 1048576 bytes"):
         contacts.add(model, data)
     assert data.ncon == 0
+
+
+def test_kinds_and_frames():
+    random = np.random.default_rng(1)
+    for rows in (np.zeros((0, 2)), random.integers(0, 5, (300, 3)), np.array([[2**31, 7], [3, 0], [2**31, 7]])):
+        expected, places = np.unique(rows.astype(np.int64), axis=0, return_inverse=True)
+        kinds, kind = kinds_of(rows)
+        assert np.array_equal(kinds, expected) and np.array_equal(kind, places.reshape(-1))
+    normals = random.normal(size=(200, 3))
+    normals = np.vstack([normals / np.linalg.norm(normals, axis=1)[:, None], np.eye(3), -np.eye(3)])
+    found = frames(normals)
+    assert np.array_equal(found[:, 0], normals)
+    assert np.abs(found @ found.transpose(0, 2, 1) - np.eye(3)).max() < 1e-15 * 4 and (np.linalg.det(found) > 0.9).all()

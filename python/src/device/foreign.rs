@@ -107,10 +107,10 @@ fn by_interface(py: Python<'_>, interface: &Bound<'_, PyDict>, device: &Device) 
     let shape: Vec<usize> = required("shape")?.extract()?;
     let kind: String = required("typestr")?.extract()?;
     let strides: Option<Vec<isize>> = entry("strides")?.map(|any| any.extract()).transpose()?;
-    let is_compact = strides.is_none_or(|strides| strides == [12, 4] || shape[0] <= 1);
     let &[rows, 3] = shape.as_slice() else {
         return Err(argument("points", format!("an array of shape {shape:?}"), SHAPE));
     };
+    let is_compact = rows <= 1 || strides.is_none_or(|strides| strides == [12, 4]);
     if kind != "<f4" || !is_compact {
         return Err(argument("points", format!("numbers of the type {kind:?}"), SHAPE));
     }

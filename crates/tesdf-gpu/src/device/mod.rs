@@ -211,9 +211,13 @@ impl Device {
     /// The number of this device in CUDA; `None` for a device that is reached through wgpu.
     pub fn cuda_number(&self) -> Option<usize> {
         #[cfg(feature = "cuda")]
-        return cuda::server::number(&self.client);
+        {
+            cuda::server::number(&self.client)
+        }
         #[cfg(not(feature = "cuda"))]
-        None
+        {
+            None
+        }
     }
 
     /// Waits until all launches are complete.
