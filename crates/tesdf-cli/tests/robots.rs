@@ -58,9 +58,9 @@ fn a_urdf_file_gives_each_collision_mesh_once_for_each_scale() {
     let assets: Vec<_> = meshes.iter().map(|mesh| mesh["asset"].as_str().unwrap_or("none")).collect();
     assert_eq!(assets, ["link.tesdf", "link-2.tesdf", "link-3.tesdf", "none", "none"]);
     let uses: Vec<_> = meshes.iter().map(|mesh| mesh["uses"].to_string()).collect();
-    assert_eq!(uses[0], r#"[{"link":"base","collision":"whole"},{"link":"base","collision":"2"}]"#);
+    assert_eq!(uses[0], r#"[{"collision":"whole","link":"base"},{"collision":"2","link":"base"}]"#);
     assert_eq!(meshes[1]["scale"].to_string(), "[1.0,-1.0,1.0]");
-    assert_eq!(uses[2], r#"[{"link":"hand","collision":"0"}]"#);
+    assert_eq!(uses[2], r#"[{"collision":"0","link":"hand"}]"#);
 
     let asset = TeSdf::open(folder.path("assets/link.tesdf")).unwrap();
     assert_eq!((asset.unit(), &*asset.about().source.name), (Some("m"), "link.obj#scale=0.001 0.001 0.001"));
@@ -135,6 +135,9 @@ fn an_mjcf_file_gives_the_meshes_of_geoms_that_can_touch() {
                 <body><geom class="collision" mesh="part"/><geom type="mesh" mesh="turned"/><geom type="mesh" mesh="odd"/></body>
               </body></worldbody></mujoco>"#,
     );
+    folder.write("model/loop.xml", "<mujoco><include file='loop.xml'/></mujoco>");
+    let (code, _, err) = folder.tesdf(&["encode", "model/loop.xml", "-o", "assets"]);
+    assert!(code == Some(2) && err.contains("line 1: loop.xml includes itself"), "{err}");
     let (code, _, err) = folder.tesdf(&["encode", "model/robot.xml", "-o", "assets"]);
     assert!(code == Some(1) && err.contains("odd.msh"), "{err}");
     let manifest = manifest(&folder, "assets/manifest.json");

@@ -68,7 +68,19 @@ fn each_object_becomes_an_asset_with_its_name() {
 fn a_step_file_is_checked_repaired_and_encoded_in_parts() {
     let folder = Folder::new();
     let step = data("cad/machine.step");
-    folder.good(&["encode", &step, "--split", "-o", "parts", "--preset", "fast", "--unit", "mm"]);
+    folder.good(&[
+        "encode",
+        &step,
+        "--split",
+        "-o",
+        "parts",
+        "--preset",
+        "fast",
+        "--unit",
+        "mm",
+        "--deviation",
+        "0.5",
+    ]);
     let asset = TeSdf::open(folder.path("parts/ball.tesdf")).unwrap();
     assert_eq!(asset.unit(), Some("mm"));
     assert!(folder.path("parts/ring.tesdf").exists());

@@ -6,7 +6,7 @@ use mjcf_rs::body::{Geom, GeomType};
 use tesdf::glam::{DAffine3, DQuat, DVec3};
 use tesdf_terminal::report::Failure;
 
-use super::MeshUse;
+use super::{MeshUse, include};
 use crate::encode_all::meshes::Use;
 
 /// All uses of meshes by geoms that can touch others, in the order of the bodies.
@@ -15,8 +15,8 @@ use crate::encode_all::meshes::Use;
 /// The file cannot be read or is no MJCF.
 pub(super) fn uses(path: &Path) -> Result<Vec<MeshUse>, Failure> {
     let at = |found: &dyn std::fmt::Display| Failure::new(format!("{}: {found}", path.display()));
-    let model = Model::from_file(path).map_err(|e| at(&e))?;
     let folder = path.parent().unwrap_or(Path::new(""));
+    let model = Model::from_str(&include::expand(path)?, folder).map_err(|e| at(&e))?;
     let mut found = Vec::new();
     for (b, body) in model.bodies.iter().enumerate() {
         let body = &body.body;
