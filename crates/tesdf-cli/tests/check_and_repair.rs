@@ -210,7 +210,7 @@ fn files_that_cannot_be_read_or_written_are_named() {
     folder.write("empty.stl", "");
     for (args, expected) in [
         (&["check", "none.stl"][..], "error: cannot read none.stl: "),
-        (&["check", "cube.step"], "error: cube.step: the extension names no mesh format that can be read"),
+        (&["check", "cube.dwg"], "error: cube.dwg: the extension names no mesh format that can be read"),
         (&["check", "bad.obj"], "error: bad.obj: OBJ, line 1: 'zero' is not a number"),
         (&["check", "empty.stl"], "error: empty.stl: the file is empty"),
         (
