@@ -48,7 +48,6 @@ pub struct Cli {
 
 /// The commands.
 #[derive(Subcommand, Debug)]
-#[expect(clippy::large_enum_variant, reason = "there is one of it")]
 pub enum Command {
     /// Report the defects of a mesh
     Check(check::Args),

@@ -374,7 +374,7 @@ fn a_mesh_is_encoded_with_the_rule_of_its_body() {
         let text = format!(
             "time_step = 1e-3\nduration = 0.05\n[[bodies]]\nname = \"plate\"\nfixed = true\n{body}\n"
         );
-        LoadedScene::parse(text, &folder.path().join("scene.toml")).unwrap().system()
+        LoadedScene::parse(text, folder.path().join("scene.toml")).unwrap().system()
     };
     let system = scene("mesh = \"plate.obj\"\ninside = \"sheet\"\nthickness = 0.2").unwrap();
     let shape = system.scene().shapes().next().unwrap().1;

@@ -275,7 +275,7 @@ fn assert_boundary(mesh: &TriangleMesh, rule: InsideRule, n: usize) -> TeSdf {
             let on = u * a + v * b + w * c;
             let beside = [1.0, -1.0].map(|s| on + s * 1e-6 * normal);
             let distance = others.distance(on);
-            let alone = distance > 1e-5 || distance < 1e-9;
+            let alone = !(1e-9..=1e-5).contains(&distance);
             alone && brute.is_inside(beside[0]) != brute.is_inside(beside[1])
         });
         assert!(ids.contains(&face) || !is_between, "face {face} is left out");
