@@ -153,9 +153,11 @@ impl Loop<'_> {
     fn short_chord(&self, piece: &[usize]) -> (usize, usize) {
         let n = piece.len();
         let every = n.div_ceil(CHORDS);
+        // A chord skips a vertex at least, so that both parts are smaller than the piece.
+        let side = (n / 4).max(2);
         let mut best = (f64::INFINITY, 0, n / 2);
         for i in (0..n / 2).step_by(every) {
-            for k in (i + n / 4..(i + n - n / 4).min(n)).step_by(every) {
+            for k in (i + side..(i + n + 1 - side).min(n)).step_by(every) {
                 let length = self.points[piece[i]].distance_squared(self.points[piece[k]]);
                 if length < best.0 && !(self.is_edge)(piece[i], piece[k]) {
                     best = (length, i, k);

@@ -86,17 +86,16 @@ fn run(
              (General.MaxZ - General.MinZ)^2)"
         ),
     };
-    let (unit, join) = match format {
-        MeshFormat::Step => ("Geometry.OCCTargetUnit = \"MM\";\n", ""),
-        // OpenCASCADE converts IGES to millimetres by itself. Its faces have curves of their own, and
-        // this command makes one of equal ones. `Geometry.OCCSewFaces` leaves faces that Gmsh 4.15
-        // cannot mesh.
-        MeshFormat::Iges => ("", "Coherence;\n"),
-        _ => ("", ""),
+    // OpenCASCADE converts IGES to millimetres by itself. Its faces have curves of their own, so
+    // seams stay open: of a ball and a ring, Gmsh 4.15 loses the walls of the ring with `Coherence`,
+    // and the ball with `Geometry.OCCSewFaces`.
+    let unit = match format {
+        MeshFormat::Step => "Geometry.OCCTargetUnit = \"MM\";\n",
+        _ => "",
     };
     let script = format!(
         "SetFactory(\"OpenCASCADE\");\nGeneral.NumThreads = 1;\nGeometry.OCCImportLabels = 1;\n\
-         {unit}Merge \"{model}\";\n{join}Save \"{NAMES}\";\nBoundingBox;\n\
+         {unit}Merge \"{model}\";\nSave \"{NAMES}\";\nBoundingBox;\n\
          Mesh.MeshSizeMax = {size};\nMesh.MeshSizeFromCurvature = {turn};\nMesh.SaveAll = 1;\n\
          Mesh.MshFileVersion = 4.1;\nMesh.Binary = 0;\n"
     );
