@@ -71,7 +71,7 @@ fn detection_refuses_an_open_mesh_and_takes_a_sheet() {
     assert!(code != Some(0) && err.contains("jumps in the holes") && err.contains("--fill-holes"), "{err}");
     let out = folder.good(&[&["collide", "b.tesdf", "b.tesdf", "--json"], &collide[..]].concat());
     let json: serde_json::Value = serde_json::from_str(&out).unwrap();
-    let contacts = json["contacts"].as_array().expect("contacts");
+    let contacts = json.as_array().expect("contacts");
     let least = contacts.iter().map(|c| c["distance"].as_f64().unwrap()).fold(f64::INFINITY, f64::min);
     assert!((least - 0.9).abs() < 1e-6, "{least}");
 }
