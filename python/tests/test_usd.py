@@ -61,7 +61,7 @@ def test_transforms_units_and_names(stage):
     asset = tesdf.encode(path)
     assert (asset.unit, asset.source.name, len(asset.source.blake3)) == ("cm", "scene.usda", 64)
     assert asset.signed_distance([[9.5, 1.0, 0.25], [10.5, 5.5, 0.9]]) == pytest.approx([-0.25, -0.1], abs=1e-12)
-    assert tesdf.encode(one, unit=one.unit).face_count == 12
+    assert len(tesdf.encode(one, unit=one.unit).faces) == 12
     assert tesdf.check(path).encodable and len(tesdf.repair(path).faces) == 24
     with pytest.warns(UserWarning, match="the file is in cm, but the unit m was given"):
         assert tesdf.encode(path, unit="m").unit == "m"
