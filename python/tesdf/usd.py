@@ -53,7 +53,7 @@ def read_usd(path: str | os.PathLike[str], *, prim: str | None = None) -> UsdMes
     no mesh or its indices are wrong.
     """
     try:
-        from pxr import Tf, Usd, UsdGeom
+        from pxr import Tf, Usd, UsdGeom  # type: ignore[import-untyped]  # it has no types
     except ImportError as error:
         raise ImportError(f"USD files are read by usd-core, which is not installed ({error}): pip install usd-core") from error
 
