@@ -192,6 +192,7 @@ impl Shapes {
         system: &mut System,
         progress: &Progress,
     ) -> Result<ShapeId, ShapeFailure> {
+        let inside = inside(body).map_err(ShapeFailure::Reason)?;
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
                 let file = scene.resolve(file);
@@ -202,7 +203,6 @@ impl Shapes {
                     return Err(ShapeFailure::Reason(reason.into()));
                 }
                 // A file that is reached by several paths is opened only once.
-                let inside = inside(body).map_err(ShapeFailure::Reason)?;
                 let path = file.canonicalize().unwrap_or_else(|_| file.clone());
                 let key = (path, format!("{inside}, {repair:?}"));
                 if let Some(&shape) = self.0.get(&key) {
