@@ -33,7 +33,7 @@ def export(
     - speed: seconds of the run in each second of the animation. Not for .rrd, whose viewer has a
       control of the speed.
     - geometries: files in place of the meshes that the run names: a dict of names of bodies and
-      paths. Not for a Simulation, which has its meshes.
+      paths; "link*" are all bodies whose names begin with "link". Not for a Simulation, which has its meshes.
 
     Each body is a node or an entity with its name; lengths are metres. In a GLB file y is up, as glTF
     wants it, and the same run gives the bytes of `tesdf export`. A recording has the frame of the

@@ -28,7 +28,7 @@ pub struct Args {
     #[arg(long, value_name = "FACTOR", value_parser = parse::factor, default_value = "1", allow_hyphen_values = true)]
     pub speed: f64,
     /// Replace the geometry of a body of the run by a .tesdf file, or by a mesh, which is encoded;
-    /// may be given several times
+    /// `link*` are all bodies whose names begin with `link`; may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry)]
     pub geometries: Vec<(String, PathBuf)>,
 }

@@ -51,8 +51,8 @@ pub struct Args {
     /// Detector mode in place of the scene's
     #[arg(long, value_enum)]
     pub mode: Option<Mode>,
-    /// Replace the geometry of a body by a .tesdf file, or by a mesh, which is encoded; may be
-    /// given several times
+    /// Replace the geometry of a body by a .tesdf file, or by a mesh, which is encoded; `link*` are
+    /// all bodies whose names begin with `link`; may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = geometry)]
     pub geometries: Vec<(String, PathBuf)>,
     /// Where contacts are found

@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long)]
     pub title: Option<String>,
     /// Replace the geometry of a body of the run by a .tesdf file, or by a mesh, which is encoded;
-    /// may be given several times
+    /// `link*` are all bodies whose names begin with `link`; may be given several times
     #[arg(long = "geometry", value_name = "BODY=FILE", value_parser = crate::simulate::geometry)]
     pub geometries: Vec<(String, PathBuf)>,
 }

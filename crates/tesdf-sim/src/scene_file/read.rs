@@ -135,22 +135,30 @@ impl LoadedScene {
     }
 
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
-    /// otherwise a mesh. A relative path is relative to the scene's folder. Returns `false` when
+    /// otherwise a mesh. `bodies` is its name; `link*` stands for all bodies whose names begin with
+    /// `link`, as copies do. A relative path is relative to the scene's folder. Returns `false` when
     /// the scene has no such body.
     #[must_use]
-    pub fn replace_geometry(&mut self, body: &str, file: impl Into<PathBuf>) -> bool {
+    pub fn replace_geometry(&mut self, bodies: &str, file: impl Into<PathBuf>) -> bool {
         let file = file.into();
-        let body = self.scene.bodies.iter_mut().map(|b| b.get_mut()).find(|b| b.name == body);
-        let Some(body) = body else { return false };
-        (body.asset, body.mesh, body.shape) = match file.extension().is_some_and(|e| e == "tesdf") {
-            true => (Some(file), None, None),
-            false => (None, Some(file), None),
+        let is_asset = file.extension().is_some_and(|e| e == "tesdf");
+        let is_named = |name: &str| match bodies.strip_suffix('*') {
+            Some(start) => name.starts_with(start),
+            None => name == bodies,
         };
-        if body.asset.is_some() {
-            // An asset has its own.
-            (body.inside, body.thickness, body.surface) = (None, None, None);
+        let mut replaced = false;
+        for body in self.scene.bodies.iter_mut().map(|body| body.get_mut()).filter(|b| is_named(&b.name)) {
+            replaced = true;
+            (body.asset, body.mesh, body.shape) = match is_asset {
+                true => (Some(file.clone()), None, None),
+                false => (None, Some(file.clone()), None),
+            };
+            if is_asset {
+                // An asset has its own.
+                (body.inside, body.thickness, body.surface, body.repair) = (None, None, None, None);
+            }
         }
-        true
+        replaced
     }
 
     /// All files of the bodies' geometries, including every file of a mesh that has several.
