@@ -1,5 +1,5 @@
-//! `tesdf._native.fill_mujoco_contacts`: the rows of MuJoCo's `data.contact`, from the contacts of a
-//! detection.
+//! `tesdf._native.fill_mujoco_contacts`: the rows of MuJoCo's `data.contact`, from the contacts of
+//! a detection.
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -15,20 +15,21 @@ use crate::errors::argument;
 
 /// Writes contacts into the rows of `data.contact` of MuJoCo from `start` on.
 ///
-/// - fields: `data.contact`. Its arrays are written in place, whatever their strides. No other thread
-///   may use the data meanwhile.
+/// - fields: `data.contact`. Its arrays are written in place, whatever their strides. No other
+///   thread may use the data meanwhile.
 /// - start: the row of the first contact.
 /// - contacts: Contacts of Scene.detect, in the frame and unit of the model.
 /// - geoms: the geom of each instance, [G].
-/// - parameters: is called once, with the first and the second geoms of the kinds of contacts, [K] and
-///   [K], int64. It returns an object with condim [K], friction [K, 5], solref [K, 2] and solimp [K, 5].
+/// - parameters: is called once, with the first and the second geoms of the kinds of contacts, [K]
+///   and [K], int64. It returns an object with condim [K], friction [K, 5], solref [K, 2] and
+///   solimp [K, 5].
 ///
-/// A contact gets the middle of its two points as `pos`, and the geom of instance_b as its first one,
-/// because MuJoCo's normal points from the first geom to the second one. `includemargin` and all that
-/// MuJoCo's solver fills in are 0, `efc_address` and the ids of flexes are -1.
+/// A contact gets the middle of its two points as `pos`, and the geom of instance_b as its first
+/// one, because MuJoCo's normal points from the first geom to the second one. `includemargin` and
+/// all that MuJoCo's solver fills in are 0, `efc_address` and the ids of flexes are -1.
 ///
-/// Raises ValueError if an array has another type or shape, lacks rows or cannot be written. Nothing has
-/// been written then.
+/// Raises ValueError if an array has another type or shape, lacks rows or cannot be written.
+/// Nothing has been written then.
 #[pyfunction]
 pub fn fill_mujoco_contacts(
     py: Python<'_>,
@@ -201,8 +202,8 @@ fn table<const W: usize>(of: &Bound<'_, PyAny>, name: &str, rows: usize) -> PyRe
     }
 }
 
-/// The fields of `data.contact`. Each row has them side by side, so they are written row by row: one
-/// field after the other would pass through the memory of all rows as many times.
+/// The fields of `data.contact`. Each row has them side by side, so they are written row by row:
+/// one field after the other would pass through the memory of all rows as many times.
 struct Fields<'a> {
     dist: Field<'a, f64, 1>,
     pos: Field<'a, f64, 3>,
@@ -337,8 +338,8 @@ impl<'a, T: Element + Copy, const W: usize> Field<'a, T, W> {
 
     fn set(&self, row: usize, numbers: [T; W]) {
         assert!(row < self.rows, "the rows of all fields are those of the contacts");
-        // SAFETY: `new` has checked that the array has this row, `W` numbers in it, and this type. Nothing
-        // refers to its memory, and numpy may lay numbers out without alignment.
+        // SAFETY: `new` has checked that the array has this row, `W` numbers in it, and this type.
+        // Nothing refers to its memory, and numpy may lay numbers out without alignment.
         unsafe {
             let at = self.first.offset(row as isize * self.strides[0]);
             if W == 1 || self.strides[1] == size_of::<T>() as isize {

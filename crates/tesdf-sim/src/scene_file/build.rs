@@ -111,8 +111,8 @@ impl LoadedScene {
         (section.mode != DetectorMode::Off).then(|| collide_options(section, system))
     }
 
-    /// Faces that touch in the states of `system`, and that the scene's mode, where it is `node`, can
-    /// miss.
+    /// Faces that touch in the states of `system`, and that the scene's mode, where it is `node`,
+    /// can miss.
     ///
     /// # Errors
     /// The scene's options are not valid.

@@ -72,8 +72,8 @@ impl SolidMesh {
     /// Checks the mesh with [`check`](super::check()).
     ///
     /// # Errors
-    /// [`NotSolid`] has all errors, and the options of the repair that would help, if one does. Only
-    /// a mesh that is refused costs the time of trying them.
+    /// [`NotSolid`] has all errors, and the options of the repair that would help, if one does.
+    /// Only a mesh that is refused costs the time of trying them.
     ///
     /// # Example
     ///
