@@ -99,6 +99,11 @@ impl GeneralizedWinding {
         self.edges.is_empty()
     }
 
+    /// Largest number of solid angles that [`at`](Self::at) computes.
+    pub(crate) fn angles_per_point(&self) -> usize {
+        self.cones.iter().map(Vec::len).sum()
+    }
+
     /// The winding number of the faces, which is that of the mesh where it is closed.
     pub fn into_faces(self) -> WindingNumber {
         self.faces
