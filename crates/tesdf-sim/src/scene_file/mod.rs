@@ -189,7 +189,7 @@ pub struct BodySection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceFaces>,
     /// `auto`: a mesh without a well-defined inside is repaired before it is encoded, if a repair
-    /// works; `never`, the default: it is an error.
+    /// works; `never`, the default: it is an error. Only a body with `mesh` may have `auto`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub repair: Option<String>,
     /// A simple shape.

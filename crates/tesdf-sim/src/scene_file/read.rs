@@ -147,8 +147,8 @@ impl LoadedScene {
             false => (None, Some(file), None),
         };
         if body.asset.is_some() {
-            // An asset has its own.
-            (body.inside, body.thickness, body.surface) = (None, None, None);
+            // An asset has its own, and is repaired already.
+            (body.inside, body.thickness, body.surface, body.repair) = (None, None, None, None);
         }
         true
     }
