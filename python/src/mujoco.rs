@@ -204,35 +204,35 @@ fn table<const W: usize>(of: &Bound<'_, PyAny>, name: &str, rows: usize) -> PyRe
 
 /// The fields of `data.contact`. Each row has them side by side, so they are written row by row:
 /// one field after the other would pass through the memory of all rows as many times.
-struct Fields<'a> {
-    dist: Field<'a, f64, 1>,
-    pos: Field<'a, f64, 3>,
-    frame: Field<'a, f64, 9>,
-    friction: Field<'a, f64, 5>,
-    solref: Field<'a, f64, 2>,
-    solimp: Field<'a, f64, 5>,
-    dim: Field<'a, i32, 1>,
-    geom1: Field<'a, i32, 1>,
-    geom2: Field<'a, i32, 1>,
-    geom: Field<'a, i32, 2>,
+struct Fields {
+    dist: Field<f64, 1>,
+    pos: Field<f64, 3>,
+    frame: Field<f64, 9>,
+    friction: Field<f64, 5>,
+    solref: Field<f64, 2>,
+    solimp: Field<f64, 5>,
+    dim: Field<i32, 1>,
+    geom1: Field<i32, 1>,
+    geom2: Field<i32, 1>,
+    geom: Field<i32, 2>,
     /// flex, elem, vert: -1
-    no_flex: [Field<'a, i32, 2>; 3],
+    no_flex: [Field<i32, 2>; 3],
     /// -1
-    efc_address: Field<'a, i32, 1>,
+    efc_address: Field<i32, 1>,
     /// 0
-    exclude: Field<'a, i32, 1>,
+    exclude: Field<i32, 1>,
     /// includemargin, mu, adhesion: 0
-    numbers: [Field<'a, f64, 1>; 3],
+    numbers: [Field<f64, 1>; 3],
     /// 0
-    solreffriction: Field<'a, f64, 2>,
+    solreffriction: Field<f64, 2>,
     /// 0
-    surfacevel: Field<'a, f64, 3>,
+    surfacevel: Field<f64, 3>,
     /// 0
-    hessian: Field<'a, f64, 36>,
+    hessian: Field<f64, 36>,
 }
 
-impl<'a> Fields<'a> {
-    fn new(of: &'a Bound<'_, PyAny>, rows: Range<usize>) -> PyResult<Self> {
+impl Fields {
+    fn new(of: &Bound<'_, PyAny>, rows: Range<usize>) -> PyResult<Self> {
         let rows = &rows;
         Ok(Self {
             dist: Field::new(of, "dist", rows)?,
@@ -289,21 +289,23 @@ impl<'a> Fields<'a> {
 ///
 /// The fields of a row lie within each other's strides, which the borrows of the crate `numpy` take
 /// for an overlap. So this has a pointer.
-struct Field<'a, T, const W: usize> {
+struct Field<T, const W: usize> {
     first: *mut u8,
     /// Bytes from row to row, and from number to number.
     strides: [isize; 2],
     rows: usize,
-    array: PhantomData<&'a T>,
+    /// Keeps the memory.
+    _array: Py<PyAny>,
+    numbers: PhantomData<T>,
 }
 
 // SAFETY: the pointer is to plain numbers, whose array lives as long as the field. Writing them
 // without the interpreter's lock is what numpy does as well.
-unsafe impl<T: Send, const W: usize> Sync for Field<'_, T, W> {}
+unsafe impl<T: Send, const W: usize> Sync for Field<T, W> {}
 
-impl<'a, T: Element + Copy, const W: usize> Field<'a, T, W> {
+impl<T: Element + Copy, const W: usize> Field<T, W> {
     /// The rows `rows` of the field `name` of `data.contact`.
-    fn new(of: &'a Bound<'_, PyAny>, name: &str, rows: &Range<usize>) -> PyResult<Self> {
+    fn new(of: &Bound<'_, PyAny>, name: &str, rows: &Range<usize>) -> PyResult<Self> {
         let name = format!("contact.{name}");
         let any = of.getattr(&name["contact.".len()..])?;
         let refused = |found: String| {
@@ -331,9 +333,9 @@ impl<'a, T: Element + Copy, const W: usize> Field<'a, T, W> {
         }
         let strides = [untyped.strides()[0], untyped.strides().get(1).copied().unwrap_or(0)];
         let start = rows.start as isize * strides[0];
-        // SAFETY: the array has the row `rows.start`, or it is one past the last one.
+        // SAFETY: the array has the row `rows.start`, or this is one past the last one.
         let first = unsafe { array.data().cast::<u8>().offset(start) };
-        Ok(Self { first, strides, rows: rows.len(), array: PhantomData })
+        Ok(Self { first, strides, rows: rows.len(), _array: any.unbind(), numbers: PhantomData })
     }
 
     fn set(&self, row: usize, numbers: [T; W]) {

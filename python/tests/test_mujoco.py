@@ -415,6 +415,16 @@ def test_rows_that_do_not_fit_are_an_error_and_nothing_is_written(change, expect
     assert fields.memory.tobytes() == before.tobytes()
 
 
+def test_fields_live_until_they_are_written():
+    found, ids, parameters = found_and_parameters(500)
+
+    class Temporary:
+        def __getattr__(self, name):
+            return Rows(500, packed=False).memory[name].copy()
+
+    fill_mujoco_contacts(Temporary(), 0, found, ids, parameters)
+
+
 def test_errors_of_what_is_called_come_through():
     found, ids, _ = found_and_parameters(5)
     with pytest.raises(ZeroDivisionError):
