@@ -39,8 +39,8 @@ impl<'py> Rows<'py> {
     }
 }
 
-/// An object that numpy converts: the array of an object that has its memory by DLPack alone, and any
-/// other object as it is.
+/// An object that numpy converts: the array of an object that has its memory by DLPack alone, and
+/// any other object as it is.
 ///
 /// # Errors
 /// `BufferError` for memory that is not on the processor.

@@ -153,8 +153,9 @@ impl Asset {
     /// device: "cpu", "gpu" (what TESDF_DEVICE names, else the best device), or the number of a
     /// device or a part of its name, such as "cuda:0" (devices lists them). A device computes in
     /// f32, exact to 2e-6 of the diagonal, whatever precision says. It keeps the asset until a
-    /// query on another device. Points that are on the device, as a DeviceArray or float32 of torch,
-    /// warp or cupy on a CUDA device, are read in place, and the answers stay there: DeviceAnswers.
+    /// query on another device. Points that are on the device, as a DeviceArray or float32 of
+    /// torch, warp or cupy on a CUDA device, are read in place, and the answers stay there:
+    /// DeviceAnswers.
     #[pyo3(signature = (points, precision = "f64", *, device = None), text_signature = "($self, points, precision=\"f64\", *, device=\"cpu\")")]
     fn query<'py>(
         &self,

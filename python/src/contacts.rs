@@ -1,10 +1,11 @@
 //! Contacts as arrays, one for each field.
-use numpy::{Element, IntoPyArray, PyArrayMethods};
+use numpy::{Element, IntoPyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tesdf::collide::{CoarseContact, Contact, Contacts, FeatureB, HiddenOverlap, InstanceId, PairReduction};
 
 use crate::classes;
+use crate::errors::{argument, kind_of};
 
 /// The cell of a contact that has none.
 pub const NO_CELL: u32 = u32::MAX;
@@ -51,6 +52,32 @@ impl<'py> Columns<'py> {
     }
 }
 
+/// An array of an object of `tesdf.contacts`.
+pub struct Column<'py, T: Element>(PyReadonlyArrayDyn<'py, T>);
+
+impl<'py, T: Element> Column<'py, T> {
+    /// The array `name` of `contacts`.
+    ///
+    /// # Errors
+    /// `ValueError` if the object does not have it.
+    pub fn new(contacts: &Bound<'py, PyAny>, name: &str) -> PyResult<Self> {
+        let refused = || argument("contacts", kind_of(contacts), "Contacts of Scene.detect");
+        let array = contacts.getattr(name).map_err(|_| refused())?;
+        let array = array.cast_into::<PyArrayDyn<T>>().map_err(|_| refused())?;
+        Ok(Self(array.try_readonly()?))
+    }
+
+    /// Its numbers.
+    pub fn each(&self) -> PyResult<&[T]> {
+        Ok(self.0.as_slice()?)
+    }
+
+    /// Its rows of `W` numbers.
+    pub fn rows<const W: usize>(&self) -> PyResult<&[[T; W]]> {
+        Ok(self.0.as_slice()?.as_chunks::<W>().0)
+    }
+}
+
 /// An object of `tesdf.Contacts`.
 pub fn contacts<'py>(py: Python<'py>, found: &Contacts) -> PyResult<Bound<'py, PyAny>> {
     columns(py, found.as_slice())?
@@ -87,8 +114,8 @@ struct Table {
     converged: Vec<bool>,
 }
 
-/// Contacts of a block. They stay in the cache while they are spread over the columns; otherwise each
-/// column would read all contacts from memory.
+/// Contacts of a block. They stay in the cache while they are spread over the columns; otherwise
+/// each column would read all contacts from memory.
 const BLOCK: usize = 256;
 
 impl Table {

@@ -25,8 +25,8 @@ impl Keywords {
     /// Converts the keywords of `function`.
     ///
     /// # Errors
-    /// `TypeError` for an unknown keyword; `ValueError` for a value of another type, an unknown name, and
-    /// keywords that exclude each other. The library checks ranges.
+    /// `TypeError` for an unknown keyword; `ValueError` for a value of another type, an unknown
+    /// name, and keywords that exclude each other. The library checks ranges.
     pub fn new(function: &str, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut found = Self { options: CollideOptions::default(), threads: None };
         let mut reduction: Option<(String, Reduction)> = None;

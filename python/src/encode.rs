@@ -22,7 +22,8 @@ use crate::pool;
 /// Encodes a closed mesh. Ctrl-C ends it with KeyboardInterrupt.
 ///
 /// - mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB, 3MF; STEP, IGES, BREP with Gmsh; USD with
-///   usd-core), a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these names.
+///   usd-core), a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these
+///   names.
 /// - preset: "default" (fast queries), "fast" (fast encoding), "compact" (small) or "gpu" (few
 ///   cells, whose lists fill the 32 threads of a GPU that read them), all exact; "paper" (the
 ///   paper's encoder: sampled, 129 samples along an edge, plain) or "sampled-safe" (sampled with a
@@ -44,15 +45,15 @@ use crate::pool;
 /// - band: width of the encoded layer around the solid, in the mesh's unit. None is 5 % of the
 ///   diagonal, and no layer with "gmsh".
 /// - regions: boxes [R, 6] that are encoded as well, each min x y z, max x y z.
-/// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing. None is the unit
-///   of the file, if it has one; another unit than that is a warning.
-/// - inside: the rule that says what is inside. "winding": a winding number of 1 or more, "nonzero":
-///   other than 0, "odd": odd; these need a closed mesh. "generalized": a generalised winding number
-///   of 1/2 or more in absolute value; for open meshes. "sheet": nearer to a face than half of the
-///   thickness; for any faces.
+/// - unit: name of the mesh's unit; it is recorded in the asset and scales nothing. None is the
+///   unit of the file, if it has one; another unit than that is a warning.
+/// - inside: the rule that says what is inside. "winding": a winding number of 1 or more,
+///   "nonzero": other than 0, "odd": odd; these need a closed mesh. "generalized": a generalised
+///   winding number of 1/2 or more in absolute value; for open meshes. "sheet": nearer to a face
+///   than half of the thickness; for any faces.
 /// - thickness: that of a sheet, in the mesh's unit.
-/// - surface: the faces to which distances refer: "all", or "boundary", the faces between inside and
-///   outside.
+/// - surface: the faces to which distances refer: "all", or "boundary", the faces between inside
+///   and outside.
 /// - repair: "auto" repairs a mesh without a well-defined inside before it is encoded: the first of
 ///   these that makes it encodable, duplicates and T-junctions and orientation, welding of cracks,
 ///   filling of holes. The asset records what was changed (asset.source.repair). None refuses such

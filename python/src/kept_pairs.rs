@@ -16,11 +16,11 @@ use crate::{arrays, contacts, pool};
 ///
 /// detect finds the contacts of Scene.detect, bit for bit. Only instances that have moved are
 /// compared with others, and those that stay within a wider box only with their neighbours. So it
-/// saves time in scenes of thousands of bodies of which most rest or move slowly; otherwise contacts
-/// take nearly all of the time.
+/// saves time in scenes of thousands of bodies of which most rest or move slowly; otherwise
+/// contacts take nearly all of the time.
 ///
-/// Any scene is accepted; another one than the last begins anew. Threads may share this object; they
-/// detect one after the other.
+/// Any scene is accepted; another one than the last begins anew. Threads may share this object;
+/// they detect one after the other.
 #[pyclass(frozen, module = "tesdf")]
 pub struct InstancePairs {
     kept: Mutex<collide::InstancePairs>,
@@ -36,8 +36,8 @@ impl InstancePairs {
 
     /// The contacts of a scene: Contacts. The options are those of Scene.detect.
     ///
-    /// moved: ids [N] of the instances that have changed since the last call. Other instances are then
-    /// not looked at, so leaving one out misses its contacts. None looks at all.
+    /// moved: ids [N] of the instances that have changed since the last call. Other instances are
+    /// then not looked at, so leaving one out misses its contacts. None looks at all.
     #[pyo3(signature = (scene, *, moved = None, **options), text_signature = "($self, scene, *, moved=None, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None)")]
     fn detect<'py>(
         &self,

@@ -16,6 +16,7 @@ mod given;
 mod interrupt;
 mod kept_pairs;
 mod mesh;
+mod mujoco;
 mod pairs;
 mod patches;
 mod playback;
@@ -40,6 +41,8 @@ mod _native {
     use super::kept_pairs::InstancePairs;
     #[pymodule_export]
     use super::mesh::{check, repair};
+    #[pymodule_export]
+    use super::mujoco::{contact_frames, fill_mujoco_contacts};
     #[pymodule_export]
     use super::pairs::pair;
     #[pymodule_export]

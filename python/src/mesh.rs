@@ -148,8 +148,8 @@ struct Mended<'a> {
 /// Checks a mesh for defects: those that prevent a well-defined inside, and those that may be
 /// unintended.
 ///
-/// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB, 3MF; STEP, IGES, BREP with Gmsh; USD with usd-core),
-/// a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these names.
+/// mesh: a path (STL, OBJ, PLY, OFF, glTF, GLB, 3MF; STEP, IGES, BREP with Gmsh; USD with
+/// usd-core), a pair (vertices [V, 3], faces [F, 3]), or an object with attributes of these names.
 ///
 /// Raises OSError or MeshError if the mesh cannot be read. Defects are in the report and raise
 /// nothing.

@@ -1,24 +1,23 @@
 //! `tesdf.PatchTracker`
 use std::sync::{Mutex, PoisonError};
 
-use numpy::{Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use tesdf::Length;
 use tesdf::collide::{self, Contact, ContactPatches, FeatureB, FeatureId, InstanceId, PatchOptions};
 use tesdf::glam::DVec3;
 
-use crate::contacts::{Columns, NO_CELL};
-use crate::errors::{Error, argument, kind_of};
+use crate::contacts::{Column, Columns, NO_CELL};
+use crate::errors::{Error, argument};
 use crate::scene::Scene;
 
-/// Groups the contacts of each detection into patches: regions in which two bodies touch. Patches and
-/// points keep their ids from detection to detection.
+/// Groups the contacts of each detection into patches: regions in which two bodies touch. Patches
+/// and points keep their ids from detection to detection.
 ///
 /// A patch has contacts of one pair of instances whose normals are similar and which are near each
 /// other or share a face, and a few points that span it.
 ///
-/// - angle: largest angle, in radians, between the normal of a contact and that of the deepest one of
-///   its patch; 0 to pi/2.
+/// - angle: largest angle, in radians, between the normal of a contact and that of the deepest one
+///   of its patch; 0 to pi/2.
 /// - link: contacts up to this distance apart belong together, in the world's unit. None is 1/32 of
 ///   the diagonal of the smaller body.
 /// - points: largest number of points of a patch.
@@ -40,9 +39,11 @@ impl PatchTracker {
     /// The patches of the contacts of a detection: ContactPatches. The scene must have the poses of
     /// the detection.
     ///
-    /// contacts: Contacts of Scene.detect, or the contacts of a Simulation with a scene of its bodies.
+    /// contacts: Contacts of Scene.detect, or the contacts of a Simulation with a scene of its
+    /// bodies.
     ///
-    /// Raises CollideError if the scene lacks an instance of a contact. The tracker is unchanged then.
+    /// Raises CollideError if the scene lacks an instance of a contact. The tracker is unchanged
+    /// then.
     fn update<'py>(
         &self,
         scene: &Bound<'py, Scene>,
@@ -53,27 +54,6 @@ impl PatchTracker {
         let found =
             py.detach(|| self.inner.lock().unwrap_or_else(PoisonError::into_inner).update(&scene, &contacts));
         patches(py, contacts.len(), &found.map_err(|e| Error::Collide(e).raise(py))?)
-    }
-}
-
-/// An array of an object of `tesdf.contacts`.
-struct Column<'py, T: Element>(PyReadonlyArrayDyn<'py, T>);
-
-impl<'py, T: Element> Column<'py, T> {
-    fn new(contacts: &Bound<'py, PyAny>, name: &str) -> PyResult<Self> {
-        let refused = || argument("contacts", kind_of(contacts), "Contacts of Scene.detect");
-        let array = contacts.getattr(name).map_err(|_| refused())?;
-        let array = array.cast_into::<PyArrayDyn<T>>().map_err(|_| refused())?;
-        Ok(Self(array.try_readonly()?))
-    }
-
-    fn each(&self) -> PyResult<&[T]> {
-        Ok(self.0.as_slice()?)
-    }
-
-    /// Its rows of `W` numbers.
-    fn rows<const W: usize>(&self) -> PyResult<&[[T; W]]> {
-        Ok(self.0.as_slice()?.as_chunks::<W>().0)
     }
 }
 

@@ -30,8 +30,8 @@ const _: () = assert!(ContactOptions::MOST == 128);
 /// - geometries: files in place of the meshes that the run names: a dict of names of bodies and
 ///   paths. Not for a Simulation, which has its meshes.
 ///
-/// Each body is a node with its name; lengths are metres, and y is up, as glTF wants it. The same run
-/// gives the bytes of `tesdf export`.
+/// Each body is a node with its name; lengths are metres, and y is up, as glTF wants it. The same
+/// run gives the bytes of `tesdf export`.
 ///
 /// Raises OSError if a file cannot be read or written, SceneError if a mesh is missing, and
 /// SimulationError if the run cannot be played.

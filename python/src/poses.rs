@@ -92,8 +92,8 @@ pub fn motion(
     }
 }
 
-/// Converts the motions of the bodies of this number of pairs, as [`motion`] does that of one. `None`
-/// if neither is given.
+/// Converts the motions of the bodies of this number of pairs, as [`motion`] does that of one.
+/// `None` if neither is given.
 ///
 /// # Errors
 /// `ValueError` for both, or for other shapes. The library checks the numbers.

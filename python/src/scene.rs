@@ -280,8 +280,8 @@ impl Scene {
     /// - device: "cpu", "gpu" (what TESDF_DEVICE names, else the best device), or the number of a
     ///   device or a part of its name, such as "cuda:0"; devices lists them. A device computes in
     ///   f32 and has no mode "edge"; docs/gpu/design.md says how far its contacts agree with the
-    ///   processor's. It keeps the shapes until a detection on another device. Ctrl-C acts after the
-    ///   detection.
+    ///   processor's. It keeps the shapes until a detection on another device. Ctrl-C acts after
+    ///   the detection.
     #[pyo3(signature = (*, device = None, **options), text_signature = "($self, *, mode='exact', contacts_per='face', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None, device='cpu')")]
     fn detect<'py>(
         &self,
@@ -335,8 +335,8 @@ impl Scene {
         classes::report(py, "Clearance", &found)
     }
 
-    /// The clearances of pairs of instances [P, 2], on all threads: Clearances, arrays with a row for
-    /// each pair. Otherwise as clearance; an error names the row. Ctrl-C ends it with
+    /// The clearances of pairs of instances [P, 2], on all threads: Clearances, arrays with a row
+    /// for each pair. Otherwise as clearance; an error names the row. Ctrl-C ends it with
     /// KeyboardInterrupt.
     #[pyo3(signature = (pairs, *, tolerance = None))]
     fn clearances<'py>(
@@ -390,12 +390,12 @@ impl Scene {
         found.map(|impact| classes::report(py, "Impact", &impact)).transpose()
     }
 
-    /// The first impacts of pairs of moving instances [P, 2], on all threads: Impacts, arrays with a
-    /// row for each pair, whose time is inf where the bodies stay apart until the end.
+    /// The first impacts of pairs of moving instances [P, 2], on all threads: Impacts, arrays with
+    /// a row for each pair, whose time is inf where the bodies stay apart until the end.
     ///
     /// velocities_a and velocities_b have the shape [P, 6], screws_a and screws_b [P, 8]; bodies
-    /// without either rest. Otherwise as time_of_impact; an error names the row. Ctrl-C ends it with
-    /// KeyboardInterrupt.
+    /// without either rest. Otherwise as time_of_impact; an error names the row. Ctrl-C ends it
+    /// with KeyboardInterrupt.
     #[pyo3(signature = (
         pairs, *, velocities_a = None, velocities_b = None, screws_a = None, screws_b = None, end = 1.0,
         tolerance = None, iterations = 1000

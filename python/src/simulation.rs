@@ -30,8 +30,8 @@ use crate::{classes, pool};
 /// A simulation of a scene, as that of the command `tesdf simulate`, with the same bits. step and
 /// run advance it.
 ///
-/// - scene: path of a TOML file, or a dict with the keys of such a file. Paths in a dict are relative
-///   to the current folder, and arrays may be those of numpy.
+/// - scene: path of a TOML file, or a dict with the keys of such a file. Paths in a dict are
+///   relative to the current folder, and arrays may be those of numpy.
 /// - mode: replaces the mode of the scene's detector: "node", "edge", "face", "exact" or "off".
 /// - time_step, duration: replace those of the scene, in seconds.
 /// - threads: number of threads; None is one per core. The states do not depend on it.
@@ -122,8 +122,8 @@ impl Simulation {
         py.detach(|| read(&self.locked()))
     }
 
-    /// The run so far, and its bodies. Waits for a step of another thread, so the caller must not hold
-    /// the interpreter's lock.
+    /// The run so far, and its bodies. Waits for a step of another thread, so the caller must not
+    /// hold the interpreter's lock.
     pub fn so_far(&self) -> (RunRecord, System) {
         let running = self.locked();
         (running.run.record().clone(), running.engine.system().clone())
@@ -376,10 +376,10 @@ impl Simulation {
         self.change(py, |engine| engine.set_motor(joint, motor))
     }
 
-    /// Sets the force [3], N, on the centre of mass and the torque [3], N m, that act on a body from
-    /// the next step on, in the world frame. The body is given by its name or number. They have no
-    /// effect on fixed and kinematic bodies. A script of the scene for the same body replaces them
-    /// in each step.
+    /// Sets the force [3], N, on the centre of mass and the torque [3], N m, that act on a body
+    /// from the next step on, in the world frame. The body is given by its name or number. They
+    /// have no effect on fixed and kinematic bodies. A script of the scene for the same body
+    /// replaces them in each step.
     #[pyo3(signature = (body, *, force = [0.0; 3], torque = [0.0; 3]))]
     fn set_wrench(
         &self,
@@ -393,8 +393,8 @@ impl Simulation {
         self.change(py, |engine| engine.set_wrench(body, Wrench { force, torque }))
     }
 
-    /// Sets the pose [7], x y z qx qy qz qw, or [4, 4], and the velocity [6], vx vy vz wx wy wz, of a
-    /// body, given by its name or number. What is None stays. For a kinematic body this is its
+    /// Sets the pose [7], x y z qx qy qz qw, or [4, 4], and the velocity [6], vx vy vz wx wy wz, of
+    /// a body, given by its name or number. What is None stays. For a kinematic body this is its
     /// motion in the next steps.
     #[pyo3(signature = (body, *, pose = None, velocity = None))]
     fn set_state(

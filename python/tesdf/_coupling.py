@@ -123,21 +123,3 @@ def check_bounds(label: str, of_mesh: Float, of_asset: Float, hint: str) -> None
     """Raises ValueError if the bounds [2, 3] of the engine's mesh are not those of the asset."""
     if np.abs(of_mesh - of_asset).max() > 1e-5 * np.linalg.norm(np.ptp(of_mesh, axis=0)):
         raise ValueError(f"{label}: its mesh spans {of_mesh.tolist()}, but the asset {of_asset.tolist()}; {hint}")
-
-
-def frames(normals: Float) -> Float:
-    """[N, 3, 3]: each normal, and two directions that make a right-handed frame with it."""
-    # Cross products written out: numpy.cross takes three times as long for rows of three numbers.
-    x, y, z = np.ascontiguousarray(normals.T)
-    is_across = np.abs(x) < 0.7
-    found = np.empty((len(normals), 3, 3))
-    found[:, 0] = normals
-    # The normal and the axis x, or y where the normal is along x.
-    other = np.where(is_across, y, x)
-    length = np.sqrt(other * other + z * z)
-    u = np.where(is_across, 0.0, -z) / length
-    v = np.where(is_across, z, 0.0) / length
-    w = np.where(is_across, -y, x) / length
-    found[:, 1, 0], found[:, 1, 1], found[:, 1, 2] = u, v, w
-    found[:, 2, 0], found[:, 2, 1], found[:, 2, 2] = y * w - z * v, z * u - x * w, x * v - y * u
-    return found

@@ -31,6 +31,16 @@ from .reports import (
 )
 from .results import Answers, DeviceAnswers, Moved, RayHits, Reencoded, Repaired
 
+class _ContactParameters(Protocol):
+    @property
+    def condim(self) -> npt.NDArray[Any]: ...
+    @property
+    def friction(self) -> npt.NDArray[Any]: ...
+    @property
+    def solref(self) -> npt.NDArray[Any]: ...
+    @property
+    def solimp(self) -> npt.NDArray[Any]: ...
+
 class _HasMesh(Protocol):
     @property
     def vertices(self) -> Any: ...
@@ -56,9 +66,11 @@ __all__ = [
     "Simulation",
     "__version__",
     "check",
+    "contact_frames",
     "devices",
     "encode",
     "export",
+    "fill_mujoco_contacts",
     "pair",
     "polygons",
     "repair",
@@ -73,6 +85,14 @@ def polygons(
     points: npt.ArrayLike, counts: npt.ArrayLike, corners: npt.ArrayLike
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32], tuple[str, ...]]: ...
 def check(mesh: _Mesh) -> CheckReport: ...
+def contact_frames(normals: npt.ArrayLike) -> npt.NDArray[np.float64]: ...
+def fill_mujoco_contacts(
+    fields: Any,
+    start: int,
+    contacts: ContactRows,
+    geoms: npt.ArrayLike,
+    parameters: Callable[[npt.NDArray[np.int64], npt.NDArray[np.int64]], _ContactParameters],
+) -> None: ...
 def devices() -> list[Device]: ...
 def repair(
     mesh: _Mesh,

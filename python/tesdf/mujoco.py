@@ -12,13 +12,14 @@ It needs the package `mujoco`, 4.0 or newer.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import Asset, Contacts as Found, Scene
-from ._coupling import Detector, frames, kinds_of
-from ._mujoco_model import Geoms, Parameters, Properties, Solref, checked_solref, combine, mj, stiffness
+from ._coupling import Detector
+from ._mujoco_model import Geoms, Integer, Parameters, Properties, Solref, checked_solref, combine, mj, stiffness
+from ._native import fill_mujoco_contacts
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -110,7 +111,9 @@ class Contacts:
                 "bytes; give it more, as <size memory=\"500M\"/>, or reduce the contacts, as reduce=64"
             )
         data.ncon = before + count
-        self._fill(model, data.contact, slice(before, before + count), found)
+        fill_mujoco_contacts(
+            data.contact, before, found, self._ids, lambda first, second: self._parameters(model, first, second)
+        )
         return count
 
     def detect(self, model: mj.MjModel, data: mj.MjData) -> Found:
@@ -125,27 +128,8 @@ class Contacts:
             data.geom_xmat[self._ids], data.geom_xpos[self._ids], moved[:, 3:], moved[:, :3], model.opt.timestep
         )
 
-    def _fill(self, model: mj.MjModel, contact: Any, rows: slice, found: Found) -> None:
-        # MuJoCo's normal points from the first geom to the second one.
-        first, second = found.instance_b, found.instance_a
-        kinds, kind = kinds_of(np.stack([first, second], 1))
-        each = self._parameters(model, self._ids[kinds[:, 0]], self._ids[kinds[:, 1]])
-        contact.dist[rows] = found.distance
-        contact.pos[rows] = 0.5 * (found.point_a + found.point_b)
-        contact.frame[rows] = frames(found.normal).reshape(-1, 9)
-        contact.dim[rows] = each.condim[kind]
-        contact.friction[rows] = each.friction[kind]
-        contact.solref[rows] = each.solref[kind]
-        contact.solimp[rows] = each.solimp[kind]
-        contact.geom1[rows] = self._ids[first]
-        contact.geom2[rows] = self._ids[second]
-        contact.geom[rows] = np.stack([self._ids[first], self._ids[second]], 1)
-        for name in ("flex", "elem", "vert", "efc_address"):
-            getattr(contact, name)[rows] = -1
-        for name in ("includemargin", "solreffriction", "mu", "H", "exclude", "adhesion", "surfacevel"):
-            getattr(contact, name)[rows] = 0
-
-    def _parameters(self, model: mj.MjModel, first: Any, second: Any) -> Parameters:
+    def _parameters(self, model: mj.MjModel, first: Integer, second: Integer) -> Parameters:
+        """The parameters of contacts between two geoms, a row for each pair."""
         of_geoms = Properties(
             model.geom_priority,
             model.geom_condim,

@@ -26,9 +26,10 @@ except ImportError:
     ) from None
 
 from . import Asset, Contacts as Found, Scene
-from ._coupling import Detector, Float, frames, kinds_of
+from ._coupling import Detector, Float, kinds_of
 from ._mujoco_model import Geoms, Integer, Parameters, Properties, Solref, checked_solref, combine, mj, stiffness
 from ._mujoco_warp_kernels import look_ahead
+from ._native import contact_frames
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -220,7 +221,7 @@ class Contacts:
         reals: dict[str, Any] = {
             "dist": distance,
             "pos": 0.5 * (found.point_a + found.point_b),
-            "frame": frames(found.normal),
+            "frame": contact_frames(found.normal),
             # The distance to the margin is the gap with the opposite sign; `look_ahead` turns it.
             "includemargin": np.maximum(2 * distance, _ABOVE_ZERO),
             "friction": each.friction[kind],

@@ -1,12 +1,18 @@
 """Contacts in MuJoCo: which bodies meet, what its solver gets, and what bodies do."""
 
+import dataclasses
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
 import tesdf
+import tesdf.contacts
 import tesdf.mujoco
 from conftest import PARTS, SCREW
-from tesdf._coupling import frames, kinds_of
+from tesdf._coupling import kinds_of
+from tesdf._mujoco_model import Parameters
+from tesdf._native import contact_frames, fill_mujoco_contacts
 
 CUBE = f"""
 <mujoco>
@@ -259,6 +265,174 @@ def test_other_errors(cube, screw):
     assert data.ncon == 0
 
 
+def frames(normals):
+    """As `contact_frames`, by numpy: each normal, and two directions that make a right-handed frame with it."""
+    x, y, z = np.ascontiguousarray(normals.T)
+    is_across = np.abs(x) < 0.7
+    found = np.empty((len(normals), 3, 3))
+    found[:, 0] = normals
+    # The normal and the axis x, or y where the normal is along x.
+    other = np.where(is_across, y, x)
+    length = np.sqrt(other * other + z * z)
+    u = np.where(is_across, 0.0, -z) / length
+    v = np.where(is_across, z, 0.0) / length
+    w = np.where(is_across, -y, x) / length
+    found[:, 1, 0], found[:, 1, 1], found[:, 1, 2] = u, v, w
+    found[:, 2, 0], found[:, 2, 1], found[:, 2, 2] = y * w - z * v, z * u - x * w, x * v - y * u
+    return found
+
+
+def fill(contact, start, found, ids, parameters):
+    """As `fill_mujoco_contacts`, by numpy, one field after the other."""
+    rows = slice(start, start + len(found))
+    first, second = found.instance_b, found.instance_a
+    kinds, kind = kinds_of(np.stack([first, second], 1))
+    each = parameters(ids[kinds[:, 0]], ids[kinds[:, 1]])
+    contact.dist[rows] = found.distance
+    contact.pos[rows] = 0.5 * (found.point_a + found.point_b)
+    contact.frame[rows] = frames(found.normal).reshape(-1, 9)
+    contact.dim[rows] = each.condim[kind]
+    for name in ("friction", "solref", "solimp"):
+        getattr(contact, name)[rows] = getattr(each, name)[kind]
+    contact.geom1[rows] = ids[first]
+    contact.geom2[rows] = ids[second]
+    contact.geom[rows] = np.stack([ids[first], ids[second]], 1)
+    for name in ("flex", "elem", "vert", "efc_address"):
+        getattr(contact, name)[rows] = -1
+    for name in ("includemargin", "solreffriction", "mu", "H", "exclude", "adhesion", "surfacevel"):
+        getattr(contact, name)[rows] = 0
+
+
+FIELDS = {
+    "dist": "f8", "pos": "3f8", "frame": "9f8", "includemargin": "f8", "friction": "5f8", "solref": "2f8",
+    "solreffriction": "2f8", "solimp": "5f8", "mu": "f8", "H": "36f8", "dim": "i4", "geom1": "i4", "geom2": "i4",
+    "geom": "2i4", "flex": "2i4", "elem": "2i4", "vert": "2i4", "exclude": "i4", "efc_address": "i4",
+    "adhesion": "f8", "surfacevel": "3f8",
+}  # fmt: skip
+
+
+class Rows:
+    """What `data.contact` is to the filling: arrays by their names. Here they are full of 7."""
+
+    def __init__(self, rows, packed):
+        self.memory = np.zeros(rows, np.dtype(list(FIELDS.items()), align=not packed))
+        for name in FIELDS:
+            self.memory[name] = 7
+            setattr(self, name, self.memory[name])
+
+
+def found_and_parameters(rows):
+    """Contacts of five instances in random order, and parameters that differ for each pair of geoms."""
+    random = np.random.default_rng(3)
+    normals = random.normal(size=(rows, 3))
+    normals[:6] = np.vstack([np.eye(3), -np.eye(3)])[:rows]
+    integers = lambda high, *shape: random.integers(0, high, (rows, *shape)).astype(np.uint32)  # noqa: E731
+    found = tesdf.contacts.ContactRows(
+        point_a=random.normal(size=(rows, 3)),
+        point_b=random.normal(size=(rows, 3)),
+        normal=normals / np.linalg.norm(normals, axis=1)[:, None],
+        distance=random.normal(size=rows),
+        face_a=integers(9), face_b=integers(9), tet_b=integers(9),
+        instance_a=integers(5), instance_b=np.sort(integers(5)),
+        feature_a=integers(9), feature_b_kind=integers(3).astype(np.uint8), feature_b=integers(9, 2),
+        converged=np.ones(rows, bool),
+    )  # fmt: skip
+
+    def parameters(first, second):
+        each = (100.0 * first + second)[:, None]
+        condim = np.array([1, 3, 4, 6])[(first + second) % 4]
+        return Parameters(condim, each + np.arange(5), each + np.arange(2), np.asfortranarray(each - np.arange(5)))
+
+    return found, np.array([11, 4, 0, 8, 5]), parameters
+
+
+@pytest.mark.parametrize("rows", [0, 1, 500])
+def test_rows_are_filled_as_by_numpy(rows):
+    found, ids, parameters = found_and_parameters(rows)
+    # Without padding, some numbers are not aligned.
+    ours, theirs = Rows(rows + 5, packed=True), Rows(rows + 5, packed=True)
+    fill_mujoco_contacts(ours, 3, found, ids, parameters)
+    fill(theirs, 3, found, ids, parameters)
+    assert ours.memory.tobytes() == theirs.memory.tobytes()
+    # The rows before and after are as they were.
+    assert (ours.memory[:3] == Rows(3, packed=True).memory).all()
+    assert (ours.memory[-2:] == Rows(2, packed=True).memory).all()
+    # Rows in reverse, with gaps between them and between their numbers.
+    wide = {name: np.full([2 * size for size in theirs.memory[name].shape], 7, theirs.memory[name].dtype) for name in FIELDS}
+    every_other = (slice(None, None, -2), slice(None, None, 2))
+    views = {name: array[every_other[: array.ndim]] for name, array in wide.items()}
+    fill_mujoco_contacts(SimpleNamespace(**views), 3, found, ids, parameters)
+    for name, array in wide.items():
+        assert np.array_equal(views[name], theirs.memory[name]), name
+        assert (array[::2] == 7).all() and (array.ndim == 1 or (array[:, 1::2] == 7).all()), name
+
+
+def test_the_solver_gets_the_same_rows_as_by_numpy(cube, screw):
+    for text, geoms in ((SCREW, screw), (CUBE, {"cube": cube, "floor": None, "wall": None})):
+        model, data = model_of(text)
+        contacts = tesdf.mujoco.Contacts(model, geoms, solref="model")
+        mujoco.mj_step1(model, data)
+        count = contacts.add(model, data)
+        assert count == data.ncon > 0
+        ours = {name: getattr(data.contact, name).copy() for name in FIELDS}
+        ids = np.array([model.geom(name).id for name in geoms])
+        fill(data.contact, 0, contacts.last, ids, lambda a, b: contacts._parameters(model, a, b))
+        for name, rows in ours.items():
+            assert rows.tobytes() == getattr(data.contact, name).tobytes(), name
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"pos": np.zeros((9, 2))}, r"contact.pos: an array of shape (9, 2); expected a numpy array of float64 of shape (N, 3)"),
+        ({"dist": np.zeros((9, 1))}, r"contact.dist: an array of shape (9, 1); expected a numpy array of float64 of shape (N,)"),
+        ({"dim": np.zeros(9)}, "contact.dim: an array of float64; expected a numpy array of int32"),
+        ({"mu": [0.0] * 9}, "contact.mu: list; expected a numpy array of float64"),
+        ({"mu": np.broadcast_to(0.0, 9)}, "contact.mu: an array that cannot be written"),
+        ({"mu": np.zeros(7)}, "contact.mu: 7 rows; expected at least 8"),
+        ({"ids": np.array([1, 2])}, "; expected instances of the 2 geoms"),
+        ({"ids": np.array([1, 2, 3, 4, 2**31])}, "geoms: the id 2147483648; expected ids from 0 to 2^31 - 1"),
+        ({"friction of kinds": np.zeros((1, 5))}, "friction: an array of shape (1, 5); expected shape ("),
+        ({"condim of kinds": np.zeros(1, int)}, "condim: an array of shape (1,); expected shape ("),
+        ({"found": np.zeros(4)}, "contacts: arrays of different lengths"),
+    ],
+)
+def test_rows_that_do_not_fit_are_an_error_and_nothing_is_written(change, expected):
+    found, ids, parameters = found_and_parameters(5)
+    fields = Rows(9, packed=True)
+    before = fields.memory.copy()
+    [(name, array)] = change.items()
+    of_kinds = {name.removesuffix(" of kinds"): array} if name.endswith("kinds") else {}
+    if name in FIELDS:
+        setattr(fields, name, array)
+    if name == "found":
+        found = dataclasses.replace(found, distance=array)
+    with pytest.raises(ValueError) as error:
+        fill_mujoco_contacts(
+            fields, 3, found, array if name == "ids" else ids, lambda a, b: dataclasses.replace(parameters(a, b), **of_kinds)
+        )
+    assert expected in str(error.value)
+    assert fields.memory.tobytes() == before.tobytes()
+
+
+def test_fields_live_until_they_are_written():
+    found, ids, parameters = found_and_parameters(500)
+
+    class Temporary:
+        def __getattr__(self, name):
+            return Rows(500, packed=False).memory[name].copy()
+
+    fill_mujoco_contacts(Temporary(), 0, found, ids, parameters)
+
+
+def test_errors_of_what_is_called_come_through():
+    found, ids, _ = found_and_parameters(5)
+    with pytest.raises(ZeroDivisionError):
+        fill_mujoco_contacts(Rows(9, packed=True), 3, found, ids, lambda a, b: 1 / 0)
+    with pytest.raises(AttributeError, match="dist"):
+        fill_mujoco_contacts(object(), 0, found, ids, found_and_parameters(5)[2])
+
+
 def test_kinds_and_frames():
     random = np.random.default_rng(1)
     for rows in (np.zeros((0, 2)), random.integers(0, 5, (300, 3)), np.array([[2**31, 7], [3, 0], [2**31, 7]])):
@@ -267,6 +441,7 @@ def test_kinds_and_frames():
         assert np.array_equal(kinds, expected) and np.array_equal(kind, places.reshape(-1))
     normals = random.normal(size=(200, 3))
     normals = np.vstack([normals / np.linalg.norm(normals, axis=1)[:, None], np.eye(3), -np.eye(3)])
-    found = frames(normals)
+    found = contact_frames(normals)
+    assert found.tobytes() == frames(normals).tobytes()
     assert np.array_equal(found[:, 0], normals)
     assert np.abs(found @ found.transpose(0, 2, 1) - np.eye(3)).max() < 1e-15 * 4 and (np.linalg.det(found) > 0.9).all()

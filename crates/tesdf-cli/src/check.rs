@@ -2,7 +2,8 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use tesdf::mesh::{CheckReport, DefectKind, LoadReport, Topology, TriangleMesh, check, repair_auto};
+use tesdf::base::InsideRule;
+use tesdf::mesh::{CheckReport, DefectKind, LoadReport, TriangleMesh, check, other_rules, repair_auto};
 
 use tesdf_terminal::mesh_file::{self, CadArgs};
 use tesdf_terminal::report::{self, Failure, Outcome};
@@ -57,18 +58,31 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
 /// A way on for a mesh that cannot be encoded as it is.
 pub struct Suggestion {
     command: String,
-    /// Whether the command repairs the mesh.
-    repairs: bool,
+    does: Does,
+}
+
+/// What the command of a suggestion does.
+enum Does {
+    /// It repairs the mesh.
+    Repair,
+    /// It encodes the mesh under another rule.
+    Encode,
+    /// It encodes the mesh as a sheet of a thickness that is not known.
+    EncodeSheet,
 }
 
 /// What to do with a mesh that cannot be encoded.
 pub fn next(way: Option<&Suggestion>) -> String {
-    match way {
-        Some(Suggestion { command, repairs: true }) => format!("{command} makes it encodable"),
-        Some(Suggestion { command, repairs: false }) => {
-            format!("no repair makes it encodable; {command} encodes it as it is")
-        }
-        None => "no repair makes it encodable; scale or move it in the program that made it".into(),
+    let Some(Suggestion { command, does }) = way else {
+        return "no repair makes it encodable; scale or move it in the program that made it".into();
+    };
+    match does {
+        Does::Repair => format!("{command} makes it encodable"),
+        Does::Encode => format!("no repair makes it encodable; {command} encodes it as it is"),
+        Does::EncodeSheet => format!(
+            "no repair makes it encodable, and it encloses nothing; {command} encodes its faces as sheets: give the \
+             thickness of the part in place of this one, which is some 1 % of the diagonal"
+        ),
     }
 }
 
@@ -81,19 +95,14 @@ pub fn suggestion(path: &Path, mesh: &TriangleMesh, found: &CheckReport) -> Opti
     }
     let (name, stem) = (path.display(), path.with_extension(""));
     let stem = stem.file_name().unwrap_or_default().display();
-    let repaired = repair_auto(mesh).ok().flatten().and_then(|found| found.options);
-    let rule = match found.winding {
-        Some([0, 0]) => "sheet --thickness T",
-        Some(_) => "nonzero",
-        None if Topology::new(mesh.faces()).is_closed() => "nonzero",
-        None => "generalized",
+    if let Some(options) = repair_auto(mesh).ok().flatten().and_then(|found| found.options) {
+        let suffix = if path.extension().is_some_and(|e| e == "ply") { "-repaired" } else { "" };
+        let command = format!("tesdf repair {name} -o {stem}{suffix}.ply{options}");
+        return Some(Suggestion { command, does: Does::Repair });
+    }
+    let (rule, does) = match *other_rules(mesh, found).first()? {
+        InsideRule::Sheet { thickness } => (format!("sheet --thickness {thickness}"), Does::EncodeSheet),
+        rule => (rule.name().to_string(), Does::Encode),
     };
-    let command = match repaired {
-        Some(options) if path.extension().is_some_and(|e| e == "ply") => {
-            format!("tesdf repair {name} -o {stem}-repaired.ply{options}")
-        }
-        Some(options) => format!("tesdf repair {name} -o {stem}.ply{options}"),
-        None => format!("tesdf encode {name} -o {stem}.tesdf --inside {rule}"),
-    };
-    Some(Suggestion { command, repairs: repaired.is_some() })
+    Some(Suggestion { command: format!("tesdf encode {name} -o {stem}.tesdf --inside {rule}"), does })
 }

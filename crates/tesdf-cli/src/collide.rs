@@ -100,8 +100,8 @@ pub struct Args {
     /// Find the K deepest contacts of the pair only. They may all be at one place
     #[arg(long, value_name = "K", conflicts_with = "reduce")]
     pub deepest: Option<u32>,
-    /// Find at most K contacts of the pair only, spread over the places that touch. The time follows
-    /// K. The deepest contact may be missing
+    /// Find at most K contacts of the pair only, spread over the places that touch. The time
+    /// follows K. The deepest contact may be missing
     #[arg(long, value_name = "K", conflicts_with_all = ["reduce", "deepest"])]
     pub spread: Option<u32>,
     /// Where contacts are found
@@ -234,8 +234,8 @@ fn warn_of(hidden: &[HiddenOverlap], mode: Mode) {
     }
 }
 
-/// Warns of faces that touch where the mode `node` does not look. `name` names an instance, `instead`
-/// is the advice.
+/// Warns of faces that touch where the mode `node` does not look. `name` names an instance,
+/// `instead` is the advice.
 pub fn warn_of_coarse(coarse: &[CoarseContact], name: impl Fn(InstanceId) -> String, instead: &str) {
     for CoarseContact { instance_a, instance_b, face_a, corner_reach, .. } in coarse {
         let (a, b) = (name(*instance_a), name(*instance_b));

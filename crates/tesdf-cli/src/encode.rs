@@ -42,9 +42,9 @@ pub struct Args {
     /// assets and their manifest with --split and for robot descriptions
     #[arg(short, long, value_name = "FILE|FOLDER")]
     pub output: PathBuf,
-    /// Encode each object of the file into an asset of its own, with its name: objects of OBJ, 3MF and
-    /// glTF, solids of STEP, IGES, BREP and ASCII STL; where a file has fewer than two of them, its
-    /// connected components
+    /// Encode each object of the file into an asset of its own, with its name: objects of OBJ, 3MF
+    /// and glTF, solids of STEP, IGES, BREP and ASCII STL; where a file has fewer than two of them,
+    /// its connected components
     #[arg(long)]
     pub split: bool,
     /// How finely CAD files become triangles.
@@ -182,8 +182,8 @@ pub(crate) fn solid(
     }
 }
 
-/// Encodes the solid of the mesh file `path` in the domain of `choices`. The error message names the
-/// file.
+/// Encodes the solid of the mesh file `path` in the domain of `choices`. The error message names
+/// the file.
 ///
 /// # Errors
 /// Gmsh or the file of tetrahedra gives no domain, an option does not apply to the solid, or

@@ -30,8 +30,8 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["weld_tolerance", "orient", "fill_holes"])]
     pub auto: bool,
     /// Merge vertices that are closer than this, and close cracks up to this width, in the mesh's
-    /// unit; `auto` takes the least of 1e-7 to 1e-4 of the diagonal that closes the cracks [default:
-    /// merge bitwise equal positions only]
+    /// unit; `auto` takes the least of 1e-7 to 1e-4 of the diagonal that closes the cracks
+    /// [default: merge bitwise equal positions only]
     #[arg(long, value_name = "T|auto", value_parser = weld, allow_hyphen_values = true)]
     pub weld_tolerance: Option<Weld>,
     /// Turn all closed shells outward, or inward where they are cavities, also shells that meet
@@ -39,8 +39,8 @@ pub struct Args {
     #[arg(long)]
     pub orient: bool,
     /// Fill holes with triangles between their vertices: flat holes in their plane, others with the
-    /// smallest folds and then the least area; MAX is the largest number of edges of a hole [default
-    /// of MAX: no limit]
+    /// smallest folds and then the least area; MAX is the largest number of edges of a hole
+    /// [default of MAX: no limit]
     #[arg(long, value_name = "MAX", num_args = 0..=1, default_missing_value = "all", value_parser = edges)]
     pub fill_holes: Option<u32>,
     /// Replace shells that overlap by the surface of their union: tesdf cannot do this; the message

@@ -68,6 +68,36 @@ fn the_suggested_command_works() {
     }
 }
 
+/// A sheet has no inside by any winding number. A dish has one, although it is too open to be filled.
+#[test]
+fn a_sheet_is_encoded_as_a_sheet_and_a_dish_as_a_solid() {
+    let folder = Folder::new();
+    let grid = |height: fn(u32, u32) -> f64| {
+        let corner = |k: u32| format!("v {} {} {}\n", k % 5, k / 5, height(k % 5, k / 5));
+        let square = |k: u32| {
+            let a = k / 4 * 5 + k % 4 + 1;
+            format!("f {a} {} {} {}\n", a + 1, a + 6, a + 5)
+        };
+        (0..25).map(corner).chain((0..16).map(square)).collect::<String>()
+    };
+    folder.write("plate.obj", grid(|_, _| 1.0));
+    folder.write("triangle.obj", "v 0 0 0\nv 2 1 0\nv 1 0 3\nf 1 2 3\n");
+    folder.write("dish.obj", grid(|x, y| 0.2 * f64::from(x.abs_diff(2).max(y.abs_diff(2)))));
+    for (file, rule) in
+        [("plate", "sheet --thickness 0.05"), ("triangle", "sheet --thickness 0.03"), ("dish", "generalized")]
+    {
+        let (_, out, hint) = folder.tesdf(&["check", &format!("{file}.obj"), "--json"]);
+        let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+        let command = json["suggestion"].as_str().unwrap();
+        assert_eq!(command, format!("tesdf encode {file}.obj -o {file}.tesdf --inside {rule}"));
+        assert!(hint.contains(command), "{hint}");
+        assert_eq!(hint.contains("encloses nothing"), rule != "generalized", "{hint}");
+        folder.good(&command.split(' ').skip(1).collect::<Vec<_>>());
+        let (_, _, refusal) = folder.tesdf(&["encode", &format!("{file}.obj"), "-o", "a.tesdf"]);
+        assert_eq!(refusal.contains("--inside generalized"), rule == "generalized", "{refusal}");
+    }
+}
+
 #[test]
 fn holes_are_filled_and_named() {
     let folder = Folder::new();

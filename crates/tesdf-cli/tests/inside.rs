@@ -27,7 +27,7 @@ fn an_open_mesh_is_encoded_under_the_rules_that_its_refusal_names() {
     let folder = open();
     let (code, _, err) = folder.tesdf(&["encode", "open.obj", "-o", "a.tesdf"]);
     assert_ne!(code, Some(0));
-    assert!(err.contains("--inside generalized") && err.contains("--inside sheet --thickness T"), "{err}");
+    assert!(err.contains("--inside generalized") && err.contains("--inside sheet --thickness 0.03"), "{err}");
 
     folder.good(&["encode", "open.obj", "-o", "a.tesdf", "--inside", "generalized"]);
     let found = distances(&folder, "a.tesdf");

@@ -72,8 +72,8 @@ impl Bolt {
         (2.0 * thread.diameter + more).min(Self::longest_thread(thread, length))
     }
 
-    /// The longest thread of a bolt of this length, in metres. The run-out of the thread (0.6 P) and
-    /// the fillet under the head (0.05 d) come after it.
+    /// The longest thread of a bolt of this length, in metres. The run-out of the thread (0.6 P)
+    /// and the fillet under the head (0.05 d) come after it.
     pub fn longest_thread(thread: &Thread, length: f64) -> f64 {
         length - 0.6 * thread.pitch - 0.06 * thread.diameter
     }

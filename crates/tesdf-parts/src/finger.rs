@@ -7,8 +7,8 @@ use crate::resolution::Resolution;
 use crate::surface::{Loop, Surface};
 
 /// A finger of a parallel gripper: a bar along +z whose root is at z = 0, with a pad near its tip
-/// that looks to +x. The surface of the pad is in the plane x = 0, and y = 0 is its middle. A finger
-/// that faces it is the same one, turned by 180° about z.
+/// that looks to +x. The surface of the pad is in the plane x = 0, and y = 0 is its middle. A
+/// finger that faces it is the same one, turned by 180° about z.
 ///
 /// # Example
 ///

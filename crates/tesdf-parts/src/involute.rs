@@ -7,8 +7,8 @@ use crate::error::{PartError, below, count, not_negative, positive};
 use crate::outline::polar;
 use crate::resolution::Resolution;
 
-/// Pressure angle, addendum, dedendum and radius of the tip of the basic rack, in modules: profile A
-/// of ISO 53.
+/// Pressure angle, addendum, dedendum and radius of the tip of the basic rack, in modules: profile
+/// A of ISO 53.
 pub(crate) const PRESSURE_ANGLE: f64 = 20.0 * PI / 180.0;
 pub(crate) const ADDENDUM: f64 = 1.0;
 pub(crate) const DEDENDUM: f64 = 1.25;

@@ -6,9 +6,9 @@
 //!
 //! - [`Bolt`] and [`Nut`]: ISO metric threads, sizes M3 to M36, any clearance.
 //! - [`LobedPeg`] and [`LobedHole`].
-//! - [`Gear`]: involute spur gear, with a hub and a dog clutch if asked. [`Sleeve`]: a splined sleeve
-//!   with dog teeth on both ends and a groove for a fork. [`Shaft`]: sections of different diameters,
-//!   keyways and splines.
+//! - [`Gear`]: involute spur gear, with a hub and a dog clutch if asked. [`Sleeve`]: a splined
+//!   sleeve with dog teeth on both ends and a groove for a fork. [`Shaft`]: sections of different
+//!   diameters, keyways and splines.
 //! - [`ChainLink`] and [`Spool`], [`Finger`] of a gripper, [`Spoon`].
 //!
 //! Lengths are in metres. Parts are made to be put together: their docs say at which pose they fit.
@@ -34,12 +34,12 @@
 //! A part is a set of blocks (`surface.rs`): bands between rings, helical surfaces, and flat faces
 //! with holes. Neighbouring blocks share vertices by number, so nothing is welded. Features that
 //! programs for solids would cut with a boolean are built: the rim of a keyway passes through
-//! columns of its cylinder, and dog teeth stand on holes of a face. Flat faces come from spade, whose
-//! triangulation decides by exact predicates.
+//! columns of its cylinder, and dog teeth stand on holes of a face. Flat faces come from spade,
+//! whose triangulation decides by exact predicates.
 //!
-//! No boolean crate is used. In November 2026, manifold-rust was at version 0.19 and boolmesh at 0.2,
-//! each before a stable interface, and manifold-csg builds C++. A boolean also rounds the vertices on
-//! its cuts, while the vertices of these parts are where the dimensions say.
+//! No boolean crate is used. In November 2026, manifold-rust was at version 0.19 and boolmesh at
+//! 0.2, each before a stable interface, and manifold-csg builds C++. A boolean also rounds the
+//! vertices on its cuts, while the vertices of these parts are where the dimensions say.
 //!
 //! `mesh` returns a checked [`SolidMesh`](tesdf::SolidMesh) that
 //! [is simple](tesdf::SolidMesh::is_simple): a closed manifold that does not touch itself.
@@ -47,9 +47,10 @@
 //!
 //! # Curves
 //!
-//! Vertices lie on the curves, and chords inside of convex ones. So bolts, pegs, shafts and gears are
-//! never larger than asked. Threads of nuts and lobed holes are widened until their chords have the
-//! clearance. Round bores and splined bores are not widened: add the deviation to the clearance.
+//! Vertices lie on the curves, and chords inside of convex ones. So bolts, pegs, shafts and gears
+//! are never larger than asked. Threads of nuts and lobed holes are widened until their chords have
+//! the clearance. Round bores and splined bores are not widened: add the deviation to the
+//! clearance.
 #![warn(missing_docs)]
 mod bolt;
 mod chain_link;

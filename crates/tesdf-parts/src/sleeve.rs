@@ -9,9 +9,9 @@ use crate::resolution::Resolution;
 use crate::spline::{Bore, Spline};
 use crate::surface::{Facing, Surface};
 
-/// A shift sleeve: it slides on a splined shaft, a fork in its groove moves it, and its dog teeth on
-/// both ends engage with those of a [`Gear`](crate::Gear). Its axis is z, the lower face of its body
-/// at z = 0; the lower dog teeth are below.
+/// A shift sleeve: it slides on a splined shaft, a fork in its groove moves it, and its dog teeth
+/// on both ends engage with those of a [`Gear`](crate::Gear). Its axis is z, the lower face of its
+/// body at z = 0; the lower dog teeth are below.
 ///
 /// # Example
 ///

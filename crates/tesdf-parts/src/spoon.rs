@@ -6,8 +6,8 @@ use crate::outline::angles;
 use crate::resolution::Resolution;
 use crate::surface::{Facing, Surface};
 
-/// A spoon: a bowl and a bent handle, lofted through oval sections. It lies along +x with the tip of
-/// the bowl near the origin, and the bowl is open upwards, to +z.
+/// A spoon: a bowl and a bent handle, lofted through oval sections. It lies along +x with the tip
+/// of the bowl near the origin, and the bowl is open upwards, to +z.
 ///
 /// # Example
 ///

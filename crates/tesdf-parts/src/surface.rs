@@ -12,7 +12,8 @@ use tesdf::{SolidMesh, TriangleMesh};
 
 use crate::error::PartError;
 
-/// Vertex numbers of a closed curve, counter-clockwise seen from above (from +z), or of an open one.
+/// Vertex numbers of a closed curve, counter-clockwise seen from above (from +z), or of an open
+/// one.
 pub(crate) type Loop = Vec<u32>;
 
 /// The direction that a level face looks to.
@@ -157,7 +158,8 @@ impl Surface {
         }
     }
 
-    /// The side of a prism between two heights, looking outwards. Returns its lower and upper curve.
+    /// The side of a prism between two heights, looking outwards. Returns its lower and upper
+    /// curve.
     pub(crate) fn prism(&mut self, outline: &[DVec2], low: f64, high: f64) -> [Loop; 2] {
         let loops = [low, high].map(|z| self.outline(outline, z));
         self.band(&loops[0], &loops[1]);

@@ -80,8 +80,8 @@ impl Thread {
 ///
 /// - Pitch: ISO 261 and 262, coarse series.
 /// - Width across flats and height of the head (nominal): ISO 4014, the same width in ISO 4032.
-/// - Diameter of the washer face (least): ISO 4014, grade A up to M24, grade B above. Its height: half
-///   of the largest.
+/// - Diameter of the washer face (least): ISO 4014, grade A up to M24, grade B above. Its height:
+///   half of the largest.
 /// - Height of the nut (largest): ISO 4032, style 1.
 /// - Shortest length of the bolt: ISO 4014.
 #[derive(Clone, Copy, Debug, PartialEq)]

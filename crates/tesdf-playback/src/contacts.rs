@@ -23,9 +23,9 @@ pub struct ContactOptions {
     /// [`LoadedScene::detection`](tesdf_sim::scene_file::LoadedScene::detection). `None`: the scene
     /// detects none.
     pub detection: Option<CollideOptions>,
-    /// Most contacts of a frame that are kept. Space is cut into cubes, 32 along the diagonal of the
-    /// run. First the deepest contact of each cube is kept, the deepest of all first, then the second
-    /// of each, and so on.
+    /// Most contacts of a frame that are kept. Space is cut into cubes, 32 along the diagonal of
+    /// the run. First the deepest contact of each cube is kept, the deepest of all first, then the
+    /// second of each, and so on.
     pub most: usize,
 }
 

@@ -12,8 +12,8 @@ const FAR: f64 = 128.0;
 /// A mesh for drawing. A vertex whose faces meet in a sharp edge is there once for each side.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Where the positions have their origin, in the shape's frame and unit. It is 0 unless the mesh
-    /// is far from the origin of its frame.
+    /// Where the positions have their origin, in the shape's frame and unit. It is 0 unless the
+    /// mesh is far from the origin of its frame.
     pub middle: DVec3,
     /// Positions of the vertices relative to [`middle`](Self::middle), in the shape's unit.
     pub positions: Vec<[f32; 3]>,

@@ -49,8 +49,8 @@ impl SmoothNormals {
         Self(smooth)
     }
 
-    /// The corners of a face, by its id in the source mesh, in the mesh's unit, and the unit normals
-    /// there. `None` for a face that does not exist or has no area.
+    /// The corners of a face, by its id in the source mesh, in the mesh's unit, and the unit
+    /// normals there. `None` for a face that does not exist or has no area.
     pub fn corners(&self, face: u32) -> Option<([DVec3; 3], [Vec3; 3])> {
         self.0.get(face as usize).copied().filter(|(_, normals)| normals.iter().all(|n| n.is_normalized()))
     }

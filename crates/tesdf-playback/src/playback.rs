@@ -23,12 +23,12 @@ pub struct Playback<'a> {
     pub steps: Vec<usize>,
     /// Time of each of these steps, s.
     pub times: Vec<f64>,
-    /// The middle of the run, m, world frame. Positions are stored relative to it, so that a run far
-    /// from the origin keeps its precision. Its coordinates are decimals with as few digits as a
-    /// 32-bit float needs: a file has them as such, and a reader in 64 bits finds them exactly.
+    /// The middle of the run, m, world frame. Positions are stored relative to it, so that a run
+    /// far from the origin keeps its precision. Its coordinates are decimals with as few digits as
+    /// a 32-bit float needs: a file has them as such, and a reader in 64 bits finds them exactly.
     pub centre: DVec3,
-    /// Bounds of the bodies except planes, m, world frame, over the whole run. What moves farther than
-    /// 1.5 extents beyond the bounds at the beginning is not in them.
+    /// Bounds of the bodies except planes, m, world frame, over the whole run. What moves farther
+    /// than 1.5 extents beyond the bounds at the beginning is not in them.
     pub bounds: Aabb,
     /// The distinct meshes. Bodies of the same shape share one.
     pub meshes: Vec<Mesh>,
@@ -119,9 +119,9 @@ impl<'a> Playback<'a> {
         }
     }
 
-    /// Poses of the origin of a body's mesh, or of the middle of its floor, in each frame. Positions
-    /// are relative to the [`centre`](Self::centre). Quaternions follow each other without a jump to
-    /// their opposite.
+    /// Poses of the origin of a body's mesh, or of the middle of its floor, in each frame.
+    /// Positions are relative to the [`centre`](Self::centre). Quaternions follow each other
+    /// without a jump to their opposite.
     ///
     /// # Errors
     /// [`PlaybackError::State`], with the step and the body.

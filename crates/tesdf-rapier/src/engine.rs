@@ -39,8 +39,8 @@ impl RapierEngine {
     /// pair.
     ///
     /// # Errors
-    /// An option of `options` or `collide` is out of range, or [`DynamicsError::Unsupported`] when the
-    /// system has joints or friction of single pairs.
+    /// An option of `options` or `collide` is out of range, or [`DynamicsError::Unsupported`] when
+    /// the system has joints or friction of single pairs.
     pub fn new(
         system: System,
         collide: CollideOptions,

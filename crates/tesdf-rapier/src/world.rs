@@ -113,8 +113,8 @@ fn rigid_body(number: usize, body: &Body, state: &State, options: &RapierOptions
 }
 
 fn collider(shape: SharedShape, friction: f64) -> Collider {
-    // The body has the mass, so the collider has none. The product of two roots is the geometric mean,
-    // by which a system combines coefficients.
+    // The body has the mass, so the collider has none. The product of two roots is the geometric
+    // mean, by which a system combines coefficients.
     ColliderBuilder::new(shape)
         .density(0.0)
         .friction(friction.sqrt())

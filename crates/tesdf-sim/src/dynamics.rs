@@ -19,7 +19,8 @@ pub trait Dynamics {
     /// Replaces the motor of a joint.
     ///
     /// # Errors
-    /// [`DynamicsError::NoJoint`], or [`DynamicsError::Joint`] when the motor does not fit the joint.
+    /// [`DynamicsError::NoJoint`], or [`DynamicsError::Joint`] when the motor does not fit the
+    /// joint.
     fn set_motor(&mut self, joint: usize, motor: Option<Motor>) -> Result<(), DynamicsError>;
 
     /// Sets the wrench that acts on a body from now on.

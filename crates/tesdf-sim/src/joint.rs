@@ -34,8 +34,9 @@ pub struct Joint {
     /// The joint's frame in the parent's frame (in the world without a parent), and in the child's
     /// frame.
     pub frames: [Pose; 2],
-    /// Bounds of the coordinate of a hinge, rad within ±π, or of a slider, m. For a ball: the greatest
-    /// angle between the z axes of the two frames, rad, as the second number; the first one is 0.
+    /// Bounds of the coordinate of a hinge, rad within ±π, or of a slider, m. For a ball: the
+    /// greatest angle between the z axes of the two frames, rad, as the second number; the first
+    /// one is 0.
     pub limits: Option<[f64; 2]>,
     /// Drives the coordinate of a hinge or a slider.
     pub motor: Option<Motor>,
@@ -73,8 +74,8 @@ pub enum Drive {
 }
 
 impl Joint {
-    /// A joint without limits and motor, whose frame is `frame` in the world while the two bodies are
-    /// at `poses`. The pose of a missing parent is ignored.
+    /// A joint without limits and motor, whose frame is `frame` in the world while the two bodies
+    /// are at `poses`. The pose of a missing parent is ignored.
     pub fn new(
         name: impl Into<String>,
         kind: JointKind,
@@ -96,8 +97,8 @@ impl Joint {
         })
     }
 
-    /// The angle of a hinge, rad within ±π, the travel of a slider, m, or the angle between the z axes
-    /// of a ball's frames, rad; 0 for a weld. It is zero where the two frames agree.
+    /// The angle of a hinge, rad within ±π, the travel of a slider, m, or the angle between the z
+    /// axes of a ball's frames, rad; 0 for a weld. It is zero where the two frames agree.
     pub fn coordinate(&self, poses: [Pose; 2]) -> f64 {
         let [a, b] = self.frames_in_world(poses);
         match self.kind {
@@ -111,8 +112,8 @@ impl Joint {
         }
     }
 
-    /// How far the joint is from what it must hold: the distance, m, and the angle, rad, by which the
-    /// two frames are apart in the directions that are not free.
+    /// How far the joint is from what it must hold: the distance, m, and the angle, rad, by which
+    /// the two frames are apart in the directions that are not free.
     pub fn error(&self, poses: [Pose; 2]) -> (f64, f64) {
         let [a, b] = self.frames_in_world(poses);
         let (way, turn) = (b.translation - a.translation, rotation_between(a, b));

@@ -55,8 +55,8 @@ impl MassProperties {
     /// counts twice, and a volume inside an inverted surface counts as negative.
     ///
     /// # Errors
-    /// A density that is not positive, a plane, a mesh whose faces do not enclose the solid, or a mesh
-    /// without volume.
+    /// A density that is not positive, a plane, a mesh whose faces do not enclose the solid, or a
+    /// mesh without volume.
     pub fn of_shape(shape: &Shape, scale: f64, density: f64) -> Result<Self, MassError> {
         let unit = match shape {
             Shape::Mesh(asset) if !asset.faces_enclose_the_solid() => {

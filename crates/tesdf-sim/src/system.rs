@@ -43,8 +43,8 @@ pub struct Wrench {
 pub struct State {
     /// Pose of the body's frame, which is the frame of its mesh or shape.
     pub pose: Pose,
-    /// Velocity of the centre of mass, m/s; of a kinematic body that of its frame's origin; zero for a
-    /// fixed body.
+    /// Velocity of the centre of mass, m/s; of a kinematic body that of its frame's origin; zero
+    /// for a fixed body.
     pub linear: DVec3,
     /// Angular velocity, rad/s.
     pub angular: DVec3,
@@ -135,12 +135,12 @@ impl System {
         Ok(self.scene.exclude(a, b)?)
     }
 
-    /// Adds a joint and returns its number: 0, 1, 2, … in the order of the calls. The two bodies of a
-    /// joint have no contacts with each other.
+    /// Adds a joint and returns its number: 0, 1, 2, … in the order of the calls. The two bodies of
+    /// a joint have no contacts with each other.
     ///
     /// # Errors
-    /// [`DynamicsError::NoBody`], or [`DynamicsError::Joint`] when its values do not fit its kind or
-    /// neither of its bodies is free.
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::Joint`] when its values do not fit its kind
+    /// or neither of its bodies is free.
     pub fn add_joint(&mut self, joint: Joint) -> Result<usize, DynamicsError> {
         let refuse = |reason| DynamicsError::Joint { name: joint.name.clone(), reason };
         joint.validate().map_err(refuse)?;
@@ -164,7 +164,8 @@ impl System {
     /// Replaces the motor of a joint.
     ///
     /// # Errors
-    /// [`DynamicsError::NoJoint`], or [`DynamicsError::Joint`] when the motor does not fit the joint.
+    /// [`DynamicsError::NoJoint`], or [`DynamicsError::Joint`] when the motor does not fit the
+    /// joint.
     pub fn set_motor(&mut self, joint: usize, motor: Option<Motor>) -> Result<(), DynamicsError> {
         let joints = self.joints.len();
         let old = self.joints.get_mut(joint).ok_or(DynamicsError::NoJoint { joint, joints })?;
@@ -183,8 +184,8 @@ impl System {
     /// Sets the coefficient of friction of a body.
     ///
     /// # Errors
-    /// [`DynamicsError::NoBody`], or [`DynamicsError::Option`] when it is not a finite number of 0 or
-    /// more.
+    /// [`DynamicsError::NoBody`], or [`DynamicsError::Option`] when it is not a finite number of 0
+    /// or more.
     pub fn set_friction(&mut self, body: usize, coefficient: f64) -> Result<(), DynamicsError> {
         self.body(body)?;
         check_friction(coefficient)?;
@@ -205,9 +206,9 @@ impl System {
         Ok(())
     }
 
-    /// The coefficient of friction between two bodies: that of the pair if one was set, otherwise the
-    /// geometric mean of those of the bodies. So a body of coefficient 0 has no friction with any
-    /// other.
+    /// The coefficient of friction between two bodies: that of the pair if one was set, otherwise
+    /// the geometric mean of those of the bodies. So a body of coefficient 0 has no friction with
+    /// any other.
     pub fn friction(&self, a: usize, b: usize) -> f64 {
         let of_bodies = || (self.bodies[a].friction * self.bodies[b].friction).sqrt();
         self.pair_friction.get(&(a.min(b), a.max(b))).copied().unwrap_or_else(of_bodies)
@@ -218,7 +219,8 @@ impl System {
         !self.pair_friction.is_empty()
     }
 
-    /// Sets the wrench that acts on a body from now on. It has no effect on fixed and kinematic bodies.
+    /// Sets the wrench that acts on a body from now on. It has no effect on fixed and kinematic
+    /// bodies.
     ///
     /// # Errors
     /// [`DynamicsError::NoBody`], or [`DynamicsError::NotFinite`].

@@ -316,6 +316,15 @@ fn a_mesh_is_repaired_if_the_body_says_so() {
     let asset = body("repair = \"auto\"").replace("mesh = \"open.ply\"", "asset = \"mm.tesdf\"");
     let error = open(&asset).expect_err("it is encoded").to_string();
     assert!(error.contains("the asset is encoded already"), "{error}");
+    for shape in ["\"plane\"", "{ box = { half_extents = [1, 1, 1] } }", "{ sphere = { radius = 1.0 } }"] {
+        let simple = body("repair = \"auto\"").replace("mesh = \"open.ply\"", &format!("shape = {shape}"));
+        let error = open(&simple).expect_err("it has no mesh").to_string();
+        assert!(error.contains("a simple shape has no mesh to repair; remove repair"), "{error}");
+    }
+    // An asset that takes the place of a mesh needs no repair.
+    let (_folder, mut loaded) = cubes(&body("repair = \"auto\""));
+    assert!(loaded.replace_geometry("a", "mm.tesdf"));
+    loaded.system().unwrap();
 }
 
 #[test]

@@ -68,8 +68,8 @@ impl Gmsh {
         let started = Command::new(&self.executable)
             .args(arguments)
             .current_dir(self.folder.path())
-            // Gmsh looks in this folder for the configuration of the user, which must not change the
-            // result.
+            // Gmsh looks in this folder for the configuration of the user, which must not change
+            // the result.
             .env("GMSH_HOME", self.folder.path())
             .env("OMP_NUM_THREADS", "1")
             .stdin(Stdio::null())

@@ -220,12 +220,19 @@ fn gradients_on_the_surface_point_outward_under_every_rule() {
 fn refusals_name_the_rules_that_take_the_mesh() {
     let open = Parts::default().open_cube(DVec3::ZERO, 1.0, Outward).mesh();
     let error = SolidMesh::new(open.clone()).expect_err("open");
-    assert_eq!(error.rules(), [Generalized, Sheet { thickness: 0.0 }]);
+    assert_eq!(error.rules(), [Generalized, Sheet { thickness: 0.01 }]);
     let text = error.to_string();
     assert!(text.contains("--inside generalized") && text.contains("--inside sheet --thickness"), "{text}");
     for rule in [Nonzero, Odd] {
         assert!(SolidMesh::with_inside(open.clone(), rule.into()).is_err(), "{rule:?}");
     }
+
+    // A sheet has no inside, whatever its number of faces.
+    let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+    let plate = Parts { vertices, faces: vec![[0, 1, 2], [0, 2, 3]] }.turned().mesh();
+    let error = SolidMesh::new(plate).expect_err("open");
+    assert_eq!(error.rules(), [Sheet { thickness: 0.01 }]);
+    assert!(error.to_string().contains("--inside sheet --thickness 0.01`"), "{error}");
 
     let inward = Parts::default().cube(DVec3::ZERO, 1.0, Inward).mesh();
     let error = SolidMesh::new(inward).expect_err("inside out");

@@ -64,8 +64,8 @@ impl DeviceArray {
             .set_data(pointer as *mut c_void)
             .set_device(DlpackExporter::device(self))
             .set_dtype(self.kind());
-        // SAFETY: the words, which the tensor owns, keep the memory at this pointer, which has a number of
-        // this type for each element of the shape.
+        // SAFETY: the words, which the tensor owns, keep the memory at this pointer, which has a
+        // number of this type for each element of the shape.
         Ok(unsafe { tensor.finish() })
     }
 
@@ -226,8 +226,8 @@ impl DeviceArray {
         export_dlpack(self, py, ExportRequest::parse(stream, max_version, dl_device, copy)?)
     }
 
-    /// (2, number) on a CUDA device. Raises BufferError on another one, whose memory other libraries
-    /// cannot use.
+    /// (2, number) on a CUDA device. Raises BufferError on another one, whose memory other
+    /// libraries cannot use.
     fn __dlpack_device__(&self) -> PyResult<(u32, i32)> {
         self.pointer()?;
         Ok(DlpackExporter::device(self).into())

@@ -131,8 +131,8 @@ fn wrapped(
     pointer: u64,
     rows: usize,
 ) -> PyResult<tesdf_gpu::DeviceArray<f32>> {
-    // SAFETY: the other library says that the memory has these numbers on this device. The owner lives
-    // until the answers are there.
+    // SAFETY: the other library says that the memory has these numbers on this device. The owner
+    // lives until the answers are there.
     let array = unsafe { tesdf_gpu::DeviceArray::from_raw_ptr(device.inner(), pointer, 3 * rows) };
     array.map_err(|e| Error::Device(e).raise(py))
 }

@@ -186,8 +186,8 @@ impl PoseFile {
     }
 }
 
-/// Encodes the meshes of a scene with `options`, each once. The assets are files in a folder that is
-/// removed when it is dropped.
+/// Encodes the meshes of a scene with `options`, each once. The assets are files in a folder that
+/// is removed when it is dropped.
 ///
 /// # Errors
 /// A mesh cannot be read or encoded, or there is no folder for temporary files.

@@ -1,5 +1,5 @@
-//! `tesdf bench worlds`: many scenes of two bodies at once, for `scripts/python_worlds.py`, which does
-//! the same in Python.
+//! `tesdf bench worlds`: many scenes of two bodies at once, for `scripts/python_worlds.py`, which
+//! does the same in Python.
 use std::path::PathBuf;
 use std::time::Instant;
 

@@ -1,12 +1,12 @@
-//! `tesdf evaluate table1|table2|table3|table4|fig8|fig9`: measures Tables I to IV and Figures 8 and
-//! 9 of the paper, next to the paper's figures.
+//! `tesdf evaluate table1|table2|table3|table4|fig8|fig9`: measures Tables I to IV and Figures 8
+//! and 9 of the paper, next to the paper's figures.
 //!
 //! The meshes of the repository (`meshes`) are encoded in a domain with both encoders, with full
 //! and with truncated lists (`measure`). The assets are compared with exact distances on a grid.
-//! The rows (`table1`, `table4`) are printed as Markdown, CSV or JSON. Table II detects the contacts
-//! of recorded poses (`table2`). Table III simulates two scenes with voxel grids and with encoded
-//! meshes (`table3`). The figures simulate a pile of shafts with
-//! truncated lists, and detect its contacts (`pile`).
+//! The rows (`table1`, `table4`) are printed as Markdown, CSV or JSON. Table II detects the
+//! contacts of recorded poses (`table2`). Table III simulates two scenes with voxel grids and with
+//! encoded meshes (`table3`). The figures simulate a pile of shafts with truncated lists, and
+//! detect its contacts (`pile`).
 mod deformed;
 mod detector;
 mod domains;
@@ -46,8 +46,8 @@ pub enum Table {
     /// Table I: memory, largest error and bands of several meshes, with full lists and with at most
     /// 32 faces per list
     Table1(TableArgs),
-    /// Table II: memory, times of the broad, middle and narrow phase, and narrow-phase queries of the
-    /// scenarios, in recorded poses
+    /// Table II: memory, times of the broad, middle and narrow phase, and narrow-phase queries of
+    /// the scenarios, in recorded poses
     Table2(table2::Args),
     /// Table III: a nut on its bolt and a peg in its hole, simulated with voxel grids of several
     /// resolutions and with encoded meshes; success or the kind of failure, and memory

@@ -59,8 +59,8 @@ pub enum Sink {
 }
 
 impl Sink {
-    /// The destination in the arguments. Its folder is created if necessary. `inputs` are files that
-    /// must not be replaced.
+    /// The destination in the arguments. Its folder is created if necessary. `inputs` are files
+    /// that must not be replaced.
     ///
     /// # Errors
     /// A file cannot be written, or is one of the inputs.

@@ -127,7 +127,8 @@ pub struct Table2 {
     pub queries: [u32; 2],
 }
 
-/// Table II: robo-assembly, chained SAM, engine transmission, bolt-nut, peg-in-hole, pile of shafts.
+/// Table II: robo-assembly, chained SAM, engine transmission, bolt-nut, peg-in-hole, pile of
+/// shafts.
 pub const TABLE_2: [Table2; 6] = [
     Table2 { memory: 5.80, phases: [0.81, 0.10, 0.10], queries: [9094, 16_711] },
     Table2 { memory: 52.91, phases: [2.1, 0.20, 0.49], queries: [140_097, 185_370] },

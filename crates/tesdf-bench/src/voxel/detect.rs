@@ -24,8 +24,8 @@ use super::{VoxelGrid, VoxelValue};
 /// - The modes [`Edge`](Mode::Edge) and [`Exact`](Mode::Exact) and reductions are refused.
 /// - Hidden overlaps of pairs with grids are not searched, because that needs exact distances.
 ///
-/// A grid knows no faces. So [`Contact::face_b`] and the feature of *b* are the block of the grid in
-/// which the point lies, as if it was a face.
+/// A grid knows no faces. So [`Contact::face_b`] and the feature of *b* are the block of the grid
+/// in which the point lies, as if it was a face.
 #[derive(Clone, Debug)]
 pub struct VoxelDetector {
     grids: BTreeMap<ShapeId, Arc<VoxelGrid>>,

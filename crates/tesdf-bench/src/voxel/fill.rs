@@ -55,9 +55,9 @@ impl VoxelGrid {
     ///
     /// A block gets fine samples when its centre is nearer to the surface than the narrow band plus
     /// half of the block's diagonal, so all points of the other blocks are farther than the narrow
-    /// band. The grid has a margin of four voxels around the mesh. `progress` receives the completed
-    /// fraction, 0 to 1, from any thread. Runs in the current rayon pool; the grid is the same for
-    /// any number of threads.
+    /// band. The grid has a margin of four voxels around the mesh. `progress` receives the
+    /// completed fraction, 0 to 1, from any thread. Runs in the current rayon pool; the grid is the
+    /// same for any number of threads.
     ///
     /// # Errors
     /// [`VoxelError`].

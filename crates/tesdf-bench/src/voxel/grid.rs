@@ -25,9 +25,9 @@ pub(super) const NO_SLOT: u32 = u32::MAX;
 /// exact distances at the corners of the block, so it has the error of a grid of eight times the
 /// spacing. A [dense](Self::dense_bytes) grid would be as fine there as near the surface.
 ///
-/// Samples are exact distances, rounded to `f32`. Outside the grid, the value is that of the nearest
-/// point of the grid plus the distance from it, which is an upper bound of the distance up to
-/// interpolation.
+/// Samples are exact distances, rounded to `f32`. Outside the grid, the value is that of the
+/// nearest point of the grid plus the distance from it, which is an upper bound of the distance up
+/// to interpolation.
 #[derive(Clone, Debug)]
 pub struct VoxelGrid {
     pub(super) origin: DVec3,
@@ -118,7 +118,8 @@ impl VoxelGrid {
     }
 
     /// Upper bound of the difference between value and exact distance, where the value is at most
-    /// `distance` and the point is in the grid. Negative values beyond the narrow band do not count.
+    /// `distance` and the point is in the grid. Negative values beyond the narrow band do not
+    /// count.
     pub(super) fn slack_within(&self, distance: f64) -> f64 {
         let edge = if distance < self.narrow_band { self.voxel } else { BLOCK as f64 * self.voxel };
         3.0_f64.sqrt() * edge
@@ -133,7 +134,8 @@ impl VoxelGrid {
 }
 
 impl VoxelValue {
-    /// The value at a point outside the grid, `way` from the point of the grid that is nearest to it.
+    /// The value at a point outside the grid, `way` from the point of the grid that is nearest to
+    /// it.
     fn moved_out(self, way: DVec3) -> Self {
         let length = way.length();
         if length == 0.0 {

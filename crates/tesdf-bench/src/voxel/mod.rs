@@ -5,8 +5,8 @@
 //!                               └─────────accuracy─────▶ VoxelAccuracy
 //! ```
 //!
-//! - [`VoxelGrid`]: exact distances at the corners of voxels, trilinear values and gradients between
-//!   them.
+//! - [`VoxelGrid`]: exact distances at the corners of voxels, trilinear values and gradients
+//!   between them.
 //! - [`VoxelDetector`]: contacts of nodes or faces with the grids of the bodies, behind
 //!   [`Detect`](tesdf_sim::newton::Detect).
 //! - [`accuracy`](accuracy()): the greatest error near the surface.

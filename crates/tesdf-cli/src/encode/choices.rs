@@ -75,8 +75,8 @@ pub enum Rule {
     Nonzero,
     /// An odd winding number: overlaps of two solids are outside; the mesh must be closed
     Odd,
-    /// A generalised winding number of 1/2 or more in absolute value; for open meshes, whose distance
-    /// jumps in the holes
+    /// A generalised winding number of 1/2 or more in absolute value; for open meshes, whose
+    /// distance jumps in the holes
     Generalized,
     /// Nearer to a face than half of a thickness; for sheets, and any other faces
     Sheet,

@@ -1,8 +1,9 @@
 //! `tesdf encode ROBOT -o FOLDER`: encodes the collision meshes of a robot description.
 //!
 //! `mjcf-rs`, of the makers of Rapier, reads MJCF: it resolves includes, classes of defaults and
-//! folders. URDF is read here with `roxmltree`: `urdf-rs` 0.10.0 names no line in its errors, refuses a
-//! file because of parts that have no mesh, and depends on two XML parsers that nobody maintains.
+//! folders. URDF is read here with `roxmltree`: `urdf-rs` 0.10.0 names no line in its errors,
+//! refuses a file because of parts that have no mesh, and depends on two XML parsers that nobody
+//! maintains.
 mod include;
 mod mjcf;
 mod packages;

@@ -7,8 +7,8 @@ const MAX_BYTES: usize = 100;
 /// Names that Windows keeps for devices, in lower case.
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 
-/// File names `NAME.tesdf`, one for each of `names`, such that no two are equal on a file system that
-/// does not tell upper from lower case. An empty name becomes `fallback`.
+/// File names `NAME.tesdf`, one for each of `names`, such that no two are equal on a file system
+/// that does not tell upper from lower case. An empty name becomes `fallback`.
 pub(crate) fn unique<'a>(names: impl Iterator<Item = &'a str>, fallback: &str) -> Vec<String> {
     let mut taken = HashSet::new();
     names

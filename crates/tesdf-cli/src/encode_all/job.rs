@@ -218,7 +218,8 @@ fn labelled(path: &Path, blake3: String, label: Option<&str>) -> Source {
 }
 
 impl Placed {
-    /// The mesh after the transform. If that mirrors, faces are turned over, so outward stays outward.
+    /// The mesh after the transform. If that mirrors, faces are turned over, so outward stays
+    /// outward.
     fn apply(&self, mesh: TriangleMesh) -> Result<TriangleMesh, MeshError> {
         if self.pose == DAffine3::IDENTITY {
             return Ok(mesh);

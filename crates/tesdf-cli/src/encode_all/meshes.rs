@@ -120,9 +120,9 @@ pub fn find(from: &Path, shard: Option<Shard>, cad: &CadArgs) -> Result<Vec<Mesh
 /// Paths by name, and why a folder cannot be read.
 type Found = BTreeMap<String, (PathBuf, Option<String>)>;
 
-/// The files in `folder` and below it that have the extension of a mesh. CAD files are read by another
-/// program and often stand beside a mesh of the same part, so only a list names them. Links to files are
-/// followed, and links to folders are not: they may lead in a circle.
+/// The files in `folder` and below it that have the extension of a mesh. CAD files are read by
+/// another program and often stand beside a mesh of the same part, so only a list names them. Links
+/// to files are followed, and links to folders are not: they may lead in a circle.
 fn in_folder(folder: &Path) -> Found {
     let name = |path: &Path| {
         let below = path.strip_prefix(folder).unwrap_or(path);

@@ -35,8 +35,8 @@ use tesdf_terminal::report::{self, Failure, Outcome};
 /// Arguments of `tesdf encode-all`.
 #[derive(clap::Args, Debug)]
 pub struct Args {
-    /// Folder of meshes, with its subfolders, or a text file with the path of one mesh on each line;
-    /// STEP, IGES and BREP files are only taken from a list
+    /// Folder of meshes, with its subfolders, or a text file with the path of one mesh on each
+    /// line; STEP, IGES and BREP files are only taken from a list
     #[arg(value_name = "FOLDER|LIST")]
     pub meshes: PathBuf,
     /// Folder of the assets and the manifest; it is made if it does not exist

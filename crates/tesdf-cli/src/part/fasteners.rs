@@ -54,8 +54,8 @@ pub struct Nut {
     /// Height [default: the largest of ISO 4032]
     #[arg(long, value_name = "LENGTH", value_parser = parse::metres)]
     pub height: Option<f64>,
-    /// Distance by which the thread is larger in radius than the basic profile; the gap normal to the
-    /// flanks is half of it [default: 1/40 of the pitch]
+    /// Distance by which the thread is larger in radius than the basic profile; the gap normal to
+    /// the flanks is half of it [default: 1/40 of the pitch]
     #[arg(long, value_name = "LENGTH", value_parser = parse::metres)]
     pub clearance: Option<f64>,
     /// Output and resolution.

@@ -62,8 +62,8 @@ pub enum Part {
     Shaft(transmission::Shaft),
     /// Chain link
     ///
-    /// It is in the plane z = 0, long in x. The next link is turned by 90° about x, and moved along x
-    /// by the pitch that is printed.
+    /// It is in the plane z = 0, long in x. The next link is turned by 90° about x, and moved along
+    /// x by the pitch that is printed.
     Link(fits::Link),
     /// Spool: a drum between two flanges, with a helical groove if asked
     ///

@@ -149,9 +149,10 @@ impl Make for Sleeve {
 /// Arguments of `tesdf part shaft`.
 #[derive(clap::Args, Debug)]
 pub struct Shaft {
-    /// A section, from below: "20mm 30mm" is a cylinder of this diameter and length, and "6 23mm 26mm
-    /// 6mm 30mm" a spline (number of teeth, minor diameter, major diameter, width of the teeth) of
-    /// this length; may be given several times [default: five sections, the last one with a keyway]
+    /// A section, from below: "20mm 30mm" is a cylinder of this diameter and length, and "6 23mm
+    /// 26mm 6mm 30mm" a spline (number of teeth, minor diameter, major diameter, width of the
+    /// teeth) of this length; may be given several times [default: five sections, the last one with
+    /// a keyway]
     #[arg(long = "section", value_name = "\"DIAMETER LENGTH\"", value_parser = section)]
     pub sections: Vec<Section>,
     /// A keyway with round ends: number of its section (from 0), width, depth, length, and distance

@@ -151,8 +151,8 @@ pub fn one_per_vertex(shapes: &[&Shape], instances: &Instances, words: &mut Vec<
     retain(&keep, words, rows);
 }
 
-/// Cosines that differ by less are equal: the rounding of unit vectors in `f32`. On the processor it
-/// is 1e-9.
+/// Cosines that differ by less are equal: the rounding of unit vectors in `f32`. On the processor
+/// it is 1e-9.
 const COSINE_TIE: f64 = 1e-6;
 
 /// The vertex at which a contact of a face is; `None` when it is at no vertex.

@@ -13,8 +13,8 @@ pub struct Counts {
     pub blocks: u32,
     /// Meshlets that can touch.
     pub meshlets: u32,
-    /// Polygons (faces clipped by cells), with contacts per face the faces, or in Node-TES nodes with
-    /// their cells. The narrow phase makes one query for each.
+    /// Polygons (faces clipped by cells), with contacts per face the faces, or in Node-TES nodes
+    /// with their cells. The narrow phase makes one query for each.
     pub polygons: u32,
     /// Contacts before a reduction.
     pub contacts: u32,
@@ -23,9 +23,9 @@ pub struct Counts {
     /// Faces or nodes that the broad phase kept.
     pub candidates: u32,
     /// Evaluations of the field by the modes face and exact; 0 without
-    /// [`Counting::Operations`](crate::Counting::Operations). In the mode face a group of 32 threads
-    /// makes an evaluation, of up to eight points at once. In the mode exact, and for the extremes of
-    /// a whole face, a thread makes an evaluation, of one point.
+    /// [`Counting::Operations`](crate::Counting::Operations). In the mode face a group of 32
+    /// threads makes an evaluation, of up to eight points at once. In the mode exact, and for the
+    /// extremes of a whole face, a thread makes an evaluation, of one point.
     pub evaluations: u32,
     /// Distances of points and faces in these evaluations and, in the mode exact, of polygons and
     /// faces; 0 without [`Counting::Operations`](crate::Counting::Operations).

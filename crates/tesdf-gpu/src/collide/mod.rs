@@ -115,8 +115,8 @@ impl Detector {
     /// - A reduction follows the rules of the processor, but compares bounds of distances instead
     ///   of distances. So it may keep other contacts. With contacts per face it also chooses among
     ///   several contacts at one vertex, of which otherwise one remains.
-    /// - [`Reduction::Deepest`] cuts the contacts on the processor, after all have been found. So it
-    ///   saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
+    /// - [`Reduction::Deepest`] cuts the contacts on the processor, after all have been found. So
+    ///   it saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors

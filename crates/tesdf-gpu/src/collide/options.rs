@@ -13,8 +13,8 @@ pub struct Capacities {
     pub blocks: u32,
     /// Meshlets that can touch.
     pub meshlets: u32,
-    /// Polygons (faces clipped by cells), with contacts per face the faces, or in Node-TES nodes with
-    /// their cells.
+    /// Polygons (faces clipped by cells), with contacts per face the faces, or in Node-TES nodes
+    /// with their cells.
     pub polygons: u32,
     /// Contacts before a reduction.
     pub contacts: u32,

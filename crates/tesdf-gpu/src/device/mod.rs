@@ -24,8 +24,8 @@ pub(crate) use buffer::{Buffer, spread};
 pub const DEVICE_VARIABLE: &str = "TESDF_DEVICE";
 
 /// The stream of all work of this crate. By default each thread has a stream of its own, and CubeCL
-/// 0.11.3 then loses buffers that one thread has made and another uses ("Memory location points to a
-/// different allocation").
+/// 0.11.3 then loses buffers that one thread has made and another uses ("Memory location points to
+/// a different allocation").
 pub(crate) const STREAM: StreamId = StreamId { value: 0 };
 
 /// The kind of a device.
@@ -139,8 +139,8 @@ impl Id {
             #[cfg(feature = "cuda")]
             Self::Cuda(index) => cuda::server::client(index)?,
         };
-        // SAFETY: the stream only orders launches and copies. In one stream all of them are in the order
-        // of the calls, whichever threads make these.
+        // SAFETY: the stream only orders launches and copies. In one stream all of them are in the
+        // order of the calls, whichever threads make these.
         unsafe { client.set_stream(STREAM) };
         Ok(client)
     }
@@ -167,8 +167,8 @@ impl Id {
 impl Device {
     /// Opens a device. `asked` is the number of a device in [`devices`], or a part of its name,
     /// such as `cuda:0`; upper and lower case are equal. `wgpu:0` is the first device that is
-    /// reached through wgpu. With `None` the environment variable `TESDF_DEVICE` selects the device.
-    /// Without this variable the best device is opened.
+    /// reached through wgpu. With `None` the environment variable `TESDF_DEVICE` selects the
+    /// device. Without this variable the best device is opened.
     ///
     /// # Errors
     /// [`GpuError::NoDevice`] when the machine has no device, [`GpuError::NoSuchDevice`] when no

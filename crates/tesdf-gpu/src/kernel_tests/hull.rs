@@ -16,7 +16,8 @@ fn read_wrench(numbers: &[f32], at: u32) -> Wrench {
     }
 }
 
-/// Adds all vertices to a hull, and shortens the residual of a target per thread in `rounds` rounds.
+/// Adds all vertices to a hull, and shortens the residual of a target per thread in `rounds`
+/// rounds.
 #[cube(launch)]
 fn shorten(vertices: &[f32], count: u32, targets: &[f32], found: &mut [f32], rounds: u32) {
     let mut hull = empty_hull();

@@ -20,8 +20,8 @@ pub struct GearRatioCriterion {
     /// Name of the hinge of the driven gear. It has no motor, or one that drives by a torque: the
     /// load.
     pub driven: String,
-    /// Turns of the driven hinge for each turn of the driver; negative when the two turn in opposite
-    /// directions about their axes.
+    /// Turns of the driven hinge for each turn of the driver; negative when the two turn in
+    /// opposite directions about their axes.
     pub ratio: f64,
     /// Maximum difference between the measured ratio and the ratio, as a fraction of the ratio.
     #[serde(default = "a_thousandth")]
@@ -38,8 +38,8 @@ pub struct GearRatioCriterion {
     pub max_transmission_error: f64,
     /// Maximum penetration, m.
     pub max_penetration: f64,
-    /// Maximum difference between the speeds of the two pitch circles, as a fraction of the speed of
-    /// the driver's, at any step.
+    /// Maximum difference between the speeds of the two pitch circles, as a fraction of the speed
+    /// of the driver's, at any step.
     pub max_speed_error: f64,
     /// Time between two measurements of the exact clearance, s.
     pub check_every: f64,
@@ -68,14 +68,14 @@ pub struct GearRatioReport {
     /// Number of measurements of the exact clearance.
     pub measurements: usize,
     /// The requirements that the run did not meet; empty when it passed. Each begins with the name
-    /// of the failure and a colon: `turns`, `ratio`, `transmission error`, `speed`, `penetration` or
-    /// `load`.
+    /// of the failure and a colon: `turns`, `ratio`, `transmission error`, `speed`, `penetration`
+    /// or `load`.
     pub failures: Vec<String>,
 }
 
 impl GearRatioCriterion {
-    /// Checks the values, that the joints are hinges, and that nothing but a load acts on the driven
-    /// one. Returns the name of the body of the driven gear.
+    /// Checks the values, that the joints are hinges, and that nothing but a load acts on the
+    /// driven one. Returns the name of the body of the driven gear.
     ///
     /// # Errors
     /// A message that names the value that was found and the expected range.

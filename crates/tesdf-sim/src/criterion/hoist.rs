@@ -8,11 +8,12 @@ use super::linking::linking_number;
 use super::shared::{Checks, Hinge, Penetration, free_body, positive, unit};
 use crate::{Joint, JointKind, MassProperties, System};
 
-/// Chains that are wound on spools hoist a body. The links hold each other by contact alone: of each
-/// chain only the first link has a weld, to its spool, and the last one, to the body.
+/// Chains that are wound on spools hoist a body. The links hold each other by contact alone: of
+/// each chain only the first link has a weld, to its spool, and the last one, to the body.
 ///
 /// The penetration is measured by the exact clearance of all pairs, not by the detector of the run.
-/// Whether a link has passed through its neighbour is told by the linking number of their centre lines.
+/// Whether a link has passed through its neighbour is told by the linking number of their centre
+/// lines.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HoistCriterion {
@@ -25,12 +26,13 @@ pub struct HoistCriterion {
     pub chains: Vec<HoistChain>,
     /// The links.
     pub link: HoistLink,
-    /// Distance from the axis of a spool to the centre line of the wound links that lie flat on it, m.
+    /// Distance from the axis of a spool to the centre line of the wound links that lie flat on it,
+    /// m.
     pub winding_radius: f64,
     /// Minimum way by which the body rises, m.
     pub min_rise: f64,
-    /// Maximum difference, m, between the rise at the end and the length of chain that the spools have
-    /// wound.
+    /// Maximum difference, m, between the rise at the end and the length of chain that the spools
+    /// have wound.
     pub rise_tolerance: f64,
     /// Maximum angle by which the body tilts at any step, rad.
     pub max_tilt: f64,
@@ -50,7 +52,8 @@ pub struct HoistChain {
     pub links: String,
 }
 
-/// The centre line of a link: two straight lines and two half circles in its plane z = 0, long in x.
+/// The centre line of a link: two straight lines and two half circles in its plane z = 0, long in
+/// x.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HoistLink {
@@ -101,8 +104,9 @@ impl HoistLink {
 
     /// The length of chain that a turn by 1 rad winds, m.
     ///
-    /// A link that lies flat touches the drum in its middle, at `radius`. The wires of the links beside it
-    /// pull at the ends of its centre line, and between two flat links the chain is straight.
+    /// A link that lies flat touches the drum in its middle, at `radius`. The wires of the links
+    /// beside it pull at the ends of its centre line, and between two flat links the chain is
+    /// straight.
     fn wound_per_radian(&self, radius: f64) -> f64 {
         let flat = self.straight / 2.0 + self.bend_radius;
         let between = self.pitch - flat;
@@ -125,8 +129,8 @@ impl HoistLink {
 }
 
 impl HoistCriterion {
-    /// Checks the values, that the bodies and joints exist, and that nothing but the chains holds the
-    /// body.
+    /// Checks the values, that the bodies and joints exist, and that nothing but the chains holds
+    /// the body.
     ///
     /// # Errors
     /// A message that names the value that was found and the expected range.

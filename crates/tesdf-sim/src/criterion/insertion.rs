@@ -54,8 +54,9 @@ fn a_fifth() -> f64 {
     0.2
 }
 
-/// A seated peg without friction still slides from wall to wall in its play, with 1e-4 of the energy
-/// where it leans by 5°. A body that falls by 10 mm and keeps 1e-3 of its energy moves at 14 mm/s.
+/// A seated peg without friction still slides from wall to wall in its play, with 1e-4 of the
+/// energy where it leans by 5°. A body that falls by 10 mm and keeps 1e-3 of its energy moves at 14
+/// mm/s.
 fn at_rest() -> f64 {
     1e-3
 }

@@ -28,7 +28,8 @@ pub struct LiftCriterion {
     /// Time from which the body is held at its height until the end of the run, s.
     pub held_from: f64,
     /// Maximum speed, m/s, at which a point of the held body creeps relative to a finger: its
-    /// greatest distance from where it was at `held_from`, divided by the time from then to the end.
+    /// greatest distance from where it was at `held_from`, divided by the time from then to the
+    /// end.
     #[serde(default = "no_creep")]
     pub max_creep: f64,
     /// Maximum penetration, m.
@@ -67,10 +68,11 @@ fn no_gain() -> f64 {
 pub struct LiftReport {
     /// Height by which the centre of mass has risen at the end, m.
     pub rise: f64,
-    /// The greatest difference between the expected height and that of the held body at any step, m.
+    /// The greatest difference between the expected height and that of the held body at any step,
+    /// m.
     pub height_error: f64,
-    /// Upper bound of the speed at which a point of the held body creeps, m/s: the way of its centre
-    /// of mass, plus its rotation times the diagonal of its bounding box.
+    /// Upper bound of the speed at which a point of the held body creeps, m/s: the way of its
+    /// centre of mass, plus its rotation times the diagonal of its bounding box.
     pub creep: f64,
     /// The greatest penetration by the exact clearance, m; 0 when none was found.
     pub penetration: f64,

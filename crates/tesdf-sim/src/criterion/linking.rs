@@ -2,8 +2,8 @@
 use robust::{Coord3D, orient3d};
 use tesdf::glam::DVec3;
 
-/// Where the apex of the cone is tried, from the middle of the curve, as fractions of its extent. Curves
-/// with symmetries meet the edges of a cone that has the same ones.
+/// Where the apex of the cone is tried, from the middle of the curve, as fractions of its extent.
+/// Curves with symmetries meet the edges of a cone that has the same ones.
 const APICES: [DVec3; 6] = [
     DVec3::ZERO,
     DVec3::new(0.031, 0.073, -0.117),
@@ -13,10 +13,10 @@ const APICES: [DVec3; 6] = [
     DVec3::new(0.173, 0.139, 0.107),
 ];
 
-/// The linking number of two closed polygons: how often `b` goes through a surface that `a` bounds, with
-/// signs. It does not change while the curves do not pass through each other. Exact for the given
-/// coordinates. `None` if the curves touch, or if each of the surfaces that are tried has an edge that `b`
-/// meets.
+/// The linking number of two closed polygons: how often `b` goes through a surface that `a` bounds,
+/// with signs. It does not change while the curves do not pass through each other. Exact for the
+/// given coordinates. `None` if the curves touch, or if each of the surfaces that are tried has an
+/// edge that `b` meets.
 ///
 /// The surfaces are cones over `a`. Where the apex is does not matter.
 pub fn linking_number(a: &[DVec3], b: &[DVec3]) -> Option<i32> {
@@ -40,8 +40,8 @@ fn edges(curve: &[DVec3]) -> impl Iterator<Item = (DVec3, DVec3)> {
     curve.iter().zip(curve.iter().cycle().skip(1)).map(|(p, q)| (*p, *q))
 }
 
-/// 1 or -1 if the segment goes through the triangle, 0 if not, `None` if it meets its border or lies in its
-/// plane.
+/// 1 or -1 if the segment goes through the triangle, 0 if not, `None` if it meets its border or
+/// lies in its plane.
 fn crossing([a, b, c]: [DVec3; 3], [p, q]: [DVec3; 2]) -> Option<i32> {
     let from = side(a, b, c, p);
     let to = side(a, b, c, q);

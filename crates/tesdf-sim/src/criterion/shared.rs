@@ -86,8 +86,8 @@ impl Penetration {
         }
     }
 
-    /// Measures the clearance of all pairs whose bounds overlap at the current states, to `tolerance`
-    /// metres.
+    /// Measures the clearance of all pairs whose bounds overlap at the current states, to
+    /// `tolerance` metres.
     pub(super) fn measure_all(&mut self, system: &System, tolerance: f64) {
         match near(system, 0.0) {
             Ok(pairs) => self.measure(system, &pairs, tolerance),
@@ -191,8 +191,8 @@ impl Hinge {
         (frame.rotation * DVec3::Z).dot(child - parent)
     }
 
-    /// The angle by which it has turned in a step of `time_step` seconds, rad. Whole turns are those of
-    /// the speed: without contacts, a load makes a shaft fast.
+    /// The angle by which it has turned in a step of `time_step` seconds, rad. Whole turns are
+    /// those of the speed: without contacts, a load makes a shaft fast.
     pub(super) fn turned(&mut self, system: &System, time_step: f64) -> f64 {
         let now = angle(system, self.joint);
         let way = self.speed(system) * time_step;

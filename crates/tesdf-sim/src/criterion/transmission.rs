@@ -9,16 +9,16 @@ use crate::{Drive, Mass, Motor, System};
 /// A gearbox turns its output shaft at the ratio of each gear in turn, by contact alone, and not in
 /// neutral.
 ///
-/// The *transmission error* is the difference between the angle of the output shaft and the angle that
-/// the input shaft and the ratio give, as a length along the pitch circle of the driven gear. The
-/// penetration is measured by the exact clearance of all pairs, not by the detector of the run.
+/// The *transmission error* is the difference between the angle of the output shaft and the angle
+/// that the input shaft and the ratio give, as a length along the pitch circle of the driven gear.
+/// The penetration is measured by the exact clearance of all pairs, not by the detector of the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TransmissionCriterion {
     /// Name of the hinge of the input shaft.
     pub input: String,
-    /// Name of the hinge of the output shaft. No other joint holds its body. Its motor, if it has one, is
-    /// a load: a torque, or a brake that drives the velocity 0.
+    /// Name of the hinge of the output shaft. No other joint holds its body. Its motor, if it has
+    /// one, is a load: a torque, or a brake that drives the velocity 0.
     pub output: String,
     /// The times in which a gear is engaged.
     pub gears: Vec<EngagedGear>,
@@ -70,7 +70,8 @@ pub struct TransmissionReport {
     /// Number of measurements of the exact clearance.
     pub measurements: usize,
     /// The requirements that the run did not meet; empty when it passed. Each begins with the name
-    /// of the failure and a colon: `turns`, `ratio`, `transmission error`, `neutral` or `penetration`.
+    /// of the failure and a colon: `turns`, `ratio`, `transmission error`, `neutral` or
+    /// `penetration`.
     pub failures: Vec<String>,
 }
 
@@ -86,8 +87,8 @@ pub struct EngagedReport {
 }
 
 impl TransmissionCriterion {
-    /// Checks the values, that the joints are hinges, and that nothing but a load acts on the output
-    /// shaft. Returns the name of its body.
+    /// Checks the values, that the joints are hinges, and that nothing but a load acts on the
+    /// output shaft. Returns the name of its body.
     ///
     /// # Errors
     /// A message that names the value that was found and the expected range.
@@ -156,8 +157,8 @@ pub struct TransmissionTracker {
     penetration: Penetration,
 }
 
-/// Angles of input and output while a gear is engaged, rad, and the bounds of the transmission error, rad of
-/// the output.
+/// Angles of input and output while a gear is engaged, rad, and the bounds of the transmission
+/// error, rad of the output.
 #[derive(Clone, Copy, Debug, Default)]
 struct Engaged {
     angles: [f64; 2],

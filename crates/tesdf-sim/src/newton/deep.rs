@@ -1,22 +1,23 @@
 //! Which contacts of bodies that overlap deeply push them apart.
 //!
-//! Deep inside of a body the nearest face can be on any side. Where two bodies are deep in each other,
-//! contacts on both sides of one then push it both ways, and nothing moves: 128 shafts in a pile stay
-//! 11.6 mm deep. Of the penetrating contacts of such a pair only those act that push a vertex or face
-//! against its own normal, into the body that it belongs to (Eq. (10) of the paper, for vertices, too).
+//! Deep inside of a body the nearest face can be on any side. Where two bodies are deep in each
+//! other, contacts on both sides of one then push it both ways, and nothing moves: 128 shafts in a
+//! pile stay 11.6 mm deep. Of the penetrating contacts of such a pair only those act that push a
+//! vertex or face against its own normal, into the body that it belongs to (Eq. (10) of the paper,
+//! for vertices, too).
 //!
 //! Two shafts that cross within a radius of each other are past the middle: their deepest contacts
-//! push along the own normals. Such a pair gets one direction for all of its pushes: of the normals of
-//! its contacts the one along which the bodies overlap least, measured by their extents (the separating
-//! axis test). Contacts act that push along it.
+//! push along the own normals. Such a pair gets one direction for all of its pushes: of the normals
+//! of its contacts the one along which the bodies overlap least, measured by their extents (the
+//! separating axis test). Contacts act that push along it.
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 use tesdf::TeSdf;
 use tesdf::collide::{Contact, InstanceId, Mode, Pose, Scene, Shape, ShapeId};
 
-/// cos θ of the filter: the normal of the contact is at least this much against that of the vertex or
-/// face, or along the direction of the pair.
+/// cos θ of the filter: the normal of the contact is at least this much against that of the vertex
+/// or face, or along the direction of the pair.
 const COS_THETA: f64 = 0.3;
 
 /// A pair is past the middle when a contact pushes along the own normal that is deeper than this
@@ -95,8 +96,8 @@ impl Surfaces {
         Some((self.0.get(&instance.shape)?, instance.pose, instance.scale))
     }
 
-    /// The cosine between the normal of a contact and that of its vertex or face. Vertices and faces of
-    /// simple shapes are always opposed.
+    /// The cosine between the normal of a contact and that of its vertex or face. Vertices and
+    /// faces of simple shapes are always opposed.
     fn cosine(&self, scene: &Scene, contact: &Contact) -> f64 {
         let own = || {
             let (surface, pose, _) = self.of(scene, contact.instance_a)?;

@@ -254,13 +254,13 @@ impl Newton {
     }
 
     /// Puts the velocities into `ahead` with which the next look finds what `velocities` bring
-    /// together and `look`, with the velocities that are in `ahead`, has not. Returns whether there is
-    /// something to find.
+    /// together and `look`, with the velocities that are in `ahead`, has not. Returns whether there
+    /// is something to find.
     ///
-    /// Where bodies fall together and the lowest is stopped, the next one may be stopped by it, and so
-    /// on. So a body that is met takes over the velocity of the one that it meets, and may meet others
-    /// with it. Of two bodies in a row, the look has one at its own velocity and one at that which it
-    /// takes over.
+    /// Where bodies fall together and the lowest is stopped, the next one may be stopped by it, and
+    /// so on. So a body that is met takes over the velocity of the one that it meets, and may meet
+    /// others with it. Of two bodies in a row, the look has one at its own velocity and one at that
+    /// which it takes over.
     fn look_on(
         &mut self,
         step: &Step,
@@ -270,7 +270,8 @@ impl Newton {
     ) -> Result<bool, DynamicsError> {
         let foreseen = ahead.to_vec();
         set_velocities(ahead, &step.free, velocities);
-        // The speed at which deep bodies are pushed apart would make the look reach through the pile.
+        // The speed at which deep bodies are pushed apart would make the look reach through the
+        // pile.
         for (free, _) in step.free.iter().zip(&step.deep).filter(|(_, deep)| **deep) {
             ahead[free.body] = foreseen[free.body];
         }
@@ -316,8 +317,8 @@ impl Newton {
         let rows = [contact_rows.as_slice(), &joints].concat();
         step.deep = self.deep(step, contacts, &rows);
         let deep = step.deep.clone();
-        // A deep body that is pushed into another one must not kick it, so what is detected again says
-        // nothing about deep bodies.
+        // A deep body that is pushed into another one must not kick it, so what is detected again
+        // says nothing about deep bodies.
         let stays = |row: &Row| row.sides.iter().flatten().any(|(k, _)| deep[*k]);
         // Where bodies overlap deeply, rigid contacts would contradict each other.
         for row in contact_rows.iter_mut().filter(|row| stays(row)) {
@@ -336,8 +337,8 @@ impl Newton {
             let beginning = self.gaps(step).beginning(contacts, &found);
             for _ in 0..self.options.redetections {
                 let mut predicted = self.moved(step, &velocities);
-                // The contacts of these bodies stay, so the detection need not look as far as they are
-                // pushed.
+                // The contacts of these bodies stay, so the detection need not look as far as they
+                // are pushed.
                 for (k, free) in step.free.iter().enumerate().filter(|(k, _)| deep[*k]) {
                     let seen = &mut predicted[free.body];
                     (seen.linear, seen.angular) = unpack(&step.target[k]);
@@ -400,7 +401,8 @@ impl Dynamics for Newton {
         }
         let mut step = self.begin(time_step);
         // The detection must reach as far as the step can close, so it uses the velocities that
-        // wrenches give; gravity is in the contact distance. Contacts, motors and joints change them.
+        // wrenches give; gravity is in the contact distance. Contacts, motors and joints change
+        // them.
         let mut ahead = self.system.states().to_vec();
         let falling = pack(time_step * self.system.gravity, DVec3::ZERO);
         let target: Vec<_> = step.target.iter().map(|v| v - falling).collect();

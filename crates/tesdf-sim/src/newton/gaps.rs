@@ -64,8 +64,8 @@ struct Depths {
     pairs: BTreeMap<(InstanceId, InstanceId), f64>,
 }
 
-/// The contacts whose directions the predicted ones are averaged with, sorted by their features, and
-/// their points in the frame of *a*.
+/// The contacts whose directions the predicted ones are averaged with, sorted by their features,
+/// and their points in the frame of *a*.
 struct Before<'a>(Vec<(&'a Found, DVec3)>);
 
 impl<'a> Gaps<'a> {
@@ -100,8 +100,8 @@ impl<'a> Gaps<'a> {
         Some(Found { contact, row, carried, skin, way })
     }
 
-    /// The velocity of a body's point at the beginning of the step, m/s. `point` is given in the world
-    /// while the bodies are at `poses`.
+    /// The velocity of a body's point at the beginning of the step, m/s. `point` is given in the
+    /// world while the bodies are at `poses`.
     fn velocity_at(&self, body: usize, poses: &[Pose], point: DVec3) -> DVec3 {
         let State { linear, angular, .. } = self.system.states()[body];
         let center = match self.system.bodies()[body].mass {
@@ -153,15 +153,15 @@ impl<'a> Gaps<'a> {
         self.find(contacts, poses).into_iter().filter_map(row).collect()
     }
 
-    /// What [`predicted_rows`](Self::predicted_rows) needs of the `contacts` at the beginning of the
-    /// step. Those in `found` have a free body.
+    /// What [`predicted_rows`](Self::predicted_rows) needs of the `contacts` at the beginning of
+    /// the step. Those in `found` have a free body.
     pub fn beginning<'f>(&self, contacts: &[Contact], found: &'f [Found]) -> Beginning<'f> {
         Beginning { depths: self.depths(contacts), before: self.before(found) }
     }
 
-    /// With the directions of the end alone, a body that crosses an edge is braked or driven on by it;
-    /// the mean over the step does neither. Contacts of vertices stay as they are: for gears the mean
-    /// was worse.
+    /// With the directions of the end alone, a body that crosses an edge is braked or driven on by
+    /// it; the mean over the step does neither. Contacts of vertices stay as they are: for gears
+    /// the mean was worse.
     fn before<'f>(&self, found: &'f [Found]) -> Before<'f> {
         if self.mode == Mode::Node {
             return Before(Vec::new());
@@ -224,8 +224,8 @@ impl<'a> Before<'a> {
 }
 
 impl Depths {
-    /// Depth of the feature that a contact belongs to, m. Within the skin it is at least that of the
-    /// pair: contacts come and go there, and one that comes must not lift the bodies.
+    /// Depth of the feature that a contact belongs to, m. Within the skin it is at least that of
+    /// the pair: contacts come and go there, and one that comes must not lift the bodies.
     fn of(&self, Found { contact, skin, .. }: &Found) -> f64 {
         let (a, b) = (contact.instance_a, contact.instance_b);
         let key = (a, b, contact.feature.a);

@@ -1,15 +1,15 @@
-//! Geometric stiffness: a body that is pulled turns into the direction of the pull (Tournier, Nesme,
-//! Gilles and Faure, *Stable constrained dynamics*, 2015).
+//! Geometric stiffness: a body that is pulled turns into the direction of the pull (Tournier,
+//! Nesme, Gilles and Faure, *Stable constrained dynamics*, 2015).
 //!
 //! A force keeps its direction while the body on which it acts turns. So its torque changes: for a
 //! force `f` at an arm `r` and a small rotation `θ` across the force by `−(f · r) θ`. The rows of a
-//! step know the torque at one pose only. Then a light link that is pulled from both sides turns too
-//! far, and back in the next step. So a step gets the energy `½ h² K |ω − ω₀|²` for each body, where
-//! `K` is the sum of `f · r`, and `h ω₀` leads to the pose that the rows were found at.
+//! step know the torque at one pose only. Then a light link that is pulled from both sides turns
+//! too far, and back in the next step. So a step gets the energy `½ h² K |ω − ω₀|²` for each body,
+//! where `K` is the sum of `f · r`, and `h ω₀` leads to the pose that the rows were found at.
 //!
 //! A rotation about the force has no such torque at a point, but links touch in several. Without a
-//! stiffness for this rotation, a chain whose end weighs a hundred times as much as its links broke.
-//! The stiffness of pushes is negative and left out, so the problem stays convex.
+//! stiffness for this rotation, a chain whose end weighs a hundred times as much as its links
+//! broke. The stiffness of pushes is negative and left out, so the problem stays convex.
 use glam::DVec3;
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
@@ -29,17 +29,19 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Without geometric stiffness. `target` has the velocities at the end of the step without rows.
+    /// Without geometric stiffness. `target` has the velocities at the end of the step without
+    /// rows.
     pub fn new(free: &[FreeBody], target: &[Vector6<f64>]) -> Self {
         Self { inertia: free.iter().map(|body| body.inertia).collect(), target: target.to_vec() }
     }
 
-    /// The same motion with the geometric stiffness of `forces` along `rows`, N or N m, in a step of
-    /// `h` seconds. The rows were found at the poses that the velocities of `found_at` lead to. Returns
-    /// `None` where the stiffness of no body matters.
+    /// The same motion with the geometric stiffness of `forces` along `rows`, N or N m, in a step
+    /// of `h` seconds. The rows were found at the poses that the velocities of `found_at` lead to.
+    /// Returns `None` where the stiffness of no body matters.
     pub fn stiffened(&self, rows: &[Row], forces: &[f64], found_at: &[Vector6<f64>], h: f64) -> Option<Self> {
         let mut stiffness = vec![0.0; self.inertia.len()];
-        // Springs are motors, and the contacts of bodies that overlap deeply: their forces are no loads.
+        // Springs are motors, and the contacts of bodies that overlap deeply: their forces are no
+        // loads.
         for (row, force) in rows.iter().zip(forces).filter(|(row, _)| row.resistance == Resistance::Rigid) {
             for (side, arm) in row.sides.iter().zip(row.arms) {
                 if let Some((body, j)) = side {
@@ -56,8 +58,8 @@ impl Motion {
                 continue;
             }
             is_stiffer = true;
-            // Two squares around different velocities are, up to a constant, one square around their
-            // mean.
+            // Two squares around different velocities are, up to a constant, one square around
+            // their mean.
             let all = inertia + Matrix3::from_diagonal_element(added);
             let angular = |v: &Vector6<f64>| v.fixed_rows::<3>(3).into_owned();
             let momentum = inertia * angular(&self.target[k]) + added * angular(&found_at[k]);

@@ -53,8 +53,8 @@ pub fn free_velocity(
     pack(state.linear + h * (gravity + wrench.force / mass.mass), turn)
 }
 
-/// The pose after moving for `h` seconds with a constant velocity of `center`, a point of the body in
-/// its frame, and a constant angular velocity.
+/// The pose after moving for `h` seconds with a constant velocity of `center`, a point of the body
+/// in its frame, and a constant angular velocity.
 pub fn moved(center: DVec3, pose: Pose, v: &Vector6<f64>, h: f64) -> Pose {
     let (linear, angular) = unpack(v);
     let moved = pose.to_world(center) + h * linear;

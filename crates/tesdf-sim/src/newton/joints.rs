@@ -1,8 +1,8 @@
 //! Converts joints to rows of the convex problem.
 //!
-//! The rows keep the directions that they have at the beginning of the step, also when the bodies were
-//! predicted; only the gaps follow, as in SHAKE (Ryckaert, Ciccotti and Berendsen 1977). With the
-//! directions of the predicted poses, a pendulum loses nine tenths of its energy.
+//! The rows keep the directions that they have at the beginning of the step, also when the bodies
+//! were predicted; only the gaps follow, as in SHAKE (Ryckaert, Ciccotti and Berendsen 1977). With
+//! the directions of the predicted poses, a pendulum loses nine tenths of its energy.
 use glam::DVec3;
 use nalgebra::Vector6;
 use tesdf::collide::Pose;
@@ -16,7 +16,8 @@ use crate::{Drive, Joint, JointKind, Mass, System};
 /// tolerance in one or two rounds less.
 const STIFFER: f64 = 100.0;
 
-/// A direction in which a joint measures an error: of the translation at a point, or of the rotation.
+/// A direction in which a joint measures an error: of the translation at a point, or of the
+/// rotation.
 #[derive(Clone, Copy, Debug)]
 enum Direction {
     Along(DVec3),

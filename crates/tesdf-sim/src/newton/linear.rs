@@ -1,9 +1,9 @@
 //! Symmetric positive definite matrices of 6 × 6 blocks, with one block row per body, and their
 //! sparse Cholesky factorisation.
 //!
-//! Crates for sparse matrices (faer, nalgebra-sparse) know single numbers only, and would have to find
-//! the blocks again. With blocks the order and the fill are those of a graph of bodies, and the
-//! arithmetic is that of nalgebra's 6 × 6 matrices.
+//! Crates for sparse matrices (faer, nalgebra-sparse) know single numbers only, and would have to
+//! find the blocks again. With blocks the order and the fill are those of a graph of bodies, and
+//! the arithmetic is that of nalgebra's 6 × 6 matrices.
 use std::collections::BTreeSet;
 
 use glam::{DMat3, DVec3};
@@ -118,8 +118,8 @@ impl<'a> BlockMatrix<'a> {
     }
 
     /// Adds `Jᵀ S J`, where `J` gives the velocity of the first body at its arm relative to that of
-    /// the second one at its own, and `S` is symmetric. A side is a body and its arm, the vector from
-    /// the centre of mass, m.
+    /// the second one at its own, and `S` is symmetric. A side is a body and its arm, the vector
+    /// from the centre of mass, m.
     pub fn add_point(&mut self, sides: [Option<(usize, DVec3)>; 2], pair: Option<usize>, s: DMat3) {
         let s = Matrix3::from(s.to_cols_array_2d());
         let products = sides.map(|side| side.map(|(body, arm)| (body, cross(arm), s * cross(arm))));

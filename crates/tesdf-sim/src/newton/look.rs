@@ -22,16 +22,16 @@ impl Look {
         Ok(Self { contacts, distances })
     }
 
-    /// The pairs that the velocities of `scene` bring closer in `time` than was looked. Their relative
-    /// velocity has changed: of two bodies that fall together, one has met a third.
+    /// The pairs that the velocities of `scene` bring closer in `time` than was looked. Their
+    /// relative velocity has changed: of two bodies that fall together, one has met a third.
     pub fn outrun(&self, scene: &Scene, time: f64) -> Result<Vec<Pair>, CollideError> {
         // The bounds of a pair that was not tested were farther apart than it looked.
         let is_outrun = |&(pair, way): &(Pair, f64)| self.distances.get(&pair).is_none_or(|&d| way > d);
         Ok(distances(scene, 0.0, time)?.into_iter().filter(is_outrun).map(|(pair, _)| pair).collect())
     }
 
-    /// Takes over what another look has found of the pairs at which it looked farther. Returns whether
-    /// that is more.
+    /// Takes over what another look has found of the pairs at which it looked farther. Returns
+    /// whether that is more.
     pub fn extend(&mut self, other: Self, scene: &Scene) -> bool {
         let before = self.contacts.len();
         let mut farther = other.distances;

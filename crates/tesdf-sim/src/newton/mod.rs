@@ -10,11 +10,11 @@
 //! with              Kᵢ = κ / (wᵢ h²),   wᵢ = Jᵢ M⁻¹ Jᵢᵀ
 //! ```
 //!
-//! Springs give way. So the problem is solved again, with each spring compressed by its force, until
-//! no contact gives way (the method of multipliers, in `problem.rs`). Its solution is that of rigid
-//! contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Islands that overlap deeply keep
-//! their springs. Gaps are counted from a skin ([`NewtonOptions::skin`]), and normals at edges that are
-//! flush are those of the faces (`normals.rs`).
+//! Springs give way. So the problem is solved again, with each spring compressed by its force,
+//! until no contact gives way (the method of multipliers, in `problem.rs`). Its solution is that of
+//! rigid contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Islands that overlap
+//! deeply keep their springs. Gaps are counted from a skin ([`NewtonOptions::skin`]), and normals
+//! at edges that are flush are those of the faces (`normals.rs`).
 //!
 //! *Friction* is a spring against the slip `h t`, where `t` is the tangential velocity, whose force
 //! ends at the limit `b = μ` × push of the contact. The push is that of the minimisation before, so
@@ -23,8 +23,8 @@
 //! the convex cone of Castro et al. can. The limits stay once they change by less than 0.3 %. Below
 //! the limit the force is raised, too, so a body that sticks does not creep.
 //!
-//! *Joints* (`joints.rs`) are rows `eᵢ + h Jᵢ v = 0`, and *motors* rows whose force stays within their
-//! limit.
+//! *Joints* (`joints.rs`) are rows `eᵢ + h Jᵢ v = 0`, and *motors* rows whose force stays within
+//! their limit.
 //!
 //! `v*` is the velocity without contacts, `gᵢ` the gap, `Jᵢ v` its rate and `h` the time step. The
 //! minimiser moves the poses. The velocity that the next step starts from is the result of a second

@@ -5,8 +5,8 @@ use tesdf::collide::{Contact, FeatureB, InstanceId};
 /// Normals that differ by a smaller angle, rad, are those of the same flat contact.
 const PARALLEL: f64 = 1e-3;
 
-/// The normal of each contact, where that of an edge or a vertex which is nearly the normal of a face
-/// that the same two bodies touch is replaced by it.
+/// The normal of each contact, where that of an edge or a vertex which is nearly the normal of a
+/// face that the same two bodies touch is replaced by it.
 ///
 /// Where the edges of two faces on each other are nearly flush, the nearest point of *b* is on its
 /// edge, to the side by less than the distance. Such a contact would push the bodies sideways.

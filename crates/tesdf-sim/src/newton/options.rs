@@ -8,8 +8,8 @@ use crate::DynamicsError;
 pub struct NewtonOptions {
     /// κ: stiffness of a contact, relative to the stiffness that the inertia of its two bodies
     /// gives within one step. Measured on a pile of 128 shafts: 10 is too soft, and 1000
-    /// overshoots. Rigid contacts do not give way whatever the stiffness; it is then that of the first
-    /// minimisation.
+    /// overshoots. Rigid contacts do not give way whatever the stiffness; it is then that of the
+    /// first minimisation.
     pub stiffness: f64,
     /// β: fraction of a penetration that one step removes.
     pub correction: f64,

@@ -43,8 +43,9 @@ struct Iterate {
     deflections: Vec<Deflection>,
     /// Multiplies the stiffness of rigid rows.
     stiffening: f64,
-    /// Whether the limits of friction follow the pushes of the contacts. Once they have settled they
-    /// stay: rounding moves the pushes of contacts that share a load, the more the stiffer they are.
+    /// Whether the limits of friction follow the pushes of the contacts. Once they have settled
+    /// they stay: rounding moves the pushes of contacts that share a load, the more the stiffer
+    /// they are.
     grips: Grips,
 }
 
@@ -81,8 +82,8 @@ const NO_LIMIT: f64 = 1e-6;
 /// pushes.
 const EXCESS: f64 = 100.0;
 
-/// A contact is nearly closed when its gap is at most this share of the way by which it differs between
-/// the velocities of the start and those without contacts.
+/// A contact is nearly closed when its gap is at most this share of the way by which it differs
+/// between the velocities of the start and those without contacts.
 const NEAR: f64 = 0.1;
 
 /// Maximum number of evaluations of a line search. The derivative is piecewise linear without
@@ -221,8 +222,8 @@ impl Part<'_> {
         (options.max_iterations, false)
     }
 
-    /// The greatest distance by which a rigid row gives way, or keeps a force that it should not, and
-    /// the greatest one that corresponds to a force. The two are m or rad.
+    /// The greatest distance by which a rigid row gives way, or keeps a force that it should not,
+    /// and the greatest one that corresponds to a force. The two are m or rad.
     fn error(&self, at: &Iterate) -> [f64; 2] {
         let errors = self.springs.iter().zip(&at.deflections).map(|(s, d)| s.error(d, at.stiffening));
         errors.fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])

@@ -70,7 +70,8 @@ pub struct Friction {
     pub coefficient: f64,
     /// Stiffness of sticking, N/m.
     pub stiffness: f64,
-    /// The way in the step that kinematic bodies add to that of the free ones, in the tangent plane, m.
+    /// The way in the step that kinematic bodies add to that of the free ones, in the tangent
+    /// plane, m.
     pub way: DVec3,
 }
 
@@ -110,7 +111,8 @@ impl Row {
     /// The row of a contact, with the contact's distance as its gap. Returns `None` when neither
     /// body is free.
     ///
-    /// `poses` are the poses at which the contact was detected, and `coefficient` is that of friction.
+    /// `poses` are the poses at which the contact was detected, and `coefficient` is that of
+    /// friction.
     pub fn of_contact(
         contact: &Contact,
         bodies: &Bodies<'_>,

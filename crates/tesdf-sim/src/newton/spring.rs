@@ -221,7 +221,8 @@ impl Spring {
         error
     }
 
-    /// The limit of the friction force, N, that follows from the contact's push, and the present one.
+    /// The limit of the friction force, N, that follows from the contact's push, and the present
+    /// one.
     pub fn grips(&self, at: &Deflection, stiffening: f64) -> Option<[f64; 2]> {
         let friction = self.friction.as_ref()?;
         Some([friction.coefficient * self.force(at, stiffening).0, at.grip])
@@ -233,8 +234,8 @@ impl Spring {
     }
 
     /// Keeps the present forces of a rigid row as the forces at zero deflection when all rigid rows
-    /// become `factor` times as stiff. Where limits of friction follow, the limit becomes that of the
-    /// present push.
+    /// become `factor` times as stiff. Where limits of friction follow, the limit becomes that of
+    /// the present push.
     pub fn keep(&self, at: &mut Deflection, stiffening: f64, factor: f64, grips: Grips) {
         let grip = match grips {
             Grips::Stay => at.grip,

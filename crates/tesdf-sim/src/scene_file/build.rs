@@ -111,8 +111,8 @@ impl LoadedScene {
         (section.mode != DetectorMode::Off).then(|| collide_options(section, system))
     }
 
-    /// Faces that touch in the states of `system`, and that the scene's mode, where it is `node`, can
-    /// miss.
+    /// Faces that touch in the states of `system`, and that the scene's mode, where it is `node`,
+    /// can miss.
     ///
     /// # Errors
     /// The scene's options are not valid.
@@ -193,15 +193,10 @@ impl Shapes {
         progress: &Progress,
     ) -> Result<ShapeId, ShapeFailure> {
         let inside = inside(body).map_err(ShapeFailure::Reason)?;
+        let repair = repair(body).map_err(ShapeFailure::Reason)?;
         let shape = match (&body.asset, &body.mesh, &body.shape) {
             (Some(file), None, None) | (None, Some(file), None) => {
                 let file = scene.resolve(file);
-                let repair = body.repair.as_deref().map_or(Ok(RepairMode::Never), str::parse);
-                let repair = repair.map_err(|e: UnknownRepair| ShapeFailure::Reason(e.to_string()))?;
-                if repair == RepairMode::Auto && body.asset.is_some() {
-                    let reason = "repair = \"auto\": the asset is encoded already; give mesh = \"FILE\" in place of asset";
-                    return Err(ShapeFailure::Reason(reason.into()));
-                }
                 // A file that is reached by several paths is opened only once.
                 let path = file.canonicalize().unwrap_or_else(|_| file.clone());
                 let key = (path, format!("{inside}, {repair:?}"));
@@ -235,6 +230,21 @@ impl Shapes {
 
 fn add_shape(system: &mut System, shape: Shape) -> Result<ShapeId, ShapeFailure> {
     system.add_shape(shape).map_err(|e| ShapeFailure::Reason(e.to_string()))
+}
+
+/// Whether the mesh of a body is repaired.
+fn repair(body: &BodySection) -> Result<RepairMode, String> {
+    let mode = body.repair.as_deref().map_or(Ok(RepairMode::Never), str::parse);
+    let mode = mode.map_err(|e: UnknownRepair| e.to_string())?;
+    let without_mesh = match body {
+        _ if mode == RepairMode::Never || body.mesh.is_some() => return Ok(mode),
+        BodySection { asset: Some(_), .. } => {
+            "the asset is encoded already; give mesh = \"FILE\" in place of asset"
+        }
+        BodySection { shape: Some(_), .. } => "a simple shape has no mesh to repair; remove repair",
+        _ => return Ok(mode),
+    };
+    Err(format!("repair = \"auto\": {without_mesh}"))
 }
 
 /// What is inside of the mesh of a body.

@@ -138,16 +138,16 @@ pub struct JointSection {
     pub parent: Option<String>,
     /// Name of the child body.
     pub child: String,
-    /// A point of the joint, m, world frame, with the bodies where they start [default: the origin of
-    /// the child].
+    /// A point of the joint, m, world frame, with the bodies where they start [default: the origin
+    /// of the child].
     #[serde(default)]
     pub anchor: Option<[f64; 3]>,
     /// Axis of a hinge or a slider, or of the cone that limits a ball: any length except 0, world
     /// frame, with the bodies where they start.
     #[serde(default = "up")]
     pub axis: [f64; 3],
-    /// Bounds of a hinge's angle, rad, or of a slider's travel, m, which are 0 at the start. Of a ball:
-    /// 0 and the greatest angle of its axis, rad.
+    /// Bounds of a hinge's angle, rad, or of a slider's travel, m, which are 0 at the start. Of a
+    /// ball: 0 and the greatest angle of its axis, rad.
     #[serde(default)]
     pub limits: Option<[f64; 2]>,
     /// Drives a hinge or a slider.
@@ -178,8 +178,8 @@ pub struct BodySection {
     /// Path of a mesh file, which is encoded with the preset `fast` when the scene is loaded.
     #[serde(default)]
     pub mesh: Option<PathBuf>,
-    /// What is inside of the mesh of `mesh`: `winding`, `nonzero`, `odd`, `generalized` or `sheet`. The
-    /// default is `winding`.
+    /// What is inside of the mesh of `mesh`: `winding`, `nonzero`, `odd`, `generalized` or `sheet`.
+    /// The default is `winding`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub inside: Option<String>,
     /// Thickness of the mesh as a sheet, in the unit of the mesh.
@@ -189,7 +189,7 @@ pub struct BodySection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceFaces>,
     /// `auto`: a mesh without a well-defined inside is repaired before it is encoded, if a repair
-    /// works; `never`, the default: it is an error.
+    /// works; `never`, the default: it is an error. Only a body with `mesh` may have `auto`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub repair: Option<String>,
     /// A simple shape.

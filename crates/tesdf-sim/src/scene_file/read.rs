@@ -154,7 +154,7 @@ impl LoadedScene {
                 false => (None, Some(file.clone()), None),
             };
             if is_asset {
-                // An asset has its own.
+                // An asset has its own, and is repaired already.
                 (body.inside, body.thickness, body.surface, body.repair) = (None, None, None, None);
             }
         }

@@ -8,8 +8,8 @@ use crate::base::Side;
 pub const VERTICES: SectionSpec = SectionSpec::required("mesh.vertices", Element::F64, 3);
 /// `[F, 3]` corner vertices of the faces, in the order of the face tree's leaves.
 pub const FACES: SectionSpec = SectionSpec::required("mesh.faces", Element::U32, 3);
-/// `[S, 3]` corner vertices of faces that are no part of the surface, but count for the sign. Only in
-/// files of version 2.
+/// `[S, 3]` corner vertices of faces that are no part of the surface, but count for the sign. Only
+/// in files of version 2.
 pub const SIGN_FACES: SectionSpec = SectionSpec::optional("mesh.sign_faces", Element::U32, 3);
 /// `[F]` id of each face in the source mesh.
 pub const FACE_IDS: SectionSpec = SectionSpec::required("mesh.face_ids", Element::U32, 1);

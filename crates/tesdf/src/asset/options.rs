@@ -98,8 +98,8 @@ pub struct Groups {
     /// stay longer where small cells need them too, such as over a vertex of more faces, or where
     /// more faces are equally near.
     ///
-    /// [`max_entries`](EncodeOptions::max_entries) drops no face that is needed nearer to the surface
-    /// than this, so distances are exact that far.
+    /// [`max_entries`](EncodeOptions::max_entries) drops no face that is needed nearer to the
+    /// surface than this, so distances are exact that far.
     pub fit_within: Length,
 }
 

@@ -234,8 +234,8 @@ impl TeSdf {
         })
     }
 
-    /// Bounds of the solid, in the unit of the mesh: those of the mesh, and half of the thickness of a
-    /// sheet around them.
+    /// Bounds of the solid, in the unit of the mesh: those of the mesh, and half of the thickness
+    /// of a sheet around them.
     pub(crate) fn bounds_of_solid(&self) -> Aabb {
         self.bounds.grown(self.half_thickness * self.frame.inverse_scale())
     }
@@ -422,8 +422,8 @@ impl TeSdf {
         });
     }
 
-    /// As [`store_normals`](Self::store_normals), for queries. After a move they compute the normals
-    /// of the few faces that they need: the next move may follow soon.
+    /// As [`store_normals`](Self::store_normals), for queries. After a move they compute the
+    /// normals of the few faces that they need: the next move may follow soon.
     #[inline]
     pub(crate) fn store_normals_unless_moved(&self) {
         if self.motion.is_none() {

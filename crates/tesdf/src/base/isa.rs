@@ -25,8 +25,9 @@ impl Isa {
         Self::of_processor().iter().rfind(within).copied().unwrap_or(Self::Baseline)
     }
 
-    /// Makes this process use this instruction set or a narrower one, for benchmarks of the narrower
-    /// ones. It holds for assets that are opened, and meshes that are encoded, from now on.
+    /// Makes this process use this instruction set or a narrower one, for benchmarks of the
+    /// narrower ones. It holds for assets that are opened, and meshes that are encoded, from now
+    /// on.
     #[doc(hidden)]
     pub fn limit_to(self) {
         LIMIT.store(self as u8, Ordering::Relaxed);

@@ -32,17 +32,17 @@ impl Ahead {
         self.way.length() + arc(self.turn, self.reach)
     }
 
-    /// Upper bound of the change of the distance between any point of this instance and any point of
-    /// the other one: by this distance, a gap can close. Proof: `docs/math.md`, section 16.
+    /// Upper bound of the change of the distance between any point of this instance and any point
+    /// of the other one: by this distance, a gap can close. Proof: `docs/math.md`, section 16.
     ///
-    /// It does not depend on the velocity that both have in common: bodies that move together as one
-    /// rigid body have a bound of nearly zero.
+    /// It does not depend on the velocity that both have in common: bodies that move together as
+    /// one rigid body have a bound of nearly zero.
     pub fn closing(&self, other: &Self) -> f64 {
         (self.motion() + other.motion()).min(self.around(other)).min(other.around(self))
     }
 
-    /// The bound by the motion of this instance as the other one sees it, split into that of the origin
-    /// and the rotation about it.
+    /// The bound by the motion of this instance as the other one sees it, split into that of the
+    /// origin and the rotation about it.
     fn around(&self, other: &Self) -> f64 {
         let way = self.way - other.way;
         let from_other = self.origin - other.origin;

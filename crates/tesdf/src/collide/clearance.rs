@@ -61,10 +61,10 @@ pub struct Clearance {
 
 /// The clearance of two instances, whatever their worlds, groups and exclusions.
 ///
-/// A best-first search over the face trees of both bodies, each in the field of the other body. When
-/// the bodies are apart, both orders would give the same result. Then only the surface with fewer
-/// faces is searched, and the other surface only for parts inside. The search runs on the current
-/// rayon pool. The result is the same for any number of threads.
+/// A best-first search over the face trees of both bodies, each in the field of the other body.
+/// When the bodies are apart, both orders would give the same result. Then only the surface with
+/// fewer faces is searched, and the other surface only for parts inside. The search runs on the
+/// current rayon pool. The result is the same for any number of threads.
 ///
 /// The signed distance of the surface of a sphere or capsule is that of its centre or segment minus
 /// its radius. This is exact while these are outside the other body. With them inside, it is at

@@ -71,8 +71,8 @@ pub struct Statistics {
     /// Faces, edges or nodes of a that remain after the broad phase, over all pairs. With
     /// [`Deepest`](super::Reduction::Deepest), this and all other numbers count what was looked at.
     pub candidates: usize,
-    /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell. With
-    /// one contact per face: faces. An edge counts once.
+    /// Pairs of a face and a cell whose clipped polygon is not empty, or of a node and its cell.
+    /// With one contact per face: faces. An edge counts once.
     pub polygons: usize,
     /// Contacts within the contact distance.
     pub touching: usize,

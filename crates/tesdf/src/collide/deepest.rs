@@ -7,8 +7,8 @@
 //! the queue is above it.
 //!
 //! The result is exact: the contacts are those that a detection without reduction finds, cut to the
-//! deepest. Where bounds cannot tell depths apart, as between two flanks of a thread that are nearly
-//! parallel, every face that touches is still compared with the limit.
+//! deepest. Where bounds cannot tell depths apart, as between two flanks of a thread that are
+//! nearly parallel, every face that touches is still compared with the limit.
 use std::collections::BTreeMap;
 
 use super::few::{OfPair, unfound};

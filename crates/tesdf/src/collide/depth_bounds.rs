@@ -73,9 +73,9 @@ impl DepthBounds {
 
     /// Adds a bound and finds the new greatest value.
     ///
-    /// The least bound is concave. Where the new bound cuts off its greatest value, the new greatest
-    /// value is on the new bound: at a corner, on an edge where another bound is equal, or inside
-    /// where two others are equal.
+    /// The least bound is concave. Where the new bound cuts off its greatest value, the new
+    /// greatest value is on the new bound: at a corner, on an edge where another bound is equal, or
+    /// inside where two others are equal.
     fn push(&mut self, bound: Bound) {
         self.bounds.push(bound);
         if value(&bound.at, self.at) >= self.greatest {

@@ -21,8 +21,9 @@ const LOWER: f64 = 0.5 * SLOPE;
 /// A contact is on a side of a face when it is nearer to it than this fraction of the longest edge.
 const ON_SIDE: f64 = 1e-4;
 
-/// Behind a wall the distance falls by at least this fraction of what it falls behind a plane. Measured
-/// with 0.5 and 0.95; a chain that swings under load holds with both, with 0.5 it is less deep.
+/// Behind a wall the distance falls by at least this fraction of what it falls behind a plane.
+/// Measured with 0.5 and 0.95; a chain that swings under load holds with both, with 0.5 it is less
+/// deep.
 const WALL: f64 = 0.5;
 
 /// The distance to the point that shows the fall: a fraction of the signed distance, because the
@@ -56,12 +57,12 @@ struct Side {
     inward: DVec3,
 }
 
-/// Whether the distance falls from a point along the surface, steeper than [`SLOPE`], and its plane is no
-/// wall.
+/// Whether the distance falls from a point along the surface, steeper than [`SLOPE`], and its plane
+/// is no wall.
 ///
 /// Another point of the same face or of a face beside it shows the fall: it is lower. So each
-/// contact that is dropped is followed by a lower one, and the deepest one stays. Planes and rounded
-/// shapes have no faces, and their points stay.
+/// contact that is dropped is followed by a lower one, and the deepest one stays. Planes and
+/// rounded shapes have no faces, and their points stay.
 ///
 /// `has_contact` tells whether a face with a lower point has a lower contact.
 pub fn descends(
@@ -89,11 +90,11 @@ pub fn descends(
 
 /// Whether the plane of a contact is a wall: the body cannot pass it sideways.
 ///
-/// In a groove, as in the bend of a chain link, the only minimum is the bottom, and its plane does not
-/// hold a body that is pushed to the side. The planes of the faces beside it do. Where the other body
-/// is convex, the surface turns away from such a plane instead, and a body that slides by has room. So
-/// the point is moved sideways by twice the way at which it meets the plane. Behind a wall it is as deep
-/// as it was high before; on a surface that turns away it is not.
+/// In a groove, as in the bend of a chain link, the only minimum is the bottom, and its plane does
+/// not hold a body that is pushed to the side. The planes of the faces beside it do. Where the
+/// other body is convex, the surface turns away from such a plane instead, and a body that slides
+/// by has room. So the point is moved sideways by twice the way at which it meets the plane. Behind
+/// a wall it is as deep as it was high before; on a surface that turns away it is not.
 fn is_wall(own: &Triangle, field: &FieldBody, at: &OnFace) -> bool {
     let along = at.gradient.reject_from_normalized(own.normal);
     let slope = along.length();

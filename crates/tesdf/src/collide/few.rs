@@ -10,8 +10,8 @@ use super::{Contact, Contacts, Mode, PairReduction, Statistics, hidden};
 use crate::geometry::Aabb;
 use crate::parallel::*;
 
-/// The contacts of ordered pairs, by a search in each pair of instances. The two orders of a pair must
-/// be adjacent. Once `stop` is set, contacts are missing.
+/// The contacts of ordered pairs, by a search in each pair of instances. The two orders of a pair
+/// must be adjacent. Once `stop` is set, contacts are missing.
 pub fn of_pairs(
     pairs: &[OrderedPair],
     mode: Mode,

@@ -135,8 +135,8 @@ impl<'a> FieldBody<'a> {
         self.least_up_to(p, radius, reach).is_none()
     }
 
-    /// Lower bound of the signed distance within `radius` of `p`; `None` where it is certain that no
-    /// point there has a signed distance up to `reach`. All in the field's frame.
+    /// Lower bound of the signed distance within `radius` of `p`; `None` where it is certain that
+    /// no point there has a signed distance up to `reach`. All in the field's frame.
     pub fn least_up_to(&self, p: DVec3, radius: f64, reach: f64) -> Option<f64> {
         let limit = radius + reach;
         // Far out, the bounds are a good approximation of the body.
@@ -190,8 +190,9 @@ impl<'a> FieldBody<'a> {
         distance - slack - radius
     }
 
-    /// The nearest points of a part's surface and of the body's surface, where the part's core is at
-    /// `point` and has this radius, the thickness of the body included. All in the field's frame.
+    /// The nearest points of a part's surface and of the body's surface, where the part's core is
+    /// at `point` and has this radius, the thickness of the body included. All in the field's
+    /// frame.
     pub fn surface_points(&self, point: DVec3, radius: f64, value: &FieldValue) -> [DVec3; 2] {
         let half = self.half_thickness();
         [point - (radius - half) * value.gradient, value.closest_point + half * value.gradient]
@@ -254,8 +255,8 @@ impl CellField<'_> {
         }
     }
 
-    /// The mesh, the part of it that answers points, and the faces of the list there. The whole field
-    /// of a mesh has `none`. `None` for a simple shape.
+    /// The mesh, the part of it that answers points, and the faces of the list there. The whole
+    /// field of a mesh has `none`. `None` for a simple shape.
     pub fn mesh<'b>(&'b self, none: &'b Faces) -> Option<(&'b TeSdf, Place, &'b Faces)> {
         match *self {
             Self::Mesh { asset, place, faces } => Some((asset, place, faces)),
@@ -387,8 +388,8 @@ impl TeSdf {
         near: impl FnOnce(&mut dyn FnMut(u32, Closest)),
     ) -> FieldValue {
         let limit = value.distance.abs() + tie;
-        // On the surface the gradients are the normals of the faces, and of a sheet those of both of
-        // its sides.
+        // On the surface the gradients are the normals of the faces, and of a sheet those of both
+        // of its sides.
         let on_surface = is_on_surface(&value, tie);
         let (mut best, mut id) = (value, self.face_ids[value.position as usize]);
         near(&mut |face, closest| {

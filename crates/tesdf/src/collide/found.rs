@@ -37,9 +37,9 @@ pub fn one_per_vertex(contacts: Vec<Contact>, at_vertices: &[AtVertex]) -> Vec<C
     contacts.into_iter().zip(keep).filter_map(|(contact, keep)| keep.then_some(contact)).collect()
 }
 
-/// For each of `count` contacts: whether it is kept. Of those with the same vertex, the one with the
-/// least cosine is; among equals, that of the lowest face. `keys` are vertex, cosine, face and index
-/// of the contacts at vertices.
+/// For each of `count` contacts: whether it is kept. Of those with the same vertex, the one with
+/// the least cosine is; among equals, that of the lowest face. `keys` are vertex, cosine, face and
+/// index of the contacts at vertices.
 pub fn kept_at_vertices<V: Ord + Send>(mut keys: Vec<(V, i64, u32, usize)>, count: usize) -> Vec<bool> {
     keys.par_sort_unstable();
     let mut keep = vec![true; count];

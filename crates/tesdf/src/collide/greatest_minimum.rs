@@ -1,5 +1,5 @@
-//! The greatest minimum of linear functions over a triangle. Each function is given by its values at
-//! the corners, a place by its barycentric coordinates.
+//! The greatest minimum of linear functions over a triangle. Each function is given by its values
+//! at the corners, a place by its barycentric coordinates.
 use glam::DVec3;
 
 /// The value of a linear function at a place.
@@ -21,8 +21,8 @@ pub fn equal_on_edges(d: [f64; 3]) -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// The place in the triangle where three functions are equal. `d` and `e` are the differences of two
-/// of them from the third.
+/// The place in the triangle where three functions are equal. `d` and `e` are the differences of
+/// two of them from the third.
 pub fn equal_inside(d: [f64; 3], e: [f64; 3]) -> Option<[f64; 3]> {
     // Weights of sum 1 at which both differences are 0.
     let w = DVec3::from(d).cross(DVec3::from(e));

@@ -18,9 +18,9 @@ impl HiddenOverlap {
     /// Overlaps at least this deep are found. A fraction of the smaller of the bodies' [inner
     /// balls](super::Shape::inner_ball).
     pub const SURE: f64 = 0.5;
-    /// Overlaps at least this deep are found when few evaluations are enough: one for each face, and
-    /// [`FINE_LOOKS`](Self::FINE_LOOKS) more. Shallower overlaps are never reported. A fraction as
-    /// for [`SURE`](Self::SURE).
+    /// Overlaps at least this deep are found when few evaluations are enough: one for each face,
+    /// and [`FINE_LOOKS`](Self::FINE_LOOKS) more. Shallower overlaps are never reported. A fraction
+    /// as for [`SURE`](Self::SURE).
     pub const FINE: f64 = 0.05;
     /// Number of evaluations per body, besides one for each face, in the search for depths below
     /// [`SURE`](Self::SURE).

@@ -13,8 +13,8 @@ pub struct InstancePair {
     /// The instance with the higher id.
     pub second: InstanceId,
     /// The pair's contact distance: contacts are reported up to this signed distance, in the
-    /// world's unit. It is that of the options, plus what the velocities of the two, relative to each
-    /// other, can close within the speculative time.
+    /// world's unit. It is that of the options, plus what the velocities of the two, relative to
+    /// each other, can close within the speculative time.
     pub contact_distance: f64,
 }
 
@@ -132,8 +132,8 @@ impl Entry {
         }
     }
 
-    /// The pair of two entries, the lower id first, if their own bounds are within the pair's contact
-    /// distance. Two planes are no pair.
+    /// The pair of two entries, the lower id first, if their own bounds are within the pair's
+    /// contact distance. Two planes are no pair.
     pub fn pair(a: &Self, b: &Self, contact_distance: f64) -> Option<InstancePair> {
         if !a.bounds.overlaps(b.bounds) || a.is_plane && b.is_plane {
             return None;

@@ -8,11 +8,11 @@ use crate::geometry::{Aabb, AabbTree};
 /// The pairs of instances that can touch, for a scene whose instances move a little from step to
 /// step.
 ///
-/// They are the same as those of [`instance_pairs`](super::instance_pairs()), in the same order. Each
-/// instance has a wider box, which it may move in. Pairs of wider boxes that overlap are kept, and
-/// only they are tested. A tree finds the pairs of an instance that has left its wider box. So the
-/// time of a step is proportional to the number of instances, and instances at rest cost next to
-/// nothing. When instances are added or removed, or change their world, all is made anew.
+/// They are the same as those of [`instance_pairs`](super::instance_pairs()), in the same order.
+/// Each instance has a wider box, which it may move in. Pairs of wider boxes that overlap are kept,
+/// and only they are tested. A tree finds the pairs of an instance that has left its wider box. So
+/// the time of a step is proportional to the number of instances, and instances at rest cost next
+/// to nothing. When instances are added or removed, or change their world, all is made anew.
 ///
 /// ```
 /// use tesdf::collide::{CollideOptions, Instance, InstancePairs, Pose, Scene, Shape, detect, detect_with};

@@ -62,8 +62,8 @@ const SHARE: usize = 8;
 /// number of threads.
 ///
 /// When the bodies are apart by a distance, no surface comes nearer to the other than that. So as
-/// long as no overlap is known, only the first order is searched. Then the other orders are searched
-/// for points that are at least as deep as the distance.
+/// long as no overlap is known, only the first order is searched. Then the other orders are
+/// searched for points that are at least as deep as the distance.
 pub fn least(orders: &[Order], tolerance: f64) -> Option<Least> {
     Search::new(orders, tolerance).run(MAX_PARTS)
 }

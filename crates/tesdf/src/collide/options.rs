@@ -38,9 +38,9 @@ pub enum ContactsPer {
     Face,
     /// A local minimum of the signed distance over the surface of body *a*: the contacts of
     /// [`Face`](Self::Face), without those beside which the surface is lower, where the distance
-    /// falls by more than 0.1 per unit of length. As planes, these would stop bodies that have room;
-    /// those that are walls all the same, as the sides of a groove, stay. Each that is left out is
-    /// followed by a lower one, so the deepest contact remains.
+    /// falls by more than 0.1 per unit of length. As planes, these would stop bodies that have
+    /// room; those that are walls all the same, as the sides of a groove, stay. Each that is left
+    /// out is followed by a lower one, so the deepest contact remains.
     Minimum,
 }
 
@@ -55,14 +55,14 @@ pub enum Reduction {
     PerPair(u32),
     /// The deepest contacts, at most this many per pair of instances. They are exactly the deepest
     /// of all contacts; of equally deep ones, the first in the order of a detection. The search is
-    /// best-first and does not find the other contacts. All deepest contacts may be at one place, so
-    /// they can hold a body worse than as many contacts of [`PerPair`](Self::PerPair).
+    /// best-first and does not find the other contacts. All deepest contacts may be at one place,
+    /// so they can hold a body worse than as many contacts of [`PerPair`](Self::PerPair).
     Deepest(u32),
     /// At most this many contacts per pair of instances, spread over the places that touch. The
     /// surfaces are divided into as many regions, and the deepest contact that a dive into each
     /// region finds is kept. The time follows this number, not the number of faces that touch. The
-    /// deepest contact of all may be missing; [`PairReduction::left_out_above`] says how deep it can
-    /// be. A device finds all contacts and keeps those of [`PerPair`](Self::PerPair).
+    /// deepest contact of all may be missing; [`PairReduction::left_out_above`] says how deep it
+    /// can be. A device finds all contacts and keeps those of [`PerPair`](Self::PerPair).
     ///
     /// [`PairReduction::left_out_above`]: super::PairReduction::left_out_above
     Spread(u32),

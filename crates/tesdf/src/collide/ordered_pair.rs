@@ -115,7 +115,8 @@ impl<'a> OrderedPair<'a> {
     }
 
     /// Why a minimum of a candidate is no contact, if it is none: Eq. (10), which does not apply to
-    /// rounded shapes and sheets, because they have normals in all directions; or a lower point beside it.
+    /// rounded shapes and sheets, because they have normals in all directions; or a lower point
+    /// beside it.
     pub fn dropped(&self, part: &Part, candidate: u32, minimum: &Minimum) -> Option<Dropped> {
         match self.options.mode {
             Mode::Node => return None,

@@ -93,8 +93,8 @@ const FEW: usize = 4;
 const THIN: f64 = 1e-3;
 /// Values in `f32` are used while more than this is to be gained (local frame).
 const COARSE: f64 = 1e-4;
-/// Nearer to the surface than this (local frame), a piece may cross it. Where two faces cross, their
-/// computed distance is rarely 0 but about 1e-17.
+/// Nearer to the surface than this (local frame), a piece may cross it. Where two faces cross,
+/// their computed distance is rarely 0 but about 1e-17.
 const CLEAR: f64 = 1e-9;
 
 impl Piece {
@@ -306,8 +306,8 @@ impl Looks<'_> {
         self.divided(&piece, bound, plane)
     }
 
-    /// The parts of a piece that can still be lower than all others. The piece is cut along a plane,
-    /// or halved.
+    /// The parts of a piece that can still be lower than all others. The piece is cut along a
+    /// plane, or halved.
     fn divided(&self, piece: &Piece, bound: f64, plane: Option<Plane>) -> Rest {
         let cut = match (plane, self.field.field) {
             (Some(plane), Field::Mesh(asset)) => piece.cut(asset, plane),
@@ -372,8 +372,8 @@ impl Looks<'_> {
         if piece.bounds.greatest < before { Progress::Lower } else { Progress::None }
     }
 
-    /// The plane through a side of a face, perpendicular to the face, that the piece crosses deepest.
-    /// A piece that is large against the face is halved instead.
+    /// The plane through a side of a face, perpendicular to the face, that the piece crosses
+    /// deepest. A piece that is large against the face is halved instead.
     fn beyond(&self, piece: &Piece, triangle: &Triangle) -> Progress {
         let [a, b, c] = triangle.corners;
         let size = piece.reach(piece.center());
@@ -420,7 +420,8 @@ impl Looks<'_> {
             .then(|| heights.map(|h| h.abs() + hair))
     }
 
-    /// The side of a piece of a mesh's field. Where it is outside, its nearest point is a candidate.
+    /// The side of a piece of a mesh's field. Where it is outside, its nearest point is a
+    /// candidate.
     fn side(&mut self, piece: &Piece) -> Side {
         let Field::Mesh(asset) = self.field.field else { return Side::Inside };
         let (points, normal, clear) = (piece.points(), piece.normal, self.hair());

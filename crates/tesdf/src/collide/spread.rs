@@ -3,12 +3,12 @@
 //!
 //! The face trees of both bodies are divided from the top, the largest node first, into as many
 //! regions as contacts are wanted. Nodes that cannot touch are dropped on the way. In each region a
-//! dive goes to the child whose middle is lower in the field, down to a leaf. The deepest contact of
-//! the leaf is kept. A dive that finds no contact goes on with the lowest node that it has passed, at
-//! a few leaves at most.
+//! dive goes to the child whose middle is lower in the field, down to a leaf. The deepest contact
+//! of the leaf is kept. A dive that finds no contact goes on with the lowest node that it has
+//! passed, at a few leaves at most.
 //!
-//! Every node that was passed has a lower bound of the distances of its contacts. The least of these
-//! bounds says how deep a contact can be that was not found.
+//! Every node that was passed has a lower bound of the distances of its contacts. The least of
+//! these bounds says how deep a contact can be that was not found.
 use super::few::{OfPair, unfound};
 use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
 use super::ordered_pair::OrderedPair;

@@ -18,8 +18,8 @@ pub struct SurfaceBody<'a> {
     shift: DVec3,
     /// Field units per unit of the shape.
     scale: f64,
-    /// How far the surfaces lie from the faces and the field's zero: half of the thicknesses of both
-    /// bodies, where they are sheets. In the field's frame.
+    /// How far the surfaces lie from the faces and the field's zero: half of the thicknesses of
+    /// both bodies, where they are sheets. In the field's frame.
     around: f64,
 }
 
@@ -200,8 +200,8 @@ impl<'a> SurfaceBody<'a> {
         matches!(self.shape, Shape::Mesh(asset) if asset.half_thickness > 0.0)
     }
 
-    /// The corners of a face, or of the core of a rounded shape, whose surface lies within the radius.
-    /// A segment has two equal corners.
+    /// The corners of a face, or of the core of a rounded shape, whose surface lies within the
+    /// radius. A segment has two equal corners.
     pub fn triangle(&self, face: u32, field: &FieldBody) -> ([DVec3; 3], f64) {
         match self.shape {
             Shape::Mesh(asset) => (asset.face_corners(face as usize).map(|p| self.to_field(p)), self.around),
@@ -224,9 +224,9 @@ impl<'a> SurfaceBody<'a> {
         Some(Triangle::new(corners.map(|p| self.to_field(p))))
     }
 
-    /// Whether one of the other faces that share all of these corners of a face is accepted. Faces of
-    /// a mesh are left out to which a direction `across` is perpendicular, up to an angle whose sine
-    /// is `level`.
+    /// Whether one of the other faces that share all of these corners of a face is accepted. Faces
+    /// of a mesh are left out to which a direction `across` is perpendicular, up to an angle whose
+    /// sine is `level`.
     pub fn any_beside(
         &self,
         face: u32,
@@ -374,8 +374,8 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// The candidates of a leaf of the face tree, or of all parts of a simple shape. In node mode, a
-    /// vertex belongs to the leaf of its lowest face, and in edge mode an edge, too.
+    /// The candidates of a leaf of the face tree, or of all parts of a simple shape. In node mode,
+    /// a vertex belongs to the leaf of its lowest face, and in edge mode an edge, too.
     pub fn of_leaf(&self, start: u32, count: u32, mode: Mode) -> Candidates {
         match (mode, self.shape) {
             (Mode::Edge, _) => {

@@ -172,9 +172,9 @@ impl<'a> Encoder<'a> {
 
     /// Reads a mesh file, checks that the mesh is a solid, and encodes it.
     ///
-    /// The asset records the name and the BLAKE3 of the file as its [`Source`], and the unit of a file
-    /// that has one, unless [`unit`](Self::unit) was called. Warnings about a
-    /// mesh that can be encoded ([`SolidMesh::warnings`]) are not reported.
+    /// The asset records the name and the BLAKE3 of the file as its [`Source`], and the unit of a
+    /// file that has one, unless [`unit`](Self::unit) was called. Warnings about a mesh that can be
+    /// encoded ([`SolidMesh::warnings`]) are not reported.
     ///
     /// # Errors
     /// [`EncodeFileError`]: the file cannot be read, its mesh has no well-defined inside, or it

@@ -242,8 +242,8 @@ fn at_tie<L: Doubles>(rule: &PlaneRule, at: usize, corner: usize, value: L, lowe
     L::select(L::both(shares, passes), tie, value)
 }
 
-/// Whether some chord lies below all four values. The chords at `winner` are tried first; it becomes
-/// the place of a chord that was found. Neighbouring candidates often have the same rival.
+/// Whether some chord lies below all four values. The chords at `winner` are tried first; it
+/// becomes the place of a chord that was found. Neighbouring candidates often have the same rival.
 #[inline(always)]
 fn any_below<L: Doubles>(chords: &[&[f64]; 4], t: [f64; 4], winner: &mut usize) -> bool {
     let t = [L::splat(t[0]), L::splat(t[1]), L::splat(t[2]), L::splat(t[3])];

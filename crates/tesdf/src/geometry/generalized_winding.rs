@@ -17,9 +17,9 @@ use super::{Aabb, WindingNumber, perturbed_orientation, signed_crossing};
 ///                         C: solid angles of the added triangles / 4 pi
 /// ```
 ///
-/// `N` and `C` jump at an added triangle, `w` does not. So both are taken at the same point `x + (e,
-/// e^2, e^3)` with an infinitesimal `e > 0`: the sign of the solid angle of a triangle that has `x`
-/// in its plane is that of [`perturbed_orientation`].
+/// `N` and `C` jump at an added triangle, `w` does not. So both are taken at the same point `x +
+/// (e, e^2, e^3)` with an infinitesimal `e > 0`: the sign of the solid angle of a triangle that has
+/// `x` in its plane is that of [`perturbed_orientation`].
 ///
 /// Near an edge of an added triangle its solid angle is badly conditioned. Then another apex is
 /// taken; only near an open edge of the mesh all of them are badly conditioned.
@@ -55,8 +55,8 @@ pub struct Generalized {
 }
 
 impl GeneralizedWinding {
-    /// Builds the tree over the faces, and finds the edges that close the mesh. `position` gives the
-    /// position of a vertex.
+    /// Builds the tree over the faces, and finds the edges that close the mesh. `position` gives
+    /// the position of a vertex.
     pub fn new(faces: &[[u32; 3]], position: impl Fn(u32) -> DVec3) -> Self {
         let triangles: Vec<[DVec3; 3]> = faces.iter().map(|f| f.map(&position)).collect();
         let bounds = triangles.iter().map(|t| Aabb::of(t)).fold(Aabb::EMPTY, Aabb::union);
@@ -97,6 +97,11 @@ impl GeneralizedWinding {
     /// Whether the mesh is closed, so that the number is an integer everywhere.
     pub fn is_closed(&self) -> bool {
         self.edges.is_empty()
+    }
+
+    /// Largest number of solid angles that [`at`](Self::at) computes.
+    pub(crate) fn angles_per_point(&self) -> usize {
+        self.cones.iter().map(Vec::len).sum()
     }
 
     /// The winding number of the faces, which is that of the mesh where it is closed.
@@ -149,8 +154,8 @@ impl GeneralizedWinding {
         self.at(x).value.abs() >= 0.5
     }
 
-    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are on
-    /// one side. No face may come within `radius` of `x`.
+    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are
+    /// on one side. No face may come within `radius` of `x`.
     ///
     /// The gradient of the solid angle of a loop is at most the integral of `dl / r²` along the
     /// loop (Biot and Savart).
@@ -172,15 +177,15 @@ impl GeneralizedWinding {
     }
 }
 
-/// Bound of the rounding of a solid angle with the condition 1: a dozen roundings of a 64-bit float,
-/// divided by 4 pi, and a factor for safety.
+/// Bound of the rounding of a solid angle with the condition 1: a dozen roundings of a 64-bit
+/// float, divided by 4 pi, and a factor for safety.
 const ROUNDING: f64 = 4e-15;
 /// A cell is on one side only where the number differs from 1/2 by more than this.
 const DECIDED: f64 = 1e-9;
 
-/// The solid angle of a triangle from `x + (e, e^2, e^3)` (Van Oosterom and Strackee 1983): positive
-/// where the point is behind the triangle. Also its condition, 0 to 1: the error is some roundings
-/// divided by the condition.
+/// The solid angle of a triangle from `x + (e, e^2, e^3)` (Van Oosterom and Strackee 1983):
+/// positive where the point is behind the triangle. Also its condition, 0 to 1: the error is some
+/// roundings divided by the condition.
 fn solid_angle(triangle: [DVec3; 3], x: DVec3) -> (f64, f64) {
     // Triangles without area have no solid angle.
     let side = perturbed_orientation(triangle, x);

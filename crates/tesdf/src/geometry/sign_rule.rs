@@ -48,8 +48,8 @@ impl SignRule {
         if self.is_inside(x) { Side::Inside } else { Side::Outside }
     }
 
-    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are on
-    /// one side. The sides of faces that come there must not differ.
+    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are
+    /// on one side. The sides of faces that come there must not differ.
     pub fn side_within(&self, x: DVec3, radius: f64) -> Option<Side> {
         let inside = match &self.number {
             Number::Integer(_) => self.is_inside(x),

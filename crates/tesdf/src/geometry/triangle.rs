@@ -197,8 +197,8 @@ impl Triangle {
         Closest { distance: p.distance(point), point, feature }
     }
 
-    /// The point of edge `k` that is closest to a point whose positions along the edge from its start
-    /// and from its end are known, and its feature.
+    /// The point of edge `k` that is closest to a point whose positions along the edge from its
+    /// start and from its end are known, and its feature.
     #[inline]
     fn on_edge(&self, k: usize, start: f64, end: f64) -> (DVec3, Feature) {
         let next = (k + 1) % 3;

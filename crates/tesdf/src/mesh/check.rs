@@ -42,7 +42,8 @@ pub struct CheckReport {
     /// Least and greatest winding number found; `None` when it is not an integer everywhere or was
     /// not tested.
     pub winding: Option<[i32; 2]>,
-    /// Whether the mesh can be encoded: it has a well-defined inside, that is, no defect is an error.
+    /// Whether the mesh can be encoded: it has a well-defined inside, that is, no defect is an
+    /// error.
     pub encodable: bool,
     /// All defects, sorted by kind.
     pub defects: Vec<Defect>,

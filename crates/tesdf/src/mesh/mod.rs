@@ -2,6 +2,7 @@
 mod check;
 mod count;
 mod defect;
+mod other_rules;
 mod polygon;
 mod presented;
 mod read;
@@ -17,6 +18,7 @@ mod write;
 pub use check::{BoundaryLoop, CheckReport, check, check_for};
 pub(crate) use check::{FaceClass, Survey, check_and_survey, coordinate_in_range};
 pub use defect::{Defect, DefectKind, Severity};
+pub use other_rules::other_rules;
 pub(crate) use presented::{Presented, Telling};
 pub(crate) use read::text;
 pub use read::{

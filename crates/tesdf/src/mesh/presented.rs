@@ -56,8 +56,8 @@ enum Faces {
 }
 
 impl Presentation {
-    /// `winding` is the range of winding numbers, and `survey` those of all sides of faces, where they
-    /// are known.
+    /// `winding` is the range of winding numbers, and `survey` those of all sides of faces, where
+    /// they are known.
     pub fn new(
         mesh: &TriangleMesh,
         inside: Inside,
@@ -137,8 +137,8 @@ impl Presentation {
         })
     }
 
-    /// The faces of the surface of the mesh, and what tells their sides. `is_simple`: all faces are an
-    /// embedded manifold with winding number 0 or 1 everywhere.
+    /// The faces of the surface of the mesh, and what tells their sides. `is_simple`: all faces are
+    /// an embedded manifold with winding number 0 or 1 everywhere.
     pub fn of<'a>(&self, solid: &'a TriangleMesh, is_simple: bool) -> Result<Presented<'a>, MeshError> {
         let Self { telling, faces, is_simple: own, .. } = self;
         let all = solid.faces();

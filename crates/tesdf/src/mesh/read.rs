@@ -159,8 +159,8 @@ pub struct LoadedMesh {
     /// Statistics and changes.
     pub report: LoadReport,
     /// The objects that the file has: of OBJ those of `o`, or else the groups of `g`; of ASCII STL
-    /// each `solid`; of glTF each node with a mesh; of 3MF each mesh that a build item shows; of STEP,
-    /// IGES and BREP each solid. Empty for other formats.
+    /// each `solid`; of glTF each node with a mesh; of 3MF each mesh that a build item shows; of
+    /// STEP, IGES and BREP each solid. Empty for other formats.
     pub parts: Vec<MeshPart>,
     /// For each vertex and face of the mesh, its source in the file.
     pub origin: Origin,
@@ -202,8 +202,8 @@ pub struct LoadReport {
     pub welded_vertices: usize,
     /// Vertices that are dropped because no face uses them.
     pub unused_vertices: usize,
-    /// Name of the unit of length: of a 3MF file its own, of glTF `m`, of STEP and IGES `mm`, to which
-    /// they are converted. `None` for other formats, which have no unit.
+    /// Name of the unit of length: of a 3MF file its own, of glTF `m`, of STEP and IGES `mm`, to
+    /// which they are converted. `None` for other formats, which have no unit.
     pub unit: Option<String>,
     /// Notes for people, one sentence each.
     pub notes: Vec<String>,
@@ -235,8 +235,8 @@ pub fn read(path: impl AsRef<Path>) -> Result<LoadedMesh, ReadError> {
     read_with(path, &CadOptions::default())
 }
 
-/// The same as [`read`], with options for files of CAD formats ([`MeshFormat::is_cad`]). Other files
-/// are read without them.
+/// The same as [`read`], with options for files of CAD formats ([`MeshFormat::is_cad`]). Other
+/// files are read without them.
 ///
 /// # Errors
 /// The same as for [`read`].

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::count::count;
 use super::{
     AutoRepaired, CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, MeshError, ReadError,
-    RepairOptions, Severity, Topology, TriangleMesh, check_and_survey, presented::Presentation,
+    RepairOptions, Severity, Survey, TriangleMesh, check_and_survey, other_rules, presented::Presentation,
     presented::Presented, read, repair_auto,
 };
 use crate::base::{Inside, InsideRule};
@@ -72,8 +72,8 @@ impl SolidMesh {
     /// Checks the mesh with [`check`](super::check()).
     ///
     /// # Errors
-    /// [`NotSolid`] has all errors, and the options of the repair that would help, if one does. Only
-    /// a mesh that is refused costs the time of trying them.
+    /// [`NotSolid`] has all errors, and the options of the repair that would help, if one does.
+    /// Only a mesh that is refused costs the time of trying them.
     ///
     /// # Example
     ///
@@ -123,15 +123,20 @@ impl SolidMesh {
     /// ```
     pub fn with_inside(mesh: TriangleMesh, inside: Inside) -> Result<Self, NotSolid> {
         let (report, survey) = check_and_survey(&mesh, inside.rule);
-        if !report.encodable {
-            let found = repair_auto(&mesh).ok().flatten();
-            return Err(NotSolid::new(&mesh, report, found.and_then(|found| found.options)));
+        if report.encodable {
+            return Ok(Self::checked(mesh, inside, report, survey));
         }
+        let found = repair_auto(&mesh).ok().flatten();
+        Err(NotSolid::new(&mesh, report, found.and_then(|found| found.options)))
+    }
+
+    /// The solid of a mesh that its report says is encodable under the rule.
+    fn checked(mesh: TriangleMesh, inside: Inside, report: CheckReport, survey: Option<Survey>) -> Self {
         let simple = report.is_simple();
         let (mut warnings, winding) = (report.defects, report.winding);
         let presentation = Presentation::new(&mesh, inside, winding, survey);
         warnings.extend(presentation.partly_buried(&mesh));
-        Ok(Self { mesh, warnings, simple, inside, presentation })
+        Self { mesh, warnings, simple, inside, presentation }
     }
 
     /// What is inside, and which faces are the surface.
@@ -169,9 +174,9 @@ impl SolidMesh {
     /// # }
     /// ```
     pub fn repaired(mesh: TriangleMesh, inside: Inside) -> Result<(Self, Option<AutoRepaired>), NotSolid> {
-        let (report, _) = check_and_survey(&mesh, inside.rule);
+        let (report, survey) = check_and_survey(&mesh, inside.rule);
         if report.encodable {
-            return Ok((Self::with_inside(mesh, inside)?, None));
+            return Ok((Self::checked(mesh, inside, report, survey), None));
         }
         match repair_auto(&mesh) {
             Ok(Some(found)) => {
@@ -243,24 +248,6 @@ pub struct NotSolid {
     rules: Vec<InsideRule>,
 }
 
-/// The rules under which a refused mesh is a solid; a sheet without its thickness.
-fn other_rules(mesh: &TriangleMesh, report: &CheckReport) -> Vec<InsideRule> {
-    let out_of_range = |d: &Defect| d.kind == DefectKind::OutOfRange;
-    if report.defects.iter().any(out_of_range) {
-        return Vec::new();
-    }
-    let is_closed = Topology::new(mesh.faces()).is_closed();
-    let mut rules = Vec::new();
-    match report.winding {
-        Some(winding) if winding != [0, 0] => rules.push(InsideRule::Nonzero),
-        None if is_closed => rules.push(InsideRule::Nonzero),
-        None => rules.push(InsideRule::Generalized),
-        Some(_) => {}
-    }
-    rules.push(InsideRule::Sheet { thickness: 0.0 });
-    rules
-}
-
 impl NotSolid {
     fn new(mesh: &TriangleMesh, report: CheckReport, suggestion: Option<RepairOptions>) -> Self {
         Self { rules: other_rules(mesh, &report), report: Box::new(report), suggestion }
@@ -282,7 +269,7 @@ impl NotSolid {
         self.suggestion.as_ref()
     }
 
-    /// The rules under which the mesh can be encoded as it is. A sheet has no thickness here.
+    /// The rules under which the mesh can be encoded as it is: [`other_rules`].
     pub fn rules(&self) -> &[InsideRule] {
         &self.rules
     }
@@ -323,21 +310,23 @@ impl fmt::Display for NotSolid {
                 f.write_str(". `tesdf repair` cannot make it encodable: `tesdf check` lists all defects")?
             }
         }
-        self.rules.iter().try_for_each(|rule| f.write_str(way_on(*rule)))
+        self.rules.iter().try_for_each(|rule| write_way_on(f, *rule))
     }
 }
 
 /// How a rule treats a mesh that is refused under another rule, and its flag.
-fn way_on(rule: InsideRule) -> &'static str {
+fn write_way_on(f: &mut fmt::Formatter<'_>, rule: InsideRule) -> fmt::Result {
     match rule {
-        InsideRule::Winding | InsideRule::Odd => "",
-        InsideRule::Nonzero => ". `--inside nonzero` takes shells that are inside out as solids",
-        InsideRule::Generalized => {
+        InsideRule::Winding | InsideRule::Odd => Ok(()),
+        InsideRule::Nonzero => f.write_str(". `--inside nonzero` takes shells that are inside out as solids"),
+        InsideRule::Generalized => f.write_str(
             ". `--inside generalized` takes it as the solid that its faces enclose for the most part (generalised \
-             winding number)"
-        }
-        InsideRule::Sheet { .. } => {
-            ". `--inside sheet --thickness T` takes its faces as sheets of a thickness"
-        }
+             winding number)",
+        ),
+        InsideRule::Sheet { thickness } => write!(
+            f,
+            ". `--inside sheet --thickness {thickness}` takes its faces as sheets of a thickness, here of some 1 % of \
+             its diagonal"
+        ),
     }
 }

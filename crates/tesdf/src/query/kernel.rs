@@ -66,9 +66,9 @@ fn nearest_avx512(records: &[FaceRecord], faces: &[[u32; LANES]], p: Vec3, best:
     nearest_lanes::<std::arch::x86_64::__m256, LANES>(records, faces, p, best)
 }
 
-/// Writes the squared distances of `faces`, as [`Nearest::distance_squared`], and returns the least.
-/// The distance to a face whose numbers overflow is NaN, and does not count. `out` has the length of
-/// `faces`.
+/// Writes the squared distances of `faces`, as [`Nearest::distance_squared`], and returns the
+/// least. The distance to a face whose numbers overflow is NaN, and does not count. `out` has the
+/// length of `faces`.
 #[inline]
 pub fn distances(
     isa: Isa,

@@ -144,8 +144,8 @@ pub(crate) struct Found {
 pub(crate) const ON_SURFACE_F64: f64 = 5e-10;
 /// The same for `f32` storage: about ten times its rounding.
 const ON_SURFACE_F32: f64 = 1e-6;
-/// Where a rule tells the side, the side of the surface is looked up at this many times the distance
-/// below which a point counts as on it.
+/// Where a rule tells the side, the side of the surface is looked up at this many times the
+/// distance below which a point counts as on it.
 const BESIDE: f64 = 4.0;
 /// Faces that share an edge are at most this far from a point of the edge.
 const TOUCHING: f64 = 1e-12;
@@ -274,8 +274,8 @@ impl TeSdf {
     /// predicates. Points on the surface may count as either; points that are not finite are
     /// outside.
     ///
-    /// For a sheet, and where the generalised winding number of an open mesh is 1/2, this is exact up
-    /// to rounding.
+    /// For a sheet, and where the generalised winding number of an open mesh is 1/2, this is exact
+    /// up to rounding.
     pub fn is_inside(&self, point: DVec3) -> bool {
         if self.half_thickness > 0.0 {
             return self.signed_distance(point) < 0.0;
@@ -314,7 +314,8 @@ impl TeSdf {
         FACES.with_borrow_mut(|faces| {
             if let Place::Listed { offset, .. } = place {
                 self.read_list(offset, faces);
-                // All of them at once: otherwise those of the second chunk would wait for the first.
+                // All of them at once: otherwise those of the second chunk would wait for the
+                // first.
                 self.fetch_faces(faces);
             }
             self.to_answer(self.find(local, place, faces, precision))
@@ -356,8 +357,8 @@ impl TeSdf {
         }
     }
 
-    /// The answer at a point of the local frame that is finite and not far. `faces` are those of the
-    /// place's list, if it has one.
+    /// The answer at a point of the local frame that is finite and not far. `faces` are those of
+    /// the place's list, if it has one.
     #[inline(always)]
     pub(crate) fn find(&self, local: DVec3, place: Place, faces: &Faces, precision: Precision) -> Found {
         match precision {
@@ -424,9 +425,9 @@ impl TeSdf {
         self.answer_f64_and_seen(local, place, faces, &mut |_, _| ())
     }
 
-    /// As [`found_at`](Self::found_at) in `f64`. `faces` are those of the place's list, if it has one.
-    /// `near` receives all faces that are within `tie` of the least distance, and maybe others. `tie`
-    /// is far below the rounding of `f32`.
+    /// As [`found_at`](Self::found_at) in `f64`. `faces` are those of the place's list, if it has
+    /// one. `near` receives all faces that are within `tie` of the least distance, and maybe
+    /// others. `tie` is far below the rounding of `f32`.
     #[cfg(feature = "collide")]
     pub(crate) fn found_with_near(
         &self,
@@ -473,7 +474,8 @@ impl TeSdf {
             let normal = match place {
                 _ if d >= ON_SURFACE_F64 => return None,
                 Place::Listed { .. } => self.pseudonormal(faces, position, &closest),
-                // A cell without a list, because no list was worth its bytes, may touch the surface.
+                // A cell without a list, because no list was worth its bytes, may touch the
+                // surface.
                 _ => self.face_normal(position),
             };
             Some(self.outward(normal, closest.point, BESIDE * ON_SURFACE_F64))

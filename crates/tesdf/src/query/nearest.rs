@@ -36,8 +36,8 @@ impl Reads {
 const F32_RELATIVE: f32 = 4e-6;
 const F32_ABSOLUTE: f32 = 4e-6;
 
-/// The constants above hold for cubes with a side up to this, which contain all faces, and for points
-/// up to half of this from the centre along each axis (local frame).
+/// The constants above hold for cubes with a side up to this, which contain all faces, and for
+/// points up to half of this from the centre along each axis (local frame).
 const F32_REACH: f64 = 4.0;
 
 // A leaf of the face tree is one step of the kernel.
@@ -166,8 +166,9 @@ impl TeSdf {
     }
 
     /// Offers the faces that can come within a limit of a convex polygon, those in nearer boxes
-    /// first. `points` are those of the polygon, from one to [`MAX_POINTS`]; `normal` is that of its
-    /// plane, or zero (local frame). `limit` is the first limit, and `offer` returns the next one.
+    /// first. `points` are those of the polygon, from one to [`MAX_POINTS`]; `normal` is that of
+    /// its plane, or zero (local frame). `limit` is the first limit, and `offer` returns the next
+    /// one.
     pub(crate) fn near_polygon(
         &self,
         points: &[DVec3],
@@ -298,8 +299,8 @@ impl TeSdf {
         (best.position, best.closest)
     }
 
-    /// Offers the faces within the rounding of the `f32` kernel of the least distance, of all faces.
-    /// `p` is relative to the centre of the cube.
+    /// Offers the faces within the rounding of the `f32` kernel of the least distance, of all
+    /// faces. `p` is relative to the centre of the cube.
     fn near_in_tree_f32(&self, p: Vec3, offer: &mut impl FnMut(u32)) {
         thread_local! {
             static NEAR: RefCell<Vec<(u32, f32)>> = const { RefCell::new(Vec::new()) };

@@ -61,9 +61,9 @@ impl TeSdf {
         if self.winding_in_cell(local) >= 1 { Side::Inside } else { Side::Outside }
     }
 
-    /// The normal of the surface at a point of it, so that it points outward. Winding numbers tell the
-    /// direction of the faces only where inside is where they are 1 or more. `step` is the distance
-    /// on both sides at which the side is looked up.
+    /// The normal of the surface at a point of it, so that it points outward. Winding numbers tell
+    /// the direction of the faces only where inside is where they are 1 or more. `step` is the
+    /// distance on both sides at which the side is looked up.
     pub(crate) fn outward(&self, normal: DVec3, at: DVec3, step: f64) -> DVec3 {
         let Some(rule) = self.sign_rule() else { return normal };
         let [front, behind] = [1.0, -1.0].map(|s| rule.side(at + s * step * normal));

@@ -58,8 +58,8 @@ impl<'a> Surroundings<'a> {
         if limit > self.limit {
             return self.asset.near_polygon(points, normal, limit, offer);
         }
-        // Where the group has too many leaves, those of the polygon alone. So the order of the faces
-        // does not depend on the group.
+        // Where the group has too many leaves, those of the polygon alone. So the order of the
+        // faces does not depend on the group.
         let own;
         let leaves = match self.leaves.get_or_init(|| self.find(self.bounds)) {
             Some(leaves) => leaves,

@@ -28,8 +28,8 @@ const KINDS: [CellKind; 6] = [
 /// Finds an error in an encoding: the point with the largest error of distance or sign, among
 /// points in cells of every kind. `None` when all points are within the promised bounds.
 ///
-/// The expected values are the least distance over all faces of the surface, and the side by the rule
-/// of `solid`, over all faces of its mesh. They use neither the lists nor the face tree.
+/// The expected values are the least distance over all faces of the surface, and the side by the
+/// rule of `solid`, over all faces of its mesh. They use neither the lists nor the face tree.
 pub(crate) fn self_check(asset: &TeSdf, solid: &SolidMesh) -> Result<Option<(Precision, Worst)>, MeshError> {
     let (mesh, _) = mesh_of(asset)?;
     let truth = BruteForce::new(&mesh, mesh.diagonal());

@@ -9,8 +9,8 @@ use crate::geometry::perturbed_orientation;
 use crate::mesh::{TriangleMesh, WindingNumber};
 use crate::query::Answer;
 
-/// What tells the side of a point by all faces of a mesh. It shares nothing with the encoder but exact
-/// predicates.
+/// What tells the side of a point by all faces of a mesh. It shares nothing with the encoder but
+/// exact predicates.
 pub(super) struct TrueSign {
     mesh: TriangleMesh,
     rule: InsideRule,
@@ -18,8 +18,8 @@ pub(super) struct TrueSign {
     winding: Option<WindingNumber>,
 }
 
-/// Nearer than this to the number at which the side changes, a sum of solid angles does not tell the
-/// side.
+/// Nearer than this to the number at which the side changes, a sum of solid angles does not tell
+/// the side.
 const UNSURE: f64 = 1e-6;
 
 impl TrueSign {
@@ -30,8 +30,8 @@ impl TrueSign {
         Self { mesh, rule, winding }
     }
 
-    /// Whether a point is inside: always `false` for a sheet, whose faces have no inside. `None` where
-    /// rounding decides.
+    /// Whether a point is inside: always `false` for a sheet, whose faces have no inside. `None`
+    /// where rounding decides.
     pub fn is_inside(&self, p: DVec3) -> Option<bool> {
         match (&self.winding, self.rule) {
             (Some(winding), rule) => Some(rule.holds(winding.at_perturbed(p))),

@@ -1,5 +1,5 @@
-//! Table II: memory, times of the three phases and narrow-phase queries of the scenarios, in recorded
-//! poses.
+//! Table II: memory, times of the three phases and narrow-phase queries of the scenarios, in
+//! recorded poses.
 mod measure;
 mod text;
 

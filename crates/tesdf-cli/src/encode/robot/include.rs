@@ -1,7 +1,7 @@
 //! The files that an MJCF file includes, put in their places.
 //!
-//! `mjcf-rs` 0.36 follows includes too, but not those whose first element is `<mujocoinclude>`, which
-//! MuJoCo takes as well.
+//! `mjcf-rs` 0.36 follows includes too, but not those whose first element is `<mujocoinclude>`,
+//! which MuJoCo takes as well.
 use std::path::{Path, PathBuf};
 
 use tesdf_terminal::report::Failure;

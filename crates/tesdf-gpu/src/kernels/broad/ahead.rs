@@ -1,5 +1,5 @@
-//! How far a detection looks ahead, as `Ahead` of `tesdf::collide`. This file defines the layout of the
-//! motions for the host, which writes them, and for the kernels, which read them.
+//! How far a detection looks ahead, as `Ahead` of `tesdf::collide`. This file defines the layout of
+//! the motions for the host, which writes them, and for the kernels, which read them.
 use cubecl::prelude::*;
 use glam::DVec3;
 use tesdf::collide::internal::Ahead as HostAhead;
@@ -8,8 +8,8 @@ use super::super::field::nearest::FAR;
 use super::super::math::pose::FarPoint;
 use super::super::math::vector::{Row, V3, last, xyz};
 
-/// Rows of a motion: way and reach; turn and greatest distance that a point moves; origin of the body
-/// relative to that of its field.
+/// Rows of a motion: way and reach; turn and greatest distance that a point moves; origin of the
+/// body relative to that of its field.
 pub const ROWS: u32 = 3;
 
 /// The motion of an instance within the speculative time.
@@ -61,8 +61,8 @@ impl Ahead {
         (self.motion + other.motion).min(self.around(other)).min(other.around(self))
     }
 
-    /// The bound by the motion of this instance as the other one sees it, split into that of the origin
-    /// and the rotation about it.
+    /// The bound by the motion of this instance as the other one sees it, split into that of the
+    /// origin and the rotation about it.
     fn around(self, other: Ahead) -> f32 {
         let way = self.way - other.way;
         let from_other = self.origin.from(other.origin);

@@ -234,8 +234,8 @@ pub fn given_pairs(
     }
 }
 
-/// Writes both ordered pairs of two instances, with their blocks. Signed distances up to `distance` are
-/// contacts.
+/// Writes both ordered pairs of two instances, with their blocks. Signed distances up to `distance`
+/// are contacts.
 #[cube]
 fn write_pair(
     shapes: &Shapes,

@@ -1,4 +1,5 @@
-//! The gradient that most opposes a face, where several faces of a body are equally near to a point.
+//! The gradient that most opposes a face, where several faces of a body are equally near to a
+//! point.
 use cubecl::prelude::*;
 use tesdf::collide::internal;
 

@@ -12,8 +12,8 @@ pub struct Contacts {
     /// [`WORDS`] words for each: instances a and b, face of a, cell, face of b, feature of this
     /// face, corner of a plus [`CONVERGED`], ordered pair.
     pub words: Box<[u32]>,
-    /// [`ROWS`] rows for each, in the field's frame: point of a and distance; gradient and its cosine
-    /// with the face's normal; point of b.
+    /// [`ROWS`] rows for each, in the field's frame: point of a and distance; gradient and its
+    /// cosine with the face's normal; point of b.
     pub rows: Box<[Row]>,
     /// Capacity of the list.
     pub room: u32,
@@ -35,8 +35,8 @@ pub struct Touch {
     pub face: u32,
     /// The number of the cell; [`NONE`](super::super::field::shapes::NONE) without a list.
     pub cell: u32,
-    /// The corner of the part that the point is, or [`NO_CORNER`], plus [`CONVERGED`] when the search
-    /// has converged.
+    /// The corner of the part that the point is, or [`NO_CORNER`], plus [`CONVERGED`] when the
+    /// search has converged.
     pub corner: u32,
     pub point: V3,
     /// Cosine between the gradient and the face's normal; 0 for nodes.

@@ -21,8 +21,8 @@ use super::piece::{Lowest, Pool, Region, empty_pool, everywhere};
 use super::polygon_distance::{Disk, Polygon};
 use super::taken::{Memory, memory_of};
 
-/// A moved face clears the surface when its distance is more than this share of the tolerance, which
-/// is at least 1e-6. Distances between faces are off by less.
+/// A moved face clears the surface when its distance is more than this share of the tolerance,
+/// which is at least 1e-6. Distances between faces are off by less.
 const CLEARS: f32 = 0.5;
 
 /// Steps between two corners of a face at which a group looks first.

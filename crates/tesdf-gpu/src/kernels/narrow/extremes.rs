@@ -2,8 +2,8 @@
 //! where the face is flat on the other body, or large, the extremes of what touches. The rules are
 //! those of `tesdf::collide::narrow::extremes`.
 //!
-//! Eight directions are searched at once. Four threads share a direction: they look for the farthest
-//! candidate, each among a quarter of the faces nearby.
+//! Eight directions are searched at once. Four threads share a direction: they look for the
+//! farthest candidate, each among a quarter of the faces nearby.
 use cubecl::prelude::*;
 use tesdf::collide::internal;
 
@@ -36,7 +36,8 @@ const BEYOND: f32 = internal::BEYOND as f32;
 const LEVEL: f32 = internal::LEVEL as f32;
 /// Number of candidates along one direction after which the search for its extreme ends.
 const TRIALS: u32 = internal::TRIALS as u32;
-/// Rounding of a height, in the local frame. On the processor, which computes in `f64`, it is 1e-12.
+/// Rounding of a height, in the local frame. On the processor, which computes in `f64`, it is
+/// 1e-12.
 const HEIGHT: f32 = 1e-6;
 /// Points that are nearer to each other (local frame) are the same. The processor compares bits.
 pub const SAME: f32 = 2e-6;

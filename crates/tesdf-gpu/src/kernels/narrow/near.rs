@@ -188,8 +188,8 @@ impl Walk {
     }
 
     /// Goes on until there are leaves for all threads, or no more nodes. Returns the number of
-    /// leaves to take next; 0 at the end. Boxes beyond `limit` are skipped. All threads of the group
-    /// must call it.
+    /// leaves to take next; 0 at the end. Boxes beyond `limit` are skipped. All threads of the
+    /// group must call it.
     pub fn next(&mut self, field: Field<'_>, axes: Axes, limit: f32, pool: &mut Pool) -> u32 {
         while self.node_count > 0u32 && self.leaf_count < LEAVES {
             sync_cube();

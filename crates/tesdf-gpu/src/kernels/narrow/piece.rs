@@ -221,8 +221,9 @@ impl Region<'_> {
         }
     }
 
-    /// The bound of a piece, with the field at its center: the value there minus the radius, or minus
-    /// the greatest minimum of four functions that the depth does not exceed, whichever is greater.
+    /// The bound of a piece, with the field at its center: the value there minus the radius, or
+    /// minus the greatest minimum of four functions that the depth does not exceed, whichever is
+    /// greater.
     pub fn bound(self, piece: Piece, here: Value, work: &mut Work) -> f32 {
         let points = Points {
             a: self.part.at(piece.a.s, piece.a.t),

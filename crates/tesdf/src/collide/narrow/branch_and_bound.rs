@@ -98,8 +98,8 @@ pub fn is_least(cell: &CellField, polygon: &Polygon, best: (f64, DVec3, u32), to
 struct Branches<'a> {
     cell: &'a CellField<'a>,
     precision: Precision,
-    /// Error bound of the `f32` values that are tried before `f64`. Where it is infinite, all values
-    /// are in `f64`.
+    /// Error bound of the `f32` values that are tried before `f64`. Where it is infinite, all
+    /// values are in `f64`.
     slack: f64,
     tolerance: f64,
     reach: f64,
@@ -124,8 +124,8 @@ impl<'a> Branches<'a> {
         Self { cell, precision, slack, tolerance, reach, enough, best, best_face: 0, evaluations: 0 }
     }
 
-    /// The value at a point. Where `f32` shows that it is not the best, the distance is only a lower
-    /// bound.
+    /// The value at a point. Where `f32` shows that it is not the best, the distance is only a
+    /// lower bound.
     fn value(&mut self, p: DVec3) -> FieldValue {
         self.evaluations += 1;
         if self.precision == Precision::F64
@@ -164,9 +164,9 @@ impl<'a> Branches<'a> {
         self.along_side(piece).unwrap_or_else(|| self.halves(piece.corners).into_iter().collect())
     }
 
-    /// Cuts a triangle near the surface where it leaves the space over the nearest face. The distance
-    /// to the face is linear over it, and beside it bounds the depth badly: halves that reach across
-    /// would be as short as the depth before they are closed.
+    /// Cuts a triangle near the surface where it leaves the space over the nearest face. The
+    /// distance to the face is linear over it, and beside it bounds the depth badly: halves that
+    /// reach across would be as short as the depth before they are closed.
     fn along_side(&mut self, piece: &Piece) -> Option<ArrayVec<[Corner; 3], 3>> {
         let (CellField::Mesh { asset, .. } | CellField::Whole(&Surroundings { asset, .. })) = *self.cell
         else {

@@ -17,8 +17,9 @@ use crate::query::{Faces, Place, Precision, Surroundings};
 /// far below any sensible tolerance.
 pub const CLEAR: f64 = 1e-9;
 
-/// Where a whole face is deeper than this fraction of its radius, branch and bound over it drops the
-/// parts near the surface at once, and finds the deepest point faster than if the face was cut first.
+/// Where a whole face is deeper than this fraction of its radius, branch and bound over it drops
+/// the parts near the surface at once, and finds the deepest point faster than if the face was cut
+/// first.
 const SUNK: f64 = 1.0 / 16.0;
 
 /// The least signed distance over a polygon, within `tolerance`; both in the field's frame. `None`
@@ -136,8 +137,8 @@ pub fn is_least(
     is_least
 }
 
-/// The direction from a face to the nearest point of the polygon. Most other faces are farther along
-/// it, in particular those that share the nearest point.
+/// The direction from a face to the nearest point of the polygon. Most other faces are farther
+/// along it, in particular those that share the nearest point.
 struct Axis {
     direction: DVec3,
     /// The lowest point of the polygon along it.

@@ -85,8 +85,8 @@ struct Candidate {
 }
 
 impl<'a> Patch<'a> {
-    /// `field` is that of all cells. `minimum` is the least signed distance over `part`, as `search`
-    /// found it.
+    /// `field` is that of all cells. `minimum` is the least signed distance over `part`, as
+    /// `search` found it.
     pub fn new(field: &'a CellField<'a>, part: &'a Part, minimum: &'a Minimum, search: &'a Search) -> Self {
         let points = part.points();
         let edges = (0..points.len()).map(|i| points[(i + 1) % points.len()] - points[i]);
@@ -271,8 +271,8 @@ impl<'a> Patch<'a> {
             return taken;
         }
         // At a border of the other body's face, a point is nearer to the side of the body than to
-        // this face, or it lies beside the body. If only rounding or less than the tolerance puts it
-        // there, it is moved inwards until the side is as deep as the face.
+        // this face, or it lies beside the body. If only rounding or less than the tolerance puts
+        // it there, it is moved inwards until the side is as deep as the face.
         let depth = self.search.tolerance.max(-self.minimum.value.distance);
         let (mut at, mut moved) = (first, point);
         for _ in 0..MOVES {

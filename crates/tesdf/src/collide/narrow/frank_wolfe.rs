@@ -5,8 +5,8 @@ use crate::query::Precision;
 
 /// Eq. (9) by Frank–Wolfe. It starts at the best of the centre and the vertices, and makes steps of
 /// 2 / (k + 2) towards the vertex that is lowest along the gradient. The result is the best point
-/// seen. `None` when no point can be within `reach`. Whether the result is the minimum is decided by
-/// [`is_least`](super::exact::is_least).
+/// seen. `None` when no point can be within `reach`. Whether the result is the minimum is decided
+/// by [`is_least`](super::exact::is_least).
 ///
 /// The paper's Appendix C is not public. Starting at the best vertex and keeping the best point
 /// costs one evaluation per vertex and is never worse than the last iterate from the centre. On a

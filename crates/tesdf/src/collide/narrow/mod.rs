@@ -67,8 +67,8 @@ const COARSE: f64 = 20.0 * ROUNDING;
 pub const LARGE: f64 = 1.0 / 16.0;
 
 impl Search {
-    /// `reach` is the contact distance; `diagonals` are those of the surface's and the field's body.
-    /// All in the world's unit.
+    /// `reach` is the contact distance; `diagonals` are those of the surface's and the field's
+    /// body. All in the world's unit.
     pub fn new(options: &CollideOptions, reach: f64, field: &FieldBody, diagonals: [f64; 2]) -> Self {
         let unit = field.unit();
         let tolerance = options.tolerance.resolve(diagonals[1]) / unit;

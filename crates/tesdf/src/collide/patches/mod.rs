@@ -21,11 +21,12 @@ use outline::Outline;
 /// Options of a [`PatchTracker`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PatchOptions {
-    /// Largest angle, in radians, between the normal of a contact and that of the deepest contact of
-    /// its patch.
+    /// Largest angle, in radians, between the normal of a contact and that of the deepest contact
+    /// of its patch.
     pub angle: f64,
-    /// Contacts up to this distance apart belong together: a fraction of the diagonal of the smaller
-    /// body, or a length in the world's unit. Contacts on one face belong together at any distance.
+    /// Contacts up to this distance apart belong together: a fraction of the diagonal of the
+    /// smaller body, or a length in the world's unit. Contacts on one face belong together at any
+    /// distance.
     pub link: Length,
     /// Largest number of points of a patch.
     pub points: usize,
@@ -89,8 +90,8 @@ pub struct ContactPatch {
     /// unit. 0 where they lie on a line.
     pub area: f64,
     /// Pressure centre, in the world: the mean point of the hull, weighted by a pressure that is
-    /// proportional to how far the distance of a point is below the greatest one of the patch. Where
-    /// all distances are equal, all points count the same.
+    /// proportional to how far the distance of a point is below the greatest one of the patch.
+    /// Where all distances are equal, all points count the same.
     pub center: DVec3,
     /// Points that span the patch. The first is the deepest.
     pub points: Vec<PatchPoint>,

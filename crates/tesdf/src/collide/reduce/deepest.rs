@@ -61,8 +61,8 @@ pub fn report_of_kept(
     })
 }
 
-/// The indices of the deepest contacts, ascending, and those of the others. Of equally deep contacts,
-/// the first are among the deepest.
+/// The indices of the deepest contacts, ascending, and those of the others. Of equally deep
+/// contacts, the first are among the deepest.
 pub fn split_deepest(contacts: &[Contact], n: usize) -> (Vec<usize>, Vec<usize>) {
     let mut order: Vec<usize> = (0..contacts.len()).collect();
     let deeper =

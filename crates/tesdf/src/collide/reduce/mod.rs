@@ -17,10 +17,10 @@
 //!    Har-Peled, Raichel, Sparse approximation via generating point sets, 2016), until there are
 //!    enough or the hull is complete.
 //!
-//! With many contacts, the third step looks at a few of them only. Contacts are put into bins, which
-//! are boxes of equal size in the space of wrenches: contacts of a bin have nearly the same direction
-//! and place. A bin is represented by its deepest contact and three extremes. The loss that is
-//! reported is that of all contacts.
+//! With many contacts, the third step looks at a few of them only. Contacts are put into bins,
+//! which are boxes of equal size in the space of wrenches: contacts of a bin have nearly the same
+//! direction and place. A bin is represented by its deepest contact and three extremes. The loss
+//! that is reported is that of all contacts.
 //!
 //! Several cells may clip one face and give several contacts. They need no special rule: equal
 //! wrenches are in the hull once one of them is kept. The bound is proved in `docs/math.md`, "What
@@ -57,11 +57,11 @@ const BINS_PER_KEPT: usize = 4;
 /// order. The reports are sorted by instances, one for each pair that touches. [`Reduction::None`]
 /// returns the contacts unchanged, without reports.
 ///
-/// [`Reduction::Deepest`] keeps the contacts that a detection with it finds. Its reports are those of
-/// contacts that were all found. [`Reduction::Spread`] keeps those of [`Reduction::PerPair`].
+/// [`Reduction::Deepest`] keeps the contacts that a detection with it finds. Its reports are those
+/// of contacts that were all found. [`Reduction::Spread`] keeps those of [`Reduction::PerPair`].
 ///
-/// A number of 0, which [`CollideOptions::validate`](super::CollideOptions::validate) refuses, counts
-/// as 1.
+/// A number of 0, which [`CollideOptions::validate`](super::CollideOptions::validate) refuses,
+/// counts as 1.
 ///
 /// The same input gives the same output for any number of threads. To keep `n` of `N` contacts of a
 /// pair takes `O(N + n²)` time and about 72 bytes per contact.
@@ -250,8 +250,8 @@ fn among_all(wrenches: Wrenches, n: usize) -> Choice {
     Choice { places: selection.order().to_vec(), error: selection.square().sqrt(), bytes }
 }
 
-/// Selects among the contacts that represent their bins. Where this leaves contacts to be kept, also
-/// among the contacts that are found to be farther from the hull.
+/// Selects among the contacts that represent their bins. Where this leaves contacts to be kept,
+/// also among the contacts that are found to be farther from the hull.
 #[inline(always)]
 fn by_bins(mut wrenches: Wrenches, bins: usize, n: usize) -> Choice {
     let (bins, order) = Bins::new(&wrenches, bins);

@@ -32,7 +32,8 @@ impl Wrenches {
         {
             let [fx, fy, fz, x, y, z] = columns.each_mut().map(|column| &mut column[..count]);
             for (i, contact) in contacts.take(count).enumerate() {
-                // The point takes the place of the torque until the centre and the length are known.
+                // The point takes the place of the torque until the centre and the length are
+                // known.
                 ([fx[i], fy[i], fz[i]], [x[i], y[i], z[i]]) =
                     (force(contact).to_array(), contact.point_a.to_array());
                 distances[i] = contact.distance;

@@ -20,8 +20,8 @@ pub struct CadOptions {
     /// Largest length that Gmsh aims at for an edge: its option `Mesh.MeshSizeMax`.
     pub mesh_size: Length,
     /// Largest distance between the triangles and the curved surface. It is measured at the middle
-    /// of each edge, where Gmsh knows the surface, so it is no proven bound between these places. If
-    /// it is exceeded, Gmsh runs again with more edges around each curve.
+    /// of each edge, where Gmsh knows the surface, so it is no proven bound between these places.
+    /// If it is exceeded, Gmsh runs again with more edges around each curve.
     pub deviation: Length,
     /// The program. `None` stands for the program that the environment variable `TESDF_GMSH` names,
     /// or else `gmsh`.

@@ -5,9 +5,10 @@
 //! the GLB header without a check, and its accessor iterators do not say which bytes are missing.
 //!
 //! The reader takes triangles, strips and fans of the default scene with the transforms of the
-//! nodes, and takes the names of the nodes. Without a default scene it takes the first scene, else all root nodes, else all meshes.
-//! Buffers may be in the file, in `data:` URIs, or in files next to it. Nodes that mirror flip
-//! their faces, so outward stays outward. Skins and morph targets are not applied.
+//! nodes, and takes the names of the nodes. Without a default scene it takes the first scene, else
+//! all root nodes, else all meshes. Buffers may be in the file, in `data:` URIs, or in files next
+//! to it. Nodes that mirror flip their faces, so outward stays outward. Skins and morph targets are
+//! not applied.
 mod buffers;
 mod limits;
 mod scene;

@@ -1,8 +1,8 @@
 //! Reads Wavefront OBJ as found in practice.
 //!
 //! The reader takes `v` (without weight and colours) and `f` (without texture and normal indices;
-//! indices may be relative), and the names of objects (`o`) or groups (`g`). Other statements are skipped. A note names those that may be geometry
-//! (`l`, `p`, free-form surfaces).
+//! indices may be relative), and the names of objects (`o`) or groups (`g`). Other statements are
+//! skipped. A note names those that may be geometry (`l`, `p`, free-form surfaces).
 use std::collections::HashMap;
 
 use glam::DVec3;

@@ -2,11 +2,12 @@
 //!
 //! The reader takes the meshes that the build items show, with their transforms, through components
 //! and through the parts of the production extension. Each mesh is an object with its name. Without
-//! build items, it takes all objects that no component shows. Supports are left out. Transforms that
-//! mirror flip the faces, so outward stays outward.
+//! build items, it takes all objects that no component shows. Supports are left out. Transforms
+//! that mirror flip the faces, so outward stays outward.
 //!
 //! The archive is read by the crate `zip`, the XML as a stream by `quick-xml`. `lib3mf` 0.1.7 and
-//! `threemf2` 0.4.1 unpack a part into one string whatever its size, and their errors name no place.
+//! `threemf2` 0.4.1 unpack a part into one string whatever its size, and their errors name no
+//! place.
 mod model;
 mod package;
 mod scene;

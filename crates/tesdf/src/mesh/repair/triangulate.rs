@@ -121,8 +121,8 @@ impl Loop<'_> {
         triangles
     }
 
-    /// Cuts the loop into pieces of at most `most` vertices along short chords, and gives each piece
-    /// its triangulation of least weight. Folds at the chords are not looked at.
+    /// Cuts the loop into pieces of at most `most` vertices along short chords, and gives each
+    /// piece its triangulation of least weight. Folds at the chords are not looked at.
     pub(super) fn pieces(&self, most: usize) -> Vec<[u32; 3]> {
         let mut triangles = Vec::with_capacity(self.points.len() - 2);
         let mut todo: Vec<Vec<usize>> = vec![(0..self.points.len()).collect()];

@@ -61,8 +61,8 @@ pub(in crate::mesh::read) fn parse(
     Ok(raw)
 }
 
-/// Edges around a circle such that the middle of an edge of a circle of an eighth of the diagonal is
-/// as far from it as wanted: π² r / (2 n²).
+/// Edges around a circle such that the middle of an edge of a circle of an eighth of the diagonal
+/// is as far from it as wanted: π² r / (2 n²).
 fn first_turn(deviation: Length) -> f64 {
     let share = match deviation {
         Length::OfDiagonal(share) => share,
@@ -87,8 +87,8 @@ fn run(
         ),
     };
     // OpenCASCADE converts IGES to millimetres by itself. Its faces have curves of their own, so
-    // seams stay open: of a ball and a ring, Gmsh 4.15 loses the walls of the ring with `Coherence`,
-    // and the ball with `Geometry.OCCSewFaces`.
+    // seams stay open: of a ball and a ring, Gmsh 4.15 loses the walls of the ring with
+    // `Coherence`, and the ball with `Geometry.OCCSewFaces`.
     let unit = match format {
         MeshFormat::Step => "Geometry.OCCTargetUnit = \"MM\";\n",
         _ => "",

@@ -252,8 +252,8 @@ impl Tag<'_> {
         Ok(Component { part, object: self.id("objectid")?, pose: self.pose()? })
     }
 
-    /// The attribute `transform`: the rows of a matrix that multiplies row vectors, so the columns of
-    /// one that multiplies column vectors.
+    /// The attribute `transform`: the rows of a matrix that multiplies row vectors, so the columns
+    /// of one that multiplies column vectors.
     fn pose(&self) -> Result<DAffine3, ReadError> {
         let Some(text) = self.text("transform")? else { return Ok(DAffine3::IDENTITY) };
         let numbers: Option<Vec<f64>> = text.split_ascii_whitespace().map(|word| word.parse().ok()).collect();

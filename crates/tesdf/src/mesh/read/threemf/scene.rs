@@ -6,8 +6,8 @@ use glam::DAffine3;
 use super::model::{Component, Model, Shape};
 use super::{ReadError, fault};
 
-/// Largest number of vertices, of face corners, and of places of objects, of all instances together.
-/// A file of some kilobytes can show a mesh any number of times.
+/// Largest number of vertices, of face corners, and of places of objects, of all instances
+/// together. A file of some kilobytes can show a mesh any number of times.
 const MAX_ELEMENTS: u64 = 1 << 27;
 
 /// A mesh at a place.
