@@ -249,17 +249,16 @@ impl TeSdf {
 
     /// Why contacts with the asset are not known; `None` when they are.
     pub(crate) fn without_contacts(&self) -> Option<(&'static str, &'static str)> {
-        match self.about.signs {
-            _ if self.about.certificate().jumps() => Some((
-                "its signed distance jumps in the holes of the mesh",
-                "a closed mesh, as `tesdf repair --fill-holes` makes it, or sheets (`--inside sheet`)",
-            )),
-            Signs::RuleUnoriented => Some((
-                "some of its faces have the inside in front of them in one place and behind them in another",
-                "faces that look outward: cut overlaps off in the program that made the mesh, or use the rule `winding`",
-            )),
-            Signs::Cells | Signs::Rule | Signs::Sheet => None,
-        }
+        self.about.certificate().jumps().then_some((
+            "its signed distance jumps in the holes of the mesh",
+            "a closed mesh, as `tesdf repair --fill-holes` makes it, or sheets (`--inside sheet`)",
+        ))
+    }
+
+    /// Whether no face has the inside in front of it. Otherwise the rule tells at each point of a face
+    /// on which side of it the inside is.
+    pub(crate) fn faces_look_outward(&self) -> bool {
+        self.about.signs != Signs::RuleUnoriented
     }
 
     pub(crate) fn about_mut(&mut self) -> &mut About {

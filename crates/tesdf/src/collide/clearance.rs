@@ -212,8 +212,8 @@ impl<'a> Pair<'a> {
         })
     }
 
-    /// For each face of *a*, a point of it and the inward direction, in the world's frame. A simple
-    /// shape is convex, so one point is enough.
+    /// For each face of *a*, a point of it and the inward direction, in the world's frame; both
+    /// directions where faces do not all look outward. A simple shape is convex, so one point is enough.
     fn behind_faces(&self) -> Vec<(DVec3, DVec3)> {
         let Body { shape, placement, .. } = &self.a;
         let rotate = |n: DVec3| placement.pose.rotation * n;
@@ -223,7 +223,11 @@ impl<'a> Pair<'a> {
         };
         match shape {
             Shape::Mesh(asset) => {
-                (0..asset.face_count()).filter_map(|f| of_face(asset.face_corners(f))).collect()
+                let of_faces = (0..asset.face_count()).filter_map(|f| of_face(asset.face_corners(f)));
+                match asset.faces_look_outward() {
+                    true => of_faces.collect(),
+                    false => of_faces.flat_map(|(p, inward)| [(p, inward), (p, -inward)]).collect(),
+                }
             }
             Shape::Plane => Vec::new(),
             // The centre of its upper side, downwards.

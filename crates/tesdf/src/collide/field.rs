@@ -184,6 +184,15 @@ impl<'a> FieldBody<'a> {
         self.field.rough(p)
     }
 
+    /// The value at `p`. Where several faces are equally near, with the gradient that most opposes
+    /// `normal`. In the field's frame.
+    pub fn opposing(&self, p: DVec3, normal: DVec3, precision: Precision) -> FieldValue {
+        match self.field {
+            Field::Mesh(asset) => CellField::Whole(&Surroundings::all(asset)).opposing(p, normal, precision),
+            Field::Simple(simple) => CellField::Simple(simple).opposing(p, normal, precision),
+        }
+    }
+
     /// Lower bound of the signed distance within `radius` of `p`. All in the field's frame.
     pub fn least_within(&self, p: DVec3, radius: f64) -> f64 {
         let (distance, slack) = self.rough(p);
@@ -397,14 +406,20 @@ impl TeSdf {
             }
             let outward = if value.distance < 0.0 { closest.point - p } else { p - closest.point };
             let mut gradient = match on_surface {
-                true => self.outward(
+                true if self.faces_look_outward() => self.outward(
                     self.local_triangle(face as usize).normal,
                     closest.point,
                     4.0 * tie.max(ON_SURFACE_F64),
                 ),
+                true => self.outward_normal(face, closest.point),
                 false => outward.normalize_or_zero(),
             };
-            if on_surface && self.half_thickness > 0.0 && gradient.dot(normal) > 0.0 {
+            // A face that is outside on both sides, or on none.
+            let is_either = on_surface && gradient == DVec3::ZERO;
+            if is_either {
+                gradient = self.local_triangle(face as usize).normal;
+            }
+            if on_surface && (self.half_thickness > 0.0 || is_either) && gradient.dot(normal) > 0.0 {
                 gradient = -gradient;
             }
             let (own, other) = (gradient.dot(normal), best.gradient.dot(normal));

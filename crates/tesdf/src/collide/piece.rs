@@ -402,16 +402,32 @@ impl Looks<'_> {
     /// is inside comes to the surface. So it is with faces in one plane, and with faces beyond a
     /// convex edge.
     fn heights(&self, asset: &TeSdf, piece: &Piece, triangle: &Triangle) -> Option<[f64; 3]> {
+        // The outside is in front of the face, or on the other side where faces do not look outward.
+        self.heights_under(asset, piece, triangle, triangle.normal).or_else(|| {
+            match asset.faces_look_outward() {
+                true => None,
+                false => self.heights_under(asset, piece, triangle, -triangle.normal),
+            }
+        })
+    }
+
+    /// The same, with the outside on the side of the plane that the normal points to.
+    fn heights_under(
+        &self,
+        asset: &TeSdf,
+        piece: &Piece,
+        triangle: &Triangle,
+        normal: DVec3,
+    ) -> Option<[f64; 3]> {
         let hair = self.hair();
-        let heights = piece.corners.map(|c| triangle.normal.dot(triangle.corners[0] - c));
-        let points: [DVec3; 3] =
-            std::array::from_fn(|k| piece.corners[k] + (heights[k] + hair) * triangle.normal);
+        let heights = piece.corners.map(|c| normal.dot(triangle.corners[0] - c));
+        let points: [DVec3; 3] = std::array::from_fn(|k| piece.corners[k] + (heights[k] + hair) * normal);
         let points = &points[..piece.count];
-        let mut is_clear = triangle.normal != DVec3::ZERO;
-        asset.near_polygon(points, triangle.normal, hair, &mut |face| {
+        let mut is_clear = normal != DVec3::ZERO;
+        asset.near_polygon(points, normal, hair, &mut |face| {
             if is_clear {
                 let other = asset.local_triangle(face as usize);
-                is_clear = polygon_to_triangle(points, triangle.normal, &other, 0.5 * hair).is_none();
+                is_clear = polygon_to_triangle(points, normal, &other, 0.5 * hair).is_none();
             }
             if is_clear { hair } else { f64::NEG_INFINITY }
         });

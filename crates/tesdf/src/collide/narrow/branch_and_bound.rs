@@ -355,7 +355,18 @@ fn coplanar_pair(asset: &TeSdf, [f, g]: [u32; 2], points: [DVec3; 3]) -> f64 {
     let off = triangles[1].corners.iter().map(|c| normal.dot(*c - a).abs()).fold(0.0, f64::max);
     // In-plane direction perpendicular to the shared edge.
     let across = normal.cross(b - a).normalize_or_zero();
-    if off > COPLANAR || normal.dot(triangles[1].normal) < 0.5 || across == DVec3::ZERO {
+    let cosine = normal.dot(triangles[1].normal);
+    // Faces that do not all look outward may lie beside each other and look in opposite directions.
+    let is_beside = || {
+        let [one, other] = triangles.each_ref().map(|t| {
+            t.corners
+                .iter()
+                .map(|c| across.dot(*c - a))
+                .fold(0.0, |m: f64, h| if h.abs() > m.abs() { h } else { m })
+        });
+        cosine <= -0.5 && !asset.faces_look_outward() && one * other < 0.0
+    };
+    if off > COPLANAR || !(cosine >= 0.5 || is_beside()) || across == DVec3::ZERO {
         return f64::INFINITY;
     }
     let nearest = points.map(|p| {

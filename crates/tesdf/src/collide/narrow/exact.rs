@@ -350,7 +350,10 @@ impl<'a> Query<'a> {
             let (clear, at, _) = moved.nearest_to_faces(face);
             clear > 0.1 * hair && cell.value(at, Precision::F64).distance > 0.0
         };
-        distance <= hair && (is_free(cell.value(point, Precision::F64).gradient) || is_free(-self.normal))
+        // A normal that does not tell the outside may point either way.
+        let is_either = || !self.asset.faces_look_outward() && is_free(self.normal);
+        distance <= hair
+            && (is_free(cell.value(point, Precision::F64).gradient) || is_free(-self.normal) || is_either())
     }
 
     /// Whether the whole polygon is farther than `limit` from the plane of a face. Decided in
