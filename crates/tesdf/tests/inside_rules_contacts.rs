@@ -8,12 +8,11 @@ use support::random::Random;
 use support::ruled::{Body, Compared, assert_contacts, assert_faces, random_pose};
 use tesdf::base::{Inside, InsideRule, SurfaceFaces};
 use tesdf::collide::{
-    ClearanceOptions, CollideError, CollideOptions, ContactsPer, Instance, Mode, Motion, Pose, Scene, Shape,
+    ClearanceOptions, CollideOptions, ContactsPer, Instance, Mode, Motion, Pose, Scene, Shape,
     TimeOfImpactOptions, Velocity, clearance, detect, time_of_impact,
 };
-use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, TriangleMesh};
+use tesdf::mesh::TriangleMesh;
 
 fn cup() -> TriangleMesh {
     Parts::default().open_cube(DVec3::splat(-0.5), 1.0, Outward).mesh()
@@ -247,12 +246,4 @@ fn a_box_in_a_void_has_contacts_clearance_and_impact_of_formulas() {
         assert!((found.normal + DVec3::X).length() < 1e-6, "{found:?}");
         scene.remove(&[moved, deep]).expect("removed");
     }
-}
-
-#[test]
-fn bodies_whose_contacts_are_not_known_are_refused() {
-    let solid = SolidMesh::with_inside(cup(), InsideRule::Generalized.into()).expect("any mesh");
-    let open = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
-    let error = Scene::new().add_shape(open).expect_err("refused");
-    assert!(matches!(error, CollideError::Shape { .. }) && error.to_string().contains("jumps"), "{error}");
 }

@@ -71,6 +71,9 @@ pub struct Clearance {
 /// most the value at the surface. A plane's half-space is infinite, so only its field is used: no
 /// point of a plane is deeper in a body than the body reaches below the plane.
 ///
+/// The signed distance of an open mesh jumps in its holes: as soon as a point of a surface is inside, the
+/// clearance is minus its distance from the faces. The place of the jump is found up to the tolerance.
+///
 /// ```
 /// use tesdf::collide::{ClearanceOptions, Instance, Pose, Scene, Shape, clearance};
 /// use tesdf::glam::DVec3;
@@ -235,12 +238,24 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// The clearance from one order. It is right when neither body is inside the other.
+    /// The clearance from one order. It is right when neither body is inside the other. For an open mesh
+    /// it is the distance of the surfaces: its own surface is searched, in a field without jumps.
     ///
     /// # Errors
-    /// Positions are too far out.
+    /// Positions are too far out, or both bodies are open meshes.
     pub fn apart(&self, tolerance: f64) -> Result<Clearance, CollideError> {
-        self.least(&[self.first()], tolerance)
+        let jumps = |body: &Body| matches!(body.shape, Shape::Mesh(asset) if asset.jump().is_some());
+        let first = match (jumps(&self.a), jumps(&self.b)) {
+            (false, false) => self.first(),
+            (true, false) => Surface::A,
+            (false, true) => Surface::B,
+            (true, true) => {
+                let reason = "both are open meshes, whose insides end in their holes, so that no time of impact is \
+                     known; expected one closed mesh or sheet, or simple shape";
+                return Err(CollideError::NoClearance { a: self.a.id, b: self.b.id, reason });
+            }
+        };
+        self.least(&[first], tolerance)
     }
 
     /// The body with fewer faces. A plane never comes first, because it has no finite surface.

@@ -564,7 +564,7 @@ impl FieldBody<'_> {
     /// Bounds of the body, in the field's frame; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         match self.field {
-            Field::Mesh(asset) => asset.local_bounds().grown(asset.half_thickness),
+            Field::Mesh(asset) => asset.local_bounds().grown(asset.reach_beyond()),
             Field::Simple(simple) => simple.bounds(),
         }
     }
@@ -572,7 +572,7 @@ impl FieldBody<'_> {
     /// A ball around the body, in the field's frame; infinite for a plane.
     fn ball(&self) -> (DVec3, f64) {
         let bounds = match self.field {
-            Field::Mesh(asset) => asset.local_bounds().grown(asset.half_thickness),
+            Field::Mesh(asset) => asset.local_bounds().grown(asset.reach_beyond()),
             Field::Simple(Simple::Box(half)) => Aabb { min: -half, max: half },
             Field::Simple(Simple::Round { half_height, radius }) => {
                 return (DVec3::ZERO, half_height + radius);

@@ -5,7 +5,7 @@ use super::locate::{Faces, Place};
 use crate::TeSdf;
 use crate::asset::layout::{Label, SignHint, SignHints};
 use crate::base::Side;
-use crate::geometry::{Closest, Feature, signed_crossing};
+use crate::geometry::{Closest, Feature, GeneralizedWinding, signed_crossing};
 
 /// The side that the closest feature implies; `None` when it implies none. `height` is the height
 /// of the point over the face.
@@ -88,6 +88,17 @@ impl TeSdf {
         let Some(rule) = self.sign_rule() else { return normal };
         let [front, behind] = [1.0, -1.0].map(|s| rule.side(at + s * step * normal));
         if front == Side::Inside && behind == Side::Outside { -normal } else { normal }
+    }
+
+    /// The number by which the sign changes where there is no face, in the local frame; `None` where it
+    /// does not.
+    pub(crate) fn jump(&self) -> Option<&GeneralizedWinding> {
+        self.sign_rule()?.jump()
+    }
+
+    /// How far the inside can extend beyond the bounds of the faces, in the local frame.
+    pub(crate) fn reach_beyond(&self) -> f64 {
+        self.jump().map_or(self.half_thickness, GeneralizedWinding::reach_beyond)
     }
 
     /// The side of a face that is outside at `at`, a point of the face. Where all faces look outward,
