@@ -2,127 +2,17 @@
 //! against brute force over all faces.
 mod support;
 
-use std::sync::Arc;
-
-use support::brute_inside::BruteInside;
 use support::parts::Turn::{Inward, Outward};
 use support::parts::{Parts, bowl};
 use support::random::Random;
-use tesdf::TeSdf;
+use support::ruled::{Body, Compared, assert_contacts, assert_faces, random_pose};
 use tesdf::base::{Inside, InsideRule, SurfaceFaces};
 use tesdf::collide::{
-    ClearanceOptions, CollideError, CollideOptions, Instance, Mode, Motion, Pose, Reduction, Scene, Shape,
+    ClearanceOptions, CollideOptions, ContactsPer, Instance, Mode, Motion, Pose, Scene, Shape,
     TimeOfImpactOptions, Velocity, clearance, detect, time_of_impact,
 };
-use tesdf::encode::{Encoder, Preset};
-use tesdf::glam::{DQuat, DVec3};
-use tesdf::mesh::{SolidMesh, TriangleMesh};
-
-/// A body with its brute force.
-struct Body {
-    mesh: TriangleMesh,
-    asset: Arc<TeSdf>,
-    brute: BruteInside,
-    half: f64,
-}
-
-impl Body {
-    fn new(mesh: TriangleMesh, inside: Inside) -> Self {
-        let solid = SolidMesh::with_inside(mesh.clone(), inside).expect("a solid");
-        let asset = Arc::new(Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes"));
-        let ids = (0..asset.face_count()).map(|at| asset.face_id(at));
-        let brute = BruteInside::new(&mesh, inside.rule, ids);
-        Self { mesh, asset, brute, half: inside.rule.half_thickness() }
-    }
-
-    fn sheet(mesh: TriangleMesh, thickness: f64) -> Self {
-        Self::new(mesh, InsideRule::Sheet { thickness }.into())
-    }
-
-    /// The signed distance by brute force.
-    fn signed_distance(&self, p: DVec3) -> f64 {
-        let distance = self.brute.distance(p);
-        if self.brute.is_inside(p) == Some(true) { -distance } else { distance - self.half }
-    }
-
-    /// Random points of the faces that are the surface.
-    fn on_faces(&self, n: usize) -> Vec<DVec3> {
-        let mut random = Random(2);
-        let faces = self.asset.face_count();
-        let on = |i: usize| {
-            let [u, v, w] = random.weights::<3>();
-            let [a, b, c] = self.asset.face_corners(i % faces);
-            u * a + v * b + w * c
-        };
-        (0..n).map(on).collect()
-    }
-}
-
-fn inverse(pose: &Pose, p: DVec3) -> DVec3 {
-    pose.rotation.inverse() * (p - pose.translation)
-}
-
-/// Compares the contacts of all modes with brute force: each contact has the distance of its point, and
-/// none is missing that is deeper.
-fn assert_contacts(a: &Body, b: &Body, poses: [Pose; 2]) {
-    let mut scene = Scene::new();
-    let shapes = [a, b].map(|body| scene.add_shape(body.asset.clone()).expect("a shape"));
-    let ids = [0, 1].map(|k| scene.add(Instance::new(shapes[k], poses[k])).expect("an instance"));
-    let size = a.mesh.diagonal().max(b.mesh.diagonal());
-    let tolerance = 1e-5 * size;
-    // The least distance over samples of both surfaces.
-    let least = |of: &Body, field: &Body, from: &Pose, to: &Pose| {
-        let world = |p: DVec3| from.rotation * p + from.translation;
-        let distance = |p: DVec3| field.signed_distance(inverse(to, world(p))) - of.half;
-        of.on_faces(1500).into_iter().map(distance).fold(f64::INFINITY, f64::min)
-    };
-    let sampled = [least(a, b, &poses[0], &poses[1]), least(b, a, &poses[1], &poses[0])];
-    for mode in [Mode::Exact, Mode::Face, Mode::Node, Mode::Edge] {
-        let options = CollideOptions {
-            contact_distance: 0.5 * size,
-            cos_theta: None,
-            ..CollideOptions::with_mode(mode)
-        };
-        let found = detect(&scene, &options).expect("contacts");
-        for contact in found.iter() {
-            let [of, field, pose] = if contact.instance_a == ids[0] { [0, 1, 1] } else { [1, 0, 0] };
-            let ([of, field], pose) = ([[a, b][of], [a, b][field]], &poses[pose]);
-            let core = contact.point_a + of.half * contact.normal;
-            let expected = field.signed_distance(inverse(pose, core)) - of.half;
-            assert!((contact.distance - expected).abs() <= tolerance, "{mode:?}: {expected} {contact:?}");
-            let apart = contact.point_a - contact.point_b;
-            assert!(
-                (apart - contact.distance * contact.normal).length() <= 1e-4 * size,
-                "{mode:?}: {contact:?}"
-            );
-        }
-        let deepest = found.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
-        if mode == Mode::Exact {
-            let sampled = sampled[0].min(sampled[1]);
-            assert!(deepest <= sampled + tolerance, "{deepest} {sampled}");
-            let kept = CollideOptions { reduction: Reduction::Deepest(3), ..options };
-            let kept = detect(&scene, &kept).expect("contacts");
-            let least = kept.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
-            assert!((least - deepest).abs() <= tolerance, "{least} {deepest}");
-        }
-    }
-    let found = clearance(&scene, ids[0], ids[1], &ClearanceOptions::default()).expect("a clearance");
-    let sampled = sampled[0].min(sampled[1]);
-    assert!(found.distance <= sampled + tolerance, "{} {sampled}", found.distance);
-    let field = [b, a][usize::from(found.field == ids[0])];
-    let (of, pose, point, normal) = match found.field == ids[1] {
-        true => (a, &poses[1], found.point_a, found.normal),
-        false => (b, &poses[0], found.point_b, -found.normal),
-    };
-    let expected = field.signed_distance(inverse(pose, point + of.half * normal)) - of.half;
-    assert!((found.distance - expected).abs() <= tolerance, "{expected} {found:?}");
-}
-
-fn random_pose(random: &mut Random, apart: f64) -> Pose {
-    let axis = random.direction();
-    Pose::new(apart * random.direction(), DQuat::from_axis_angle(axis, random.between(0.0, 3.0)))
-        .expect("a pose")
-}
+use tesdf::glam::DVec3;
+use tesdf::mesh::TriangleMesh;
 
 fn cup() -> TriangleMesh {
     Parts::default().open_cube(DVec3::splat(-0.5), 1.0, Outward).mesh()
@@ -210,15 +100,150 @@ fn a_sheet_and_a_box_have_the_clearance_and_impact_of_formulas() {
     }
 }
 
+/// Solids of which an odd number overlaps: faces of each have the inside in front of them in one place,
+/// and behind them in another.
+fn odd_bodies() -> Vec<Body> {
+    let third = 1.0 / 3.0;
+    let two = Parts::default()
+        .cube(DVec3::splat(-0.5), 0.7, Outward)
+        .cube(DVec3::new(-0.2, -0.25, -0.3), 0.7, Outward)
+        .turned();
+    // Edges and corners lie on faces of the other, and sides of both on each other.
+    let on_each_other = Parts::default().cube(DVec3::splat(-0.5), 2.0 * third, Outward).cube(
+        DVec3::new(-0.5 + third, -0.5, -0.5 + third),
+        2.0 * third,
+        Outward,
+    );
+    let nested = Parts::default()
+        .cube(DVec3::splat(-0.5), 1.0, Outward)
+        .cube(DVec3::splat(-0.3), 0.6, Outward)
+        .cube(DVec3::splat(-0.1), 0.4, Outward);
+    let spheres = bowl(5, 5);
+    let shifted: Vec<DVec3> = spheres.vertices.iter().map(|&v| 0.7 * v + 0.6 * DVec3::X).collect();
+    let faces = spheres.faces.clone();
+    let spheres = spheres.add(&shifted, &faces, Inward);
+    [two, on_each_other, nested, spheres]
+        .map(|parts| Body::new(parts.mesh(), InsideRule::Odd.into()))
+        .into_iter()
+        .collect()
+}
+
 #[test]
-fn bodies_whose_contacts_are_not_known_are_refused() {
-    let solid = SolidMesh::with_inside(cup(), InsideRule::Generalized.into()).expect("any mesh");
-    let open = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
-    let overlap = Parts::default().cube(DVec3::ZERO, 2.0, Outward).cube(DVec3::ONE, 2.0, Outward).mesh();
-    let solid = SolidMesh::with_inside(overlap, InsideRule::Odd.into()).expect("closed");
-    let odd = Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes");
-    for (asset, says) in [(open, "jumps"), (odd, "in front of them")] {
-        let error = Scene::new().add_shape(asset).expect_err("refused");
-        assert!(matches!(error, CollideError::Shape { .. }) && error.to_string().contains(says), "{error}");
+fn overlaps_that_are_outside_touch_on_both_sides_of_their_faces() {
+    let bodies = odd_bodies();
+    let small = box_of(0.3);
+    let mut random = Random(8);
+    let mut compared = Compared::default();
+    for body in &bodies {
+        for apart in [0.1, 0.5, 0.9] {
+            let poses = [random_pose(&mut random, 0.05), random_pose(&mut random, apart)];
+            assert_contacts(body, &small, poses);
+            for (pair, poses) in
+                [([body, &small], [&poses[0], &poses[1]]), ([&small, body], [&poses[1], &poses[0]])]
+            {
+                assert_faces(pair, poses, 0.05, (24, 1), &mut compared);
+            }
+        }
+    }
+    for (i, j) in [(0, 1), (2, 3), (0, 0)] {
+        let poses = [random_pose(&mut random, 0.1), random_pose(&mut random, 0.6)];
+        assert_contacts(&bodies[i], &bodies[j], poses);
+        assert_faces([&bodies[i], &bodies[j]], [&poses[0], &poses[1]], 0.0, (16, 1), &mut compared);
+    }
+    assert!(compared.deep > 50 && compared.apart > 50, "{} {}", compared.deep, compared.apart);
+}
+
+/// The filter of Eq. (10) takes the normal that points outward at the contact.
+#[test]
+fn the_cosine_filter_knows_the_outside_of_faces_that_have_both() {
+    let bodies = odd_bodies();
+    let small = box_of(0.3);
+    let mut random = Random(10);
+    let (mut kept, mut dropped, mut turned) = (0, 0, 0);
+    for (k, body) in bodies.iter().enumerate() {
+        for _ in 0..6 {
+            let apart = random.between(0.2, 0.6);
+            let poses = [random_pose(&mut random, 0.05), random_pose(&mut random, apart)];
+            let mut scene = Scene::new();
+            let shapes = [body, &small].map(|b| scene.add_shape(b.asset.clone()).expect("a shape"));
+            let a = scene.add(Instance::new(shapes[0], poses[0])).expect("an instance");
+            scene.add(Instance::new(shapes[1], poses[1])).expect("an instance");
+            let all = CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::default() };
+            let cos = 0.3;
+            let filtered = CollideOptions { cos_theta: Some(cos), ..all };
+            let [all, filtered] = [all, filtered].map(|o| detect(&scene, &o).expect("contacts"));
+            for contact in all.iter().filter(|c| c.instance_a == a) {
+                let pose = &poses[0];
+                let at = pose.rotation.inverse() * (contact.point_a - pose.translation);
+                let normals = body.outward(contact.face_a, at);
+                let cosines: Vec<f64> =
+                    normals.iter().map(|n| contact.normal.dot(pose.rotation * *n)).collect();
+                let least = cosines.iter().copied().fold(f64::INFINITY, f64::min);
+                if (least + cos).abs() < 1e-6 {
+                    continue;
+                }
+                let is_kept = filtered.iter().any(|c| c == contact);
+                assert_eq!(is_kept, least < -cos, "body {k}: {cosines:?} {contact:?}");
+                kept += usize::from(is_kept);
+                dropped += usize::from(!is_kept);
+                let [a, b, c] = body.mesh.triangle(contact.face_a as usize);
+                turned += usize::from(normals.len() == 1 && normals[0].dot((b - a).cross(c - a)) < 0.0);
+            }
+        }
+    }
+    assert!(kept > 20 && dropped > 20 && turned > 20, "{kept} {dropped} {turned}");
+}
+
+/// A box in the overlap of two boxes is outside of both. It touches their walls from there.
+#[test]
+fn a_box_in_a_void_has_contacts_clearance_and_impact_of_formulas() {
+    let mesh = Parts::default()
+        .cube(DVec3::new(-2.0, -1.0, -1.0), 3.0, Outward)
+        .cube(DVec3::new(-1.0, -1.5, -1.5), 4.0, Outward)
+        .mesh();
+    // The void is x from -1 to 1, y and z from -1 to 2.
+    let body = Body::new(mesh, InsideRule::Odd.into());
+    let mut scene = Scene::new();
+    let shape = scene.add_shape(body.asset.clone()).expect("faces of both orientations");
+    let ball = scene.add_shape(Shape::Sphere { radius: 0.25 }).expect("a ball");
+    let cube = scene.add_shape(box_of(0.5).asset).expect("a box");
+    let walls = scene.add(Instance::new(shape, Pose::IDENTITY)).expect("added");
+    for (shape, is_round) in [(ball, true), (cube, false)] {
+        let at = DVec3::new(0.7, 0.5, 0.5);
+        let moved = scene.add(Instance::new(shape, Pose::at(at))).expect("added");
+        let found = clearance(&scene, moved, walls, &ClearanceOptions::default()).expect("a clearance");
+        assert!((found.distance - 0.05).abs() < 1e-6 && !found.overlap, "{found:?}");
+        assert!((found.normal + DVec3::X).length() < 1e-6, "{found:?}");
+        let right = Motion::Linear { velocity: Velocity { linear: DVec3::X, angular: DVec3::ZERO } };
+        let options = TimeOfImpactOptions::default();
+        let impact = time_of_impact(&scene, moved, walls, right, Motion::Rest, &options);
+        let impact = impact.expect("an answer").expect("an impact");
+        assert!((impact.time - 0.05).abs() < 1e-5, "{impact:?}");
+        for mode in [Mode::Node, Mode::Edge, Mode::Face, Mode::Exact] {
+            let contacts_per = ContactsPer::Face;
+            let options = CollideOptions {
+                contact_distance: 0.06,
+                contacts_per,
+                cos_theta: Some(0.5),
+                ..CollideOptions::with_mode(mode)
+            };
+            let found = detect(&scene, &options).expect("contacts");
+            let of_moved: Vec<_> = found.iter().filter(|c| c.instance_a == moved).collect();
+            assert!(!of_moved.is_empty(), "{mode:?}");
+            for contact in of_moved {
+                assert!((contact.distance - 0.05).abs() < 1e-6, "{mode:?}: {contact:?}");
+                assert!((contact.normal + DVec3::X).length() < 1e-4, "{mode:?}: {contact:?}");
+            }
+            // The wall has its outside on the side of the body.
+            let of_wall = found.iter().filter(|c| c.instance_a == walls && c.normal.x > 0.9).count();
+            assert!(of_wall > 0 || mode != Mode::Exact, "{mode:?}");
+        }
+        // In the wall, the way out is back into the void.
+        let at = DVec3::new(0.95, 0.5, 0.5);
+        let deep = scene.add(Instance::new(shape, Pose::at(at))).expect("added");
+        let found = clearance(&scene, deep, walls, &ClearanceOptions::default()).expect("a clearance");
+        assert!((found.distance + 0.2).abs() < 1e-6 && found.overlap, "{is_round} {found:?}");
+        assert!((found.normal + DVec3::X).length() < 1e-6, "{found:?}");
+        scene.remove(&[moved, deep]).expect("removed");
     }
 }

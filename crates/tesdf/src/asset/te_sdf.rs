@@ -234,10 +234,10 @@ impl TeSdf {
         })
     }
 
-    /// Bounds of the solid, in the unit of the mesh: those of the mesh, and half of the thickness
-    /// of a sheet around them.
+    /// Bounds of the solid, in the unit of the mesh: those of the mesh, with half of the thickness of a
+    /// sheet around them. The inside of an open mesh can extend farther beyond them.
     pub(crate) fn bounds_of_solid(&self) -> Aabb {
-        self.bounds.grown(self.half_thickness * self.frame.inverse_scale())
+        self.bounds.grown(self.reach_beyond() * self.frame.inverse_scale())
     }
 
     /// Whether the faces stand for their winding number: inside is where it is 1 or more, so they
@@ -247,19 +247,10 @@ impl TeSdf {
         self.about.signs == Signs::Cells
     }
 
-    /// Why contacts with the asset are not known; `None` when they are.
-    pub(crate) fn without_contacts(&self) -> Option<(&'static str, &'static str)> {
-        match self.about.signs {
-            _ if self.about.certificate().jumps() => Some((
-                "its signed distance jumps in the holes of the mesh",
-                "a closed mesh, as `tesdf repair --fill-holes` makes it, or sheets (`--inside sheet`)",
-            )),
-            Signs::RuleUnoriented => Some((
-                "some of its faces have the inside in front of them in one place and behind them in another",
-                "faces that look outward: cut overlaps off in the program that made the mesh, or use the rule `winding`",
-            )),
-            Signs::Cells | Signs::Rule | Signs::Sheet => None,
-        }
+    /// Whether no face has the inside in front of it. Otherwise the rule tells at each point of a face
+    /// on which side of it the inside is.
+    pub(crate) fn faces_look_outward(&self) -> bool {
+        self.about.signs != Signs::RuleUnoriented
     }
 
     pub(crate) fn about_mut(&mut self) -> &mut About {

@@ -71,6 +71,9 @@ pub struct Clearance {
 /// most the value at the surface. A plane's half-space is infinite, so only its field is used: no
 /// point of a plane is deeper in a body than the body reaches below the plane.
 ///
+/// The signed distance of an open mesh jumps in its holes: as soon as a point of a surface is inside, the
+/// clearance is minus its distance from the faces. The place of the jump is found up to the tolerance.
+///
 /// ```
 /// use tesdf::collide::{ClearanceOptions, Instance, Pose, Scene, Shape, clearance};
 /// use tesdf::glam::DVec3;
@@ -212,8 +215,8 @@ impl<'a> Pair<'a> {
         })
     }
 
-    /// For each face of *a*, a point of it and the inward direction, in the world's frame. A simple
-    /// shape is convex, so one point is enough.
+    /// For each face of *a*, a point of it and the inward direction, in the world's frame; both
+    /// directions where faces do not all look outward. A simple shape is convex, so one point is enough.
     fn behind_faces(&self) -> Vec<(DVec3, DVec3)> {
         let Body { shape, placement, .. } = &self.a;
         let rotate = |n: DVec3| placement.pose.rotation * n;
@@ -223,7 +226,11 @@ impl<'a> Pair<'a> {
         };
         match shape {
             Shape::Mesh(asset) => {
-                (0..asset.face_count()).filter_map(|f| of_face(asset.face_corners(f))).collect()
+                let of_faces = (0..asset.face_count()).filter_map(|f| of_face(asset.face_corners(f)));
+                match asset.faces_look_outward() {
+                    true => of_faces.collect(),
+                    false => of_faces.flat_map(|(p, inward)| [(p, inward), (p, -inward)]).collect(),
+                }
             }
             Shape::Plane => Vec::new(),
             // The centre of its upper side, downwards.
@@ -231,12 +238,24 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// The clearance from one order. It is right when neither body is inside the other.
+    /// The clearance from one order. It is right when neither body is inside the other. For an open mesh
+    /// it is the distance of the surfaces: its own surface is searched, in a field without jumps.
     ///
     /// # Errors
-    /// Positions are too far out.
+    /// Positions are too far out, or both bodies are open meshes.
     pub fn apart(&self, tolerance: f64) -> Result<Clearance, CollideError> {
-        self.least(&[self.first()], tolerance)
+        let jumps = |body: &Body| matches!(body.shape, Shape::Mesh(asset) if asset.jump().is_some());
+        let first = match (jumps(&self.a), jumps(&self.b)) {
+            (false, false) => self.first(),
+            (true, false) => Surface::A,
+            (false, true) => Surface::B,
+            (true, true) => {
+                let reason = "both are open meshes, whose insides end in their holes, so that no time of impact is \
+                     known; expected one closed mesh or sheet, or simple shape";
+                return Err(CollideError::NoClearance { a: self.a.id, b: self.b.id, reason });
+            }
+        };
+        self.least(&[first], tolerance)
     }
 
     /// The body with fewer faces. A plane never comes first, because it has no finite surface.

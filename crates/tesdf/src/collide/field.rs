@@ -7,8 +7,9 @@ use super::field_value::FieldValue;
 use super::simple::Simple;
 use super::{FeatureB, Placement, Shape};
 use crate::TeSdf;
+use crate::asset::layout::Label;
 use crate::base::Side;
-use crate::geometry::{Closest, Feature};
+use crate::geometry::{Closest, Feature, GeneralizedWinding};
 use crate::query::{Faces, ON_SURFACE_F64, Place, Precision, Surroundings};
 
 /// A field in the frame of its computations: the local frame of an asset, or the frame of a simple
@@ -41,6 +42,27 @@ impl Field<'_> {
                 let value = simple.value(p);
                 (value, FAR * (value.distance.abs() + p.abs().max_element()))
             }
+        }
+    }
+
+    /// The number by which the sign changes where there is no face; `None` where it does not.
+    pub fn jump(&self) -> Option<&GeneralizedWinding> {
+        match self {
+            Field::Mesh(asset) => asset.jump(),
+            Field::Simple(_) => None,
+        }
+    }
+
+    /// Lower bound of the signed distances within `radius` of `p`, where that at `p` is `distance` up to
+    /// `slack`.
+    pub fn least_in_ball(&self, p: DVec3, radius: f64, (distance, slack): (f64, f64)) -> f64 {
+        let Some(jump) = self.jump() else { return distance - slack - radius };
+        // Only the distance without its sign is 1-Lipschitz.
+        let nearest = distance - slack - radius;
+        if nearest > 0.0 && jump.is_outside_within(p, radius) {
+            nearest
+        } else {
+            -(distance.abs() + slack + radius)
         }
     }
 
@@ -140,12 +162,18 @@ impl<'a> FieldBody<'a> {
     pub fn least_up_to(&self, p: DVec3, radius: f64, reach: f64) -> Option<f64> {
         let limit = radius + reach;
         // Far out, the bounds are a good approximation of the body.
-        if let Field::Mesh(asset) = self.field
-            && asset.local_bounds().distance_squared(p) > (limit.max(0.0) + ROUNDING).powi(2)
-        {
-            return None;
+        if let Field::Mesh(asset) = self.field {
+            let far = limit.max(0.0) + ROUNDING;
+            let far = asset.jump().map_or(far, |jump| far.max(radius + jump.reach_beyond()));
+            if asset.local_bounds().distance_squared(p) > far.powi(2) {
+                return None;
+            }
         }
         let (distance, slack) = self.rough(p);
+        if self.field.jump().is_some() {
+            let least = self.field.least_in_ball(p, radius, (distance, slack));
+            return (least <= reach).then_some(least);
+        }
         (distance <= limit + slack).then_some(distance - slack - radius)
     }
 
@@ -184,10 +212,23 @@ impl<'a> FieldBody<'a> {
         self.field.rough(p)
     }
 
+    /// The value at `p`. Where several faces are equally near, with the gradient that most opposes
+    /// `normal`. In the field's frame.
+    pub fn opposing(&self, p: DVec3, normal: DVec3, precision: Precision) -> FieldValue {
+        match self.field {
+            Field::Mesh(asset) => CellField::Whole(&Surroundings::all(asset)).opposing(p, normal, precision),
+            Field::Simple(simple) => CellField::Simple(simple).opposing(p, normal, precision),
+        }
+    }
+
     /// Lower bound of the signed distance within `radius` of `p`. All in the field's frame.
     pub fn least_within(&self, p: DVec3, radius: f64) -> f64 {
-        let (distance, slack) = self.rough(p);
-        distance - slack - radius
+        self.field.least_in_ball(p, radius, self.rough(p))
+    }
+
+    /// The lowest value that a signed distance can have where it jumps at a point with this one.
+    pub fn lowest_beside(&self, distance: f64) -> f64 {
+        if self.field.jump().is_some() { -distance.abs() } else { distance }
     }
 
     /// The nearest points of a part's surface and of the body's surface, where the part's core is
@@ -272,6 +313,17 @@ impl CellField<'_> {
                 Field::Mesh(asset).rough(p)
             }
             Self::Simple(simple) => Field::Simple(simple).rough(p),
+        }
+    }
+
+    /// The number by which the sign changes where there is no face; `None` where it does not.
+    pub fn jump(&self) -> Option<&GeneralizedWinding> {
+        match *self {
+            // All points of the cell are on one side.
+            Self::Mesh { place: Place::Listed { label: Label::Inside | Label::Outside, .. }, .. } => None,
+            Self::Mesh { asset, .. } => asset.jump(),
+            Self::Whole(around) => around.asset.jump(),
+            Self::Simple(_) => None,
         }
     }
 
@@ -398,14 +450,20 @@ impl TeSdf {
             }
             let outward = if value.distance < 0.0 { closest.point - p } else { p - closest.point };
             let mut gradient = match on_surface {
-                true => self.outward(
+                true if self.faces_look_outward() => self.outward(
                     self.local_triangle(face as usize).normal,
                     closest.point,
                     4.0 * tie.max(ON_SURFACE_F64),
                 ),
+                true => self.outward_normal(face, closest.point),
                 false => outward.normalize_or_zero(),
             };
-            if on_surface && self.half_thickness > 0.0 && gradient.dot(normal) > 0.0 {
+            // A face that is outside on both sides, or on none.
+            let is_either = on_surface && gradient == DVec3::ZERO;
+            if is_either {
+                gradient = self.local_triangle(face as usize).normal;
+            }
+            if on_surface && (self.half_thickness > 0.0 || is_either) && gradient.dot(normal) > 0.0 {
                 gradient = -gradient;
             }
             let (own, other) = (gradient.dot(normal), best.gradient.dot(normal));

@@ -80,7 +80,8 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
         };
         for ((part, face_a, feature), &candidate) in group.iter().zip(&mut next) {
             let mut found = |minimum: Minimum| {
-                match pair.dropped(part, candidate, &minimum) {
+                let (minimum, cosine) = pair.faced(part, candidate, minimum);
+                match pair.dropped(part, candidate, &minimum, cosine) {
                     None => {}
                     Some(Dropped::AtEnd) => return,
                     Some(Dropped::ByCosine(_) | Dropped::Descending) => {
@@ -89,7 +90,6 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
                     }
                 }
                 if let Some(vertex) = pair.vertex(part, &minimum) {
-                    let cosine = minimum.value.gradient.dot(part.normal);
                     at_vertices.push(AtVertex { index: contacts.len(), vertex, cosine });
                 }
                 contacts.push(pair.contact(part, &minimum, *face_a, *feature));

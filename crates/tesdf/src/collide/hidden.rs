@@ -213,7 +213,7 @@ impl Looks<'_> {
             let values = self.values(&centers);
             let wanted = self.wanted(HiddenOverlap::FINE);
             let can_be_deep = |(branch, value): &(Branch, Option<FieldValue>)| {
-                value.is_none_or(|value| branch.radius - value.distance > wanted)
+                value.is_none_or(|value| branch.radius - self.field.lowest_beside(value.distance) > wanted)
             };
             level = branches.into_iter().zip(values).filter(can_be_deep).map(|(b, _)| b.child).collect();
         }
@@ -259,7 +259,7 @@ impl Looks<'_> {
             let greatest = match value {
                 None => piece.radius + reach - self.core.distance_squared(middle).sqrt(),
                 Some(value) => {
-                    let within_reach = reach - value.distance;
+                    let within_reach = reach - self.field.lowest_beside(value.distance);
                     if piece.radius + within_reach <= wanted {
                         continue;
                     }

@@ -33,7 +33,9 @@ pub struct ClippedPolygon {
 /// Parts beyond the band are skipped, unless `reach` is wider than the band. Then the face tree
 /// answers them.
 pub fn clip(asset: &TeSdf, polygon: Polygon, reach: f64, visit: &mut impl FnMut(&ClippedPolygon)) {
-    let clipping = Clipping { asset, reach, beyond: reach >= asset.band() };
+    // The inside of an open mesh may extend beyond the domain.
+    let beyond = reach >= asset.band() || asset.jump().is_some();
+    let clipping = Clipping { asset, reach, beyond };
     if let Some(domain) = &asset.conforming {
         // The domain need not extend beyond the solid.
         return Clipping { beyond: reach > 0.0, ..clipping }.tetrahedra(domain, polygon, visit);
@@ -195,7 +197,7 @@ impl Clipping<'_> {
 pub fn locate(asset: &TeSdf, point: DVec3, reach: f64, visit: &mut impl FnMut(&ClippedPolygon)) {
     let (place, word) = asset.locate_with_word(point);
     let cell = u32::try_from(word).ok();
-    let beyond = matches!(place, Place::NotOfDomain) && reach < asset.band();
+    let beyond = matches!(place, Place::NotOfDomain) && reach < asset.band() && asset.jump().is_none();
     if beyond || cell.is_some_and(|word| asset.cell_bounds().least(word) > reach) {
         return;
     }

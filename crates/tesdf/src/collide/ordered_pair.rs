@@ -1,5 +1,7 @@
 //! Two instances in an order: the surface of the first against the signed distance field of the
 //! second.
+use glam::DVec3;
+
 use super::descent::{OnFace, descends};
 use super::field::FieldBody;
 use super::instance_pairs::{InstancePair, instance_pairs};
@@ -114,10 +116,32 @@ impl<'a> OrderedPair<'a> {
         }
     }
 
+    /// A minimum of a candidate, with the cosine between its gradient and the normal of its part. Where
+    /// the other side of a face is outside there, the gradient is the one that most opposes that side.
+    /// Where both sides are alike, any side counts.
+    pub fn faced(&self, part: &Part, candidate: u32, minimum: Minimum) -> (Minimum, f64) {
+        let cosine = minimum.value.gradient.dot(part.normal);
+        if part.points().len() < 3 {
+            return (minimum, cosine);
+        }
+        let turned = match self.surface.outward_at(candidate, minimum.point) {
+            None => return (minimum, cosine),
+            Some(DVec3::ZERO) => return (minimum, -cosine.abs()),
+            Some(normal) if normal.dot(part.normal) > 0.0 => return (minimum, cosine),
+            Some(normal) => normal,
+        };
+        let value = match self.options.contacts_per {
+            ContactsPer::Cell => minimum.value,
+            _ => self.field.opposing(minimum.point, turned, self.options.precision),
+        };
+        (Minimum { value, ..minimum }, value.gradient.dot(turned))
+    }
+
     /// Why a minimum of a candidate is no contact, if it is none: Eq. (10), which does not apply to
-    /// rounded shapes and sheets, because they have normals in all directions; or a lower point
-    /// beside it.
-    pub fn dropped(&self, part: &Part, candidate: u32, minimum: &Minimum) -> Option<Dropped> {
+    /// rounded shapes and sheets, because they have normals in all directions; or a lower point beside it.
+    ///
+    /// `cosine` is that of [`faced`](Self::faced).
+    pub fn dropped(&self, part: &Part, candidate: u32, minimum: &Minimum, cosine: f64) -> Option<Dropped> {
         match self.options.mode {
             Mode::Node => return None,
             Mode::Edge => {
@@ -127,7 +151,6 @@ impl<'a> OrderedPair<'a> {
             Mode::Face | Mode::Exact => {}
         }
         let gradient = minimum.value.gradient;
-        let cosine = gradient.dot(part.normal);
         if part.points().len() == 3
             && !self.surface.is_sheet()
             && self.options.cos_theta.is_some_and(|cos| cosine > -cos)

@@ -2,12 +2,13 @@
 use glam::DVec3;
 
 use super::depth_bounds::{Bound, DepthBounds, Kind};
-use super::field::{Field, FieldBody};
+use super::field::{Field, FieldBody, ROUNDING};
 use super::field_value::FieldValue;
+use super::narrow::jump;
 use super::polygon::{Parts, Polygon};
 use super::surface::Part;
 use crate::TeSdf;
-use crate::geometry::{Feature, Triangle, polygon_to_triangle};
+use crate::geometry::{Feature, GeneralizedWinding, Triangle, polygon_to_triangle};
 
 /// A part of a face, or of the core of a rounded shape, in the field's frame.
 #[derive(Clone, Debug)]
@@ -91,6 +92,8 @@ const ROUNDS: usize = 8;
 const FEW: usize = 4;
 /// A piece is cut along the side of a face where this share of its size is on both sides.
 const THIN: f64 = 1e-3;
+/// A piece is cut along a jump where this share of its size is on both sides; otherwise it is halved.
+const SLICE: f64 = 0.125;
 /// Values in `f32` are used while more than this is to be gained (local frame).
 const COARSE: f64 = 1e-4;
 /// Nearer to the surface than this (local frame), a piece may cross it. Where two faces cross,
@@ -247,7 +250,7 @@ impl Looks<'_> {
     pub fn first(&mut self, mut piece: Piece, bound: f64) -> Rest {
         let center = piece.center();
         let (value, lower) = self.value(&piece, center, false);
-        let bound = bound.max(lower - piece.reach(center));
+        let bound = bound.max(self.by_reach(&piece, center, &value, lower));
         if self.is_closed(bound) {
             return Rest::Nothing;
         }
@@ -278,7 +281,7 @@ impl Looks<'_> {
             let at = piece.point(piece.bounds.at);
             let is_fine = -self.least - piece.radius + COARSE > piece.bounds.greatest;
             let (value, lower) = self.value(&piece, at, is_fine);
-            bound = bound.max(lower - piece.reach(at));
+            bound = bound.max(self.by_reach(&piece, at, &value, lower));
             if self.is_closed(bound) {
                 return Rest::Nothing;
             }
@@ -306,8 +309,21 @@ impl Looks<'_> {
         self.divided(&piece, bound, plane)
     }
 
-    /// The parts of a piece that can still be lower than all others. The piece is cut along a
-    /// plane, or halved.
+    /// Lower bound of the signed distances of the surface on a piece, by the value at a point and the bound
+    /// `lower` there.
+    fn by_reach(&self, piece: &Piece, at: DVec3, value: &FieldValue, lower: f64) -> f64 {
+        let (field, reach) = (self.field.field, piece.reach(at));
+        match field.jump() {
+            None => lower - reach,
+            Some(_) => {
+                let slack = ROUNDING + 1e-9 * value.distance.abs();
+                field.least_in_ball(at, reach, (value.distance, slack)) - piece.radius
+            }
+        }
+    }
+
+    /// The parts of a piece that can still be lower than all others. The piece is cut along a plane,
+    /// or halved.
     fn divided(&self, piece: &Piece, bound: f64, plane: Option<Plane>) -> Rest {
         let cut = match (plane, self.field.field) {
             (Some(plane), Field::Mesh(asset)) => piece.cut(asset, plane),
@@ -402,16 +418,36 @@ impl Looks<'_> {
     /// is inside comes to the surface. So it is with faces in one plane, and with faces beyond a
     /// convex edge.
     fn heights(&self, asset: &TeSdf, piece: &Piece, triangle: &Triangle) -> Option<[f64; 3]> {
+        if asset.jump().is_some() {
+            // On the way, the sign may change where there is no surface.
+            return None;
+        }
+        // The outside is in front of the face, or on the other side where faces do not look outward.
+        self.heights_under(asset, piece, triangle, triangle.normal).or_else(|| {
+            match asset.faces_look_outward() {
+                true => None,
+                false => self.heights_under(asset, piece, triangle, -triangle.normal),
+            }
+        })
+    }
+
+    /// The same, with the outside on the side of the plane that the normal points to.
+    fn heights_under(
+        &self,
+        asset: &TeSdf,
+        piece: &Piece,
+        triangle: &Triangle,
+        normal: DVec3,
+    ) -> Option<[f64; 3]> {
         let hair = self.hair();
-        let heights = piece.corners.map(|c| triangle.normal.dot(triangle.corners[0] - c));
-        let points: [DVec3; 3] =
-            std::array::from_fn(|k| piece.corners[k] + (heights[k] + hair) * triangle.normal);
+        let heights = piece.corners.map(|c| normal.dot(triangle.corners[0] - c));
+        let points: [DVec3; 3] = std::array::from_fn(|k| piece.corners[k] + (heights[k] + hair) * normal);
         let points = &points[..piece.count];
-        let mut is_clear = triangle.normal != DVec3::ZERO;
-        asset.near_polygon(points, triangle.normal, hair, &mut |face| {
+        let mut is_clear = normal != DVec3::ZERO;
+        asset.near_polygon(points, normal, hair, &mut |face| {
             if is_clear {
                 let other = asset.local_triangle(face as usize);
-                is_clear = polygon_to_triangle(points, triangle.normal, &other, 0.5 * hair).is_none();
+                is_clear = polygon_to_triangle(points, normal, &other, 0.5 * hair).is_none();
             }
             if is_clear { hair } else { f64::NEG_INFINITY }
         });
@@ -453,7 +489,7 @@ impl Looks<'_> {
         if crossed > 0 {
             return Side::Across(deepest.1.filter(|_| crossed <= FEW));
         }
-        // It is on one side. Where its centre is on the surface, a corner shows the side.
+        // It is on one side, unless the sign jumps. Where its centre is on the surface, a corner shows the side.
         let center = piece.center();
         let mut at = (center, self.field.field.exact_value(center));
         if at.1.distance.abs() <= clear {
@@ -464,10 +500,44 @@ impl Looks<'_> {
                 }
             }
         }
+        if let (Some(jump), true) = (asset.jump(), at.1.distance.abs() > clear) {
+            return self.side_of_jump(jump, piece, at);
+        }
         if at.1.distance >= -clear {
             return Side::Outside;
         }
         self.offer(piece, at.0, &at.1);
         Side::Inside
+    }
+
+    /// The side of a piece that no face passes through, in the field of an open mesh. `at` is a point of
+    /// it off the faces, with the value there.
+    fn side_of_jump(
+        &mut self,
+        jump: &GeneralizedWinding,
+        piece: &Piece,
+        (at, value): (DVec3, FieldValue),
+    ) -> Side {
+        self.offer(piece, at, &value);
+        let plane = match jump::side(jump, piece.points(), at) {
+            jump::Side::Outside => return Side::Outside,
+            jump::Side::Inside => return Side::Inside,
+            jump::Side::Across(cut) => {
+                // How deep the part is that is certainly inside.
+                if let Parts::Across(inner, _) = Polygon::new(piece.points()).cut(|v| cut.inner(v.point)) {
+                    for p in inner.points() {
+                        self.value(piece, p, false);
+                    }
+                }
+                cut.plane().map(|(point, normal)| Plane(point, normal))
+            }
+            jump::Side::Unknown => None,
+        };
+        let size = piece.reach(piece.center());
+        if size <= self.tolerance {
+            // The jump is found up to the tolerance.
+            return Side::Outside;
+        }
+        Side::Across(plane.filter(|plane| piece.depth_across(*plane) > SLICE * size))
     }
 }

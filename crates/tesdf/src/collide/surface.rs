@@ -8,6 +8,7 @@ use super::{Mode, Placement, Shape};
 use crate::TeSdf;
 use crate::asset::layout::TreeChild;
 use crate::geometry::{Aabb, Triangle};
+use crate::query::Facing;
 
 /// A surface placed in the world, mapped to the frame of a field.
 #[derive(Clone, Debug)]
@@ -50,12 +51,23 @@ pub struct Part {
     pub normal: DVec3,
     /// The least cosine between the normal and that of a face that has the part.
     pub cosine: f64,
+    /// Whether the normal is right everywhere on the part.
+    pub facing: PartFacing,
+}
+
+/// Where the normal of a face points outward.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PartFacing {
+    /// Everywhere on the face.
+    Everywhere,
+    /// At its centre. Elsewhere the other side of the face may be outside.
+    AtCenter,
 }
 
 impl Part {
     fn new(points: &[DVec3], radius: f64) -> Self {
-        let (normal, cosine) = (DVec3::ZERO, 1.0);
-        let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal, cosine };
+        let (normal, cosine, facing) = (DVec3::ZERO, 1.0, PartFacing::Everywhere);
+        let mut part = Self { points: [DVec3::ZERO; 3], count: points.len(), radius, normal, cosine, facing };
         part.points[..points.len()].copy_from_slice(points);
         if let [a, b, c] = *points {
             part.normal = Triangle::new([a, b, c]).normal;
@@ -177,8 +189,17 @@ impl<'a> SurfaceBody<'a> {
     /// A candidate face.
     pub fn face(&self, face: u32, field: &FieldBody, reach: f64) -> Part {
         match self.shape {
-            Shape::Mesh(asset) => {
+            Shape::Mesh(asset) if asset.faces_look_outward() => {
                 Part::new(&asset.face_corners(face as usize).map(|p| self.to_field(p)), self.around)
+            }
+            Shape::Mesh(asset) => {
+                let [a, b, c] = asset.face_corners(face as usize).map(|p| self.to_field(p));
+                let center = asset.local_corners(face as usize).iter().sum::<DVec3>() / 3.0;
+                let points = match asset.facing(face, center) {
+                    Facing::Inward => [a, c, b],
+                    Facing::Outward | Facing::Either => [a, b, c],
+                };
+                Part { facing: PartFacing::AtCenter, ..Part::new(&points, self.around) }
             }
             Shape::Plane => {
                 // Only the part over or under the field's body matters.
@@ -192,6 +213,19 @@ impl<'a> SurfaceBody<'a> {
                 let points: Vec<DVec3> = parts[face as usize].iter().map(|&p| self.to_field(p)).collect();
                 Part::new(&points, radius * self.scale + self.around)
             }
+        }
+    }
+
+    /// The normal that points outward at a point of a face (field's frame); zero where it points outward
+    /// on both sides or on none. `None` where the face's part has it.
+    pub fn outward_at(&self, face: u32, point: DVec3) -> Option<DVec3> {
+        match self.shape {
+            Shape::Mesh(asset) if !asset.faces_look_outward() => {
+                let at = self.linear.transpose() * (point - self.shift) / (self.scale * self.scale);
+                let normal = asset.outward_normal(face, asset.frame.to_local(at));
+                Some((self.linear * normal).normalize_or_zero())
+            }
+            _ => None,
         }
     }
 
@@ -284,8 +318,10 @@ impl<'a> SurfaceBody<'a> {
                 let corners = asset.face_corners(face);
                 let points = [corners[side], corners[(side + 1) % 3]].map(|p| self.to_field(p));
                 let faces = asset.faces_beside(face, side).chain([face]);
+                let [start, end] = [side, (side + 1) % 3].map(|k| asset.local_corners(face)[k]);
+                let middle = 0.5 * (start + end);
                 let normals: Vec<DVec3> =
-                    faces.map(|f| self.linear * asset.local_triangle(f).normal).collect();
+                    faces.map(|f| self.linear * asset.outward_normal(f as u32, middle)).collect();
                 Part::edge(points, self.around, normals.into_iter())
             }
             simple => {
@@ -303,7 +339,8 @@ impl<'a> SurfaceBody<'a> {
     pub fn node_of_faces(&self, node: u32) -> Part {
         let normal = match self.shape {
             Shape::Mesh(asset) => {
-                let normal = |&face: &u32| asset.local_triangle(face as usize).normal;
+                let at = asset.frame.to_local(DVec3::from_array(asset.vertices[node as usize]));
+                let normal = |&face: &u32| asset.outward_normal(face, at);
                 asset.faces_at(node).iter().map(normal).sum()
             }
             Shape::Box { .. } => Simple::from(self.shape).nodes().0[node as usize].0.signum(),
@@ -527,7 +564,7 @@ impl FieldBody<'_> {
     /// Bounds of the body, in the field's frame; infinite for a plane.
     pub fn bounds(&self) -> Aabb {
         match self.field {
-            Field::Mesh(asset) => asset.local_bounds().grown(asset.half_thickness),
+            Field::Mesh(asset) => asset.local_bounds().grown(asset.reach_beyond()),
             Field::Simple(simple) => simple.bounds(),
         }
     }
@@ -535,7 +572,7 @@ impl FieldBody<'_> {
     /// A ball around the body, in the field's frame; infinite for a plane.
     fn ball(&self) -> (DVec3, f64) {
         let bounds = match self.field {
-            Field::Mesh(asset) => asset.local_bounds().grown(asset.half_thickness),
+            Field::Mesh(asset) => asset.local_bounds().grown(asset.reach_beyond()),
             Field::Simple(Simple::Box(half)) => Aabb { min: -half, max: half },
             Field::Simple(Simple::Round { half_height, radius }) => {
                 return (DVec3::ZERO, half_height + radius);

@@ -58,6 +58,8 @@ pub struct Impact {
 /// Bodies that penetrate at the start have time 0 and their negative distance. Bodies within the
 /// tolerance have time 0.
 ///
+/// An open mesh is touched where the surfaces touch: a body may pass through its holes.
+///
 /// ```
 /// use tesdf::collide::{
 ///     Instance, Motion, Pose, Scene, Shape, TimeOfImpactOptions, Velocity, time_of_impact,
@@ -78,7 +80,7 @@ pub struct Impact {
 /// ```
 ///
 /// # Errors
-/// As [`clearance`](super::clearance()); also for a motion that is not finite, a rotating plane, or
+/// As [`clearance`](super::clearance()); also for two open meshes, a motion that is not finite, a rotating plane, or
 /// an invalid option.
 pub fn time_of_impact(
     scene: &Scene,

@@ -267,7 +267,8 @@ impl Stages<'_> {
         let mut seen = Vec::new();
         let mut kept = Vec::new();
         search.minima(field, &part, None, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
-            let verdict = match self.pair.dropped(&part, candidate, &minimum) {
+            let (minimum, cosine) = self.pair.faced(&part, candidate, minimum);
+            let verdict = match self.pair.dropped(&part, candidate, &minimum, cosine) {
                 Some(Dropped::ByCosine(cosine)) => PolygonVerdict::Filtered { cosine },
                 Some(Dropped::Descending) => PolygonVerdict::Descending,
                 Some(Dropped::AtEnd) => PolygonVerdict::AtEnd,

@@ -54,6 +54,17 @@ pub struct Generalized {
     pub error: f64,
 }
 
+/// The generalised winding number around a point, to first order.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NearWinding {
+    /// The number at the point.
+    pub value: f64,
+    /// Its gradient.
+    pub gradient: DVec3,
+    /// A bound of the error of the linear function, rounding included.
+    pub error: f64,
+}
+
 impl GeneralizedWinding {
     /// Builds the tree over the faces, and finds the edges that close the mesh. `position` gives
     /// the position of a vertex.
@@ -154,8 +165,46 @@ impl GeneralizedWinding {
         self.at(x).value.abs() >= 0.5
     }
 
-    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are
-    /// on one side. No face may come within `radius` of `x`.
+    /// The number within `radius` of `x`, at points that can be reached straight from `x` without passing
+    /// through a face. `None` where an open edge comes as near.
+    ///
+    /// The gradient is a sum over the open edges (Biot and Savart). Of second order, an edge adds at
+    /// most the integral of `dl / r³` times the squared radius.
+    pub fn near(&self, x: DVec3, radius: f64) -> Option<NearWinding> {
+        let Generalized { value, error } = self.at(x);
+        let (mut gradient, mut bend) = (DVec3::ZERO, 0.0);
+        for &[a, b] in &self.edges {
+            let (along, from, to) = (b - a, x - a, x - b);
+            let apart = apart_from_edge(x, [a, b]);
+            if apart <= radius {
+                return None;
+            }
+            let lengths = from.length() * to.length();
+            gradient -=
+                along.cross(from) * ((from.length() + to.length()) / (lengths * (lengths + from.dot(to))));
+            // Points of the edge at the way s from the nearest one are at least √(s² + apart²) away.
+            let of_edge = (along.length() / apart).min(2.0) / (apart * apart);
+            bend += of_edge / (1.0 - radius / apart).powi(3);
+        }
+        let error = 1.000_001 * radius * radius * bend / (4.0 * PI) + error + DECIDED;
+        let is_known = error.is_finite() && gradient.is_finite();
+        is_known.then_some(NearWinding { value, gradient: gradient / (4.0 * PI), error })
+    }
+
+    /// Whether all points within `radius` of `x` are certainly outside. No face may come as near.
+    pub fn is_outside_within(&self, x: DVec3, radius: f64) -> bool {
+        let apart = self.bounds.distance_squared(x).sqrt() - radius;
+        apart > self.reach_beyond() || self.side_within(x, radius) == Some(false)
+    }
+
+    /// Points that are farther than this from the bounds of the faces are outside: the solid angle of a
+    /// face seen from the distance `d` is at most its area / d².
+    pub fn reach_beyond(&self) -> f64 {
+        (self.area / (0.9 * 2.0 * PI)).sqrt()
+    }
+
+    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are on
+    /// one side. No face may come within `radius` of `x`.
     ///
     /// The gradient of the solid angle of a loop is at most the integral of `dl / r²` along the
     /// loop (Biot and Savart).
@@ -163,13 +212,11 @@ impl GeneralizedWinding {
         let Generalized { value, error } = self.at(x);
         let mut change = 0.0;
         for &[a, b] in &self.edges {
-            let along = b - a;
-            let t = ((x - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            let apart = (a + t * along).distance(x) * (1.0 - 1e-12) - radius;
+            let apart = apart_from_edge(x, [a, b]) - radius;
             if apart <= 0.0 {
                 return None;
             }
-            change += along.length() / (apart * apart);
+            change += (b - a).length() / (apart * apart);
         }
         let change = 1.000_001 * radius * change / (4.0 * PI) + error + DECIDED;
         let beyond = value.abs() - 0.5;
@@ -183,9 +230,16 @@ const ROUNDING: f64 = 4e-15;
 /// A cell is on one side only where the number differs from 1/2 by more than this.
 const DECIDED: f64 = 1e-9;
 
-/// The solid angle of a triangle from `x + (e, e^2, e^3)` (Van Oosterom and Strackee 1983):
-/// positive where the point is behind the triangle. Also its condition, 0 to 1: the error is some
-/// roundings divided by the condition.
+/// The distance of a point from an edge, less its rounding.
+fn apart_from_edge(x: DVec3, [a, b]: [DVec3; 2]) -> f64 {
+    let along = b - a;
+    let t = ((x - a).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+    (a + t * along).distance(x) * (1.0 - 1e-12)
+}
+
+/// The solid angle of a triangle from `x + (e, e^2, e^3)` (Van Oosterom and Strackee 1983): positive
+/// where the point is behind the triangle. Also its condition, 0 to 1: the error is some roundings
+/// divided by the condition.
 fn solid_angle(triangle: [DVec3; 3], x: DVec3) -> (f64, f64) {
     // Triangles without area have no solid angle.
     let side = perturbed_orientation(triangle, x);
@@ -323,6 +377,34 @@ mod tests {
             }
         }
         assert!(decided.iter().all(|&n| n > 5) && open > 5, "{decided:?} {open}");
+    }
+
+    /// Within a ball that no face comes near, the number is the linear function up to its error, and the
+    /// error shrinks with the square of the radius.
+    #[test]
+    fn the_number_near_a_point_is_linear() {
+        let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let faces = [[0, 2, 1], [0, 1, 3], [2, 0, 3]];
+        let winding = GeneralizedWinding::new(&faces, |v| vertices[v as usize]);
+        let mut known = 0;
+        for k in 0..1000 {
+            let lattice = DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100));
+            let center = 0.13 * lattice + 0.031;
+            let radius = 0.4 * center.min_element();
+            let Some(near) = winding.near(center, radius) else { continue };
+            known += 1;
+            for j in 0..8 {
+                let corner = DVec3::new(f64::from(j & 1), f64::from(j >> 1 & 1), f64::from(j >> 2));
+                let way = radius * (2.0 * corner - 1.0) / 3f64.sqrt();
+                let error = by_angles(&faces, &vertices, center + way) - near.value - near.gradient.dot(way);
+                assert!(error.abs() <= near.error, "{center}: {error:e} {:e}", near.error);
+                let fine = 1e-3 * way;
+                let moved = by_angles(&faces, &vertices, center + fine) - near.value;
+                let slope = near.gradient.dot(fine);
+                assert!((moved - slope).abs() <= 1e-6 * near.error + 1e-13, "{center}: {moved:e} {slope:e}");
+            }
+        }
+        assert!(known > 500, "{known}");
     }
 
     #[test]

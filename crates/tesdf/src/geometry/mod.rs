@@ -24,7 +24,7 @@ pub use barycentric::barycentric;
 pub use crossing::{normal_signs, orientation, perturbed_orientation, signed_crossing};
 pub use flat::is_flat;
 pub use frame::LocalFrame;
-pub use generalized_winding::{Generalized, GeneralizedWinding};
+pub use generalized_winding::{Generalized, GeneralizedWinding, NearWinding};
 pub use meet::{segment_meets_triangle, surely_apart, triangles_meet};
 pub use polygon_distance::polygon_to_triangle;
 pub(crate) use ray::{NearRay, length_and_direction};

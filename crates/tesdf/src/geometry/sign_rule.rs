@@ -60,6 +60,14 @@ impl SignRule {
 
     /// Whether the sign can change where there is no face.
     pub fn jumps(&self) -> bool {
-        matches!(self.number, Number::Real(_))
+        self.jump().is_some()
+    }
+
+    /// The number by which the sign changes where there is no face; `None` where it does not.
+    pub fn jump(&self) -> Option<&GeneralizedWinding> {
+        match &self.number {
+            Number::Real(winding) => Some(winding),
+            Number::Integer(_) => None,
+        }
     }
 }

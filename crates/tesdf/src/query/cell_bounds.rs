@@ -44,6 +44,8 @@ impl TeSdf {
                 let least = |&face: &u32| self.least_to_face(face, center, &cell.corners);
                 faces.ids().iter().map(least).fold(f64::INFINITY, f64::min)
             }),
+            // The inside of an open mesh may be there.
+            Node::Far(_) | Node::NotOfDomain if !self.is_outside_within(center, reach) => 0.0,
             Node::Far(Side::Outside) => at_center(Place::Far(Side::Outside)),
             Node::NotOfDomain => {
                 // A cell outside the domain is at least as far away as the band.
@@ -53,6 +55,14 @@ impl TeSdf {
             _ => 0.0,
         };
         (least - ROUNDING).max(0.0)
+    }
+
+    /// Whether all points within `radius` of `p` are certainly outside, or the sign changes at faces only.
+    fn is_outside_within(&self, p: DVec3, radius: f64) -> bool {
+        self.jump().is_none_or(|jump| {
+            let apart = self.found_at(p, self.locate(p), Precision::F32).signed_distance;
+            apart - ROUNDING > radius && jump.is_outside_within(p, radius)
+        })
     }
 
     /// Lower bound of the distance to a face over a cell. The distance is convex, so its tangent at

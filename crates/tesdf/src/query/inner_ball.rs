@@ -37,18 +37,19 @@ impl TeSdf {
     fn middle_below(&self, face: usize) -> DVec3 {
         let triangle = self.local_triangle(face);
         let on_face = triangle.corners.iter().sum::<DVec3>() / 3.0;
+        let normal = self.outward_normal(face as u32, on_face);
         let mut radius = 0.5 * self.local_bounds().extent().length();
         for _ in 0..STEPS {
-            let nearest = self.found_exactly(on_face - radius * triangle.normal);
+            let nearest = self.found_exactly(on_face - radius * normal);
             if nearest.signed_distance.abs() >= radius * (1.0 - FITS) {
                 break;
             }
             // The ball through both points that is tangent to the face's plane.
             let apart = on_face - nearest.closest_point;
-            let through = apart.length_squared() / (2.0 * apart.dot(triangle.normal));
+            let through = apart.length_squared() / (2.0 * apart.dot(normal));
             radius = if through > 0.0 && through < radius { through } else { 0.5 * radius };
         }
-        on_face - radius * triangle.normal
+        on_face - radius * normal
     }
 
     /// For each node of the face tree, the greatest [`corner_reach`] of the faces below it, in the

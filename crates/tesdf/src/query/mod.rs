@@ -75,6 +75,7 @@ use crate::TeSdf;
 use crate::base::Side;
 use crate::geometry::{Closest, Feature};
 use far::is_near;
+pub(crate) use sign::Facing;
 use sign::hinted_side;
 
 /// The arithmetic of a query, for code that chooses it at run time with [`TeSdf::query_with`] and
@@ -416,6 +417,7 @@ impl TeSdf {
         });
         let on_surface = |d: f64| match place {
             _ if d >= ON_SURFACE_F32 => None,
+            _ if !self.faces_look_outward() => Some(self.normal_outward(found.face, local)),
             _ => Some(self.outward(triangle.normal, local, BESIDE * ON_SURFACE_F32)),
         };
         self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
@@ -474,10 +476,13 @@ impl TeSdf {
             let normal = match place {
                 _ if d >= ON_SURFACE_F64 => return None,
                 Place::Listed { .. } => self.pseudonormal(faces, position, &closest),
-                // A cell without a list, because no list was worth its bytes, may touch the
-                // surface.
+                // A cell without a list, because no list was worth its bytes, may touch the surface.
+                _ if !self.faces_look_outward() => self.normal_outward(position, closest.point),
                 _ => self.face_normal(position),
             };
+            if !self.faces_look_outward() {
+                return Some(normal);
+            }
             Some(self.outward(normal, closest.point, BESIDE * ON_SURFACE_F64))
         };
         self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
@@ -507,7 +512,7 @@ impl TeSdf {
     }
 
     /// The unit normal of a face. For a segment or a point, some direction perpendicular to it.
-    fn face_normal(&self, position: u32) -> DVec3 {
+    pub(super) fn face_normal(&self, position: u32) -> DVec3 {
         let triangle = self.local_triangle(position as usize);
         if triangle.normal != DVec3::ZERO {
             return triangle.normal;
@@ -525,7 +530,11 @@ impl TeSdf {
     /// need not, so the face tree is used.
     fn pseudonormal(&self, faces: &Faces, position: u32, closest: &Closest) -> DVec3 {
         let corners = self.faces[position as usize];
-        let own = self.face_normal(position);
+        let turned = !self.faces_look_outward();
+        let own = match turned {
+            true => self.normal_outward(position, closest.point),
+            false => self.face_normal(position),
+        };
         let held: &[u32] = match closest.feature {
             Feature::Face => return own,
             Feature::Edge(k) => &[corners[k as usize], corners[(k as usize + 1) % 3]],
@@ -556,7 +565,8 @@ impl TeSdf {
                 _ => 1.0,
             };
             if weight.is_finite() {
-                sum += weight * triangle.normal;
+                sum +=
+                    weight * if turned { self.outward_normal(face, closest.point) } else { triangle.normal };
             }
         }
         sum.try_normalize().unwrap_or(own)

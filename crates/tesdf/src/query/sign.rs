@@ -5,7 +5,7 @@ use super::locate::{Faces, Place};
 use crate::TeSdf;
 use crate::asset::layout::{Label, SignHint, SignHints};
 use crate::base::Side;
-use crate::geometry::{Closest, Feature, signed_crossing};
+use crate::geometry::{Closest, Feature, GeneralizedWinding, signed_crossing};
 
 /// The side that the closest feature implies; `None` when it implies none. `height` is the height
 /// of the point over the face.
@@ -23,6 +23,26 @@ pub fn hinted_side(hints: SignHints, feature: Feature, height: f64) -> Option<Si
         SignHint::Inside => Some(Side::Inside),
     }
 }
+
+/// The side of a face at a point of it that is outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Facing {
+    /// The front, to which the normal points.
+    Outward,
+    /// The back.
+    Inward,
+    /// Both or none, or not the same all around the point.
+    Either,
+}
+
+/// Lengths (local frame): the points at which the sides of a face are looked up lie this far beside the
+/// point, towards the inside of the face, and this far off the face. Other faces that have the point
+/// are then farther away, unless they make an angle below some 1e-3 with it.
+const ASIDE: f64 = 1e-5;
+const OFF: f64 = 1e-9;
+
+/// The points aside lie towards points at this share of the way from the corners to the centroid.
+const INNER: f64 = 0.1;
 
 impl TeSdf {
     /// The side of a point in a crossing cell whose nearest face is known in `f64`. The hint
@@ -68,6 +88,56 @@ impl TeSdf {
         let Some(rule) = self.sign_rule() else { return normal };
         let [front, behind] = [1.0, -1.0].map(|s| rule.side(at + s * step * normal));
         if front == Side::Inside && behind == Side::Outside { -normal } else { normal }
+    }
+
+    /// The number by which the sign changes where there is no face, in the local frame; `None` where it
+    /// does not.
+    pub(crate) fn jump(&self) -> Option<&GeneralizedWinding> {
+        self.sign_rule()?.jump()
+    }
+
+    /// How far the inside can extend beyond the bounds of the faces, in the local frame.
+    pub(crate) fn reach_beyond(&self) -> f64 {
+        self.jump().map_or(self.half_thickness, GeneralizedWinding::reach_beyond)
+    }
+
+    /// The side of a face that is outside at `at`, a point of the face. Where all faces look outward,
+    /// this is known. Otherwise the rule tells it, beside the point in three directions: at an edge of
+    /// the face its sides would be those of another face.
+    pub(crate) fn facing(&self, face: u32, at: DVec3) -> Facing {
+        let Some(rule) = self.sign_rule().filter(|_| !self.faces_look_outward()) else {
+            return Facing::Outward;
+        };
+        let triangle = self.local_triangle(face as usize);
+        let at = triangle.closest(at).point;
+        let center = triangle.corners.iter().sum::<DVec3>() / 3.0;
+        let mut facings = triangle.corners.iter().map(|&corner| {
+            let way = corner + INNER * (center - corner) - at;
+            let beside = at + way * (ASIDE / way.length().max(ASIDE));
+            match [1.0, -1.0].map(|side| rule.side(beside + side * OFF * triangle.normal)) {
+                [Side::Outside, Side::Inside] => Facing::Outward,
+                [Side::Inside, Side::Outside] => Facing::Inward,
+                _ => Facing::Either,
+            }
+        });
+        let first = facings.next().unwrap_or(Facing::Either);
+        if first != Facing::Either && facings.all(|facing| facing == first) { first } else { Facing::Either }
+    }
+
+    /// The normal of a face at a point of it, so that it points outward; zero where it points outward on
+    /// both sides or on none, and for a face without area.
+    pub(crate) fn outward_normal(&self, face: u32, at: DVec3) -> DVec3 {
+        let normal = self.local_triangle(face as usize).normal;
+        match self.facing(face, at) {
+            Facing::Outward => normal,
+            Facing::Inward => -normal,
+            Facing::Either => DVec3::ZERO,
+        }
+    }
+
+    /// As [`outward_normal`](Self::outward_normal), or the normal as the face has it where that is zero.
+    pub(crate) fn normal_outward(&self, face: u32, at: DVec3) -> DVec3 {
+        self.outward_normal(face, at).try_normalize().unwrap_or_else(|| self.face_normal(face))
     }
 
     /// Winding number in a crossing cell: the number at its centroid plus the crossings on the

@@ -17,22 +17,22 @@ use crate::query::{Precision, Surroundings};
 
 /// Number of evaluations after which a search gives up. The kernel `narrow_exact` counts rounds
 /// instead (`ROUNDS`), because its threads evaluate pieces together.
-const MAX_EVALUATIONS: usize = 20_000;
+pub const MAX_EVALUATIONS: usize = 20_000;
 
 /// A corner of a part of the polygon.
 #[derive(Clone, Copy, Debug)]
-struct Corner {
-    point: DVec3,
-    value: FieldValue,
+pub struct Corner {
+    pub point: DVec3,
+    pub value: FieldValue,
 }
 
 /// A part of the polygon that is still to be searched.
-struct Piece {
+pub struct Piece {
     /// Lower bound of the signed distances on it.
-    bound: f64,
-    corners: [Corner; 3],
+    pub bound: f64,
+    pub corners: [Corner; 3],
     /// The value at the centre.
-    center: FieldValue,
+    pub center: FieldValue,
 }
 
 impl PartialEq for Piece {
@@ -95,7 +95,8 @@ pub fn is_least(cell: &CellField, polygon: &Polygon, best: (f64, DVec3, u32), to
         .all(|corners| search.best.0 >= search.enough && search.piece(corners).bound >= least - tolerance)
 }
 
-struct Branches<'a> {
+/// The search over triangles.
+pub struct Branches<'a> {
     cell: &'a CellField<'a>,
     precision: Precision,
     /// Error bound of the `f32` values that are tried before `f64`. Where it is infinite, all
@@ -105,14 +106,19 @@ struct Branches<'a> {
     reach: f64,
     /// The search ends at a distance below this.
     enough: f64,
-    best: (f64, DVec3),
+    /// The lowest signed distance so far, and its point.
+    pub best: (f64, DVec3),
     /// The face nearest to the best point.
     best_face: u32,
-    evaluations: usize,
+    /// Number of values so far.
+    pub evaluations: usize,
+    /// Whether only the distance without its sign is 1-Lipschitz.
+    jumps: bool,
 }
 
 impl<'a> Branches<'a> {
-    fn new(
+    /// A search that has seen nothing.
+    pub fn new(
         cell: &'a CellField<'a>,
         polygon: &Polygon,
         precision: Precision,
@@ -121,12 +127,13 @@ impl<'a> Branches<'a> {
     ) -> Self {
         let best = (f64::INFINITY, polygon.center());
         let (slack, enough) = (ROUNDING, f64::NEG_INFINITY);
-        Self { cell, precision, slack, tolerance, reach, enough, best, best_face: 0, evaluations: 0 }
+        let jumps = cell.jump().is_some();
+        Self { cell, precision, slack, tolerance, reach, enough, best, best_face: 0, evaluations: 0, jumps }
     }
 
-    /// The value at a point. Where `f32` shows that it is not the best, the distance is only a
-    /// lower bound.
-    fn value(&mut self, p: DVec3) -> FieldValue {
+    /// The value at a point. Where `f32` shows that it is not the best, the distance is only a lower
+    /// bound.
+    pub fn value(&mut self, p: DVec3) -> FieldValue {
         self.evaluations += 1;
         if self.precision == Precision::F64
             && self.slack.is_finite()
@@ -146,21 +153,28 @@ impl<'a> Branches<'a> {
         value
     }
 
-    fn corner(&mut self, point: DVec3) -> Corner {
+    /// The value at a point in `f64`, which is no candidate.
+    pub fn exact(&self, p: DVec3) -> FieldValue {
+        self.cell.value(p, Precision::F64)
+    }
+
+    /// A corner with its value.
+    pub fn corner(&mut self, point: DVec3) -> Corner {
         Corner { point, value: self.value(point) }
     }
 
-    fn corners(&mut self, polygon: &Polygon) -> ArrayVec<Corner, MAX_VERTICES> {
+    /// The corners of a polygon, with their values.
+    pub fn corners(&mut self, polygon: &Polygon) -> ArrayVec<Corner, MAX_VERTICES> {
         polygon.points().map(|p| self.corner(p)).collect()
     }
 
     /// Whether a part with this bound can still improve the result.
-    fn is_open(&self, bound: f64) -> bool {
+    pub fn is_open(&self, bound: f64) -> bool {
         bound < self.best.0 - self.tolerance && bound <= self.reach && self.best.0 >= self.enough
     }
 
     /// Divides a triangle, along a side of the face nearest to its centre where that helps.
-    fn parts(&mut self, piece: &Piece) -> ArrayVec<[Corner; 3], 3> {
+    pub fn parts(&mut self, piece: &Piece) -> ArrayVec<[Corner; 3], 3> {
         self.along_side(piece).unwrap_or_else(|| self.halves(piece.corners).into_iter().collect())
     }
 
@@ -217,12 +231,17 @@ impl<'a> Branches<'a> {
         [[a, m, c], [m, b, c]]
     }
 
-    fn piece(&mut self, corners: [Corner; 3]) -> Piece {
+    /// A triangle, with its bound.
+    pub fn piece(&mut self, corners: [Corner; 3]) -> Piece {
         let points = corners.map(|c| c.point);
         let center = (points[0] + points[1] + points[2]) / 3.0;
         let value = self.value(center);
         let radius = points.iter().map(|c| c.distance_squared(center)).fold(0.0, f64::max).sqrt();
-        let mut bound = value.distance - radius;
+        let mut bound = match self.jumps {
+            // The value may be lower than the distance by twice the slack.
+            true => -(value.distance.abs() + 2.0 * ROUNDING) - radius,
+            false => value.distance - radius,
+        };
         match *self.cell {
             CellField::Mesh { asset, .. } | CellField::Whole(&Surroundings { asset, .. }) => {
                 let triangle = |face: u32| asset.local_triangle(face as usize);
@@ -292,7 +311,7 @@ impl<'a> Branches<'a> {
 }
 
 /// The triangles of a polygon. A segment is a triangle with two equal corners.
-fn triangles(corners: &[Corner]) -> impl Iterator<Item = [Corner; 3]> {
+pub fn triangles(corners: &[Corner]) -> impl Iterator<Item = [Corner; 3]> {
     let last = corners.len() - 1;
     (2..corners.len().max(3)).map(move |k| [corners[0], corners[k - 1], corners[k.min(last)]])
 }
@@ -355,7 +374,18 @@ fn coplanar_pair(asset: &TeSdf, [f, g]: [u32; 2], points: [DVec3; 3]) -> f64 {
     let off = triangles[1].corners.iter().map(|c| normal.dot(*c - a).abs()).fold(0.0, f64::max);
     // In-plane direction perpendicular to the shared edge.
     let across = normal.cross(b - a).normalize_or_zero();
-    if off > COPLANAR || normal.dot(triangles[1].normal) < 0.5 || across == DVec3::ZERO {
+    let cosine = normal.dot(triangles[1].normal);
+    // Faces that do not all look outward may lie beside each other and look in opposite directions.
+    let is_beside = || {
+        let [one, other] = triangles.each_ref().map(|t| {
+            t.corners
+                .iter()
+                .map(|c| across.dot(*c - a))
+                .fold(0.0, |m: f64, h| if h.abs() > m.abs() { h } else { m })
+        });
+        cosine <= -0.5 && !asset.faces_look_outward() && one * other < 0.0
+    };
+    if off > COPLANAR || !(cosine >= 0.5 || is_beside()) || across == DVec3::ZERO {
         return f64::INFINITY;
     }
     let nearest = points.map(|p| {

@@ -1,8 +1,8 @@
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
-use super::Lowest;
 use super::branch_and_bound::{self, branch_and_bound};
+use super::{Lowest, jump};
 use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
@@ -37,6 +37,9 @@ pub fn lowest(
     reach: f64,
     precision: Precision,
 ) -> Option<Lowest> {
+    if let Some(jump) = cell.jump() {
+        return jump::lowest(jump, cell, polygon, normal, (tolerance, reach), precision);
+    }
     let center = polygon.center();
     let radius = polygon.reach(center);
     let first = match cell {
@@ -209,6 +212,30 @@ impl<'a> Query<'a> {
         }
     }
 
+    /// A polygon in a field; `none` is the list of the whole field. `None` for a simple shape.
+    pub fn of_cell(
+        cell: &'a CellField<'a>,
+        none: &'a Faces,
+        polygon: &'a Polygon,
+        normal: DVec3,
+        (tolerance, reach): (f64, f64),
+    ) -> Option<Self> {
+        let (asset, place, faces) = cell.mesh(none)?;
+        let center = polygon.center();
+        let (radius, around) = (polygon.reach(center), cell.surroundings());
+        let slack = 0.0;
+        Some(Self { asset, around, place, faces, polygon, normal, center, radius, tolerance, slack, reach })
+    }
+
+    /// Another polygon in the same plane.
+    pub fn with_polygon<'b>(&self, polygon: &'b Polygon) -> Query<'b>
+    where
+        'a: 'b,
+    {
+        let center = polygon.center();
+        Query { polygon, center, radius: polygon.reach(center), ..*self }
+    }
+
     fn points(&self) -> ArrayVec<DVec3, MAX_VERTICES> {
         self.polygon.points().collect()
     }
@@ -293,7 +320,7 @@ impl<'a> Query<'a> {
 
     /// Cuts the polygon along the plane of the face that it crosses deepest; `None` when it crosses
     /// no face.
-    fn cut(&self) -> Option<(Polygon, Polygon)> {
+    pub fn cut(&self) -> Option<(Polygon, Polygon)> {
         let points = &self.points();
         let mut deepest = (CLEAR, None);
         self.near(0.0, &mut |face| {
@@ -351,7 +378,10 @@ impl<'a> Query<'a> {
             let (clear, at, _) = moved.nearest_to_faces(face);
             clear > 0.1 * hair && cell.value(at, Precision::F64).distance > 0.0
         };
-        distance <= hair && (is_free(cell.value(point, Precision::F64).gradient) || is_free(-self.normal))
+        // A normal that does not tell the outside may point either way.
+        let is_either = || !self.asset.faces_look_outward() && is_free(self.normal);
+        distance <= hair
+            && (is_free(cell.value(point, Precision::F64).gradient) || is_free(-self.normal) || is_either())
     }
 
     /// Whether the whole polygon is farther than `limit` from the plane of a face. Decided in

@@ -13,7 +13,7 @@ use glam::DVec3;
 use super::{Minimum, Search, cell_of};
 use crate::collide::field::CellField;
 use crate::collide::field_value::FieldValue;
-use crate::collide::surface::Part;
+use crate::collide::surface::{Part, PartFacing};
 use crate::geometry::{Feature, Triangle};
 
 /// Number of directions in the plane of a face. A polygon's corner with a right angle is an extreme
@@ -61,6 +61,8 @@ pub struct Patch<'a> {
     within: ArrayVec<DVec3, 3>,
     /// The normal of `within`; zero for a chord or an edge.
     normal: DVec3,
+    /// The normal of the part on the side that touches.
+    facing: DVec3,
     sides: [Side; 3],
 }
 
@@ -97,6 +99,9 @@ impl<'a> Patch<'a> {
         let Search { tolerance, reach, .. } = *search;
         let limit = if is_large { reach + part.radius } else { minimum.value.distance + tolerance };
         let normal = part.plane_normal();
+        // A normal that may be that of the other side is turned against the gradient.
+        let is_turned = part.facing == PartFacing::AtCenter && minimum.value.gradient.dot(part.normal) > 0.0;
+        let facing = if is_turned { -part.normal } else { part.normal };
         Self {
             field,
             part,
@@ -107,6 +112,7 @@ impl<'a> Patch<'a> {
             limit,
             within,
             normal,
+            facing,
             sides: Default::default(),
         }
     }
@@ -246,7 +252,7 @@ impl<'a> Patch<'a> {
     /// The contact at a point, or near it, if the field there is within the limit and opposes the
     /// face.
     fn take(&self, point: DVec3, corner: Option<u8>) -> Option<Minimum> {
-        let normal = self.part.normal;
+        let normal = self.facing;
         let value = |p: DVec3| self.field.opposing(p, normal, self.search.precision);
         // The normal of an edge is oblique to its faces, and the other body may oppose either of
         // them.
@@ -347,7 +353,13 @@ impl<'a> Patch<'a> {
     /// face is within `limit` there.
     fn overlay(&self, face: &Triangle, limit: f64, offer: &mut impl FnMut(DVec3)) {
         let (points, normal) = (&self.within, self.normal);
-        if face.normal == DVec3::ZERO || face.normal.dot(self.part.normal) > 0.0 {
+        let looks_outward = match self.field {
+            CellField::Whole(around) => around.asset.faces_look_outward(),
+            CellField::Mesh { asset, .. } => asset.faces_look_outward(),
+            CellField::Simple(_) => true,
+        };
+        let is_behind = looks_outward && face.normal.dot(self.facing) > 0.0;
+        if face.normal == DVec3::ZERO || is_behind {
             return;
         }
         if normal != DVec3::ZERO {

@@ -3,6 +3,7 @@ mod branch_and_bound;
 mod exact;
 pub mod extremes;
 mod frank_wolfe;
+pub mod jump;
 mod segment;
 
 use glam::DVec3;
@@ -265,7 +266,7 @@ impl Search {
     fn exact(&self, cell: &CellField, polygon: &Polygon, part: &Part, reach: f64) -> Option<Lowest> {
         let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
         match (self.mode, cell, part.points()) {
-            (Mode::Edge, CellField::Whole(around), &[start, end]) => {
+            (Mode::Edge, CellField::Whole(around), &[start, end]) if cell.jump().is_none() => {
                 segment::lowest(around, [start, end], self.tolerance, reach, precision)
             }
             _ => exact::lowest(cell, polygon, part.plane_normal(), self.tolerance, reach, precision),
@@ -285,8 +286,9 @@ impl Search {
                 Some(Lowest { point: polygon.vertices()[0].point, converged: true, face: None })
             }
             Mode::Node => Some(Lowest { point: polygon.vertices()[0].point, converged: true, face: None }),
-            Mode::Face => frank_wolfe::lowest(cell, polygon, self.iterations, reach),
-            Mode::Edge | Mode::Exact => self.exact(cell, polygon, part, reach),
+            // Steps along the gradient do not see what is beyond a jump.
+            Mode::Face if cell.jump().is_none() => frank_wolfe::lowest(cell, polygon, self.iterations, reach),
+            Mode::Face | Mode::Edge | Mode::Exact => self.exact(cell, polygon, part, reach),
         }?;
         let Lowest { point, converged, face } = lowest;
         let normal = part.normal;
@@ -303,7 +305,7 @@ impl Search {
         };
         let value = Some(value).filter(|value| value.distance <= reach)?;
         let converged = match self.mode {
-            Mode::Face if polygon.vertices().len() > 1 => {
+            Mode::Face if polygon.vertices().len() > 1 && cell.jump().is_none() => {
                 let least = match self.precision {
                     Precision::F64 => value,
                     Precision::F32 => cell.value(point, Precision::F64),

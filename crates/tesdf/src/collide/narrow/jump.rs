@@ -1,0 +1,271 @@
+//! The least signed distance over a polygon where the sign changes without a face: of an open mesh, in
+//! whose holes the generalised winding number passes through 1/2 (`docs/math.md`, section 14).
+//!
+//! Only the distance without its sign is 1-Lipschitz. The side is told by the winding number. Over a
+//! part that no face passes through, the number is linear up to a known error. So a part is outside,
+//! inside, or cut where it is certainly outside, and the rest is searched like a part inside.
+use arrayvec::ArrayVec;
+use glam::DVec3;
+
+use super::Lowest;
+use super::branch_and_bound::{Branches, Corner, MAX_EVALUATIONS, Piece, branch_and_bound, triangles};
+use super::exact::{CLEAR, Query};
+use crate::collide::field::{CellField, ROUNDING};
+use crate::collide::field_value::FieldValue;
+use crate::collide::polygon::{MAX_VERTICES, Parts, Polygon};
+use crate::collide::queue::Queue;
+use crate::geometry::GeneralizedWinding;
+use crate::query::{Faces, Precision};
+
+/// Corners within this share of the tolerance are beside a cut.
+const BESIDE: f64 = 0.125;
+
+/// The side of a convex set of points that no face passes through.
+pub enum Side {
+    /// All points are outside.
+    Outside,
+    /// All points are inside.
+    Inside,
+    /// Some may be inside and some outside, as a linear function tells.
+    Across(Cut),
+    /// Nothing is known.
+    Unknown,
+}
+
+/// Where a set of points is cut by a jump.
+pub struct Cut {
+    from: DVec3,
+    /// The gradient of the winding number, or its opposite where the number is negative.
+    gradient: DVec3,
+    outer: f64,
+    inner: f64,
+}
+
+impl Cut {
+    /// Where this is negative, a point of the set is outside.
+    pub fn outer(&self, p: DVec3) -> f64 {
+        self.gradient.dot(p - self.from) + self.outer
+    }
+
+    /// Where this is positive, a point of the set is inside.
+    pub fn inner(&self, p: DVec3) -> f64 {
+        self.gradient.dot(p - self.from) + self.inner
+    }
+
+    /// The plane where [`outer`](Self::outer) is 0: a point, and the normal. `None` without a gradient.
+    pub fn plane(&self) -> Option<(DVec3, DVec3)> {
+        let normal = self.gradient.try_normalize()?;
+        Some((self.from - self.outer / self.gradient.length() * normal, normal))
+    }
+}
+
+/// The side of the convex hull of points. `from` is one of its points, off the faces, and no face passes
+/// between it and another point.
+pub fn side(jump: &GeneralizedWinding, points: &[DVec3], from: DVec3) -> Side {
+    let radius = points.iter().map(|p| p.distance(from)).fold(0.0, f64::max);
+    let Some(near) = jump.near(from, radius) else { return Side::Unknown };
+    let numbers = points.iter().map(|p| near.value + near.gradient.dot(*p - from));
+    let (low, high) = numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), w| (l.min(w), h.max(w)));
+    let (low, high) = (low - near.error, high + near.error);
+    let cut = |sign: f64| {
+        let beyond = sign * near.value - 0.5;
+        let (outer, inner) = (beyond + near.error, beyond - near.error);
+        Side::Across(Cut { from, gradient: sign * near.gradient, outer, inner })
+    };
+    match (low > -0.5, high < 0.5) {
+        (true, true) => Side::Outside,
+        _ if low >= 0.5 || high <= -0.5 => Side::Inside,
+        (true, false) => cut(1.0),
+        (false, true) => cut(-1.0),
+        (false, false) => Side::Unknown,
+    }
+}
+
+/// What is known of a part of the polygon.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Known {
+    /// Nothing.
+    Nothing,
+    /// No face passes through it.
+    Clear,
+    /// It is inside.
+    Inside,
+}
+
+/// A part of the polygon that is still to be searched.
+struct Open {
+    piece: Piece,
+    known: Known,
+}
+
+/// The least signed distance over a polygon, within `tolerance`, up to `reach`; both in the field's frame.
+///
+/// Points inside that are within the tolerance of a point of the polygon outside may be passed over: the
+/// jump is found up to the tolerance. Where the search is cut short, the lowest point seen is returned,
+/// and `converged` is false.
+pub(super) fn lowest(
+    jump: &GeneralizedWinding,
+    cell: &CellField,
+    polygon: &Polygon,
+    normal: DVec3,
+    (tolerance, reach): (f64, f64),
+    precision: Precision,
+) -> Option<Lowest> {
+    let (center, none) = (polygon.center(), Faces::default());
+    let radius = polygon.reach(center);
+    let first: FieldValue = match cell {
+        CellField::Whole(around) => around.asset.found_exactly(center).into(),
+        _ => cell.value(center, Precision::F32),
+    };
+    let query = Query::of_cell(cell, &none, polygon, normal, (tolerance, reach))?;
+    let is_clear = first.distance.abs() > radius + ROUNDING;
+    if is_clear {
+        let points: ArrayVec<DVec3, MAX_VERTICES> = polygon.points().collect();
+        match side(jump, &points, center) {
+            Side::Outside if first.distance - radius > reach + ROUNDING => return None,
+            Side::Outside => {
+                let (distance, point, face) = query.nearest_to_faces(first.position);
+                return (distance <= reach).then_some(Lowest { point, converged: true, face });
+            }
+            Side::Inside => return Some(branch_and_bound(cell, polygon, tolerance, reach, precision)),
+            Side::Across(_) | Side::Unknown => {}
+        }
+    }
+    let (distance, point, face) = query.nearest_to_faces(first.position);
+    let mut branches = Branches::new(cell, polygon, precision, tolerance, reach);
+    if distance.is_finite() {
+        branches.value(point);
+    }
+    let mut search = Search { jump, query, branches, open: Queue::new(), tolerance };
+    let known = if is_clear { Known::Clear } else { Known::Nothing };
+    search.push(polygon, known);
+    let converged = search.run();
+    let (least, at) = search.branches.best;
+    // Where nothing is inside, the nearest point of the faces is the lowest.
+    let face = face.filter(|_| least > CLEAR && at == point);
+    least.is_finite().then_some(Lowest { point: at, converged, face })
+}
+
+struct Search<'a> {
+    jump: &'a GeneralizedWinding,
+    query: Query<'a>,
+    branches: Branches<'a>,
+    open: Queue<Open>,
+    tolerance: f64,
+}
+
+impl Search<'_> {
+    fn push(&mut self, polygon: &Polygon, known: Known) {
+        if polygon.vertices().len() > 1 {
+            let corners = self.branches.corners(polygon);
+            triangles(&corners).for_each(|corners| self.push_triangle(corners, known));
+        }
+    }
+
+    fn push_triangle(&mut self, corners: [Corner; 3], known: Known) {
+        let piece = self.branches.piece(corners);
+        if self.branches.is_open(piece.bound) {
+            self.open.push(piece.bound, Open { piece, known });
+        }
+    }
+
+    /// Searches all parts that can be lower. Returns whether it was not cut short.
+    fn run(&mut self) -> bool {
+        while let Some(open) = self.open.pop() {
+            if !self.branches.is_open(open.piece.bound) {
+                break;
+            }
+            if self.branches.evaluations > MAX_EVALUATIONS {
+                return false;
+            }
+            self.look(open);
+        }
+        true
+    }
+
+    fn look(&mut self, Open { piece, mut known }: Open) {
+        self.branches.evaluations += 1;
+        let points = piece.corners.map(|c| c.point);
+        let center = points.iter().sum::<DVec3>() / 3.0;
+        let radius = points.iter().map(|p| p.distance(center)).fold(0.0, f64::max);
+        let polygon = polygon_of(points);
+        if known == Known::Nothing {
+            if piece.center.distance.abs() <= radius + 2.0 * ROUNDING
+                && let Some((above, below)) = self.query.with_polygon(&polygon).cut()
+            {
+                [above, below].iter().for_each(|part| self.push(part, Known::Nothing));
+                return;
+            }
+            known = Known::Clear;
+        }
+        let mut rest = None;
+        if known == Known::Clear {
+            match self.off_faces(&piece, center).map_or(Side::Unknown, |from| side(self.jump, &points, from))
+            {
+                Side::Outside => return,
+                Side::Inside => known = Known::Inside,
+                Side::Across(cut) => {
+                    // How deep the part is that is certainly inside.
+                    if let Parts::Across(inner, _) = polygon.cut(|v| cut.inner(v.point)) {
+                        self.branches.corners(&inner);
+                    }
+                    // Corners beside the cut are on it. Otherwise slivers would remain, cut after cut. Nothing
+                    // but the outside is cut off: the cut lies farther out by as much.
+                    let beside = BESIDE * self.tolerance * cut.gradient.length();
+                    let height = |p: DVec3| match cut.outer(p) + beside {
+                        h if h.abs() <= beside => 0.0,
+                        h => h,
+                    };
+                    match polygon.cut(|v| height(v.point)) {
+                        Parts::Above => {}
+                        Parts::Below => return,
+                        Parts::Across(kept, _) => rest = Some(kept),
+                    }
+                }
+                Side::Unknown => {}
+            }
+        }
+        if known != Known::Inside && radius <= self.tolerance {
+            return;
+        }
+        // Also after a cut, so that parts get smaller.
+        let halve = |search: &mut Self, piece: &Piece| {
+            for part in search.branches.parts(piece) {
+                search.push_triangle(part, known);
+            }
+        };
+        match rest {
+            None => halve(self, &piece),
+            Some(kept) if kept.vertices().len() > 1 => {
+                let known_at = |p: DVec3| piece.corners.iter().find(|c| c.point == p).copied();
+                let corners: ArrayVec<Corner, MAX_VERTICES> =
+                    kept.points().map(|p| known_at(p).unwrap_or_else(|| self.branches.corner(p))).collect();
+                for corners in triangles(&corners) {
+                    let piece = self.branches.piece(corners);
+                    if self.branches.is_open(piece.bound) {
+                        halve(self, &piece);
+                    }
+                }
+            }
+            Some(_) => {}
+        }
+    }
+
+    /// The point of a part, its centre or a corner, that is farthest from the faces; `None` where all of
+    /// them are on faces, up to rounding.
+    fn off_faces(&mut self, piece: &Piece, center: DVec3) -> Option<DVec3> {
+        let corners = piece.corners.iter().map(|c| (c.value.distance.abs(), c.point));
+        let first = (piece.center.distance.abs(), center);
+        let (distance, at) = corners.fold(first, |best, next| if next.0 > best.0 { next } else { best });
+        let is_off = distance > 4.0 * ROUNDING || self.branches.exact(at).distance.abs() > 4.0 * CLEAR;
+        is_off.then_some(at)
+    }
+}
+
+/// The polygon of a triangle, which may be a segment.
+fn polygon_of([a, b, c]: [DVec3; 3]) -> Polygon {
+    if b == c || a == c {
+        return Polygon::new(&[a, b]);
+    }
+    if a == b { Polygon::new(&[b, c]) } else { Polygon::new(&[a, b, c]) }
+}
