@@ -1,8 +1,8 @@
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
+use super::Lowest;
 use super::branch_and_bound::{self, branch_and_bound};
-use super::{Lowest, jump};
 use crate::TeSdf;
 use crate::asset::layout::Label;
 use crate::base::Side;
@@ -29,6 +29,8 @@ const SUNK: f64 = 1.0 / 16.0;
 /// Inside, the depth is a minimum of convex functions, and branch and bound finds its maximum. It
 /// uses that the field is 1-Lipschitz, and that the distance to one face is convex, so over a
 /// triangle it is at most its greatest value at a corner.
+///
+/// Where the sign jumps, [`jump::lowest`](super::jump::lowest) is for it.
 pub fn lowest(
     cell: &CellField,
     polygon: &Polygon,
@@ -37,9 +39,6 @@ pub fn lowest(
     reach: f64,
     precision: Precision,
 ) -> Option<Lowest> {
-    if let Some(jump) = cell.jump() {
-        return jump::lowest(jump, cell, polygon, normal, (tolerance, reach), precision);
-    }
     let center = polygon.center();
     let radius = polygon.reach(center);
     let first = match cell {

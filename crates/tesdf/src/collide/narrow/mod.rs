@@ -265,11 +265,15 @@ impl Search {
     /// The lowest point of a polygon of a part, within the tolerance.
     fn exact(&self, cell: &CellField, polygon: &Polygon, part: &Part, reach: f64) -> Option<Lowest> {
         let precision = if self.tolerance >= COARSE { Precision::F32 } else { Precision::F64 };
+        let normal = part.plane_normal();
+        if let Some(jump) = cell.jump() {
+            return jump::lowest(jump, cell, polygon, normal, (self.tolerance, reach), precision);
+        }
         match (self.mode, cell, part.points()) {
-            (Mode::Edge, CellField::Whole(around), &[start, end]) if cell.jump().is_none() => {
+            (Mode::Edge, CellField::Whole(around), &[start, end]) => {
                 segment::lowest(around, [start, end], self.tolerance, reach, precision)
             }
-            _ => exact::lowest(cell, polygon, part.plane_normal(), self.tolerance, reach, precision),
+            _ => exact::lowest(cell, polygon, normal, self.tolerance, reach, precision),
         }
     }
 
