@@ -136,8 +136,8 @@ impl LoadedScene {
 
     /// Replaces the geometry of a body by a file: an asset when its name ends in `.tesdf`,
     /// otherwise a mesh. `bodies` is its name; `link*` stands for all bodies whose names begin with
-    /// `link`, as copies do. A relative path is relative to the scene's folder. Returns `false` when
-    /// the scene has no such body.
+    /// `link`, as copies do. A relative path is relative to the scene's folder. Returns `false`
+    /// when the scene has no such body.
     #[must_use]
     pub fn replace_geometry(&mut self, bodies: &str, file: impl Into<PathBuf>) -> bool {
         let file = file.into();

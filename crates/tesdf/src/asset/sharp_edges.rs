@@ -12,8 +12,8 @@ const TURNED: f64 = 1e-6;
 impl TeSdf {
     /// For each face, in the order of the file, the sides that are edges to be tested: bit k is the
     /// side from corner k to the next one. An edge belongs to the lowest face that has it. Edges
-    /// are left out between two coplanar faces, and where two faces form a valley, if the faces look
-    /// outward. Made on first use.
+    /// are left out between two coplanar faces, and where two faces form a valley, if the faces
+    /// look outward. Made on first use.
     ///
     /// Where the nearest point of a body that is apart lies on an edge, the direction to the other
     /// body is between the normals of its faces. In a valley there is none. On a flat edge it is

@@ -234,8 +234,8 @@ impl TeSdf {
         })
     }
 
-    /// Bounds of the solid, in the unit of the mesh: those of the mesh, with half of the thickness of a
-    /// sheet around them. The inside of an open mesh can extend farther beyond them.
+    /// Bounds of the solid, in the unit of the mesh: those of the mesh, with half of the thickness
+    /// of a sheet around them. The inside of an open mesh can extend farther beyond them.
     pub(crate) fn bounds_of_solid(&self) -> Aabb {
         self.bounds.grown(self.reach_beyond() * self.frame.inverse_scale())
     }
@@ -247,8 +247,8 @@ impl TeSdf {
         self.about.signs == Signs::Cells
     }
 
-    /// Whether no face has the inside in front of it. Otherwise the rule tells at each point of a face
-    /// on which side of it the inside is.
+    /// Whether no face has the inside in front of it. Otherwise the rule tells at each point of a
+    /// face on which side of it the inside is.
     pub(crate) fn faces_look_outward(&self) -> bool {
         self.about.signs != Signs::RuleUnoriented
     }

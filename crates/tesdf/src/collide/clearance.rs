@@ -71,8 +71,9 @@ pub struct Clearance {
 /// most the value at the surface. A plane's half-space is infinite, so only its field is used: no
 /// point of a plane is deeper in a body than the body reaches below the plane.
 ///
-/// The signed distance of an open mesh jumps in its holes: as soon as a point of a surface is inside, the
-/// clearance is minus its distance from the faces. The place of the jump is found up to the tolerance.
+/// The signed distance of an open mesh jumps in its holes: as soon as a point of a surface is
+/// inside, the clearance is minus its distance from the faces. The place of the jump is found up to
+/// the tolerance.
 ///
 /// ```
 /// use tesdf::collide::{ClearanceOptions, Instance, Pose, Scene, Shape, clearance};
@@ -216,7 +217,8 @@ impl<'a> Pair<'a> {
     }
 
     /// For each face of *a*, a point of it and the inward direction, in the world's frame; both
-    /// directions where faces do not all look outward. A simple shape is convex, so one point is enough.
+    /// directions where faces do not all look outward. A simple shape is convex, so one point is
+    /// enough.
     fn behind_faces(&self) -> Vec<(DVec3, DVec3)> {
         let Body { shape, placement, .. } = &self.a;
         let rotate = |n: DVec3| placement.pose.rotation * n;
@@ -238,8 +240,9 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// The clearance from one order. It is right when neither body is inside the other. For an open mesh
-    /// it is the distance of the surfaces: its own surface is searched, in a field without jumps.
+    /// The clearance from one order. It is right when neither body is inside the other. For an open
+    /// mesh it is the distance of the surfaces: its own surface is searched, in a field without
+    /// jumps.
     ///
     /// # Errors
     /// Positions are too far out, or both bodies are open meshes.

@@ -53,8 +53,8 @@ impl Field<'_> {
         }
     }
 
-    /// Lower bound of the signed distances within `radius` of `p`, where that at `p` is `distance` up to
-    /// `slack`.
+    /// Lower bound of the signed distances within `radius` of `p`, where that at `p` is `distance`
+    /// up to `slack`.
     pub fn least_in_ball(&self, p: DVec3, radius: f64, (distance, slack): (f64, f64)) -> f64 {
         let Some(jump) = self.jump() else { return distance - slack - radius };
         // Only the distance without its sign is 1-Lipschitz.

@@ -16,8 +16,9 @@ pub enum Mode {
     /// and near it, the ends of that part are contacts, so that bars that cross hold each other.
     Edge,
     /// Face-TES: the least signed distance over each face, cell by cell (Eq. 9). A fixed number of
-    /// Frank–Wolfe [`iterations`](CollideOptions::iterations) gives an upper bound of the minimum. In
-    /// the field of an open mesh, whose signed distance jumps, it searches as [`Exact`](Self::Exact).
+    /// Frank–Wolfe [`iterations`](CollideOptions::iterations) gives an upper bound of the minimum.
+    /// In the field of an open mesh, whose signed distance jumps, it searches as
+    /// [`Exact`](Self::Exact).
     Face,
     /// As [`Face`](Self::Face), but with the minimum itself, within a
     /// [`tolerance`](CollideOptions::tolerance). It comes from a closed form outside, and from

@@ -116,9 +116,9 @@ impl<'a> OrderedPair<'a> {
         }
     }
 
-    /// A minimum of a candidate, with the cosine between its gradient and the normal of its part. Where
-    /// the other side of a face is outside there, the gradient is the one that most opposes that side.
-    /// Where both sides are alike, any side counts.
+    /// A minimum of a candidate, with the cosine between its gradient and the normal of its part.
+    /// Where the other side of a face is outside there, the gradient is the one that most opposes
+    /// that side. Where both sides are alike, any side counts.
     pub fn faced(&self, part: &Part, candidate: u32, minimum: Minimum) -> (Minimum, f64) {
         let cosine = minimum.value.gradient.dot(part.normal);
         if part.points().len() < 3 {
@@ -138,7 +138,8 @@ impl<'a> OrderedPair<'a> {
     }
 
     /// Why a minimum of a candidate is no contact, if it is none: Eq. (10), which does not apply to
-    /// rounded shapes and sheets, because they have normals in all directions; or a lower point beside it.
+    /// rounded shapes and sheets, because they have normals in all directions; or a lower point
+    /// beside it.
     ///
     /// `cosine` is that of [`faced`](Self::faced).
     pub fn dropped(&self, part: &Part, candidate: u32, minimum: &Minimum, cosine: f64) -> Option<Dropped> {

@@ -92,7 +92,8 @@ const ROUNDS: usize = 8;
 const FEW: usize = 4;
 /// A piece is cut along the side of a face where this share of its size is on both sides.
 const THIN: f64 = 1e-3;
-/// A piece is cut along a jump where this share of its size is on both sides; otherwise it is halved.
+/// A piece is cut along a jump where this share of its size is on both sides; otherwise it is
+/// halved.
 const SLICE: f64 = 0.125;
 /// Values in `f32` are used while more than this is to be gained (local frame).
 const COARSE: f64 = 1e-4;
@@ -309,8 +310,8 @@ impl Looks<'_> {
         self.divided(&piece, bound, plane)
     }
 
-    /// Lower bound of the signed distances of the surface on a piece, by the value at a point and the bound
-    /// `lower` there.
+    /// Lower bound of the signed distances of the surface on a piece, by the value at a point and
+    /// the bound `lower` there.
     fn by_reach(&self, piece: &Piece, at: DVec3, value: &FieldValue, lower: f64) -> f64 {
         let (field, reach) = (self.field.field, piece.reach(at));
         match field.jump() {
@@ -322,8 +323,8 @@ impl Looks<'_> {
         }
     }
 
-    /// The parts of a piece that can still be lower than all others. The piece is cut along a plane,
-    /// or halved.
+    /// The parts of a piece that can still be lower than all others. The piece is cut along a
+    /// plane, or halved.
     fn divided(&self, piece: &Piece, bound: f64, plane: Option<Plane>) -> Rest {
         let cut = match (plane, self.field.field) {
             (Some(plane), Field::Mesh(asset)) => piece.cut(asset, plane),
@@ -422,7 +423,8 @@ impl Looks<'_> {
             // On the way, the sign may change where there is no surface.
             return None;
         }
-        // The outside is in front of the face, or on the other side where faces do not look outward.
+        // The outside is in front of the face, or on the other side where faces do not look
+        // outward.
         self.heights_under(asset, piece, triangle, triangle.normal).or_else(|| {
             match asset.faces_look_outward() {
                 true => None,
@@ -489,7 +491,8 @@ impl Looks<'_> {
         if crossed > 0 {
             return Side::Across(deepest.1.filter(|_| crossed <= FEW));
         }
-        // It is on one side, unless the sign jumps. Where its centre is on the surface, a corner shows the side.
+        // It is on one side, unless the sign jumps. Where its centre is on the surface, a corner
+        // shows the side.
         let center = piece.center();
         let mut at = (center, self.field.field.exact_value(center));
         if at.1.distance.abs() <= clear {
@@ -510,8 +513,8 @@ impl Looks<'_> {
         Side::Inside
     }
 
-    /// The side of a piece that no face passes through, in the field of an open mesh. `at` is a point of
-    /// it off the faces, with the value there.
+    /// The side of a piece that no face passes through, in the field of an open mesh. `at` is a
+    /// point of it off the faces, with the value there.
     fn side_of_jump(
         &mut self,
         jump: &GeneralizedWinding,

@@ -106,8 +106,8 @@ impl Shape {
         }
     }
 
-    /// Diagonal of the bounds, in the shape's unit; infinite for a plane. For an open mesh, that of its
-    /// faces.
+    /// Diagonal of the bounds, in the shape's unit; infinite for a plane. For an open mesh, that of
+    /// its faces.
     pub fn diagonal(&self) -> f64 {
         match self {
             Self::Mesh(asset) if asset.jump().is_some() => asset.bounds().extent().length(),

@@ -216,8 +216,8 @@ impl<'a> SurfaceBody<'a> {
         }
     }
 
-    /// The normal that points outward at a point of a face (field's frame); zero where it points outward
-    /// on both sides or on none. `None` where the face's part has it.
+    /// The normal that points outward at a point of a face (field's frame); zero where it points
+    /// outward on both sides or on none. `None` where the face's part has it.
     pub fn outward_at(&self, face: u32, point: DVec3) -> Option<DVec3> {
         match self.shape {
             Shape::Mesh(asset) if !asset.faces_look_outward() => {

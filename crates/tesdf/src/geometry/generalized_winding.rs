@@ -165,11 +165,11 @@ impl GeneralizedWinding {
         self.at(x).value.abs() >= 0.5
     }
 
-    /// The number within `radius` of `x`, at points that can be reached straight from `x` without passing
-    /// through a face. `None` where an open edge comes as near.
+    /// The number within `radius` of `x`, at points that can be reached straight from `x` without
+    /// passing through a face. `None` where an open edge comes as near.
     ///
-    /// The gradient is a sum over the open edges (Biot and Savart). Of second order, an edge adds at
-    /// most the integral of `dl / r³` times the squared radius.
+    /// The gradient is a sum over the open edges (Biot and Savart). Of second order, an edge adds
+    /// at most the integral of `dl / r³` times the squared radius.
     pub fn near(&self, x: DVec3, radius: f64) -> Option<NearWinding> {
         let Generalized { value, error } = self.at(x);
         let (mut gradient, mut bend) = (DVec3::ZERO, 0.0);
@@ -182,7 +182,8 @@ impl GeneralizedWinding {
             let lengths = from.length() * to.length();
             gradient -=
                 along.cross(from) * ((from.length() + to.length()) / (lengths * (lengths + from.dot(to))));
-            // Points of the edge at the way s from the nearest one are at least √(s² + apart²) away.
+            // Points of the edge at the way s from the nearest one are at least √(s² + apart²)
+            // away.
             let of_edge = (along.length() / apart).min(2.0) / (apart * apart);
             bend += of_edge / (1.0 - radius / apart).powi(3);
         }
@@ -197,14 +198,14 @@ impl GeneralizedWinding {
         apart > self.reach_beyond() || self.side_within(x, radius) == Some(false)
     }
 
-    /// Points that are farther than this from the bounds of the faces are outside: the solid angle of a
-    /// face seen from the distance `d` is at most its area / d².
+    /// Points that are farther than this from the bounds of the faces are outside: the solid angle
+    /// of a face seen from the distance `d` is at most its area / d².
     pub fn reach_beyond(&self) -> f64 {
         (self.area / (0.9 * 2.0 * PI)).sqrt()
     }
 
-    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are on
-    /// one side. No face may come within `radius` of `x`.
+    /// The side of all points within `radius` of `x`; `None` when it is not certain that they are
+    /// on one side. No face may come within `radius` of `x`.
     ///
     /// The gradient of the solid angle of a loop is at most the integral of `dl / r²` along the
     /// loop (Biot and Savart).
@@ -237,9 +238,9 @@ fn apart_from_edge(x: DVec3, [a, b]: [DVec3; 2]) -> f64 {
     (a + t * along).distance(x) * (1.0 - 1e-12)
 }
 
-/// The solid angle of a triangle from `x + (e, e^2, e^3)` (Van Oosterom and Strackee 1983): positive
-/// where the point is behind the triangle. Also its condition, 0 to 1: the error is some roundings
-/// divided by the condition.
+/// The solid angle of a triangle from `x + (e, e^2, e^3)` (Van Oosterom and Strackee 1983):
+/// positive where the point is behind the triangle. Also its condition, 0 to 1: the error is some
+/// roundings divided by the condition.
 fn solid_angle(triangle: [DVec3; 3], x: DVec3) -> (f64, f64) {
     // Triangles without area have no solid angle.
     let side = perturbed_orientation(triangle, x);
@@ -379,8 +380,8 @@ mod tests {
         assert!(decided.iter().all(|&n| n > 5) && open > 5, "{decided:?} {open}");
     }
 
-    /// Within a ball that no face comes near, the number is the linear function up to its error, and the
-    /// error shrinks with the square of the radius.
+    /// Within a ball that no face comes near, the number is the linear function up to its error,
+    /// and the error shrinks with the square of the radius.
     #[test]
     fn the_number_near_a_point_is_linear() {
         let vertices = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];

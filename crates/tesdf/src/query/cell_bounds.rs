@@ -57,7 +57,8 @@ impl TeSdf {
         (least - ROUNDING).max(0.0)
     }
 
-    /// Whether all points within `radius` of `p` are certainly outside, or the sign changes at faces only.
+    /// Whether all points within `radius` of `p` are certainly outside, or the sign changes at
+    /// faces only.
     fn is_outside_within(&self, p: DVec3, radius: f64) -> bool {
         self.jump().is_none_or(|jump| {
             let apart = self.found_at(p, self.locate(p), Precision::F32).signed_distance;

@@ -476,7 +476,8 @@ impl TeSdf {
             let normal = match place {
                 _ if d >= ON_SURFACE_F64 => return None,
                 Place::Listed { .. } => self.pseudonormal(faces, position, &closest),
-                // A cell without a list, because no list was worth its bytes, may touch the surface.
+                // A cell without a list, because no list was worth its bytes, may touch the
+                // surface.
                 _ if !self.faces_look_outward() => self.normal_outward(position, closest.point),
                 _ => self.face_normal(position),
             };

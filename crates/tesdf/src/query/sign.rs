@@ -35,9 +35,9 @@ pub(crate) enum Facing {
     Either,
 }
 
-/// Lengths (local frame): the points at which the sides of a face are looked up lie this far beside the
-/// point, towards the inside of the face, and this far off the face. Other faces that have the point
-/// are then farther away, unless they make an angle below some 1e-3 with it.
+/// Lengths (local frame): the points at which the sides of a face are looked up lie this far beside
+/// the point, towards the inside of the face, and this far off the face. Other faces that have the
+/// point are then farther away, unless they make an angle below some 1e-3 with it.
 const ASIDE: f64 = 1e-5;
 const OFF: f64 = 1e-9;
 
@@ -90,8 +90,8 @@ impl TeSdf {
         if front == Side::Inside && behind == Side::Outside { -normal } else { normal }
     }
 
-    /// The number by which the sign changes where there is no face, in the local frame; `None` where it
-    /// does not.
+    /// The number by which the sign changes where there is no face, in the local frame; `None`
+    /// where it does not.
     pub(crate) fn jump(&self) -> Option<&GeneralizedWinding> {
         self.sign_rule()?.jump()
     }
@@ -101,9 +101,9 @@ impl TeSdf {
         self.jump().map_or(self.half_thickness, GeneralizedWinding::reach_beyond)
     }
 
-    /// The side of a face that is outside at `at`, a point of the face. Where all faces look outward,
-    /// this is known. Otherwise the rule tells it, beside the point in three directions: at an edge of
-    /// the face its sides would be those of another face.
+    /// The side of a face that is outside at `at`, a point of the face. Where all faces look
+    /// outward, this is known. Otherwise the rule tells it, beside the point in three directions:
+    /// at an edge of the face its sides would be those of another face.
     pub(crate) fn facing(&self, face: u32, at: DVec3) -> Facing {
         let Some(rule) = self.sign_rule().filter(|_| !self.faces_look_outward()) else {
             return Facing::Outward;
@@ -124,8 +124,8 @@ impl TeSdf {
         if first != Facing::Either && facings.all(|facing| facing == first) { first } else { Facing::Either }
     }
 
-    /// The normal of a face at a point of it, so that it points outward; zero where it points outward on
-    /// both sides or on none, and for a face without area.
+    /// The normal of a face at a point of it, so that it points outward; zero where it points
+    /// outward on both sides or on none, and for a face without area.
     pub(crate) fn outward_normal(&self, face: u32, at: DVec3) -> DVec3 {
         let normal = self.local_triangle(face as usize).normal;
         match self.facing(face, at) {
@@ -135,7 +135,8 @@ impl TeSdf {
         }
     }
 
-    /// As [`outward_normal`](Self::outward_normal), or the normal as the face has it where that is zero.
+    /// As [`outward_normal`](Self::outward_normal), or the normal as the face has it where that is
+    /// zero.
     pub(crate) fn normal_outward(&self, face: u32, at: DVec3) -> DVec3 {
         self.outward_normal(face, at).try_normalize().unwrap_or_else(|| self.face_normal(face))
     }

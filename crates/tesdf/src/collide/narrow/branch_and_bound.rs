@@ -131,8 +131,8 @@ impl<'a> Branches<'a> {
         Self { cell, precision, slack, tolerance, reach, enough, best, best_face: 0, evaluations: 0, jumps }
     }
 
-    /// The value at a point. Where `f32` shows that it is not the best, the distance is only a lower
-    /// bound.
+    /// The value at a point. Where `f32` shows that it is not the best, the distance is only a
+    /// lower bound.
     pub fn value(&mut self, p: DVec3) -> FieldValue {
         self.evaluations += 1;
         if self.precision == Precision::F64

@@ -1,9 +1,10 @@
-//! The least signed distance over a polygon where the sign changes without a face: of an open mesh, in
-//! whose holes the generalised winding number passes through 1/2 (`docs/math.md`, section 14).
+//! The least signed distance over a polygon where the sign changes without a face: of an open mesh,
+//! in whose holes the generalised winding number passes through 1/2 (`docs/math.md`, section 14).
 //!
-//! Only the distance without its sign is 1-Lipschitz. The side is told by the winding number. Over a
-//! part that no face passes through, the number is linear up to a known error. So a part is outside,
-//! inside, or cut where it is certainly outside, and the rest is searched like a part inside.
+//! Only the distance without its sign is 1-Lipschitz. The side is told by the winding number. Over
+//! a part that no face passes through, the number is linear up to a known error. So a part is
+//! outside, inside, or cut where it is certainly outside, and the rest is searched like a part
+//! inside.
 use arrayvec::ArrayVec;
 use glam::DVec3;
 
@@ -52,15 +53,16 @@ impl Cut {
         self.gradient.dot(p - self.from) + self.inner
     }
 
-    /// The plane where [`outer`](Self::outer) is 0: a point, and the normal. `None` without a gradient.
+    /// The plane where [`outer`](Self::outer) is 0: a point, and the normal. `None` without a
+    /// gradient.
     pub fn plane(&self) -> Option<(DVec3, DVec3)> {
         let normal = self.gradient.try_normalize()?;
         Some((self.from - self.outer / self.gradient.length() * normal, normal))
     }
 }
 
-/// The side of the convex hull of points. `from` is one of its points, off the faces, and no face passes
-/// between it and another point.
+/// The side of the convex hull of points. `from` is one of its points, off the faces, and no face
+/// passes between it and another point.
 pub fn side(jump: &GeneralizedWinding, points: &[DVec3], from: DVec3) -> Side {
     let radius = points.iter().map(|p| p.distance(from)).fold(0.0, f64::max);
     let Some(near) = jump.near(from, radius) else { return Side::Unknown };
@@ -98,11 +100,12 @@ struct Open {
     known: Known,
 }
 
-/// The least signed distance over a polygon, within `tolerance`, up to `reach`; both in the field's frame.
+/// The least signed distance over a polygon, within `tolerance`, up to `reach`; both in the field's
+/// frame.
 ///
-/// Points inside that are within the tolerance of a point of the polygon outside may be passed over: the
-/// jump is found up to the tolerance. Where the search is cut short, the lowest point seen is returned,
-/// and `converged` is false.
+/// Points inside that are within the tolerance of a point of the polygon outside may be passed
+/// over: the jump is found up to the tolerance. Where the search is cut short, the lowest point
+/// seen is returned, and `converged` is false.
 pub(super) fn lowest(
     jump: &GeneralizedWinding,
     cell: &CellField,
@@ -209,8 +212,8 @@ impl Search<'_> {
                     if let Parts::Across(inner, _) = polygon.cut(|v| cut.inner(v.point)) {
                         self.branches.corners(&inner);
                     }
-                    // Corners beside the cut are on it. Otherwise slivers would remain, cut after cut. Nothing
-                    // but the outside is cut off: the cut lies farther out by as much.
+                    // Corners beside the cut are on it. Otherwise slivers would remain, cut after
+                    // cut. Nothing but the outside is cut off: the cut lies farther out by as much.
                     let beside = BESIDE * self.tolerance * cut.gradient.length();
                     let height = |p: DVec3| match cut.outer(p) + beside {
                         h if h.abs() <= beside => 0.0,
@@ -251,8 +254,8 @@ impl Search<'_> {
         }
     }
 
-    /// The point of a part, its centre or a corner, that is farthest from the faces; `None` where all of
-    /// them are on faces, up to rounding.
+    /// The point of a part, its centre or a corner, that is farthest from the faces; `None` where
+    /// all of them are on faces, up to rounding.
     fn off_faces(&mut self, piece: &Piece, center: DVec3) -> Option<DVec3> {
         let corners = piece.corners.iter().map(|c| (c.value.distance.abs(), c.point));
         let first = (piece.center.distance.abs(), center);
