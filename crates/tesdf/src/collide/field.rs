@@ -450,11 +450,6 @@ impl TeSdf {
             }
             let outward = if value.distance < 0.0 { closest.point - p } else { p - closest.point };
             let mut gradient = match on_surface {
-                true if self.faces_look_outward() => self.outward(
-                    self.local_triangle(face as usize).normal,
-                    closest.point,
-                    4.0 * tie.max(ON_SURFACE_F64),
-                ),
                 true => self.outward_normal(face, closest.point),
                 false => outward.normalize_or_zero(),
             };

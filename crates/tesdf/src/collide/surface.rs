@@ -121,6 +121,11 @@ impl<'a> SurfaceBody<'a> {
         self.linear * p + self.shift
     }
 
+    /// From the field's frame to the shape's frame.
+    fn out_of_field(&self, p: DVec3) -> DVec3 {
+        self.linear.transpose() * (p - self.shift) / (self.scale * self.scale)
+    }
+
     /// Faces of the leaves that can come within `reach` (field's frame) of the solid. For a simple
     /// shape, the indices of its parts.
     pub fn faces_of_leaves(&self, field: &FieldBody, reach: f64) -> Candidates {
@@ -204,7 +209,7 @@ impl<'a> SurfaceBody<'a> {
             Shape::Plane => {
                 // Only the part over or under the field's body matters.
                 let (center, radius) = field.ball();
-                let center = self.linear.transpose() * (center - self.shift) / (self.scale * self.scale);
+                let center = self.out_of_field(center);
                 let square = plane_square(center, (radius + reach) / self.scale);
                 Part::new(&square[face as usize % 2].map(|p| self.to_field(p)), self.around)
             }
@@ -221,8 +226,7 @@ impl<'a> SurfaceBody<'a> {
     pub fn outward_at(&self, face: u32, point: DVec3) -> Option<DVec3> {
         match self.shape {
             Shape::Mesh(asset) if !asset.faces_look_outward() => {
-                let at = self.linear.transpose() * (point - self.shift) / (self.scale * self.scale);
-                let normal = asset.outward_normal(face, asset.frame.to_local(at));
+                let normal = asset.outward_normal(face, asset.frame.to_local(self.out_of_field(point)));
                 Some((self.linear * normal).normalize_or_zero())
             }
             _ => None,

@@ -145,9 +145,6 @@ pub(crate) struct Found {
 pub(crate) const ON_SURFACE_F64: f64 = 5e-10;
 /// The same for `f32` storage: about ten times its rounding.
 const ON_SURFACE_F32: f64 = 1e-6;
-/// Where a rule tells the side, the side of the surface is looked up at this many times the
-/// distance below which a point counts as on it.
-const BESIDE: f64 = 4.0;
 /// Faces that share an edge are at most this far from a point of the edge.
 const TOUCHING: f64 = 1e-12;
 
@@ -417,8 +414,8 @@ impl TeSdf {
         });
         let on_surface = |d: f64| match place {
             _ if d >= ON_SURFACE_F32 => None,
-            _ if !self.faces_look_outward() => Some(self.normal_outward(found.face, local)),
-            _ => Some(self.outward(triangle.normal, local, BESIDE * ON_SURFACE_F32)),
+            _ if self.facing(found.face, local) == Facing::Inward => Some(-triangle.normal),
+            _ => Some(triangle.normal),
         };
         self.finish(relative, closest, side, found.face, self.cube.middle(), on_surface)
     }
@@ -472,19 +469,11 @@ impl TeSdf {
             true => self.side_in_cell(local, position, &closest),
             false => Side::Outside,
         });
-        let on_surface = |d: f64| {
-            let normal = match place {
-                _ if d >= ON_SURFACE_F64 => return None,
-                Place::Listed { .. } => self.pseudonormal(faces, position, &closest),
-                // A cell without a list, because no list was worth its bytes, may touch the
-                // surface.
-                _ if !self.faces_look_outward() => self.normal_outward(position, closest.point),
-                _ => self.face_normal(position),
-            };
-            if !self.faces_look_outward() {
-                return Some(normal);
-            }
-            Some(self.outward(normal, closest.point, BESIDE * ON_SURFACE_F64))
+        let on_surface = |d: f64| match place {
+            _ if d >= ON_SURFACE_F64 => None,
+            Place::Listed { .. } => Some(self.pseudonormal(faces, position, &closest)),
+            // A cell without a list, because no list was worth its bytes, may touch the surface.
+            _ => Some(self.normal_outward(position, closest.point)),
         };
         self.finish(local, closest, side, position, DVec3::ZERO, on_surface)
     }
@@ -531,11 +520,7 @@ impl TeSdf {
     /// need not, so the face tree is used.
     fn pseudonormal(&self, faces: &Faces, position: u32, closest: &Closest) -> DVec3 {
         let corners = self.faces[position as usize];
-        let turned = !self.faces_look_outward();
-        let own = match turned {
-            true => self.normal_outward(position, closest.point),
-            false => self.face_normal(position),
-        };
+        let own = self.normal_outward(position, closest.point);
         let held: &[u32] = match closest.feature {
             Feature::Face => return own,
             Feature::Edge(k) => &[corners[k as usize], corners[(k as usize + 1) % 3]],
@@ -566,8 +551,7 @@ impl TeSdf {
                 _ => 1.0,
             };
             if weight.is_finite() {
-                sum +=
-                    weight * if turned { self.outward_normal(face, closest.point) } else { triangle.normal };
+                sum += weight * self.facing(face, closest.point).sign() * triangle.normal;
             }
         }
         sum.try_normalize().unwrap_or(own)

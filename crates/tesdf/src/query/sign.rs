@@ -35,6 +35,18 @@ pub(crate) enum Facing {
     Either,
 }
 
+impl Facing {
+    /// What the normal of the face is multiplied by to point outward; 0 for
+    /// [`Either`](Self::Either).
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Outward => 1.0,
+            Self::Inward => -1.0,
+            Self::Either => 0.0,
+        }
+    }
+}
+
 /// Lengths (local frame): the points at which the sides of a face are looked up lie this far beside
 /// the point, towards the inside of the face, and this far off the face. Other faces that have the
 /// point are then farther away, unless they make an angle below some 1e-3 with it.
@@ -81,15 +93,6 @@ impl TeSdf {
         if self.winding_in_cell(local) >= 1 { Side::Inside } else { Side::Outside }
     }
 
-    /// The normal of the surface at a point of it, so that it points outward. Winding numbers tell
-    /// the direction of the faces only where inside is where they are 1 or more. `step` is the
-    /// distance on both sides at which the side is looked up.
-    pub(crate) fn outward(&self, normal: DVec3, at: DVec3, step: f64) -> DVec3 {
-        let Some(rule) = self.sign_rule() else { return normal };
-        let [front, behind] = [1.0, -1.0].map(|s| rule.side(at + s * step * normal));
-        if front == Side::Inside && behind == Side::Outside { -normal } else { normal }
-    }
-
     /// The number by which the sign changes where there is no face, in the local frame; `None`
     /// where it does not.
     pub(crate) fn jump(&self) -> Option<&GeneralizedWinding> {
@@ -127,18 +130,14 @@ impl TeSdf {
     /// The normal of a face at a point of it, so that it points outward; zero where it points
     /// outward on both sides or on none, and for a face without area.
     pub(crate) fn outward_normal(&self, face: u32, at: DVec3) -> DVec3 {
-        let normal = self.local_triangle(face as usize).normal;
-        match self.facing(face, at) {
-            Facing::Outward => normal,
-            Facing::Inward => -normal,
-            Facing::Either => DVec3::ZERO,
-        }
+        self.facing(face, at).sign() * self.local_triangle(face as usize).normal
     }
 
-    /// As [`outward_normal`](Self::outward_normal), or the normal as the face has it where that is
-    /// zero.
-    pub(crate) fn normal_outward(&self, face: u32, at: DVec3) -> DVec3 {
-        self.outward_normal(face, at).try_normalize().unwrap_or_else(|| self.face_normal(face))
+    /// The unit normal of a face, turned round where the back of the face is outside at a point of
+    /// it, and nothing else.
+    pub(super) fn normal_outward(&self, face: u32, at: DVec3) -> DVec3 {
+        let normal = self.face_normal(face);
+        if self.facing(face, at) == Facing::Inward { -normal } else { normal }
     }
 
     /// Winding number in a crossing cell: the number at its centroid plus the crossings on the

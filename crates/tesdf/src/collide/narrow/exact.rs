@@ -113,22 +113,17 @@ pub fn is_least(
         let gradient = simple.value(point).gradient;
         return polygon.points().all(|p| gradient.dot(p - point) >= -tolerance);
     }
-    let none = Faces::default();
-    let Some((asset, place, faces)) = cell.mesh(&none) else { return false };
     if least <= CLEAR {
         return branch_and_bound::is_least(cell, polygon, (least, point, face), tolerance);
     }
-    let center = polygon.center();
-    let radius = polygon.reach(center);
-    let (around, slack, reach) = (cell.surroundings(), 0.0, least);
-    let query =
-        Query { asset, around, place, faces, polygon, normal, center, radius, tolerance, slack, reach };
+    let none = Faces::default();
+    let Some(query) = Query::of_cell(cell, &none, polygon, normal, (tolerance, least)) else { return false };
     let points = query.points();
     // A polygon that keeps clear of all faces is on one side of the surface.
     let bound = (least - tolerance).max(0.5 * CLEAR);
     let mut is_least = true;
     query.near(least, &mut |face| {
-        let triangle = asset.local_triangle(face as usize);
+        let triangle = query.asset.local_triangle(face as usize);
         let closest = triangle.closest(point);
         let outward = (point - closest.point) / closest.distance;
         let slope = polygon.points().map(|p| outward.dot(p - point)).fold(f64::INFINITY, f64::min);
@@ -293,7 +288,7 @@ impl<'a> Query<'a> {
         while let Some(polygon) = parts.pop() {
             let center = polygon.center();
             let reach = self.reach.min(least.0);
-            let part = Query { polygon: &polygon, center, radius: polygon.reach(center), reach, ..*self };
+            let part = Query { reach, ..self.with_polygon(&polygon) };
             if cuts < MAX_CUTS
                 && let Some((above, below)) = part.cut()
             {

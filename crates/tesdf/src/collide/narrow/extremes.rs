@@ -15,6 +15,7 @@ use crate::collide::field::CellField;
 use crate::collide::field_value::FieldValue;
 use crate::collide::surface::{Part, PartFacing};
 use crate::geometry::{Feature, Triangle};
+use crate::query::Faces;
 
 /// Number of directions in the plane of a face. A polygon's corner with a right angle is an extreme
 /// of two of them.
@@ -353,11 +354,8 @@ impl<'a> Patch<'a> {
     /// face is within `limit` there.
     fn overlay(&self, face: &Triangle, limit: f64, offer: &mut impl FnMut(DVec3)) {
         let (points, normal) = (&self.within, self.normal);
-        let looks_outward = match self.field {
-            CellField::Whole(around) => around.asset.faces_look_outward(),
-            CellField::Mesh { asset, .. } => asset.faces_look_outward(),
-            CellField::Simple(_) => true,
-        };
+        let none = Faces::default();
+        let looks_outward = self.field.mesh(&none).is_none_or(|(asset, ..)| asset.faces_look_outward());
         let is_behind = looks_outward && face.normal.dot(self.facing) > 0.0;
         if face.normal == DVec3::ZERO || is_behind {
             return;
