@@ -10,8 +10,9 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 version=0.20.2
 deny=target/tools/bin/cargo-deny
 if [ "$("$deny" --version 2>/dev/null)" != "cargo-deny $version" ]; then
-    # Not optimised: the program runs for seconds, and compiling it takes most of the time.
-    step cargo install --quiet --locked --debug --root target/tools "cargo-deny@$version"
+    # Not optimised, without data for debuggers: the program runs for seconds, and compiling it takes most
+    # of the time.
+    CARGO_PROFILE_DEV_DEBUG=0 step cargo install --quiet --locked --debug --root target/tools "cargo-deny@$version"
 fi
 
 advisories=

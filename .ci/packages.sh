@@ -1,17 +1,27 @@
 #!/usr/bin/env bash
-# Packages each crate that can be published. Builds the packages of the library, of parts and of
-# dynamics from the packaged files. The other packages are not built: they need the GPU's or
-# Rapier's crates, which would be compiled again for minutes, and ./test compiles the same files.
+# Packages each crate that can be published. Compiles the library, parts and dynamics from the packaged
+# files. The other packages are not compiled: they need the GPU's or Rapier's crates, which would be
+# compiled again for minutes, and ./test compiles the same files.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
+. .ci/oldest.sh
 
-# Not optimised: the compiled code never runs.
-export CARGO_PROFILE_DEV_OPT_LEVEL=0
-# A new folder each time: cargo unpacks the packages into its home, under a name made from this path,
-# and takes what an earlier run unpacked there, even where its files have changed since.
+# A new folder each time, so that nothing of an earlier run is taken.
 mkdir -p target/packages
-target_dir=$(mktemp -d "$PWD/target/packages/XXXXXX")
-trap 'rm -rf "$target_dir"' EXIT
-step cargo package --quiet --allow-dirty --target-dir "$target_dir" -p tesdf -p tesdf-parts -p tesdf-sim
-step cargo package --quiet --allow-dirty --target-dir "$target_dir" --no-verify --workspace --exclude tesdf-python
+folder=$(mktemp -d "$PWD/target/packages/XXXXXX")
+trap 'rm -rf "$folder"' EXIT
+step cargo package --quiet --allow-dirty --target-dir "$folder" --no-verify --workspace --exclude tesdf-python
+
+# One workspace of the packaged files. Checked, not built as `cargo package` would: the compiled code
+# never runs.
+version=$(sed -n 's/^version = "\(.*\)"$/\1/p' Cargo.toml)
+packed=$folder/packed
+mkdir "$packed"
+cp Cargo.lock "$packed"
+printf '[workspace]\nresolver = "3"\nmembers = ["*-%s"]\n[patch.crates-io]\n' "$version" >"$packed/Cargo.toml"
+for crate in tesdf tesdf-parts tesdf-sim; do
+    tar -xzf "$folder/package/$crate-$version.crate" -C "$packed"
+    echo "$crate = { path = \"$crate-$version\" }" >>"$packed/Cargo.toml"
+done
+check --manifest-path "$packed/Cargo.toml" --workspace

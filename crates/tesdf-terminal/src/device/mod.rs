@@ -9,7 +9,9 @@ use crate::report::Failure;
 
 #[cfg(feature = "gpu")]
 mod gpu;
-#[cfg(not(feature = "gpu"))]
+// Tests of a tool with the GPU compile it, too, for the test of its error.
+#[cfg(any(not(feature = "gpu"), test))]
+#[cfg_attr(feature = "gpu", allow(dead_code))]
 mod no_gpu;
 
 #[cfg(feature = "gpu")]

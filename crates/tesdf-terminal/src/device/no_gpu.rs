@@ -48,15 +48,14 @@ impl Detect for Device {
 
 #[cfg(test)]
 mod tests {
-    use crate::device::Choice;
+    use super::open;
 
     #[test]
     fn a_device_is_an_error_that_says_how_to_build_with_the_gpu() {
-        for (choice, name) in [(Choice::Best, "--device gpu"), (Choice::Named("2".into()), "--device 2")] {
-            let failure = choice.open().err().expect("there is no device");
+        for (choice, name) in [(None, "--device gpu"), (Some("2"), "--device 2")] {
+            let failure = open(choice).err().expect("there is no device");
             assert!(failure.message.starts_with(name), "{failure:?}");
             assert!(failure.hint.is_some_and(|hint| hint.contains("--features gpu")));
         }
-        assert!(Choice::Processor.open().is_ok_and(|device| device.is_none()));
     }
 }
