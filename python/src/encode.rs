@@ -195,9 +195,8 @@ fn named_encoder(name: &str) -> PyResult<MethodChoice> {
 
 /// Converts the name of a domain, or a path. Text that is not a name is a path.
 fn domain_choice(any: &Bound<'_, PyAny>) -> PyResult<DomainChoice> {
-    if let Ok(text) = any.cast::<PyString>()
-        && let Ok(choice) = text.to_cow()?.parse()
-    {
+    if let Ok(text) = any.cast::<PyString>() {
+        let Ok(choice) = text.to_cow()?.parse();
         return Ok(choice);
     }
     any.extract::<PathBuf>()

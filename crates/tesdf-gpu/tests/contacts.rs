@@ -123,7 +123,7 @@ fn moving_bodies_look_ahead() {
     let (fall, turn) = (0.5 * size * random.direction(), 0.5 * random.direction());
     let mut scene = Scene::new();
     for world in 0..2 {
-        for (k, shape) in shapes.iter().cycle().take(6).enumerate() {
+        for (k, shape) in shapes.iter().cycle().take(8).enumerate() {
             let is_plane = matches!(shape, Shape::Plane);
             let id = scene.add_shape(shape.clone()).expect("a shape");
             let scale = if is_plane { 1.0 } else { size / shape.diagonal() };

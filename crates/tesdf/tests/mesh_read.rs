@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use tesdf::glam::DVec3;
-use tesdf::mesh::{LoadedMesh, MeshFormat, ReadError, read, read_bytes};
+use tesdf::mesh::{LoadedMesh, MeshFormat, ReadError, SolidMesh, read, read_bytes};
 
 fn bad(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bad").join(name)
@@ -220,6 +220,30 @@ fn obj_errors_name_the_line() {
         let message = error(text, MeshFormat::Obj);
         words.iter().for_each(|w| assert!(message.contains(w), "no {w:?} in {message:?}"));
     }
+}
+
+/// A tetrahedron with a corner at 1, which one facet has at `other`.
+fn cracked_stl(other: &str) -> String {
+    let facet = |[a, b, c]: [&str; 3]| {
+        format!("facet normal 0 0 0\nouter loop\nvertex {a}\nvertex {b}\nvertex {c}\nendloop\nendfacet\n")
+    };
+    let moved = format!("{other} 0 0");
+    let [o, x, y, z] = ["0 0 0", "1 0 0", "0 1 0", "0 0 1"];
+    format!("solid\n{}endsolid\n", [[o, y, x], [o, x, z], [&moved, y, z], [o, z, y]].map(facet).concat())
+}
+
+#[test]
+fn cracks_of_rounding_in_stl_are_closed() {
+    let near = read_bytes(cracked_stl("1.0000001").as_bytes(), MeshFormat::Stl).unwrap();
+    assert_consistent(&near);
+    assert_eq!((near.mesh.vertices().len(), near.report.welded_vertices), (4, 8));
+    assert!(near.report.notes[0].starts_with("1 vertex at most 2.4e-7 from another merged"), "{near:?}");
+    assert!(SolidMesh::new(near.mesh).is_ok());
+    let apart = read_bytes(cracked_stl("1.000001").as_bytes(), MeshFormat::Stl).unwrap();
+    assert_eq!((apart.mesh.vertices().len(), apart.report.notes.len()), (5, 0));
+    // Other formats have more digits.
+    let obj = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1.0000001 0 0\nf 1 3 2\nf 1 2 4\nf 5 3 4\nf 1 4 3\n";
+    assert_eq!(read_bytes(obj, MeshFormat::Obj).unwrap().mesh.vertices().len(), 5);
 }
 
 #[test]

@@ -198,7 +198,8 @@ pub struct LoadReport {
     pub triangulated_polygons: usize,
     /// Polygons among these that are not convex.
     pub concave_polygons: usize,
-    /// Used vertices that are merged into an earlier vertex with bitwise the same position.
+    /// Used vertices that are merged into an earlier vertex with bitwise the same position; of an STL
+    /// file also those that rounding to its 32-bit numbers moved apart, if the mesh is closed so.
     pub welded_vertices: usize,
     /// Vertices that are dropped because no face uses them.
     pub unused_vertices: usize,

@@ -4,6 +4,7 @@ use super::{
     MeshError, Severity, TriangleMesh, check,
     check::out_of_range,
     topology::{Topology, has_repeated_corner},
+    weld::weld_within,
 };
 
 mod around_edge;
@@ -18,7 +19,6 @@ mod report;
 mod split;
 mod tolerance;
 mod triangulate;
-mod weld;
 
 pub use auto::{AutoRepaired, RepairMode, UnknownRepair, repair_auto};
 pub use options::{RepairOptions, ShellOrientation};
@@ -152,7 +152,7 @@ fn join(mesh: &TriangleMesh, options: &RepairOptions) -> Result<(Draft, RepairRe
     let mut report = RepairReport { weld_tolerance: options.weld_tolerance, ..RepairReport::default() };
     let mut draft = Draft::of(mesh);
     if let Some(tolerance) = options.weld_tolerance {
-        report.welded_vertices = weld::weld(&mut draft, tolerance);
+        report.welded_vertices = draft.weld(tolerance);
     }
     let collapsed = draft.retain(|_, corners| !has_repeated_corner(corners));
     report.collapsed_faces = collapsed;
@@ -181,6 +181,14 @@ impl Draft {
             faces: mesh.faces().to_vec(),
             origin: (0..mesh.faces().len() as u32).collect(),
         }
+    }
+
+    /// Merges vertices. Returns pairs of the merged vertex and the vertex that replaces it.
+    fn weld(&mut self, tolerance: f64) -> Vec<[u32; 2]> {
+        let target = weld_within(&self.vertices, tolerance);
+        self.faces.iter_mut().flatten().for_each(|v| *v = target[*v as usize]);
+        let pairs = (0..).zip(target).filter(|(v, to)| v != to);
+        pairs.map(|(v, to)| [v, to]).collect()
     }
 
     fn is_closed(&self) -> bool {

@@ -2,6 +2,7 @@
 use glam::DVec3;
 
 use super::{LoadReport, LoadedMesh, MeshFormat, MeshPart, Origin, Place, ReadError};
+use crate::mesh::count::count;
 use crate::mesh::polygon::{Shape, triangulate};
 use crate::mesh::weld::weld_equal;
 use crate::mesh::{MeshError, TriangleMesh};
@@ -183,7 +184,7 @@ pub(super) fn assemble(
 
     let unused = used.iter().filter(|u| !**u).count();
     let unused_non_finite = (0..positions.len()).find(|&i| !used[i] && non_finite(i).is_some());
-    let welded = weld_equal(&positions, &used);
+    let mut welded = weld_equal(&positions, &used);
     let mut faces = Vec::with_capacity(corners.len().saturating_sub(2 * ends.len()));
     let mut face_origin = Vec::with_capacity(faces.capacity());
     let mut counts = PolygonCounts::default();
@@ -204,6 +205,14 @@ pub(super) fn assemble(
         face_origin.extend(std::iter::repeat_n(face as u32, triangles.len()));
     }
 
+    if format == MeshFormat::Stl
+        && let Some((merged, distance)) = welded.close_rounding(&mut faces)
+    {
+        notes.push(format!(
+            "{} at most {distance:.1e} from another merged, the rounding of STL's 32-bit numbers; the mesh is closed so",
+            count(merged, "vertex", "vertices")
+        ));
+    }
     if unused > 0 {
         notes.push(format!("vertices dropped because no face uses them: {unused}"));
     }
