@@ -48,7 +48,7 @@ impl Welded {
     ///
     /// Unlike a fixed tolerance it is right for parts of any size, because it follows from the format.
     pub fn close_rounding(&mut self, faces: &mut [[u32; 3]]) -> Option<(usize, f64)> {
-        let largest = self.positions.iter().fold(0.0, |m: f64, p| m.max(p.abs().max_element())) as f32;
+        let largest = largest_coordinate(&self.positions) as f32;
         let distance = f64::from(ROUNDINGS * (largest.next_up() - largest));
         if !distance.is_finite() || Topology::new(faces).is_closed() {
             return None;
@@ -58,23 +58,20 @@ impl Welded {
         if !Topology::new(&merged).is_closed() || merged.iter().all(|&face| has_repeated_corner(face)) {
             return None;
         }
-        let is_kept: Vec<bool> = target.iter().enumerate().map(|(v, &to)| to == v as u32).collect();
-        let number: Vec<u32> = is_kept
-            .iter()
-            .scan(0, |next, &kept| {
-                let here = *next;
-                *next += u32::from(kept);
-                Some(here)
-            })
-            .collect();
-        let to = |v: u32| number[target[v as usize] as usize];
-        faces.iter_mut().flatten().for_each(|v| *v = to(*v));
-        self.target.iter_mut().flatten().for_each(|v| *v = to(*v));
-        let mut kept = is_kept.iter();
-        self.positions.retain(|_| kept.next().is_some_and(|&kept| kept));
-        let mut kept = is_kept.iter();
-        self.first.retain(|_| kept.next().is_some_and(|&kept| kept));
-        Some((is_kept.len() - self.positions.len(), distance))
+        // The vertex that replaces another one comes before it.
+        let mut number: Vec<u32> = Vec::with_capacity(target.len());
+        let (mut positions, mut first) = (Vec::new(), Vec::new());
+        for (v, &to) in target.iter().enumerate() {
+            number.push(if to == v as u32 { positions.len() as u32 } else { number[to as usize] });
+            if to == v as u32 {
+                positions.push(self.positions[v]);
+                first.push(self.first[v]);
+            }
+        }
+        let ids = faces.iter_mut().flatten().chain(self.target.iter_mut().flatten());
+        ids.for_each(|v| *v = number[*v as usize]);
+        (self.positions, self.first) = (positions, first);
+        Some((number.len() - self.positions.len(), distance))
     }
 }
 
@@ -84,7 +81,7 @@ impl Welded {
 /// was kept and is within `tolerance`; otherwise it is kept. So no vertex moves by more than the
 /// tolerance, and the result depends only on the order of the vertices.
 pub(super) fn weld_within(positions: &[DVec3], tolerance: f64) -> Vec<u32> {
-    let largest = positions.iter().fold(0.0, |m: f64, p| m.max(p.abs().max_element()));
+    let largest = largest_coordinate(positions);
     // Most points are near no side of their cell, so few cells are looked at. A cell may be larger,
     // so that cell indices fit into 64 bits.
     let cell = (2.0 * tolerance).max(largest * 2f64.powi(-40));
@@ -110,6 +107,11 @@ pub(super) fn weld_within(positions: &[DVec3], tolerance: f64) -> Vec<u32> {
         }
     }
     target
+}
+
+/// The largest magnitude of a coordinate.
+fn largest_coordinate(positions: &[DVec3]) -> f64 {
+    positions.iter().fold(0.0, |m, p| p.abs().max_element().max(m))
 }
 
 #[cfg(test)]
