@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/oldest.sh
 
 check --bins --workspace --exclude tesdf-gpu
-for set in "" parallel collide collide,parallel encode encode,collide gltf threemf vtu gmsh encode,collide,parallel,gltf,threemf,vtu,gmsh; do
+for set in "" parallel collide collide,parallel encode encode,collide encode,parallel gltf threemf vtu gmsh gltf,collide threemf,vtu encode,collide,parallel,gltf,threemf,vtu,gmsh; do
     check -p tesdf --no-default-features --features "$set"
 done
 

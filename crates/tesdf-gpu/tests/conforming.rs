@@ -99,7 +99,8 @@ fn contacts_are_those_of_the_host() {
         for (encoding, other, turn) in [(&plain, &ball, 2.0), (&by_cost, &ball, 2.0), (&plain, &block, 0.1)] {
             let beam = encoded(&solid, &domain, encoding);
             let scene = meeting(&beam, other, turn, &mut random);
-            // Half of the modes with each domain: a processor that stands in for the device takes long.
+            // Half of the modes with each domain: it takes long where a processor stands in for the
+            // device.
             for options in each_mode(8.0).into_iter().skip(first).step_by(2) {
                 let one = hold(&scene, &options, 8.0);
                 println!("{:?}: {one:?}", options.mode);

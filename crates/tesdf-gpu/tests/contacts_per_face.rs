@@ -29,9 +29,8 @@ fn each_face_keeps_its_least_distance() {
     let mut random = Random(11);
     let names = [["cube", "cube"], ["l_bracket", "cube"], ["torus_quads", "tetra"], ["beam", "l_bracket"]];
     let mut all = Kept::default();
-    for (k, names) in names.into_iter().enumerate() {
-        // Half of the relations: these tests take minutes where a processor stands in for the device.
-        for relation in RELATIONS.into_iter().skip(k % 2).step_by(2) {
+    for names in names {
+        for relation in RELATIONS {
             if relation == Relation::Same && names[0] != names[1] {
                 continue;
             }
@@ -41,7 +40,7 @@ fn each_face_keeps_its_least_distance() {
             all.unconverged += kept.unconverged;
         }
     }
-    assert!(all.faces > 500 && all.unconverged * 200 < all.faces, "{all:?}");
+    assert!(all.faces > 2000 && all.unconverged * 200 < all.faces, "{all:?}");
 }
 
 #[test]
@@ -58,15 +57,16 @@ fn minima_are_followed_by_no_lower_point() {
     let names = [["l_bracket", "cube"], ["torus_quads", "tetra"], ["beam", "l_bracket"]];
     let mut all = [0, 0];
     for names in names {
-        let relations = RELATIONS.into_iter().filter(|&relation| relation != Relation::Same);
-        for (relation, mode) in relations.zip([Mode::Exact, Mode::Face].into_iter().cycle()) {
+        for relation in RELATIONS.into_iter().filter(|&relation| relation != Relation::Same) {
             let bodies = relation.place(names, &mut random);
             let contact_distance = 1e-3 * bodies[0].diagonal();
-            let counts = DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, mode);
-            all = [all[0] + counts[0], all[1] + counts[1]];
+            for mode in [Mode::Exact, Mode::Face] {
+                let counts = DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, mode);
+                all = [all[0] + counts[0], all[1] + counts[1]];
+            }
         }
     }
-    assert!(all[0] > 200 && all[1] > 200, "{all:?}");
+    assert!(all[0] > 500 && all[1] > 500, "{all:?}");
 }
 
 #[test]

@@ -85,3 +85,13 @@ impl std::fmt::Display for Choice {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Choice;
+
+    #[test]
+    fn the_processor_is_no_device() {
+        assert!(Choice::Processor.open().is_ok_and(|device| device.is_none()));
+    }
+}
