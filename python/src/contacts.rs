@@ -83,7 +83,7 @@ pub fn contacts<'py>(py: Python<'py>, found: &Contacts) -> PyResult<Bound<'py, P
     columns(py, found.as_slice())?
         .with("statistics", classes::report(py, "DetectionStatistics", &found.statistics)?)?
         .with("reductions", reductions(py, &found.reductions)?)?
-        .with("hidden", hidden(py, &found.hidden)?)?
+        .with("hidden", hidden_overlaps(py, &found.hidden)?)?
         .build("Contacts")
 }
 
@@ -93,7 +93,7 @@ pub fn of_step<'py>(
     found: &[Contact],
     overlaps: &[HiddenOverlap],
 ) -> PyResult<Bound<'py, PyAny>> {
-    columns(py, found)?.with("hidden", hidden(py, overlaps)?)?.build("StepContacts")
+    columns(py, found)?.with("hidden", hidden_overlaps(py, overlaps)?)?.build("StepContacts")
 }
 
 /// The columns of contacts. In Python each is an array.
@@ -197,7 +197,7 @@ fn reductions<'py>(py: Python<'py>, found: &[PairReduction]) -> PyResult<Bound<'
         .build("Reductions")
 }
 
-fn hidden<'py>(py: Python<'py>, found: &[HiddenOverlap]) -> PyResult<Bound<'py, PyAny>> {
+pub fn hidden_overlaps<'py>(py: Python<'py>, found: &[HiddenOverlap]) -> PyResult<Bound<'py, PyAny>> {
     let of = || found.iter();
     Columns::new(py)
         .add("instance_a", ids(of().map(|h| h.instance_a)))?

@@ -6,15 +6,15 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tesdf::collide::{
-    self, ClearanceOptions, CollideError, Instance, InstanceId, Pose, ShapeId, TimeOfImpactOptions,
+    self, ClearanceOptions, CollideError, ContactsPer, Instance, InstanceId, Pose, ShapeId, TimeOfImpactOptions,
     clearance, coarse_contacts, detect_until, time_of_impact, why,
 };
 
 use crate::arrays;
 use crate::contacts::{self, Columns};
 use crate::detection::{self, Keywords};
-use crate::device::{self, HeldDetector};
-use crate::errors::Error;
+use crate::device::{self, GivenArrays, HeldDetector};
+use crate::errors::{Error, argument};
 use crate::given::{Given, PerInstance};
 use crate::interrupt::cancellable;
 use crate::pairs::{self, Motions, pairs_of};
@@ -299,6 +299,47 @@ impl Scene {
         let work = || pool.install(|| detect_until(&scene, &options, &stop));
         let found = cancellable(py, work, || stop.store(true, Ordering::Relaxed), || Ok(()))?;
         contacts::contacts(py, &found.map_err(|e| Error::Collide(e).raise(py))?)
+    }
+
+    /// Contacts that stay on a device, as DeviceContacts, for a physics engine on the same device.
+    ///
+    /// They are those of detect on this device, rounded to float32, sorted by world and instances;
+    /// within a pair, faces have the order of the asset. On a CUDA device other libraries use the
+    /// arrays in place, and their poses are used in place. Only counters are copied to the processor,
+    /// and contacts only to tell whether they show a deep overlap that was found otherwise.
+    ///
+    /// - poses: float32 [N, 7], x y z qx qy qz qw, a row for each instance in the order of ids: a
+    ///   DeviceArray, memory of another library on this device (DLPack or __cuda_array_interface__),
+    ///   or an array, which is copied to it. Quaternions have length 1, up to 1e-5. None: the poses
+    ///   of the scene, which poses do not change.
+    /// - velocities: float32 [N, 6], vx vy vz wx wy wz, likewise; only with poses. None: at rest.
+    /// - device: as in detect; None is that of poses if these are a DeviceArray, else "gpu".
+    /// - The other options are those of detect. contacts_per="minimum", contacts per face without
+    ///   reduce, and deepest need the processor, and are DeviceErrors.
+    #[pyo3(signature = (*, poses = None, velocities = None, device = None, **options), text_signature = "($self, *, poses=None, velocities=None, device=None, mode='exact', contacts_per='cell', contact_distance=0.0, speculative_time=0.0, cos_theta=None, iterations=16, tolerance=None, reduce=None, deepest=None, spread=None, precision='f64', threads=None)")]
+    fn detect_on_device<'py>(
+        &self,
+        py: Python<'py>,
+        poses: Option<&Bound<'py, PyAny>>,
+        velocities: Option<&Bound<'py, PyAny>>,
+        device: Option<&Bound<'py, PyAny>>,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let per_cell = !options.is_some_and(|given| given.contains("contacts_per").unwrap_or(false));
+        let Keywords { mut options, .. } = Keywords::new("detect_on_device", options)?;
+        if per_cell {
+            options.contacts_per = ContactsPer::Cell;
+        }
+        let device = match device {
+            Some(_) => device::chosen(device)?
+                .ok_or_else(|| argument("device", "\"cpu\"", "a device other than the processor"))?,
+            None => match poses.and_then(device::of_array) {
+                Some(device) => device,
+                None => device::open(py, None)?,
+            },
+        };
+        let given = GivenArrays { poses, velocities };
+        device::detect_on_device(py, &self.on_device, &device, &self.now(), given, &options)
     }
 
     /// Faces that touch and that are large against the other body, one for each ordered pair of

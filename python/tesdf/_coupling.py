@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._native import Asset, Scene
+from ._native import Asset, DeviceArray, Scene
 from .bodies import Shape
-from .contacts import Contacts as Found
+from .contacts import Contacts as Found, DeviceContacts
 
 Float = npt.NDArray[np.float64]
 
@@ -50,6 +50,7 @@ class Detector:
 
     scene: Scene
     last: Found | None
+    last_on_device: DeviceContacts | None
 
     def __init__(
         self,
@@ -58,7 +59,10 @@ class Detector:
         excluded: Iterable[tuple[int, int]],
         options: Mapping[str, Any],
     ) -> None:
-        self.last = None
+        self.last = self.last_on_device = None
+        self._poses: Any = None
+        # The number of the device in CUDA, -1 for another one; None is not known yet.
+        self._number: int | None = None
         self._rotations = np.array([shape.rotation for shape in shapes])
         self._translations = np.array([shape.translation for shape in shapes])
         self._options: dict[str, Any] = {"mode": "node", **options}
@@ -100,8 +104,48 @@ class Detector:
         poses[:, 3, 3] = 1.0
         velocities = np.hstack([linear.reshape(-1, 3) + np.cross(angular, arms), angular])
         self.scene.update(np.arange(len(arms), dtype=np.uint32), poses=poses, velocities=velocities)
-        self.last = self.scene.detect(**{"speculative_time": _STEPS_AHEAD * time_step, **self._options})
-        return self.last
+        found = self.scene.detect(**{"speculative_time": _STEPS_AHEAD * time_step, **self._options})
+        self.last, self.last_on_device = found, None
+        return found
+
+    def leaves_on(self, cuda: int | None) -> bool:
+        """Whether contacts can stay on this CUDA device, given by its number, which is that of the engine:
+        they are found there, in a form that needs no processor."""
+        if cuda is None or self._options.get("device") in (None, "cpu"):
+            return False
+        if self._number is None:
+            self._number = _cuda_number(self._options["device"])
+        options = self._options
+        per_cell = options["mode"] == "node" or options.get("contacts_per") == "cell"
+        reduces = options.get("reduce") is not None or options.get("spread") is not None
+        is_possible = options.get("deepest") is None and options.get("contacts_per") != "minimum"
+        return self._number == cuda and is_possible and (per_cell or reduces)
+
+    def detect_on_device(self, poses: Any, velocities: Any, time_step: float) -> DeviceContacts:
+        """Finds contacts where they stay, by arrays there: poses [N, 7], velocities [N, 6] of the shapes'
+        own frames."""
+        options = {"contacts_per": "face", "speculative_time": _STEPS_AHEAD * time_step, **self._options}
+        if options["mode"] == "node":
+            options["contacts_per"] = "cell"
+        found = self.scene.detect_on_device(poses=poses, velocities=velocities, **options)
+        self.last, self.last_on_device, self._poses = None, found, poses
+        return found
+
+    def scene_now(self) -> Scene:
+        """A copy of the scene at the poses of the last detection."""
+        scene = self.scene.__copy__()
+        if self.last_on_device is not None:
+            poses = self._poses.numpy().astype(np.float64)
+            poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1, keepdims=True)
+            scene.update(np.arange(len(poses), dtype=np.uint32), poses=poses)
+        return scene
+
+
+def _cuda_number(device: str | int) -> int:
+    try:
+        return DeviceArray(np.zeros(1, np.float32), device).__dlpack_device__()[1]
+    except BufferError:
+        return -1
 
 
 def kinds_of(rows: npt.NDArray[Any]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:

@@ -12,6 +12,7 @@ from .contacts import (
     ContactPatches,
     ContactRows,
     Contacts,
+    DeviceContacts,
     Impacts,
     Instances,
     Record,
@@ -226,6 +227,25 @@ class Scene:
         threads: int | None = None,
         device: _Device = "cpu",
     ) -> Contacts: ...
+    def detect_on_device(
+        self,
+        *,
+        poses: Any = None,
+        velocities: Any = None,
+        device: _Device = None,
+        mode: Literal["node", "edge", "face", "exact"] = "exact",
+        contacts_per: Literal["cell", "face", "minimum"] = "cell",
+        contact_distance: float = 0.0,
+        speculative_time: float = 0.0,
+        cos_theta: float | None = None,
+        iterations: int = 16,
+        tolerance: float | None = None,
+        reduce: int | None = None,
+        deepest: int | None = None,
+        spread: int | None = None,
+        precision: _Precision = "f64",
+        threads: int | None = None,
+    ) -> DeviceContacts: ...
     def coarse_contacts(
         self,
         *,

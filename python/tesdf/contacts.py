@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from .reports import DetectionStatistics
+
+if TYPE_CHECKING:
+    from ._native import DeviceArray
 
 _Float = npt.NDArray[np.float64]
 _Id = npt.NDArray[np.uint32]
@@ -249,6 +252,28 @@ class Contacts(ContactRows):
     def __repr__(self) -> str:
         overlaps = f", {len(self.hidden)} hidden overlaps" if len(self.hidden) else ""
         return f"<tesdf.Contacts: {len(self)} contacts{overlaps}>"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DeviceContacts(_Rows):
+    """Contacts on a device, sorted by world and instances. numpy() of an array copies it; on a CUDA
+    device other libraries use it in place."""
+
+    point_a: DeviceArray
+    """[N, 3] float32, witness point on the surface of a"""
+    point_b: DeviceArray
+    """[N, 3] float32, the point of b's surface that is closest to it"""
+    normal: DeviceArray
+    """[N, 3] float32, unit gradient of b's signed distance; points from b to a"""
+    distance: DeviceArray
+    """[N] float32, signed distance of b; negative where the bodies overlap"""
+    instances: DeviceArray
+    """[N, 2] uint32, the ids of a, which has the surface, and of b, whose field is used"""
+    hidden: HiddenOverlaps
+    """pairs that overlap without a contact that shows it"""
+
+    def __len__(self) -> int:
+        return len(self.distance)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -7,7 +7,8 @@
     for _ in range(1000):
         contacts.step(m, d)                         # in place of mujoco_warp.step
 
-It needs the packages `mujoco` and `mujoco-warp`, 4.0 or newer. Contacts are found on the processor.
+It needs the packages `mujoco` and `mujoco-warp`, 4.0 or newer. Contacts are found on the processor, or with
+device="cuda:0" on a GPU: where MJWarp runs on the same one, poses and contacts stay there.
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ except ImportError:
         "tesdf.mujoco_warp needs the package mujoco-warp: pip install 'mujoco-warp>=4'"
     ) from None
 
-from . import Asset, Contacts as Found, Scene
+from . import Asset, Contacts as Found, DeviceContacts, Scene
 from ._coupling import Detector, Float, kinds_of
 from ._mujoco_model import Geoms, Integer, Parameters, Properties, Solref, checked_solref, combine, mj, stiffness
-from ._mujoco_warp_kernels import look_ahead
+from ._mujoco_warp_kernels import fill, look_ahead, place
+from ._warp import Memory, cuda_number, in_place
 from ._native import contact_frames
 
 if TYPE_CHECKING:
@@ -45,6 +47,18 @@ _WITHOUT_CONTACTS = mjw.DisableBit.CONSTRAINT | mjw.DisableBit.CONTACT
 
 # MJWarp keeps contacts with dist < includemargin. For a distance of zero this is includemargin.
 _ABOVE_ZERO = 1e-30
+
+
+# Fields of `d.contact` that are the same for all contacts.
+_SAME = {
+    "solreffriction": 0.0,
+    "adhesion": 0.0,
+    "surfacevel": 0.0,
+    "flex": -1,
+    "elem": -1,
+    "vert": -1,
+    "type": _FOR_SOLVER,
+}
 
 
 class Contacts:
@@ -78,6 +92,7 @@ class Contacts:
         self._roots = model.body_rootid[self._bodies]
         self._with_asset = self._ids[[asset is not None for asset in geoms.values()]]
         self._worlds = nworld
+        self._on_device: _OnDevice | None = None
         count = len(self._ids)
         self._detector = Detector(
             self._geoms.shapes * nworld,
@@ -87,15 +102,16 @@ class Contacts:
         )
 
     @property
-    def last(self) -> Found | None:
-        """The contacts of the last detection in all worlds, None before the first. The instance of
-        geom i in world w is w * len(geoms) + i."""
-        return self._detector.last
+    def last(self) -> Found | DeviceContacts | None:
+        """The contacts of the last detection in all worlds, None before the first; `DeviceContacts` where they
+        stay on a GPU. The instance of geom i in world w is w * len(geoms) + i."""
+        there = self._detector.last_on_device
+        return self._detector.last if there is None else there
 
     @property
     def scene(self) -> Scene:
         """A copy of the scene of all worlds, at the poses of the last detection."""
-        return self._detector.scene.__copy__()
+        return self._detector.scene_now()
 
     def step(self, m: mjw.Model, d: mjw.Data) -> None:
         """Does what `mujoco_warp.step` does, with the contacts of this object.
@@ -144,20 +160,28 @@ class Contacts:
         `d` must have passed `fwd_kinematics` and `com_vel`. `step` also makes the rows of contacts
         that do not touch yet look ahead; without this such a contact pushes before it touches.
         """
-        found = self.detect(m, d)
+        stays = self._detector.leaves_on(cuda_number(d.nacon.device))
+        found = self._detect_there(m, d) if stays else self.detect(m, d)
         count, before = len(found), int(d.nacon.numpy()[0])
         if before + count > d.naconmax:
             raise ValueError(
                 f"{before + count} contacts in {d.nworld} worlds, but the data has room for {d.naconmax}; make it with "
                 f"make_data(…, naconmax={_rounded(before + count)}) or reduce the contacts, as reduce=64"
             )
-        if count:
+        if count == 0:
+            return 0
+        if isinstance(found, DeviceContacts):
+            self._fill_there(m, d, found, before)
+        else:
             for name, rows in self._rows(m, found).items():
                 target = getattr(d.contact, name)
-                # MJWarp makes no room for what the model does not have, such as surface velocities.
-                if target.size:
-                    wp.copy(target, wp.array(rows, dtype=target.dtype, device="cpu"), dest_offset=before, count=count)
-            d.nacon.fill_(before + count)
+                wp.copy(target, wp.array(rows, dtype=target.dtype, device="cpu"), dest_offset=before, count=count)
+        for name, value in _SAME.items():
+            target = getattr(d.contact, name)
+            # MJWarp makes no room for what the model does not have, such as surface velocities.
+            if target.size:
+                target[before : before + count].fill_(value)
+        d.nacon.fill_(before + count)
         return count
 
     def detect(self, m: mjw.Model, d: mjw.Data) -> Found:
@@ -175,6 +199,87 @@ class Contacts:
             linear[:, self._geoms.moves] += (_array(m.opt.gravity) * steps[:, None])[:, None]
         return self._detector.detect(
             _array(d.geom_xmat)[:, self._ids], positions, linear, angular, float(steps.max())
+        )
+
+    def _detect_there(self, m: mjw.Model, d: mjw.Data) -> DeviceContacts:
+        """As `detect`, where MJWarp has its arrays."""
+        self._check(m, d)
+        here = d.nacon.device
+        if self._on_device is None or self._on_device.device != here:
+            self._on_device = _OnDevice(here, self)
+        own = self._on_device
+        wp.launch(
+            place,
+            dim=(self._worlds, len(self._ids)),
+            inputs=[
+                own.geoms,
+                own.bodies,
+                own.roots,
+                own.falls if not m.opt.disableflags & mjw.DisableBit.GRAVITY else own.none,
+                own.rotations,
+                own.translations,
+                m.opt.timestep,
+                m.opt.gravity,
+                d.geom_xpos,
+                d.geom_xmat,
+                d.cvel,
+                d.subtree_com,
+            ],
+            outputs=[own.poses, own.velocities],
+            device=here,
+        )
+        # tesdf works in a stream of its own, which does not wait for Warp's.
+        wp.synchronize_device(here)
+        step = float(_array(m.opt.timestep).max())
+        return self._detector.detect_on_device(Memory(own.poses), Memory(own.velocities), step)
+
+    def _fill_there(self, m: mjw.Model, d: mjw.Data, found: DeviceContacts, before: int) -> None:
+        """Writes the fields of `d.contact` where they are."""
+        here, count, contact = d.nacon.device, len(found), d.contact
+        one, two = np.triu_indices(len(self._ids), 1)
+        pairs = np.zeros((len(self._ids),) * 2, np.int32)
+        pairs[one, two] = pairs[two, one] = np.arange(len(one))
+        world = np.repeat(np.arange(self._worlds), len(one))
+        each, kind = self._parameters(m, world, np.tile(self._ids[np.stack([one, two], 1)], (self._worlds, 1)))
+        parameters: list[Any] = [
+            wp.array(rows[kind], dtype=target.dtype, device=here)
+            for rows, target in (
+                (each.condim, contact.dim),
+                (each.friction, contact.friction),
+                (each.solref, contact.solref),
+                (each.solimp, contact.solimp),
+            )
+        ]
+        wp.launch(
+            fill,
+            dim=count,
+            inputs=[
+                before,
+                _ABOVE_ZERO,
+                self._on_device.geoms,  # type: ignore[union-attr]
+                wp.array(pairs, device=here),
+                len(one),
+                *parameters,
+                in_place(found.point_a, wp.vec3, here),
+                in_place(found.point_b, wp.vec3, here),
+                in_place(found.normal, wp.vec3, here),
+                in_place(found.distance, wp.float32, here),
+                in_place(found.instances, wp.vec2i, here),
+            ],
+            outputs=[
+                contact.dist,
+                contact.pos,
+                contact.frame,
+                contact.includemargin,
+                contact.friction,
+                contact.solref,
+                contact.solimp,
+                contact.dim,
+                contact.geom,
+                contact.worldid,
+                contact.geomcollisionid,
+            ],
+            device=here,
         )
 
     def _check(self, m: mjw.Model, d: mjw.Data) -> None:
@@ -216,7 +321,6 @@ class Contacts:
         geoms = self._ids[pairs % count]
         each, kind = self._parameters(m, world, geoms)
         rows = len(found)
-        none = np.full((rows, 2), -1)
         distance = found.distance.astype(np.float32)
         reals: dict[str, Any] = {
             "dist": distance,
@@ -226,19 +330,12 @@ class Contacts:
             "includemargin": np.maximum(2 * distance, _ABOVE_ZERO),
             "friction": each.friction[kind],
             "solref": each.solref[kind],
-            "solreffriction": np.zeros((rows, 2)),
             "solimp": each.solimp[kind],
-            "adhesion": np.zeros(rows),
-            "surfacevel": np.zeros((rows, 3)),
         }
         integers: dict[str, Any] = {
             "dim": each.condim[kind],
             "geom": geoms,
-            "flex": none,
-            "elem": none,
-            "vert": none,
             "worldid": world,
-            "type": np.full(rows, _FOR_SOLVER),
             "geomcollisionid": np.arange(rows),
         }
         return {
@@ -260,6 +357,26 @@ class Contacts:
         steps = _array(m.opt.timestep)
         combined = combine(Properties(**same, **each), first, second)
         return stiffness(self._solref, steps[kinds[:, 0] % len(steps)], combined), kind
+
+
+class _OnDevice:
+    """What the coupling keeps on the device of MJWarp."""
+
+    def __init__(self, device: Any, of: Contacts) -> None:
+        geoms, count = of._geoms, of._worlds * len(of._ids)
+        self.device: Any = device
+        self.geoms: Any = wp.array(of._ids, dtype=wp.int32, device=device)
+        self.bodies: Any = wp.array(of._bodies, dtype=wp.int32, device=device)
+        self.roots: Any = wp.array(of._roots, dtype=wp.int32, device=device)
+        self.falls: Any = wp.array(geoms.moves.astype(np.int32), device=device)
+        self.none: Any = wp.zeros_like(self.falls)
+        quaternions = np.zeros((len(of._ids), 4))
+        for quaternion, shape in zip(quaternions, geoms.shapes):
+            mj.mju_mat2Quat(quaternion, shape.rotation.ravel())
+        self.rotations: Any = wp.array(quaternions[:, [1, 2, 3, 0]], dtype=wp.quat, device=device)
+        self.translations: Any = wp.array([shape.translation for shape in geoms.shapes], dtype=wp.vec3, device=device)
+        self.poses: Any = wp.zeros((count, 7), dtype=float, device=device)
+        self.velocities: Any = wp.zeros((count, 6), dtype=float, device=device)
 
 
 def _array(given: Any) -> Float:

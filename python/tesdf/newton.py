@@ -5,7 +5,8 @@
     contacts = pipeline.contacts()
     pipeline.collide(state, contacts, dt=h)         # as without tesdf
 
-It needs the package `newton`, 1.8 or newer. Contacts are found on the processor.
+It needs the package `newton`, 1.8 or newer. Contacts are found on the processor, or with device="cuda:0" on a GPU:
+where Newton runs on the same one, poses and contacts stay there.
 """
 
 from __future__ import annotations
@@ -22,8 +23,10 @@ try:
 except ImportError:
     raise ImportError("tesdf.newton needs the package newton: pip install 'newton[sim]>=1.8'") from None
 
-from . import Asset, Contacts as Found, Scene
+from . import Asset, Contacts as Found, DeviceContacts, Scene
 from ._coupling import RIGID_SOLIMP, Detector, Float, Placed, check_bounds, rigid_solref
+from ._newton_kernels import meet, place, write
+from ._warp import Memory, cuda_number, in_place
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -95,10 +98,11 @@ class NarrowPhase(nt.geometry.NarrowPhase):  # type: ignore[misc, unused-ignore]
         )
 
     @property
-    def last(self) -> Found | None:
-        """The contacts of the last detection, None before the first. `shapes` has the shape of each
-        instance."""
-        return self._tesdf_detector.last
+    def last(self) -> Found | DeviceContacts | None:
+        """The contacts of the last detection, None before the first; `DeviceContacts` where they stay on a GPU.
+        `shapes` has the shape of each instance."""
+        there = self._tesdf_detector.last_on_device
+        return self._tesdf_detector.last if there is None else there
 
     @property
     def shapes(self) -> npt.NDArray[np.int64]:
@@ -108,7 +112,7 @@ class NarrowPhase(nt.geometry.NarrowPhase):  # type: ignore[misc, unused-ignore]
     @property
     def scene(self) -> Scene:
         """A copy of the scene, at the poses of the last detection."""
-        return self._tesdf_detector.scene.__copy__()
+        return self._tesdf_detector.scene_now()
 
     def launch_custom_write(self, **arguments: Any) -> None:
         """Called by the pipeline. Finds the contacts of the candidate pairs."""
@@ -125,7 +129,11 @@ class NarrowPhase(nt.geometry.NarrowPhase):  # type: ignore[misc, unused-ignore]
             arguments["candidate_pair_count"] = wp.array([int((~ours).sum())], dtype=wp.int32, device=device)
             super().launch_custom_write(**arguments)
         if ours.any():
-            self._tesdf_write(self._tesdf_detect(arguments), pairs[ours], arguments["writer_data"])
+            out = arguments["writer_data"]
+            if self._tesdf_detector.leaves_on(cuda_number(device)):
+                self._tesdf_write_there(self._tesdf_detect_there(arguments), pairs[ours], out)
+            else:
+                self._tesdf_write(self._tesdf_detect(arguments), pairs[ours], out)
 
     def _tesdf_detect(self, arguments: dict[str, Any]) -> Found:
         transforms = arguments["shape_transform"].numpy()[self._tesdf_instances].astype(np.float64)
@@ -144,12 +152,8 @@ class NarrowPhase(nt.geometry.NarrowPhase):  # type: ignore[misc, unused-ignore]
         meets = np.isin(keys, np.sort(pairs, axis=1) @ [len(self._tesdf_has_asset), 1])
         shapes, normal = shapes[meets], found.normal[meets]
         points = found.point_b[meets], found.point_a[meets]
-        first, rows = int(out.contact_count.numpy()[0]), len(shapes)
-        if first + rows > out.contact_max:
-            raise ValueError(
-                f"{first + rows} contacts, but the pipeline has room for {out.contact_max}; give CollisionPipeline "
-                f"rigid_contact_max={int(1.3 * (first + rows))}, or reduce the contacts, as reduce=64"
-            )
+        rows = len(shapes)
+        first = _room(out, rows)
         body_q, bodies = out.body_q.numpy().astype(np.float64).reshape(-1, 7), out.shape_body.numpy()
         margins = self._tesdf_margins[shapes]
         for side, sign in ((0, 1.0), (1, -1.0)):
@@ -163,10 +167,67 @@ class NarrowPhase(nt.geometry.NarrowPhase):  # type: ignore[misc, unused-ignore]
             _put(getattr(out, f"out_offset{side}"), first, offset)
             _put(getattr(out, f"out_margin{side}"), first, margin)
         _put(out.out_normal, first, normal)
-        _put(out.out_tids, first, np.zeros(rows))
-        for name in ("out_stiffness", "out_damping", "out_friction"):
-            _put(getattr(out, name), first, np.zeros(rows))
-        out.contact_count.fill_(first + rows)
+        _finish(out, first, rows)
+
+    def _tesdf_detect_there(self, arguments: dict[str, Any]) -> DeviceContacts:
+        """As `_tesdf_detect`, where Newton has its arrays."""
+        transforms = arguments["shape_transform"]
+        here, count = transforms.device, len(self._tesdf_instances)
+        velocities = [arguments.get(name) for name in ("shape_linear_velocity", "shape_angular_velocity")]
+        of_poses, of_velocities = (wp.zeros((count, columns), dtype=float, device=here) for columns in (7, 6))
+        self._tesdf_there: Any = wp.array(self._tesdf_instances, dtype=wp.int32, device=here)
+        inputs = [self._tesdf_there, transforms, *velocities]
+        wp.launch(place, dim=count, inputs=inputs, outputs=[of_poses, of_velocities], device=here)
+        # tesdf works in a stream of its own, which does not wait for Warp's.
+        wp.synchronize_device(here)
+        step = arguments.get("collision_update_dt", 0.0)
+        return self._tesdf_detector.detect_on_device(Memory(of_poses), Memory(of_velocities), step)
+
+    def _tesdf_write_there(self, found: DeviceContacts, pairs: npt.NDArray[Any], out: Any) -> None:
+        here, count, shapes = out.contact_count.device, len(found), len(self._tesdf_has_asset)
+        if count == 0:
+            return
+        keys = np.unique(np.sort(pairs, axis=1).astype(np.int64) @ np.array([shapes, 1]))
+        instances = in_place(found.instances, wp.vec2i, here)
+        meets, places = (wp.zeros(count, dtype=wp.int32, device=here) for _ in range(2))
+        inputs = [self._tesdf_there, shapes, wp.array(keys, dtype=wp.int64, device=here), instances]
+        wp.launch(meet, dim=count, inputs=inputs, outputs=[meets], device=here)
+        wp.utils.array_scan(meets, places, inclusive=True)
+        rows = int(places[count - 1 :].numpy()[0])
+        first = _room(out, rows)
+        margins: Any = wp.array(self._tesdf_margins, dtype=float, device=here)
+        points = [in_place(array, wp.vec3, here) for array in (found.point_a, found.point_b, found.normal)]
+        wp.launch(
+            write,
+            dim=count,
+            inputs=[first, self._tesdf_there, margins, out.body_q, out.shape_body, meets, places, *points, instances],
+            outputs=[
+                *(getattr(out, f"out_{name}{side}") for name in ("shape", "point", "offset", "margin") for side in (0, 1)),
+                out.out_normal,
+            ],
+            device=here,
+        )
+        _finish(out, first, rows)
+
+
+def _room(out: Any, rows: int) -> int:
+    """The number of contacts that are there, after which there is room for some rows."""
+    first = int(out.contact_count.numpy()[0])
+    if first + rows > out.contact_max:
+        raise ValueError(
+            f"{first + rows} contacts, but the pipeline has room for {out.contact_max}; give CollisionPipeline "
+            f"rigid_contact_max={int(1.3 * (first + rows))}, or reduce the contacts, as reduce=64"
+        )
+    return first
+
+
+def _finish(out: Any, first: int, rows: int) -> None:
+    """Fills what is zero for all of our contacts, where the pipeline uses it, and counts them."""
+    for name in ("out_tids", "out_stiffness", "out_damping", "out_friction"):
+        target = getattr(out, name)
+        if rows and target is not None and target.size:
+            target[first : first + rows].fill_(0)
+    out.contact_count.fill_(first + rows)
 
 
 def rigid(time_step: float) -> dict[str, Any]:

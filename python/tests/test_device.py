@@ -259,6 +259,120 @@ def test_cuda_memory_that_is_refused(asset, points):
         asset.query(ByDlpack(array))
 
 
+def rows_of(found):
+    arrays = [found.instances.numpy(), found.distance.numpy()[:, None], found.point_a.numpy()]
+    rows = np.hstack([array.astype(np.float64) for array in arrays])
+    return rows[np.lexsort(rows.T[::-1])]
+
+
+def test_contacts_stay_on_the_device(linked, device):
+    reach = 0.03
+    for options in ({"mode": "node"}, {"mode": "exact", "reduce": 8, "contacts_per": "face"}):
+        expected = linked.detect(contact_distance=reach, device=device, **options)
+        found = linked.detect_on_device(contact_distance=reach, device=device, **options)
+        assert type(found) is tesdf.DeviceContacts and len(found) == len(expected) > 0
+        arrays = found.point_a, found.point_b, found.normal, found.distance, found.instances
+        assert [a.shape[1:] for a in arrays] == [(3,), (3,), (3,), (), (2,)] and {len(a) for a in arrays} == {len(found)}
+        assert [a.dtype for a in arrays] == [np.float32] * 4 + [np.uint32] and len(found.hidden) == 0
+        # Those of `detect`, rounded.
+        rows = np.column_stack([expected.instance_a, expected.instance_b, expected.distance, expected.point_a])
+        there = rows_of(found)
+        nearest = np.abs(there[:, None] - rows[None]).max(axis=2)
+        assert (nearest.min(axis=0) < 1e-6).all() and (nearest.min(axis=1) < 1e-6).all()
+        back = found.point_b.numpy() + found.distance.numpy()[:, None] * found.normal.numpy()
+        assert np.abs(back - found.point_a.numpy()).max() < 8 * DISTANCE * DIAGONAL
+
+
+def test_poses_come_from_arrays(linked, asset, device):
+    options = {"mode": "node", "contact_distance": 0.03}
+    apart = tesdf.Scene()
+    apart.add_many(apart.add_shape(asset), [[0, 0, 0, 0, 0, 0, 1], [90, 0, 0, 0, 0, 0, 1]])
+    expected = rows_of(linked.detect_on_device(device=device, **options))
+    poses = linked.instances.poses.astype(np.float32)
+    for given in (poses, poses.astype(np.float64), tesdf.DeviceArray(poses, device)):
+        found = apart.detect_on_device(poses=given, device=device, **options)
+        assert len(found) == len(expected) > 0 and np.abs(rows_of(found) - expected).max() < 2e-6
+    assert len(apart.detect_on_device(poses=tesdf.DeviceArray(poses, device), **options)) == len(expected)
+    assert len(apart.detect_on_device(device=device, **options)) == 0
+    # The bodies come nearer by 0.1 in a second.
+    velocities = np.array([[0, 0, 0, 0, 0, 0], [0, 0, 0.1, 0, 0, 0]])
+    ahead = apart.detect_on_device(poses=poses, velocities=velocities, speculative_time=1.0, device=device, **options)
+    assert len(ahead) > len(expected)
+    assert np.array_equal(apart.instances.poses[1, :3], [90, 0, 0])
+
+
+def test_arrays_of_poses_that_are_refused(linked, device):
+    poses = linked.instances.poses
+    detect = lambda **given: linked.detect_on_device(mode="node", device=device, **given)  # noqa: E731
+    with pytest.raises(ValueError, match=r"poses: an array of shape \[2, 6\]; expected float32 of shape \(N, 7\)"):
+        detect(poses=poses[:, :6])
+    with pytest.raises(ValueError, match="velocities: an array without poses; expected both, or poses alone"):
+        detect(velocities=np.zeros((2, 6)))
+    with pytest.raises(tesdf.DeviceError, match='"poses" has 7 elements; expected 14: 7 for each of 2 instances'):
+        detect(poses=poses[:1])
+    with pytest.raises(tesdf.DeviceError, match="instance 1: the arrays place it at .*NaN.*; expected finite numbers"):
+        detect(poses=np.where(np.arange(14).reshape(2, 7) == 8, np.nan, poses))
+    with pytest.raises(tesdf.DeviceError, match="leaving one contact of all faces at a vertex there is not available"):
+        linked.detect_on_device(mode="exact", contacts_per="face", device=device)
+    with pytest.raises(ValueError, match='device: "cpu"; expected a device other than the processor'):
+        linked.detect_on_device(device="cpu")
+
+
+def test_contacts_for_mjwarp_stay_on_cuda(tmp_path, monkeypatch):
+    """Warp's arrays are on the processor here, whose memory is that of the stand-in for CUDA."""
+    import mujoco
+    import mujoco_warp as mjw
+    import tesdf.mujoco_warp
+    import warp as wp
+    from unoptimised_kernels import unoptimised
+
+    if not any("CUDA on the CPU" in device.name for device in tesdf.devices()):
+        pytest.fail("this test needs the stand-in for CUDA")
+    unoptimised()
+    tetrahedron = ([0, 0, 0], [1, 0.1, 0], [0, 0.8, 0], [0.2, 0.2, 0.7])
+    (tmp_path / "part.obj").write_text("".join("v {} {} {}\n".format(*v) for v in tetrahedron)
+                                       + "".join("f {} {} {}\n".format(*f) for f in ([1, 3, 2], [1, 2, 4], [2, 3, 4], [1, 4, 3])))
+    model = mujoco.MjModel.from_xml_string(f"""<mujoco>
+      <option timestep="0.01"/>
+      <asset><mesh name="part" file="{tmp_path}/part.obj" scale="2 2 2"/></asset>
+      <worldbody>
+        <geom name="floor" type="plane" size="9 9 0.1" friction="0.3" priority="1" condim="4"/>
+        <body name="low" pos="0 0 0.02" euler="5 3 40"><freejoint/><geom name="low" type="mesh" mesh="part" solmix="2"/></body>
+        <body name="high" pos="0.2 0.1 0.5" euler="70 9 0"><freejoint/><geom name="high" type="mesh" mesh="part" friction="0.7"/></body>
+      </worldbody></mujoco>""")
+    part = tesdf.encode(tmp_path / "part.obj", "fast")
+    found, poses = [], []
+    for options in ({}, {"device": "cuda:0"}):
+        contacts = tesdf.mujoco_warp.Contacts(model, {"low": part, "floor": None, "high": part}, nworld=2, contact_distance=0.3, **options)
+        m = mjw.put_model(model)
+        d = mjw.make_data(model, nworld=2, nconmax=64, njmax=256)
+        friction = np.tile(model.geom_friction, (2, 1, 1))
+        friction[1, model.geom("floor").id, 0] = 0.9
+        m.geom_friction = wp.array(friction, dtype=wp.vec3)
+        velocities = np.random.default_rng(3).uniform(-1, 1, (2, model.nv))
+        d.qvel.assign(velocities)
+        mjw.fwd_kinematics(m, d)
+        mjw.com_vel(m, d)
+        if options:
+            monkeypatch.setattr(tesdf.mujoco_warp, "cuda_number", lambda device: 0)
+        d.nacon.fill_(1)
+        count = contacts.add(m, d)
+        assert count == len(contacts.last) > 6 and d.nacon.numpy()[0] == count + 1
+        names = ("dist", "pos", "frame", "includemargin", "friction", "solref", "solreffriction", "solimp",
+                 "dim", "geom", "flex", "worldid", "type")
+        rows = np.hstack([getattr(d.contact, name).numpy()[1 : count + 1].reshape(count, -1).astype(float) for name in names])
+        found.append(rows[np.lexsort((rows[:, 3].round(4), rows[:, 2].round(4), rows[:, 1].round(4), rows[:, -2]))])
+        assert d.contact.geomcollisionid.numpy()[1 : count + 1].tolist() == list(range(count))
+        poses.append(contacts.scene.instances.poses)
+    assert type(contacts.last) is tesdf.DeviceContacts
+    assert found[0].shape == found[1].shape and set(found[0][:, -2]) == {0, 1}
+    assert np.abs(found[0] - found[1]).max() < 2e-5
+    # A quaternion and its negative are the same rotation.
+    signs = np.sign((poses[0] * poses[1])[:, 3:].sum(axis=1))
+    assert np.abs(poses[0][:, 3:] - signs[:, None] * poses[1][:, 3:]).max() < 1e-6
+    assert np.abs(poses[0][:, :3] - poses[1][:, :3]).max() < 1e-6
+
+
 def test_a_simulation_on_a_device_agrees_with_the_processor():
     box = {"box": {"half_extents": [0.02, 0.02, 0.02]}}
     scene = {

@@ -32,8 +32,8 @@ mod testing;
 pub use collide::queries::{DeviceAnswers, WorldAnswer};
 pub use collide::scene::{GpuShapeId, GpuShapes, ShapeBytes};
 pub use collide::{
-    Capacities, Counting, Counts, Detector, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes,
-    Memory, Pruning, SharedDetector,
+    Capacities, Counting, Counts, Detector, DetectorOptions, DeviceBytes, DeviceContacts, DeviceReport,
+    Exchange, GivenPoses, Lanes, Memory, Pruning, SharedDetector,
 };
 pub use device::{Device, DeviceArray, DeviceInfo, DeviceKind, Word, devices};
 pub use encode::{DeviceSampler, ROUNDING, SampleCounter, SampleCounts, SamplerLimits};

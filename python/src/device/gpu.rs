@@ -140,7 +140,8 @@ impl HeldDetector {
         detector.detect(scene, options).map_err(Error::Device)
     }
 
-    fn detector(&self, device: &Device) -> Arc<SharedDetector> {
+    /// The detector of this device.
+    pub fn detector(&self, device: &Device) -> Arc<SharedDetector> {
         let mut held = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         match &*held {
             Some((of, detector)) if of.is(device) => Arc::clone(detector),

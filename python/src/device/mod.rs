@@ -10,6 +10,8 @@ use crate::errors::{argument, kind_of};
 #[cfg(feature = "gpu")]
 mod array;
 #[cfg(feature = "gpu")]
+mod contacts;
+#[cfg(feature = "gpu")]
 mod foreign;
 #[cfg(feature = "gpu")]
 mod gpu;
@@ -21,9 +23,13 @@ mod queries;
 #[cfg(feature = "gpu")]
 pub use array::DeviceArray;
 #[cfg(feature = "gpu")]
+pub use contacts::{GivenArrays, detect_on_device};
+#[cfg(feature = "gpu")]
 pub use gpu::{Device, HeldDetector, devices, open};
 #[cfg(not(feature = "gpu"))]
-pub use no_gpu::{Device, DeviceArray, HeldDetector, HeldShapes, devices, of_array, open, query};
+pub use no_gpu::{
+    Device, DeviceArray, GivenArrays, HeldDetector, HeldShapes, detect_on_device, devices, of_array, open, query,
+};
 #[cfg(feature = "gpu")]
 pub use queries::{HeldShapes, of_array, query};
 

@@ -9,7 +9,7 @@ use tesdf::glam::DVec3;
 use tesdf_gpu::{DeviceAnswers, GpuError, GpuShapes, WorldAnswer};
 
 use super::array::{DeviceArray, Words};
-use super::foreign::{PointsThere, points_there};
+use super::foreign::{Named, RowsThere, rows_there};
 use super::gpu::Device;
 use crate::arrays::{self, Rows};
 use crate::errors::Error;
@@ -37,12 +37,15 @@ impl HeldShapes {
 /// The frame of the mesh.
 const IN_PLACE: Placement = Placement { pose: Pose::IDENTITY, scale: 1.0 };
 
+/// The points of a query.
+const POINTS: Named = Named { name: "points", columns: 3 };
+
 /// Number of points between two checks for Python's signals.
 const CHUNK: usize = 1 << 19;
 
 /// The device on which an object is that this package has made.
-pub fn of_array(points: &Bound<'_, PyAny>) -> Option<Device> {
-    points.cast::<DeviceArray>().ok().map(|array| array.get().device.clone())
+pub fn of_array(array: &Bound<'_, PyAny>) -> Option<Device> {
+    array.cast::<DeviceArray>().ok().map(|array| array.get().device.clone())
 }
 
 /// The answers at points: `Answers`, or `DeviceAnswers` for points that are on the device.
@@ -54,7 +57,7 @@ pub fn query<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = points.py();
     let failed = |e| Error::Device(e).raise(py);
-    let there = points_there(points, device)?;
+    let there = rows_there(POINTS, points, device)?;
     let shapes = py.detach(|| held.shapes(asset, device)).map_err(failed)?;
     match there {
         Some(there) => stay(py, &shapes, device, &there),
@@ -67,7 +70,7 @@ fn stay<'py>(
     py: Python<'py>,
     shapes: &GpuShapes,
     device: &Device,
-    points: &PointsThere,
+    points: &RowsThere,
 ) -> PyResult<Bound<'py, PyAny>> {
     let rows = points.rows;
     let array = &points.array;

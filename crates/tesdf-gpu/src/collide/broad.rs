@@ -20,11 +20,11 @@ impl Pass<'_> {
     fn instance_pairs(&mut self) -> Result<(), GpuError> {
         let (device, shapes) = (&self.detector.device, &self.detector.shapes);
         let all = self.instances;
-        let rows = device.upload("instances", &all.rows)?;
+        let rows = self.placed.clone();
         let words = device.upload("words of instances", &all.words)?;
         let excluded = device.upload("excluded pairs", &all.excluded)?;
         let bounds = device.empty("bounds of instances", all.ids.len() * BOUNDS_ROWS as usize * ROW)?;
-        self.sent += rows.bytes() + words.bytes() + excluded.bytes();
+        self.sent += words.bytes() + excluded.bytes();
         let count = all.ids.len() as u32;
         let distance = self.options.contact_distance as f32;
         let instances = || InstancesLaunch::new(rows.rows(), words.words(), count, distance);

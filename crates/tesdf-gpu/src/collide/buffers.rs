@@ -1,5 +1,8 @@
 //! Pipeline buffers: the memory between the stages of a pass.
+use tesdf::collide::Reduction;
+
 use super::Capacities;
+use super::counts::Counts;
 use crate::GpuError;
 use crate::device::{Buffer, Device};
 use crate::kernels::broad::meshlets::{BlocksLaunch, WORDS as BLOCK_WORDS};
@@ -119,6 +122,20 @@ impl PipelineBuffers {
         ContactsLaunch::new(self.contact_words.words(), self.contact_rows.rows(), self.room.contacts)
     }
 
+    /// The contacts of a pass with these counts, or those that its reduction kept.
+    pub fn kept(&self, reduction: Reduction, counts: &Counts) -> ContactBuffers<'_> {
+        match (reduction, &self.members) {
+            (Reduction::PerPair(_), Some(own)) => {
+                ContactBuffers { words: &own.kept_words, rows: &own.kept_rows, count: counts.kept }
+            }
+            _ => ContactBuffers {
+                words: &self.contact_words,
+                rows: &self.contact_rows,
+                count: counts.contacts,
+            },
+        }
+    }
+
     /// Name and size in bytes of each buffer.
     pub fn account(&self) -> Vec<(&'static str, usize)> {
         let Self {
@@ -129,6 +146,19 @@ impl PipelineBuffers {
         let members = self.members.as_ref().map(MemberBuffers::buffers);
         let all = own.chain(&self.weights).chain(members.into_iter().flatten());
         all.map(|buffer| (buffer.name(), buffer.bytes())).collect()
+    }
+}
+
+/// The buffers of some contacts, and the number of these.
+pub struct ContactBuffers<'a> {
+    pub words: &'a Buffer,
+    pub rows: &'a Buffer,
+    pub count: u32,
+}
+
+impl ContactBuffers<'_> {
+    pub fn argument(&self) -> ContactsLaunch {
+        ContactsLaunch::new(self.words.words(), self.rows.rows(), self.count)
     }
 }
 

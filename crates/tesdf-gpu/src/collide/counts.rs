@@ -44,6 +44,8 @@ pub struct Counts {
     /// Instances of shapes with a vertex that was moved to an invalid position. More than 0 is an
     /// error.
     pub(super) badly_moved: u32,
+    /// Instances whose pose or velocity in an array on the device is none. More than 0 is an error.
+    pub(super) badly_placed: u32,
     /// Threads whose loops the driver stopped early. More than 0 is an error.
     pub(super) broken_off: u32,
 }
@@ -69,6 +71,7 @@ impl Counts {
             kept: at(counters::KEPT),
             hidden: at(counters::HIDDEN),
             badly_moved: at(counters::BADLY_MOVED),
+            badly_placed: at(counters::BADLY_PLACED),
             broken_off: at(counters::BROKEN_OFF),
         })
     }

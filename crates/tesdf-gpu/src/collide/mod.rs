@@ -6,6 +6,7 @@ mod contacts;
 mod counts;
 mod middle;
 mod narrow;
+mod on_device;
 mod options;
 mod pass;
 pub mod queries;
@@ -22,9 +23,10 @@ use tesdf::collide::{
     ShapeId, Statistics, reduce_pairs,
 };
 
-use buffers::{PipelineBuffers, ROW, WORD};
-use contacts::{contacts, keep_minima, one_per_vertex};
+use buffers::{ContactBuffers, PipelineBuffers, ROW, WORD};
+use contacts::{Row, Words, contacts, keep_minima, one_per_vertex};
 pub use counts::Counts;
+pub use on_device::{DeviceContacts, GivenPoses};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
@@ -36,7 +38,7 @@ pub use shared::SharedDetector;
 use stages::Timing;
 
 use crate::GpuError;
-use crate::device::{Device, DeviceArray};
+use crate::device::{Buffer, Device, DeviceArray};
 use crate::kernels::broad::ordered_pair::WORDS as PAIR_WORDS;
 use crate::kernels::broad::pairs::{BOUNDS_ROWS, INSTANCE_ROWS, INSTANCE_WORDS};
 
@@ -162,18 +164,8 @@ impl Detector {
     }
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
-        options.validate()?;
-        if options.mode == Mode::Edge {
-            return Err(GpuError::Unavailable {
-                what: "the mode `edge`".into(),
-                instead: "use the mode `exact`, or detect on the processor",
-            });
-        }
-        let reduction = match options.reduction {
-            Reduction::Spread(n) => Reduction::PerPair(n),
-            reduction => reduction,
-        };
-        let options = &CollideOptions { reduction, ..*options };
+        let options = &possible(options)?;
+        let reduction = options.reduction;
         if wants_minima(options) && self.shapes.have_moved() {
             return Err(GpuError::Unavailable {
                 what: "contacts per minimum of shapes whose vertices have moved on the device".into(),
@@ -200,6 +192,19 @@ impl Detector {
         options: &CollideOptions,
         timing: Timing,
     ) -> Result<Contacts, GpuError> {
+        let (instances, _) = self.passes(scene, None, options, timing)?;
+        self.contacts(scene, &instances, options)
+    }
+
+    /// Makes passes until all buffers are large enough. Returns the instances, and their poses on
+    /// the device.
+    fn passes(
+        &mut self,
+        scene: &Scene,
+        given: Option<&GivenPoses<'_>>,
+        options: &CollideOptions,
+        timing: Timing,
+    ) -> Result<(Instances, Buffer), GpuError> {
         if shape_ids(scene) != self.shape_ids {
             if self.shapes.have_moved() {
                 return Err(GpuError::Unavailable {
@@ -209,19 +214,23 @@ impl Detector {
             }
             self.upload(scene)?;
         }
-        // The processor's tree does not know vertices that have moved on the device.
-        let max_tests = if self.shapes.have_moved() { u64::MAX } else { self.options.max_pair_tests };
-        let instances = Instances::new(scene, options, &self.shape_ids, &self.frames, max_tests)?;
+        // The processor's tree knows neither vertices nor instances that have moved on the device.
+        let on_processor = !self.shapes.have_moved() && given.is_none();
+        let max_tests = if on_processor { self.options.max_pair_tests } else { u64::MAX };
+        let mut instances = Instances::new(scene, options, &self.shape_ids, &self.frames, max_tests)?;
+        if given.is_some() {
+            instances.fixed = on_device::fixed_rows(scene, &instances)?;
+        }
         self.report = DeviceReport::default();
         loop {
             self.report.passes += 1;
             if matches!(options.reduction, Reduction::PerPair(_)) {
                 self.buffers.add_members(&self.device)?;
             }
-            let counts = self.pass(&instances, options, timing)?;
+            let (counts, placed) = self.pass(&instances, given, options, timing)?;
             if !self.grow(&counts)? {
                 self.report.counts = counts;
-                return self.contacts(scene, &instances, options);
+                return Ok((instances, placed));
             }
         }
     }
@@ -273,14 +282,7 @@ impl Detector {
         let counts = self.report.counts;
         let shapes: Vec<&Shape> =
             self.shape_ids.iter().map(|&id| scene.shape(id)).collect::<Result<_, _>>()?;
-        let buffers = &self.buffers;
-        let (words, rows, count) = match (options.reduction, &buffers.members) {
-            (Reduction::PerPair(_), Some(own)) => (&own.kept_words, &own.kept_rows, counts.kept),
-            _ => (&buffers.contact_words, &buffers.contact_rows, counts.contacts),
-        };
-        let mut words = self.device.read(words, count as usize)?;
-        let mut rows = self.device.read(rows, count as usize)?;
-        self.report.read += size_of_val(words.as_slice()) + size_of_val(rows.as_slice());
+        let (mut words, mut rows) = self.read_contacts(options)?;
         let mut filtered = counts.filtered as usize;
         if parts(options) == Parts::Faces && !matches!(options.reduction, Reduction::PerPair(_)) {
             if wants_minima(options) {
@@ -311,6 +313,20 @@ impl Detector {
         Ok(Contacts::new(contacts, statistics, reductions, hidden))
     }
 
+    /// The buffers with the contacts of the last pass, or with those that a reduction kept.
+    fn kept(&self, options: &CollideOptions) -> ContactBuffers<'_> {
+        self.buffers.kept(options.reduction, &self.report.counts)
+    }
+
+    /// Reads the contacts of the last pass, or those that a reduction kept.
+    fn read_contacts(&mut self, options: &CollideOptions) -> Result<(Vec<Words>, Vec<Row>), GpuError> {
+        let kept = self.kept(options);
+        let words: Vec<Words> = self.device.read(kept.words, kept.count as usize)?;
+        let rows: Vec<Row> = self.device.read(kept.rows, kept.count as usize)?;
+        self.report.read += size_of_val(words.as_slice()) + size_of_val(rows.as_slice());
+        Ok((words, rows))
+    }
+
     /// The pairs of instances with an overlap that contacts need not show.
     fn overlaps(&mut self, instances: &Instances) -> Result<Vec<HiddenOverlap>, GpuError> {
         if self.report.counts.hidden == 0 {
@@ -333,6 +349,22 @@ impl Detector {
         };
         Ok(deepest.into_iter().map(overlap).collect())
     }
+}
+
+/// Validates options. On a device, spread contacts are those of a reduction.
+fn possible(options: &CollideOptions) -> Result<CollideOptions, GpuError> {
+    options.validate()?;
+    if options.mode == Mode::Edge {
+        return Err(GpuError::Unavailable {
+            what: "the mode `edge`".into(),
+            instead: "use the mode `exact`, or detect on the processor",
+        });
+    }
+    let reduction = match options.reduction {
+        Reduction::Spread(n) => Reduction::PerPair(n),
+        reduction => reduction,
+    };
+    Ok(CollideOptions { reduction, ..*options })
 }
 
 /// Whether contacts that are no local minima are dropped, which the processor does.

@@ -2,13 +2,15 @@
 use cubecl::prelude::*;
 use tesdf::collide::{CollideOptions, ContactsPer, Mode};
 
-use super::buffers::WORD;
+use super::buffers::{ROW, WORD};
 use super::counts::Counts;
+use super::on_device::GivenPoses;
 use super::scene::instances::Instances;
 use super::stages::{Stages, Timing, launch};
 use super::{Detector, Pruning};
 use crate::GpuError;
 use crate::device::Buffer;
+use crate::kernels::broad::pairs::INSTANCE_ROWS;
 use crate::kernels::counters::{self, COUNTERS, CountersLaunch};
 
 pub use crate::kernels::GROUP;
@@ -41,31 +43,43 @@ pub struct Pass<'a> {
     pub instances: &'a Instances,
     counters: Buffer,
     pub stages: Stages<'a>,
+    /// Poses and motions of the instances.
+    pub placed: Buffer,
     /// Bytes that were sent to the device.
     pub sent: usize,
 }
 
 impl Detector {
-    /// Launches all stages, and reads the counters.
+    /// Launches all stages, and reads the counters. Returns them with the poses of the instances on
+    /// the device.
     pub(super) fn pass(
         &mut self,
         instances: &Instances,
+        given: Option<&GivenPoses<'_>>,
         options: &CollideOptions,
         timing: Timing,
-    ) -> Result<Counts, GpuError> {
+    ) -> Result<(Counts, Buffer), GpuError> {
         let device = self.device.clone();
         if parts(options) == Parts::Polygons {
             self.buffers.add_weights(&device)?;
         }
         let counters = device.upload("counters", &[0u32; COUNTERS])?;
+        let placed = match given {
+            None => device.upload("instances", &instances.rows)?,
+            Some(_) => device.empty("instances", instances.ids.len() * INSTANCE_ROWS as usize * ROW)?,
+        };
         let mut pass = Pass {
             detector: self,
             options,
             instances,
-            sent: counters.bytes(),
+            sent: counters.bytes() + if given.is_some() { 0 } else { placed.bytes() },
             counters: counters.clone(),
+            placed: placed.clone(),
             stages: Stages::new(&device, timing),
         };
+        if let Some(given) = given {
+            pass.place(given)?;
+        }
         pass.broad()?;
         let per_meshlet = pass.groups_for(pass.detector.buffers.room.meshlets, 1, counters::MESHLETS)?;
         pass.middle(&per_meshlet)?;
@@ -78,7 +92,10 @@ impl Detector {
         let counts = Counts::read(&device, &counters)?;
         self.report.read += COUNTERS * WORD;
         self.check(&counts)?;
-        Ok(counts)
+        if let Some(given) = given.filter(|_| counts.badly_placed > 0) {
+            return Err(given.first_bad(&device, instances)?);
+        }
+        Ok((counts, placed))
     }
 
     /// Returns errors that only threads of the device detect.

@@ -3,7 +3,7 @@ use std::sync::{Mutex, PoisonError};
 
 use tesdf::collide::{CollideOptions, Contacts, Scene};
 
-use super::{Detector, DetectorOptions};
+use super::{Detector, DetectorOptions, DeviceContacts, GivenPoses};
 use crate::GpuError;
 use crate::device::Device;
 
@@ -25,11 +25,32 @@ impl SharedDetector {
     /// # Errors
     /// The errors of [`Detector::new`] and [`Detector::detect`].
     pub fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
+        self.with(scene, |detector| detector.detect(scene, options))
+    }
+
+    /// As [`Detector::detect_on_device`].
+    ///
+    /// # Errors
+    /// The errors of [`Detector::new`] and [`Detector::detect_on_device`].
+    pub fn detect_on_device(
+        &self,
+        scene: &Scene,
+        given: Option<&GivenPoses<'_>>,
+        options: &CollideOptions,
+    ) -> Result<DeviceContacts, GpuError> {
+        self.with(scene, |detector| detector.detect_on_device(scene, given, options))
+    }
+
+    fn with<T>(
+        &self,
+        scene: &Scene,
+        detect: impl FnOnce(&mut Detector) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
         let mut held = self.detector.lock().unwrap_or_else(PoisonError::into_inner);
         let detector = match held.take() {
             Some(detector) => detector,
             None => Detector::new(&self.device, scene, DetectorOptions::default())?,
         };
-        held.insert(detector).detect(scene, options)
+        detect(held.insert(detector))
     }
 }

@@ -13,6 +13,7 @@ use cubecl_environment::stream::StreamId;
 use super::broad::meshlets::BlocksLaunch;
 use super::broad::ordered_pair::OrderedPairsLaunch;
 use super::broad::pairs::{FoundLaunch, InstancesLaunch, PairsLaunch};
+use super::broad::place::GivenLaunch;
 use super::counters::{self, CountersLaunch};
 use super::deform::bounds::MovingLaunch;
 use super::encode::sample::SamplesLaunch;
@@ -23,6 +24,7 @@ use super::narrow::contacts::ContactsLaunch;
 use super::narrow::exact::AskedExactLaunch;
 use super::narrow::exchange::{LANES, Variant};
 use super::narrow::faces::AskedLaunch;
+use super::narrow::world::WorldContactsLaunch;
 use super::reduce::members::{MembersLaunch, TouchingLaunch};
 use super::{GROUP, broad, deform, encode, field, middle, narrow, reduce};
 use crate::cuda::Count;
@@ -92,7 +94,9 @@ fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let instances = || InstancesLaunch::new(rows(), words(), 1, 0.0);
     let some = || PairsLaunch::new(words(), 0);
     let found = || FoundLaunch::new(pairs(), blocks());
+    let given = || GivenLaunch::new(words(), words(), rows(), words(), 1, 1, 1.0);
     kernels!(all, device, target;
+        Direct broad::place::place, GROUP, (given(), counters(), rows());;
         Direct broad::pairs::instance_bounds, GROUP, (shapes(), instances(), counters(), rows());;
         Direct broad::pairs::instance_pairs, GROUP, (shapes(), instances(), rows(), some(), counters(), found());;
         Direct broad::pairs::given_pairs, GROUP, (shapes(), instances(), some(), counters(), found());;
@@ -124,7 +128,11 @@ fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
 fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
     let exact = || AskedExactLaunch::new(words(), 0.0);
     let asked = || AskedLaunch::new(words(), 1, 0.0);
+    let in_world = || WorldContactsLaunch::new(words(), words(), words(), words(), words());
     kernels!(all, device, target;
+        Direct narrow::sorted::begin, GROUP, (words(), 1);;
+        Direct narrow::sorted::merge, GROUP, (contacts(), words(), words(), 1, 1);;
+        Direct narrow::world::to_world, GROUP, (contacts(), words(), rows(), words(), in_world(), 1);;
         Indirect narrow::nodes::narrow_nodes, GROUP, (shapes(), pairs(), items(), counters(), contacts());;
         Indirect narrow::exact::narrow_exact, LANES,
             (shapes(), pairs(), polygons(), counters(), contacts(), exact(), false);;

@@ -39,8 +39,10 @@ pub const KEPT: u32 = 14;
 /// Threads that found an overlap that contacts need not show: see
 /// [`hidden`](super::middle::hidden).
 pub const HIDDEN: u32 = 15;
+/// Instances that an array on the device places at what is no pose.
+pub const BADLY_PLACED: u32 = 16;
 /// Number of counters.
-pub const COUNTERS: usize = 16;
+pub const COUNTERS: usize = 17;
 
 /// The counters, one atomic word each.
 #[derive(CubeType, CubeLaunch)]

@@ -17,6 +17,9 @@ pub struct Instances {
     pub shapes: Vec<usize>,
     /// [`INSTANCE_ROWS`] rows for each instance: all poses, then all motions.
     pub rows: Vec<[f32; 4]>,
+    /// [`FIXED_ROWS`](crate::kernels::broad::place::FIXED_ROWS) rows for each instance, where an
+    /// array on the device has the poses; otherwise empty.
+    pub fixed: Vec<[f32; 4]>,
     /// [`INSTANCE_WORDS`] words for each instance.
     pub words: Vec<u32>,
     /// Excluded pairs, by index, sorted.
@@ -43,6 +46,7 @@ impl Instances {
             placed: Vec::with_capacity(order.len()),
             shapes: Vec::with_capacity(order.len()),
             rows: Vec::with_capacity(INSTANCE_ROWS as usize * order.len()),
+            fixed: Vec::new(),
             words: Vec::with_capacity(INSTANCE_WORDS as usize * order.len()),
             excluded: Vec::new(),
             pairs: None,
@@ -86,5 +90,14 @@ impl Instances {
             all.pairs = Some(pairs.iter().flat_map(places).collect());
         }
         Ok(all)
+    }
+
+    /// For each instance, its place in the order of ids.
+    pub fn ranks(&self) -> Vec<u32> {
+        let mut by_id: Vec<usize> = (0..self.ids.len()).collect();
+        by_id.sort_unstable_by_key(|&k| self.ids[k]);
+        let mut ranks = vec![0; by_id.len()];
+        by_id.into_iter().zip(0..).for_each(|(k, rank)| ranks[k] = rank);
+        ranks
     }
 }

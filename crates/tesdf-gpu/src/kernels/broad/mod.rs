@@ -3,3 +3,4 @@ pub mod ahead;
 pub mod meshlets;
 pub mod ordered_pair;
 pub mod pairs;
+pub mod place;

@@ -109,7 +109,7 @@ const NAN: u32 = 0x7FC0_0000;
 
 /// Tests the bits, because a shader may assume that all numbers are finite.
 #[cube]
-fn is_finite(x: f32) -> bool {
+pub fn is_finite(x: f32) -> bool {
     to_bits(x) & EXPONENT != EXPONENT
 }
 

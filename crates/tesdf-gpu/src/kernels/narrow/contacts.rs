@@ -4,7 +4,7 @@ use cubecl::prelude::*;
 use super::super::broad::ordered_pair::OrderedPair;
 use super::super::counters::{CONTACTS, Counters};
 use super::super::field::value::Value;
-use super::super::math::vector::{Row, V3, row_of, xyz};
+use super::super::math::vector::{Row, V3, row_of, to_bits, xyz};
 
 /// Contacts, or the contacts that a reduction keeps.
 #[derive(CubeType, CubeLaunch)]
@@ -55,6 +55,20 @@ pub struct Name {
     pub corner: u32,
 }
 
+/// Result of a comparison: 0 undecided, 1 the first comes before, 2 it comes after.
+#[cube]
+pub fn compare(order: u32, a: u32, b: u32) -> u32 {
+    select(order == 0u32, select(a < b, 1u32, select(a > b, 2u32, 0u32)), order)
+}
+
+/// Two instances.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Both {
+    pub a: u32,
+    pub b: u32,
+}
+
 #[cube]
 impl Contacts {
     /// Appends a contact.
@@ -97,6 +111,26 @@ impl Contacts {
         }
     }
 
+    /// Compares two contacts of one pair of instances by their names, and then by the bits of their
+    /// points. `order` is the result of comparisons before.
+    pub fn compare_names(&self, order: u32, x: u32, y: u32) -> u32 {
+        let (a, b) = (self.name(x), self.name(y));
+        let (p, q) = (self.point(x), self.point(y));
+        let mut order = compare(order, a.order, b.order);
+        order = compare(order, a.face, b.face);
+        order = compare(order, a.cell, b.cell);
+        order = compare(order, a.corner, b.corner);
+        order = compare(order, to_bits(p.x), to_bits(q.x));
+        order = compare(order, to_bits(p.y), to_bits(q.y));
+        compare(order, to_bits(p.z), to_bits(q.z))
+    }
+
+    /// The instances of a contact: that of the surface, and that of the field.
+    pub fn instances(&self, contact: u32) -> Both {
+        let at = (contact * WORDS) as usize;
+        Both { a: self.words[at], b: self.words[at + 1] }
+    }
+
     /// The point of a and the distance of a contact.
     pub fn point_and_distance(&self, contact: u32) -> Row {
         self.rows[(contact * ROWS) as usize]
@@ -108,6 +142,11 @@ impl Contacts {
 
     pub fn gradient(&self, contact: u32) -> V3 {
         xyz(self.rows[(contact * ROWS + 1u32) as usize])
+    }
+
+    /// The point of b.
+    pub fn closest(&self, contact: u32) -> V3 {
+        xyz(self.rows[(contact * ROWS + 2u32) as usize])
     }
 
     /// Copies a contact of `other` to index `at`.
@@ -122,5 +161,19 @@ impl Contacts {
             self.rows[(at * ROWS + k) as usize] = other.rows[(contact * ROWS + k) as usize];
             k += 1u32;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_difference_decides() {
+        let of = |a: &[u32], b: &[u32]| a.iter().zip(b).fold(0, |order, (&a, &b)| compare(order, a, b));
+        assert_eq!(
+            [of(&[1, 2, 3], &[1, 2, 3]), of(&[1, 2, 9], &[1, 3, 0]), of(&[1, 4, 0], &[1, 3, 9])],
+            [0, 1, 2]
+        );
     }
 }

@@ -9,6 +9,8 @@ pub mod near;
 pub mod nodes;
 pub mod piece;
 pub mod polygon_distance;
+pub mod sorted;
 pub mod taken;
 pub mod whole_faces;
 pub mod work;
+pub mod world;

@@ -4,7 +4,6 @@ use cubecl::prelude::*;
 
 use super::super::field::nearest::FAR;
 use super::super::field::shapes::NONE;
-use super::super::math::vector::to_bits;
 use super::super::narrow::contacts::Contacts;
 use super::members::{Members, MembersExpand};
 
@@ -40,28 +39,12 @@ pub fn nothing_chosen() -> Chosen {
     Chosen { key: -FAR.runtime(), member: NONE.runtime() }
 }
 
-/// Result of a comparison: 0 undecided, 1 the first comes before, 2 it comes after.
-#[cube]
-fn compare(order: u32, a: u32, b: u32) -> u32 {
-    select(order == 0u32, select(a < b, 1u32, select(a > b, 2u32, 0u32)), order)
-}
-
 #[cube]
 impl Members {
-    /// Whether the name of a contact comes before the name of another contact of its pair. A name
-    /// has the ordered pair, face, cell, corner, and the bits of the point.
+    /// Whether the contact of a member comes before that of another member of its pair.
     fn is_before(&self, contacts: &Contacts, member: u32, other: u32) -> bool {
         let (x, y) = (self.contacts[member as usize], self.contacts[other as usize]);
-        let (a, b) = (contacts.name(x), contacts.name(y));
-        let (p, q) = (contacts.point(x), contacts.point(y));
-        let mut order = compare(0u32, a.order, b.order);
-        order = compare(order, a.face, b.face);
-        order = compare(order, a.cell, b.cell);
-        order = compare(order, a.corner, b.corner);
-        order = compare(order, to_bits(p.x), to_bits(q.x));
-        order = compare(order, to_bits(p.y), to_bits(q.y));
-        order = compare(order, to_bits(p.z), to_bits(q.z));
-        order == 1u32
+        contacts.compare_names(0u32, x, y) == 1u32
     }
 
     /// Whether `a` has the greater key, or an equal key and the lower name.
@@ -97,19 +80,5 @@ impl Members {
             sync_cube();
         }
         Chosen { key: chooser.keys[0], member: chooser.members[0] }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_first_difference_decides() {
-        let of = |a: &[u32], b: &[u32]| a.iter().zip(b).fold(0, |order, (&a, &b)| compare(order, a, b));
-        assert_eq!(
-            [of(&[1, 2, 3], &[1, 2, 3]), of(&[1, 2, 9], &[1, 3, 0]), of(&[1, 4, 0], &[1, 3, 9])],
-            [0, 1, 2]
-        );
     }
 }
