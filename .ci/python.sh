@@ -53,6 +53,9 @@ wheel as-in-tests default
 wait $environments_job || { cat "$folder/environments.txt"; exit 1; }
 step "$env/bin/python" "${pip[@]}" --no-deps "$wheels"/gpu/*.whl
 step "$newton/bin/python" "${pip[@]}" --no-deps "$wheels"/default/*.whl
+# For the test of Newton beside a GPU.
+rm -rf "$folder/with_gpu"
+step "$newton/bin/python" "${pip[@]}" --no-deps --target "$folder/with_gpu" "$wheels"/gpu/*.whl
 
 export TESDF_CLI=${CARGO_TARGET_DIR:-$PWD/target}/debug/tesdf
 # Warp compiles each kernel once, which takes minutes.
@@ -68,12 +71,13 @@ in_newton() {
         step "$newton/bin/python" python/tests/unoptimised_kernels.py examples/python/newton_nut_on_bolt.py &&
         # CUDA's replacement is for these tests only: Warp would take it, too.
         LD_LIBRARY_PATH=$cuda_on_cpu tests "$env" python/tests/test_device.py &&
+        PYTHONPATH=$PWD/$folder/with_gpu LD_LIBRARY_PATH=$cuda_on_cpu tests "$newton" python/tests/test_newton_device.py &&
         # Compares the stubs with the module. The tests use the module as the stubs describe it.
         step "$env/bin/python" -m mypy.stubtest tesdf --allowlist python/tests/stubtest-allowlist.txt
 }
 in_mujoco() {
     tests "$env" python/tests --ignore python/tests/test_newton.py --ignore python/tests/test_no_device.py \
-        --ignore python/tests/test_device.py || return
+        --ignore python/tests/test_device.py --ignore python/tests/test_newton_device.py || return
     # Each example checks what it shows.
     for example in examples/python/*.py; do
         case $example in

@@ -85,10 +85,12 @@ def write(
         to_one = wp.transform_inverse(body_q[shape_body[one]])
     if shape_body[two] >= 0:
         to_two = wp.transform_inverse(body_q[shape_body[two]])
-    shape0[at], shape1[at] = one, two
+    shape0[at] = one
+    shape1[at] = two
     point0[at] = wp.transform_point(to_one, point_b[found])
     point1[at] = wp.transform_point(to_two, point_a[found])
     offset0[at] = wp.transform_vector(to_one, margins[one] * normal[found])
     offset1[at] = wp.transform_vector(to_two, -margins[two] * normal[found])
-    margin0[at], margin1[at] = margins[one], margins[two]
+    margin0[at] = margins[one]
+    margin1[at] = margins[two]
     normals[at] = normal[found]
