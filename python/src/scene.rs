@@ -6,8 +6,8 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use tesdf::collide::{
-    self, ClearanceOptions, CollideError, ContactsPer, Instance, InstanceId, Pose, ShapeId, TimeOfImpactOptions,
-    clearance, coarse_contacts, detect_until, time_of_impact, why,
+    self, ClearanceOptions, CollideError, ContactsPer, Instance, InstanceId, Pose, ShapeId,
+    TimeOfImpactOptions, clearance, coarse_contacts, detect_until, time_of_impact, why,
 };
 
 use crate::arrays;

@@ -16,6 +16,7 @@ def test_a_device_is_an_error_that_says_how_to_build(asset, points):
         lambda: tesdf.collide(ball, ball, device="gpu"),
         lambda: asset.query(points, device="cuda:0"),
         lambda: tesdf.Simulation(scene, device=1),
+        lambda: tesdf.Scene().detect_on_device(),
     ):
         with pytest.raises(tesdf.DeviceError) as refused:
             call()

@@ -4,6 +4,7 @@
 //! Shape ──GpuShapes::upload──▶ buffers ──signed_distances──▶ answers of many points
 //! SolidMesh ──tesdf::Encoder, DeviceSampler──▶ TeSdf
 //! Scene ──Detector──▶ contacts, in the form and order of `tesdf::collide::detect`
+//! Scene, arrays of poses ──Detector──▶ arrays of contacts on the device
 //! ```
 //!
 //! Each kernel is written once, in Rust with [CubeCL](https://github.com/tracel-ai/cubecl). It runs

@@ -21,13 +21,14 @@ fn detector(scene: &Scene) -> Detector {
 /// A bracket, a cube and a box in each world. The box meets the cube.
 fn worlds(count: u32, random: &mut Random) -> Scene {
     let mut scene = Scene::new();
-    let meshes =
-        ["l_bracket", "cube"].map(|name| scene.add_shape(Shape::Mesh(body(name).asset.clone())).expect("a shape"));
+    let meshes = ["l_bracket", "cube"]
+        .map(|name| scene.add_shape(Shape::Mesh(body(name).asset.clone())).expect("a shape"));
     let slab = scene.add_shape(Shape::Box { half_extents: DVec3::new(0.5, 0.5, 0.1) }).expect("a shape");
     for world in 0..count {
         let [a, b] = Relation::Deep.place(["l_bracket", "cube"], random);
         let slab_at = Pose { translation: b.at.pose.translation, rotation: rotation(random) };
-        let placed = [(meshes[0], a.at.pose, a.at.scale), (meshes[1], b.at.pose, b.at.scale), (slab, slab_at, 0.5)];
+        let placed =
+            [(meshes[0], a.at.pose, a.at.scale), (meshes[1], b.at.pose, b.at.scale), (slab, slab_at, 0.5)];
         for (shape, pose, scale) in placed {
             let velocity = Velocity { linear: 0.01 * random.in_cube(), angular: 0.01 * random.in_cube() };
             let instance = Instance { world, scale, velocity, ..Instance::new(shape, pose) };
@@ -123,13 +124,15 @@ fn contacts_have_the_order_of_a_detection() {
         for k in 0..2 {
             let half_extents = 0.3 * DVec3::ONE + 0.2 * random.in_cube();
             let shape = scene.add_shape(Shape::Box { half_extents }).expect("a shape");
-            let pose = Pose { translation: f64::from(k) * 0.2 * random.in_cube(), rotation: rotation(&mut random) };
+            let pose =
+                Pose { translation: f64::from(k) * 0.2 * random.in_cube(), rotation: rotation(&mut random) };
             // Ids do not have the order of worlds.
             scene.add(Instance { world: 40 - world, ..Instance::new(shape, pose) }).expect("an instance");
         }
     }
     let mut detector = detector(&scene);
-    let options = CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(Mode::Exact) };
+    let options =
+        CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(Mode::Exact) };
     let expected = detector.detect(&scene, &options).expect("detects");
     let found = detector.detect_on_device(&scene, None, &options).expect("detects");
     let rows = read(detector.device(), &found);
@@ -280,25 +283,37 @@ fn what_is_no_pose_is_an_error() {
     let error = detect(&[0.0; 7], None).expect_err("one row");
     assert_eq!(error.to_string(), "array \"poses\" has 7 elements; expected 14: 7 for each of 2 instances");
     let error = detect(&both(at(1.5, 1.0)), Some(&[0.0; 6])).expect_err("one row");
-    assert_eq!(error.to_string(), "array \"velocities\" has 6 elements; expected 12: 6 for each of 2 instances");
+    assert_eq!(
+        error.to_string(),
+        "array \"velocities\" has 6 elements; expected 12: 6 for each of 2 instances"
+    );
 }
 
 #[test]
 fn what_only_the_processor_does_is_an_error() {
     let scene = worlds(1, &mut Random(8));
     let mut detector = detector(&scene);
-    let of = |mode, contacts_per, reduction| CollideOptions { contacts_per, reduction, ..CollideOptions::with_mode(mode) };
+    let of = |mode, contacts_per, reduction| CollideOptions {
+        contacts_per,
+        reduction,
+        ..CollideOptions::with_mode(mode)
+    };
     for (options, text) in [
-        (of(Mode::Exact, ContactsPer::Face, Reduction::None), "leaving one contact of all faces at a vertex there"),
+        (
+            of(Mode::Exact, ContactsPer::Face, Reduction::None),
+            "leaving one contact of all faces at a vertex there",
+        ),
         (of(Mode::Exact, ContactsPer::Minimum, Reduction::None), "leaving contacts per minimum there"),
         (of(Mode::Node, ContactsPer::Face, Reduction::Deepest(4)), "leaving the deepest contacts there"),
         (of(Mode::Edge, ContactsPer::Face, Reduction::None), "the mode `edge` is not available"),
     ] {
-        let error = detector.detect_on_device(&scene, None, &options).map(|found| found.count).expect_err("refused");
+        let error =
+            detector.detect_on_device(&scene, None, &options).map(|found| found.count).expect_err("refused");
         assert!(error.to_string().contains(text), "{error}");
     }
     let empty = Scene::new();
-    let found = detector.detect_on_device(&empty, None, &CollideOptions::with_mode(Mode::Node)).expect("detects");
+    let found =
+        detector.detect_on_device(&empty, None, &CollideOptions::with_mode(Mode::Node)).expect("detects");
     assert_eq!(found.count, 0);
     assert!(read(detector.device(), &found).is_empty());
 }

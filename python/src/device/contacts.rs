@@ -27,9 +27,12 @@ fn rows(named: Named, any: &Bound<'_, PyAny>, device: &Device) -> PyResult<RowsT
         return Ok(there);
     }
     let py = any.py();
-    let given = py.import("numpy")?.call_method1("asarray", (arrays::on_host(any)?, numpy::dtype::<f32>(py), "C"))?;
+    let given =
+        py.import("numpy")?.call_method1("asarray", (arrays::on_host(any)?, numpy::dtype::<f32>(py), "C"))?;
     let numbers = given.cast_into::<PyArrayDyn<f32>>()?.try_readonly()?;
-    let &[count, columns] = numbers.shape() else { return Err(named.wrong(format!("an array of shape {:?}", numbers.shape()))) };
+    let &[count, columns] = numbers.shape() else {
+        return Err(named.wrong(format!("an array of shape {:?}", numbers.shape())));
+    };
     if columns != named.columns {
         return Err(named.wrong(format!("an array of shape {:?}", numbers.shape())));
     }
@@ -52,14 +55,18 @@ pub fn detect_on_device<'py>(
             let velocities = velocities.as_ref().map(|rows| &rows.array);
             Some(GivenPoses { poses: &poses.array, velocities })
         }
-        (None, Some(_)) => return Err(argument("velocities", "an array without poses", "both, or poses alone")),
+        (None, Some(_)) => {
+            return Err(argument("velocities", "an array without poses", "both, or poses alone"));
+        }
         (None, None) => None,
     };
     let detector = held.detector(device);
     let found = py.detach(|| detector.detect_on_device(scene, given.as_ref(), options));
     let found = found.map_err(|e| Error::Device(e).raise(py))?;
     let count = found.count;
-    let of = |words, shape| Ok::<_, PyErr>(Bound::new(py, DeviceArray { device: device.clone(), words, shape })?.into_any());
+    let of = |words, shape| {
+        Ok::<_, PyErr>(Bound::new(py, DeviceArray { device: device.clone(), words, shape })?.into_any())
+    };
     Columns::new(py)
         .with("point_a", of(Words::F32(found.points_a), vec![count, 3])?)?
         .with("point_b", of(Words::F32(found.points_b), vec![count, 3])?)?

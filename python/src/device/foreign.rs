@@ -63,11 +63,7 @@ unsafe impl DlpackStream for LegacyDefaultStream {
 /// # Errors
 /// `ValueError` for memory on another device, numbers other than float32, another shape, and rows
 /// that are not one after the other.
-pub fn rows_there(
-    named: Named,
-    any: &Bound<'_, PyAny>,
-    device: &Device,
-) -> PyResult<Option<RowsThere>> {
+pub fn rows_there(named: Named, any: &Bound<'_, PyAny>, device: &Device) -> PyResult<Option<RowsThere>> {
     if let Ok(array) = any.cast::<DeviceArray>() {
         return of_array(named, array.get(), device).map(Some);
     }
@@ -105,17 +101,11 @@ fn elsewhere(named: Named, found: String, device: &Device) -> PyErr {
     )
 }
 
-fn by_dlpack(
-    named: Named,
-    any: &Bound<'_, PyAny>,
-    on: DLDevice,
-    device: &Device,
-) -> PyResult<RowsThere> {
+fn by_dlpack(named: Named, any: &Bound<'_, PyAny>, on: DLDevice, device: &Device) -> PyResult<RowsThere> {
     if device.inner().cuda_number() != usize::try_from(on.device_id).ok() {
         return Err(elsewhere(named, format!("cuda:{}", on.device_id), device));
     }
-    let imported =
-        ImportRequest::new(any.as_borrowed())?.import(Some(&LegacyDefaultStream), Some(false))?;
+    let imported = ImportRequest::new(any.as_borrowed())?.import(Some(&LegacyDefaultStream), Some(false))?;
     let (rows, pointer) = {
         let refused = |e: dlpark::tensor::Error| PyValueError::new_err(format!("{}: {e}", named.name));
         let tensor = imported.validate().map_err(refused)?;

@@ -189,7 +189,10 @@ impl Detector {
         } else if wants_minima(options) {
             Some(("contacts per minimum", "ask for contacts per cell, or reduced contacts per face"))
         } else if parts(options) == Parts::Faces && !reduces {
-            Some(("one contact of all faces at a vertex", "reduce the contacts, or ask for contacts per cell"))
+            Some((
+                "one contact of all faces at a vertex",
+                "reduce the contacts, or ask for contacts per cell",
+            ))
         } else {
             None
         };
