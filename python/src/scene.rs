@@ -13,7 +13,7 @@ use tesdf::collide::{
 use crate::arrays;
 use crate::contacts::{self, Columns};
 use crate::detection::{self, Keywords};
-use crate::device::{self, GivenArrays, HeldDetector};
+use crate::device::{self, HeldDetector};
 use crate::errors::{Error, argument};
 use crate::given::{Given, PerInstance};
 use crate::interrupt::cancellable;
@@ -338,7 +338,7 @@ impl Scene {
                 None => device::open(py, None)?,
             },
         };
-        let given = GivenArrays { poses, velocities };
+        let given = [poses, velocities];
         device::detect_on_device(py, &self.on_device, &device, &self.now(), given, &options)
     }
 

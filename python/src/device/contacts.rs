@@ -14,13 +14,6 @@ use crate::errors::{Error, argument};
 const POSES: Named = Named { name: "poses", columns: 7 };
 const VELOCITIES: Named = Named { name: "velocities", columns: 6 };
 
-/// Poses and velocities of all instances, in place where they are on the device.
-#[derive(Clone, Copy)]
-pub struct GivenArrays<'a, 'py> {
-    pub poses: Option<&'a Bound<'py, PyAny>>,
-    pub velocities: Option<&'a Bound<'py, PyAny>>,
-}
-
 /// The rows of an array, which is copied to the device unless it is there.
 fn rows(named: Named, any: &Bound<'_, PyAny>, device: &Device) -> PyResult<RowsThere> {
     if let Some(there) = rows_there(named, any, device)? {
@@ -39,17 +32,18 @@ fn rows(named: Named, any: &Bound<'_, PyAny>, device: &Device) -> PyResult<RowsT
     RowsThere::upload(device, count, numbers.as_slice()?).map_err(|e| Error::Device(e).raise(py))
 }
 
-/// `DeviceContacts`: the contacts of a scene with its instances at the given poses.
+/// `DeviceContacts`: the contacts of a scene with its instances at the given poses and velocities,
+/// which are used in place where they are on the device.
 pub fn detect_on_device<'py>(
     py: Python<'py>,
     held: &HeldDetector,
     device: &Device,
     scene: &Scene,
-    given: GivenArrays<'_, 'py>,
+    [poses, velocities]: [Option<&Bound<'py, PyAny>>; 2],
     options: &CollideOptions,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let poses = given.poses.map(|any| rows(POSES, any, device)).transpose()?;
-    let velocities = given.velocities.map(|any| rows(VELOCITIES, any, device)).transpose()?;
+    let poses = poses.map(|any| rows(POSES, any, device)).transpose()?;
+    let velocities = velocities.map(|any| rows(VELOCITIES, any, device)).transpose()?;
     let given = match (&poses, &velocities) {
         (Some(poses), velocities) => {
             let velocities = velocities.as_ref().map(|rows| &rows.array);

@@ -23,13 +23,12 @@ mod queries;
 #[cfg(feature = "gpu")]
 pub use array::DeviceArray;
 #[cfg(feature = "gpu")]
-pub use contacts::{GivenArrays, detect_on_device};
+pub use contacts::detect_on_device;
 #[cfg(feature = "gpu")]
 pub use gpu::{Device, HeldDetector, devices, open};
 #[cfg(not(feature = "gpu"))]
 pub use no_gpu::{
-    Device, DeviceArray, GivenArrays, HeldDetector, HeldShapes, detect_on_device, devices, of_array, open,
-    query,
+    Device, DeviceArray, HeldDetector, HeldShapes, detect_on_device, devices, of_array, open, query,
 };
 #[cfg(feature = "gpu")]
 pub use queries::{HeldShapes, of_array, query};

@@ -73,20 +73,13 @@ pub fn of_array(_: &Bound<'_, PyAny>) -> Option<Device> {
     None
 }
 
-/// Poses and velocities of all instances.
-#[derive(Clone, Copy)]
-pub struct GivenArrays<'a, 'py> {
-    pub poses: Option<&'a Bound<'py, PyAny>>,
-    pub velocities: Option<&'a Bound<'py, PyAny>>,
-}
-
 /// Never called.
 pub fn detect_on_device<'py>(
     _: Python<'py>,
     _: &HeldDetector,
     device: &Device,
     _: &Scene,
-    _: GivenArrays<'_, 'py>,
+    _: [Option<&Bound<'py, PyAny>>; 2],
     _: &CollideOptions,
 ) -> PyResult<Bound<'py, PyAny>> {
     match *device {}
