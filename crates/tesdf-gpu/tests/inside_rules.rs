@@ -1,20 +1,22 @@
-//! Assets whose inside needs more than the winding number of their faces: kernels refuse them, and
-//! detect the others as the processor does.
+//! Assets whose inside is not told by the winding number of their faces: kernels read sheets, and
+//! refuse rules that are evaluated at points.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
 mod compare;
 
-use compare::device;
-use support::parts::Parts;
+use compare::{Compared, device, each_mode, hold};
+use support::bodies::rotation;
 use support::parts::Turn::{Inward, Outward};
+use support::parts::{Parts, bowl};
+use support::random::Random;
 use tesdf::TeSdf;
 use tesdf::base::{Inside, InsideRule, SurfaceFaces};
-use tesdf::collide::{CollideOptions, Instance, Pose, Scene, detect};
+use tesdf::collide::{CollideOptions, Instance, Placement, Pose, Scene, Shape, detect};
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
-use tesdf_gpu::{Detector, DetectorOptions, GpuError};
+use tesdf_gpu::{Detector, DetectorOptions, GpuError, GpuShapes};
 
 fn encode(mesh: TriangleMesh, inside: Inside) -> TeSdf {
     let solid = SolidMesh::with_inside(mesh, inside).expect("a solid");
@@ -36,11 +38,89 @@ fn kernels_refuse_rules_that_they_do_not_evaluate() {
     let overlap =
         Parts::default().cube(DVec3::ZERO, 1.0, Outward).cube(DVec3::splat(0.4), 1.0, Outward).mesh();
     let boundary = Inside { rule: InsideRule::Winding, surface: SurfaceFaces::Boundary };
-    for asset in [encode(open, InsideRule::Sheet { thickness: 0.1 }.into()), encode(overlap, boundary)] {
+    for asset in [encode(open, InsideRule::Generalized.into()), encode(overlap, boundary)] {
         let rule = asset.inside().rule.name();
         let refused = Detector::new(&device(), &scene(asset), DetectorOptions::default());
         let error = refused.err().expect("refused");
         assert!(matches!(&error, GpuError::Shape { .. }) && error.to_string().contains(rule), "{error}");
+    }
+}
+
+/// A bowl and an open cube as sheets, of some 2 in size.
+fn sheets() -> [TeSdf; 2] {
+    let cube = Parts::default().open_cube(DVec3::splat(-0.6), 1.2, Inward).turned();
+    [(bowl(6, 3), 0.1), (cube, 0.04)]
+        .map(|(parts, thickness)| encode(parts.mesh(), InsideRule::Sheet { thickness }.into()))
+}
+
+/// Sheets on each other, in each other and through each other, and on solids, round shapes and a
+/// plane.
+#[test]
+fn sheets_touch_as_on_the_processor() {
+    let [bowl, cube] = sheets().map(Shape::from);
+    let solid = Shape::from(encode(
+        Parts::default().cube(DVec3::splat(-0.5), 1.0, Outward).turned().mesh(),
+        InsideRule::Winding.into(),
+    ));
+    let others = [
+        bowl.clone(),
+        cube.clone(),
+        solid,
+        Shape::Box { half_extents: DVec3::new(0.4, 0.5, 0.6) },
+        Shape::Sphere { radius: 0.3 },
+        Shape::Capsule { half_height: 0.4, radius: 0.2 },
+        Shape::Plane,
+    ];
+    let mut random = Random(31);
+    let (mut scene, mut world) = (Scene::new(), 0);
+    for other in others {
+        let ids = [&bowl, &cube, &other].map(|shape| scene.add_shape(shape.clone()).expect("a shape"));
+        for near in [0.0, 0.4, 1.0, 1.04] {
+            for sheet in &ids[..2] {
+                world += 1;
+                let turned = Pose { translation: DVec3::ZERO, rotation: rotation(&mut random) };
+                let first = Instance { scale: 1.3, ..Instance::new(*sheet, turned) };
+                let at = Pose { translation: near * random.direction(), rotation: rotation(&mut random) };
+                for instance in [first, Instance::new(ids[2], at)] {
+                    scene.add(Instance { world, ..instance }).expect("an instance");
+                }
+            }
+        }
+    }
+    let mut all = Compared::default();
+    for options in each_mode(2.0) {
+        all.add(hold(&scene, &options, 3.0));
+    }
+    all.is_good(1000);
+}
+
+#[test]
+fn distances_to_sheets_are_those_of_the_processor() {
+    let mut random = Random(32);
+    for asset in sheets() {
+        let uploaded = GpuShapes::upload(&device(), &[Shape::from(asset.clone())]).expect("fits");
+        let at = Placement { pose: Pose::at(DVec3::new(3.0, -1.0, 2.0)), scale: 1.7 };
+        let mut points: Vec<DVec3> = (0..400).map(|_| 1.5 * random.in_cube()).collect();
+        points.extend((0..asset.face_count()).flat_map(|k| {
+            let corners = asset.face_corners(k);
+            [corners[0], corners.iter().sum::<DVec3>() / 3.0]
+        }));
+        let world: Vec<DVec3> = points.iter().map(|p| at.to_world(*p)).collect();
+        let answers =
+            uploaded.signed_distances(&world, &[(uploaded.ids()[0], at)]).expect("answers").remove(0);
+        let mut inside = 0;
+        for (p, answer) in points.iter().zip(&answers) {
+            let expected = asset.query_by_tree(*p).signed_distance;
+            inside += usize::from(expected < 0.0);
+            assert!(
+                (answer.signed_distance - at.scale * expected).abs() < 2e-5,
+                "{p}: {answer:?}, {expected}"
+            );
+            // In the thickness, the point half of it off the nearest face may be in that of another face.
+            let on = asset.signed_distance(at.to_shape(answer.closest_point));
+            assert!(expected < 0.0 || on.abs() < 2e-5, "{p}: {answer:?} is {on} off the surface");
+        }
+        assert!(inside >= 2 * asset.face_count(), "{inside} points in the sheet");
     }
 }
 

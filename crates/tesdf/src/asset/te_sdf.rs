@@ -226,7 +226,7 @@ impl TeSdf {
     /// Why kernels on other devices cannot read the asset; `None` when they can.
     #[doc(hidden)]
     pub fn unsupported_on_devices(&self) -> Option<String> {
-        (self.about.signs != Signs::Cells).then(|| {
+        (!matches!(self.about.signs, Signs::Cells | Signs::Sheet)).then(|| {
             format!(
                 "its inside is by the rule `{}`, which kernels do not evaluate; detect on the processor",
                 self.inside().rule.name()

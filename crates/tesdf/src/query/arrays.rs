@@ -51,6 +51,8 @@ pub struct Arrays<'a> {
     pub inner_ball: Option<(DVec3, f64)>,
     /// Whether every list is proved exact for the current vertices.
     pub has_exact_lists: bool,
+    /// Half of the thickness of a sheet, whose faces' distances the field is; otherwise 0.
+    pub half_thickness: f64,
     /// Corner vertices of the tetrahedra of a conforming domain; each tetrahedron is a root of the
     /// forest. The mesh's vertices come first, then the domain's own. Empty for the bisection
     /// domain, whose roots are the six tetrahedra of the cube.
@@ -87,6 +89,7 @@ impl TeSdf {
             band: self.band(),
             inner_ball: (ball.radius > 0.0).then(|| (ball.center - self.cube.middle(), ball.radius)),
             has_exact_lists: self.has_exact_lists(),
+            half_thickness: self.half_thickness,
             tetrahedra: self.conforming.as_ref().map_or(&[], Conforming::tetrahedra),
             vertices: &self.vertices,
             domain_vertices: self.conforming.as_ref().map_or(&[], Conforming::vertices),

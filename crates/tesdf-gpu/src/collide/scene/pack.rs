@@ -121,6 +121,7 @@ impl Packed {
         set(shapes::INVERSE_SIDE, 1.0 / mesh.cube.side());
         set(shapes::BOUND_UNIT, mesh.cell_bound_unit);
         set(shapes::BAND, mesh.band);
+        set(shapes::HALF_THICKNESS, mesh.half_thickness);
         for axis in 0..3 {
             set(shapes::LOW + axis as u32, (mesh.bounds.min - mesh.cube.middle())[axis]);
             set(shapes::HIGH + axis as u32, (mesh.bounds.max - mesh.cube.middle())[axis]);

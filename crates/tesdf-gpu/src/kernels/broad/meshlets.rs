@@ -161,7 +161,7 @@ pub fn meshlets(
                 let ball = surface.meshlet_ball(meshlet);
                 let field = shapes.field(pair.shape_b);
                 let center = pair.to_field(ball.center);
-                kept = !field.is_beyond(center, pair.scale * ball.radius, pair.reach, prune);
+                kept = !field.is_beyond(center, pair.scale * ball.radius, pair.part_reach(), prune);
             }
             if kept {
                 let at = counters.append(counters::MESHLETS);

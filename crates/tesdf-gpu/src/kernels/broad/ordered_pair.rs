@@ -15,7 +15,7 @@ pub struct OrderedPairs {
     /// [`WORDS`] words for each: instances a and b, shapes of a and b.
     pub words: Box<[u32]>,
     /// [`ROWS`] rows for each: the three rows of the linear map, each with its coordinate of the
-    /// shift; then scale, reach and radius.
+    /// shift; then scale, reach and both distances of the surfaces.
     pub rows: Box<[Row]>,
     /// Capacity of the list.
     pub room: u32,
@@ -45,9 +45,12 @@ pub struct OrderedPair {
     pub scale: f32,
     /// Contact distance in the frame of the field: smaller signed distances are contacts.
     pub reach: f32,
-    /// Radius of a sphere or capsule: its surface is at most this far from its core (a point or a
-    /// segment). Otherwise 0.
-    pub radius: f32,
+    /// How far the surface of a lies from its parts, in the frame of the field: the radius of a
+    /// sphere or capsule, half of the thickness of a sheet. Otherwise 0.
+    pub own_radius: f32,
+    /// Half of the thickness of a sheet that has the field, whose field is the distance to its
+    /// faces. Otherwise 0.
+    pub half_thickness: f32,
 }
 
 #[cube]
@@ -69,7 +72,8 @@ impl OrderedPairs {
             shift: v3(last(p), last(q), last(r)),
             scale: s.extract(0usize),
             reach: s.extract(1usize),
-            radius: s.extract(2usize),
+            own_radius: s.extract(2usize),
+            half_thickness: last(s),
         }
     }
 
@@ -84,15 +88,26 @@ impl OrderedPairs {
         self.rows[row] = row_of(pair.x, pair.shift.x);
         self.rows[row + 1] = row_of(pair.y, pair.shift.y);
         self.rows[row + 2] = row_of(pair.z, pair.shift.z);
-        self.rows[row + 3] = row_of(v3(pair.scale, pair.reach, pair.radius), 0.0f32);
+        self.rows[row + 3] = row_of(v3(pair.scale, pair.reach, pair.own_radius), pair.half_thickness);
     }
 }
 
 #[cube]
 impl OrderedPair {
+    /// The surfaces touch where a part of a is this far from the points where the field is 0.
+    pub fn radius(self) -> f32 {
+        self.own_radius + self.half_thickness
+    }
+
     /// Contact distance for parts of the surface: the reach plus the radius.
     pub fn part_reach(self) -> f32 {
-        self.reach + self.radius
+        self.reach + self.radius()
+    }
+
+    /// Whether the cosine filter of Eq. (10) drops a contact. It does not apply to rounded shapes
+    /// and sheets, because they have normals in all directions.
+    pub fn is_filtered(self, cosine: f32, cos_theta: f32) -> bool {
+        self.own_radius == 0.0f32 && cosine > -cos_theta
     }
 
     fn linear(self, p: V3) -> V3 {
@@ -182,7 +197,8 @@ impl Field<'_> {
     fn body_radius(self) -> f32 {
         let kind = self.entry(KIND);
         let sizes = self.vector(SIZES);
-        let extent = self.vector(HIGH) - self.vector(LOW);
+        let around = 2.0f32 * self.half_thickness();
+        let extent = (self.vector(HIGH) - self.vector(LOW)) + v3(around, around, around);
         let round = select(kind == ROUND, sizes.x + sizes.y, sizes.length());
         select(kind == MESH, 0.5f32 * extent.length(), round)
     }

@@ -134,7 +134,8 @@ pub fn instance_bounds(shapes: &Shapes, instances: &Instances, counters: &Counte
     if i < instances.count {
         let field = shapes.field(instances.shape(i));
         let own = field.bounds();
-        let half = (own.high - own.low) * 0.5f32;
+        let around = field.half_thickness();
+        let half = (own.high - own.low) * 0.5f32 + v3(around, around, around);
         let at = instances.pose(i);
         let off = at.rotation.rotate(((own.low + own.high) * 0.5f32) * at.unit);
         let x = at.rotation.rotate(v3(at.unit * half.x, 0.0f32, 0.0f32));
@@ -287,6 +288,7 @@ fn ordered_pair(
     let z = column(from, to, scale, v3(0.0f32, 0.0f32, 1.0f32));
     let surface = shapes.field(instances.shape(a));
     let is_round = surface.entry(KIND) == ROUND;
+    let around = select(is_round, surface.number(comptime!(SIZES + 1)), surface.half_thickness());
     OrderedPair {
         number,
         a,
@@ -299,7 +301,8 @@ fn ordered_pair(
         shift: to.to_local(from.origin),
         scale,
         reach: distance / to.unit,
-        radius: select(is_round, scale * surface.number(comptime!(SIZES + 1)), 0.0f32),
+        own_radius: scale * around,
+        half_thickness: shapes.field(instances.shape(b)).half_thickness(),
     }
 }
 

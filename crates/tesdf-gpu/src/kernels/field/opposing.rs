@@ -92,7 +92,10 @@ impl Field<'_> {
         // On the surface, the gradients are the normals of the faces.
         let on_surface = best.distance.abs() <= TIE;
         let turned = !same(c.height < 0.0f32, is_inside);
-        let over_face = f.normal * select(turned && !on_surface, -1.0f32, 1.0f32);
+        // A sheet has both of its sides there.
+        let other_side = on_surface && self.half_thickness() > 0.0f32 && f.normal.dot(normal) > 0.0f32;
+        let turned = other_side || (turned && !on_surface);
+        let over_face = f.normal * select(turned, -1.0f32, 1.0f32);
         let away = c.outward * (select(is_inside, -1.0f32, 1.0f32) / distance.max(LEAST_DIVISOR));
         let gradient = pick(on_surface || c.feature == 0u32, over_face, away);
         let own = gradient.dot(normal);

@@ -52,7 +52,7 @@ pub fn signed_distances(
         let at = (2u32 * (pair % batch.points)) as usize;
         let p = FarPoint { high: xyz(points[at]), low: xyz(points[at + 1]) };
         let local = pose(&instances.poses, instance).to_local(p);
-        let v = shapes.field(instances.shapes[instance as usize]).value(local);
+        let v = shapes.field(instances.shapes[instance as usize]).answer(local);
         let out = (index * ANSWER_ROWS) as usize;
         answers.rows[out] = row_of(v.gradient, v.distance);
         answers.rows[out + 1] = row_of(v.point, 0.0f32);
@@ -88,7 +88,7 @@ pub fn world_distances(
         let finite = is_finite(x) && is_finite(y) && is_finite(z);
         let p = FarPoint { high: pick(finite, v3(x, y, z), zero()), low: zero() };
         let frame = pose(&instances.poses, instance);
-        let v = shapes.field(instances.shapes[instance as usize]).value(frame.to_local(p));
+        let v = shapes.field(instances.shapes[instance as usize]).answer(frame.to_local(p));
         answers.distances[index as usize] = or_nan(finite, v.distance * frame.unit);
         put(&mut answers.gradients, index, finite, frame.rotation.rotate(v.gradient));
         put(&mut answers.closest, index, finite, frame.to_world(v.point));

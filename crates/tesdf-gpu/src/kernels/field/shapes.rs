@@ -93,6 +93,8 @@ pub const BAD_VERTEX: u32 = 37;
 /// Row of a ball inside the shape: center and radius. The radius is 0 when there is no ball. It is
 /// negative after vertices have moved, because the center may then be outside.
 pub const INNER_BALL: u32 = 38;
+/// Half of the thickness of a sheet in the local frame; 0 for other meshes. Simple shapes have 0.
+pub const HALF_THICKNESS: u32 = 39;
 
 /// No such array, face, cell or vertex.
 pub const NONE: u32 = u32::MAX;
@@ -193,6 +195,11 @@ impl Field<'_> {
     /// roots of the cube.
     pub fn is_conforming(self) -> bool {
         self.entry(TREE_NODES) > 0u32
+    }
+
+    /// Half of the thickness of a sheet, whose field is the distance to its faces; otherwise 0.
+    pub fn half_thickness(self) -> f32 {
+        self.number(HALF_THICKNESS)
     }
 
     /// Whether distances to listed faces are distances to the surface.

@@ -93,6 +93,20 @@ impl Field<'_> {
         self.value_in_cell(cell, p)
     }
 
+    /// The signed distance to the surface at any point: for a sheet, half of its thickness less than
+    /// the value.
+    pub fn answer(self, p: V3) -> Value {
+        let v = self.value(p);
+        let half = self.half_thickness();
+        Value {
+            distance: v.distance - half,
+            gradient: v.gradient,
+            point: v.point + v.gradient * half,
+            face: v.face,
+            feature: v.feature,
+        }
+    }
+
     /// The value at a point and its cell, exact up to rounding even when lists are truncated. For
     /// any shape.
     pub fn exact_value_in(self, cell: Cell, p: V3) -> Value {

@@ -85,10 +85,10 @@ impl Contacts {
             self.words[word + 6] = touch.corner;
             self.words[word + 7] = pair.number;
             let row = (at * ROWS) as usize;
-            let on_surface = touch.point + v.gradient * -pair.radius;
-            self.rows[row] = row_of(on_surface, v.distance - pair.radius);
+            let on_surface = touch.point + v.gradient * -pair.own_radius;
+            self.rows[row] = row_of(on_surface, v.distance - pair.radius());
             self.rows[row + 1] = row_of(v.gradient, touch.cosine);
-            self.rows[row + 2] = row_of(v.point, 0.0f32);
+            self.rows[row + 2] = row_of(v.point + v.gradient * pair.half_thickness, 0.0f32);
         }
     }
 

@@ -275,7 +275,7 @@ pub fn narrow_exact(
             let v = field.value_in_cell(cell, point);
             if v.distance <= reach {
                 let cosine = v.gradient.dot(normal);
-                if part.count == 3u32 && cosine > -asked.cos_theta {
+                if pair.is_filtered(cosine, asked.cos_theta) {
                     counters.append(counters::FILTERED);
                 } else {
                     let corner = NO_CORNER + select(found.converged, CONVERGED, 0u32);

@@ -157,7 +157,9 @@ fn look(
         let found = memory.pool.lowest(Lowest { distance: here.distance, at });
         if is_first {
             known.best = found;
-            known.searches = found.distance < 0.0f32 || near.distance <= CLEAR;
+            // The field of a sheet is nowhere below 0.
+            let crosses = near.distance <= CLEAR && field.half_thickness() == 0.0f32;
+            known.searches = found.distance < 0.0f32 || crosses;
             let mine = here.distance == found.distance && at.s == found.at.s && at.t == found.at.t;
             outward.share(mine, here.gradient);
         } else {

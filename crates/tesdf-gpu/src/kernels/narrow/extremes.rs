@@ -351,7 +351,7 @@ impl Facing<'_> {
     /// Writes a contact, or counts it as filtered.
     fn write(self, taken: Taken, converged: bool, counters: &Counters, contacts: &mut Contacts) {
         let cosine = taken.value.gradient.dot(self.normal);
-        if self.part.count == 3u32 && cosine > -self.limits.cos_theta {
+        if self.pair.is_filtered(cosine, self.limits.cos_theta) {
             counters.append(counters::FILTERED);
         } else {
             let corner = taken.corner + select(converged, CONVERGED, 0u32);

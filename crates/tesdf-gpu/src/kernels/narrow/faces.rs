@@ -459,7 +459,7 @@ pub fn narrow_faces(
             let v = best.get(select(lanes == 1u32, UNIT_POS, 0u32), search.distance);
             let point = part.at(search.best.s, search.best.t);
             let cosine = v.gradient.dot(shapes.part_normal(pair, item.face));
-            if part.count == 3u32 && cosine > -asked.cos_theta {
+            if pair.is_filtered(cosine, asked.cos_theta) {
                 counters.append(counters::FILTERED);
             } else {
                 // Nothing proves that no point is lower.
