@@ -1,9 +1,11 @@
-//! Assets whose inside is not told by the winding number of their faces: kernels read sheets, and
-//! refuse rules that are evaluated at points.
+//! Assets whose inside is not told by the winding number of their faces: kernels answer queries by
+//! each rule, and detect contacts where no field jumps and no face looks inwards.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
 mod compare;
+
+use std::sync::Arc;
 
 use compare::{Compared, device, each_mode, hold};
 use support::bodies::rotation;
@@ -33,17 +35,41 @@ fn scene(asset: TeSdf) -> Scene {
 }
 
 #[test]
-fn kernels_refuse_rules_that_they_do_not_evaluate() {
+fn detection_refuses_fields_that_jump_and_faces_that_look_inwards() {
     let open = Parts::default().open_cube(DVec3::ZERO, 1.0, Outward).mesh();
-    let overlap =
-        Parts::default().cube(DVec3::ZERO, 1.0, Outward).cube(DVec3::splat(0.4), 1.0, Outward).mesh();
-    let boundary = Inside { rule: InsideRule::Winding, surface: SurfaceFaces::Boundary };
-    for asset in [encode(open, InsideRule::Generalized.into()), encode(overlap, boundary)] {
+    for asset in [encode(open, InsideRule::Generalized.into()), encode(overlap(), InsideRule::Odd.into())] {
         let rule = asset.inside().rule.name();
         let refused = Detector::new(&device(), &scene(asset), DetectorOptions::default());
         let error = refused.err().expect("refused");
         assert!(matches!(&error, GpuError::Shape { .. }) && error.to_string().contains(rule), "{error}");
     }
+}
+
+/// Two cubes that overlap.
+fn overlap() -> TriangleMesh {
+    Parts::default().cube(DVec3::ZERO, 1.0, Outward).cube(DVec3::splat(0.4), 1.0, Outward).turned().mesh()
+}
+
+/// Two solids that overlap, with the boundary of their union as the surface, on others.
+#[test]
+fn the_boundary_of_overlaps_touches_as_on_the_processor() {
+    let boundary = Inside { rule: InsideRule::Winding, surface: SurfaceFaces::Boundary };
+    let solid =
+        encode(Parts::default().cube(DVec3::splat(-0.5), 1.0, Outward).turned().mesh(), Inside::default());
+    let mut scene = Scene::new();
+    let ids = [encode(overlap(), boundary), solid].map(|asset| scene.add_shape(asset).expect("a shape"));
+    let mut random = Random(33);
+    for (world, shape) in ids.into_iter().cycle().take(4).enumerate() {
+        let at = Pose { translation: 0.9 * random.direction(), rotation: rotation(&mut random) };
+        for instance in [Instance::new(ids[0], Pose::IDENTITY), Instance::new(shape, at)] {
+            scene.add(Instance { world: world as u32, ..instance }).expect("an instance");
+        }
+    }
+    let mut all = Compared::default();
+    for options in each_mode(2.0) {
+        all.add(hold(&scene, &options, 2.0));
+    }
+    all.is_good(100);
 }
 
 /// A bowl and an open cube as sheets, of some 2 in size.
@@ -75,7 +101,7 @@ fn sheets_touch_as_on_the_processor() {
     let (mut scene, mut world) = (Scene::new(), 0);
     for other in others {
         let ids = [&bowl, &cube, &other].map(|shape| scene.add_shape(shape.clone()).expect("a shape"));
-        for near in [0.0, 0.4, 1.0, 1.04] {
+        for near in [0.4, 1.03] {
             for sheet in &ids[..2] {
                 world += 1;
                 let turned = Pose { translation: DVec3::ZERO, rotation: rotation(&mut random) };
@@ -91,36 +117,54 @@ fn sheets_touch_as_on_the_processor() {
     for options in each_mode(2.0) {
         all.add(hold(&scene, &options, 3.0));
     }
-    all.is_good(1000);
+    all.is_good(500);
 }
 
+/// Each rule that is told by more than the cells: closed and open meshes, overlaps and sheets.
 #[test]
-fn distances_to_sheets_are_those_of_the_processor() {
+fn distances_by_each_rule_are_those_of_the_processor() {
+    let boundary = |rule| Inside { rule, surface: SurfaceFaces::Boundary };
+    let open = Parts::default().open_cube(DVec3::splat(-0.6), 1.2, Outward).turned();
+    let mut assets = Vec::from(sheets());
+    assets.extend([
+        encode(overlap(), boundary(InsideRule::Winding)),
+        encode(overlap(), boundary(InsideRule::Nonzero)),
+        encode(overlap(), InsideRule::Odd.into()),
+        encode(open.mesh(), InsideRule::Generalized.into()),
+        encode(bowl(6, 4).turned().mesh(), InsideRule::Generalized.into()),
+    ]);
+    let assets: Vec<Arc<TeSdf>> = assets.into_iter().map(Arc::new).collect();
+    let shapes: Vec<Shape> = assets.iter().map(|asset| Shape::from(Arc::clone(asset))).collect();
+    let uploaded = GpuShapes::upload(&device(), &shapes).expect("fits");
     let mut random = Random(32);
-    for asset in sheets() {
-        let uploaded = GpuShapes::upload(&device(), &[Shape::from(asset.clone())]).expect("fits");
+    for (asset, id) in assets.iter().zip(uploaded.ids()) {
+        let rule = asset.inside();
         let at = Placement { pose: Pose::at(DVec3::new(3.0, -1.0, 2.0)), scale: 1.7 };
-        let mut points: Vec<DVec3> = (0..400).map(|_| 1.5 * random.in_cube()).collect();
+        let mut points: Vec<DVec3> = (0..800).map(|_| 1.5 * random.in_cube()).collect();
         points.extend((0..asset.face_count()).flat_map(|k| {
             let corners = asset.face_corners(k);
             [corners[0], corners.iter().sum::<DVec3>() / 3.0]
         }));
         let world: Vec<DVec3> = points.iter().map(|p| at.to_world(*p)).collect();
-        let answers =
-            uploaded.signed_distances(&world, &[(uploaded.ids()[0], at)]).expect("answers").remove(0);
-        let mut inside = 0;
+        let answers = uploaded.signed_distances(&world, &[(id, at)]).expect("answers").remove(0);
+        let (mut inside, mut wrong) = (0, 0);
         for (p, answer) in points.iter().zip(&answers) {
             let expected = asset.query_by_tree(*p).signed_distance;
             inside += usize::from(expected < 0.0);
-            assert!(
-                (answer.signed_distance - at.scale * expected).abs() < 2e-5,
-                "{p}: {answer:?}, {expected}"
-            );
+            if (answer.signed_distance - at.scale * expected).abs() > 2e-5 {
+                // In the hole of an open mesh, a point may be on either side up to rounding.
+                let is_other_side = (answer.signed_distance + at.scale * expected).abs() < 2e-5;
+                assert!(
+                    rule.rule == InsideRule::Generalized && is_other_side,
+                    "{rule}, {p}: {answer:?}, {expected}"
+                );
+                wrong += 1;
+            }
             // In the thickness, the point half of it off the nearest face may be in that of another face.
-            let on = asset.signed_distance(at.to_shape(answer.closest_point));
-            assert!(expected < 0.0 || on.abs() < 2e-5, "{p}: {answer:?} is {on} off the surface");
+            let on = asset.query_by_tree(at.to_shape(answer.closest_point)).signed_distance;
+            assert!(expected < 0.0 || on.abs() < 2e-5, "{rule}, {p}: {answer:?} is {on} off the surface");
         }
-        assert!(inside >= 2 * asset.face_count(), "{inside} points in the sheet");
+        assert!(inside >= 30 && wrong <= 1, "{rule}: {inside} points inside, {wrong} on the other side");
     }
 }
 

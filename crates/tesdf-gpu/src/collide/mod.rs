@@ -90,6 +90,12 @@ impl Detector {
     pub fn upload(&mut self, scene: &Scene) -> Result<(), GpuError> {
         let ids = shape_ids(scene);
         let shapes: Vec<Shape> = ids.iter().map(|&id| scene.shape(id).cloned()).collect::<Result<_, _>>()?;
+        for (number, shape) in shapes.iter().enumerate() {
+            let Shape::Mesh(asset) = shape else { continue };
+            if let Some(reason) = asset.undetected_on_devices() {
+                return Err(GpuError::Shape { number, reason });
+            }
+        }
         self.shapes = GpuShapes::upload(&self.device, &shapes)?;
         self.frames = shapes.iter().map(FieldFrame::new).collect();
         self.diagonals = shapes.iter().map(Shape::diagonal).collect();

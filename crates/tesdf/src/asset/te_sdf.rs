@@ -223,15 +223,18 @@ impl TeSdf {
         })
     }
 
-    /// Why kernels on other devices cannot read the asset; `None` when they can.
+    /// Why kernels on other devices find no contacts of the asset; `None` when they do.
     #[doc(hidden)]
-    pub fn unsupported_on_devices(&self) -> Option<String> {
-        (!matches!(self.about.signs, Signs::Cells | Signs::Sheet)).then(|| {
-            format!(
-                "its inside is by the rule `{}`, which kernels do not evaluate; detect on the processor",
-                self.inside().rule.name()
-            )
-        })
+    pub fn undetected_on_devices(&self) -> Option<String> {
+        let why = match () {
+            () if self.jump().is_some() => "the field jumps in the holes of an open mesh",
+            () if !self.faces_look_outward() => "faces may have the inside in front of them",
+            () => return None,
+        };
+        let rule = self.inside().rule.name();
+        Some(format!(
+            "its inside is by the rule `{rule}`, and {why}, which kernels do not detect; detect on the processor"
+        ))
     }
 
     /// Bounds of the solid, in the unit of the mesh: those of the mesh, with half of the thickness

@@ -2,6 +2,7 @@ use glam::DVec3;
 
 use crate::TeSdf;
 use crate::asset::{Conforming, FaceRecord};
+use crate::base::InsideRule;
 use crate::domain::DomainCube;
 use crate::geometry::{Aabb, LocalFrame};
 
@@ -63,7 +64,29 @@ pub struct Arrays<'a> {
     pub domain_vertices: &'a [[f64; 3]],
 }
 
+/// What tells the side of points in crossing cells where the listed faces do not.
+#[derive(Clone, Debug)]
+pub struct SignArrays {
+    /// The rule. All faces count, and the triangles.
+    pub rule: InsideRule,
+    /// Whether the side also changes where there is no face: for an open mesh.
+    pub jumps: bool,
+    /// Triangles that count for the side alone, in the local frame.
+    pub triangles: Vec<[DVec3; 3]>,
+}
+
 impl TeSdf {
+    /// What tells the side of points; `None` where the listed faces do, or where there are no
+    /// sides.
+    #[doc(hidden)]
+    pub fn sign_arrays(&self) -> Option<SignArrays> {
+        let rule = self.sign_rule()?;
+        let local = |v: u32| self.frame.to_local(DVec3::from_array(self.vertices[v as usize]));
+        let faces = self.sign_faces.as_deref().unwrap_or(&[]);
+        let triangles = faces.iter().map(|face| face.map(local)).collect();
+        Some(SignArrays { rule: self.inside().rule, jumps: rule.jumps(), triangles })
+    }
+
     /// The arrays that kernels on other devices read. Computes the bounds of the cells on first
     /// use.
     pub fn arrays(&self) -> Arrays<'_> {

@@ -61,7 +61,7 @@ use std::cell::RefCell;
 
 use glam::DVec3;
 
-pub use arrays::Arrays;
+pub use arrays::{Arrays, SignArrays};
 pub use batch::{AnswerColumns, BatchError, Extent};
 pub(crate) use inner_ball::corner_reach;
 pub(crate) use locate::{Faces, Place};

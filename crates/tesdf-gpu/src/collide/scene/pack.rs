@@ -2,15 +2,17 @@
 use glam::{DVec3, Vec3};
 use tesdf::asset::FaceRecord;
 use tesdf::asset::layout::{SignHints, TreeChild};
+use tesdf::base::InsideRule;
 use tesdf::collide::Shape;
 use tesdf::geometry::Triangle;
-use tesdf::query::Arrays;
+use tesdf::query::{Arrays, SignArrays};
 
 use super::moving::{face_levels, tree_levels};
 use super::roots::Roots;
 use crate::kernels::broad::meshlets::FACES_OF_MESHLET;
 use crate::kernels::deform::refit::GROWN;
 use crate::kernels::field::nearest::TREE_DEPTH;
+use crate::kernels::field::rule;
 use crate::kernels::field::shapes::{self, STRIDE};
 
 /// The contents of the buffers of [`Shapes`](crate::kernels::field::shapes::Shapes).
@@ -42,10 +44,7 @@ impl Packed {
         };
         match shape {
             Shape::Mesh(asset) => {
-                return match asset.unsupported_on_devices() {
-                    Some(reason) => Err(reason),
-                    None => self.add_mesh(&asset.arrays()),
-                };
+                return self.add_mesh(&asset.arrays(), asset.sign_arrays().as_ref());
             }
             Shape::Plane => sizes(shapes::PLANE, DVec3::ZERO),
             Shape::Box { half_extents } => sizes(shapes::BOX, *half_extents),
@@ -67,7 +66,11 @@ impl Packed {
         Ok(row)
     }
 
-    fn add_mesh(&mut self, mesh: &Arrays) -> Result<[u32; STRIDE as usize], String> {
+    fn add_mesh(
+        &mut self,
+        mesh: &Arrays,
+        sign: Option<&SignArrays>,
+    ) -> Result<[u32; STRIDE as usize], String> {
         let depth = depth(mesh);
         // A walk of the tree replaces a node on its stack by the two children.
         if depth + 2 > TREE_DEPTH {
@@ -102,6 +105,12 @@ impl Packed {
         set(shapes::MESHLET_COUNT, meshlets.len() as u32);
         set(shapes::FACE_COUNT, mesh.faces.len() as u32);
         set(shapes::EXACT_LISTS, u32::from(mesh.has_exact_lists));
+        if let Some(sign) = sign {
+            set(shapes::RULE, rule_of(sign));
+            let corners = sign.triangles.iter().flatten().map(|p| (*p - mesh.cube.middle()).as_vec3());
+            set(shapes::SIGN_TRIANGLES, self.rows_at(corners.map(|p| p.extend(0.0).to_array()))?);
+            set(shapes::SIGN_COUNT, sign.triangles.len() as u32);
+        }
         let roots = Roots::new(mesh);
         set(shapes::TETRAHEDRA, self.rows_at(roots.rows.into_iter())?);
         set(shapes::TREE_BOXES, self.rows_at(roots.boxes.into_iter())?);
@@ -150,6 +159,16 @@ impl Packed {
         let at = self.rows.len();
         self.rows.extend(rows);
         u32::try_from(at).map_err(|_| "more than 2^32 rows of arrays".to_owned())
+    }
+}
+
+/// The number of a rule in [`shapes::RULE`].
+fn rule_of(sign: &SignArrays) -> u32 {
+    match sign.rule {
+        InsideRule::Generalized if sign.jumps => rule::GENERALIZED,
+        InsideRule::Nonzero | InsideRule::Generalized => rule::NONZERO,
+        InsideRule::Odd => rule::ODD,
+        InsideRule::Winding | InsideRule::Sheet { .. } => rule::WINDING,
     }
 }
 

@@ -4,6 +4,7 @@ pub mod locate;
 pub mod nearest;
 pub mod opposing;
 pub mod query;
+pub mod rule;
 pub mod shapes;
 pub mod simple;
 pub mod tetrahedra;

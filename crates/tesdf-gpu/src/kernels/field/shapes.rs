@@ -17,7 +17,7 @@ pub struct Shapes {
 }
 
 /// Words in the table for each shape.
-pub const STRIDE: u32 = 40;
+pub const STRIDE: u32 = 43;
 
 /// The kind: [`MESH`], [`PLANE`], [`BOX`] or [`ROUND`].
 pub const KIND: u32 = 0;
@@ -95,6 +95,12 @@ pub const BAD_VERTEX: u32 = 37;
 pub const INNER_BALL: u32 = 38;
 /// Half of the thickness of a sheet in the local frame; 0 for other meshes. Simple shapes have 0.
 pub const HALF_THICKNESS: u32 = 39;
+/// What tells the side of points in crossing cells: see [`rule`](super::rule).
+pub const RULE: u32 = 40;
+/// Row of the first triangle that counts for the side alone. A triangle has three rows.
+pub const SIGN_TRIANGLES: u32 = 41;
+/// Number of these triangles.
+pub const SIGN_COUNT: u32 = 42;
 
 /// No such array, face, cell or vertex.
 pub const NONE: u32 = u32::MAX;
