@@ -111,7 +111,7 @@ fn kernels_decode_lists_as_the_layout_defines_them() {
             device.client(),
             groups_of(count),
             CubeDim::new_1d(GROUP),
-            ShapesLaunch::new(table.words(), words.words(), rows.rows()),
+            ShapesLaunch::new(table.words(), words.words(), rows.rows(), false),
             offsets.words(),
             counts.words(),
             faces.words(),

@@ -142,6 +142,8 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
             (shapes(), pairs(), polygons(), counters(), contacts(), exact(), false);;
         Indirect narrow::exact_faces::narrow_exact_faces, LANES,
             (shapes(), pairs(), polygons(), counters(), contacts(), exact(), true); "counting";;
+        Indirect narrow::exact_faces::narrow_exact_faces, LANES,
+            (shapes_with(true), pairs(), polygons(), counters(), contacts(), exact(), false); "with rules";;
     );
     for counting in [false, true] {
         for lanes in [LANES, 1] {
@@ -183,7 +185,11 @@ fn add_reduce(all: &mut Vec<Named>, device: &Device, target: &Target) {
 }
 
 fn shapes() -> ShapesLaunch {
-    ShapesLaunch::new(words(), words(), rows())
+    shapes_with(false)
+}
+
+fn shapes_with(has_rules: bool) -> ShapesLaunch {
+    ShapesLaunch::new(words(), words(), rows(), has_rules)
 }
 
 fn counters() -> CountersLaunch {

@@ -21,6 +21,8 @@ pub struct Packed {
     pub table: Vec<u32>,
     pub words: Vec<u32>,
     pub rows: Vec<[f32; 4]>,
+    /// Whether any shape is told by a rule at points.
+    pub has_rules: bool,
 }
 
 impl Packed {
@@ -107,6 +109,7 @@ impl Packed {
         set(shapes::EXACT_LISTS, u32::from(mesh.has_exact_lists));
         if let Some(sign) = sign {
             set(shapes::RULE, rule_of(sign));
+            self.has_rules = true;
             let corners = sign.triangles.iter().flatten().map(|p| (*p - mesh.cube.middle()).as_vec3());
             set(shapes::SIGN_TRIANGLES, self.rows_at(corners.map(|p| p.extend(0.0).to_array()))?);
             set(shapes::SIGN_COUNT, sign.triangles.len() as u32);

@@ -19,6 +19,8 @@ pub struct GpuShapes {
     /// domain.
     pub(super) moving: Vec<Option<Moving>>,
     pub(super) moved: bool,
+    /// Whether any shape is told by a rule at points.
+    has_rules: bool,
 }
 
 /// The id of a shape in [`GpuShapes`].
@@ -55,12 +57,13 @@ impl GpuShapes {
             shapes: shapes.to_vec(),
             moving: packed.table.chunks(STRIDE as usize).zip(shapes).map(Moving::new).collect(),
             moved: false,
+            has_rules: packed.has_rules,
         })
     }
 
     /// The buffers as an argument of kernels.
     pub(crate) fn argument(&self) -> ShapesLaunch {
-        ShapesLaunch::new(self.table.words(), self.words.words(), self.rows.rows())
+        ShapesLaunch::new(self.table.words(), self.words.words(), self.rows.rows(), self.has_rules)
     }
 
     /// The device that holds the shapes.

@@ -33,16 +33,24 @@ impl Field<'_> {
     /// Whether the side of a point outside of all lists is told by the rule. Beyond the faces of a
     /// closed mesh all is outside; the inside of an open one may extend there.
     pub fn is_open(self) -> bool {
-        self.entry(RULE) == GENERALIZED
+        let mut open = false;
+        if comptime!(self.shapes.has_rules) {
+            open = self.entry(RULE) == GENERALIZED;
+        }
+        open
     }
 
     /// Whether a point is inside, by numbers of faces.
     pub fn is_inside(self, p: V3) -> bool {
         let mut inside = false;
-        if self.entry(RULE) == BY_CELLS {
-            inside = self.winding(p) >= 1i32;
+        if comptime!(self.shapes.has_rules) {
+            if self.entry(RULE) == BY_CELLS {
+                inside = self.winding(p) >= 1i32;
+            } else {
+                inside = self.is_inside_by_rule(p);
+            }
         } else {
-            inside = self.is_inside_by_rule(p);
+            inside = self.winding(p) >= 1i32;
         }
         inside
     }

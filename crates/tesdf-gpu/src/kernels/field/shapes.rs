@@ -14,6 +14,10 @@ pub struct Shapes {
     pub words: Box<[u32]>,
     /// Arrays of rows.
     pub rows: Box<[Row]>,
+    /// Whether any shape is told by a rule at points. Kernels without such shapes are compiled without
+    /// the rules, which take registers.
+    #[cube(comptime)]
+    pub has_rules: bool,
 }
 
 /// Words in the table for each shape.
@@ -127,7 +131,7 @@ pub const HINTS: u32 = 0x3F80_0000;
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Field<'a> {
-    shapes: &'a Shapes,
+    pub(super) shapes: &'a Shapes,
     /// First word of the shape in the table.
     entry: u32,
 }
