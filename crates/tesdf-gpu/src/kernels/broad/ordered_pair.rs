@@ -15,7 +15,7 @@ pub struct OrderedPairs {
     /// [`WORDS`] words for each: instances a and b, shapes of a and b.
     pub words: Box<[u32]>,
     /// [`ROWS`] rows for each: the three rows of the linear map, each with its coordinate of the
-    /// shift; then scale, reach and both distances of the surfaces.
+    /// shift; then scale, reach and both radii.
     pub rows: Box<[Row]>,
     /// Capacity of the list.
     pub room: u32,
@@ -45,12 +45,12 @@ pub struct OrderedPair {
     pub scale: f32,
     /// Contact distance in the frame of the field: smaller signed distances are contacts.
     pub reach: f32,
+    /// The surfaces touch where a part of a is this far from the points where the field is 0: the
+    /// sum of the own radius, and of half of the thickness of a sheet that has the field.
+    pub radius: f32,
     /// How far the surface of a lies from its parts, in the frame of the field: the radius of a
     /// sphere or capsule, half of the thickness of a sheet. Otherwise 0.
     pub own_radius: f32,
-    /// Half of the thickness of a sheet that has the field, whose field is the distance to its
-    /// faces. Otherwise 0.
-    pub half_thickness: f32,
 }
 
 #[cube]
@@ -72,8 +72,8 @@ impl OrderedPairs {
             shift: v3(last(p), last(q), last(r)),
             scale: s.extract(0usize),
             reach: s.extract(1usize),
-            own_radius: s.extract(2usize),
-            half_thickness: last(s),
+            radius: s.extract(2usize),
+            own_radius: last(s),
         }
     }
 
@@ -88,20 +88,15 @@ impl OrderedPairs {
         self.rows[row] = row_of(pair.x, pair.shift.x);
         self.rows[row + 1] = row_of(pair.y, pair.shift.y);
         self.rows[row + 2] = row_of(pair.z, pair.shift.z);
-        self.rows[row + 3] = row_of(v3(pair.scale, pair.reach, pair.own_radius), pair.half_thickness);
+        self.rows[row + 3] = row_of(v3(pair.scale, pair.reach, pair.radius), pair.own_radius);
     }
 }
 
 #[cube]
 impl OrderedPair {
-    /// The surfaces touch where a part of a is this far from the points where the field is 0.
-    pub fn radius(self) -> f32 {
-        self.own_radius + self.half_thickness
-    }
-
     /// Contact distance for parts of the surface: the reach plus the radius.
     pub fn part_reach(self) -> f32 {
-        self.reach + self.radius()
+        self.reach + self.radius
     }
 
     /// Whether the cosine filter of Eq. (10) drops a contact. It does not apply to rounded shapes

@@ -301,8 +301,8 @@ fn ordered_pair(
         shift: to.to_local(from.origin),
         scale,
         reach: distance / to.unit,
+        radius: scale * around + shapes.field(instances.shape(b)).half_thickness(),
         own_radius: scale * around,
-        half_thickness: shapes.field(instances.shape(b)).half_thickness(),
     }
 }
 

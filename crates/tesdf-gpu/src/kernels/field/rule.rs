@@ -33,11 +33,7 @@ impl Field<'_> {
     /// Whether the side of a point outside of all lists is told by the rule. Beyond the faces of a
     /// closed mesh all is outside; the inside of an open one may extend there.
     pub fn is_open(self) -> bool {
-        let mut open = false;
-        if comptime!(self.shapes.has_rules) {
-            open = self.entry(RULE) == GENERALIZED;
-        }
-        open
+        self.entry(RULE) == GENERALIZED
     }
 
     /// Whether a point is inside, by numbers of faces.

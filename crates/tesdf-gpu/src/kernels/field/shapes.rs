@@ -21,7 +21,7 @@ pub struct Shapes {
 }
 
 /// Words in the table for each shape.
-pub const STRIDE: u32 = 43;
+pub const STRIDE: u32 = 44;
 
 /// The kind: [`MESH`], [`PLANE`], [`BOX`] or [`ROUND`].
 pub const KIND: u32 = 0;

@@ -84,13 +84,12 @@ fn depth_of(field: Field<'_>, pair: OrderedPair, part: Part, thickness: f32) -> 
     while open {
         let here = part.quarter(quarter_at(path, level));
         let core = bounds_of(here.a, here.b, here.c);
-        let radius = pair.radius();
-        let by = v3(radius, radius, radius);
+        let by = v3(pair.radius, pair.radius, pair.radius);
         let bounds = Bounds { low: core.low - by, high: core.high + by };
         let mut down = false;
         if looks < MAX_LOOKS && field.reaches(bounds, FINE * thickness) {
             let ball = here.ball();
-            let depth = radius - field.exact_distance(ball.center);
+            let depth = pair.radius - field.exact_distance(ball.center);
             deepest = deepest.max(depth);
             looks += 1u32;
             let share = select(looks <= FINE_LOOKS, FINE, SURE);

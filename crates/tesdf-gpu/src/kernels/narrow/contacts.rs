@@ -86,9 +86,9 @@ impl Contacts {
             self.words[word + 7] = pair.number;
             let row = (at * ROWS) as usize;
             let on_surface = touch.point + v.gradient * -pair.own_radius;
-            self.rows[row] = row_of(on_surface, v.distance - pair.radius());
+            self.rows[row] = row_of(on_surface, v.distance - pair.radius);
             self.rows[row + 1] = row_of(v.gradient, touch.cosine);
-            self.rows[row + 2] = row_of(v.point + v.gradient * pair.half_thickness, 0.0f32);
+            self.rows[row + 2] = row_of(v.point + v.gradient * (pair.radius - pair.own_radius), 0.0f32);
         }
     }
 
