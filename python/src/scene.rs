@@ -338,8 +338,7 @@ impl Scene {
                 None => device::open(py, None)?,
             },
         };
-        let given = [poses, velocities];
-        device::detect_on_device(py, &self.on_device, &device, &self.now(), given, &options)
+        device::detect_on_device(py, &self.on_device, &device, &self.now(), poses, velocities, &options)
     }
 
     /// Faces that touch and that are large against the other body, one for each ordered pair of

@@ -1,5 +1,6 @@
 //! Assets whose inside is not told by the winding number of their faces: kernels answer queries by
-//! each rule, and detect contacts where no field jumps and no face looks inwards.
+//! each rule, and detect contacts where no field jumps and no face looks inwards. The processor
+//! detects the rest.
 #[path = "../../tesdf/tests/support/mod.rs"]
 mod support;
 
@@ -14,7 +15,10 @@ use support::parts::{Parts, bowl};
 use support::random::Random;
 use tesdf::TeSdf;
 use tesdf::base::{Inside, InsideRule, SurfaceFaces};
-use tesdf::collide::{CollideOptions, Instance, Placement, Pose, Scene, Shape, detect};
+use tesdf::collide::{
+    CollideOptions, Contact, Contacts, Instance, InstanceId, Mode, Placement, Pose, Reduction, Scene, Shape,
+    detect,
+};
 use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh};
@@ -34,15 +38,65 @@ fn scene(asset: TeSdf) -> Scene {
     scene
 }
 
+/// Instances that kernels detect beside some that they do not: the contacts are those of the two, in
+/// the order of all.
 #[test]
-fn detection_refuses_fields_that_jump_and_faces_that_look_inwards() {
-    let open = Parts::default().open_cube(DVec3::ZERO, 1.0, Outward).mesh();
-    for asset in [encode(open, InsideRule::Generalized.into()), encode(overlap(), InsideRule::Odd.into())] {
-        let rule = asset.inside().rule.name();
-        let refused = Detector::new(&device(), &scene(asset), DetectorOptions::default());
-        let error = refused.err().expect("refused");
-        assert!(matches!(&error, GpuError::Shape { .. }) && error.to_string().contains(rule), "{error}");
+fn the_processor_detects_fields_that_jump_and_faces_that_look_inwards() {
+    let cube = || Parts::default().cube(DVec3::splat(-0.5), 1.0, Outward).turned().mesh();
+    let open = Parts::default().open_cube(DVec3::splat(-0.5), 1.0, Outward).mesh();
+    let others = [encode(open, InsideRule::Generalized.into()), encode(overlap(), InsideRule::Odd.into())];
+    let mut scene = Scene::new();
+    let solid = scene.add_shape(encode(cube(), Inside::default())).expect("a shape");
+    let mut random = Random(34);
+    for other in others {
+        let other = scene.add_shape(other).expect("a shape");
+        for (world, shapes) in
+            [[other, solid, solid], [solid, other, solid], [solid, other, other]].iter().enumerate()
+        {
+            for (k, shape) in shapes.iter().enumerate() {
+                let at = Pose { translation: DVec3::X * (0.8 * k as f64), rotation: rotation(&mut random) };
+                let world = world as u32 % 2;
+                scene.add(Instance { world, ..Instance::new(*shape, at) }).expect("an instance");
+            }
+        }
     }
+    let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("uploads");
+    for options in [
+        CollideOptions::with_mode(Mode::Node),
+        CollideOptions::default(),
+        CollideOptions { reduction: Reduction::PerPair(4), ..CollideOptions::default() },
+    ] {
+        let found = detector.detect(&scene, &options).expect("contacts");
+        let expected = detect(&scene, &options).expect("contacts");
+        let pairs = detector.report().pairs_on_processor;
+        let on_processor = |id: InstanceId| {
+            let shape = scene.instance(id).expect("an instance").shape;
+            shape != solid
+        };
+        // To the bit where the processor detects.
+        let of_processor = |contacts: &Contacts| -> Vec<Contact> {
+            let either = |c: &&Contact| on_processor(c.instance_a) || on_processor(c.instance_b);
+            contacts.iter().filter(either).copied().collect()
+        };
+        let (own, others) = (of_processor(&found), of_processor(&expected));
+        assert_eq!(own, others);
+        assert!(pairs > 5 && own.len() > 20 && found.len() > own.len(), "{pairs} {}", own.len());
+        let place = |c: &Contact| {
+            let (a, b) = (c.instance_a, c.instance_b);
+            (scene.instance(a).expect("an instance").world, a.min(b), a.max(b))
+        };
+        assert!(found.as_slice().is_sorted_by_key(place));
+        let of_pairs = |contacts: &Contacts| -> Vec<[InstanceId; 2]> {
+            contacts.reductions.iter().map(|r| [r.instance_a, r.instance_b]).collect()
+        };
+        assert_eq!(of_pairs(&found), of_pairs(&expected));
+    }
+    let refused = detector.detect_on_device(&scene, None, &CollideOptions::with_mode(Mode::Node));
+    let error = refused.err().expect("refused");
+    assert!(
+        matches!(&error, GpuError::Unavailable { .. }) && error.to_string().contains("generalized"),
+        "{error}"
+    );
 }
 
 /// Two cubes that overlap.
@@ -160,7 +214,8 @@ fn distances_by_each_rule_are_those_of_the_processor() {
                 );
                 wrong += 1;
             }
-            // In the thickness, the point half of it off the nearest face may be in that of another face.
+            // In the thickness of a sheet, the point half of it off the nearest face may be in the
+            // thickness at another face.
             let on = asset.query_by_tree(at.to_shape(answer.closest_point)).signed_distance;
             assert!(expected < 0.0 || on.abs() < 2e-5, "{rule}, {p}: {answer:?} is {on} off the surface");
         }
@@ -174,7 +229,7 @@ fn a_shell_inside_out_touches_as_on_the_processor() {
     let scene = scene(encode(inward, InsideRule::Nonzero.into()));
     let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("uploads");
     let options = CollideOptions::default();
-    let deepest = |contacts: &tesdf::Contacts| contacts.iter().map(|c| c.distance).fold(0.0, f64::min);
+    let deepest = |contacts: &Contacts| contacts.iter().map(|c| c.distance).fold(0.0, f64::min);
     let found = detector.detect(&scene, &options).expect("contacts");
     let expected = detect(&scene, &options).expect("contacts");
     assert!(!found.is_empty() && deepest(&expected) < -0.05, "{expected:?}");

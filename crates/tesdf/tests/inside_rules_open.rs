@@ -9,10 +9,10 @@ use support::parts::Turn::{Inward, Outward};
 use support::parts::bowl;
 use support::random::Random;
 use support::ruled::{Body, Compared, assert_contacts, assert_faces, assert_nodes, random_pose};
-use tesdf::base::{Inside, InsideRule};
+use tesdf::base::{Inside, InsideRule, Length};
 use tesdf::collide::{
-    ClearanceOptions, CollideError, CollideOptions, ContactsPer, Instance, InstanceId, Mode, Motion, Pose,
-    Reduction, Scene, Shape, TimeOfImpactOptions, Velocity, clearance, detect, time_of_impact,
+    ClearanceOptions, CollideOptions, ContactsPer, Instance, InstanceId, Mode, Motion, Pose, Reduction,
+    Scene, Shape, TimeOfImpactOptions, Velocity, clearance, detect, time_of_impact,
 };
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh, read};
@@ -206,12 +206,52 @@ fn an_impact_is_where_surfaces_touch() {
     let impact = time_of_impact(&scene, a, b, Motion::Rest, down, &options);
     let impact = impact.expect("an answer").expect("at the start");
     assert!(impact.time == 0.0 && impact.clearance.distance < -0.29, "{impact:?}");
-    let (scene, [a, b]) = scene_of([&cup, &cup], [Pose::IDENTITY, Pose::at(DVec3::Z * 3.0)]);
-    let error = time_of_impact(&scene, a, b, Motion::Rest, down, &options).expect_err("refused");
-    assert!(
-        matches!(error, CollideError::NoClearance { .. }) && error.to_string().contains("open meshes"),
-        "{error}"
-    );
+    // A cup sinks into the other, down to the bottom.
+    let little = open(Parts::default().open_cube(DVec3::splat(-0.2), 0.4, Outward).mesh());
+    let (scene, [a, b]) = scene_of([&cup, &little], [Pose::IDENTITY, Pose::at(DVec3::Z * 1.2)]);
+    let impact = time_of_impact(&scene, a, b, Motion::Rest, down, &options);
+    let impact = impact.expect("an answer").expect("an impact with the bottom");
+    assert!((impact.time - 0.75).abs() < 1e-5 && impact.touches, "{impact:?}");
+}
+
+/// Two open meshes are as far apart as their faces, which are measured here as sheets of no
+/// notable thickness. They do not touch before the impact.
+#[test]
+fn open_meshes_meet_where_their_faces_do() {
+    const THICKNESS: f64 = 1e-4;
+    let mut random = Random(7);
+    let mut met = 0;
+    for round in 0..40 {
+        let meshes = [bowl(5 + round % 3, 3).mesh(), bowl(6, 2 + round % 2).mesh()];
+        let [open_a, open_b] = [0, 1].map(|k| open(meshes[k].clone()));
+        let [sheet_a, sheet_b] = [0, 1].map(|k| Body::sheet(meshes[k].clone(), THICKNESS));
+        let [mut pose_a, pose_b] = [random_pose(&mut random, 0.1), random_pose(&mut random, 0.1)];
+        let from = random.direction();
+        pose_a.translation += 2.5 * from;
+        let aside = 0.7 * random.direction();
+        let velocity = Velocity { linear: 4.0 * (aside - from), angular: 3.0 * random.direction() };
+        let motion = Motion::Linear { velocity };
+        let options = TimeOfImpactOptions { tolerance: Length::Absolute(1e-6), ..Default::default() };
+        let (scene, [a, b]) = scene_of([&open_a, &open_b], [pose_a, pose_b]);
+        let impact = time_of_impact(&scene, a, b, motion, Motion::Rest, &options).expect("an answer");
+        let faces_apart = |time: f64| {
+            let poses = [motion.pose_at(pose_a, time), pose_b];
+            let (scene, [a, b]) = scene_of([&sheet_a, &sheet_b], poses);
+            let options = ClearanceOptions { tolerance: Length::Absolute(1e-9) };
+            clearance(&scene, a, b, &options).expect("a clearance").distance + THICKNESS
+        };
+        let until = impact.map_or(1.0, |impact| impact.time);
+        assert!((0..50).all(|k| faces_apart(until * f64::from(k) / 50.0) > 0.4e-6), "{round}: {impact:?}");
+        if let Some(impact) = impact {
+            assert!(impact.touches && impact.clearance.distance <= 1e-6, "{round}: {impact:?}");
+            assert!(
+                (faces_apart(impact.time) - impact.clearance.distance).abs() < 2e-7,
+                "{round}: {impact:?}"
+            );
+            met += 1;
+        }
+    }
+    assert!((10..40).contains(&met), "{met}");
 }
 
 #[test]

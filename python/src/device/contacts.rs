@@ -39,7 +39,8 @@ pub fn detect_on_device<'py>(
     held: &HeldDetector,
     device: &Device,
     scene: &Scene,
-    [poses, velocities]: [Option<&Bound<'py, PyAny>>; 2],
+    poses: Option<&Bound<'py, PyAny>>,
+    velocities: Option<&Bound<'py, PyAny>>,
     options: &CollideOptions,
 ) -> PyResult<Bound<'py, PyAny>> {
     let poses = poses.map(|any| rows(POSES, any, device)).transpose()?;

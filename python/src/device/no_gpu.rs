@@ -79,7 +79,8 @@ pub fn detect_on_device<'py>(
     _: &HeldDetector,
     device: &Device,
     _: &Scene,
-    _: [Option<&Bound<'py, PyAny>>; 2],
+    _: Option<&Bound<'py, PyAny>>,
+    _: Option<&Bound<'py, PyAny>>,
     _: &CollideOptions,
 ) -> PyResult<Bound<'py, PyAny>> {
     match *device {}

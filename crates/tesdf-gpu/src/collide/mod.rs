@@ -7,6 +7,7 @@ mod counts;
 mod middle;
 mod narrow;
 mod on_device;
+mod on_processor;
 mod options;
 mod pass;
 pub mod queries;
@@ -27,6 +28,7 @@ use buffers::{ContactBuffers, PipelineBuffers, ROW, WORD};
 use contacts::{Row, Words, contacts, keep_minima, one_per_vertex};
 pub use counts::Counts;
 pub use on_device::{DeviceContacts, GivenPoses};
+use on_processor::{Divided, with_pairs};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
@@ -88,14 +90,13 @@ impl Detector {
     /// # Errors
     /// The errors of [`new`](Self::new).
     pub fn upload(&mut self, scene: &Scene) -> Result<(), GpuError> {
+        self.upload_shapes(&Divided::new(scene)?.on_device)
+    }
+
+    /// Uploads the shapes of a scene whose contacts kernels find.
+    fn upload_shapes(&mut self, scene: &Scene) -> Result<(), GpuError> {
         let ids = shape_ids(scene);
         let shapes: Vec<Shape> = ids.iter().map(|&id| scene.shape(id).cloned()).collect::<Result<_, _>>()?;
-        for (number, shape) in shapes.iter().enumerate() {
-            let Shape::Mesh(asset) = shape else { continue };
-            if let Some(reason) = asset.undetected_on_devices() {
-                return Err(GpuError::Shape { number, reason });
-            }
-        }
         self.shapes = GpuShapes::upload(&self.device, &shapes)?;
         self.frames = shapes.iter().map(FieldFrame::new).collect();
         self.diagonals = shapes.iter().map(Shape::diagonal).collect();
@@ -125,6 +126,10 @@ impl Detector {
     ///   several contacts at one vertex, of which otherwise one remains.
     /// - [`Reduction::Deepest`] cuts the contacts on the processor, after all have been found. So
     ///   it saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
+    /// - Kernels do not detect open meshes under the rule
+    ///   [`Generalized`](tesdf::base::InsideRule::Generalized), nor meshes with faces that look
+    ///   inwards in places. The processor finds all contacts of their instances, in `f64`.
+    ///   [`DeviceReport::pairs_on_processor`] counts these pairs.
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors
@@ -134,7 +139,7 @@ impl Detector {
     /// - [`GpuError::Shape`] when a shape cannot be uploaded, or a vertex was moved to an invalid
     ///   position.
     /// - [`GpuError::Unavailable`] for the mode [`Edge`](Mode::Edge), and when vertices have moved
-    ///   on the device and the scene now has other shapes.
+    ///   on the device and the scene now has other shapes, or shapes that the processor detects.
     /// - [`GpuError::Device`] when the device fails, or a driver stops the loops of a kernel early.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::Off)
@@ -171,6 +176,27 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         let options = &possible(options)?;
+        let divided = Divided::new(scene)?;
+        let pairs = divided.pairs(scene, options)?;
+        if !pairs.is_empty() && self.shapes.have_moved() {
+            return Err(GpuError::Unavailable {
+                what:
+                    "contacts of shapes that the processor detects, while vertices have moved on the device"
+                        .into(),
+                instead: "move the vertices of the scene, and upload it",
+            });
+        }
+        let found = self.run_on_device(&divided.on_device, options, timing)?;
+        self.report.pairs_on_processor = pairs.len();
+        Ok(with_pairs(found, &pairs, scene, options)?)
+    }
+
+    fn run_on_device(
+        &mut self,
+        scene: &Scene,
+        options: &CollideOptions,
+        timing: Timing,
+    ) -> Result<Contacts, GpuError> {
         let reduction = options.reduction;
         if wants_minima(options) && self.shapes.have_moved() {
             return Err(GpuError::Unavailable {
@@ -218,7 +244,7 @@ impl Detector {
                     instead: "upload the scene, and move its vertices again",
                 });
             }
-            self.upload(scene)?;
+            self.upload_shapes(scene)?;
         }
         // The processor's tree knows neither vertices nor instances that have moved on the device.
         let on_processor = !self.shapes.have_moved() && given.is_none();

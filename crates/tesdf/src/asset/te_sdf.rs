@@ -232,9 +232,7 @@ impl TeSdf {
             () => return None,
         };
         let rule = self.inside().rule.name();
-        Some(format!(
-            "its inside is by the rule `{rule}`, and {why}, which kernels do not detect; detect on the processor"
-        ))
+        Some(format!("its inside is by the rule `{rule}`, and {why}, which kernels do not detect"))
     }
 
     /// Bounds of the solid, in the unit of the mesh: those of the mesh, with half of the thickness

@@ -183,9 +183,10 @@ impl<'a> Pair<'a> {
     pub fn clearance(&self, tolerance: f64) -> Result<Clearance, CollideError> {
         let first = self.first();
         if matches!(self.a.shape, Shape::Plane) || matches!(self.b.shape, Shape::Plane) {
-            return self.least(&[first], tolerance);
+            return self.least(vec![(first, self.field(first))], tolerance);
         }
-        let found = self.least(&[first, first.other()], tolerance)?;
+        let both = [first, first.other()].map(|of| (of, self.field(of)));
+        let found = self.least(both.into(), tolerance)?;
         let overlap = match found.distance {
             d if d < -tolerance => true,
             d if d > tolerance => false,
@@ -240,25 +241,14 @@ impl<'a> Pair<'a> {
         }
     }
 
-    /// The clearance from one order. It is right when neither body is inside the other. For an open
-    /// mesh it is the distance of the surfaces: its own surface is searched, in a field without
-    /// jumps.
+    /// The clearance from one order. It is right when neither body is inside the other. For open
+    /// meshes it is the distance of the surfaces, whose sign does not jump.
     ///
     /// # Errors
-    /// Positions are too far out, or both bodies are open meshes.
+    /// Positions are too far out.
     pub fn apart(&self, tolerance: f64) -> Result<Clearance, CollideError> {
-        let jumps = |body: &Body| matches!(body.shape, Shape::Mesh(asset) if asset.jump().is_some());
-        let first = match (jumps(&self.a), jumps(&self.b)) {
-            (false, false) => self.first(),
-            (true, false) => Surface::A,
-            (false, true) => Surface::B,
-            (true, true) => {
-                let reason = "both are open meshes, whose insides end in their holes, so that no time of impact is \
-                     known; expected one closed mesh or sheet, or simple shape";
-                return Err(CollideError::NoClearance { a: self.a.id, b: self.b.id, reason });
-            }
-        };
-        self.least(&[first], tolerance)
+        let first = self.first();
+        self.least(vec![(first, self.field(first).without_jump())], tolerance)
     }
 
     /// The body with fewer faces. A plane never comes first, because it has no finite surface.
@@ -272,8 +262,18 @@ impl<'a> Pair<'a> {
     }
 
     /// The least signed distance over surfaces, each in the field of the other body.
-    fn least(&self, surfaces: &[Surface], tolerance: f64) -> Result<Clearance, CollideError> {
-        let orders: Vec<Order> = surfaces.iter().map(|of| self.order(*of)).collect();
+    fn least(
+        &self,
+        searches: Vec<(Surface, FieldBody<'_>)>,
+        tolerance: f64,
+    ) -> Result<Clearance, CollideError> {
+        let (surfaces, orders): (Vec<Surface>, Vec<Order>) = searches
+            .into_iter()
+            .map(|(of, field)| {
+                let Body { shape, placement, .. } = self.body(of);
+                (of, Order { surface: SurfaceBody::new(shape, *placement, &field), field })
+            })
+            .unzip();
         let Some(Least { order, distance, lower_bound, lowest, converged }) = least(&orders, tolerance)
         else {
             return Err(CollideError::NoClearance {
@@ -306,16 +306,19 @@ impl<'a> Pair<'a> {
         })
     }
 
-    /// The surface of one body and the field of the other.
-    fn order(&self, of: Surface) -> Order<'a> {
-        let (surface, field) = match of {
-            Surface::A => (&self.a, &self.b),
-            Surface::B => (&self.b, &self.a),
-        };
-        if let Shape::Mesh(asset) = field.shape {
+    fn body(&self, of: Surface) -> &Body<'a> {
+        match of {
+            Surface::A => &self.a,
+            Surface::B => &self.b,
+        }
+    }
+
+    /// The field in which a surface is searched: that of the other body.
+    fn field(&self, of: Surface) -> FieldBody<'a> {
+        let Body { shape, placement, .. } = self.body(of.other());
+        if let Shape::Mesh(asset) = shape {
             asset.store_normals();
         }
-        let field = FieldBody::new(field.shape, field.placement);
-        Order { surface: SurfaceBody::new(surface.shape, surface.placement, &field), field }
+        FieldBody::new(shape, *placement)
     }
 }

@@ -97,7 +97,15 @@ impl Field<'_> {
 pub struct FieldBody<'a> {
     /// The field.
     pub field: Field<'a>,
+    signs: Signs,
     placement: Placement,
+}
+
+/// Whether distances have their signs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Signs {
+    Kept,
+    Dropped,
 }
 
 /// Error bound of `f32` in the local frame of an asset: twice the bound promised for queries.
@@ -113,7 +121,54 @@ impl<'a> FieldBody<'a> {
             Shape::Mesh(asset) => Field::Mesh(asset),
             simple => Field::Simple(Simple::from(simple)),
         };
-        Self { field, placement }
+        Self { field, signs: Signs::Kept, placement }
+    }
+
+    /// The distance to the faces without a sign, where the sign jumps. Any other field is the same.
+    pub fn without_jump(self) -> Self {
+        match self.field.jump() {
+            Some(_) => Self { signs: Signs::Dropped, ..self },
+            None => self,
+        }
+    }
+
+    /// The number by which the sign changes where there is no face; `None` where it does not.
+    pub fn jump(&self) -> Option<&GeneralizedWinding> {
+        self.field.jump().filter(|_| self.signs == Signs::Kept)
+    }
+
+    /// No distance is below this.
+    pub fn lowest(&self) -> f64 {
+        match self.signs {
+            Signs::Kept => f64::NEG_INFINITY,
+            Signs::Dropped => 0.0,
+        }
+    }
+
+    fn value_of(&self, value: FieldValue) -> FieldValue {
+        match self.signs {
+            Signs::Kept => value,
+            Signs::Dropped => value.unsigned(),
+        }
+    }
+
+    /// As [`Field::rough_value`].
+    pub fn rough_value(&self, p: DVec3) -> (FieldValue, f64) {
+        let (value, slack) = self.field.rough_value(p);
+        (self.value_of(value), slack)
+    }
+
+    /// As [`Field::exact_value`].
+    pub fn exact_value(&self, p: DVec3) -> FieldValue {
+        self.value_of(self.field.exact_value(p))
+    }
+
+    /// As [`Field::least_in_ball`].
+    pub fn least_in_ball(&self, p: DVec3, radius: f64, (distance, slack): (f64, f64)) -> f64 {
+        match self.signs {
+            Signs::Kept => self.field.least_in_ball(p, radius, (distance, slack)),
+            Signs::Dropped => (distance - slack - radius).max(0.0),
+        }
     }
 
     /// World units per unit of the field's frame.
@@ -164,14 +219,14 @@ impl<'a> FieldBody<'a> {
         // Far out, the bounds are a good approximation of the body.
         if let Field::Mesh(asset) = self.field {
             let far = limit.max(0.0) + ROUNDING;
-            let far = asset.jump().map_or(far, |jump| far.max(radius + jump.reach_beyond()));
+            let far = self.jump().map_or(far, |jump| far.max(radius + jump.reach_beyond()));
             if asset.local_bounds().distance_squared(p) > far.powi(2) {
                 return None;
             }
         }
         let (distance, slack) = self.rough(p);
         if self.field.jump().is_some() {
-            let least = self.field.least_in_ball(p, radius, (distance, slack));
+            let least = self.least_in_ball(p, radius, (distance, slack));
             return (least <= reach).then_some(least);
         }
         (distance <= limit + slack).then_some(distance - slack - radius)
@@ -209,7 +264,8 @@ impl<'a> FieldBody<'a> {
 
     /// The signed distance at `p` and a bound of its error, in the field's frame.
     pub fn rough(&self, p: DVec3) -> (f64, f64) {
-        self.field.rough(p)
+        let (value, slack) = self.rough_value(p);
+        (value.distance, slack)
     }
 
     /// The value at `p`. Where several faces are equally near, with the gradient that most opposes
@@ -223,12 +279,12 @@ impl<'a> FieldBody<'a> {
 
     /// Lower bound of the signed distance within `radius` of `p`. All in the field's frame.
     pub fn least_within(&self, p: DVec3, radius: f64) -> f64 {
-        self.field.least_in_ball(p, radius, self.rough(p))
+        self.least_in_ball(p, radius, self.rough(p))
     }
 
     /// The lowest value that a signed distance can have where it jumps at a point with this one.
     pub fn lowest_beside(&self, distance: f64) -> f64 {
-        if self.field.jump().is_some() { -distance.abs() } else { distance }
+        if self.jump().is_some() { -distance.abs() } else { distance }
     }
 
     /// The nearest points of a part's surface and of the body's surface, where the part's core is

@@ -18,6 +18,17 @@ pub struct FieldValue {
     pub feature: Feature,
 }
 
+impl FieldValue {
+    /// The same for the distance without its sign.
+    pub fn unsigned(self) -> Self {
+        if self.distance < 0.0 {
+            Self { distance: -self.distance, gradient: -self.gradient, ..self }
+        } else {
+            self
+        }
+    }
+}
+
 impl From<Found> for FieldValue {
     fn from(found: Found) -> Self {
         let Found { signed_distance: distance, gradient, closest_point, position, feature } = found;

@@ -313,9 +313,9 @@ impl Looks<'_> {
     /// Lower bound of the signed distances of the surface on a piece, by the value at a point and
     /// the bound `lower` there.
     fn by_reach(&self, piece: &Piece, at: DVec3, value: &FieldValue, lower: f64) -> f64 {
-        let (field, reach) = (self.field.field, piece.reach(at));
+        let (field, reach) = (self.field, piece.reach(at));
         match field.jump() {
-            None => lower - reach,
+            None => (lower - reach).max(field.lowest() - piece.radius),
             Some(_) => {
                 let slack = ROUNDING + 1e-9 * value.distance.abs();
                 field.least_in_ball(at, reach, (value.distance, slack)) - piece.radius
@@ -339,13 +339,13 @@ impl Looks<'_> {
     /// there. In `f32`, unless `is_fine` or where the point is lower than all others.
     fn value(&mut self, piece: &Piece, p: DVec3, is_fine: bool) -> (FieldValue, f64) {
         if !is_fine {
-            let (value, slack) = self.field.field.rough_value(p);
+            let (value, slack) = self.field.rough_value(p);
             let lower = value.distance - slack - piece.radius;
             if lower >= self.least {
                 return (value, lower);
             }
         }
-        let value = self.field.field.exact_value(p);
+        let value = self.field.exact_value(p);
         self.offer(piece, p, &value);
         (value, value.distance - piece.radius)
     }
@@ -454,8 +454,7 @@ impl Looks<'_> {
             if is_clear { hair } else { f64::NEG_INFINITY }
         });
         let center = points.iter().sum::<DVec3>() / points.len() as f64;
-        (is_clear && self.field.field.exact_value(center).distance > 0.0)
-            .then(|| heights.map(|h| h.abs() + hair))
+        (is_clear && self.field.exact_value(center).distance > 0.0).then(|| heights.map(|h| h.abs() + hair))
     }
 
     /// The side of a piece of a mesh's field. Where it is outside, its nearest point is a
@@ -486,7 +485,7 @@ impl Looks<'_> {
             if crossed > FEW { f64::NEG_INFINITY } else { nearest.0.max(2.0 * clear) }
         });
         if let (Some(at), true) = (nearest.1, self.least + piece.radius >= 0.0) {
-            self.offer(piece, at, &self.field.field.exact_value(at));
+            self.offer(piece, at, &self.field.exact_value(at));
         }
         if crossed > 0 {
             return Side::Across(deepest.1.filter(|_| crossed <= FEW));
@@ -494,16 +493,16 @@ impl Looks<'_> {
         // It is on one side, unless the sign jumps. Where its centre is on the surface, a corner
         // shows the side.
         let center = piece.center();
-        let mut at = (center, self.field.field.exact_value(center));
+        let mut at = (center, self.field.exact_value(center));
         if at.1.distance.abs() <= clear {
             for p in points {
-                let value = self.field.field.exact_value(*p);
+                let value = self.field.exact_value(*p);
                 if value.distance.abs() > at.1.distance.abs() {
                     at = (*p, value);
                 }
             }
         }
-        if let (Some(jump), true) = (asset.jump(), at.1.distance.abs() > clear) {
+        if let (Some(jump), true) = (self.field.jump(), at.1.distance.abs() > clear) {
             return self.side_of_jump(jump, piece, at);
         }
         if at.1.distance >= -clear {

@@ -80,8 +80,8 @@ pub struct Impact {
 /// ```
 ///
 /// # Errors
-/// As [`clearance`](super::clearance()); also for two open meshes, a motion that is not finite, a
-/// rotating plane, or an invalid option.
+/// As [`clearance`](super::clearance()); also for a motion that is not finite, a rotating plane, or
+/// an invalid option.
 pub fn time_of_impact(
     scene: &Scene,
     a: InstanceId,

@@ -45,17 +45,6 @@ enum Soup {
 const SOUPS: [Soup; 5] = [Soup::General, Soup::Lattice, Soup::Sheets, Soup::Needles, Soup::Around];
 
 fn soup(kind: Soup, random: &mut Random) -> TriangleMesh {
-    // Corners that all but coincide would be scaled beyond the local frame, to 200 diagonals from
-    // its origin, where rounding exceeds the margin.
-    loop {
-        if let Some(mesh) = try_soup(kind, random) {
-            return mesh;
-        }
-    }
-}
-
-/// `None` where all faces are within a thousandth of the frame.
-fn try_soup(kind: Soup, random: &mut Random) -> Option<TriangleMesh> {
     let n = 4 + random.below(12);
     let lattice = |random: &mut Random| (in_cube(random) * 3.0).round() / 8.0;
     let apart = 10f64.powf(random.between(-16.0, -7.0));
@@ -80,8 +69,11 @@ fn try_soup(kind: Soup, random: &mut Random) -> Option<TriangleMesh> {
     }
     // Bodies in the local frame have a diagonal of 0.5 to 1.
     let extent = TriangleMesh::new(vertices.clone(), faces.clone()).expect("valid ids").diagonal();
-    vertices.iter_mut().for_each(|v| *v *= 0.7 / extent);
-    (extent > 1e-3).then(|| TriangleMesh::new(vertices, faces).expect("valid ids"))
+    // Corners that all but coincide would be scaled out of the frame, where rounding exceeds the
+    // margin.
+    let scale = if extent > 1e-3 { 0.7 / extent } else { 1.0 };
+    vertices.iter_mut().for_each(|v| *v *= scale);
+    TriangleMesh::new(vertices, faces).expect("valid ids")
 }
 
 fn tetrahedron(random: &mut Random) -> Cell {

@@ -21,8 +21,6 @@ pub struct Packed {
     pub table: Vec<u32>,
     pub words: Vec<u32>,
     pub rows: Vec<[f32; 4]>,
-    /// Whether any shape is told by a rule at points.
-    pub has_rules: bool,
 }
 
 impl Packed {
@@ -109,7 +107,6 @@ impl Packed {
         set(shapes::EXACT_LISTS, u32::from(mesh.has_exact_lists));
         if let Some(sign) = sign {
             set(shapes::RULE, rule_of(sign));
-            self.has_rules = true;
             let corners = sign.triangles.iter().flatten().map(|p| (*p - mesh.cube.middle()).as_vec3());
             set(shapes::SIGN_TRIANGLES, self.rows_at(corners.map(|p| p.extend(0.0).to_array()))?);
             set(shapes::SIGN_COUNT, sign.triangles.len() as u32);
@@ -134,9 +131,10 @@ impl Packed {
         set(shapes::BOUND_UNIT, mesh.cell_bound_unit);
         set(shapes::BAND, mesh.band);
         set(shapes::HALF_THICKNESS, mesh.half_thickness);
+        let bounds = mesh.bounds.grown(mesh.half_thickness);
         for axis in 0..3 {
-            set(shapes::LOW + axis as u32, (mesh.bounds.min - mesh.cube.middle())[axis]);
-            set(shapes::HIGH + axis as u32, (mesh.bounds.max - mesh.cube.middle())[axis]);
+            set(shapes::LOW + axis as u32, (bounds.min - mesh.cube.middle())[axis]);
+            set(shapes::HIGH + axis as u32, (bounds.max - mesh.cube.middle())[axis]);
         }
         Ok(row)
     }

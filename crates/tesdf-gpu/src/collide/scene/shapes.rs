@@ -5,7 +5,8 @@ use super::moving::Moving;
 use super::pack::Packed;
 use crate::GpuError;
 use crate::device::{Buffer, Device};
-use crate::kernels::field::shapes::{STRIDE, ShapesLaunch};
+use crate::kernels::field::rule::BY_CELLS;
+use crate::kernels::field::shapes::{RULE, STRIDE, ShapesLaunch};
 
 /// A list of shapes in the memory of a device.
 #[derive(Clone)]
@@ -57,7 +58,7 @@ impl GpuShapes {
             shapes: shapes.to_vec(),
             moving: packed.table.chunks(STRIDE as usize).zip(shapes).map(Moving::new).collect(),
             moved: false,
-            has_rules: packed.has_rules,
+            has_rules: packed.table.chunks(STRIDE as usize).any(|entry| entry[RULE as usize] != BY_CELLS),
         })
     }
 

@@ -6,6 +6,7 @@ use super::super::field::shapes::{
     Field, FieldExpand, HIGH, KIND, LOW, MESH, OWNED_CORNERS, PLANE, ROUND, SIZES, Shapes, ShapesExpand,
 };
 use super::super::field::tetrahedra::bounds_of;
+use super::super::math::triangle::Triangle;
 use super::super::math::vector::{Row, V3, last, pick, row_of, v3, xyz, zero};
 use super::super::middle::cut::Quarter;
 
@@ -192,8 +193,7 @@ impl Field<'_> {
     fn body_radius(self) -> f32 {
         let kind = self.entry(KIND);
         let sizes = self.vector(SIZES);
-        let around = 2.0f32 * self.half_thickness();
-        let extent = (self.vector(HIGH) - self.vector(LOW)) + v3(around, around, around);
+        let extent = self.vector(HIGH) - self.vector(LOW);
         let round = select(kind == ROUND, sizes.x + sizes.y, sizes.length());
         select(kind == MESH, 0.5f32 * extent.length(), round)
     }
@@ -213,15 +213,6 @@ impl Field<'_> {
     }
 }
 
-/// Three corners.
-#[derive(CubeType, CubeTypeMut, Clone, Copy)]
-#[expand(derive(Clone, Copy))]
-struct Triangle {
-    a: V3,
-    b: V3,
-    c: V3,
-}
-
 #[cube]
 impl Shapes {
     /// Part `number` of the surface of an ordered pair, in the frame of the field.
@@ -235,7 +226,7 @@ impl Shapes {
             corners = self.field(pair.shape_b).plane_part(pair, number);
         } else {
             let f = surface.face(number);
-            corners = Triangle { a: f.a, b: f.corner(1u32), c: f.corner(2u32) };
+            corners = f.corners();
             owned = (f.hints >> OWNED_CORNERS) & 7u32;
             if kind == ROUND {
                 let is_sphere = surface.entry(SIZES) == 0u32;

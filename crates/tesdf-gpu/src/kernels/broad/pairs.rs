@@ -134,8 +134,7 @@ pub fn instance_bounds(shapes: &Shapes, instances: &Instances, counters: &Counte
     if i < instances.count {
         let field = shapes.field(instances.shape(i));
         let own = field.bounds();
-        let around = field.half_thickness();
-        let half = (own.high - own.low) * 0.5f32 + v3(around, around, around);
+        let half = (own.high - own.low) * 0.5f32;
         let at = instances.pose(i);
         let off = at.rotation.rotate(((own.low + own.high) * 0.5f32) * at.unit);
         let x = at.rotation.rotate(v3(at.unit * half.x, 0.0f32, 0.0f32));

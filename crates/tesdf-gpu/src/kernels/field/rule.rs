@@ -2,8 +2,12 @@
 //! over all faces where these do not tell it.
 use cubecl::prelude::*;
 
-use super::super::math::vector::{V3, v3, xyz, zero};
-use super::shapes::{FACE_COUNT, Field, FieldExpand, RULE, SIDE, SIGN_COUNT, SIGN_TRIANGLES};
+use super::super::math::triangle::Triangle;
+use super::super::math::vector::{V3, v3, xyz};
+use super::nearest::{TREE_DEPTH, TreeChild};
+use super::shapes::{
+    Bounds, CHILDREN, FACE_COUNT, Field, FieldExpand, RULE, SIDE, SIGN_COUNT, SIGN_TRIANGLES,
+};
 use super::winding::crossing;
 
 /// Inside is where the winding number is 1 or more. Cells have it at their centroids, and lists
@@ -19,19 +23,13 @@ pub const ODD: u32 = 3;
 /// least, of either sign (Jacobson et al. 2013).
 pub const GENERALIZED: u32 = 4;
 
-/// Three corners of a face that counts.
-#[derive(CubeType, CubeTypeMut, Clone, Copy)]
-#[expand(derive(Clone, Copy))]
-struct Counted {
-    a: V3,
-    b: V3,
-    c: V3,
-}
+/// A face farther off a line than this (local frame) is not crossed by it, whatever is rounded.
+const MARGIN: f32 = 1e-5;
 
 #[cube]
 impl Field<'_> {
-    /// Whether the side of a point outside of all lists is told by the rule. Beyond the faces of a
-    /// closed mesh all is outside; the inside of an open one may extend there.
+    /// Whether the inside of a mesh may extend beyond its faces, so that the rule tells the side of
+    /// points outside of all lists as well.
     pub fn is_open(self) -> bool {
         self.entry(RULE) == GENERALIZED
     }
@@ -51,44 +49,86 @@ impl Field<'_> {
         inside
     }
 
-    fn counted(self, number: u32) -> Counted {
-        let own = self.entry(FACE_COUNT);
-        let mut counted = Counted { a: zero(), b: zero(), c: zero() };
-        if number < own {
-            let f = self.face(number);
-            counted = Counted { a: f.corner(0u32), b: f.corner(1u32), c: f.corner(2u32) };
-        } else {
-            let row = self.entry(SIGN_TRIANGLES) + 3u32 * (number - own);
-            counted =
-                Counted { a: xyz(self.row(row)), b: xyz(self.row(row + 1u32)), c: xyz(self.row(row + 2u32)) };
-        }
-        counted
+    /// Corners of a triangle that counts for the side alone.
+    fn sign_triangle(self, number: u32) -> Triangle {
+        let row = self.entry(SIGN_TRIANGLES) + 3u32 * number;
+        Triangle { a: xyz(self.row(row)), b: xyz(self.row(row + 1u32)), c: xyz(self.row(row + 2u32)) }
     }
 
-    /// The rule takes every face into account. The winding number of a closed mesh is the sum of
-    /// the signed crossings on the way to a point beyond it.
     fn is_inside_by_rule(self, p: V3) -> bool {
         let rule = self.entry(RULE);
-        let side = self.number(SIDE);
-        let beyond = v3(0.37f32 * side, 0.21f32 * side, 2.0f32 * side);
-        let count = self.entry(FACE_COUNT) + self.entry(SIGN_COUNT);
-        let mut winding = 0i32;
-        let mut angle = 0.0f32;
-        let mut i = 0u32;
-        while i < count {
-            let f = self.counted(i);
-            if rule == GENERALIZED {
-                angle += half_solid_angle(f.a - p, f.b - p, f.c - p);
-            } else {
-                winding += crossing(p, beyond, f.a, f.b, f.c);
-            }
-            i += 1u32;
+        let mut inside = false;
+        if rule == GENERALIZED {
+            inside = self.half_solid_angles(p).abs() >= std::f32::consts::PI;
+        } else {
+            let winding = self.winding_of_all(p);
+            inside = (rule == WINDING && winding >= 1i32)
+                || (rule == NONZERO && winding != 0i32)
+                || (rule == ODD && winding % 2i32 != 0i32);
         }
-        let by_angle = rule == GENERALIZED && angle.abs() >= std::f32::consts::PI;
-        let by_winding = rule == WINDING && winding >= 1i32;
-        let by_other = (rule == NONZERO && winding != 0i32) || (rule == ODD && winding % 2i32 != 0i32);
-        by_angle || by_winding || by_other
+        inside
     }
+
+    /// Half of the solid angles of all faces of an open mesh, which has no other triangles.
+    fn half_solid_angles(self, p: V3) -> f32 {
+        let mut angle = 0.0f32;
+        let mut face = 0u32;
+        while face < self.entry(FACE_COUNT) {
+            let f = self.face(face).corners();
+            angle += half_solid_angle(f.a - p, f.b - p, f.c - p);
+            face += 1u32;
+        }
+        angle
+    }
+
+    /// The winding number of all faces and triangles, which are closed: the sum of the signed
+    /// crossings on the way along z to a point beyond them.
+    fn winding_of_all(self, p: V3) -> i32 {
+        let beyond = v3(p.x, p.y, p.z + 2.0f32 * self.number(SIDE));
+        let children = self.entry(CHILDREN);
+        let mut words = Array::<u32>::new(TREE_DEPTH);
+        let mut winding = 0i32;
+        let mut top = 1u32;
+        words[0] = 0u32;
+        while top > 0u32 {
+            top -= 1u32;
+            let child = TreeChild { word: words[top as usize] };
+            if child.is_leaf() {
+                let mut face = child.start();
+                while face < child.start() + child.count() {
+                    let f = self.face(face).corners();
+                    winding += crossing(p, beyond, f.a, f.b, f.c);
+                    face += 1u32;
+                }
+            } else {
+                let boxes = self.node_boxes(child.word);
+                if is_under(p, boxes.left) {
+                    words[top as usize] = self.word(children + 2u32 * child.word);
+                    top += 1u32;
+                }
+                if is_under(p, boxes.right) {
+                    words[top as usize] = self.word(children + 2u32 * child.word + 1u32);
+                    top += 1u32;
+                }
+            }
+        }
+        let mut k = 0u32;
+        while k < self.entry(SIGN_COUNT) {
+            let f = self.sign_triangle(k);
+            winding += crossing(p, beyond, f.a, f.b, f.c);
+            k += 1u32;
+        }
+        winding
+    }
+}
+
+/// Whether the way from a point along z can meet a face within a box, up to rounding.
+#[cube]
+fn is_under(p: V3, bounds: Bounds) -> bool {
+    let (low, high) = (bounds.low, bounds.high);
+    let along_x = p.x >= low.x - MARGIN && p.x <= high.x + MARGIN;
+    let along_y = p.y >= low.y - MARGIN && p.y <= high.y + MARGIN;
+    along_x && along_y && p.z <= high.z + MARGIN
 }
 
 /// Half of the solid angle of a triangle seen from the origin, positive from its back (Van Oosterom
@@ -103,18 +143,15 @@ pub fn half_solid_angle(a: V3, b: V3, c: V3) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::winding::tests::cube;
     use super::*;
 
     /// The sides of a cube take a sixth of the sphere each from its middle, and nothing in all from
     /// without.
     #[test]
     fn solid_angles_of_a_cube_sum_up_to_the_sphere_within_it() {
-        let corner = |k: u32| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit as f32 * 2.0 - 1.0);
-        let squares = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        let faces = squares.map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).concat();
         let sum = |p: V3| -> f32 {
-            let of = |f: &[u32; 3]| f.map(corner).map(|[x, y, z]| v3(x, y, z) - p);
-            faces.iter().map(of).map(|[a, b, c]| half_solid_angle(a, b, c)).sum()
+            cube().into_iter().map(|[a, b, c]| half_solid_angle(a - p, b - p, c - p)).sum()
         };
         for (p, expected) in [
             (v3(0.0, 0.0, 0.0), 2.0),

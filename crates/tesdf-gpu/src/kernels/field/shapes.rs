@@ -14,8 +14,8 @@ pub struct Shapes {
     pub words: Box<[u32]>,
     /// Arrays of rows.
     pub rows: Box<[Row]>,
-    /// Whether any shape is told by a rule at points. Kernels without such shapes are compiled without
-    /// the rules, which take registers.
+    /// Whether any shape is told by a rule at points. Otherwise kernels are compiled without the
+    /// rules, which take registers.
     #[cube(comptime)]
     pub has_rules: bool,
 }
@@ -61,7 +61,8 @@ pub const INVERSE_SIDE: u32 = 16;
 pub const BOUND_UNIT: u32 = 17;
 /// Least distance around the solid up to which the domain reaches.
 pub const BAND: u32 = 18;
-/// Minimum corner of the surface's bounds, relative to the center of the cube: three words.
+/// Minimum corner of the bounds of the solid, relative to the center of the cube: three words. For a
+/// sheet, half of its thickness is around the faces.
 pub const LOW: u32 = 19;
 /// Maximum corner, in the same way.
 pub const HIGH: u32 = 22;

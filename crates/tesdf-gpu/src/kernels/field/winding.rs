@@ -204,20 +204,23 @@ fn is_left(along: V3, a: V3, b: V3) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
+
+    /// The faces of a cube with corners at ±1, outward.
+    pub fn cube() -> Vec<[V3; 3]> {
+        let corner = |k: u32| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit as f32 * 2.0 - 1.0);
+        let squares = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let faces = squares.map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).concat();
+        faces.into_iter().map(|f| f.map(corner).map(|[x, y, z]| v3(x, y, z))).collect()
+    }
 
     /// Segments through edges and corners of a cube, as symmetry produces them, enter it once and
     /// leave it once.
     #[test]
     fn a_segment_through_an_edge_or_a_corner_crosses_once() {
-        let corner = |k: u32| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit as f32 * 2.0 - 1.0);
-        let squares = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-        let faces = squares.map(|[a, b, c, d]| [[a, b, c], [a, c, d]]).concat();
-        let sum = |p: V3, q: V3| -> i32 {
-            let of = |f: &[u32; 3]| f.map(corner).map(|[x, y, z]| v3(x, y, z));
-            faces.iter().map(of).map(|[a, b, c]| crossing(p, q, a, b, c)).sum()
-        };
+        let faces = cube();
+        let sum = |p: V3, q: V3| -> i32 { faces.iter().map(|&[a, b, c]| crossing(p, q, a, b, c)).sum() };
         let steps = [-3.0, -2.0, -1.5, 0.0, 1.5, 2.0, 3.0f32];
         for x in steps {
             for y in steps {

@@ -15,6 +15,15 @@ pub const ROWS: u32 = 4;
 /// edge a–b, 2 the edge b–c, 3 the edge c–a.
 pub const PART: u32 = internal::PART;
 
+/// Three corners.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Triangle {
+    pub a: V3,
+    pub b: V3,
+    pub c: V3,
+}
+
 /// A face in the local frame, relative to the center of the cube.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
@@ -150,6 +159,11 @@ impl Face {
     /// Corner `k`.
     pub fn corner(self, k: u32) -> V3 {
         pick(k == 1u32, self.a + self.ab, pick(k == 2u32, self.a + self.ac, self.a))
+    }
+
+    /// All three corners.
+    pub fn corners(self) -> Triangle {
+        Triangle { a: self.a, b: self.corner(1u32), c: self.corner(2u32) }
     }
 
     /// Whether the face is a segment or a point.
