@@ -5,7 +5,7 @@ use tesdf::collide::internal::Ahead;
 use tesdf::collide::{CollideError, CollideOptions, HiddenOverlap, InstanceId, Reduction, Scene, Shape};
 
 use super::contacts::contacts;
-use super::on_processor::why_undetected;
+use super::on_processor::{Divided, why_undetected};
 use super::pass::{GROUP, Parts, Pass, parts};
 use super::scene::instances::Instances;
 use super::scene::placed::Placed;
@@ -163,16 +163,6 @@ pub fn fixed_rows(scene: &Scene, instances: &Instances) -> Result<Vec<[f32; 4]>,
     Ok(rows.collect::<Result<Vec<_>, CollideError>>()?.into_flattened())
 }
 
-/// The first instance whose contacts kernels do not find, and why.
-fn undetected(scene: &Scene) -> Result<Option<(InstanceId, String)>, CollideError> {
-    for (id, instance) in scene.instances() {
-        if let Some(why) = why_undetected(scene.shape(instance.shape)?) {
-            return Ok(Some((id, why)));
-        }
-    }
-    Ok(None)
-}
-
 impl Detector {
     /// Finds contacts as [`detect`](Self::detect), and leaves them on the device. With `given`
     /// poses, the instances of the scene are there instead of at their own poses. Only counters are
@@ -211,7 +201,8 @@ impl Detector {
         if let Some((what, instead)) = of_processor {
             return Err(GpuError::Unavailable { what: format!("leaving {what} there"), instead });
         }
-        if let Some((id, why)) = undetected(scene)? {
+        if let Some(&id) = Divided::new(scene)?.on_processor.first() {
+            let why = why_undetected(scene.shape(scene.instance(id)?.shape)?).unwrap_or_default();
             return Err(GpuError::Unavailable {
                 what: format!("leaving the contacts of instance {} there: {why}", id.0),
                 instead: "detect contacts that are returned, of which the processor finds those",

@@ -10,7 +10,7 @@ use tesdf::collide::{
 pub struct Divided<'a> {
     /// The scene without the instances of [`on_processor`](Self::on_processor).
     pub on_device: Cow<'a, Scene>,
-    /// The instances that kernels do not detect, sorted. The processor finds all their contacts.
+    /// The instances that kernels do not detect, in the order of ids. The processor finds all their contacts.
     pub on_processor: Vec<InstanceId>,
 }
 
@@ -27,7 +27,6 @@ impl<'a> Divided<'a> {
                 on_processor.push(id);
             }
         }
-        on_processor.sort_unstable();
         let mut on_device = scene.clone();
         on_device.remove(&on_processor)?;
         Ok(Self { on_device: Cow::Owned(on_device), on_processor })
