@@ -1,11 +1,14 @@
 #!/usr/bin/env bash
-# Packages each crate that can be published. Compiles the library, parts and dynamics from the packaged
+# Compiles all crates except the GPU's with the oldest supported Rust. Packages each crate that can be
+# published. Compiles the library, parts and dynamics from the packaged
 # files. The other packages are not compiled: they need the GPU's or Rapier's crates, which would be
 # compiled again for minutes, and ./test compiles the same files.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
 . .ci/oldest.sh
+
+check --bins --workspace --exclude tesdf-gpu
 
 # A new folder each time, so that nothing of an earlier run is taken.
 mkdir -p target/packages

@@ -11,7 +11,8 @@ use support::bodies::{Body, Placed, RELATIONS, rotation, scene};
 use support::random::Random;
 use support::shapes;
 use tesdf::collide::{
-    CollideOptions, HiddenOverlap, Instance, InstanceId, Mode, Placement, Pose, Scene, Shape, detect,
+    CollideOptions, HiddenOverlap, HiddenSearch, Instance, InstanceId, Mode, Placement, Pose, Scene, Shape,
+    detect,
 };
 use tesdf::glam::DVec3;
 use tesdf_gpu::{Detector, DetectorOptions};
@@ -75,6 +76,11 @@ fn bodies_in_one_place_overlap_in_every_mode() {
         let [device, host] = both(&scene, mode);
         assert_eq!((device.len(), host.len()), (1, 1), "{mode:?}");
         assert!((device[0].depth - host[0].depth).abs() < 1e-5, "{device:?} instead of {host:?}");
+        let mut detector = Detector::new(&crate::device(), &scene, DetectorOptions::default()).expect("fits");
+        let [searched, found] = [HiddenSearch::On, HiddenSearch::Off].map(|hidden| {
+            detector.detect(&scene, &CollideOptions { hidden, ..options(mode) }).expect("detects")
+        });
+        assert_eq!((found.as_slice(), found.hidden.len()), (searched.as_slice(), 0), "{mode:?}");
     }
 }
 

@@ -78,6 +78,20 @@ fn torque_free_rotation_drifts_to_first_order() {
 }
 
 #[test]
+fn detections_end_once_a_step_has_settled() {
+    for (settled, expected) in [(0.0, 9), (1e-6, 2)] {
+        let mut system = System::new(GRAVITY);
+        add_plane(&mut system, Pose::IDENTITY);
+        add_free(&mut system, BRICK, Pose::at(DVec3::new(0.0, 0.0, 0.03)), Velocity::default());
+        let options = NewtonOptions { redetections: 8, settled, ..NewtonOptions::default() };
+        let mut engine = Newton::new(system, detect, nodes(1e-3), options).unwrap();
+        for _ in 0..10 {
+            assert_eq!(engine.step(1e-3).unwrap().detections, expected, "{settled}");
+        }
+    }
+}
+
+#[test]
 fn a_box_comes_to_rest_on_a_plane() {
     let tilt = DQuat::from_scaled_axis(DVec3::new(0.3, 0.2, 0.0));
     for redetections in 0..=2 {
@@ -210,7 +224,7 @@ fn deep_overlap_is_removed_without_a_kick() {
 #[test]
 fn values_out_of_range_are_refused() {
     let system = System::new(GRAVITY);
-    let bad = NewtonOptions { redetections: 3, ..NewtonOptions::default() };
+    let bad = NewtonOptions { redetections: 9, ..NewtonOptions::default() };
     let refused = Newton::new(system.clone(), nothing, nodes(0.0), bad);
     assert!(matches!(refused.err(), Some(DynamicsError::Option { option: "redetections", .. })));
     let mut engine = Newton::new(system, nothing, nodes(0.0), NewtonOptions::default()).unwrap();

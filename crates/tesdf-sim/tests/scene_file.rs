@@ -7,7 +7,7 @@ use tesdf::glam::DVec3;
 use tesdf::mesh::{SolidMesh, TriangleMesh, write};
 use tesdf_sim::record::{RecordError, RunRecord};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, MAX_BODIES, SceneError};
-use tesdf_sim::{Mass, SimulateError, simulate};
+use tesdf_sim::{Dynamics, Mass, SimulateError, simulate};
 
 const DROP: &str = r#"
 time_step = 1e-3
@@ -122,7 +122,15 @@ fn errors_name_the_line_and_the_body() {
         (change("[0, 0, 0.031]", "[0, 0, nan]"), vec!["line 13", "brick", "finite"]),
         (change("mass = 0.5", "mass = 0.5\nrotation = [0, 0, 0, 2]"), vec!["brick", "length 1"]),
         (change("time_step = 1e-3", "time_step = 0"), vec!["time_step", "above 0"]),
-        (change("[record]", "[solver]\nredetections = 3\n[record]"), vec!["solver", "redetections"]),
+        (change("[record]", "[solver]\nredetections = 9\n[record]"), vec!["solver", "redetections"]),
+        (
+            change("[record]", "[[exclude]]\nbodies = [\"brick\", \"floors\"]\n[record]"),
+            vec!["exclude", "number 1", "no body floors", "floor, brick"],
+        ),
+        (
+            change("[record]", "[[exclude]]\nbodies = [\"brick\", \"brick\"]\n[record]"),
+            vec!["exclude", "both bodies are brick"],
+        ),
         (change("[record]", "[detector]\ntolerance = 0\n[record]"), vec!["detector", "tolerance"]),
         (change("[record]", "[detector]\nmode = \"vertex\"\n[record]"), vec!["line 6", "vertex"]),
         (change("[record]", "[detector]\ncontacts_per = \"body\"\n[record]"), vec!["line 6", "body"]),
@@ -137,12 +145,28 @@ fn errors_name_the_line_and_the_body() {
         ),
     ];
     for (k, (text, expected)) in cases.into_iter().enumerate() {
-        let text = if k >= 19 { refusal(&text) } else { text };
+        let text = if k >= 21 { refusal(&text) } else { text };
         assert!(text.starts_with("drop.toml"), "case {k}: {text}");
         for part in expected {
             assert!(text.contains(part), "case {k}: no {part:?} in {text}");
         }
     }
+}
+
+#[test]
+fn excluded_bodies_pass_through_each_other() {
+    let falls = |text: &str| {
+        let loaded = load(text).unwrap();
+        let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
+        for _ in 0..100 {
+            engine.step(1e-3).unwrap();
+        }
+        engine.system().states()[1].pose.translation.z
+    };
+    let stands = falls(DROP);
+    assert!((stands - 0.03).abs() < 1e-5, "the brick is at {stands}");
+    let fallen = falls(&format!("{DROP}\n[[exclude]]\nbodies = [\"brick\", \"floor\"]\n"));
+    assert!(fallen < -0.015, "the brick is at {fallen}");
 }
 
 #[test]

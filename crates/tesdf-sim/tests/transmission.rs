@@ -10,8 +10,9 @@ fn text() -> String {
     let text = std::fs::read_to_string(support::path_of("engine-transmission")).unwrap();
     let (bodies, _) = text.split_once("# Between the gears").expect("the comment above the scripts");
     let is_of_first = |block: &&str| {
-        let name = block.lines().find_map(|line| line.strip_prefix("name = \"")).unwrap_or_default();
-        !name.trim_end_matches('"').ends_with(['2', '3', '4', '5'])
+        let of = |key: &str| block.lines().find_map(|line| line.strip_prefix(key)?.split('"').next());
+        let name = of("name = \"").or_else(|| of("bodies = [\"")).unwrap_or_default();
+        !name.ends_with(['2', '3', '4', '5'])
     };
     let bodies = bodies.split("\n[[").filter(is_of_first).collect::<Vec<_>>().join("\n[[");
     let (before, rest) = bodies.split_once("gears = [").expect("the criterion");

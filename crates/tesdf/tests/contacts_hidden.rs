@@ -8,8 +8,8 @@ use support::random::Random;
 use support::shapes;
 use tesdf::Length;
 use tesdf::collide::{
-    ClearanceOptions, CollideOptions, Contacts, Instance, InstanceId, Mode, Placement, Pose, Scene, Shape,
-    clearance, detect,
+    ClearanceOptions, CollideOptions, Contacts, HiddenSearch, Instance, InstanceId, Mode, Placement, Pose,
+    Reduction, Scene, Shape, clearance, detect, hidden_overlaps,
 };
 use tesdf::glam::{DQuat, DVec3};
 
@@ -49,6 +49,24 @@ fn hidden(scene: &Scene, mode: Mode) -> Option<f64> {
 
 fn deepest(found: &Contacts) -> f64 {
     found.iter().map(|c| -c.distance).fold(0.0, f64::max)
+}
+
+#[test]
+fn without_the_search_contacts_are_the_same() {
+    let scene = bodies(cube(), cube(), at(0.3, 0.0, 0.0));
+    for mode in MODES {
+        let mut options = CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode) };
+        for reduction in [Reduction::None, Reduction::Deepest(4), Reduction::Spread(4)] {
+            options = CollideOptions { reduction, hidden: HiddenSearch::On, ..options };
+            let searched = detect(&scene, &options).expect("good");
+            assert_eq!(searched.hidden.is_empty(), mode != NODE && reduction != Reduction::Spread(4));
+            options.hidden = HiddenSearch::Off;
+            let found = detect(&scene, &options).expect("good");
+            assert_eq!((found.as_slice(), found.hidden.len()), (searched.as_slice(), 0), "{mode:?}");
+            let later = hidden_overlaps(&scene, &options, found.as_slice()).expect("good");
+            assert_eq!(later, searched.hidden, "{mode:?}, {reduction:?}");
+        }
+    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Middle phase: finds hidden overlaps, then the nodes with their cells, the polygons, or the
 //! faces.
 use cubecl::prelude::*;
-use tesdf::collide::Mode;
+use tesdf::collide::{HiddenSearch, Mode};
 
 use super::pass::{Parts, Pass, parts};
 use super::stages::launch;
@@ -13,7 +13,9 @@ use crate::kernels::reduce::members;
 
 impl Pass<'_> {
     pub(super) fn middle(&mut self, per_meshlet: &CubeCount) -> Result<(), GpuError> {
-        self.hidden(per_meshlet)?;
+        if self.options.hidden == HiddenSearch::On {
+            self.hidden(per_meshlet)?;
+        }
         match parts(self.options) {
             Parts::Nodes => self.nodes(per_meshlet),
             Parts::Polygons => self.polygons(per_meshlet),

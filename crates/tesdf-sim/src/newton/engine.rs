@@ -3,7 +3,9 @@ use std::time::Instant;
 use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
-use tesdf::collide::{CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, Pose, Scene};
+use tesdf::collide::{
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Pose, Scene,
+};
 
 use super::NewtonOptions;
 use super::deep::Surfaces;
@@ -138,9 +140,14 @@ impl Newton {
         CollideOptions { contact_distance, speculative_time, ..self.collide }
     }
 
-    fn detect(&mut self, step: &mut Step, states: &[State]) -> Result<Contacts, DynamicsError> {
+    fn detect(
+        &mut self,
+        step: &mut Step,
+        states: &[State],
+        hidden: HiddenSearch,
+    ) -> Result<Contacts, DynamicsError> {
         let start = Instant::now();
-        let options = self.options_of(step);
+        let options = CollideOptions { hidden, ..self.options_of(step) };
         let contacts = self.detector.detect(self.system.scene_at(states)?, &options)?;
         step.report.detections += 1;
         step.report.detection += start.elapsed();
@@ -231,7 +238,7 @@ impl Newton {
 
     /// Detects as far ahead as the velocities of `ahead` move the bodies.
     fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
-        let contacts = self.detect(step, ahead)?;
+        let contacts = self.detect(step, ahead, HiddenSearch::On)?;
         let options = self.options_of(step);
         Ok(Look::new(contacts, self.system.scene_at(ahead)?, &options)?)
     }
@@ -308,6 +315,15 @@ impl Newton {
         Ok(place.iter().any(Option::is_some))
     }
 
+    /// Bound of the way between the points of free bodies that these velocities move in a step, m.
+    fn farthest(&self, step: &Step, from: &[Vector6<f64>], to: &[Vector6<f64>]) -> f64 {
+        let way = |((free, from), to): ((&FreeBody, &Vector6<f64>), &Vector6<f64>)| {
+            let (linear, angular) = unpack(&(to - from));
+            step.h * (linear.length() + self.sizes[free.body] * angular.length())
+        };
+        step.free.iter().zip(from).zip(to).map(way).fold(0.0, f64::max)
+    }
+
     /// The velocities that move the poses, and the velocities that the next step starts from.
     fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
         let contacts = &self.surfaces.acting(self.system.scene(), contacts, |c| self.is_deep(c));
@@ -343,7 +359,8 @@ impl Newton {
                     let seen = &mut predicted[free.body];
                     (seen.linear, seen.angular) = unpack(&step.target[k]);
                 }
-                let contacts = self.detect(step, &predicted)?;
+                // A step reports the overlaps at its beginning.
+                let contacts = self.detect(step, &predicted, HiddenSearch::Off)?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
                 let mut next =
                     self.gaps(step).predicted_rows(contacts.as_slice(), &poses, &velocities, &beginning);
@@ -355,7 +372,11 @@ impl Newton {
                 let joints = rows.len() - joints.len()..;
                 predict(&mut rows[joints], &self.gaps(step).bodies(), &poses, &velocities, step.h);
                 let motion = stiffened.as_ref().unwrap_or(&plain);
-                (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &velocities);
+                let before = velocities;
+                (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &before);
+                if self.farthest(step, &before, &velocities) < self.options.settled {
+                    break;
+                }
             }
         }
         let carried = match rows.iter().any(|row| row.relaxed_gap > row.gap) {

@@ -9,13 +9,18 @@ use crate::script::Scripts;
 use crate::{Joint, System};
 
 impl LoadedScene {
-    /// Adds the friction of pairs and the joints to the system, and checks the scripts.
+    /// Adds the friction of pairs, the excluded pairs and the joints to the system, and checks the
+    /// scripts.
     pub(super) fn connect(&self, system: &mut System) -> Result<(), SceneError> {
         for (k, pair) in self.scene.friction.iter().enumerate() {
             let at = |reason: String| self.value("friction", format!("number {}: {reason}", k + 1));
-            let [a, b] = &pair.bodies;
-            let [a, b] = [body(system, a).map_err(at)?, body(system, b).map_err(at)?];
+            let [a, b] = pair_of(system, &pair.bodies).map_err(at)?;
             system.set_pair_friction(a, b, pair.coefficient).map_err(|e| at(e.to_string()))?;
+        }
+        for (k, pair) in self.scene.exclude.iter().enumerate() {
+            let at = |reason: String| self.value("exclude", format!("number {}: {reason}", k + 1));
+            let [a, b] = pair_of(system, &pair.bodies).map_err(at)?;
+            system.exclude(a, b).map_err(|e| at(e.to_string()))?;
         }
         for (k, section) in self.scene.joints.iter().enumerate() {
             let at = |reason: String| self.value("joints", format!("{}: {reason}", section.name));
@@ -81,6 +86,15 @@ fn joint(system: &System, section: &JointSection) -> Result<Joint, String> {
     let poses = [parent.map_or(Pose::IDENTITY, pose), pose(child)];
     let joint = Joint::new(&section.name, section.kind, (parent, child), poses, frame);
     Ok(Joint { limits: section.limits, motor: section.motor, ..joint })
+}
+
+/// The numbers of two different bodies.
+fn pair_of(system: &System, names: &[String; 2]) -> Result<[usize; 2], String> {
+    let [a, b] = [body(system, &names[0])?, body(system, &names[1])?];
+    match a == b {
+        true => Err(format!("both bodies are {}; give two different bodies", names[0])),
+        false => Ok([a, b]),
+    }
 }
 
 fn body(system: &System, name: &str) -> Result<usize, String> {

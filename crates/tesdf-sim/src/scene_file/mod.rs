@@ -39,6 +39,9 @@
 //! interpolation = "step"
 //! keyframes = [{ time = 0, target = 1.5 }, { time = 1, target = 0 }]
 //!
+//! [[exclude]]                  # no contacts between these two
+//! bodies = ["link0", "floor"]
+//!
 //! [detector]
 //! mode = "exact"               # node, face, exact, or off
 //! ```
@@ -104,6 +107,9 @@ pub struct SceneFile {
     /// Coefficients of friction of pairs of bodies, in place of those that follow from the bodies.
     #[serde(default)]
     pub friction: Vec<FrictionSection>,
+    /// Pairs of bodies that have no contacts with each other.
+    #[serde(default)]
+    pub exclude: Vec<ExcludeSection>,
     /// Joints between bodies, or a body and the world.
     #[serde(default)]
     pub joints: Vec<JointSection>,
@@ -123,6 +129,15 @@ pub struct FrictionSection {
     pub bodies: [String; 2],
     /// Coefficient of friction.
     pub coefficient: f64,
+}
+
+/// Two bodies that have no contacts with each other, such as a shaft and a gear whose bearing is a
+/// joint with the world.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExcludeSection {
+    /// The names of the two bodies.
+    pub bodies: [String; 2],
 }
 
 /// A joint. Its two bodies have no contacts with each other.

@@ -112,10 +112,10 @@ fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) 
     let stopped = || stop.load(Ordering::Relaxed);
     match options.reduction {
         Reduction::Deepest(n) => {
-            return few::of_pairs(pairs, options.mode, stop, |pair| deepest::of_pair(pair, n as usize));
+            return few::of_pairs(pairs, options, stop, |pair| deepest::of_pair(pair, n as usize));
         }
         Reduction::Spread(n) => {
-            return few::of_pairs(pairs, options.mode, stop, |pair| spread::of_pair(pair, n as usize));
+            return few::of_pairs(pairs, options, stop, |pair| spread::of_pair(pair, n as usize));
         }
         Reduction::None | Reduction::PerPair(_) => {}
     }
@@ -155,6 +155,6 @@ fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) 
     let Reduced { contacts, reports, bytes } = reduced(contacts, options.reduction);
     statistics.reduced = all - contacts.len();
     statistics.bytes += bytes;
-    let hidden = hidden::among(pairs, options.mode, &contacts, stop);
+    let hidden = hidden::among(pairs, options, &contacts, stop);
     Contacts::new(contacts, statistics, reports, hidden)
 }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::field::ROUNDING;
 use super::ordered_pair::OrderedPair;
 use super::reduce::Unfound;
-use super::{Contact, Contacts, Mode, PairReduction, Statistics, hidden};
+use super::{CollideOptions, Contact, Contacts, PairReduction, Statistics, hidden};
 use crate::geometry::Aabb;
 use crate::parallel::*;
 
@@ -14,7 +14,7 @@ use crate::parallel::*;
 /// must be adjacent. Once `stop` is set, contacts are missing.
 pub fn of_pairs(
     pairs: &[OrderedPair],
-    mode: Mode,
+    options: &CollideOptions,
     stop: &AtomicBool,
     search: impl Fn(&[OrderedPair]) -> OfPair + Sync + Send,
 ) -> Contacts {
@@ -37,7 +37,7 @@ pub fn of_pairs(
     }
     statistics.bytes += size_of_val(pairs) + size_of_val(all.as_slice());
     reports.sort_unstable_by_key(|r| (r.instance_a, r.instance_b));
-    let hidden = hidden::among(pairs, mode, &all, stop);
+    let hidden = hidden::among(pairs, options, &all, stop);
     Contacts::new(all, statistics, reports, hidden)
 }
 

@@ -20,7 +20,7 @@ use super::field_value::FieldValue;
 use super::ordered_pair::OrderedPair;
 use super::queue::Queue;
 use super::surface::{Branch, SurfaceBody};
-use super::{CollideError, CollideOptions, Contact, HiddenOverlap, InstanceId, Mode, Scene};
+use super::{CollideError, CollideOptions, Contact, HiddenOverlap, HiddenSearch, InstanceId, Mode, Scene};
 use crate::asset::layout::TreeChild;
 use crate::geometry::Aabb;
 use crate::query::corner_reach;
@@ -82,17 +82,21 @@ pub fn hidden_overlaps(
     options: &CollideOptions,
     contacts: &[Contact],
 ) -> Result<Vec<HiddenOverlap>, CollideError> {
-    Ok(among(&OrderedPair::all(scene, options)?, options.mode, contacts, &AtomicBool::new(false)))
+    let options = CollideOptions { hidden: HiddenSearch::On, ..*options };
+    Ok(among(&OrderedPair::all(scene, &options)?, &options, contacts, &AtomicBool::new(false)))
 }
 
 /// The same for ordered pairs. The two orders of a pair must be adjacent. Once `stop` is set,
-/// overlaps are missing.
+/// overlaps are missing. Empty where the options say that nothing is searched.
 pub fn among(
     pairs: &[OrderedPair],
-    mode: Mode,
+    options: &CollideOptions,
     contacts: &[Contact],
     stop: &AtomicBool,
 ) -> Vec<HiddenOverlap> {
+    if options.hidden == HiddenSearch::Off {
+        return Vec::new();
+    }
     let shown = Shown::by(contacts);
     let overlap = |pair: &[OrderedPair]| {
         if stop.load(Ordering::Relaxed) {
@@ -102,7 +106,7 @@ pub fn among(
         let shown = shown.of(a, b);
         let depth = |p: &OrderedPair| {
             let unit = p.field.unit();
-            depth(&p.surface, &p.field, mode, shown / unit) * unit
+            depth(&p.surface, &p.field, options.mode, shown / unit) * unit
         };
         let depth = pair.iter().map(depth).fold(0.0, f64::max);
         let is_hidden = depth > HiddenOverlap::SHOWN * shown;

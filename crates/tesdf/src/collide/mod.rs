@@ -99,7 +99,7 @@ pub use ids::{InstanceId, ShapeId};
 pub use instance_pairs::{InstancePair, instance_pairs};
 pub use kept_pairs::InstancePairs;
 pub use motion::Motion;
-pub use options::{CollideOptions, ContactsPer, Mode, Reduction};
+pub use options::{CollideOptions, ContactsPer, HiddenSearch, Mode, Reduction};
 pub use patches::{ContactPatch, ContactPatches, PatchOptions, PatchPoint, PatchTracker};
 pub use pose::{Placement, Pose};
 pub use reduce::{reduce_pairs, wrench_error};

@@ -70,6 +70,18 @@ pub enum Reduction {
     Spread(u32),
 }
 
+/// Whether a detection searches for [hidden overlaps](super::HiddenOverlap).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HiddenSearch {
+    /// [`Contacts::hidden`](super::Contacts::hidden) lists them.
+    #[default]
+    On,
+    /// None are listed. This saves time in the mode [`Node`](Mode::Node), where contacts miss most,
+    /// for detections whose overlaps nobody reads.
+    Off,
+}
+
 /// Options of a detection.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CollideOptions {
@@ -98,6 +110,9 @@ pub struct CollideOptions {
     pub cos_theta: Option<f64>,
     /// Number of contacts kept per pair of instances.
     pub reduction: Reduction,
+    /// Whether overlaps are searched for that no contact shows. Changes no contact.
+    #[serde(default)]
+    pub hidden: HiddenSearch,
     /// Precision of the reported distances, normals and witness points.
     #[serde(skip, default = "exact")]
     pub precision: Precision,
@@ -172,6 +187,7 @@ impl Default for CollideOptions {
             speculative_time: 0.0,
             cos_theta: None,
             reduction: Reduction::None,
+            hidden: HiddenSearch::On,
             precision: Precision::F64,
         }
     }
