@@ -262,6 +262,25 @@ fn friction_holds_a_box_that_gravity_or_a_wrench_pulls() {
 }
 
 #[test]
+fn damping_slows_a_rotation() {
+    let shape = Shape::Sphere { radius: 0.02 };
+    let mass = Mass::Free(steel(&shape));
+    let mut system = System::new(DVec3::ZERO);
+    let body = add(&mut system, "ball", shape, Pose::at(DVec3::ZERO), mass);
+    system.set_angular_damping(body, 2.0).expect("a rate");
+    let spin = DVec3::new(0.0, 0.0, 5.0);
+    let state = State { angular: spin, ..system.states()[body] };
+    system.set_state(body, state).expect("finite");
+    let mut engine = engine(system, collide(Mode::Exact));
+    for _ in 0..100 {
+        engine.step(1e-3).expect("a step");
+    }
+    let expected = spin / 1.002f64.powi(100);
+    let found = engine.system().states()[body].angular;
+    assert!(found.distance(expected) < 1e-9, "{found} instead of {expected}");
+}
+
+#[test]
 fn kinematic_bodies_move_and_joints_are_refused() {
     let ball = Shape::Sphere { radius: 0.01 };
     let mut system = System::new(GRAVITY);

@@ -27,6 +27,9 @@ pub struct Body {
     pub mass: Mass,
     /// Coefficient of friction, see [`System::friction`].
     pub friction: f64,
+    /// Rate at which the angular velocity of a free body decays, 1/s: in a step of h seconds, it is
+    /// divided by 1 + h times this.
+    pub angular_damping: f64,
 }
 
 /// A force and a torque that act on a body from outside, in the world frame.
@@ -98,7 +101,7 @@ impl System {
     }
 
     /// Adds a body and returns its number: 0, 1, 2, … in the order of the calls. A free or
-    /// kinematic body starts with the velocity of `instance`. Its coefficient of friction is 0.
+    /// kinematic body starts with the velocity of `instance`. Its friction and damping are 0.
     ///
     /// # Errors
     /// The same errors as [`Scene::add`].
@@ -120,7 +123,7 @@ impl System {
                     (velocity.linear + velocity.angular.cross(arm), velocity.angular);
             }
         }
-        self.bodies.push(Body { name: name.into(), instance: id, mass, friction: 0.0 });
+        self.bodies.push(Body { name: name.into(), instance: id, mass, friction: 0.0, angular_damping: 0.0 });
         self.states.push(state);
         self.wrenches.push(Wrench::default());
         Ok(self.bodies.len() - 1)
@@ -188,8 +191,17 @@ impl System {
     /// or more.
     pub fn set_friction(&mut self, body: usize, coefficient: f64) -> Result<(), DynamicsError> {
         self.body(body)?;
-        check_friction(coefficient)?;
-        self.bodies[body].friction = coefficient;
+        self.bodies[body].friction = not_negative("friction", coefficient)?;
+        Ok(())
+    }
+
+    /// Sets the [angular damping](Body::angular_damping) of a body, 1/s.
+    ///
+    /// # Errors
+    /// The same errors as [`set_friction`](Self::set_friction).
+    pub fn set_angular_damping(&mut self, body: usize, damping: f64) -> Result<(), DynamicsError> {
+        self.body(body)?;
+        self.bodies[body].angular_damping = not_negative("angular_damping", damping)?;
         Ok(())
     }
 
@@ -201,7 +213,7 @@ impl System {
     pub fn set_pair_friction(&mut self, a: usize, b: usize, coefficient: f64) -> Result<(), DynamicsError> {
         self.body(a)?;
         self.body(b)?;
-        check_friction(coefficient)?;
+        let coefficient = not_negative("friction", coefficient)?;
         self.pair_friction.insert((a.min(b), a.max(b)), coefficient);
         Ok(())
     }
@@ -356,14 +368,10 @@ impl System {
     }
 }
 
-fn check_friction(found: f64) -> Result<(), DynamicsError> {
+fn not_negative(option: &'static str, found: f64) -> Result<f64, DynamicsError> {
     match found >= 0.0 && found.is_finite() {
-        true => Ok(()),
-        false => Err(DynamicsError::Option {
-            option: "friction",
-            found,
-            expected: "a finite number, 0 or greater",
-        }),
+        true => Ok(found),
+        false => Err(DynamicsError::Option { option, found, expected: "a finite number, 0 or greater" }),
     }
 }
 

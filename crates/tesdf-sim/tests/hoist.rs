@@ -6,15 +6,17 @@ use tesdf_parts::{Resolution, Spool};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
 use tesdf_sim::{RunRecord, Summary};
 
-/// The scene of the repository with ten links a chain, that turns its spools by 0.4 rad.
-fn text() -> String {
-    let mut text = std::fs::read_to_string(support::path_of("chained-sam")).unwrap();
+/// A scene of the repository with ten links a chain, that turns its spools by 0.4 rad. `platform` is
+/// where its platform is, m, with 100 links and with ten.
+fn short(scene: &str, platform: [&str; 2]) -> String {
+    let mut text = std::fs::read_to_string(support::path_of(scene)).unwrap();
+    let [from, to] = platform.map(|z| format!("translation = [0, 0, {z}]"));
     for (from, to) in [
         ("count = 100", "count = 10"),
         ("a99", "a9"),
         ("b99", "b9"),
         ("c99", "c9"),
-        ("translation = [0, 0, -2.90001]", "translation = [0, 0, -0.29091]"),
+        (&from, &to),
         ("duration = 3.85", "duration = 0.3"),
         ("time = 0.4, target = 4", "time = 0.15, target = 4"),
         ("time = 3.25, target = 4", "time = 0.2, target = 4"),
@@ -27,6 +29,10 @@ fn text() -> String {
     text
 }
 
+fn text() -> String {
+    short("chained-sam", ["-2.90001", "-0.29091"])
+}
+
 fn load(text: String) -> Result<LoadedScene, SceneError> {
     LoadedScene::parse(text, support::path_of("chained-sam"))
 }
@@ -34,8 +40,12 @@ fn load(text: String) -> Result<LoadedScene, SceneError> {
 fn run(change: impl FnOnce(&mut LoadedScene)) -> (RunRecord, Summary) {
     let mut loaded = load(text()).unwrap();
     change(&mut loaded);
+    run_loaded(&loaded)
+}
+
+fn run_loaded(loaded: &LoadedScene) -> (RunRecord, Summary) {
     let system = loaded.system().unwrap();
-    let (record, mut summary) = support::run(&loaded, system);
+    let (record, mut summary) = support::run(loaded, system);
     (summary.detection_ms, summary.solution_ms) = (0.0, 0.0);
     (record, summary)
 }
@@ -59,6 +69,34 @@ fn the_platform_rises_the_same_on_any_number_of_threads() {
         assert_eq!(again, summary, "{threads} threads");
         assert_eq!(other.states(60), record.states(60), "{threads} threads");
     }
+}
+
+#[test]
+fn with_a_skin_vertices_hoist_it() {
+    let loaded = load(short("chained-sam-nodes", ["-2.891397", "-0.290127"])).unwrap();
+    assert_eq!(loaded.scene.detector.mode, DetectorMode::Node);
+    let (_, summary) = run_loaded(&loaded);
+    assert_eq!(summary.passed, Some(true), "{summary:?}");
+}
+
+/// The scene for nodes is the other one, but for its skin, what follows from it, the damping, and
+/// finer links.
+#[test]
+fn both_scenes_are_one_but_for_a_few_values() {
+    let [faces, nodes] = ["chained-sam", "chained-sam-nodes"].map(|name| {
+        let text = std::fs::read_to_string(support::path_of(name)).unwrap();
+        let is_of_scene = |line: &&str| !line.starts_with('#') && !line.starts_with("angular_damping");
+        text.lines().filter(is_of_scene).map(|line| format!("{line}\n")).collect::<String>()
+    });
+    let expected = [
+        ("mode = \"exact\"\n", "mode = \"node\"\n\n[solver]\nskin = 2e-3\n"),
+        ("pitch = 0.029 ", "pitch = 0.0289127 "),
+        ("winding_radius = 0.0625\n", "winding_radius = 0.0625873\n"),
+        ("[0, 0, -2.90001]", "[0, 0, -2.891397]"),
+        ("chain_link.ply", "chain_link_36.ply"),
+        ("[0.02899, 0, 0]", "[0.028903, 0, 0]"),
+    ];
+    assert_eq!(expected.iter().fold(faces, |text, (from, to)| text.replace(from, to)), nodes);
 }
 
 #[test]

@@ -131,6 +131,7 @@ fn errors_name_the_line_and_the_body() {
             change("[record]", "[[exclude]]\nbodies = [\"brick\", \"brick\"]\n[record]"),
             vec!["exclude", "both bodies are brick"],
         ),
+        (change("mass = 0.5", "mass = 0.5\nangular_damping = -1"), vec!["brick", "angular_damping", "-1"]),
         (change("[record]", "[detector]\ntolerance = 0\n[record]"), vec!["detector", "tolerance"]),
         (change("[record]", "[detector]\nmode = \"vertex\"\n[record]"), vec!["line 6", "vertex"]),
         (change("[record]", "[detector]\ncontacts_per = \"body\"\n[record]"), vec!["line 6", "body"]),
@@ -145,7 +146,7 @@ fn errors_name_the_line_and_the_body() {
         ),
     ];
     for (k, (text, expected)) in cases.into_iter().enumerate() {
-        let text = if k >= 21 { refusal(&text) } else { text };
+        let text = if k >= 22 { refusal(&text) } else { text };
         assert!(text.starts_with("drop.toml"), "case {k}: {text}");
         for part in expected {
             assert!(text.contains(part), "case {k}: no {part:?} in {text}");

@@ -11,7 +11,7 @@ use super::NewtonOptions;
 use super::deep::Surfaces;
 use super::gaps::Gaps;
 use super::geometric::Motion;
-use super::integrate::{free_velocity, moved, pack, unpack, velocity};
+use super::integrate::{Outside, free_velocity, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
 use super::look::Look;
@@ -103,8 +103,9 @@ impl Newton {
             if let Mass::Free(mass) = body.mass {
                 free_of[k] = Some(free.len());
                 free.push(FreeBody::new(k, &mass, state));
-                let wrench = self.system.wrenches()[k];
-                target.push(free_velocity(&mass, state, self.system.gravity, wrench, h));
+                let (gravity, wrench) = (self.system.gravity, self.system.wrenches()[k]);
+                let outside = Outside { gravity, wrench, angular_damping: body.angular_damping };
+                target.push(free_velocity(&mass, state, &outside, h));
             }
         }
         let poses = states.iter().map(|state| state.pose).collect();

@@ -20,15 +20,21 @@ pub fn unpack(v: &Vector6<f64>) -> (DVec3, DVec3) {
     (DVec3::new(v[0], v[1], v[2]), DVec3::new(v[3], v[4], v[5]))
 }
 
-/// The velocity after a step of `h` seconds without contacts: gravity, a wrench from outside and an
-/// implicit gyroscopic term.
-pub fn free_velocity(
-    mass: &MassProperties,
-    state: &State,
-    gravity: DVec3,
-    wrench: Wrench,
-    h: f64,
-) -> Vector6<f64> {
+/// What acts on a body besides contacts and joints.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outside {
+    /// Acceleration, m/s².
+    pub gravity: DVec3,
+    /// Force and torque.
+    pub wrench: Wrench,
+    /// As [`Body::angular_damping`](crate::Body::angular_damping).
+    pub angular_damping: f64,
+}
+
+/// The velocity after a step of `h` seconds without contacts: what acts from outside, with implicit
+/// damping, and an implicit gyroscopic term.
+pub fn free_velocity(mass: &MassProperties, state: &State, outside: &Outside, h: f64) -> Vector6<f64> {
+    let Outside { gravity, wrench, angular_damping } = *outside;
     let rotation = state.pose.rotation;
     let before = rotation.inverse() * state.angular;
     let inertia = mass.inertia;
@@ -49,6 +55,7 @@ pub fn free_velocity(
             break;
         }
     }
+    let spin = spin / (1.0 + angular_damping * h);
     let turn = rotation * spin + h * (mass.inertia_in_world(state.pose).inverse() * wrench.torque);
     pack(state.linear + h * (gravity + wrench.force / mass.mass), turn)
 }
@@ -81,11 +88,16 @@ mod tests {
         let mut state = State::at_rest(Pose { translation: DVec3::ONE, rotation });
         state.angular = DVec3::new(3.0, -5.0, 8.0);
         let h = 0.01;
-        let (linear, angular) = unpack(&free_velocity(&mass, &state, DVec3::NEG_Z, Wrench::default(), h));
+        let mut outside = Outside { gravity: DVec3::NEG_Z, ..Outside::default() };
+        let (linear, angular) = unpack(&free_velocity(&mass, &state, &outside, h));
         assert_eq!(linear, DVec3::new(0.0, 0.0, -0.01));
         let i = mass.inertia_in_world(state.pose);
         let residual = i * (angular - state.angular) + h * angular.cross(i * angular);
         assert!(residual.length() < 1e-13, "{residual}");
+        outside.angular_damping = 100.0;
+        let (same, slower) = unpack(&free_velocity(&mass, &state, &outside, h));
+        assert_eq!(same, linear);
+        assert!(slower.distance(angular / 2.0) < 1e-15, "{slower} instead of half of {angular}");
     }
 
     #[test]

@@ -62,7 +62,10 @@ impl LoadedScene {
             let body = system
                 .add(&section.name, instance, mass)
                 .map_err(|e| self.body_error(k, instance_reason(e)))?;
-            system.set_friction(body, section.friction).map_err(|e| self.body_error(k, e.to_string()))?;
+            let given = system.set_friction(body, section.friction);
+            given
+                .and_then(|()| system.set_angular_damping(body, section.angular_damping))
+                .map_err(|e| self.body_error(k, e.to_string()))?;
         }
         self.connect(&mut system)?;
         self.check_criteria(&system)?;

@@ -240,6 +240,9 @@ pub struct BodySection {
     /// Coefficient of friction. Between two bodies the geometric mean of theirs acts.
     #[serde(default)]
     pub friction: f64,
+    /// Rate at which the angular velocity of a free body decays, 1/s.
+    #[serde(default)]
+    pub angular_damping: f64,
 }
 
 fn one() -> f64 {
