@@ -62,8 +62,8 @@ impl LoadedScene {
             let body = system
                 .add(&section.name, instance, mass)
                 .map_err(|e| self.body_error(k, instance_reason(e)))?;
-            let given = system.set_friction(body, section.friction);
-            given
+            system
+                .set_friction(body, section.friction)
                 .and_then(|()| system.set_angular_damping(body, section.angular_damping))
                 .map_err(|e| self.body_error(k, e.to_string()))?;
         }
