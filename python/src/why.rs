@@ -23,6 +23,7 @@ struct Why<'a> {
 #[derive(Serialize)]
 struct Part<'a> {
     id: u32,
+    contact_distance: f64,
     broad: &'static str,
     bound: Option<f64>,
     polygons: Vec<Polygon<'a>>,
@@ -47,7 +48,9 @@ impl<'a> From<&'a PartReport> for Part<'a> {
             BroadVerdict::PrunedByTree { bound } => ("pruned_by_tree", Some(bound)),
             BroadVerdict::PrunedByBall { bound } => ("pruned_by_ball", Some(bound)),
         };
-        Self { id: part.id, broad, bound, polygons: part.polygons.iter().map(Polygon::from).collect() }
+        let PartReport { id, contact_distance, .. } = *part;
+        let polygons = part.polygons.iter().map(Polygon::from).collect();
+        Self { id, contact_distance, broad, bound, polygons }
     }
 }
 

@@ -478,6 +478,8 @@ class WhyPart:
     """A face, vertex or edge of a."""
 
     id: int
+    contact_distance: float
+    """at most that of the pair: less where the part hardly moves against b"""
     broad: str
     """"candidate"; or why it was dropped: "pruned_by_tree" or "pruned_by_ball" """
     bound: Optional[float]

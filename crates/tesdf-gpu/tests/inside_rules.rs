@@ -6,6 +6,7 @@ mod support;
 
 mod compare;
 
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 use compare::{Compared, device, each_mode, hold};
@@ -20,7 +21,7 @@ use tesdf::collide::{
     detect,
 };
 use tesdf::encode::{Encoder, Preset};
-use tesdf::glam::DVec3;
+use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf_gpu::{Detector, DetectorOptions, GpuError, GpuShapes};
 
@@ -172,6 +173,35 @@ fn sheets_touch_as_on_the_processor() {
         all.add(hold(&scene, &options, 3.0));
     }
     all.is_good(500);
+}
+
+/// Sheets that cross each other and a box without a vertex in it.
+#[test]
+fn hidden_overlaps_of_sheets_are_those_of_the_processor() {
+    let corners = [-DVec3::X - DVec3::Y, DVec3::X - DVec3::Y, DVec3::X + DVec3::Y, DVec3::Y - DVec3::X];
+    let plate = Parts::default().add(&corners, &[[0, 1, 2], [0, 2, 3]], Outward).mesh();
+    let plate = encode(plate, InsideRule::Sheet { thickness: 0.2 }.into());
+    let mut scene = Scene::new();
+    let plate = scene.add_shape(plate).expect("a shape");
+    let small = scene.add_shape(Shape::Box { half_extents: DVec3::splat(0.25) }).expect("a shape");
+    let across = |z: f64| Pose { translation: z * DVec3::Z, rotation: DQuat::from_rotation_x(0.5 * PI) };
+    for (world, (other, pose)) in
+        [(plate, across(0.0)), (small, Pose::at(DVec3::new(0.3, 0.2, 0.0))), (plate, across(1.25))]
+            .into_iter()
+            .enumerate()
+    {
+        for instance in [Instance::new(plate, Pose::IDENTITY), Instance::new(other, pose)] {
+            scene.add(Instance { world: world as u32, ..instance }).expect("an instance");
+        }
+    }
+    let options = CollideOptions::with_mode(Mode::Node);
+    let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("uploads");
+    let found = detector.detect(&scene, &options).expect("contacts").hidden;
+    let expected = detect(&scene, &options).expect("contacts").hidden;
+    assert_eq!((found.len(), expected.len()), (2, 2), "{found:?} {expected:?}");
+    for (found, greatest) in found.iter().zip([0.2, 0.35]) {
+        assert!((0.74 * greatest..greatest + 1e-5).contains(&found.depth), "{found:?} of {greatest}");
+    }
 }
 
 /// Each rule that is told by more than the cells: closed and open meshes, overlaps and sheets.

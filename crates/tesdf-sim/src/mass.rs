@@ -1,8 +1,16 @@
-//! Mass, centre of mass and inertia of closed meshes and simple shapes.
+//! Mass, centre of mass and inertia of meshes and simple shapes.
+mod by_distance;
+mod integral;
+
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
+use tesdf::TeSdf;
+use tesdf::base::InsideRule;
 use tesdf::collide::Shape;
+
+use by_distance::by_distance;
+use integral::{Integral, square};
 
 /// Mass, centre of mass and inertia of a rigid body, in the frame of its mesh or shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,15 +38,6 @@ pub enum MassError {
     /// The shape is a half space.
     #[error("a plane has no finite mass; make the body fixed")]
     Plane,
-    /// The faces of the mesh do not enclose the solid.
-    #[error(
-        "the inside of the mesh is by the rule `{rule}`, whose volume its faces do not give; make the body fixed, or \
-         encode it with another rule"
-    )]
-    Rule {
-        /// The rule.
-        rule: &'static str,
-    },
     /// The mesh encloses no positive volume.
     #[error("the mesh encloses {volume:e} m³; a free body needs a closed mesh whose faces point outward")]
     NoVolume {
@@ -52,17 +51,24 @@ impl MassProperties {
     /// the shape, m.
     ///
     /// The volume of a mesh is weighted by the winding number: a volume that two shells share
-    /// counts twice, and a volume inside an inverted surface counts as negative.
+    /// counts twice, and a volume inside an inverted surface counts as negative. This is exact.
+    ///
+    /// Where another rule says what is inside, two methods approximate:
+    /// - A sheet is the sum of prisms of its thickness over its faces. What its round border adds and
+    ///   what prisms share at folds is left out, in all some thickness × length of borders and folds
+    ///   of its area.
+    /// - Otherwise, cubes of 1/128 of the longest side of the bounds are asked for their distance; the
+    ///   mass is some 0.2 % off. The volume is that of the solid, each place counted once.
     ///
     /// # Errors
-    /// A density that is not positive, a plane, a mesh whose faces do not enclose the solid, or a
-    /// mesh without volume.
+    /// A density that is not positive, a plane, or a mesh without volume.
     pub fn of_shape(shape: &Shape, scale: f64, density: f64) -> Result<Self, MassError> {
         let unit = match shape {
-            Shape::Mesh(asset) if !asset.faces_enclose_the_solid() => {
-                return Err(MassError::Rule { rule: asset.inside().rule.name() });
-            }
-            Shape::Mesh(asset) => Self::of_triangles((0..asset.face_count()).map(|f| asset.face_corners(f)))?,
+            Shape::Mesh(asset) if asset.faces_enclose_the_solid() => Self::of_triangles(triangles(asset))?,
+            Shape::Mesh(asset) => match asset.inside().rule {
+                InsideRule::Sheet { thickness } => Self::of_sheet(triangles(asset), thickness)?,
+                _ => by_distance(asset, shape)?,
+            },
             Shape::Plane => return Err(MassError::Plane),
             Shape::Box { half_extents: h } => {
                 let mass = 8.0 * h.x * h.y * h.z;
@@ -100,30 +106,35 @@ impl MassProperties {
     pub fn of_triangles(
         triangles: impl ExactSizeIterator<Item = [DVec3; 3]> + Clone,
     ) -> Result<Self, MassError> {
-        // The mean of the corners is the reference point: with the origin, a body far from it would
-        // lose digits to cancellation.
-        let count = 3.0 * triangles.len().max(1) as f64;
-        let middle: DVec3 = triangles.clone().flatten().sum::<DVec3>() / count;
-        let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
-        for [a, b, c] in triangles {
-            let [a, b, c] = [a - middle, b - middle, c - middle];
-            let six = a.dot(b.cross(c));
-            let sum = a + b + c;
-            volume += six / 6.0;
-            first += six / 24.0 * sum;
-            second += six / 120.0 * (square(a) + square(b) + square(c) + square(sum));
-        }
-        if !(volume > 0.0 && volume.is_finite()) {
-            return Err(MassError::NoVolume { volume });
-        }
-        let arm = first / volume;
-        let second = second - volume * square(arm);
-        let trace = second.x_axis.x + second.y_axis.y + second.z_axis.z;
-        Ok(Self {
-            mass: volume,
-            center: middle + arm,
-            inertia: DMat3::from_diagonal(DVec3::splat(trace)) - second,
-        })
+        let middle = middle(triangles.clone());
+        let part = |triangle: [DVec3; 3]| {
+            let [a, b, c] = triangle.map(|p| p - middle);
+            let (six, sum) = (a.dot(b.cross(c)), a + b + c);
+            let second = six / 120.0 * (square(a) + square(b) + square(c) + square(sum));
+            Integral { volume: six / 6.0, first: six / 24.0 * sum, second }
+        };
+        triangles.map(part).sum::<Integral>().about(middle)
+    }
+
+    /// Mass properties of density 1 of prisms of a thickness over triangles, which lie in their middle.
+    ///
+    /// # Errors
+    /// [`MassError::NoVolume`].
+    fn of_sheet(
+        triangles: impl ExactSizeIterator<Item = [DVec3; 3]> + Clone,
+        thickness: f64,
+    ) -> Result<Self, MassError> {
+        let middle = middle(triangles.clone());
+        let part = |triangle: [DVec3; 3]| {
+            let [a, b, c] = triangle.map(|p| p - middle);
+            let across = (b - a).cross(c - a);
+            let volume = 0.5 * across.length() * thickness;
+            let center = (a + b + c) / 3.0;
+            let around: DMat3 = [a, b, c].map(|p| square(p - center)).into_iter().sum();
+            let along = square(across.normalize_or_zero()) * thickness * thickness;
+            Integral::of_part(volume, center, volume / 12.0 * (around + along))
+        };
+        triangles.map(part).sum::<Integral>().about(middle)
     }
 
     /// The same distribution of mass, scaled to the total `mass`, kg.
@@ -146,8 +157,15 @@ impl MassProperties {
     }
 }
 
-fn square(a: DVec3) -> DMat3 {
-    DMat3::from_cols(a * a.x, a * a.y, a * a.z)
+fn triangles(asset: &TeSdf) -> impl ExactSizeIterator<Item = [DVec3; 3]> + Clone {
+    (0..asset.face_count()).map(|f| asset.face_corners(f))
+}
+
+/// The mean of all corners. With the origin as the reference point, a body far from it would lose digits to
+/// cancellation.
+fn middle(triangles: impl ExactSizeIterator<Item = [DVec3; 3]>) -> DVec3 {
+    let count = 3.0 * triangles.len().max(1) as f64;
+    triangles.flatten().sum::<DVec3>() / count
 }
 
 fn check(what: &'static str, found: f64) -> Result<(), MassError> {

@@ -368,7 +368,8 @@ impl System {
     }
 }
 
-fn not_negative(option: &'static str, found: f64) -> Result<f64, DynamicsError> {
+/// A finite number, 0 or greater, or an error that names the option.
+pub fn not_negative(option: &'static str, found: f64) -> Result<f64, DynamicsError> {
     match found >= 0.0 && found.is_finite() {
         true => Ok(found),
         false => Err(DynamicsError::Option { option, found, expected: "a finite number, 0 or greater" }),

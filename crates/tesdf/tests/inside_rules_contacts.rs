@@ -2,6 +2,8 @@
 //! against brute force over all faces.
 mod support;
 
+use std::f64::consts::PI;
+
 use support::parts::Turn::{Inward, Outward};
 use support::parts::{Parts, bowl};
 use support::random::Random;
@@ -11,7 +13,7 @@ use tesdf::collide::{
     ClearanceOptions, CollideOptions, ContactsPer, Instance, Mode, Motion, Pose, Scene, Shape,
     TimeOfImpactOptions, Velocity, clearance, detect, time_of_impact,
 };
-use tesdf::glam::DVec3;
+use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::TriangleMesh;
 
 fn cup() -> TriangleMesh {
@@ -52,13 +54,52 @@ fn shells_inside_out_and_boundaries_touch_as_solids() {
     }
 }
 
+/// A square of edge 2 about the origin, across z.
+fn plate() -> TriangleMesh {
+    let corners = [-DVec3::X - DVec3::Y, DVec3::X - DVec3::Y, DVec3::X + DVec3::Y, DVec3::Y - DVec3::X];
+    Parts::default().add(&corners, &[[0, 1, 2], [0, 2, 3]], Outward).mesh()
+}
+
+/// Plates that cross, and a box on both sides of a plate, have no vertex in each other.
+#[test]
+fn overlaps_of_sheets_that_no_vertex_shows_are_reported() {
+    let sheet = Shape::from(Body::sheet(plate(), 0.2).asset);
+    let mesh = Shape::from(box_of(0.5).asset);
+    let half_extents = DVec3::splat(0.25);
+    let across = |z: f64| Pose::new(z * DVec3::Z, DQuat::from_rotation_x(0.5 * PI)).expect("a pose");
+    for (other, pose, expected) in [
+        (sheet.clone(), across(0.0), Some(0.2)),
+        (sheet.clone(), across(1.25), None),
+        (mesh, Pose::at(DVec3::new(0.3, 0.2, 0.0)), Some(0.35)),
+        (Shape::Box { half_extents }, Pose::at(DVec3::new(0.3, 0.2, 0.0)), Some(0.35)),
+        (Shape::Box { half_extents }, Pose::at(0.36 * DVec3::Z), None),
+    ] {
+        let mut scene = Scene::new();
+        for (shape, pose) in [(sheet.clone(), Pose::IDENTITY), (other, pose)] {
+            let shape = scene.add_shape(shape).expect("a shape");
+            scene
+                .add(Instance {
+                    scale: 2.0,
+                    ..Instance::new(shape, Pose { translation: 2.0 * pose.translation, ..pose })
+                })
+                .expect("added");
+        }
+        let found = detect(&scene, &CollideOptions::with_mode(Mode::Node)).expect("contacts");
+        assert!(found.is_empty(), "{found:?}");
+        let depth = found.hidden.first().map(|h| h.depth);
+        match expected {
+            None => assert_eq!(depth, None),
+            Some(expected) => {
+                let depth = depth.expect("an overlap");
+                assert!((1.48 * expected..2.0 * expected + 1e-9).contains(&depth), "{depth}, {expected}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_sheet_and_a_box_have_the_clearance_and_impact_of_formulas() {
-    let plate = Parts {
-        vertices: vec![-DVec3::X - DVec3::Y, DVec3::X - DVec3::Y, DVec3::X + DVec3::Y, DVec3::Y - DVec3::X],
-        faces: vec![[0, 1, 2], [0, 2, 3]],
-    };
-    let plate = Body::sheet(plate.mesh(), 0.2);
+    let plate = Body::sheet(plate(), 0.2);
     for side in [1.0, -1.0] {
         for shape in [
             Shape::from(box_of(0.5).asset),

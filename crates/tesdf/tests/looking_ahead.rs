@@ -4,12 +4,19 @@ mod support;
 
 use std::f64::consts::PI;
 
+use support::parts::Parts;
+use support::parts::Turn::Outward;
 use support::random::Random;
-use tesdf::collide::internal::Ahead;
+use tesdf::TeSdf;
+use tesdf::base::Inside;
+use tesdf::collide::internal::{Ahead, Approach};
 use tesdf::collide::{
-    CollideOptions, Instance, Motion, Pose, Scene, Shape, Velocity, detect, instance_pairs, why,
+    CollideOptions, Instance, Mode, Motion, Pose, Reduction, Scene, Shape, Velocity, detect, instance_pairs,
+    why,
 };
+use tesdf::encode::{Encoder, Preset};
 use tesdf::glam::{DQuat, DVec3};
+use tesdf::mesh::SolidMesh;
 
 const BOX: Shape = Shape::Box { half_extents: DVec3::new(0.3, 0.5, 0.2) };
 
@@ -28,6 +35,13 @@ fn velocity(random: &mut Random) -> Velocity {
         _ => random.power(-2.0, 1.0) * random.direction(),
     };
     Velocity { linear: part(), angular: part() }
+}
+
+/// A mesh of some 1 in size.
+fn wedge() -> TeSdf {
+    let solid = Parts::default().cube(DVec3::splat(-0.4), 0.8, Outward).turned().mesh();
+    let solid = SolidMesh::with_inside(solid, Inside::default()).expect("a solid");
+    Encoder::new().preset(Preset::Fast).encode(&solid).expect("encodes")
 }
 
 /// The velocity at another place of the body that moves with `velocity` at `from`.
@@ -81,6 +95,155 @@ fn no_two_points_come_closer_than_the_bound_says() {
     }
     assert!(widest > 0.95, "the bound is never nearly reached: {widest}");
     assert!(relative > 400, "only {relative} cases in which bodies move together");
+}
+
+/// The bound of a part holds for the points of the part, and is less than that of the pair for many.
+#[test]
+fn no_point_of_a_part_comes_closer_than_its_bound_says() {
+    let mut random = Random(21);
+    let (mut widest, mut less) = (0.0f64, 0);
+    for case in 0..4000 {
+        let mut scene = Scene::new();
+        let mut a = instance(&mut scene, BOX, &mut random);
+        let mut b = instance(&mut scene, BOX, &mut random);
+        (a.velocity, b.velocity) = (velocity(&mut random), velocity(&mut random));
+        if case % 3 == 0 {
+            // Two gears: the places where they roll on each other hardly move.
+            let way = b.pose.translation - a.pose.translation;
+            let place = a.pose.translation + random.unit() * way;
+            b.velocity = carried(
+                Velocity { angular: -2.0 * a.velocity.angular, ..a.velocity },
+                place,
+                b.pose.translation,
+            );
+            a.velocity = carried(a.velocity, place, a.pose.translation);
+        }
+        let time = random.power(-2.0, -0.5).abs();
+        let [ahead_a, ahead_b] = [&a, &b].map(|i| Ahead::new(i, &BOX, time));
+        let (approach, whole) = (ahead_a.approach(&ahead_b), ahead_a.closing(&ahead_b));
+        for _ in 0..40 {
+            let (p, q) = (point(&a, &mut random), point(&b, &mut random));
+            let begin = moved(&a, p, 0.0);
+            let radius = if random.index(2) == 0 { 0.0 } else { random.power(-2.0, 0.0).abs() };
+            let center = begin + radius * random.unit() * random.direction();
+            let bound = approach.around(center, radius);
+            let distance = |time| moved(&a, p, time).distance(moved(&b, q, time));
+            let change = (distance(time * random.unit()) - distance(0.0)).abs();
+            let rounding = 1e-13 * (20.0 + ahead_a.motion() + ahead_b.motion());
+            assert!(change <= bound + rounding, "case {case}: {change} is more than {bound}\n{a:?}\n{b:?}");
+            less += usize::from(bound < 0.5 * whole);
+            if bound > 1e-6 {
+                widest = widest.max(change / bound);
+            }
+        }
+    }
+    assert!(widest > 0.95, "the bound is never nearly reached: {widest}");
+    assert!(less > 10_000, "only {less} parts look less far than their pair");
+}
+
+/// Where an approach covers another one, no point of the ball needs more than it has looked.
+#[test]
+fn an_approach_covers_what_is_nowhere_greater() {
+    let mut random = Random(22);
+    let (mut covered, mut missed) = (0, 0);
+    for case in 0..20_000 {
+        let mut approach = |like: Option<Approach>| {
+            let mut vector = |size: f64| size * random.power(-2.0, 0.0) * random.direction();
+            let (way, turn) = (vector(1.0), vector(2.0));
+            match like {
+                None => Approach { about: vector(1.0), way, turn, rest: 0.01 * way.length() },
+                Some(like) => {
+                    let share = [0.0, 0.4, 1.0, 1.1][case % 4];
+                    let (way, turn) = (share * like.way + 0.1 * way, share * like.turn + 0.1 * turn);
+                    Approach { way, turn, ..like }
+                }
+            }
+        };
+        let own = approach(None);
+        let other = approach(Some(own));
+        let (center, radius, slack) =
+            (random.direction(), random.power(-2.0, 0.0).abs(), 0.3 * random.unit() * random.unit());
+        let is_covered = own.covers(&other, center, radius, slack);
+        let greatest = (0..60)
+            .map(|_| {
+                center
+                    + radius
+                        * if random.index(2) == 0 {
+                            random.direction()
+                        } else {
+                            random.in_cube().clamp_length_max(1.0)
+                        }
+            })
+            .map(|p| other.around(p, 0.0) - own.around(p, 0.0))
+            .fold(f64::NEG_INFINITY, f64::max);
+        assert!(!is_covered || greatest <= slack + 1e-12, "case {case}: {greatest} is more than {slack}");
+        covered += usize::from(is_covered);
+        missed += usize::from(!is_covered && greatest <= slack);
+    }
+    assert!(covered > 4000 && missed < covered, "{covered} covered, {missed} not found to be");
+}
+
+/// Parts look as far as their own motion says: of the contacts within the contact distance of their pair,
+/// a detection finds those within that of their part.
+#[test]
+fn each_part_looks_as_far_as_it_moves() {
+    let mut random = Random(23);
+    let (mut found, mut dropped) = (0, 0);
+    for case in 0..60 {
+        let mut scene = Scene::new();
+        let ids: Vec<_> = (0..3)
+            .map(|k| {
+                let shape = match k {
+                    0 => BOX,
+                    1 => Shape::Capsule { half_height: 0.3, radius: 0.1 },
+                    _ => Shape::from(wedge()),
+                };
+                let mut i = instance(&mut scene, shape, &mut random);
+                (i.scale, i.pose.translation) = (1.0, 0.8 * random.in_cube());
+                i.velocity = Velocity { linear: 0.3 * random.in_cube(), angular: 3.0 * random.in_cube() };
+                scene.add(i).expect("an instance")
+            })
+            .collect();
+        let mode = [Mode::Node, Mode::Edge, Mode::Exact][case % 3];
+        let reduction = [Reduction::None, Reduction::Deepest(1000)][case / 3 % 2];
+        let options = CollideOptions {
+            speculative_time: 0.2,
+            contact_distance: 0.01,
+            cos_theta: None,
+            reduction,
+            ..CollideOptions::with_mode(mode)
+        };
+        let all = detect(&scene, &options).expect("contacts");
+        for (k, &a) in ids.iter().enumerate() {
+            for &b in ids.iter().enumerate().filter(|(l, _)| *l != k).map(|(_, id)| id) {
+                let of_pair = instance_pairs(&scene, 0.01, 0.2).expect("pairs");
+                let Some(pair) = of_pair.iter().find(|p| (p.first, p.second) == (a.min(b), a.max(b))) else {
+                    continue;
+                };
+                let wide = CollideOptions {
+                    speculative_time: 0.0,
+                    contact_distance: pair.contact_distance,
+                    reduction: Reduction::None,
+                    ..options
+                };
+                let far = why(&scene, &wide, a, b, None).expect("a report");
+                for part in &far.parts {
+                    let own = &why(&scene, &options, a, b, Some(part.id)).expect("a report").parts[0];
+                    assert!(own.contact_distance <= pair.contact_distance + 1e-12);
+                    let has =
+                        all.iter().any(|c| (c.instance_a, c.instance_b, c.feature.a) == (a, b, part.id));
+                    let distance = part.distance();
+                    if mode == Mode::Node || distance > own.contact_distance {
+                        let expected = distance <= own.contact_distance;
+                        assert_eq!(has, expected, "case {case}, part {}: {distance} {own:?}", part.id);
+                    }
+                    found += usize::from(has);
+                    dropped += usize::from(!has && distance <= pair.contact_distance);
+                }
+            }
+        }
+    }
+    assert!(found > 500 && dropped > 300, "{found} contacts, {dropped} dropped");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tesdf::collide::{
-    CollideOptions, Contact, Contacts, ContactsPer, InstanceId, Mode, Scene, Shape, detect, instance_pairs,
+    CollideOptions, Contact, Contacts, ContactsPer, InstanceId, Mode, Scene, Shape, detect, why,
 };
 use tesdf::geometry::Triangle;
 use tesdf::glam::DVec3;
@@ -99,23 +99,10 @@ pub fn least(contacts: &[Contact]) -> BTreeMap<(InstanceId, InstanceId, u32), f6
     least
 }
 
-/// The contact distances of the pairs of a scene, which velocities add to.
-struct ContactDistances {
-    pairs: BTreeMap<(InstanceId, InstanceId), f64>,
-    /// That of the options.
-    least: f64,
-}
-
-impl ContactDistances {
-    fn new(scene: &Scene, options: &CollideOptions) -> Self {
-        let pairs = instance_pairs(scene, options.contact_distance, options.speculative_time);
-        let pairs = pairs.expect("pairs").into_iter().map(|p| ((p.first, p.second), p.contact_distance));
-        Self { pairs: pairs.collect(), least: options.contact_distance }
-    }
-
-    fn of(&self, &(a, b, _): &(InstanceId, InstanceId, u32)) -> f64 {
-        self.pairs.get(&(a.min(b), a.max(b))).copied().unwrap_or(self.least)
-    }
+/// The contact distance of a part of an ordered pair, which velocities add to.
+fn reach(scene: &Scene, options: &CollideOptions, &(a, b, part): &(InstanceId, InstanceId, u32)) -> f64 {
+    let report = why(scene, options, a, b, Some(part)).expect("a report");
+    report.parts.iter().map(|part| part.contact_distance).fold(0.0, f64::max)
 }
 
 /// The number of touching parts, and of those with different results on device and host.
@@ -164,12 +151,11 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
     }
     let (on_host, on_device) = (least(host.as_slice()), least(device.as_slice()));
     let keys: BTreeSet<_> = on_host.keys().chain(on_device.keys()).collect();
-    let reach = ContactDistances::new(scene, options);
     let mut others = 0;
     for key in &keys {
         let (h, d) = (on_host.get(key), on_device.get(key));
         let deepest = h.into_iter().chain(d).fold(f64::INFINITY, |x: f64, y| x.min(*y));
-        let is_close = reach.of(key) - deepest < ROUNDING * size;
+        let is_close = || reach(scene, options, key) - deepest < ROUNDING * size;
         match (h, d) {
             (Some(h), Some(d)) if options.mode == Mode::Node => {
                 assert!((h - d).abs() < ROUNDING * size, "node {key:?}: {d} instead of {h}");
@@ -178,7 +164,7 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
             // Without the filter, only a part at the contact distance may be missing on one side.
             _ => {
                 assert!(
-                    is_close || options.cos_theta.is_some(),
+                    options.cos_theta.is_some() || is_close(),
                     "{key:?}: {h:?} on the host, {d:?} on the device"
                 );
                 others += 1;
@@ -200,7 +186,6 @@ fn faces_hold(scene: &Scene, options: &CollideOptions, size: f64, sides: [&Conta
     let by_face = sides.map(|side| least(side.as_slice()));
     let corners = Corners::new(scene);
     let keys: BTreeSet<_> = by_face.iter().flat_map(BTreeMap::keys).collect();
-    let reach = ContactDistances::new(scene, options);
     let mut others = 0;
     for key in &keys {
         let [h, d] = [0, 1].map(|side: usize| {
@@ -208,12 +193,12 @@ fn faces_hold(scene: &Scene, options: &CollideOptions, size: f64, sides: [&Conta
             corners.shared(key, sides[side], size).chain(own).reduce(f64::min)
         });
         let deepest = h.into_iter().chain(d).fold(f64::INFINITY, f64::min);
-        let is_close = reach.of(key) - deepest < ROUNDING * size;
+        let is_close = || reach(scene, options, key) - deepest < ROUNDING * size;
         match (h, d) {
             (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
             _ => {
                 assert!(
-                    is_close || options.cos_theta.is_some(),
+                    options.cos_theta.is_some() || is_close(),
                     "{key:?}: {h:?} on the host, {d:?} on the device"
                 );
                 others += 1;

@@ -1,6 +1,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::DynamicsError;
+use crate::system::not_negative;
 
 /// Parameters of the built-in engine.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -66,44 +67,28 @@ impl NewtonOptions {
     /// Checks that every value is in its range.
     ///
     /// # Errors
-    /// [`DynamicsError::Option`] names the first option that is out of range.
+    /// [`DynamicsError::Option`] names an option that is out of range.
     pub fn validate(&self) -> Result<(), DynamicsError> {
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        let share = |x: f64| (0.0..=1.0).contains(&x);
+        for (option, found) in [
+            ("correction_speed", self.correction_speed),
+            ("settled", self.settled),
+            ("skin", self.skin),
+            ("deep", self.deep),
+            ("speculation", self.speculation),
+        ] {
+            not_negative(option, found)?;
+        }
+        let (tolerance, iterations) = (self.tolerance, self.max_iterations);
+        let is_stiff = self.stiffness > 0.0 && self.stiffness.is_finite();
         let checks = [
-            ("stiffness", self.stiffness, positive(self.stiffness), "a finite number greater than 0"),
-            ("correction", self.correction, share(self.correction), "0 to 1"),
-            (
-                "correction_speed",
-                self.correction_speed,
-                self.correction_speed == 0.0 || positive(self.correction_speed),
-                "a finite number, 0 or greater",
-            ),
+            ("stiffness", self.stiffness, is_stiff, "a finite number greater than 0"),
+            ("correction", self.correction, (0.0..=1.0).contains(&self.correction), "0 to 1"),
             ("redetections", f64::from(self.redetections), self.redetections <= 8, "0 to 8"),
-            (
-                "settled",
-                self.settled,
-                self.settled == 0.0 || positive(self.settled),
-                "a finite number, 0 or greater",
-            ),
-            ("skin", self.skin, self.skin == 0.0 || positive(self.skin), "a finite number, 0 or greater"),
-            ("deep", self.deep, self.deep == 0.0 || positive(self.deep), "a finite number, 0 or greater"),
-            (
-                "speculation",
-                self.speculation,
-                self.speculation == 0.0 || positive(self.speculation),
-                "a finite number, 0 or greater",
-            ),
-            (
-                "tolerance",
-                self.tolerance,
-                self.tolerance > 0.0 && self.tolerance < 1.0,
-                "greater than 0, less than 1",
-            ),
+            ("tolerance", tolerance, tolerance > 0.0 && tolerance < 1.0, "greater than 0, less than 1"),
             (
                 "max_iterations",
-                f64::from(self.max_iterations),
-                (1..=MAX_ITERATIONS).contains(&self.max_iterations),
+                f64::from(iterations),
+                (1..=MAX_ITERATIONS).contains(&iterations),
                 "1 to 10000",
             ),
         ];

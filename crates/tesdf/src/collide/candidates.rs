@@ -40,7 +40,7 @@ fn of_pair(pair: &OrderedPair) -> Vec<Candidate> {
     let mut found = Vec::new();
     for candidate in pair.candidates() {
         let (part, face_a, _) = pair.part(candidate);
-        pair.search.polygons(&pair.field, &part, &mut |clipped| {
+        pair.search_of([&part]).polygons(&pair.field, &part, &mut |clipped| {
             found.push(Candidate {
                 instance_a: pair.a,
                 instance_b: pair.b,
@@ -73,7 +73,7 @@ pub fn count_polygons(scene: &Scene, options: &CollideOptions) -> Result<usize, 
         let mut polygons = 0;
         for &candidate in *chunk {
             let (part, ..) = pair.part(candidate);
-            pair.search.polygons(&pair.field, &part, &mut |_| polygons += 1);
+            pair.search_of([&part]).polygons(&pair.field, &part, &mut |_| polygons += 1);
         }
         polygons
     };

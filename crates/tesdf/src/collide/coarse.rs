@@ -49,7 +49,7 @@ fn of_pair(pair: &OrderedPair) -> Option<CoarseContact> {
             return None;
         }
         let mut least: Option<f64> = None;
-        pair.search.minima(&pair.field, &part, None, &mut |_| (), &mut |_, minimum| {
+        pair.search_of([&part]).minima(&pair.field, &part, None, &mut |_| (), &mut |_, minimum| {
             let distance = minimum.value.distance - part.radius;
             least = Some(least.map_or(distance, |l| l.min(distance)));
         });

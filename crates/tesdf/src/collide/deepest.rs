@@ -136,11 +136,15 @@ impl<'a> Search<'a> {
 
     fn search(&self, open: &Open) -> Searched {
         let pair = &self.orders[open.order];
-        let OrderedPair { surface, field, search, .. } = pair;
+        let OrderedPair { surface, field, search, reach, .. } = pair;
         let (start, count) = match open.child {
             TreeChild::Node(node) => {
                 let bound = |branch: Branch| {
-                    let least = field.least_contact(branch.center, branch.radius, search.reach)?;
+                    let least = field.least_contact(
+                        branch.center,
+                        branch.radius,
+                        reach.around(branch.center, branch.radius),
+                    )?;
                     Some(((least - field.rounding()) * field.unit(), branch.child))
                 };
                 let branches = surface.halves(node).into_iter().flatten();

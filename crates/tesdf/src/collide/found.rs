@@ -74,8 +74,9 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
         let nodes = rest.iter().take_while(|part| !is_whole(part)).count();
         let (group, others) = rest.split_at(if nodes == 0 { near_each_other(rest) } else { nodes });
         rest = others;
+        let parts = || group.iter().map(|(part, ..)| part);
         let around = match nodes {
-            0 => pair.search.surroundings(&pair.field, group.iter().map(|(part, ..)| part)),
+            0 => pair.search_of(parts()).surroundings(&pair.field, parts()),
             _ => None,
         };
         for ((part, face_a, feature), &candidate) in group.iter().zip(&mut next) {
@@ -95,7 +96,8 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
                 contacts.push(pair.contact(part, &minimum, *face_a, *feature));
             };
             let mut polygon = |_: &_| *polygons += 1;
-            pair.search.minima(&pair.field, part, around.as_ref(), &mut polygon, &mut |_, m| found(m));
+            let search = pair.search_of([part]);
+            search.minima(&pair.field, part, around.as_ref(), &mut polygon, &mut |_, m| found(m));
         }
     }
     found

@@ -132,7 +132,7 @@ fn depth(surface: &SurfaceBody, field: &FieldBody, mode: Mode, shown: f64) -> f6
         // The body is too thin relative to rounding.
         return 0.0;
     }
-    let deepest = radius.min(-at_center).max(0.0);
+    let deepest = radius.min(field.half_thickness() - at_center).max(0.0);
     let mut search = Looks { field, core, thickness, shown, deepest, looks: 0 };
     if matches!(mode, Mode::Node | Mode::Edge) {
         let faces = search.faces(surface);

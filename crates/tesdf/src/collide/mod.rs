@@ -58,6 +58,7 @@ mod piece;
 mod polygon;
 mod pose;
 mod queue;
+mod reach;
 mod reduce;
 mod scene;
 mod shape;
@@ -73,7 +74,7 @@ mod why;
 /// Not part of the API.
 #[doc(hidden)]
 pub mod internal {
-    pub use super::ahead::Ahead;
+    pub use super::ahead::{Ahead, Approach};
     pub use super::candidates::{count_faces, count_polygons};
     pub use super::field::ROUNDING;
     pub use super::found::kept_at_vertices;

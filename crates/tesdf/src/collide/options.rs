@@ -103,7 +103,8 @@ pub struct CollideOptions {
     pub contact_distance: f64,
     /// Adds to a pair's contact distance what the velocities of the two instances, relative to each
     /// other, can close within this time; 0 adds nothing. Instances that move together add next to
-    /// nothing, whatever their speed.
+    /// nothing, whatever their speed. Faces, edges and vertices add what their own place closes,
+    /// if that is less.
     pub speculative_time: f64,
     /// Eq. (10): a contact of a face is dropped when ∇φ · n > −cos θ. `None` keeps all. Not used
     /// for nodes and edges.

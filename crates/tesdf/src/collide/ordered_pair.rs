@@ -2,10 +2,12 @@
 //! second.
 use glam::DVec3;
 
+use super::ahead::Ahead;
 use super::descent::{OnFace, descends};
 use super::field::FieldBody;
 use super::instance_pairs::{InstancePair, instance_pairs};
 use super::narrow::{Minimum, Search};
+use super::reach::Reach;
 use super::surface::{Candidates, Part, SurfaceBody};
 use super::{CollideError, CollideOptions, Contact, ContactsPer, FeatureId, InstanceId, Mode, Scene, Shape};
 use crate::query::Precision;
@@ -27,7 +29,9 @@ pub struct OrderedPair<'a> {
     pub surface: SurfaceBody<'a>,
     /// The body whose signed distances are used.
     pub field: FieldBody<'a>,
-    /// The search for minima, with its limit.
+    /// How far each part of the surface looks.
+    pub reach: Reach,
+    /// The search for minima, up to the greatest of these distances.
     pub search: Search,
     options: &'a CollideOptions,
     pub a: InstanceId,
@@ -73,24 +77,33 @@ impl<'a> OrderedPair<'a> {
         let diagonals = [(shape_a, of_a), (shape_b, of_b)]
             .map(|(shape, instance)| shape.diagonal().min(f64::MAX) * instance.scale);
         let search = Search::new(options, contact_distance, &field, diagonals);
-        Ok(Self { surface, field, search, options, a, b })
+        let [ahead_a, ahead_b] = Ahead::of_both(scene, [a, b], options.speculative_time)?;
+        let least = options.contact_distance.min(contact_distance);
+        let reach = Reach::new(&ahead_a.approach(&ahead_b), &field, contact_distance, least);
+        Ok(Self { surface, field, reach, search, options, a, b })
     }
 
     /// Broad phase.
     pub fn candidates(&self) -> Candidates {
         match self.options.mode {
-            Mode::Node => self.surface.nodes(&self.field, self.search.reach),
+            Mode::Node => self.surface.nodes(&self.field, &self.reach),
             Mode::Edge => {
-                let mut both = self.surface.nodes(&self.field, self.search.reach);
-                both.extend(self.surface.edges(&self.field, self.search.reach));
+                let mut both = self.surface.nodes(&self.field, &self.reach);
+                both.extend(self.surface.edges(&self.field, &self.reach));
                 both
             }
             // The search over a face begins with the test by which `faces` drops it.
             Mode::Face | Mode::Exact if self.search.is_of_faces() => {
-                self.surface.faces_of_leaves(&self.field, self.search.reach)
+                self.surface.faces_of_leaves(&self.field, &self.reach)
             }
-            Mode::Face | Mode::Exact => self.surface.faces(&self.field, self.search.reach),
+            Mode::Face | Mode::Exact => self.surface.faces(&self.field, &self.reach),
         }
+    }
+
+    /// The search for minima of some parts, up to the greatest of their own contact distances.
+    pub fn search_of<'p>(&self, parts: impl IntoIterator<Item = &'p Part>) -> Search {
+        let reach = parts.into_iter().map(|part| self.reach.of(part.points(), part.radius));
+        self.search.within(reach.fold(f64::NEG_INFINITY, f64::max))
     }
 
     /// The mode of the detection.
@@ -111,7 +124,7 @@ impl<'a> OrderedPair<'a> {
             Mode::Node => (self.surface.node(candidate), self.surface.face_of_node(candidate), candidate),
             Mode::Face | Mode::Exact => {
                 let face = self.surface.face_id(candidate);
-                (self.surface.face(candidate, &self.field, self.search.reach), face, face)
+                (self.surface.face(candidate, &self.field, self.reach.most), face, face)
             }
         }
     }
@@ -172,10 +185,14 @@ impl<'a> OrderedPair<'a> {
 
     /// Whether the surface is lower beside a point of a face. So is then a contact there.
     pub fn descends(&self, at: &OnFace) -> bool {
-        descends(&self.surface, &self.field, at, |face| match self.options.mode {
-            // Frank–Wolfe need not find the lower point.
-            Mode::Face => self.search.frank_wolfe(&self.field, face) < at.distance,
-            Mode::Node | Mode::Edge | Mode::Exact => true,
+        descends(&self.surface, &self.field, at, |face| {
+            let around = self.surface.around();
+            let reach = self.reach.of(&face.corners, around) + around;
+            match self.options.mode {
+                // Frank–Wolfe need not find the lower point.
+                Mode::Face => self.search.within(reach).frank_wolfe(&self.field, face) < at.distance,
+                Mode::Node | Mode::Edge | Mode::Exact => at.distance <= reach,
+            }
         })
     }
 

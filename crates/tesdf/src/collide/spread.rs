@@ -98,9 +98,10 @@ pub fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
 
 /// The children of a node that can have contacts.
 fn children(pair: &OrderedPair, order: usize, node: u32, bound: f64) -> impl Iterator<Item = Region> {
-    let OrderedPair { surface, field, search, .. } = pair;
+    let OrderedPair { surface, field, reach, .. } = pair;
     surface.halves(node).into_iter().flatten().filter_map(move |branch| {
-        let least = field.least_contact(branch.center, branch.radius, search.reach)?;
+        let least =
+            field.least_contact(branch.center, branch.radius, reach.around(branch.center, branch.radius))?;
         let (radius, bound) = (branch.radius * field.unit(), bound.max(least * field.unit()));
         Some(Region { radius, order, child: branch.child, bound })
     })

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3, Vec3};
 
 use super::field::{Field, FieldBody};
+use super::reach::Reach;
 use super::simple::{Simple, plane_square};
 use super::{Mode, Placement, Shape};
 use crate::TeSdf;
@@ -37,6 +38,13 @@ pub struct Branch {
     pub center: DVec3,
     /// Radius of the ball.
     pub radius: f64,
+}
+
+impl Branch {
+    /// Whether none of its points can be within its contact distance of the solid.
+    fn is_beyond(&self, field: &FieldBody, reach: &Reach) -> bool {
+        field.is_beyond(self.center, self.radius, reach.around(self.center, self.radius))
+    }
 }
 
 /// A face, an edge, or the core of a rounded shape, in the field's frame.
@@ -115,6 +123,11 @@ impl<'a> SurfaceBody<'a> {
         Self { shape, linear, shift, scale: unit, around: own + field.half_thickness() }
     }
 
+    /// How far the surfaces lie from the faces and the field's zero, in the field's frame.
+    pub fn around(&self) -> f64 {
+        self.around
+    }
+
     /// From the shape's frame to the field's frame.
     #[inline]
     pub fn to_field(&self, p: DVec3) -> DVec3 {
@@ -128,7 +141,7 @@ impl<'a> SurfaceBody<'a> {
 
     /// Faces of the leaves that can come within `reach` (field's frame) of the solid. For a simple
     /// shape, the indices of its parts.
-    pub fn faces_of_leaves(&self, field: &FieldBody, reach: f64) -> Candidates {
+    pub fn faces_of_leaves(&self, field: &FieldBody, reach: &Reach) -> Candidates {
         let mut faces = Vec::new();
         match self.shape {
             Shape::Mesh(asset) => {
@@ -142,19 +155,19 @@ impl<'a> SurfaceBody<'a> {
 
     /// Faces that can come within `reach` (field's frame) of the solid. For a simple shape, the
     /// indices of its parts.
-    pub fn faces(&self, field: &FieldBody, reach: f64) -> Candidates {
+    pub fn faces(&self, field: &FieldBody, reach: &Reach) -> Candidates {
         let mut faces = self.faces_of_leaves(field, reach);
         faces.retain(|&face| {
-            let part = self.face(face, field, reach);
+            let part = self.face(face, field, reach.most);
             let (center, ball) = part.ball();
-            !field.is_beyond(center, ball, reach + part.radius)
+            !field.is_beyond(center, ball, reach.of(part.points(), part.radius) + part.radius)
         });
         faces
     }
 
     /// The vertices of the faces in the leaves that can come within `reach`. For a simple shape,
     /// all its nodes.
-    pub fn nodes(&self, field: &FieldBody, reach: f64) -> Candidates {
+    pub fn nodes(&self, field: &FieldBody, reach: &Reach) -> Candidates {
         let Shape::Mesh(asset) = self.shape else {
             return (0..Simple::from(self.shape).nodes().0.len() as u32).collect();
         };
@@ -169,7 +182,7 @@ impl<'a> SurfaceBody<'a> {
 
     /// The edges of the faces in the leaves that can come within `reach`; see
     /// [`edge`](Self::edge). For a simple shape, all its edges.
-    pub fn edges(&self, field: &FieldBody, reach: f64) -> Candidates {
+    pub fn edges(&self, field: &FieldBody, reach: &Reach) -> Candidates {
         match self.shape {
             Shape::Mesh(asset) => {
                 let mut edges = Vec::new();
@@ -509,7 +522,7 @@ impl<'a> SurfaceBody<'a> {
 
     /// Visits the leaves of the face tree that can come within `reach` of the solid. The field is
     /// 1-Lipschitz, so a node is skipped when the ball around its box is out of reach.
-    fn visit_leaves(&self, asset: &TeSdf, field: &FieldBody, reach: f64, mut leaf: impl FnMut(u32, u32)) {
+    fn visit_leaves(&self, asset: &TeSdf, field: &FieldBody, reach: &Reach, mut leaf: impl FnMut(u32, u32)) {
         let mut stack = vec![TreeChild::Node(0)];
         while let Some(child) = stack.pop() {
             match child {
@@ -519,7 +532,7 @@ impl<'a> SurfaceBody<'a> {
                     self.branches(asset, node)
                         .into_iter()
                         .rev()
-                        .filter(|branch| !field.is_beyond(branch.center, branch.radius, reach))
+                        .filter(|branch| !branch.is_beyond(field, reach))
                         .map(|branch| branch.child),
                 ),
             }
@@ -529,7 +542,12 @@ impl<'a> SurfaceBody<'a> {
     /// The bound by which the broad phase skips all leaves that `holds` (first face, number of
     /// faces) accepts: the least signed distance that the skipped node's ball can have (field's
     /// frame). `None` when the broad phase keeps such a leaf.
-    pub fn pruned_by(&self, field: &FieldBody, reach: f64, holds: impl Fn(u32, u32) -> bool) -> Option<f64> {
+    pub fn pruned_by(
+        &self,
+        field: &FieldBody,
+        reach: &Reach,
+        holds: impl Fn(u32, u32) -> bool,
+    ) -> Option<f64> {
         let mut least: Option<f64> = None;
         let mut stack = vec![(self.whole(), None)];
         while let Some((child, pruned)) = stack.pop() {
@@ -542,8 +560,8 @@ impl<'a> SurfaceBody<'a> {
                 TreeChild::Node(node) => {
                     for branch in self.halves(node).into_iter().flatten() {
                         let beyond = || {
-                            field
-                                .is_beyond(branch.center, branch.radius, reach)
+                            branch
+                                .is_beyond(field, reach)
                                 .then(|| field.least_within(branch.center, branch.radius))
                         };
                         stack.push((branch.child, pruned.or_else(beyond)));

@@ -96,6 +96,9 @@ pub struct PartReport {
     /// The id of the face or node in the user's numbering; of an edge, as
     /// [`FeatureId::a`](super::FeatureId::a).
     pub id: u32,
+    /// The part's contact distance, in the world's unit: at most that of the pair. Parts that hardly move
+    /// against the other body look less far.
+    pub contact_distance: f64,
     /// The result of the broad phase.
     pub broad: BroadVerdict,
     /// All its polygons, in the order of the forest. With one contact per face: its contacts, or
@@ -156,8 +159,7 @@ pub fn why(
     options.validate()?;
     let (of_a, of_b) = (scene.instance(a)?, scene.instance(b)?);
     let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
-    let [ahead_a, ahead_b] =
-        [(of_a, shape_a), (of_b, shape_b)].map(|(i, s)| Ahead::new(i, s, options.speculative_time));
+    let [ahead_a, ahead_b] = Ahead::of_both(scene, [a, b], options.speculative_time)?;
     let contact_distance = options.contact_distance + ahead_a.closing(&ahead_b);
     let (bounds_a, bounds_b) = (scene.bounds(a)?, scene.bounds(b)?);
     let bounds_gap = (bounds_a.min - bounds_b.max).max(bounds_b.min - bounds_a.max).max_element().max(0.0);
@@ -239,14 +241,16 @@ impl Stages<'_> {
     }
 
     fn part(&self, candidate: u32, is_candidate: bool) -> PartReport {
-        let OrderedPair { surface, field, search, .. } = &self.pair;
+        let OrderedPair { surface, field, reach, .. } = &self.pair;
         let (part, _, id) = self.pair.part(candidate);
+        let search = self.pair.search_of([&part]);
+        let contact_distance = search.reach * field.unit();
         let unit = field.unit();
         let broad = if is_candidate {
             BroadVerdict::Candidate
         } else {
             let holds = |start: u32, count: u32| surface.holds(start, count, candidate, self.options.mode);
-            match surface.pruned_by(field, search.reach, holds) {
+            match surface.pruned_by(field, reach, holds) {
                 Some(bound) => BroadVerdict::PrunedByTree { bound: bound * unit },
                 None => {
                     let (center, radius) = part.ball();
@@ -277,7 +281,8 @@ impl Stages<'_> {
             kept.push((key(polygon), describe(polygon, &minimum, verdict)));
         });
         if search.is_whole(&part) && !kept.is_empty() {
-            return PartReport { id, broad, polygons: kept.into_iter().map(|k| k.1).collect() };
+            let polygons = kept.into_iter().map(|k| k.1).collect();
+            return PartReport { id, contact_distance, broad, polygons };
         }
         let mut polygons = Vec::new();
         search.within(f64::INFINITY).minima(field, &part, None, &mut |_| (), &mut |polygon, minimum| {
@@ -293,7 +298,7 @@ impl Stages<'_> {
             // Without a limit, the extremes of flat contact are others.
             polygons.truncate(1);
         }
-        PartReport { id, broad, polygons }
+        PartReport { id, contact_distance, broad, polygons }
     }
 }
 

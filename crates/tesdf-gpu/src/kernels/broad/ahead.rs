@@ -5,7 +5,7 @@ use glam::DVec3;
 use tesdf::collide::internal::Ahead as HostAhead;
 
 use super::super::field::nearest::FAR;
-use super::super::math::pose::FarPoint;
+use super::super::math::pose::{FarPoint, Pose};
 use super::super::math::vector::{Row, V3, last, xyz};
 
 /// Rows of a motion: way and reach; turn and greatest distance that a point moves; origin of the
@@ -48,6 +48,25 @@ pub fn ahead(rows: &[Row], at: u32, field: FarPoint) -> Ahead {
     }
 }
 
+/// The motion of the points of an instance as another one sees it, as `Approach` of `tesdf::collide`.
+/// A point p moves by `way` + `turn` × p, up to `rest`.
+#[derive(CubeType, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Approach {
+    pub way: V3,
+    pub turn: V3,
+    pub rest: f32,
+}
+
+#[cube]
+impl Approach {
+    /// Upper bound of the change of the distance between any point of the instance within `radius`
+    /// of `p`, and any point of the other one.
+    pub fn around(self, p: V3, radius: f32) -> f32 {
+        (self.way + self.turn.cross(p)).length() + self.turn.length() * radius + self.rest
+    }
+}
+
 /// The greatest distance that a point moves, from the motion in row `at`.
 #[cube]
 pub fn motion(rows: &[Row], at: u32) -> f32 {
@@ -59,6 +78,18 @@ impl Ahead {
     /// Upper bound of the change of the distance between any two points of the instances.
     pub fn closing(self, other: Ahead) -> f32 {
         (self.motion + other.motion).min(self.around(other)).min(other.around(self))
+    }
+
+    /// The motion of the points of this instance as the other one sees it, in the frame of a field with the
+    /// pose `to`.
+    pub fn approach(self, other: Ahead, to: Pose) -> Approach {
+        let (way, turn) = (self.way - other.way, self.turn - other.turn);
+        let at_origin = way - other.turn.cross(self.origin.from(other.origin));
+        let bends = other.turn.cross(way).length() + self.turn.length() * turn.length() * self.reach;
+        let unit = 1.0f32 / to.unit;
+        let turn = to.rotation.rotate_back(turn);
+        let way = to.rotation.rotate_back(at_origin) * unit - turn.cross(to.to_local(self.origin));
+        Approach { way, turn, rest: 0.5f32 * bends * unit }
     }
 
     /// The bound by the motion of this instance as the other one sees it, split into that of the
@@ -74,8 +105,9 @@ impl Ahead {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
+    use glam::{DQuat, Vec3};
 
+    use super::super::super::math::pose::Rotation;
     use super::super::super::math::vector::v3;
     use super::*;
     use crate::collide::scene::placed::split;
@@ -85,11 +117,15 @@ mod tests {
     fn bounds_are_those_of_the_host() {
         let mut random = fastrand::Rng::with_seed(4);
         let mut vector = |size: f64| size * DVec3::from_array(std::array::from_fn(|_| random.f64() - 0.5));
+        let of = |v: Vec3| v3(v.x, v.y, v.z);
+        let far = |p: DVec3| {
+            let (high, low) = split(p);
+            FarPoint { high: of(high), low: of(low) }
+        };
         let device = |host: &HostAhead, field: DVec3| {
-            let of = |v: Vec3| v3(v.x, v.y, v.z);
-            let (high, low) = split(field);
             let [p, q, r] = rows(host, field).map(|[x, y, z, w]| (v3(x, y, z), w));
-            let origin = FarPoint { high: of(high), low: of(low) + r.0 };
+            let FarPoint { high, low } = far(field);
+            let origin = FarPoint { high, low: low + r.0 };
             Ahead { origin, way: p.0, turn: q.0, reach: p.1, motion: q.1 }
         };
         for k in 0..5000 {
@@ -113,6 +149,21 @@ mod tests {
                 "{found} instead of {expected}: {a:?} {b:?}"
             );
             assert_eq!(found, y.closing(x));
+            // A field with another origin and unit than its body.
+            let rotation = DQuat::from_scaled_axis(vector(4.0));
+            let q = rotation.as_quat();
+            let to = Pose {
+                origin: far(b.origin + vector(1.0)),
+                rotation: Rotation { axis: v3(q.x, q.y, q.z), scalar: q.w },
+                unit: 2.0,
+            };
+            let (p, radius) = (a.origin + vector(2.0), vector(1.0).length());
+            let expected = a.approach(&b).around(p, radius);
+            let found = x.approach(y, to).around(to.to_local(far(p)), 0.5 * radius as f32);
+            assert!(
+                (2.0 * f64::from(found) - expected).abs() < 4.0 * bound || expected > 1e20,
+                "{found} instead of half of {expected} at {p}: {a:?} {b:?}"
+            );
         }
     }
 }

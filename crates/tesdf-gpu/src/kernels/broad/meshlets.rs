@@ -161,7 +161,8 @@ pub fn meshlets(
                 let ball = surface.meshlet_ball(meshlet);
                 let field = shapes.field(pair.shape_b);
                 let center = pair.to_field(ball.center);
-                kept = !field.is_beyond(center, pair.scale * ball.radius, pair.part_reach(), prune);
+                let radius = pair.scale * ball.radius;
+                kept = !field.is_beyond(center, radius, pairs.reach_around(pair, center, radius), prune);
             }
             if kept {
                 let at = counters.append(counters::MESHLETS);

@@ -9,6 +9,7 @@ use super::super::field::tetrahedra::bounds_of;
 use super::super::math::triangle::Triangle;
 use super::super::math::vector::{Row, V3, last, pick, row_of, v3, xyz, zero};
 use super::super::middle::cut::Quarter;
+use super::ahead::Approach;
 
 /// The ordered pairs of a scene. The two ordered pairs of the same instances are neighbours.
 #[derive(CubeType, CubeLaunch)]
@@ -16,7 +17,7 @@ pub struct OrderedPairs {
     /// [`WORDS`] words for each: instances a and b, shapes of a and b.
     pub words: Box<[u32]>,
     /// [`ROWS`] rows for each: the three rows of the linear map, each with its coordinate of the
-    /// shift; then scale, reach and both radii.
+    /// shift; scale, reach and both radii; way and rest of the approach, and its turn.
     pub rows: Box<[Row]>,
     /// Capacity of the list.
     pub room: u32,
@@ -25,7 +26,7 @@ pub struct OrderedPairs {
 /// Words of an ordered pair.
 pub const WORDS: u32 = 4;
 /// Rows of an ordered pair.
-pub const ROWS: u32 = 4;
+pub const ROWS: u32 = 6;
 
 /// An ordered pair: instance a has the surface, instance b has the field.
 #[derive(CubeType, Clone, Copy)]
@@ -44,7 +45,8 @@ pub struct OrderedPair {
     pub shift: V3,
     /// Length of one unit of a, in units of the field.
     pub scale: f32,
-    /// Contact distance in the frame of the field: smaller signed distances are contacts.
+    /// Contact distance of the pair in the frame of the field: smaller signed distances are contacts. No part
+    /// looks farther.
     pub reach: f32,
     /// The surfaces touch where a part of a is this far from the points where the field is 0: the
     /// sum of the own radius, and of half of the thickness of a sheet that has the field.
@@ -78,8 +80,29 @@ impl OrderedPairs {
         }
     }
 
-    /// Writes an ordered pair. Its number is its index.
-    pub fn put(&mut self, pair: OrderedPair) {
+    /// The contact distance of an ordered pair for all points within `radius` of `p`, with the radius of
+    /// the pair.
+    pub fn reach_around(&self, pair: OrderedPair, p: V3, radius: f32) -> f32 {
+        pair.reach.min(self.approach(pair).around(p, radius)) + pair.radius
+    }
+
+    /// The contact distance for a part of the surface, with the radius of the pair.
+    pub fn reach_of(&self, pair: OrderedPair, part: Part) -> f32 {
+        let approach = self.approach(pair);
+        let (a, b) = (approach.around(part.a, pair.radius), approach.around(part.b, pair.radius));
+        // The motion is linear in the place, so it is greatest at a corner.
+        pair.reach.min(a.max(b).max(approach.around(part.c, pair.radius))) + pair.radius
+    }
+
+    fn approach(&self, pair: OrderedPair) -> Approach {
+        let row = (pair.number * ROWS) as usize;
+        let (p, q) = (self.rows[row + 4], self.rows[row + 5]);
+        Approach { way: xyz(p), turn: xyz(q), rest: last(p) }
+    }
+
+    /// Writes an ordered pair. Its number is its index. The rest of the approach contains the contact
+    /// distance of parts that do not move against the other body.
+    pub fn put(&mut self, pair: OrderedPair, approach: Approach) {
         let word = (pair.number * WORDS) as usize;
         self.words[word] = pair.a;
         self.words[word + 1] = pair.b;
@@ -90,12 +113,14 @@ impl OrderedPairs {
         self.rows[row + 1] = row_of(pair.y, pair.shift.y);
         self.rows[row + 2] = row_of(pair.z, pair.shift.z);
         self.rows[row + 3] = row_of(v3(pair.scale, pair.reach, pair.radius), pair.own_radius);
+        self.rows[row + 4] = row_of(approach.way, approach.rest);
+        self.rows[row + 5] = row_of(approach.turn, 0.0f32);
     }
 }
 
 #[cube]
 impl OrderedPair {
-    /// Contact distance for parts of the surface: the reach plus the radius.
+    /// Greatest contact distance for parts of the surface: the reach plus the radius.
     pub fn part_reach(self) -> f32 {
         self.reach + self.radius
     }

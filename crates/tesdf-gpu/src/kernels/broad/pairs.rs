@@ -7,7 +7,7 @@ use super::super::field::nearest::FAR;
 use super::super::field::shapes::{BAD_VERTEX, KIND, MESHLET_COUNT, NONE, PLANE, ROUND, SIZES, Shapes};
 use super::super::math::pose::{FarPoint, Pose, ROWS as POSE_ROWS, pose};
 use super::super::math::vector::{Row, V3, row_of, v3, xyz};
-use super::ahead::{self, Ahead, ROWS as MOTION_ROWS};
+use super::ahead::{self, Ahead, Approach, ROWS as MOTION_ROWS};
 use super::meshlets::{Blocks, MESHLETS_OF_BLOCK};
 use super::ordered_pair::{OrderedPair, OrderedPairs};
 
@@ -95,6 +95,14 @@ impl Instances {
     /// The contact distance of a pair.
     fn contact_distance_of(&self, i: u32, j: u32) -> f32 {
         self.contact_distance + self.ahead(i).closing(self.ahead(j))
+    }
+
+    /// The motion of the points of `a` as `b` sees it, in its field's frame. Its rest contains the contact
+    /// distance.
+    fn approach(&self, a: u32, b: u32) -> Approach {
+        let to = self.pose(b);
+        let found = self.ahead(a).approach(self.ahead(b), to);
+        Approach { way: found.way, turn: found.turn, rest: found.rest + self.contact_distance / to.unit }
     }
 }
 
@@ -249,9 +257,9 @@ fn write_pair(
     let at = counters.add(ORDERED_PAIRS, 2u32);
     if at + 2u32 <= found.pairs.room {
         let first = ordered_pair(shapes, instances, distance, at, i, j);
-        found.pairs.put(first);
+        found.pairs.put(first, instances.approach(i, j));
         let second = ordered_pair(shapes, instances, distance, at + 1u32, j, i);
-        found.pairs.put(second);
+        found.pairs.put(second, instances.approach(j, i));
         write_blocks(shapes, counters, &mut found.blocks, at, instances.shape(i));
         write_blocks(shapes, counters, &mut found.blocks, at + 1u32, instances.shape(j));
     }

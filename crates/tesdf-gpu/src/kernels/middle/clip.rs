@@ -62,11 +62,12 @@ pub fn clip_polygons(
         let share = Share { mine: UNIT_POS % threads, threads };
         if UNIT_POS / threads < faces {
             let face = work.face(UNIT_POS / threads);
-            let subject = Subject { pair, face, part: shapes.part(pair, face) };
+            let part = shapes.part(pair, face);
+            let subject = Subject { pair, face, part, reach: pairs.reach_of(pair, part) };
             let center = subject.part.center();
             let field = work.field;
             let radius = subject.part.radius_around(center);
-            if !field.is_beyond(center, radius, pair.part_reach(), prune) {
+            if !field.is_beyond(center, radius, subject.reach, prune) {
                 if share.mine == 0u32 {
                     counters.append(CANDIDATES);
                 }
@@ -88,8 +89,6 @@ pub fn clip_polygons(
 #[expand(derive(Clone, Copy))]
 struct Search {
     subject: Subject,
-    /// Contact distance for the part: smaller distances are contacts.
-    reach: f32,
     /// Whether points outside of the cells can be contacts.
     beyond: bool,
     /// 1 when cells may be skipped by their bounds, otherwise 0.
@@ -107,14 +106,14 @@ fn clip(
     polygon: &mut Cut,
     prune: u32,
 ) {
-    let reach = subject.pair.part_reach();
+    let reach = subject.reach;
     let conforming = field.is_conforming();
     // Around a conforming domain, `outside::outside_polygons` finds the parts of the face.
     let beyond = (conforming && reach > 0.0f32) || (!conforming && reach >= field.number(BAND));
     if beyond && !conforming && share.mine == 0u32 {
         outside_cube(field, subject, counters, polygons, polygon);
     }
-    let search = Search { subject, reach, beyond, prune };
+    let search = Search { subject, beyond, prune };
     let around = around_of(subject.part.a, subject.part.b, subject.part.c);
     let mut start = start_of(field, share);
     let mut path = no_bits();
@@ -228,7 +227,7 @@ fn walk(
         let k = 3u32 - depth % 3u32;
         let mut down = false;
         let mut side = false;
-        if !held.is_separate() && (search.prune == 0u32 || field.cell_bound(cell) <= search.reach) {
+        if !held.is_separate() && (search.prune == 0u32 || field.cell_bound(cell) <= search.subject.reach) {
             if is_split(word) {
                 let over = held.over_bisection(k);
                 let above = over.greatest() > 0.0f32;

@@ -25,7 +25,8 @@ pub fn whole_faces(
             let face = work.face(UNIT_POS);
             let part = shapes.part(pair, face);
             let center = part.center();
-            if !work.field.is_beyond(center, part.radius_around(center), pair.part_reach(), prune) {
+            let reach = pairs.reach_of(pair, part);
+            if !work.field.is_beyond(center, part.radius_around(center), reach, prune) {
                 counters.append(counters::CANDIDATES);
                 let at = counters.append(counters::POLYGONS);
                 if at < faces.room {

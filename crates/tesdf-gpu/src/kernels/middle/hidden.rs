@@ -134,7 +134,7 @@ pub fn hidden(
             let mut depth = 0.0f32;
             if work.meshlet == 0u32 && UNIT_POS == 0u32 && own.radius > 0.0f32 {
                 let distance = field.exact_distance(pair.to_field(own.center));
-                depth = (own.radius * pair.scale).min(-distance);
+                depth = (own.radius * pair.scale).min(field.half_thickness() - distance);
             }
             if by_faces == 1u32 && UNIT_POS < work.faces() {
                 let part = shapes.part(pair, work.face(UNIT_POS));

@@ -57,6 +57,8 @@ pub struct Subject {
     pub pair: OrderedPair,
     pub face: u32,
     pub part: Part,
+    /// Contact distance for the part: smaller distances are contacts.
+    pub reach: f32,
 }
 
 /// A point of a face: the weights of its second and third corner.

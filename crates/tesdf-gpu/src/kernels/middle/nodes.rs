@@ -52,7 +52,8 @@ pub fn nodes(
             while k < 3u32 {
                 if (part.owned >> k) & 1u32 == 1u32 {
                     counters.append(CANDIDATES);
-                    let node = work.field.locate_node(part.corner(k), pair.part_reach(), prune);
+                    let p = part.corner(k);
+                    let node = work.field.locate_node(p, pairs.reach_around(pair, p, pair.radius), prune);
                     if node.kept {
                         let at = counters.append(counters::POLYGONS);
                         if at < nodes.room {

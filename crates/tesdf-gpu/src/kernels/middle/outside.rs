@@ -161,10 +161,11 @@ pub fn outside_polygons(
             let mut waits = 0u32;
             if active {
                 let face = work.face(number);
-                let subject = Subject { pair, face, part: shapes.part(pair, face) };
+                let part = shapes.part(pair, face);
+                let subject = Subject { pair, face, part, reach: pairs.reach_of(pair, part) };
                 let center = subject.part.center();
                 let radius = subject.part.radius_around(center);
-                if !field.is_beyond(center, radius, pair.part_reach(), prune) {
+                if !field.is_beyond(center, radius, subject.reach, prune) {
                     waits = around(field, subject, alone, counters, polygons);
                 }
             }
@@ -245,7 +246,7 @@ fn around(
         let piece = part.quarter(quarter);
         let center = piece.center();
         let mut down = false;
-        if !field.is_far(center, piece.radius_around(center), subject.pair.part_reach()) {
+        if !field.is_far(center, piece.radius_around(center), subject.reach) {
             near.find(field, piece, face_plane.part(piece.a, piece.b, piece.c));
             if !near.held && !near.is_full() && is_face {
                 near.held = near.cover(field, subject, quarter, &mut polygon);

@@ -266,7 +266,7 @@ pub fn narrow_exact(
         let field = shapes.field(pair.shape_b);
         let cell = field.cell(item.cell);
         let region = region(field, cell, part);
-        let reach = pair.part_reach();
+        let reach = pairs.reach_of(pair, part);
         let goal = Goal { reach, tolerance: asked.tolerances[pair.b as usize] };
         let found = minimize(region, polygons.polygon(number, part), normal, goal, &mut pool);
         pool.work.add_to(counters);

@@ -213,12 +213,12 @@ pub fn narrow_exact_faces(
     if number < count {
         let item = polygons.items.get(number);
         let pair = pairs.get(item.pair);
-        let reach = pair.part_reach();
         let tolerance = asked.tolerances[pair.b as usize];
-        let face = facing(shapes, pair, item.face, Limits { tolerance, cos_theta: asked.cos_theta });
+        let face = facing(shapes, pairs, pair, item.face, Limits { tolerance, cos_theta: asked.cos_theta });
         let region = everywhere(face.field, face.part);
-        let found = minimize(region, polygons, face.normal, Goal { reach, tolerance }, &mut memory);
-        if found.best.distance <= reach {
+        let found =
+            minimize(region, polygons, face.normal, Goal { reach: face.reach, tolerance }, &mut memory);
+        if found.best.distance <= face.reach {
             face.report(found.best.at, found.converged, counters, contacts, &mut memory);
         }
         memory.pool.work.add_to(counters);

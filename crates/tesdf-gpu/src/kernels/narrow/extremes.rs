@@ -7,7 +7,7 @@
 use cubecl::prelude::*;
 use tesdf::collide::internal;
 
-use super::super::broad::ordered_pair::{OrderedPair, Part, PartExpand};
+use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs, Part, PartExpand};
 use super::super::counters::{self, Counters};
 use super::super::field::locate::no_cell;
 use super::super::field::nearest::FAR;
@@ -53,6 +53,8 @@ pub struct Facing<'a> {
     pub part: Part,
     /// Unit normal, or zero.
     pub normal: V3,
+    /// Contact distance for the part: smaller distances are contacts.
+    pub reach: f32,
     /// The body that has the face.
     surface: Field<'a>,
     limits: Limits,
@@ -71,13 +73,21 @@ pub struct Limits {
 
 /// A face of an ordered pair.
 #[cube]
-pub fn facing<'a>(shapes: &'a Shapes, pair: OrderedPair, face: u32, limits: Limits) -> Facing<'a> {
+pub fn facing<'a>(
+    shapes: &'a Shapes,
+    pairs: &OrderedPairs,
+    pair: OrderedPair,
+    face: u32,
+    limits: Limits,
+) -> Facing<'a> {
+    let part = shapes.part(pair, face);
     Facing::<'a> {
         field: shapes.field(pair.shape_b),
         pair,
         face,
-        part: shapes.part(pair, face),
+        part,
         normal: shapes.part_normal(pair, face),
+        reach: pairs.reach_of(pair, part),
         surface: shapes.field(pair.shape_a),
         limits,
     }
@@ -201,7 +211,7 @@ impl Facing<'_> {
         }
         let own = select(minimum.corner == NO_CORNER, 0u32, 1u32);
         let is_flat = self.part.count > 1u32 && (is_large || level > own);
-        let limit = select(is_large, self.pair.part_reach(), v.distance + self.limits.tolerance);
+        let limit = select(is_large, self.reach, v.distance + self.limits.tolerance);
         let opposes = v.gradient.dot(self.normal) < OPPOSES;
         Patch {
             limit: select(is_flat, limit, -FAR),

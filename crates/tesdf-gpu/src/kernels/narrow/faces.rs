@@ -447,7 +447,7 @@ pub fn narrow_faces(
         let cell = field.cell(item.cell);
         let list = share_list(field, cell, variant);
         let polygon = polygons.polygon(number, part);
-        let reach = pair.part_reach();
+        let reach = pairs.reach_of(pair, part);
         let search = minimize(field, list, polygon, reach, asked.iterations, &mut exchange, &mut best);
         if comptime!(lanes > 1) {
             // Another thread than the one that writes the contact may have found it.

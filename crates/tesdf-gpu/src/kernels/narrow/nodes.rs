@@ -24,7 +24,7 @@ pub fn narrow_nodes(
         let field = shapes.field(pair.shape_b);
         let cell = field.cell(item.cell);
         let v = field.value_in_cell(cell, point);
-        if v.distance <= pair.part_reach() {
+        if v.distance <= pairs.reach_around(pair, point, pair.radius) {
             let corner = item.number + CONVERGED;
             let touch = Touch { face: item.face, cell: cell.name(), corner, point, cosine: 0.0f32.runtime() };
             contacts.append(counters, pair, touch, v);

@@ -34,14 +34,14 @@ pub fn narrow_whole_faces(
     if number < count {
         let item = polygons.items.get(number);
         let pair = pairs.get(item.pair);
-        let reach = pair.part_reach();
         let tolerance = asked.tolerances[pair.b as usize];
-        let face = facing(shapes, pair, item.face, Limits { tolerance, cos_theta: asked.cos_theta });
+        let face = facing(shapes, pairs, pair, item.face, Limits { tolerance, cos_theta: asked.cos_theta });
         let list = share_list(face.field, no_cell(), variant);
         let polygon = polygons.whole(face.part);
-        let search = minimize(face.field, list, polygon, reach, asked.iterations, &mut exchange, &mut best);
+        let search =
+            minimize(face.field, list, polygon, face.reach, asked.iterations, &mut exchange, &mut best);
         search.count(counters, variant);
-        if search.distance <= reach {
+        if search.distance <= face.reach {
             // Nothing proves that no point is lower.
             face.report(search.best, false.runtime(), counters, contacts, &mut memory);
         }
