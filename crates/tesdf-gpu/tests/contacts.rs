@@ -153,7 +153,7 @@ fn moving_bodies_look_ahead() {
         let by_host = DetectorOptions { max_pair_tests: 0, ..DetectorOptions::default() };
         assert_eq!(all.as_slice(), found(&scene, &options, by_host).0.as_slice());
     }
-    compared.is_good(5000);
+    compared.is_good(4000);
     let pairs = instance_pairs(&scene, 0.0, 0.5).expect("pairs");
     let widest = pairs.iter().map(|p| p.contact_distance).fold(0.0, f64::max);
     let narrow = pairs.iter().filter(|p| p.contact_distance < 0.2 * widest).count();
