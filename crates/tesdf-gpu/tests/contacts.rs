@@ -147,14 +147,14 @@ fn moving_bodies_look_ahead() {
     }
     let mut compared = Compared::default();
     for options in each_mode(size).into_iter().step_by(4) {
-        let options = CollideOptions { speculative_time: 0.5, ..options };
+        let options = CollideOptions { speculative_time: 0.7, ..options };
         compared.add(hold(&scene, &options, 2.0 * size));
         let (all, _) = found(&scene, &options, DetectorOptions::default());
         let by_host = DetectorOptions { max_pair_tests: 0, ..DetectorOptions::default() };
         assert_eq!(all.as_slice(), found(&scene, &options, by_host).0.as_slice());
     }
-    compared.is_good(4000);
-    let pairs = instance_pairs(&scene, 0.0, 0.5).expect("pairs");
+    compared.is_good(5000);
+    let pairs = instance_pairs(&scene, 0.0, 0.7).expect("pairs");
     let widest = pairs.iter().map(|p| p.contact_distance).fold(0.0, f64::max);
     let narrow = pairs.iter().filter(|p| p.contact_distance < 0.2 * widest).count();
     assert!(narrow > 10 && narrow < pairs.len(), "{narrow} of {}", pairs.len());
