@@ -178,9 +178,7 @@ fn sheets_touch_as_on_the_processor() {
 /// Sheets that cross each other and a box without a vertex in it.
 #[test]
 fn hidden_overlaps_of_sheets_are_those_of_the_processor() {
-    let corners = [-DVec3::X - DVec3::Y, DVec3::X - DVec3::Y, DVec3::X + DVec3::Y, DVec3::Y - DVec3::X];
-    let plate = Parts::default().add(&corners, &[[0, 1, 2], [0, 2, 3]], Outward).mesh();
-    let plate = encode(plate, InsideRule::Sheet { thickness: 0.2 }.into());
+    let plate = encode(Parts::default().plate(2.0).mesh(), InsideRule::Sheet { thickness: 0.2 }.into());
     let mut scene = Scene::new();
     let plate = scene.add_shape(plate).expect("a shape");
     let small = scene.add_shape(Shape::Box { half_extents: DVec3::splat(0.25) }).expect("a shape");

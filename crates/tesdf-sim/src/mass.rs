@@ -54,11 +54,11 @@ impl MassProperties {
     /// counts twice, and a volume inside an inverted surface counts as negative. This is exact.
     ///
     /// Where another rule says what is inside, two methods approximate:
-    /// - A sheet is the sum of prisms of its thickness over its faces. What its round border adds and
-    ///   what prisms share at folds is left out, in all some thickness × length of borders and folds
-    ///   of its area.
-    /// - Otherwise, cubes of 1/128 of the longest side of the bounds are asked for their distance; the
-    ///   mass is some 0.2 % off. The volume is that of the solid, each place counted once.
+    /// - A sheet is the sum of prisms of its thickness over its faces. What its round border adds
+    ///   and what prisms share at folds is left out, in all some thickness × length of borders and
+    ///   folds of its area.
+    /// - Otherwise, cubes of 1/128 of the longest side of the bounds are asked for their distance;
+    ///   the mass is some 0.2 % off. The volume is that of the solid, each place counted once.
     ///
     /// # Errors
     /// A density that is not positive, a plane, or a mesh without volume.
@@ -116,7 +116,8 @@ impl MassProperties {
         triangles.map(part).sum::<Integral>().about(middle)
     }
 
-    /// Mass properties of density 1 of prisms of a thickness over triangles, which lie in their middle.
+    /// Mass properties of density 1 of prisms of a thickness over triangles, which lie in their
+    /// middle.
     ///
     /// # Errors
     /// [`MassError::NoVolume`].
@@ -161,8 +162,8 @@ fn triangles(asset: &TeSdf) -> impl ExactSizeIterator<Item = [DVec3; 3]> + Clone
     (0..asset.face_count()).map(|f| asset.face_corners(f))
 }
 
-/// The mean of all corners. With the origin as the reference point, a body far from it would lose digits to
-/// cancellation.
+/// The mean of all corners. With the origin as the reference point, a body far from it would lose
+/// digits to cancellation.
 fn middle(triangles: impl ExactSizeIterator<Item = [DVec3; 3]>) -> DVec3 {
     let count = 3.0 * triangles.len().max(1) as f64;
     triangles.flatten().sum::<DVec3>() / count

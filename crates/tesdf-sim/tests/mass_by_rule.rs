@@ -1,5 +1,5 @@
-//! Bodies whose faces do not enclose them: mass properties against formulas and sums over points, and a
-//! sheet that falls.
+//! Bodies whose faces do not enclose them: mass properties against formulas and sums over points,
+//! and a sheet that falls.
 #[path = "../../tesdf/tests/support/parts.rs"]
 #[allow(dead_code, reason = "each test program uses its part")]
 mod parts;
@@ -106,13 +106,8 @@ fn a_flat_sheet_has_the_mass_of_a_plate() {
     assert!(difference(&found, &expected) < 1e-12, "{found:?} instead of {expected:?}");
 }
 
-/// A square sheet about the origin, across z.
-fn plate(length: f64, thickness: f64) -> Shape {
-    let half = 0.5 * length;
-    let corners =
-        [[-half, -half], [half, -half], [half, half], [-half, half]].map(|[x, y]| DVec3::new(x, y, 0.0));
-    let mesh = Parts::default().add(&corners, &[[0, 1, 2], [0, 2, 3]], Outward).mesh();
-    shape(mesh, InsideRule::Sheet { thickness })
+fn plate(edge: f64, thickness: f64) -> Shape {
+    shape(Parts::default().plate(edge).mesh(), InsideRule::Sheet { thickness })
 }
 
 /// A sheet comes to rest on the ground, half of its thickness above it.

@@ -54,16 +54,10 @@ fn shells_inside_out_and_boundaries_touch_as_solids() {
     }
 }
 
-/// A square of edge 2 about the origin, across z.
-fn plate() -> TriangleMesh {
-    let corners = [-DVec3::X - DVec3::Y, DVec3::X - DVec3::Y, DVec3::X + DVec3::Y, DVec3::Y - DVec3::X];
-    Parts::default().add(&corners, &[[0, 1, 2], [0, 2, 3]], Outward).mesh()
-}
-
 /// Plates that cross, and a box on both sides of a plate, have no vertex in each other.
 #[test]
 fn overlaps_of_sheets_that_no_vertex_shows_are_reported() {
-    let sheet = Shape::from(Body::sheet(plate(), 0.2).asset);
+    let sheet = Shape::from(Body::sheet(Parts::default().plate(2.0).mesh(), 0.2).asset);
     let mesh = Shape::from(box_of(0.5).asset);
     let half_extents = DVec3::splat(0.25);
     let across = |z: f64| Pose::new(z * DVec3::Z, DQuat::from_rotation_x(0.5 * PI)).expect("a pose");
@@ -99,7 +93,7 @@ fn overlaps_of_sheets_that_no_vertex_shows_are_reported() {
 
 #[test]
 fn a_sheet_and_a_box_have_the_clearance_and_impact_of_formulas() {
-    let plate = Body::sheet(plate(), 0.2);
+    let plate = Body::sheet(Parts::default().plate(2.0).mesh(), 0.2);
     for side in [1.0, -1.0] {
         for shape in [
             Shape::from(box_of(0.5).asset),

@@ -61,6 +61,12 @@ fn moved(instance: &Instance, p: DVec3, time: f64) -> DVec3 {
     Motion::Linear { velocity: instance.velocity }.pose_at(instance.pose, time).to_world(p)
 }
 
+/// The change of the distance of two points within `time`.
+fn change([(a, p), (b, q)]: [(&Instance, DVec3); 2], time: f64) -> f64 {
+    let distance = |time| moved(a, p, time).distance(moved(b, q, time));
+    (distance(time) - distance(0.0)).abs()
+}
+
 #[test]
 fn no_two_points_come_closer_than_the_bound_says() {
     let mut random = Random(7);
@@ -84,8 +90,7 @@ fn no_two_points_come_closer_than_the_bound_says() {
         relative += usize::from(bound < 0.5 * absolute);
         for _ in 0..40 {
             let (p, q) = (point(&a, &mut random), point(&b, &mut random));
-            let distance = |time| moved(&a, p, time).distance(moved(&b, q, time));
-            let change = (distance(time * random.unit()) - distance(0.0)).abs();
+            let change = change([(&a, p), (&b, q)], time * random.unit());
             let rounding = 1e-13 * (20.0 + absolute);
             assert!(change <= bound + rounding, "case {case}: {change} is more than {bound}\n{a:?}\n{b:?}");
             if bound > 1e-6 {
@@ -97,7 +102,8 @@ fn no_two_points_come_closer_than_the_bound_says() {
     assert!(relative > 400, "only {relative} cases in which bodies move together");
 }
 
-/// The bound of a part holds for the points of the part, and is less than that of the pair for many.
+/// The bound of a part holds for the points of the part, and is less than that of the pair for
+/// many.
 #[test]
 fn no_point_of_a_part_comes_closer_than_its_bound_says() {
     let mut random = Random(21);
@@ -127,8 +133,7 @@ fn no_point_of_a_part_comes_closer_than_its_bound_says() {
             let radius = if random.index(2) == 0 { 0.0 } else { random.power(-2.0, 0.0).abs() };
             let center = begin + radius * random.unit() * random.direction();
             let bound = approach.around(center, radius);
-            let distance = |time| moved(&a, p, time).distance(moved(&b, q, time));
-            let change = (distance(time * random.unit()) - distance(0.0)).abs();
+            let change = change([(&a, p), (&b, q)], time * random.unit());
             let rounding = 1e-13 * (20.0 + ahead_a.motion() + ahead_b.motion());
             assert!(change <= bound + rounding, "case {case}: {change} is more than {bound}\n{a:?}\n{b:?}");
             less += usize::from(bound < 0.5 * whole);
@@ -165,14 +170,9 @@ fn an_approach_covers_what_is_nowhere_greater() {
             (random.direction(), random.power(-2.0, 0.0).abs(), 0.3 * random.unit() * random.unit());
         let is_covered = own.covers(&other, center, radius, slack);
         let greatest = (0..60)
-            .map(|_| {
-                center
-                    + radius
-                        * if random.index(2) == 0 {
-                            random.direction()
-                        } else {
-                            random.in_cube().clamp_length_max(1.0)
-                        }
+            .map(|k| match k % 2 {
+                0 => center + radius * random.direction(),
+                _ => center + radius * random.in_cube().clamp_length_max(1.0),
             })
             .map(|p| other.around(p, 0.0) - own.around(p, 0.0))
             .fold(f64::NEG_INFINITY, f64::max);
@@ -183,8 +183,8 @@ fn an_approach_covers_what_is_nowhere_greater() {
     assert!(covered > 4000 && missed < covered, "{covered} covered, {missed} not found to be");
 }
 
-/// Parts look as far as their own motion says: of the contacts within the contact distance of their pair,
-/// a detection finds those within that of their part.
+/// Parts look as far as their own motion says: of the contacts within the contact distance of their
+/// pair, a detection finds those within that of their part.
 #[test]
 fn each_part_looks_as_far_as_it_moves() {
     let mut random = Random(23);

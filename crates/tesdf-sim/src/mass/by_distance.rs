@@ -1,5 +1,5 @@
-//! Mass properties of a solid whose faces do not enclose it: by cubes, and the signed distances at their
-//! centres.
+//! Mass properties of a solid whose faces do not enclose it: by cubes, and the signed distances at
+//! their centres.
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use tesdf::TeSdf;
@@ -13,8 +13,9 @@ const CUBES: f64 = 16.0;
 /// A cube that the surface can pass through is halved along each axis this many times.
 const HALVINGS: u32 = 3;
 
-/// The mass properties of density 1. Cubes that the surface passes through are 1/128 of the longest side; each
-/// counts by the share that a plane at its distance leaves. The error falls with the square of that size.
+/// The mass properties of density 1. Cubes that the surface passes through are 1/128 of the longest
+/// side; each counts by the share that a plane at its distance leaves. The error falls with the
+/// square of that size.
 pub fn by_distance(asset: &TeSdf, shape: &Shape) -> Result<MassProperties, MassError> {
     let bounds = shape.bounds();
     let (middle, extent) = (bounds.center(), bounds.extent());

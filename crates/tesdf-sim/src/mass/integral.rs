@@ -17,7 +17,8 @@ pub struct Integral {
 impl Integral {
     const ZERO: Self = Self { volume: 0.0, first: DVec3::ZERO, second: DMat3::ZERO };
 
-    /// Those of a part about the reference point, from its centre and its own second moment about that.
+    /// Those of a part about the reference point, from its centre and its own second moment about
+    /// that.
     pub fn of_part(volume: f64, center: DVec3, own: DMat3) -> Self {
         Self { volume, first: volume * center, second: own + volume * square(center) }
     }

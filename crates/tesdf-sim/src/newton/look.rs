@@ -39,8 +39,9 @@ impl Look {
         Ok(Self { contacts, ways: vec![way] })
     }
 
-    /// The pairs that the velocities of `scene` bring closer in `time`, at some place, than was looked
-    /// there. Their relative velocity has changed: of two bodies that fall together, one has met a third.
+    /// The pairs that the velocities of `scene` bring closer in `time`, at some place, than was
+    /// looked there. Their relative velocity has changed: of two bodies that fall together, one has
+    /// met a third.
     pub fn outrun(&self, scene: &Scene, time: f64) -> Result<Vec<Pair>, CollideError> {
         let Way { pairs, .. } = Way::new(scene, 0.0, time)?;
         Ok(pairs
@@ -96,8 +97,8 @@ impl Way {
         Ok(Self { contact_distance, pairs: pairs.collect::<Result<_, CollideError>>()? })
     }
 
-    /// Whether every part of the two instances has looked as far as needed. The bounds of a pair that was
-    /// not tested were farther apart than it looked.
+    /// Whether every part of the two instances has looked as far as needed. The bounds of a pair
+    /// that was not tested were farther apart than it looked.
     fn covers(&self, pair: Pair, needed: &Between) -> bool {
         let Some(Between { distance, ahead: [a, b] }) = self.pairs.get(&pair) else { return false };
         let [c, d] = &needed.ahead;
@@ -112,8 +113,8 @@ impl Way {
     }
 }
 
-/// The contacts of two looks at the same pairs. Where both have contacts of a face, an edge or a node, those
-/// of the look that has more.
+/// The contacts of two looks at the same pairs. Where both have contacts of a face, an edge or a
+/// node, those of the look that has more.
 fn union(own: Vec<Contact>, other: Vec<Contact>) -> Vec<Contact> {
     let mut parts: BTreeMap<_, [Vec<Contact>; 2]> = BTreeMap::new();
     for (look, contacts) in [own, other].into_iter().enumerate() {

@@ -70,8 +70,8 @@ impl Ahead {
     }
 }
 
-/// The motion of the points of an instance as another one sees it, within a time. Proof of the bounds:
-/// `docs/math.md`, section 16.
+/// The motion of the points of an instance as another one sees it, within a time. Proof of the
+/// bounds: `docs/math.md`, section 16.
 #[derive(Clone, Copy, Debug)]
 pub struct Approach {
     /// Where the instance's origin is at the beginning.
@@ -91,12 +91,13 @@ impl Approach {
         (self.way + self.turn.cross(center - self.about)).length() + arc(self.turn, radius) + self.rest
     }
 
-    /// Whether, within `radius` of `center`, no other approach of the same instance is greater than this
-    /// one by more than `slack`. `true` is certain.
+    /// Whether, within `radius` of `center`, no other approach of the same instance is greater than
+    /// this one by more than `slack`. `true` is certain.
     pub fn covers(&self, other: &Self, center: DVec3, radius: f64, slack: f64) -> bool {
         let [own, its] = [self, other].map(|a| (a.way + a.turn.cross(center - a.about), a.turn));
         let slack = slack + self.rest - other.rest;
-        // The share of the own motion that is most like the other one. What is left of it must be small.
+        // The share of the own motion that is most like the other one. What is left of it must be
+        // small.
         let weight = if radius.is_finite() { radius * radius } else { 0.0 };
         let product = |x: (DVec3, DVec3), y: (DVec3, DVec3)| x.0.dot(y.0) + weight * x.1.dot(y.1);
         let square = product(own, own);

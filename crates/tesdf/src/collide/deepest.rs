@@ -11,12 +11,13 @@
 //! nearly parallel, every face that touches is still compared with the limit.
 use std::collections::BTreeMap;
 
+use super::branch::Branch;
 use super::few::{OfPair, unfound};
 use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
 use super::ordered_pair::OrderedPair;
 use super::queue::Queue;
 use super::reduce::deepest_of_pair;
-use super::surface::{Branch, Part};
+use super::surface::Part;
 use super::{Contact, Mode, Statistics};
 use crate::asset::layout::{TREE_LEAF, TreeChild};
 use crate::parallel::*;
@@ -140,11 +141,7 @@ impl<'a> Search<'a> {
         let (start, count) = match open.child {
             TreeChild::Node(node) => {
                 let bound = |branch: Branch| {
-                    let least = field.least_contact(
-                        branch.center,
-                        branch.radius,
-                        reach.around(branch.center, branch.radius),
-                    )?;
+                    let least = branch.least_contact(field, reach)?;
                     Some(((least - field.rounding()) * field.unit(), branch.child))
                 };
                 let branches = surface.halves(node).into_iter().flatten();

@@ -15,11 +15,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::parallel::*;
 use glam::DVec3;
 
+use super::branch::Branch;
 use super::field::{Field, FieldBody};
 use super::field_value::FieldValue;
 use super::ordered_pair::OrderedPair;
 use super::queue::Queue;
-use super::surface::{Branch, SurfaceBody};
+use super::surface::SurfaceBody;
 use super::{CollideError, CollideOptions, Contact, HiddenOverlap, HiddenSearch, InstanceId, Mode, Scene};
 use crate::asset::layout::TreeChild;
 use crate::geometry::Aabb;

@@ -13,8 +13,8 @@ pub struct InstancePair {
     /// The instance with the higher id.
     pub second: InstanceId,
     /// The pair's contact distance: contacts are reported up to this signed distance at most, in
-    /// the world's unit. It is that of the options, plus what the velocities of the two, relative to
-    /// each other, can close within the speculative time.
+    /// the world's unit. It is that of the options, plus what the velocities of the two, relative
+    /// to each other, can close within the speculative time.
     pub contact_distance: f64,
 }
 

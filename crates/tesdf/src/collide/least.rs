@@ -1,8 +1,9 @@
 //! The least signed distance over whole surfaces, by best-first search over their face trees.
+use super::branch::Branch;
 use super::field::FieldBody;
 use super::piece::{Looks, Lowest, Piece, Rest};
 use super::queue::Queue;
-use super::surface::{Branch, SurfaceBody};
+use super::surface::SurfaceBody;
 use crate::asset::layout::TreeChild;
 use crate::parallel::*;
 

@@ -2,7 +2,6 @@
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-use super::ahead::Ahead;
 use super::descent::OnFace;
 use super::ordered_pair::OrderedPair;
 use super::{CollideError, CollideOptions, Contact, InstanceId, Scene};
@@ -26,9 +25,8 @@ pub fn local_minima(
     for (contact, &face) in contacts.iter().zip(faces) {
         let (a, b) = (contact.instance_a, contact.instance_b);
         if let Entry::Vacant(entry) = pairs.entry((a, b)) {
-            let [ahead_a, ahead_b] = Ahead::of_both(scene, [a, b], options.speculative_time)?;
-            let reach = options.contact_distance + ahead_a.closing(&ahead_b);
-            entry.insert(OrderedPair::new(scene, options, a, b, reach)?);
+            let distance = OrderedPair::contact_distance(scene, options, [a, b])?;
+            entry.insert(OrderedPair::new(scene, options, a, b, distance)?);
         }
         let least = lowest.entry((a, b, face)).or_insert(contact.distance);
         *least = least.min(contact.distance);

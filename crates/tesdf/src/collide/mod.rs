@@ -26,6 +26,7 @@
 //! In each contact, *a* is the body that has the face (or node), and *b* is the body whose signed
 //! distance field is used. Both orders of a pair are evaluated.
 mod ahead;
+mod branch;
 mod candidates;
 mod clearance;
 mod coarse;

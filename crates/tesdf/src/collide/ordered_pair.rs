@@ -59,6 +59,16 @@ impl<'a> OrderedPair<'a> {
             .collect()
     }
 
+    /// The contact distance of two instances, in the world's unit.
+    pub fn contact_distance(
+        scene: &Scene,
+        options: &CollideOptions,
+        both: [InstanceId; 2],
+    ) -> Result<f64, CollideError> {
+        let [a, b] = Ahead::of_both(scene, both, options.speculative_time)?;
+        Ok(options.contact_distance + a.closing(&b))
+    }
+
     /// `contact_distance` is that of the pair, in the world's unit.
     pub fn new(
         scene: &'a Scene,

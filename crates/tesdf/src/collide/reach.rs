@@ -1,5 +1,5 @@
-//! The contact distance of each part of a surface: a part that hardly moves against the other body looks
-//! less far than its pair.
+//! The contact distance of each part of a surface: a part that hardly moves against the other body
+//! looks less far than its pair.
 use glam::DVec3;
 
 use super::ahead::Approach;
@@ -14,8 +14,8 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// All lengths are in the world's unit. `most` is the contact distance of the pair, `least` that of a
-    /// part that does not move against the body of the field.
+    /// All lengths are in the world's unit. `most` is the contact distance of the pair, `least`
+    /// that of a part that does not move against the body of the field.
     pub fn new(approach: &Approach, field: &FieldBody, most: f64, least: f64) -> Self {
         let unit = field.unit();
         let turned = |v: DVec3| field.rotate_back(v);

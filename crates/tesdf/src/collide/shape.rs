@@ -74,9 +74,8 @@ impl Shape {
 
     /// Centre and radius of a ball inside, in the shape's frame. The radius is a lower bound of the
     /// thickness of the body. For a mesh, it is the largest of the balls that touch the surface at
-    /// the centroids of up to 64 faces, and for a sheet that of half of its thickness on a face; computed
-    /// on first use. `None` for a plane, and for a mesh
-    /// in which no ball was found.
+    /// the centroids of up to 64 faces, and for a sheet that of half of its thickness on a face;
+    /// computed on first use. `None` for a plane, and for a mesh in which no ball was found.
     pub fn inner_ball(&self) -> Option<(DVec3, f64)> {
         match self {
             Self::Mesh(asset) => {

@@ -100,8 +100,7 @@ pub fn of_pair(orders: &[OrderedPair], count: usize) -> OfPair {
 fn children(pair: &OrderedPair, order: usize, node: u32, bound: f64) -> impl Iterator<Item = Region> {
     let OrderedPair { surface, field, reach, .. } = pair;
     surface.halves(node).into_iter().flatten().filter_map(move |branch| {
-        let least =
-            field.least_contact(branch.center, branch.radius, reach.around(branch.center, branch.radius))?;
+        let least = branch.least_contact(field, reach)?;
         let (radius, bound) = (branch.radius * field.unit(), bound.max(least * field.unit()));
         Some(Region { radius, order, child: branch.child, bound })
     })

@@ -2,6 +2,7 @@
 //! edges or nodes that can touch a field.
 use glam::{DMat3, DVec3, Vec3};
 
+use super::branch::Branch;
 use super::field::{Field, FieldBody};
 use super::reach::Reach;
 use super::simple::{Simple, plane_square};
@@ -28,24 +29,6 @@ pub struct SurfaceBody<'a> {
 /// The result of the broad phase: faces, edges or nodes of a surface that can touch, in order. In
 /// edge mode, numbers below that of the nodes are nodes.
 pub type Candidates = Vec<u32>;
-
-/// A node or leaf of the face tree.
-#[derive(Clone, Copy, Debug)]
-pub struct Branch {
-    /// The node or leaf.
-    pub child: TreeChild,
-    /// Centre of a ball that contains it, in the field's frame.
-    pub center: DVec3,
-    /// Radius of the ball.
-    pub radius: f64,
-}
-
-impl Branch {
-    /// Whether none of its points can be within its contact distance of the solid.
-    fn is_beyond(&self, field: &FieldBody, reach: &Reach) -> bool {
-        field.is_beyond(self.center, self.radius, reach.around(self.center, self.radius))
-    }
-}
 
 /// A face, an edge, or the core of a rounded shape, in the field's frame.
 #[derive(Clone, Copy, Debug)]

@@ -3,7 +3,6 @@
 use glam::DVec3;
 use serde::Serialize;
 
-use super::ahead::Ahead;
 use super::middle::ClippedPolygon;
 use super::narrow::Minimum;
 use super::ordered_pair::{Dropped, OrderedPair};
@@ -96,8 +95,8 @@ pub struct PartReport {
     /// The id of the face or node in the user's numbering; of an edge, as
     /// [`FeatureId::a`](super::FeatureId::a).
     pub id: u32,
-    /// The part's contact distance, in the world's unit: at most that of the pair. Parts that hardly move
-    /// against the other body look less far.
+    /// The part's contact distance, in the world's unit: at most that of the pair. Parts that
+    /// hardly move against the other body look less far.
     pub contact_distance: f64,
     /// The result of the broad phase.
     pub broad: BroadVerdict,
@@ -159,8 +158,7 @@ pub fn why(
     options.validate()?;
     let (of_a, of_b) = (scene.instance(a)?, scene.instance(b)?);
     let (shape_a, shape_b) = (scene.shape(of_a.shape)?, scene.shape(of_b.shape)?);
-    let [ahead_a, ahead_b] = Ahead::of_both(scene, [a, b], options.speculative_time)?;
-    let contact_distance = options.contact_distance + ahead_a.closing(&ahead_b);
+    let contact_distance = OrderedPair::contact_distance(scene, options, [a, b])?;
     let (bounds_a, bounds_b) = (scene.bounds(a)?, scene.bounds(b)?);
     let bounds_gap = (bounds_a.min - bounds_b.max).max(bounds_b.min - bounds_a.max).max_element().max(0.0);
     let pair = match () {

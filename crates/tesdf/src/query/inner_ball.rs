@@ -15,9 +15,9 @@ const STEPS: usize = 32;
 const FITS: f64 = 1e-3;
 
 impl TeSdf {
-    /// The largest of the balls that touch the surface from inside at the centroids of some faces. In a sheet,
-    /// the ball of half of its thickness on a face. Its radius is a lower bound of the radius of the largest
-    /// ball inside. Computed on first use.
+    /// The largest of the balls that touch the surface from inside at the centroids of some faces.
+    /// In a sheet, the ball of half of its thickness on a face. Its radius is a lower bound of the
+    /// radius of the largest ball inside. Computed on first use.
     pub(crate) fn inner_ball(&self) -> InnerBall {
         *self.inner_ball.get_or_init(|| {
             if self.half_thickness > 0.0 {

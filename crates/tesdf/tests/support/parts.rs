@@ -39,6 +39,13 @@ impl Parts {
     }
 
     /// The mesh, with one vertex for each position, as reading makes it.
+    /// A square about the origin, across z.
+    pub fn plate(self, edge: f64) -> Self {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let corners = corners.map(|[x, y]| 0.5 * edge * DVec3::new(x, y, 0.0));
+        self.add(&corners, &[[0, 1, 2], [0, 2, 3]], Turn::Outward)
+    }
+
     pub fn mesh(self) -> TriangleMesh {
         let mut known: HashMap<[u64; 3], u32> = HashMap::new();
         let mut vertices = Vec::new();

@@ -48,8 +48,8 @@ pub fn ahead(rows: &[Row], at: u32, field: FarPoint) -> Ahead {
     }
 }
 
-/// The motion of the points of an instance as another one sees it, as `Approach` of `tesdf::collide`.
-/// A point p moves by `way` + `turn` × p, up to `rest`.
+/// The motion of the points of an instance as another one sees it, as `Approach` of
+/// `tesdf::collide`. A point p moves by `way` + `turn` × p, up to `rest`.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Approach {
@@ -80,8 +80,8 @@ impl Ahead {
         (self.motion + other.motion).min(self.around(other)).min(other.around(self))
     }
 
-    /// The motion of the points of this instance as the other one sees it, in the frame of a field with the
-    /// pose `to`.
+    /// The motion of the points of this instance as the other one sees it, in the frame of a field
+    /// with the pose `to`.
     pub fn approach(self, other: Ahead, to: Pose) -> Approach {
         let (way, turn) = (self.way - other.way, self.turn - other.turn);
         let at_origin = way - other.turn.cross(self.origin.from(other.origin));

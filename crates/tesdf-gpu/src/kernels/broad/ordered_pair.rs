@@ -45,8 +45,8 @@ pub struct OrderedPair {
     pub shift: V3,
     /// Length of one unit of a, in units of the field.
     pub scale: f32,
-    /// Contact distance of the pair in the frame of the field: smaller signed distances are contacts. No part
-    /// looks farther.
+    /// Contact distance of the pair in the frame of the field: smaller signed distances are
+    /// contacts. No part looks farther.
     pub reach: f32,
     /// The surfaces touch where a part of a is this far from the points where the field is 0: the
     /// sum of the own radius, and of half of the thickness of a sheet that has the field.
@@ -80,8 +80,8 @@ impl OrderedPairs {
         }
     }
 
-    /// The contact distance of an ordered pair for all points within `radius` of `p`, with the radius of
-    /// the pair.
+    /// The contact distance of an ordered pair for all points within `radius` of `p`, with the
+    /// radius of the pair.
     pub fn reach_around(&self, pair: OrderedPair, p: V3, radius: f32) -> f32 {
         pair.reach.min(self.approach(pair).around(p, radius)) + pair.radius
     }
@@ -100,8 +100,8 @@ impl OrderedPairs {
         Approach { way: xyz(p), turn: xyz(q), rest: last(p) }
     }
 
-    /// Writes an ordered pair. Its number is its index. The rest of the approach contains the contact
-    /// distance of parts that do not move against the other body.
+    /// Writes an ordered pair. Its number is its index. The rest of the approach contains the
+    /// contact distance of parts that do not move against the other body.
     pub fn put(&mut self, pair: OrderedPair, approach: Approach) {
         let word = (pair.number * WORDS) as usize;
         self.words[word] = pair.a;

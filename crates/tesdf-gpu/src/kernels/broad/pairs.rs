@@ -97,8 +97,8 @@ impl Instances {
         self.contact_distance + self.ahead(i).closing(self.ahead(j))
     }
 
-    /// The motion of the points of `a` as `b` sees it, in its field's frame. Its rest contains the contact
-    /// distance.
+    /// The motion of the points of `a` as `b` sees it, in its field's frame. Its rest contains the
+    /// contact distance.
     fn approach(&self, a: u32, b: u32) -> Approach {
         let to = self.pose(b);
         let found = self.ahead(a).approach(self.ahead(b), to);
