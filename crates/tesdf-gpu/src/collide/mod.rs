@@ -20,8 +20,8 @@ use std::collections::BTreeMap;
 
 use tesdf::Length;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, Mode, Reduction, Scene, Shape,
-    ShapeId, Statistics, reduce_pairs,
+    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, InstancePair, Mode, Reduction, Scene,
+    Shape, ShapeId, Statistics, reduce_pairs,
 };
 
 use buffers::{ContactBuffers, PipelineBuffers, ROW, WORD};
@@ -176,6 +176,19 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         let options = &possible(options)?;
+        let (divided, pairs) = self.divide(scene, options)?;
+        let found = self.run_on_device(&divided.on_device, options, timing)?;
+        self.report.pairs_on_processor = pairs.len();
+        Ok(with_pairs(found, &pairs, scene, options)?)
+    }
+
+    /// Divides the instances of a scene by where contacts are found, and returns the pairs that the
+    /// processor detects.
+    fn divide<'a>(
+        &self,
+        scene: &'a Scene,
+        options: &CollideOptions,
+    ) -> Result<(Divided<'a>, Vec<InstancePair>), GpuError> {
         let divided = Divided::new(scene)?;
         let pairs = divided.pairs(scene, options)?;
         if !pairs.is_empty() && self.shapes.have_moved() {
@@ -186,9 +199,7 @@ impl Detector {
                 instead: "move the vertices of the scene, and upload it",
             });
         }
-        let found = self.run_on_device(&divided.on_device, options, timing)?;
-        self.report.pairs_on_processor = pairs.len();
-        Ok(with_pairs(found, &pairs, scene, options)?)
+        Ok((divided, pairs))
     }
 
     fn run_on_device(

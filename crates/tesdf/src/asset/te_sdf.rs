@@ -223,16 +223,11 @@ impl TeSdf {
         })
     }
 
-    /// Why kernels on other devices find no contacts of the asset; `None` when they do.
+    /// Whether kernels on other devices find contacts of the asset: its field does not jump, and no
+    /// face has the inside in front of it.
     #[doc(hidden)]
-    pub fn undetected_on_devices(&self) -> Option<String> {
-        let why = match () {
-            () if self.jump().is_some() => "the field jumps in the holes of an open mesh",
-            () if !self.faces_look_outward() => "faces may have the inside in front of them",
-            () => return None,
-        };
-        let rule = self.inside().rule.name();
-        Some(format!("its inside is by the rule `{rule}`, and {why}, which kernels do not detect"))
+    pub fn is_detected_on_devices(&self) -> bool {
+        self.jump().is_none() && self.faces_look_outward()
     }
 
     /// Bounds of the solid, in the unit of the mesh: those of the mesh, with half of the thickness
