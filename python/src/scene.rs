@@ -306,8 +306,7 @@ impl Scene {
     /// They are those of detect on this device, rounded to float32, sorted by world and instances;
     /// within a pair, faces have the order of the asset. On a CUDA device other libraries use the
     /// arrays in place, and their poses are used in place. Only counters are copied to the processor,
-    /// and contacts only to tell whether they show a deep overlap that was found otherwise. Where the
-    /// processor finds contacts of a body (docs/meshes.md), poses and contacts are copied.
+    /// and contacts only to tell whether they show a deep overlap that was found otherwise.
     ///
     /// - poses: float32 [N, 7], x y z qx qy qz qw, a row for each instance in the order of ids: a
     ///   DeviceArray, memory of another library on this device (DLPack or __cuda_array_interface__),

@@ -7,7 +7,6 @@ mod counts;
 mod middle;
 mod narrow;
 mod on_device;
-mod on_processor;
 mod options;
 mod pass;
 pub mod queries;
@@ -20,15 +19,14 @@ use std::collections::BTreeMap;
 
 use tesdf::Length;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, InstancePair, Mode, Reduction, Scene,
-    Shape, ShapeId, Statistics, reduce_pairs,
+    CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, Mode, Reduction, Scene, Shape,
+    ShapeId, Statistics, reduce_pairs,
 };
 
 use buffers::{ContactBuffers, PipelineBuffers, ROW, WORD};
 use contacts::{Row, Words, contacts, keep_minima, one_per_vertex};
 pub use counts::Counts;
 pub use on_device::{DeviceContacts, GivenPoses};
-use on_processor::{Divided, with_pairs};
 pub use options::{
     Capacities, Counting, DetectorOptions, DeviceBytes, DeviceReport, Exchange, Lanes, Memory, Pruning,
 };
@@ -90,11 +88,6 @@ impl Detector {
     /// # Errors
     /// The errors of [`new`](Self::new).
     pub fn upload(&mut self, scene: &Scene) -> Result<(), GpuError> {
-        self.upload_shapes(&Divided::new(scene)?.on_device)
-    }
-
-    /// Uploads the shapes of a scene whose contacts kernels find.
-    fn upload_shapes(&mut self, scene: &Scene) -> Result<(), GpuError> {
         let ids = shape_ids(scene);
         let shapes: Vec<Shape> = ids.iter().map(|&id| scene.shape(id).cloned()).collect::<Result<_, _>>()?;
         self.shapes = GpuShapes::upload(&self.device, &shapes)?;
@@ -126,10 +119,9 @@ impl Detector {
     ///   several contacts at one vertex, of which otherwise one remains.
     /// - [`Reduction::Deepest`] cuts the contacts on the processor, after all have been found. So
     ///   it saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
-    /// - Kernels do not detect open meshes under the rule
-    ///   [`Generalized`](tesdf::base::InsideRule::Generalized), nor meshes with faces that look
-    ///   inwards in places. The processor finds all contacts of their instances, in `f64`.
-    ///   [`DeviceReport::pairs_on_processor`] counts these pairs.
+    /// - In the field of an open mesh under the rule
+    ///   [`Generalized`](tesdf::base::InsideRule::Generalized), a search ends after the same number
+    ///   of rounds as everywhere. Along a jump it needs more of them, and says `converged: false` sooner.
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors
@@ -139,7 +131,7 @@ impl Detector {
     /// - [`GpuError::Shape`] when a shape cannot be uploaded, or a vertex was moved to an invalid
     ///   position.
     /// - [`GpuError::Unavailable`] for the mode [`Edge`](Mode::Edge), and when vertices have moved
-    ///   on the device and the scene now has other shapes, or shapes that the processor detects.
+    ///   on the device and the scene now has other shapes.
     /// - [`GpuError::Device`] when the device fails, or a driver stops the loops of a kernel early.
     pub fn detect(&mut self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, GpuError> {
         self.run(scene, options, Timing::Off)
@@ -176,38 +168,6 @@ impl Detector {
 
     fn run(&mut self, scene: &Scene, options: &CollideOptions, timing: Timing) -> Result<Contacts, GpuError> {
         let options = &possible(options)?;
-        let (divided, pairs) = self.divide(scene, options)?;
-        let found = self.run_on_device(&divided.on_device, options, timing)?;
-        self.report.pairs_on_processor = pairs.len();
-        Ok(with_pairs(found, &pairs, scene, options)?)
-    }
-
-    /// Divides the instances of a scene by where contacts are found, and returns the pairs that the
-    /// processor detects.
-    fn divide<'a>(
-        &self,
-        scene: &'a Scene,
-        options: &CollideOptions,
-    ) -> Result<(Divided<'a>, Vec<InstancePair>), GpuError> {
-        let divided = Divided::new(scene)?;
-        let pairs = divided.pairs(scene, options)?;
-        if !pairs.is_empty() && self.shapes.have_moved() {
-            return Err(GpuError::Unavailable {
-                what:
-                    "contacts of shapes that the processor detects, while vertices have moved on the device"
-                        .into(),
-                instead: "move the vertices of the scene, and upload it",
-            });
-        }
-        Ok((divided, pairs))
-    }
-
-    fn run_on_device(
-        &mut self,
-        scene: &Scene,
-        options: &CollideOptions,
-        timing: Timing,
-    ) -> Result<Contacts, GpuError> {
         let reduction = options.reduction;
         if wants_minima(options) && self.shapes.have_moved() {
             return Err(GpuError::Unavailable {
@@ -255,7 +215,7 @@ impl Detector {
                     instead: "upload the scene, and move its vertices again",
                 });
             }
-            self.upload_shapes(scene)?;
+            self.upload(scene)?;
         }
         // The processor's tree knows neither vertices nor instances that have moved on the device.
         let on_processor = !self.shapes.have_moved() && given.is_none();

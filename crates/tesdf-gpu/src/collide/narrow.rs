@@ -16,9 +16,12 @@ impl Pass<'_> {
     pub(super) fn narrow(&mut self) -> Result<(), GpuError> {
         match self.options.mode {
             Mode::Node => self.narrow_nodes(),
-            Mode::Face => self.narrow_faces(),
+            Mode::Face => {
+                self.narrow_faces()?;
+                if self.detector.shapes.rules.jumps { self.narrow_exact(1) } else { Ok(()) }
+            }
             // A detection refuses edges.
-            Mode::Edge | Mode::Exact => self.narrow_exact(),
+            Mode::Edge | Mode::Exact => self.narrow_exact(0),
         }
     }
 
@@ -94,12 +97,13 @@ impl Pass<'_> {
         )
     }
 
-    fn narrow_exact(&mut self) -> Result<(), GpuError> {
+    /// The exact mode; with `only_open` 1 for the fields of open meshes alone.
+    fn narrow_exact(&mut self, only_open: u32) -> Result<(), GpuError> {
         let (shapes, buffers) = (&self.detector.shapes, &self.detector.buffers);
         let per_polygon = self.groups_for(buffers.room.polygons, 1, POLYGONS)?;
         let tolerances = self.tolerances()?;
         let (pairs, counters, contacts) = (buffers.ordered_pairs(), self.counters(), buffers.contacts());
-        let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta());
+        let asked = AskedExactLaunch::new(tolerances.words(), self.cos_theta(), only_open);
         let counting = self.detector.options.counting == Counting::Operations;
         if parts(self.options) == Parts::Faces {
             let faces = buffers.whole_faces();

@@ -139,9 +139,6 @@ pub struct DeviceReport {
     pub read: usize,
     /// Counts of the last pass.
     pub counts: Counts,
-    /// Number of pairs of instances whose contacts the processor has found, because kernels do not
-    /// detect a shape.
-    pub pairs_on_processor: usize,
     /// Name and device time of each launch of the last pass, in order. Empty except after
     /// [`Detector::detect_timed`](super::Detector::detect_timed).
     pub stages: Vec<(&'static str, Duration)>,

@@ -5,7 +5,7 @@ use tesdf::asset::layout::List;
 use super::{device, groups_of, read, upload};
 use crate::kernels::GROUP;
 use crate::kernels::field::shapes::{
-    LISTS, NONE, PALETTE_STARTS, PALETTES, PALETTES_HIGH, STRIDE, Shapes, ShapesLaunch,
+    LISTS, NONE, PALETTE_STARTS, PALETTES, PALETTES_HIGH, Rules, STRIDE, Shapes, ShapesLaunch,
 };
 
 /// Reads a list per thread: `counts` gets its number of faces, `faces` the first `room` faces.
@@ -111,7 +111,7 @@ fn kernels_decode_lists_as_the_layout_defines_them() {
             device.client(),
             groups_of(count),
             CubeDim::new_1d(GROUP),
-            ShapesLaunch::new(table.words(), words.words(), rows.rows(), false),
+            ShapesLaunch::new(table.words(), words.words(), rows.rows(), Rules::default()),
             offsets.words(),
             counts.words(),
             faces.words(),

@@ -18,7 +18,7 @@ use super::counters::{self, CountersLaunch};
 use super::deform::bounds::MovingLaunch;
 use super::encode::sample::SamplesLaunch;
 use super::field::query;
-use super::field::shapes::ShapesLaunch;
+use super::field::shapes::{Rules, ShapesLaunch};
 use super::middle::items::{ItemsLaunch, PolygonsLaunch};
 use super::narrow::contacts::ContactsLaunch;
 use super::narrow::exact::AskedExactLaunch;
@@ -126,7 +126,9 @@ fn add_middle(all: &mut Vec<Named>, device: &Device, target: &Target) {
 
 /// Adds the kernels of the narrow phase.
 fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
-    let exact = || AskedExactLaunch::new(words(), 0.0);
+    let exact = || AskedExactLaunch::new(words(), 0.0, 0);
+    let at_points = Rules { at_points: true, ..Rules::default() };
+    let all_rules = Rules { at_points: true, jumps: true, turned: true };
     let asked = || AskedLaunch::new(words(), 1, 0.0);
     let in_world = || WorldContactsLaunch::new(words(), words(), words(), words(), words());
     kernels!(all, device, target;
@@ -143,7 +145,9 @@ fn add_narrow(all: &mut Vec<Named>, device: &Device, target: &Target) {
         Indirect narrow::exact_faces::narrow_exact_faces, LANES,
             (shapes(), pairs(), polygons(), counters(), contacts(), exact(), true); "counting";;
         Indirect narrow::exact_faces::narrow_exact_faces, LANES,
-            (shapes_with(true), pairs(), polygons(), counters(), contacts(), exact(), false); "with rules";;
+            (shapes_with(at_points), pairs(), polygons(), counters(), contacts(), exact(), false); "with rules";;
+        Indirect narrow::exact_faces::narrow_exact_faces, LANES,
+            (shapes_with(all_rules), pairs(), polygons(), counters(), contacts(), exact(), false); "with all rules";;
     );
     for counting in [false, true] {
         for lanes in [LANES, 1] {
@@ -185,11 +189,11 @@ fn add_reduce(all: &mut Vec<Named>, device: &Device, target: &Target) {
 }
 
 fn shapes() -> ShapesLaunch {
-    shapes_with(false)
+    shapes_with(Rules::default())
 }
 
-fn shapes_with(has_rules: bool) -> ShapesLaunch {
-    ShapesLaunch::new(words(), words(), rows(), has_rules)
+fn shapes_with(rules: Rules) -> ShapesLaunch {
+    ShapesLaunch::new(words(), words(), rows(), rules)
 }
 
 fn counters() -> CountersLaunch {

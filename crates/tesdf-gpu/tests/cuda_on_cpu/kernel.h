@@ -43,6 +43,8 @@ static inline int max(int a, int b) { return a > b ? a : b; }
 static inline float min(float a, float b) { return __builtin_fminf(a, b); }
 static inline float max(float a, float b) { return __builtin_fmaxf(a, b); }
 static inline float sqrt(float x) { return __builtin_sqrtf(x); }
+static inline float floor(float x) { return __builtin_floorf(x); }
+static inline float atan2(float y, float x) { return __builtin_atan2f(y, x); }
 static inline float fabs(float x) { return __builtin_fabsf(x); }
 
 static inline unsigned cuda_fetch_max(unsigned *at, unsigned value) {

@@ -115,6 +115,12 @@ impl GeneralizedWinding {
         self.cones.iter().map(Vec::len).sum()
     }
 
+    /// Triangles that close the mesh. Their first two corners are an open edge. The third one, an
+    /// apex, lies aside of the means of the edges, in which the mesh may be symmetric.
+    pub fn closing(&self) -> &[[DVec3; 3]] {
+        &self.cones[1]
+    }
+
     /// The winding number of the faces, which is that of the mesh where it is closed.
     pub fn into_faces(self) -> WindingNumber {
         self.faces

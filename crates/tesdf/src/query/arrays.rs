@@ -4,7 +4,7 @@ use crate::TeSdf;
 use crate::asset::{Conforming, FaceRecord};
 use crate::base::InsideRule;
 use crate::domain::DomainCube;
-use crate::geometry::{Aabb, LocalFrame};
+use crate::geometry::{Aabb, GeneralizedWinding, LocalFrame};
 
 /// The arrays of an asset, as kernels on other devices read them. [`layout`](crate::asset::layout)
 /// explains the words.
@@ -69,10 +69,15 @@ pub struct Arrays<'a> {
 pub struct SignArrays {
     /// The rule. All faces count, and the triangles.
     pub rule: InsideRule,
-    /// Whether the side also changes where there is no face: for an open mesh.
-    pub jumps: bool,
     /// Triangles that count for the side alone, in the local frame.
     pub triangles: Vec<[DVec3; 3]>,
+    /// Triangles that close an open mesh, in the local frame: each begins with an open edge. The side
+    /// then changes where there is no face, too. Empty for a closed mesh.
+    pub closing: Vec<[DVec3; 3]>,
+    /// How far the inside of an open mesh can extend beyond the bounds of its faces; otherwise 0.
+    pub reach_beyond: f64,
+    /// Whether no face has the inside in front of it.
+    pub faces_look_outward: bool,
 }
 
 impl TeSdf {
@@ -84,7 +89,13 @@ impl TeSdf {
         let local = |v: u32| self.frame.to_local(DVec3::from_array(self.vertices[v as usize]));
         let faces = self.sign_faces.as_deref().unwrap_or(&[]);
         let triangles = faces.iter().map(|face| face.map(local)).collect();
-        Some(SignArrays { rule: self.inside().rule, jumps: rule.jumps(), triangles })
+        Some(SignArrays {
+            rule: self.inside().rule,
+            triangles,
+            closing: rule.jump().map_or(Vec::new(), |jump| jump.closing().to_vec()),
+            reach_beyond: rule.jump().map_or(0.0, GeneralizedWinding::reach_beyond),
+            faces_look_outward: self.faces_look_outward(),
+        })
     }
 
     /// The arrays that kernels on other devices read. Computes the bounds of the cells on first

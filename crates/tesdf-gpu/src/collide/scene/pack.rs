@@ -107,9 +107,16 @@ impl Packed {
         set(shapes::EXACT_LISTS, u32::from(mesh.has_exact_lists));
         if let Some(sign) = sign {
             set(shapes::RULE, rule_of(sign));
-            let corners = sign.triangles.iter().flatten().map(|p| (*p - mesh.cube.middle()).as_vec3());
-            set(shapes::SIGN_TRIANGLES, self.rows_at(corners.map(|p| p.extend(0.0).to_array()))?);
-            set(shapes::SIGN_COUNT, sign.triangles.len() as u32);
+            let triangles = [&sign.triangles[..], &sign.closing].concat();
+            let record = |corners: &[DVec3; 3]| {
+                let (triangle, hints) = (Triangle::new(*corners), SignHints::default());
+                without_nan(*FaceRecord::new(&triangle, mesh.cube.middle(), hints).as_array())
+            };
+            let records = triangles.iter().map(record).flat_map(four);
+            set(shapes::SIGN_TRIANGLES, self.rows_at(records)?);
+            set(shapes::SIGN_COUNT, triangles.len() as u32);
+            set(shapes::CLOSING_COUNT, sign.closing.len() as u32);
+            set(shapes::TURNED, u32::from(!sign.faces_look_outward));
         }
         let roots = Roots::new(mesh);
         set(shapes::TETRAHEDRA, self.rows_at(roots.rows.into_iter())?);
@@ -131,7 +138,9 @@ impl Packed {
         set(shapes::BOUND_UNIT, mesh.cell_bound_unit);
         set(shapes::BAND, mesh.band);
         set(shapes::HALF_THICKNESS, mesh.half_thickness);
-        let bounds = mesh.bounds.grown(mesh.half_thickness);
+        let beyond = sign.map_or(0.0, |sign| sign.reach_beyond);
+        set(shapes::REACH_BEYOND, beyond);
+        let bounds = mesh.bounds.grown(mesh.half_thickness + beyond);
         for axis in 0..3 {
             set(shapes::LOW + axis as u32, (bounds.min - mesh.cube.middle())[axis]);
             set(shapes::HIGH + axis as u32, (bounds.max - mesh.cube.middle())[axis]);
@@ -166,7 +175,7 @@ impl Packed {
 /// The number of a rule in [`shapes::RULE`].
 fn rule_of(sign: &SignArrays) -> u32 {
     match sign.rule {
-        InsideRule::Generalized if sign.jumps => rule::GENERALIZED,
+        InsideRule::Generalized if !sign.closing.is_empty() => rule::GENERALIZED,
         InsideRule::Nonzero | InsideRule::Generalized => rule::NONZERO,
         InsideRule::Odd => rule::ODD,
         InsideRule::Winding | InsideRule::Sheet { .. } => rule::WINDING,

@@ -5,8 +5,8 @@ use super::moving::Moving;
 use super::pack::Packed;
 use crate::GpuError;
 use crate::device::{Buffer, Device};
-use crate::kernels::field::rule::BY_CELLS;
-use crate::kernels::field::shapes::{RULE, STRIDE, ShapesLaunch};
+use crate::kernels::field::rule::{BY_CELLS, GENERALIZED};
+use crate::kernels::field::shapes::{RULE, Rules, STRIDE, ShapesLaunch, TURNED};
 
 /// A list of shapes in the memory of a device.
 #[derive(Clone)]
@@ -20,8 +20,8 @@ pub struct GpuShapes {
     /// domain.
     pub(super) moving: Vec<Option<Moving>>,
     pub(super) moved: bool,
-    /// Whether any shape is told by a rule at points.
-    has_rules: bool,
+    /// The rules that the shapes need.
+    pub(crate) rules: Rules,
 }
 
 /// The id of a shape in [`GpuShapes`].
@@ -50,6 +50,12 @@ impl GpuShapes {
         for (number, shape) in shapes.iter().enumerate() {
             packed.add(shape).map_err(|reason| GpuError::Shape { number, reason })?;
         }
+        let any = |is: fn(&[u32]) -> bool| packed.table.chunks(STRIDE as usize).any(is);
+        let rules = Rules {
+            at_points: any(|entry| entry[RULE as usize] != BY_CELLS),
+            jumps: any(|entry| entry[RULE as usize] == GENERALIZED),
+            turned: any(|entry| entry[TURNED as usize] == 1),
+        };
         Ok(Self {
             device: device.clone(),
             table: device.upload("shapes", &packed.table)?,
@@ -58,13 +64,13 @@ impl GpuShapes {
             shapes: shapes.to_vec(),
             moving: packed.table.chunks(STRIDE as usize).zip(shapes).map(Moving::new).collect(),
             moved: false,
-            has_rules: packed.table.chunks(STRIDE as usize).any(|entry| entry[RULE as usize] != BY_CELLS),
+            rules,
         })
     }
 
     /// The buffers as an argument of kernels.
     pub(crate) fn argument(&self) -> ShapesLaunch {
-        ShapesLaunch::new(self.table.words(), self.words.words(), self.rows.rows(), self.has_rules)
+        ShapesLaunch::new(self.table.words(), self.words.words(), self.rows.rows(), self.rules)
     }
 
     /// The device that holds the shapes.

@@ -106,7 +106,14 @@ impl Field<'_> {
     pub fn is_beyond(self, p: V3, radius: f32, reach: f32, prune: u32) -> bool {
         let limit = radius + reach;
         if self.is_mesh() {
-            self.mesh_is_beyond(p, limit, prune)
+            let mut beyond = self.mesh_is_beyond(p, limit, prune);
+            // Only without its sign is the distance to an open mesh 1-Lipschitz everywhere.
+            if self.is_open() && beyond {
+                let bounds = self.bounds();
+                let out = outside_box(p, bounds.low, bounds.high);
+                beyond = out.length() > radius + ROUNDING || !self.may_jump(p, radius, true);
+            }
+            beyond
         } else {
             let distance = self.simple_value(p).distance;
             distance > limit + SIMPLE_ROUNDING * (p.abs().greatest() + distance.abs())

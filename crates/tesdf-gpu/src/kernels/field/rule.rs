@@ -2,11 +2,12 @@
 //! over all faces where these do not tell it.
 use cubecl::prelude::*;
 
-use super::super::math::triangle::Triangle;
-use super::super::math::vector::{V3, v3, xyz};
-use super::nearest::{TREE_DEPTH, TreeChild};
+use super::super::math::triangle::{ROWS as FACE_ROWS, Triangle, read_face};
+use super::super::math::vector::{LEAST_DIVISOR, V3, v3};
+use super::nearest::{FAR, TREE_DEPTH, TreeChild};
 use super::shapes::{
-    Bounds, CHILDREN, FACE_COUNT, Field, FieldExpand, RULE, SIDE, SIGN_COUNT, SIGN_TRIANGLES,
+    Bounds, CHILDREN, CLOSING_COUNT, Field, FieldExpand, NONE, REACH_BEYOND, RECORDS, RULE, SIDE, SIGN_COUNT,
+    SIGN_TRIANGLES, TURNED,
 };
 use super::winding::crossing;
 
@@ -20,28 +21,53 @@ pub const NONZERO: u32 = 2;
 /// Inside is where it is odd.
 pub const ODD: u32 = 3;
 /// Inside is where the solid angles of all faces of an open mesh sum up to half of the sphere at
-/// least, of either sign (Jacobson et al. 2013).
+/// least, of either sign (Jacobson et al. 2013): the winding number of the mesh with closing triangles, less
+/// their solid angles.
 pub const GENERALIZED: u32 = 4;
 
 /// A face farther off a line than this (local frame) is not crossed by it, whatever is rounded.
 const MARGIN: f32 = 1e-5;
+/// The rounding of the winding number of an open mesh, off its open edges.
+const DECIDED: f32 = 1e-5;
+
+/// Lengths (local frame): the points at which the sides of a face are looked up lie this far beside
+/// the point, towards the inside of the face, and this far off the face. The processor, which computes in
+/// `f64`, looks nearer.
+const ASIDE: f32 = 3e-4;
+const OFF: f32 = 2e-6;
+/// The points aside lie towards points at this share of the way from the corners to the centroid.
+const INNER: f32 = 0.1;
 
 #[cube]
 impl Field<'_> {
-    /// Whether the inside of a mesh may extend beyond its faces, so that the rule tells the side of
-    /// points outside of all lists as well.
+    /// Whether the side changes where there is no face. Then the inside may extend beyond the
+    /// faces, and the rule tells the side of points outside of all lists as well.
     pub fn is_open(self) -> bool {
-        self.entry(RULE) == GENERALIZED
+        let mut open = false;
+        if comptime!(self.shapes.rules.jumps) {
+            open = self.entry(RULE) == GENERALIZED;
+        }
+        open
+    }
+
+    /// Whether faces may have the inside in front of them.
+    pub fn has_turned_faces(self) -> bool {
+        let mut turned = false;
+        if comptime!(self.shapes.rules.turned) {
+            turned = self.entry(TURNED) == 1u32;
+        }
+        turned
     }
 
     /// Whether a point is inside, by numbers of faces.
     pub fn is_inside(self, p: V3) -> bool {
         let mut inside = false;
-        if comptime!(self.shapes.has_rules) {
-            if self.entry(RULE) == BY_CELLS {
-                inside = self.winding(p) >= 1i32;
-            } else {
-                inside = self.is_inside_by_rule(p);
+        if comptime!(self.shapes.rules.at_points) {
+            let rule = self.entry(RULE);
+            let number = self.winding_by_rule(p);
+            inside = select(rule == BY_CELLS || rule == WINDING, number, number.abs()) >= 0.5f32;
+            if rule == ODD {
+                inside = number as i32 % 2i32 != 0i32;
             }
         } else {
             inside = self.winding(p) >= 1i32;
@@ -49,76 +75,143 @@ impl Field<'_> {
         inside
     }
 
-    /// Corners of a triangle that counts for the side alone.
+    /// Whether the side may change without a face within `radius` of a point. With `or_inside`, also
+    /// whether the point is inside.
+    ///
+    /// Off the faces, the winding number of an open mesh changes at most by the integral of `dl / r²`
+    /// along its open edges, divided by 4 pi, per length (Biot and Savart). At a face it changes by a
+    /// whole number. So it is nowhere 1/2 or -1/2 off the faces if it changes by less than what separates
+    /// it from half a whole number.
+    pub fn may_jump(self, p: V3, radius: f32, or_inside: bool) -> bool {
+        let mut may = false;
+        if self.is_open() {
+            let turns = self.winding_by_rule(p);
+            let apart = (turns - turns.floor() - 0.5f32).abs();
+            let mut change = 0.0f32;
+            let mut k = self.entry(SIGN_COUNT) - self.entry(CLOSING_COUNT);
+            while k < self.entry(SIGN_COUNT) {
+                change += change_by(p, radius, self.sign_triangle(k));
+                k += 1u32;
+            }
+            may = radius * comptime!(0.25 / std::f32::consts::PI) * change + DECIDED >= apart;
+            may = may || (or_inside && turns.abs() >= 0.5f32);
+        }
+        may
+    }
+
+    /// The side of a face that is outside at a point of it: 1 in front, -1 behind, and 0 on both
+    /// sides or on none. As `facing` of the processor, beside the point in three directions: at an edge
+    /// of the face its sides would be those of another face.
+    pub fn facing(self, face: u32, at: V3) -> f32 {
+        let mut side = 1.0f32;
+        if self.has_turned_faces() {
+            let f = self.face(face);
+            let center = ((f.corner(0u32) + f.corner(1u32)) + f.corner(2u32)) * 0.333_333_34f32;
+            let mut in_front = 0u32;
+            let mut behind = 0u32;
+            let mut above = false;
+            // Both sides in each direction. This is a loop, so that the long code of the rule stands here once.
+            let mut look = 0u32;
+            while look < 6u32 {
+                let corner = f.corner(look / 2u32);
+                let way = (corner + (center - corner) * INNER) - at;
+                let beside = at + way * (ASIDE / way.length().max(ASIDE));
+                let is_above = look % 2u32 == 0u32;
+                let inside = self.is_inside(beside + f.normal * select(is_above, OFF, -OFF));
+                in_front += select(!is_above && inside && !above, 1u32, 0u32);
+                behind += select(!is_above && !inside && above, 1u32, 0u32);
+                above = inside;
+                look += 1u32;
+            }
+            side = select(in_front == 3u32, 1.0f32, select(behind == 3u32, -1.0f32, 0.0f32));
+        }
+        side
+    }
+
+    /// A triangle that counts for the side alone.
     fn sign_triangle(self, number: u32) -> Triangle {
-        let row = self.entry(SIGN_TRIANGLES) + 3u32 * number;
-        Triangle { a: xyz(self.row(row)), b: xyz(self.row(row + 1u32)), c: xyz(self.row(row + 2u32)) }
+        read_face(&self.shapes.rows, self.entry(SIGN_TRIANGLES) + number * FACE_ROWS).corners()
     }
 
-    fn is_inside_by_rule(self, p: V3) -> bool {
-        let rule = self.entry(RULE);
-        let mut inside = false;
-        if rule == GENERALIZED {
-            inside = self.half_solid_angles(p).abs() >= std::f32::consts::PI;
-        } else {
-            let winding = self.winding_of_all(p);
-            inside = (rule == WINDING && winding >= 1i32)
-                || (rule == NONZERO && winding != 0i32)
-                || (rule == ODD && winding % 2i32 != 0i32);
-        }
-        inside
-    }
-
-    /// Half of the solid angles of all faces of an open mesh, which has no other triangles.
-    fn half_solid_angles(self, p: V3) -> f32 {
-        let mut angle = 0.0f32;
-        let mut face = 0u32;
-        while face < self.entry(FACE_COUNT) {
-            let f = self.face(face).corners();
-            angle += half_solid_angle(f.a - p, f.b - p, f.c - p);
-            face += 1u32;
-        }
-        angle
-    }
-
-    /// The winding number of all faces and triangles, which are closed: the sum of the signed
-    /// crossings on the way along z to a point beyond them.
-    fn winding_of_all(self, p: V3) -> i32 {
-        let beyond = v3(p.x, p.y, p.z + 2.0f32 * self.number(SIDE));
-        let children = self.entry(CHILDREN);
-        let mut words = Array::<u32>::new(TREE_DEPTH);
-        let mut winding = 0i32;
-        let mut top = 1u32;
-        words[0] = 0u32;
-        while top > 0u32 {
-            top -= 1u32;
-            let child = TreeChild { word: words[top as usize] };
-            if child.is_leaf() {
-                let mut face = child.start();
-                while face < child.start() + child.count() {
-                    let f = self.face(face).corners();
-                    winding += crossing(p, beyond, f.a, f.b, f.c);
-                    face += 1u32;
-                }
-            } else {
-                let boxes = self.node_boxes(child.word);
-                if is_under(p, boxes.left) {
-                    words[top as usize] = self.word(children + 2u32 * child.word);
-                    top += 1u32;
-                }
-                if is_under(p, boxes.right) {
-                    words[top as usize] = self.word(children + 2u32 * child.word + 1u32);
-                    top += 1u32;
-                }
+    /// The winding number that the rule is about.
+    ///
+    /// By cells it is that at the centroid of the cell, with the signed crossings on the way there with the
+    /// listed faces. Otherwise it is that of all faces and triangles, which are closed: the crossings on
+    /// the way along z to a point beyond them. The solid angles of triangles that close an open mesh are
+    /// taken away again.
+    fn winding_by_rule(self, p: V3) -> f32 {
+        let by_cells = self.entry(RULE) == BY_CELLS;
+        let mut end = v3(p.x, p.y, p.z + 2.0f32 * self.number(SIDE) + self.number(REACH_BEYOND));
+        let mut sum = 0i32;
+        let mut at = 0u32;
+        let mut is_listed = false;
+        if by_cells {
+            let held = self.centered(p);
+            sum = select(held.cell.is_inside(), 1i32, 0i32);
+            if held.cell.is_crossing() {
+                sum = self.winding_at_centroid(held.cell);
+                end = held.centroid;
+                at = held.cell.offset();
+                is_listed = true;
             }
         }
-        let mut k = 0u32;
-        while k < self.entry(SIGN_COUNT) {
-            let f = self.sign_triangle(k);
-            winding += crossing(p, beyond, f.a, f.b, f.c);
-            k += 1u32;
+        let list = self.list(at);
+        let mut count = select(is_listed, list.count, 0u32);
+        let children = self.entry(CHILDREN);
+        let mut words = Array::<u32>::new(TREE_DEPTH);
+        words[0] = 0u32;
+        let mut top = select(by_cells, 0u32, 1u32);
+        let mut triangles = select(by_cells, 0u32, self.entry(SIGN_COUNT));
+        let mut rows = self.entry(RECORDS);
+        let mut first = 0u32;
+        // Triangles from this one on close the mesh.
+        let mut closing = NONE.runtime();
+        let mut angle = 0.0f32;
+        let mut open = true;
+        // The list; or one leaf of the face tree after the other, and then the triangles. This is a loop, so
+        // that the long code of a crossing stands here once.
+        while open {
+            let mut i = 0u32;
+            while i < count {
+                let mut number = first + i;
+                if by_cells {
+                    number = self.listed(list, i);
+                }
+                let f = read_face(&self.shapes.rows, rows + number * FACE_ROWS).corners();
+                sum += crossing(p, end, f.a, f.b, f.c);
+                if comptime!(self.shapes.rules.jumps) {
+                    angle += angle_of_closing(p, f, number >= closing);
+                }
+                i += 1u32;
+            }
+            count = 0u32;
+            if top > 0u32 {
+                top -= 1u32;
+                let child = TreeChild { word: words[top as usize] };
+                if child.is_leaf() {
+                    first = child.start();
+                    count = child.count();
+                } else {
+                    let boxes = self.node_boxes(child.word);
+                    if is_under(p, boxes.left) {
+                        words[top as usize] = self.word(children + 2u32 * child.word);
+                        top += 1u32;
+                    }
+                    if is_under(p, boxes.right) {
+                        words[top as usize] = self.word(children + 2u32 * child.word + 1u32);
+                        top += 1u32;
+                    }
+                }
+            } else {
+                open = triangles > 0u32;
+                rows = self.entry(SIGN_TRIANGLES);
+                first = 0u32;
+                count = triangles;
+                closing = triangles - self.entry(CLOSING_COUNT);
+                triangles = 0u32;
+            }
         }
-        winding
+        sum as f32 - angle * comptime!(0.5 / std::f32::consts::PI)
     }
 }
 
@@ -131,14 +224,39 @@ fn is_under(p: V3, bounds: Bounds) -> bool {
     along_x && along_y && p.z <= high.z + MARGIN
 }
 
-/// Half of the solid angle of a triangle seen from the origin, positive from its back (Van Oosterom
-/// and Strackee 1983).
+/// Half of the solid angle of a triangle if it closes a mesh; otherwise 0.
 #[cube]
-pub fn half_solid_angle(a: V3, b: V3, c: V3) -> f32 {
+fn angle_of_closing(p: V3, f: Triangle, closes: bool) -> f32 {
+    let mut angle = 0.0f32;
+    if closes {
+        angle = half_solid_angle(p, f);
+    }
+    angle
+}
+
+/// Half of the solid angle of a triangle seen from a point, positive from its back (Van Oosterom and
+/// Strackee 1983). The side is that of [`crossing`], so that both change at the same point.
+#[cube]
+fn half_solid_angle(p: V3, f: Triangle) -> f32 {
+    let over = (f.b - f.a).cross(f.c - f.a).dot(p - f.a) >= 0.0f32;
+    let (a, b, c) = (f.a - p, f.b - p, f.c - p);
     let (x, y, z) = (a.length(), b.length(), c.length());
-    let volume = a.dot(b.cross(c));
+    let volume = a.dot(b.cross(c)).abs();
     let rest = x * y * z + a.dot(b) * z + b.dot(c) * x + c.dot(a) * y;
-    volume.atan2(rest)
+    select(over, -1.0f32, 1.0f32) * volume.atan2(rest)
+}
+
+/// Bound of the integral of `dl / r²` along the first edge of a triangle, from points within `radius`
+/// of `p`.
+#[cube]
+fn change_by(p: V3, radius: f32, f: Triangle) -> f32 {
+    let along = f.b - f.a;
+    let t = (p - f.a).dot(along) / along.dot(along).max(LEAST_DIVISOR);
+    let nearest = f.a + along * t.clamp(0.0f32, 1.0f32);
+    let apart = (p - nearest).length() - radius - MARGIN;
+    let near = 1.0f32 / apart.max(LEAST_DIVISOR);
+    // Of a straight line, at most 2 / apart.
+    select(apart > 0.0f32, (along.length() * near).min(2.0f32) * near, FAR)
 }
 
 #[cfg(test)]
@@ -146,13 +264,19 @@ mod tests {
     use super::super::winding::tests::cube;
     use super::*;
 
+    fn triangle([a, b, c]: [V3; 3]) -> Triangle {
+        Triangle { a, b, c }
+    }
+
+    /// The solid angles of all faces.
+    fn angles(faces: &[[V3; 3]], p: V3) -> f32 {
+        faces.iter().map(|f| half_solid_angle(p, triangle(*f))).sum::<f32>() / std::f32::consts::PI
+    }
+
     /// The sides of a cube take a sixth of the sphere each from its middle, and nothing in all from
     /// without.
     #[test]
     fn solid_angles_of_a_cube_sum_up_to_the_sphere_within_it() {
-        let sum = |p: V3| -> f32 {
-            cube().into_iter().map(|[a, b, c]| half_solid_angle(a - p, b - p, c - p)).sum()
-        };
         for (p, expected) in [
             (v3(0.0, 0.0, 0.0), 2.0),
             (v3(0.9, -0.9, 0.3), 2.0),
@@ -160,8 +284,41 @@ mod tests {
             (v3(1.001, 0.1, 0.2), 0.0),
             (v3(3.0, -2.0, 5.0), 0.0),
         ] {
-            let found = sum(p) / std::f32::consts::PI;
+            let found = angles(&cube(), p);
             assert!((found - expected).abs() < 1e-5, "{found} instead of {expected} half spheres");
         }
+    }
+
+    /// A cube without two of its faces: crossings with closing triangles, less their angles, are the
+    /// angles of the faces. Between points the number changes by no more than the bound says.
+    #[test]
+    fn an_open_cube_is_closed_by_triangles() {
+        let open = &cube()[2..];
+        let corners = [v3(-1.0, -1.0, -1.0), v3(-1.0, -1.0, 1.0), v3(-1.0, 1.0, 1.0), v3(-1.0, 1.0, -1.0)];
+        let apex = v3(-0.7, 0.2, -0.1);
+        let closing: Vec<[V3; 3]> = (0..4).map(|k| [corners[k], corners[(k + 1) % 4], apex]).collect();
+        let turns = |p: V3| {
+            let beyond = v3(p.x, p.y, p.z + 10.0);
+            let all = open.iter().chain(&closing);
+            let crossings: i32 = all.map(|&[a, b, c]| crossing(p, beyond, a, b, c)).sum();
+            crossings as f32 - 0.5 * angles(&closing, p)
+        };
+        let mut random = fastrand::Rng::with_seed(9);
+        let mut near = 0;
+        for _ in 0..4000 {
+            let mut at = || 3.0 * random.f32() - 1.5;
+            let p = v3(at(), at(), at());
+            let (found, expected) = (turns(p), 0.5 * angles(open, p));
+            assert!((found - expected).abs() < 2e-5, "{found} instead of {expected}");
+            let q = p + v3(at(), at(), at()) * 0.02;
+            let radius = (q - p).length();
+            let change: f32 = closing.iter().map(|f| change_by(p, radius, triangle(*f))).sum();
+            let most = radius * change / (4.0 * std::f32::consts::PI);
+            let moved = turns(q) - found;
+            let moved = moved - moved.round();
+            assert!(moved.abs() <= most + 2e-5, "{moved}, at most {most}");
+            near += u32::from(most < 2.0 * moved.abs());
+        }
+        assert!(near > 10, "the bound is never near: {near}");
     }
 }

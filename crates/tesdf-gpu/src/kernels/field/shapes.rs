@@ -14,14 +14,25 @@ pub struct Shapes {
     pub words: Box<[u32]>,
     /// Arrays of rows.
     pub rows: Box<[Row]>,
-    /// Whether any shape is told by a rule at points. Otherwise kernels are compiled without the
-    /// rules, which take registers.
+    /// The rules that some shape needs. Kernels are compiled without the others, which take
+    /// registers.
     #[cube(comptime)]
-    pub has_rules: bool,
+    pub rules: Rules,
+}
+
+/// What kernels need to know about the sides of shapes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Rules {
+    /// Whether any shape is told by a rule at points.
+    pub at_points: bool,
+    /// Whether the side of any shape changes where there is no face.
+    pub jumps: bool,
+    /// Whether any shape has faces with the inside in front of them.
+    pub turned: bool,
 }
 
 /// Words in the table for each shape.
-pub const STRIDE: u32 = 44;
+pub const STRIDE: u32 = 46;
 
 /// The kind: [`MESH`], [`PLANE`], [`BOX`] or [`ROUND`].
 pub const KIND: u32 = 0;
@@ -62,7 +73,7 @@ pub const BOUND_UNIT: u32 = 17;
 /// Least distance around the solid up to which the domain reaches.
 pub const BAND: u32 = 18;
 /// Minimum corner of the bounds of the solid, relative to the center of the cube: three words. For a
-/// sheet, half of its thickness is around the faces.
+/// sheet, half of its thickness is around the faces, and for an open mesh [`REACH_BEYOND`].
 pub const LOW: u32 = 19;
 /// Maximum corner, in the same way.
 pub const HIGH: u32 = 22;
@@ -102,10 +113,17 @@ pub const INNER_BALL: u32 = 38;
 pub const HALF_THICKNESS: u32 = 39;
 /// What tells the side of points in crossing cells: see [`rule`](super::rule).
 pub const RULE: u32 = 40;
-/// Row of the first triangle that counts for the side alone. A triangle has three rows.
+/// Row of the first triangle that counts for the side alone, in the layout of faces.
 pub const SIGN_TRIANGLES: u32 = 41;
 /// Number of these triangles.
 pub const SIGN_COUNT: u32 = 42;
+/// Number of those among them that close an open mesh; they are the last ones. Each begins with an open
+/// edge.
+pub const CLOSING_COUNT: u32 = 43;
+/// How far the inside of an open mesh can extend beyond the bounds of its faces; otherwise 0.
+pub const REACH_BEYOND: u32 = 44;
+/// 1 when faces may have the inside in front of them, otherwise 0.
+pub const TURNED: u32 = 45;
 
 /// No such array, face, cell or vertex.
 pub const NONE: u32 = u32::MAX;

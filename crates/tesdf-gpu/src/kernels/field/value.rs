@@ -51,25 +51,24 @@ impl Field<'_> {
         let by_normal = !flat && (on_surface || over_face);
         let direction = pick(by_normal, f.normal, outward);
         let mut inside = cell.is_inside();
+        let mut by_number = self.is_open() && !cell.is_listed();
         if cell.is_crossing() {
             let hint = (f.hints >> (HINT_BITS * c.feature)) & HINT_MASK;
             inside = hint == INSIDE || (hint == BY_PLANE && c.height < 0.0f32);
             // A flat face has no plane from which the side could follow.
-            if hint == BY_WINDING || (hint == BY_PLANE && flat) {
-                inside = self.is_inside(p);
-            }
+            by_number = hint == BY_WINDING || (hint == BY_PLANE && flat);
         }
-        if comptime!(self.shapes.has_rules) {
-            let beyond = self.is_open() && !cell.is_listed();
-            if beyond {
-                inside = self.is_inside(p);
-            }
+        if by_number {
+            inside = self.is_inside(p);
         }
         let sign = select(inside, -1.0f32, 1.0f32);
         // Over the interior of a face, the sign of the height gives the direction more precisely
         // than the difference of two points.
         let turned = !on_surface && over_face && !same(c.height < 0.0f32, inside);
-        let sign_of_normal = select(turned, -1.0f32, 1.0f32);
+        let mut sign_of_normal = select(turned, -1.0f32, 1.0f32);
+        if self.has_turned_faces() && on_surface {
+            sign_of_normal = select(self.facing(nearest.face, c.point) < 0.0f32, -1.0f32, 1.0f32);
+        }
         let sign_of_outward = select(away, sign, 1.0f32);
         Value {
             distance: sign * distance,

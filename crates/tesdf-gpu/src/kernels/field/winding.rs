@@ -12,9 +12,9 @@ const WINDING_BYTES: u32 = layout::WINDING_BYTES;
 /// A cell and its centroid.
 #[derive(CubeType, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
-struct Centered {
-    cell: Cell,
-    centroid: V3,
+pub struct Centered {
+    pub cell: Cell,
+    pub centroid: V3,
 }
 
 /// One coordinate of each of the four corners of a cell.
@@ -131,7 +131,7 @@ impl Field<'_> {
     }
 
     /// The winding number at the centroid of a crossing cell.
-    fn winding_at_centroid(self, cell: Cell) -> i32 {
+    pub fn winding_at_centroid(self, cell: Cell) -> i32 {
         let mut sum = cell.short_winding() as i32;
         if cell.has_long_winding() {
             let lists = self.entry(LISTS);
@@ -143,7 +143,7 @@ impl Field<'_> {
 
     /// The cell that [`locate`](Self::locate) finds for a point, with its centroid. A point that
     /// rounding has moved out of the cube is moved back into it.
-    fn centered(self, p: V3) -> Centered {
+    pub fn centered(self, p: V3) -> Centered {
         let free = self.in_cube(p);
         let u = v3(free.x.clamp(0.0f32, 1.0f32), free.y.clamp(0.0f32, 1.0f32), free.z.clamp(0.0f32, 1.0f32));
         let first = root(u);

@@ -109,7 +109,8 @@ fn clip(
     let reach = subject.reach;
     let conforming = field.is_conforming();
     // Around a conforming domain, `outside::outside_polygons` finds the parts of the face.
-    let beyond = (conforming && reach > 0.0f32) || (!conforming && reach >= field.number(BAND));
+    let beyond =
+        (conforming && reach > 0.0f32) || (!conforming && (reach >= field.number(BAND) || field.is_open()));
     if beyond && !conforming && share.mine == 0u32 {
         outside_cube(field, subject, counters, polygons, polygon);
     }

@@ -14,7 +14,7 @@ use super::super::field::shapes::{Field, NONE, Shapes};
 use super::super::math::vector::{V3, pick, zero};
 use super::super::middle::items::{Polygons, Weights};
 use super::contacts::Contacts;
-use super::exact::{AskedExact, CLEAR, Goal, Searched, search};
+use super::exact::{AskedExact, CLEAR, Goal, Searched, nowhere, search};
 use super::extremes::{Limits, facing};
 use super::near::{Walk, axes_of, no_walk};
 use super::piece::{Lowest, Pool, Region, empty_pool, everywhere};
@@ -141,6 +141,10 @@ fn look(
     };
     let mut limit = goal.reach + 2.0f32 * CLEAR;
     let mut by = zero();
+    // Of an open mesh, the way out may lead through a hole, and nothing is proved.
+    let proves = !field.is_open();
+    let ball = polygons.whole(part).ball();
+    let jumps = region.may_jump(part.at(ball.center.s, ball.center.t), ball.radius);
     // First the face itself. Then it is moved along the gradient at the best point, and then
     // against its normal. This is a loop, so that the long code of distances stands here once.
     let mut attempt = 0u32;
@@ -159,7 +163,7 @@ fn look(
             known.best = found;
             // The field of a sheet is nowhere below 0.
             let crosses = near.distance <= CLEAR && field.half_thickness() == 0.0f32;
-            known.searches = found.distance < 0.0f32 || crosses;
+            known.searches = found.distance < 0.0f32 || crosses || jumps;
             let mine = here.distance == found.distance && at.s == found.at.s && at.t == found.at.t;
             outward.share(mine, here.gradient);
         } else {
@@ -168,7 +172,7 @@ fn look(
         limit = CLEARS * goal.tolerance;
         let length = goal.tolerance + (-known.best.distance).max(0.0f32);
         by = pick(is_first, outward.get(), normal.negated()) * length;
-        attempt = select(known.searches, attempt + 1u32, 3u32);
+        attempt = select(known.searches && proves, attempt + 1u32, 3u32);
     }
     known
 }
@@ -216,10 +220,13 @@ pub fn narrow_exact_faces(
         let tolerance = asked.tolerances[pair.b as usize];
         let face = facing(shapes, pairs, pair, item.face, Limits { tolerance, cos_theta: asked.cos_theta });
         let region = everywhere(face.field, face.part);
-        let found =
-            minimize(region, polygons, face.normal, Goal { reach: face.reach, tolerance }, &mut memory);
+        let mut found = Searched { best: nowhere(), converged: true };
+        if asked.has(face.field) {
+            found =
+                minimize(region, polygons, face.plane, Goal { reach: face.reach, tolerance }, &mut memory);
+        }
         if found.best.distance <= face.reach {
-            face.report(found.best.at, found.converged, counters, contacts, &mut memory);
+            face.report(shapes, found.best.at, found.converged, counters, contacts, &mut memory);
         }
         memory.pool.work.add_to(counters);
         counters.tell_if_broken_off(count);

@@ -11,11 +11,14 @@ use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs, Part, PartExp
 use super::super::counters::{self, Counters};
 use super::super::field::locate::no_cell;
 use super::super::field::nearest::FAR;
-use super::super::field::shapes::{BOX, FACE_COUNT, Field, FieldExpand, KIND, NONE, PLANE, Shapes};
+use super::super::field::shapes::{
+    BOX, FACE_COUNT, Field, FieldExpand, KIND, NONE, PLANE, REACH_BEYOND, Shapes,
+};
 use super::super::math::triangle::Face;
-use super::super::math::vector::{LEAST_DIVISOR, V3, pick, zero};
+use super::super::math::vector::{LEAST_DIVISOR, V3, pick, v3, zero};
 use super::super::middle::items::Weights;
 use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
+use super::exact::opposed;
 use super::near::{FACES, Walk, axes_of};
 use super::piece::{Lowest, Pool};
 use super::polygon_distance::weights_of;
@@ -51,8 +54,10 @@ pub struct Facing<'a> {
     pub pair: OrderedPair,
     pub face: u32,
     pub part: Part,
-    /// Unit normal, or zero.
-    pub normal: V3,
+    /// Unit normal by the order of the corners, or zero.
+    pub plane: V3,
+    /// The same, turned to the side that is outside at the center.
+    normal: V3,
     /// Contact distance for the part: smaller distances are contacts.
     pub reach: f32,
     /// The body that has the face.
@@ -81,12 +86,16 @@ pub fn facing<'a>(
     limits: Limits,
 ) -> Facing<'a> {
     let part = shapes.part(pair, face);
+    let plane = shapes.part_normal(pair, face);
+    let center = ((part.a + part.b) + part.c) * 0.333_333_34f32;
+    let is_turned = shapes.facing(pair, face, center) < 0.0f32;
     Facing::<'a> {
         field: shapes.field(pair.shape_b),
         pair,
         face,
         part,
-        normal: shapes.part_normal(pair, face),
+        plane,
+        normal: plane * select(is_turned, -1.0f32, 1.0f32),
         reach: pairs.reach_of(pair, part),
         surface: shapes.field(pair.shape_a),
         limits,
@@ -105,6 +114,8 @@ struct Patch {
     depth: f32,
     /// Faces of the other body are looked at up to this distance.
     near: f32,
+    /// The normal on the side that touches.
+    normal: V3,
 }
 
 /// A direction in the plane of a face: its products with both edges at the first corner.
@@ -164,10 +175,12 @@ impl Part {
 
 #[cube]
 impl Field<'_> {
-    /// The diagonal of the bounds.
+    /// The diagonal of the bounds of the faces.
     fn diagonal(self) -> f32 {
         let bounds = self.bounds();
-        select(self.entry(KIND) == PLANE, FAR, (bounds.high - bounds.low).length())
+        let beyond = select(self.is_mesh(), 2.0f32 * self.number(REACH_BEYOND), 0.0f32);
+        let extent = (bounds.high - bounds.low) + v3(-beyond, -beyond, -beyond);
+        select(self.entry(KIND) == PLANE, FAR, extent.length())
     }
 }
 
@@ -212,12 +225,16 @@ impl Facing<'_> {
         let own = select(minimum.corner == NO_CORNER, 0u32, 1u32);
         let is_flat = self.part.count > 1u32 && (is_large || level > own);
         let limit = select(is_large, self.reach, v.distance + self.limits.tolerance);
-        let opposes = v.gradient.dot(self.normal) < OPPOSES;
+        // A normal that may be that of the other side is turned against the gradient.
+        let is_other = self.surface.has_turned_faces() && v.gradient.dot(self.normal) > 0.0f32;
+        let normal = self.normal * select(is_other, -1.0f32, 1.0f32);
+        let opposes = v.gradient.dot(normal) < OPPOSES;
         Patch {
             limit: select(is_flat, limit, -FAR),
             opposes: select(self.has_plane(), OPPOSES, 2.0f32),
             depth: select(opposes, -v.distance, 0.0f32).max(0.0f32),
             near: limit.abs().max(v.distance.abs()),
+            normal,
         }
     }
 
@@ -238,13 +255,13 @@ impl Facing<'_> {
                 work.evaluate(self.field.exact_distances(cell, found.point), is_own);
             }
             let v = self.field.exact_value_in(cell, found.point);
-            let v = self.field.opposing(cell, found.point, self.normal, v);
-            let along = v.gradient.dot(self.normal);
+            let v = self.field.opposing(cell, found.point, patch.normal, v);
+            let along = v.gradient.dot(patch.normal);
             found.value = v;
             found.cell = cell.name();
             found.is_taken = v.distance <= patch.limit && along < patch.opposes;
             let missing = v.distance + patch.depth;
-            let sideways = v.gradient + self.normal * -along;
+            let sideways = v.gradient + patch.normal * -along;
             let square = sideways.dot(sideways);
             let step = (BEYOND * missing.max(0.0f32) + HEIGHT) / square.max(LEVEL * LEVEL);
             let next = found.point + sideways * -step;
@@ -254,7 +271,7 @@ impl Facing<'_> {
                 && patch.depth > 0.0f32
                 && leads
                 && turn <= MOVES
-                && self.part.holds(self.normal, next);
+                && self.part.holds(self.plane, next);
             found.point = pick(open, next, found.point);
             found.corner = select(open, NO_CORNER, found.corner);
         }
@@ -264,9 +281,10 @@ impl Facing<'_> {
     /// The farthest candidate along the direction of this thread: a corner of the face, a corner of
     /// the other body's faces over it, or a crossing of their edges. All threads of the group must
     /// call it.
-    fn farthest(self, to: Direction, near: f32, walk: &mut Walk, pool: &mut Pool) -> Lowest {
+    fn farthest(self, to: Direction, patch: Patch, walk: &mut Walk, pool: &mut Pool) -> Lowest {
         let quarter = UNIT_POS / DIRECTIONS;
-        let axes = axes_of(self.part, self.normal);
+        let axes = axes_of(self.part, self.plane);
+        let near = patch.near;
         let limit = near + axes.rounding;
         let is_mesh = self.field.is_mesh();
         let sides = select(self.field.entry(KIND) == BOX, self.field.entry(FACE_COUNT), 0u32);
@@ -293,7 +311,7 @@ impl Facing<'_> {
                 if face != NONE {
                     let f = self.field.face(face);
                     if !is_mesh || axes.to_face(f) <= limit {
-                        best = self.overlay(to, f, select(is_mesh, near + HEIGHT, FAR), best);
+                        best = self.overlay(to, f, patch.normal, select(is_mesh, near + HEIGHT, FAR), best);
                     }
                 }
                 i += 1u32;
@@ -305,10 +323,12 @@ impl Facing<'_> {
 
     /// Offers the corners of the overlay of the part and a face of the other body, as far as the
     /// face is within `limit` there.
-    fn overlay(self, to: Direction, f: Face, limit: f32, start: Lowest) -> Lowest {
-        let (part, normal) = (self.part, self.normal);
+    fn overlay(self, to: Direction, f: Face, facing: V3, limit: f32, start: Lowest) -> Lowest {
+        let (part, normal) = (self.part, self.plane);
         let mut best = start;
-        if !f.is_flat() && f.normal.dot(normal) <= 0.0f32 {
+        // A face that may have the inside in front of it tells nothing by its normal.
+        let opposes = f.normal.dot(facing) <= 0.0f32 || self.field.has_turned_faces();
+        if !f.is_flat() && opposes {
             let edges = select(part.count == 3u32, 3u32, 1u32);
             let mut k = 0u32;
             while k < 3u32 {
@@ -359,14 +379,37 @@ impl Facing<'_> {
     }
 
     /// Writes a contact, or counts it as filtered.
-    fn write(self, taken: Taken, converged: bool, counters: &Counters, contacts: &mut Contacts) {
-        let cosine = taken.value.gradient.dot(self.normal);
+    fn write(
+        self,
+        shapes: &Shapes,
+        taken: Taken,
+        converged: bool,
+        counters: &Counters,
+        contacts: &mut Contacts,
+    ) {
+        let facing = shapes.facing(self.pair, self.face, taken.point);
+        let mut v = taken.value;
+        let mut cosine = opposed(v.gradient.dot(self.plane), facing);
+        if self.surface.has_turned_faces() {
+            let outward = self.plane * facing;
+            // The value opposes the side that is outside at the center.
+            if outward.dot(self.normal) < 0.0f32 {
+                let cell = self.field.cell_at(taken.point);
+                v = self.field.opposing(
+                    cell,
+                    taken.point,
+                    outward,
+                    self.field.exact_value_in(cell, taken.point),
+                );
+                cosine = v.gradient.dot(outward);
+            }
+        }
         if self.pair.is_filtered(cosine, self.limits.cos_theta) {
             counters.append(counters::FILTERED);
         } else {
             let corner = taken.corner + select(converged, CONVERGED, 0u32);
             let touch = Touch { face: self.face, cell: taken.cell, corner, point: taken.point, cosine };
-            contacts.append(counters, self.pair, touch, taken.value);
+            contacts.append(counters, self.pair, touch, v);
         }
     }
 
@@ -374,6 +417,7 @@ impl Facing<'_> {
     /// group must call it.
     pub fn report(
         self,
+        shapes: &Shapes,
         at: Weights,
         converged: bool,
         counters: &Counters,
@@ -382,7 +426,8 @@ impl Facing<'_> {
     ) {
         let direction = UNIT_POS % DIRECTIONS;
         memory.points.clear();
-        let anywhere = Patch { limit: FAR.runtime(), opposes: 2.0f32, depth: 0.0f32, near: 0.0f32 };
+        let anywhere =
+            Patch { limit: FAR.runtime(), opposes: 2.0f32, depth: 0.0f32, near: 0.0f32, normal: self.normal };
         let mut patch = anywhere;
         let mut below = FAR.runtime();
         // Whether this thread's direction has no extreme yet.
@@ -395,7 +440,7 @@ impl Facing<'_> {
             let mut candidate = Lowest { distance: 0.0f32, at };
             if !is_minimum {
                 let to = self.direction(direction, below);
-                candidate = self.farthest(to, patch.near, &mut memory.walk, &mut memory.pool);
+                candidate = self.farthest(to, patch, &mut memory.walk, &mut memory.pool);
             }
             searches = searches && candidate.distance < FAR;
             let mut taken = nothing_at(zero(), NO_CORNER.runtime());
@@ -409,7 +454,7 @@ impl Facing<'_> {
             memory.points.put(select(is_minimum, DIRECTIONS, direction), round + 1u32, taken);
             let is_new = memory.points.is_new(select(is_minimum, DIRECTIONS, direction), round + 1u32, taken);
             if writes && taken.is_taken && is_new {
-                self.write(taken, converged, counters, contacts);
+                self.write(shapes, taken, converged, counters, contacts);
             }
             if is_minimum {
                 patch = self.patch(taken);
