@@ -38,7 +38,8 @@ def programs(messages):
 def jobs(built, cuda, again):
     """All runs: name, command, folder and environment."""
     for folder, name, file in built:
-        skipped = ON_CUDA_ALONE.get(name) if folder.name == "tesdf-gpu" else None
+        is_on_software = folder.name == "tesdf-gpu" and not os.environ.get("TESDF_DEVICE")
+        skipped = ON_CUDA_ALONE.get(name) if is_on_software else None
         without = ["--skip", skipped] if skipped else []
         yield f"{folder.name}: {name}", [file, "--quiet", *without], folder, {}
     of_gpu = {name: (folder, file) for folder, name, file in built if folder.name == "tesdf-gpu"}
@@ -47,6 +48,10 @@ def jobs(built, cuda, again):
         folder, file = of_gpu[name]
         environment = {"LD_LIBRARY_PATH": cuda, "TESDF_DEVICE": "cuda:0"}
         yield f"tesdf-gpu: {name} on CUDA", [file, "--quiet", *filters.split(",")], folder, environment
+
+
+def order(job):
+    return next((k for k, name in enumerate(FIRST) if job[0].startswith(name)), len(FIRST))
 
 
 def run(job):
@@ -68,8 +73,10 @@ def run(job):
 def main():
     cuda, *again = sys.argv[1:]
     built = list(programs(sys.stdin))
-    first = lambda job: next((k for k, name in enumerate(FIRST) if job[0].startswith(name)), len(FIRST))
-    queue = sorted(jobs(built, cuda, again), key=first)
+    if not built:
+        print("error: cargo named no test program", file=sys.stderr)
+        return 1
+    queue = sorted(jobs(built, cuda, again), key=order)
     failed = []
     times = os.environ.get("STEP_TIMES")
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -82,7 +89,7 @@ def main():
             if status:
                 failed.append(f"{name}: exit status {status}")
     print(f"{len(queue)} test programs, {len(failed)} failed", *failed, sep="\n")
-    return 1 if failed or not queue else 0
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":
