@@ -9,7 +9,6 @@ static SOURCES: LazyLock<Vec<CudaSource>> = LazyLock::new(|| sources().unwrap_or
 
 /// Compiles to machine code for GPUs of compute centers, and prints the resources of each kernel.
 #[test]
-#[ignore = "takes minutes, and what compiles to PTX seldom fails here; `.ci/release` runs it"]
 fn every_kernel_compiles_to_machine_code() {
     println!("{:46} registers warps stack spilled shared", "kernel");
     for source in SOURCES.iter() {
