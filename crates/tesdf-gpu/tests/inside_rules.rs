@@ -12,7 +12,7 @@ use std::sync::Arc;
 use compare::{Compared, ROUNDING, device, each_mode, field, found, hold, hold_against};
 use support::bodies::rotation;
 use support::parts::Turn::{Inward, Outward};
-use support::parts::{Parts, bowl};
+use support::parts::{Parts, bowl, soups};
 use support::random::Random;
 use tesdf::TeSdf;
 use tesdf::base::{Inside, InsideRule, SurfaceFaces};
@@ -38,6 +38,13 @@ fn scene(asset: TeSdf) -> Scene {
     scene
 }
 
+/// Adds instances of shapes to a world of their own.
+fn add_world(scene: &mut Scene, world: u32, placed: impl IntoIterator<Item = (ShapeId, Pose)>) {
+    for (shape, pose) in placed {
+        scene.add(Instance { world, ..Instance::new(shape, pose) }).expect("an instance");
+    }
+}
+
 /// The height of a box over an open cube, and the depths of its faces and of its corners there. No face
 /// of the cube is near, and yet the box is inside from the lid on.
 const IN_THE_HOLE: [(f64, Option<f64>, Option<f64>); 3] =
@@ -50,11 +57,8 @@ fn boxes_in_the_hole(modes: &[CollideOptions]) {
     let mut scene = Scene::new();
     let [cup, small] = [encode(cup, InsideRule::Generalized.into()), encode(small, Inside::default())]
         .map(|asset| scene.add_shape(asset).expect("a shape"));
-    for (world, (z, ..)) in IN_THE_HOLE.into_iter().enumerate() {
-        for (shape, z) in [(cup, 0.0), (small, z)] {
-            let at = Pose::at(DVec3::new(0.0, 0.0, z));
-            scene.add(Instance { world: world as u32, ..Instance::new(shape, at) }).expect("an instance");
-        }
+    for (world, (z, ..)) in (0..).zip(IN_THE_HOLE) {
+        add_world(&mut scene, world, [(cup, Pose::IDENTITY), (small, Pose::at(z * DVec3::Z))]);
     }
     let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("uploads");
     for options in modes {
@@ -106,36 +110,24 @@ fn open_meshes() -> Scene {
     for (world, ((first, second), apart)) in (0..).zip(placed) {
         let turned = Pose { translation: DVec3::ZERO, rotation: rotation(&mut random) };
         let at = Pose { translation: apart * random.direction(), rotation: rotation(&mut random) };
-        for instance in [Instance::new(first, turned), Instance::new(second, at)] {
-            scene.add(Instance { world, ..instance }).expect("an instance");
-        }
+        add_world(&mut scene, world, [(first, turned), (second, at)]);
     }
     scene
 }
 
-/// Triangles that enclose nothing, in all or in part, each other's repetitions, and a needle; each on a solid.
-fn soups() -> Scene {
-    let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) - 0.5;
-    let corners: Vec<DVec3> = (0..6).map(corner).collect();
-    let needle = vec![DVec3::ZERO, DVec3::X, DVec3::new(0.5, 1e-9, 0.0), DVec3::new(0.2, 0.6, 0.4)];
-    let soups: [(&[DVec3], &[[u32; 3]]); 5] = [
-        (&corners, &[[0, 1, 2]]),
-        (&corners, &[[0, 1, 2], [3, 4, 5]]),
-        (&corners, &[[0, 1, 2], [0, 1, 2], [2, 1, 3], [5, 0, 3]]),
-        (&corners, &[[0, 1, 2], [0, 1, 3], [0, 1, 4]]),
-        (&needle, &[[0, 1, 2], [0, 1, 3]]),
-    ];
+/// Soups of triangles, each on solids.
+fn soups_on_solids() -> Scene {
     let solid = encode(Parts::default().cube(DVec3::splat(-0.15), 0.3, Outward).mesh(), Inside::default());
     let mut scene = Scene::new();
     let solid = scene.add_shape(solid).expect("a shape");
     let mut random = Random(5);
-    for (world, (vertices, faces)) in (0..).zip(soups) {
-        let mesh = TriangleMesh::new(vertices.to_vec(), faces.to_vec()).expect("valid ids");
+    for (world, mesh) in (0..).zip(soups()) {
         let soup = scene.add_shape(encode(mesh, InsideRule::Generalized.into())).expect("a shape");
-        for (shape, apart) in [(soup, 0.05), (solid, 0.2), (solid, 0.4)] {
+        let placed = [(soup, 0.05), (solid, 0.2), (solid, 0.4)].map(|(shape, apart)| {
             let at = Pose { translation: apart * random.direction(), rotation: rotation(&mut random) };
-            scene.add(Instance { world, ..Instance::new(shape, at) }).expect("an instance");
-        }
+            (shape, at)
+        });
+        add_world(&mut scene, world, placed);
     }
     scene
 }
@@ -146,11 +138,8 @@ fn ties() -> Scene {
     let cup = Parts::default().open_cube(DVec3::splat(-0.5), 1.0, Outward).mesh();
     let cup = scene.add_shape(encode(cup, InsideRule::Generalized.into())).expect("a shape");
     let small = scene.add_shape(Shape::Box { half_extents: DVec3::splat(0.2) }).expect("a shape");
-    for (world, (shape, z)) in [(small, 0.7), (small, 0.0), (cup, 0.0), (cup, 1.0)].into_iter().enumerate() {
-        for (shape, z) in [(cup, 0.0), (shape, z)] {
-            let instance = Instance::new(shape, Pose::at(z * DVec3::Z));
-            scene.add(Instance { world: world as u32, ..instance }).expect("an instance");
-        }
+    for (world, (shape, z)) in (0..).zip([(small, 0.7), (small, 0.0), (cup, 0.0), (cup, 1.0)]) {
+        add_world(&mut scene, world, [(cup, Pose::IDENTITY), (shape, Pose::at(z * DVec3::Z))]);
     }
     scene
 }
@@ -175,7 +164,7 @@ fn contacts_of(scene: &Scene, options: &CollideOptions) -> Contacts {
 /// Compares the contacts of open meshes in a mode with those of the processor.
 fn open_meshes_hold(options: &CollideOptions) -> Compared {
     let mut all = Compared::default();
-    for scene in [open_meshes(), soups()] {
+    for scene in [open_meshes(), soups_on_solids()] {
         all.add(hold_against(&scene, options, 1.0, &contacts_of(&scene, options)));
     }
     // Either side is right.
@@ -212,12 +201,10 @@ fn overlaps_by_parity(modes: &[CollideOptions]) -> Compared {
     let mut scene = Scene::new();
     let ids = [Shape::from(odd), solid.into(), small].map(|shape| scene.add_shape(shape).expect("a shape"));
     let mut random = Random(36);
-    for (world, shape) in ids.into_iter().cycle().take(12).enumerate() {
+    for (world, shape) in (0..12).zip(ids.into_iter().cycle()) {
         let turned = Pose { translation: DVec3::ZERO, rotation: rotation(&mut random) };
         let at = Pose { translation: 0.7 * random.direction(), rotation: rotation(&mut random) };
-        for instance in [Instance::new(ids[0], turned), Instance::new(shape, at)] {
-            scene.add(Instance { world: world as u32, ..instance }).expect("an instance");
-        }
+        add_world(&mut scene, world, [(ids[0], turned), (shape, at)]);
     }
     let mut all = Compared::default();
     modes.iter().for_each(|options| all.add(hold(&scene, options, 2.0)));
@@ -243,11 +230,9 @@ fn the_boundary_of_overlaps_touches_as_on_the_processor() {
     let mut scene = Scene::new();
     let ids = [encode(overlap(), boundary), solid].map(|asset| scene.add_shape(asset).expect("a shape"));
     let mut random = Random(33);
-    for (world, shape) in ids.into_iter().cycle().take(4).enumerate() {
+    for (world, shape) in (0..4).zip(ids.into_iter().cycle()) {
         let at = Pose { translation: 0.9 * random.direction(), rotation: rotation(&mut random) };
-        for instance in [Instance::new(ids[0], Pose::IDENTITY), Instance::new(shape, at)] {
-            scene.add(Instance { world: world as u32, ..instance }).expect("an instance");
-        }
+        add_world(&mut scene, world, [(ids[0], Pose::IDENTITY), (shape, at)]);
     }
     // Kernels with rules are compiled for this test alone: the smaller ones.
     let [node, _, _, exact, ..] = each_mode(2.0);
@@ -312,14 +297,9 @@ fn hidden_overlaps_of_sheets_are_those_of_the_processor() {
     let plate = scene.add_shape(plate).expect("a shape");
     let small = scene.add_shape(Shape::Box { half_extents: DVec3::splat(0.25) }).expect("a shape");
     let across = |z: f64| Pose { translation: z * DVec3::Z, rotation: DQuat::from_rotation_x(0.5 * PI) };
-    for (world, (other, pose)) in
-        [(plate, across(0.0)), (small, Pose::at(DVec3::new(0.3, 0.2, 0.0))), (plate, across(1.25))]
-            .into_iter()
-            .enumerate()
-    {
-        for instance in [Instance::new(plate, Pose::IDENTITY), Instance::new(other, pose)] {
-            scene.add(Instance { world: world as u32, ..instance }).expect("an instance");
-        }
+    let others = [(plate, across(0.0)), (small, Pose::at(DVec3::new(0.3, 0.2, 0.0))), (plate, across(1.25))];
+    for (world, other) in (0..).zip(others) {
+        add_world(&mut scene, world, [(plate, Pose::IDENTITY), other]);
     }
     let options = CollideOptions::with_mode(Mode::Node);
     let mut detector = Detector::new(&device(), &scene, DetectorOptions::default()).expect("uploads");

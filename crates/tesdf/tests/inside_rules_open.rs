@@ -6,7 +6,7 @@ use std::path::Path;
 
 use support::parts::Parts;
 use support::parts::Turn::{Inward, Outward};
-use support::parts::bowl;
+use support::parts::{bowl, soups};
 use support::random::Random;
 use support::ruled::{Body, Compared, assert_contacts, assert_faces, assert_nodes, random_pose};
 use tesdf::base::{Inside, InsideRule, Length};
@@ -158,24 +158,10 @@ fn ties_at_the_jump_are_either_side() {
 /// lie on each other.
 #[test]
 fn soups_touch_as_brute_force_says() {
-    let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) - 0.5;
-    let mesh = |mut vertices: Vec<DVec3>, faces: &[[u32; 3]]| {
-        vertices.iter_mut().for_each(|v| *v *= 0.8);
-        TriangleMesh::new(vertices, faces.to_vec()).expect("valid ids")
-    };
-    let corners: Vec<DVec3> = (0..6).map(corner).collect();
-    let needle = vec![DVec3::ZERO, DVec3::X, DVec3::new(0.5, 1e-9, 0.0), DVec3::new(0.2, 0.6, 0.4)];
-    let meshes = [
-        mesh(corners.clone(), &[[0, 1, 2]]),
-        mesh(corners.clone(), &[[0, 1, 2], [3, 4, 5]]),
-        mesh(corners.clone(), &[[0, 1, 2], [0, 1, 2], [2, 1, 3], [5, 0, 3]]),
-        mesh(corners, &[[0, 1, 2], [0, 1, 3], [0, 1, 4]]),
-        mesh(needle, &[[0, 1, 2], [0, 1, 3]]),
-    ];
     let small = box_of(0.3);
     let mut random = Random(5);
     let mut compared = Compared::default();
-    for mesh in meshes {
+    for mesh in soups() {
         let Ok(_) = SolidMesh::with_inside(mesh.clone(), InsideRule::Generalized.into()) else { continue };
         let body = open(mesh);
         for apart in [0.1, 0.4] {

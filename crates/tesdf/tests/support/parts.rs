@@ -38,7 +38,6 @@ impl Parts {
         self.add(&corners(low, edge), &sides(&[0, 2, 3, 4, 5]), turn)
     }
 
-    /// The mesh, with one vertex for each position, as reading makes it.
     /// A square about the origin, across z.
     pub fn plate(self, edge: f64) -> Self {
         let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
@@ -46,6 +45,7 @@ impl Parts {
         self.add(&corners, &[[0, 1, 2], [0, 2, 3]], Turn::Outward)
     }
 
+    /// The mesh, with one vertex for each position, as reading makes it.
     pub fn mesh(self) -> TriangleMesh {
         let mut known: HashMap<[u64; 3], u32> = HashMap::new();
         let mut vertices = Vec::new();
@@ -124,4 +124,22 @@ pub fn moebius(n: u32) -> Parts {
         [[a, b, c], [b, d, c]]
     });
     Parts { vertices: vertices.collect(), faces: faces.collect() }
+}
+
+/// Triangles that enclose nothing, in all or in part, repeated ones, and a needle.
+pub fn soups() -> [TriangleMesh; 5] {
+    let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)) - 0.5;
+    let corners: Vec<DVec3> = (0..6).map(corner).collect();
+    let needle = vec![DVec3::ZERO, DVec3::X, DVec3::new(0.5, 1e-9, 0.0), DVec3::new(0.2, 0.6, 0.4)];
+    let soups: [(&[DVec3], &[[u32; 3]]); 5] = [
+        (&corners, &[[0, 1, 2]]),
+        (&corners, &[[0, 1, 2], [3, 4, 5]]),
+        (&corners, &[[0, 1, 2], [0, 1, 2], [2, 1, 3], [5, 0, 3]]),
+        (&corners, &[[0, 1, 2], [0, 1, 3], [0, 1, 4]]),
+        (&needle, &[[0, 1, 2], [0, 1, 3]]),
+    ];
+    soups.map(|(vertices, faces)| {
+        let vertices = vertices.iter().map(|v| 0.8 * *v).collect();
+        TriangleMesh::new(vertices, faces.to_vec()).expect("valid ids")
+    })
 }
