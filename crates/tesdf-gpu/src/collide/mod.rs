@@ -120,8 +120,8 @@ impl Detector {
     /// - [`Reduction::Deepest`] cuts the contacts on the processor, after all have been found. So
     ///   it saves no time here. [`Reduction::Spread`] is [`Reduction::PerPair`] here.
     /// - In the field of an open mesh under the rule
-    ///   [`Generalized`](tesdf::base::InsideRule::Generalized), a search ends after the same number
-    ///   of rounds as everywhere. Along a jump it needs more of them, and says `converged: false` sooner.
+    ///   [`Generalized`](tesdf::base::InsideRule::Generalized), a search along a jump needs more
+    ///   rounds than elsewhere. It ends after the same number, and says `converged: false` sooner.
     /// - The same input gives the same bytes on the same device.
     ///
     /// # Errors

@@ -9,4 +9,5 @@ pub mod shapes;
 pub mod simple;
 pub mod tetrahedra;
 pub mod value;
+pub mod walk;
 pub mod winding;

@@ -6,9 +6,10 @@ use tesdf::collide::internal;
 use super::super::math::triangle::part_of;
 use super::super::math::vector::{LEAST_DIVISOR, V3, pick, same, v3};
 use super::locate::Cell;
-use super::nearest::{TREE_DEPTH, TreeChild, to_box};
-use super::shapes::{BOX, CHILDREN, Field, FieldExpand, KIND, SIZES};
+use super::nearest::to_box;
+use super::shapes::{BOX, Field, FieldExpand, KIND, NONE, SIZES};
 use super::value::Value;
+use super::walk::face_walk;
 
 /// Below this cosine, a gradient opposes a normal so well that ties are not looked for.
 const OPPOSITE: f32 = -0.999;
@@ -37,45 +38,24 @@ impl Field<'_> {
     fn most_opposing_face(self, cell: Cell, p: V3, normal: V3, v: Value) -> Value {
         let limit = v.distance.abs() + TIE;
         let by_list = cell.is_listed() && self.has_exact_lists();
-        let list = self.list(select(by_list, cell.offset(), 0u32));
-        let children = self.entry(CHILDREN);
-        let mut words = Array::<u32>::new(TREE_DEPTH);
-        words[0] = 0u32;
-        let mut top = select(by_list, 0u32, 1u32);
-        let mut first = 0u32;
-        let mut count = select(by_list, list.count, 0u32);
+        let mut walk = face_walk(self.list(select(by_list, cell.offset(), 0u32)), by_list);
+        let far = limit * limit;
         let mut best = v;
         let mut open = true;
-        // The list, or one leaf of the face tree after the other.
         while open {
             let mut i = 0u32;
-            while i < count {
-                let mut face = first + i;
-                if by_list {
-                    face = self.listed(list, i);
-                }
-                best = self.more_opposing(p, normal, best, face, limit);
+            while i < walk.count {
+                best = self.more_opposing(p, normal, best, walk.face(self, i), limit);
                 i += 1u32;
             }
-            count = 0u32;
-            open = top > 0u32;
+            walk.count = 0u32;
+            open = walk.is_open();
             if open {
-                top -= 1u32;
-                let child = TreeChild { word: words[top as usize] };
-                if child.is_leaf() {
-                    first = child.start();
-                    count = child.count();
-                } else {
-                    let boxes = self.node_boxes(child.word);
-                    let far = limit * limit;
-                    if to_box(p, boxes.right) <= far {
-                        words[top as usize] = self.word(children + 2u32 * child.word + 1u32);
-                        top += 1u32;
-                    }
-                    if to_box(p, boxes.left) <= far {
-                        words[top as usize] = self.word(children + 2u32 * child.word);
-                        top += 1u32;
-                    }
+                let node = walk.next();
+                if node != NONE {
+                    let boxes = self.node_boxes(node);
+                    let (left, right) = (to_box(p, boxes.left) <= far, to_box(p, boxes.right) <= far);
+                    walk.look_into(self, node, left, right);
                 }
             }
         }
@@ -92,7 +72,7 @@ impl Field<'_> {
         // On the surface, the gradients are the normals of the faces.
         let on_surface = best.distance.abs() <= TIE;
         let turned = !same(c.height < 0.0f32, is_inside);
-        // A sheet has both of its sides there, and so has a face that is outside on both sides, or on none.
+        // A sheet has both of its sides there, and so has a face whose sides are alike.
         let mut facing = 1.0f32;
         if self.has_turned_faces() && on_surface && distance <= limit {
             facing = self.facing(face, c.point);

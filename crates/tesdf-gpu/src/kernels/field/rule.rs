@@ -3,12 +3,13 @@
 use cubecl::prelude::*;
 
 use super::super::math::triangle::{ROWS as FACE_ROWS, Triangle, read_face};
-use super::super::math::vector::{LEAST_DIVISOR, V3, v3};
-use super::nearest::{FAR, TREE_DEPTH, TreeChild};
+use super::super::math::vector::{LEAST_DIVISOR, V3, centroid, v3};
+use super::nearest::FAR;
 use super::shapes::{
-    Bounds, CHILDREN, CLOSING_COUNT, Field, FieldExpand, NONE, REACH_BEYOND, RECORDS, RULE, SIDE, SIGN_COUNT,
+    Bounds, CLOSING_COUNT, Field, FieldExpand, NONE, REACH_BEYOND, RECORDS, RULE, SIDE, SIGN_COUNT,
     SIGN_TRIANGLES, TURNED,
 };
+use super::walk::face_walk;
 use super::winding::crossing;
 
 /// Inside is where the winding number is 1 or more. Cells have it at their centroids, and lists
@@ -21,8 +22,8 @@ pub const NONZERO: u32 = 2;
 /// Inside is where it is odd.
 pub const ODD: u32 = 3;
 /// Inside is where the solid angles of all faces of an open mesh sum up to half of the sphere at
-/// least, of either sign (Jacobson et al. 2013): the winding number of the mesh with closing triangles, less
-/// their solid angles.
+/// least, of either sign (Jacobson et al. 2013). The sum is the winding number of the mesh with
+/// closing triangles, less their solid angles.
 pub const GENERALIZED: u32 = 4;
 
 /// A face farther off a line than this (local frame) is not crossed by it, whatever is rounded.
@@ -31,8 +32,8 @@ const MARGIN: f32 = 1e-5;
 const DECIDED: f32 = 1e-5;
 
 /// Lengths (local frame): the points at which the sides of a face are looked up lie this far beside
-/// the point, towards the inside of the face, and this far off the face. The processor, which computes in
-/// `f64`, looks nearer.
+/// the point, towards the inside of the face, and this far off the face. The processor looks nearer,
+/// because it computes in `f64`.
 const ASIDE: f32 = 3e-4;
 const OFF: f32 = 2e-6;
 /// The points aside lie towards points at this share of the way from the corners to the centroid.
@@ -75,42 +76,54 @@ impl Field<'_> {
         inside
     }
 
-    /// Whether the side may change without a face within `radius` of a point. With `or_inside`, also
-    /// whether the point is inside.
-    ///
-    /// Off the faces, the winding number of an open mesh changes at most by the integral of `dl / r²`
-    /// along its open edges, divided by 4 pi, per length (Biot and Savart). At a face it changes by a
-    /// whole number. So it is nowhere 1/2 or -1/2 off the faces if it changes by less than what separates
-    /// it from half a whole number.
-    pub fn may_jump(self, p: V3, radius: f32, or_inside: bool) -> bool {
+    /// Whether the side may change without a face within `radius` of a point.
+    pub fn may_jump(self, p: V3, radius: f32) -> bool {
         let mut may = false;
         if self.is_open() {
-            let turns = self.winding_by_rule(p);
-            let apart = (turns - turns.floor() - 0.5f32).abs();
-            let mut change = 0.0f32;
-            let mut k = self.entry(SIGN_COUNT) - self.entry(CLOSING_COUNT);
-            while k < self.entry(SIGN_COUNT) {
-                change += change_by(p, radius, self.sign_triangle(k));
-                k += 1u32;
-            }
-            may = radius * comptime!(0.25 / std::f32::consts::PI) * change + DECIDED >= apart;
-            may = may || (or_inside && turns.abs() >= 0.5f32);
+            may = self.may_change(self.winding_by_rule(p), p, radius);
         }
         may
     }
 
+    /// Whether a point may be inside that can be reached within `radius` of a point without passing
+    /// through a face. Only for open meshes.
+    pub fn may_be_inside(self, p: V3, radius: f32) -> bool {
+        let turns = self.winding_by_rule(p);
+        turns.abs() >= 0.5f32 || self.may_change(turns, p, radius)
+    }
+
+    /// Whether the winding number of an open mesh, which is `turns` at a point, may be 1/2 or -1/2 within
+    /// `radius` of it, off the faces.
+    ///
+    /// Off the faces, it changes at most by the integral of `dl / r²` along the open edges, divided by
+    /// 4 pi, per length (Biot and Savart). At a face it changes by a whole number. So it must change by
+    /// what separates it from half of an odd number.
+    fn may_change(self, turns: f32, p: V3, radius: f32) -> bool {
+        let apart = (turns - turns.floor() - 0.5f32).abs();
+        let mut change = 0.0f32;
+        let mut k = self.entry(SIGN_COUNT) - self.entry(CLOSING_COUNT);
+        while k < self.entry(SIGN_COUNT) {
+            change += change_by(p, radius, self.sign_triangle(k));
+            k += 1u32;
+        }
+        radius * comptime!(0.25 / std::f32::consts::PI) * change + DECIDED >= apart
+    }
+
     /// The side of a face that is outside at a point of it: 1 in front, -1 behind, and 0 on both
-    /// sides or on none. As `facing` of the processor, beside the point in three directions: at an edge
+    /// sides or on none.
+    ///
+    /// As `facing` of the processor, it is looked up beside the point in three directions. At an edge
     /// of the face its sides would be those of another face.
     pub fn facing(self, face: u32, at: V3) -> f32 {
         let mut side = 1.0f32;
         if self.has_turned_faces() {
             let f = self.face(face);
-            let center = ((f.corner(0u32) + f.corner(1u32)) + f.corner(2u32)) * 0.333_333_34f32;
+            let center = centroid(f.corner(0u32), f.corner(1u32), f.corner(2u32));
             let mut in_front = 0u32;
             let mut behind = 0u32;
             let mut above = false;
-            // Both sides in each direction. This is a loop, so that the long code of the rule stands here once.
+            // Both sides in each direction. This is a loop, so that the long code of the rule stands
+            // here once.
             let mut look = 0u32;
             while look < 6u32 {
                 let corner = f.corner(look / 2u32);
@@ -135,10 +148,11 @@ impl Field<'_> {
 
     /// The winding number that the rule is about.
     ///
-    /// By cells it is that at the centroid of the cell, with the signed crossings on the way there with the
-    /// listed faces. Otherwise it is that of all faces and triangles, which are closed: the crossings on
-    /// the way along z to a point beyond them. The solid angles of triangles that close an open mesh are
-    /// taken away again.
+    /// By cells it is the number at the centroid of the cell, plus the signed crossings with listed
+    /// faces on the way there. Otherwise it is that of all faces and triangles, which are closed: the
+    /// crossings on the way along z to a point beyond them. The solid angles of triangles that close
+    /// an open mesh are taken away again. [`winding`](Self::winding) is the part by cells alone, for
+    /// kernels without rules.
     fn winding_by_rule(self, p: V3) -> f32 {
         let by_cells = self.entry(RULE) == BY_CELLS;
         let mut end = v3(p.x, p.y, p.z + 2.0f32 * self.number(SIDE) + self.number(REACH_BEYOND));
@@ -155,28 +169,19 @@ impl Field<'_> {
                 is_listed = true;
             }
         }
-        let list = self.list(at);
-        let mut count = select(is_listed, list.count, 0u32);
-        let children = self.entry(CHILDREN);
-        let mut words = Array::<u32>::new(TREE_DEPTH);
-        words[0] = 0u32;
-        let mut top = select(by_cells, 0u32, 1u32);
+        let mut walk = face_walk(self.list(at), by_cells);
+        // In other cells no face counts.
+        walk.count = select(is_listed, walk.count, 0u32);
         let mut triangles = select(by_cells, 0u32, self.entry(SIGN_COUNT));
         let mut rows = self.entry(RECORDS);
-        let mut first = 0u32;
         // Triangles from this one on close the mesh.
         let mut closing = NONE.runtime();
         let mut angle = 0.0f32;
         let mut open = true;
-        // The list; or one leaf of the face tree after the other, and then the triangles. This is a loop, so
-        // that the long code of a crossing stands here once.
         while open {
             let mut i = 0u32;
-            while i < count {
-                let mut number = first + i;
-                if by_cells {
-                    number = self.listed(list, i);
-                }
+            while i < walk.count {
+                let number = walk.face(self, i);
                 let f = read_face(&self.shapes.rows, rows + number * FACE_ROWS).corners();
                 sum += crossing(p, end, f.a, f.b, f.c);
                 if comptime!(self.shapes.rules.jumps) {
@@ -184,29 +189,18 @@ impl Field<'_> {
                 }
                 i += 1u32;
             }
-            count = 0u32;
-            if top > 0u32 {
-                top -= 1u32;
-                let child = TreeChild { word: words[top as usize] };
-                if child.is_leaf() {
-                    first = child.start();
-                    count = child.count();
-                } else {
-                    let boxes = self.node_boxes(child.word);
-                    if is_under(p, boxes.left) {
-                        words[top as usize] = self.word(children + 2u32 * child.word);
-                        top += 1u32;
-                    }
-                    if is_under(p, boxes.right) {
-                        words[top as usize] = self.word(children + 2u32 * child.word + 1u32);
-                        top += 1u32;
-                    }
+            walk.count = 0u32;
+            if walk.is_open() {
+                let node = walk.next();
+                if node != NONE {
+                    let boxes = self.node_boxes(node);
+                    walk.look_into(self, node, is_under(p, boxes.left), is_under(p, boxes.right));
                 }
             } else {
+                // After the faces, the triangles.
                 open = triangles > 0u32;
                 rows = self.entry(SIGN_TRIANGLES);
-                first = 0u32;
-                count = triangles;
+                walk.take(0u32, triangles);
                 closing = triangles - self.entry(CLOSING_COUNT);
                 triangles = 0u32;
             }
@@ -235,7 +229,7 @@ fn angle_of_closing(p: V3, f: Triangle, closes: bool) -> f32 {
 }
 
 /// Half of the solid angle of a triangle seen from a point, positive from its back (Van Oosterom and
-/// Strackee 1983). The side is that of [`crossing`], so that both change at the same point.
+/// Strackee 1983). The side is that of [`crossing`], so both change at the same point.
 #[cube]
 fn half_solid_angle(p: V3, f: Triangle) -> f32 {
     let over = (f.b - f.a).cross(f.c - f.a).dot(p - f.a) >= 0.0f32;

@@ -132,6 +132,15 @@ pub fn pick(condition: bool, first: V3, second: V3) -> V3 {
     )
 }
 
+/// A third.
+pub const THIRD: f32 = 0.333_333_34;
+
+/// The mean of three points.
+#[cube]
+pub fn centroid(a: V3, b: V3, c: V3) -> V3 {
+    ((a + b) + c) * THIRD
+}
+
 /// Whether both conditions are equal. CubeCL's CUDA C++ cannot compare truth values.
 #[cube]
 pub fn same(a: bool, b: bool) -> bool {

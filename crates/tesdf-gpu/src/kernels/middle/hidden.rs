@@ -11,7 +11,7 @@ use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs, Part, PartExp
 use super::super::counters::{self, Counters};
 use super::super::field::shapes::{Ball, Bounds, Field, FieldExpand, SIZES, Shapes};
 use super::super::field::tetrahedra::bounds_of;
-use super::super::math::vector::{LEAST_DIVISOR, pick, to_bits, v3};
+use super::super::math::vector::{LEAST_DIVISOR, centroid, pick, to_bits, v3};
 use super::cut::quarter_at;
 
 const SURE: f32 = HiddenOverlap::SURE as f32;
@@ -66,7 +66,7 @@ impl Part {
         let (u, v, w) = ((self.b - self.a).length(), (self.c - self.b).length(), (self.a - self.c).length());
         let is_ab = u >= v && u >= w;
         let on_side = (pick(is_ab || w > v, self.a, self.b) + pick(is_ab, self.b, self.c)) * 0.5f32;
-        let centroid = ((self.a + self.b) + self.c) * 0.333_333_34f32;
+        let centroid = centroid(self.a, self.b, self.c);
         let to_side = self.radius_around(on_side);
         let to_centroid = self.radius_around(centroid);
         Ball { center: pick(to_side <= to_centroid, on_side, centroid), radius: to_side.min(to_centroid) }

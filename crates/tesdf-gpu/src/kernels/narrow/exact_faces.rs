@@ -135,10 +135,7 @@ fn look(
     outward: &mut Direction,
 ) -> Known {
     let (field, part) = (region.field, region.part);
-    let mut known = Known {
-        best: Lowest { distance: FAR.runtime(), at: Weights { s: 0.0f32, t: 0.0f32 } },
-        searches: true,
-    };
+    let mut known = Known { best: nowhere(), searches: true };
     let mut limit = goal.reach + 2.0f32 * CLEAR;
     let mut by = zero();
     // Of an open mesh, the way out may lead through a hole, and nothing is proved.
@@ -226,7 +223,7 @@ pub fn narrow_exact_faces(
                 minimize(region, polygons, face.plane, Goal { reach: face.reach, tolerance }, &mut memory);
         }
         if found.best.distance <= face.reach {
-            face.report(shapes, found.best.at, found.converged, counters, contacts, &mut memory);
+            face.report(found.best.at, found.converged, counters, contacts, &mut memory);
         }
         memory.pool.work.add_to(counters);
         counters.tell_if_broken_off(count);

@@ -15,7 +15,7 @@ use super::super::field::shapes::{
     BOX, FACE_COUNT, Field, FieldExpand, KIND, NONE, PLANE, REACH_BEYOND, Shapes,
 };
 use super::super::math::triangle::Face;
-use super::super::math::vector::{LEAST_DIVISOR, V3, pick, v3, zero};
+use super::super::math::vector::{LEAST_DIVISOR, V3, centroid, pick, v3, zero};
 use super::super::middle::items::Weights;
 use super::contacts::{CONVERGED, Contacts, NO_CORNER, Touch};
 use super::exact::opposed;
@@ -87,7 +87,7 @@ pub fn facing<'a>(
 ) -> Facing<'a> {
     let part = shapes.part(pair, face);
     let plane = shapes.part_normal(pair, face);
-    let center = ((part.a + part.b) + part.c) * 0.333_333_34f32;
+    let center = centroid(part.a, part.b, part.c);
     let is_turned = shapes.facing(pair, face, center) < 0.0f32;
     Facing::<'a> {
         field: shapes.field(pair.shape_b),
@@ -379,28 +379,15 @@ impl Facing<'_> {
     }
 
     /// Writes a contact, or counts it as filtered.
-    fn write(
-        self,
-        shapes: &Shapes,
-        taken: Taken,
-        converged: bool,
-        counters: &Counters,
-        contacts: &mut Contacts,
-    ) {
-        let facing = shapes.facing(self.pair, self.face, taken.point);
+    fn write(self, taken: Taken, converged: bool, counters: &Counters, contacts: &mut Contacts) {
+        let facing = self.surface.facing(self.face, self.pair.to_surface(taken.point));
         let mut v = taken.value;
         let mut cosine = opposed(v.gradient.dot(self.plane), facing);
         if self.surface.has_turned_faces() {
             let outward = self.plane * facing;
             // The value opposes the side that is outside at the center.
             if outward.dot(self.normal) < 0.0f32 {
-                let cell = self.field.cell_at(taken.point);
-                v = self.field.opposing(
-                    cell,
-                    taken.point,
-                    outward,
-                    self.field.exact_value_in(cell, taken.point),
-                );
+                v = self.field.opposing(self.field.cell_at(taken.point), taken.point, outward, v);
                 cosine = v.gradient.dot(outward);
             }
         }
@@ -417,7 +404,6 @@ impl Facing<'_> {
     /// group must call it.
     pub fn report(
         self,
-        shapes: &Shapes,
         at: Weights,
         converged: bool,
         counters: &Counters,
@@ -454,7 +440,7 @@ impl Facing<'_> {
             memory.points.put(select(is_minimum, DIRECTIONS, direction), round + 1u32, taken);
             let is_new = memory.points.is_new(select(is_minimum, DIRECTIONS, direction), round + 1u32, taken);
             if writes && taken.is_taken && is_new {
-                self.write(shapes, taken, converged, counters, contacts);
+                self.write(taken, converged, counters, contacts);
             }
             if is_minimum {
                 patch = self.patch(taken);

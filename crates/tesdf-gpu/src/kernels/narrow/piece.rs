@@ -8,14 +8,13 @@ use super::super::field::nearest::FAR;
 use super::super::field::shapes::Field;
 use super::super::field::value::Value;
 use super::super::math::greatest_minimum::Functions;
-use super::super::math::vector::{V3, v3};
+use super::super::math::vector::{THIRD, V3, centroid, v3};
 use super::super::middle::items::Weights;
 use super::exchange::LANES;
 use super::work::{Work, no_work};
 
 /// Capacity of the pool of waiting pieces.
 pub const POOL: u32 = 128;
-const THIRD: f32 = 0.333_333_34;
 
 /// A triangle of a polygon, with the nearest face at each corner. No point of the triangle has a
 /// signed distance below `bound`.
@@ -176,7 +175,7 @@ impl Region<'_> {
     pub fn may_jump(self, p: V3, radius: f32) -> bool {
         let mut may = false;
         if !self.cell.is_listed() || self.cell.is_crossing() {
-            may = self.field.may_jump(p, radius, false);
+            may = self.field.may_jump(p, radius);
         }
         may
     }
@@ -244,7 +243,7 @@ impl Region<'_> {
             b: self.part.at(piece.b.s, piece.b.t),
             c: self.part.at(piece.c.s, piece.c.t),
         };
-        let middle = ((points.a + points.b) + points.c) * THIRD;
+        let middle = centroid(points.a, points.b, points.c);
         let radius =
             (points.a - middle).length().max((points.b - middle).length()).max((points.c - middle).length());
         let jumps = self.may_jump(middle, radius);

@@ -46,7 +46,7 @@ pub fn narrow_whole_faces(
         search.count(counters, variant);
         if search.distance <= reach {
             // Nothing proves that no point is lower.
-            face.report(shapes, search.best, false.runtime(), counters, contacts, &mut memory);
+            face.report(search.best, false.runtime(), counters, contacts, &mut memory);
         }
         memory.pool.work.add_to(counters);
         counters.tell_if_broken_off(count);
