@@ -31,8 +31,8 @@ pub struct Rules {
     pub turned: bool,
 }
 
-/// Words in the table for each shape. The last two are not used: with a multiple of 16, kernels take fewer
-/// registers (`docs/gpu/measurements.md`).
+/// Words in the table for each shape. The last two are not used: with a multiple of 16, kernels take
+/// fewer registers (`docs/gpu/measurements.md`).
 pub const STRIDE: u32 = 48;
 
 /// The kind: [`MESH`], [`PLANE`], [`BOX`] or [`ROUND`].
@@ -118,8 +118,8 @@ pub const RULE: u32 = 40;
 pub const SIGN_TRIANGLES: u32 = 41;
 /// Number of these triangles.
 pub const SIGN_COUNT: u32 = 42;
-/// Number of those among them that close an open mesh; they are the last ones. Each begins with an open
-/// edge.
+/// Number of those among them that close an open mesh; they are the last ones. Each begins with an
+/// open edge.
 pub const CLOSING_COUNT: u32 = 43;
 /// How far the inside of an open mesh can extend beyond the bounds of its faces; otherwise 0.
 pub const REACH_BEYOND: u32 = 44;

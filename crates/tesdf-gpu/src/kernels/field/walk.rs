@@ -1,13 +1,13 @@
-//! A walk over some faces: those of a list, or those of the leaves of the face tree that a kernel asks
-//! for.
+//! A walk over some faces: those of a list, or those of the leaves of the face tree that a kernel
+//! asks for.
 use cubecl::prelude::*;
 
 use super::list::List;
 use super::nearest::{TREE_DEPTH, TreeChild};
 use super::shapes::{CHILDREN, Field, NONE};
 
-/// The faces of a list, or of one leaf after the other. The caller tells which nodes are looked into, so
-/// that its long code for a face stands in the kernel once.
+/// The faces of a list, or of one leaf after the other. The caller tells which nodes are looked
+/// into, and its long code for a face stands in the kernel once.
 #[derive(CubeType)]
 pub struct FaceWalk {
     /// Words of the children that are still to be visited.
@@ -53,8 +53,8 @@ impl FaceWalk {
         self.top > 0u32
     }
 
-    /// Goes on to the next child: takes the faces of a leaf, or returns the node, for which the caller
-    /// says by [`look_into`](Self::look_into) where to look. [`NONE`] for a leaf.
+    /// Goes on to the next child. Takes the faces of a leaf, and returns [`NONE`]; or returns a node,
+    /// for which the caller says by [`look_into`](Self::look_into) where to look.
     pub fn next(&mut self) -> u32 {
         self.top -= 1u32;
         let child = TreeChild { word: self.words[self.top as usize] };
