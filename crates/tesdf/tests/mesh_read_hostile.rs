@@ -1,5 +1,6 @@
 //! Reads hostile bytes: no panic, no part of a file ignored silently, no memory allocated by a
 //! count.
+#[path = "it/sample/mod.rs"]
 mod sample;
 
 use std::alloc::{GlobalAlloc, Layout, System};

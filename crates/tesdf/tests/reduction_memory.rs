@@ -1,4 +1,5 @@
 //! The bytes that a detection reports for a reduction are those that it holds.
+#[path = "it/support/mod.rs"]
 mod support;
 
 use std::alloc::{GlobalAlloc, Layout, System};

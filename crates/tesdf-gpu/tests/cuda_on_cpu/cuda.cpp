@@ -3,9 +3,14 @@
 // memory.
 //
 // The "machine code" of a kernel is the path of a shared library, which the C++ compiler makes from
-// the kernel's text. The threads of a block are fibers. Each fiber runs to its next barrier. When
+// the kernel's text. It stays in the folder `kernels` beside this library, by the hash of the text,
+// for all processes. The threads of a block are fibers. Each fiber runs to its next barrier. When
 // some threads never reach a barrier, the process ends. Each buffer lies directly before protected
 // memory, so a read or write past its end also ends the process.
+//
+// A GPU promises no order of blocks, nor of threads between two barriers. With CUDA_ON_CPU_ORDER=SEED
+// both orders are random, and others in each launch and after each barrier.
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -14,8 +19,11 @@
 #include <dlfcn.h>
 #include <fstream>
 #include <map>
+#include <numeric>
+#include <random>
 #include <string>
 #include <sys/mman.h>
+#include <sys/stat.h>
 #include <ucontext.h>
 #include <unistd.h>
 #include <vector>
@@ -114,9 +122,7 @@ struct Kernel {
 
 CUDA int cuModuleLoadData(void **module, const void *image) {
     if (current != CONTEXT) return NO_CONTEXT;
-    const std::string library = (const char *)image + strlen(MAGIC), folder = library.substr(0, library.rfind('/'));
-    *module = dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL);
-    for (const char *file : {"/kernel.cpp", "/kernel.so", "/log", ""}) remove((folder + file).c_str());
+    *module = dlopen((const char *)image + strlen(MAGIC), RTLD_NOW | RTLD_LOCAL);
     return *module ? 0 : INVALID;
 }
 template <typename T> static bool find(T &to, void *module, const char *name) {
@@ -141,9 +147,22 @@ static ucontext_t launcher;
 static std::vector<ucontext_t> fibers;
 static std::vector<Fiber> states;
 static std::vector<unsigned> words;
+static std::vector<unsigned> order_of_threads, order_of_blocks;
 static unsigned running;
 static Kernel *kernel;
 static void **arguments;
+
+// The numbers below `count`, in another order in each call where CUDA_ON_CPU_ORDER is a seed.
+static const std::vector<unsigned> &order(unsigned count, std::vector<unsigned> &all) {
+    static const char *seed = getenv("CUDA_ON_CPU_ORDER");
+    static std::mt19937 random(seed ? strtoul(seed, nullptr, 10) : 0);
+    if (all.size() != count) {
+        all.resize(count);
+        std::iota(all.begin(), all.end(), 0);
+    }
+    if (seed) std::shuffle(all.begin(), all.end(), random);
+    return all;
+}
 
 static void leave() { swapcontext(&fibers[running], &launcher); }
 static unsigned exchange(unsigned word, unsigned other) {
@@ -169,7 +188,8 @@ static void run_block(unsigned threads, const std::vector<std::vector<char>> &st
     }
     for (unsigned done = 0; done < threads;) {
         done = 0;
-        for (running = 0; running < threads; running++) {
+        for (unsigned thread : order(threads, order_of_threads)) {
+            running = thread;
             *kernel->thread = {running, 0, 0};
             if (states[running] != Fiber::Done) swapcontext(&launcher, &fibers[running]);
             done += states[running] == Fiber::Done;
@@ -193,12 +213,10 @@ CUDA int cuLaunchKernel(void *function, unsigned gx, unsigned gy, unsigned gz, u
     *kernel->exchange = exchange;
     *kernel->threads = {bx, by, bz};
     *kernel->grid = {gx, gy, gz};
-    for (unsigned z = 0; z < gz; z++)
-        for (unsigned y = 0; y < gy; y++)
-            for (unsigned x = 0; x < gx; x++) {
-                *kernel->block = {x, y, z};
-                run_block(bx, stacks);
-            }
+    for (unsigned block : order(gx * gy * gz, order_of_blocks)) {
+        *kernel->block = {block % gx, block / gx % gy, block / gx / gy};
+        run_block(bx, stacks);
+    }
     return 0;
 }
 
@@ -250,6 +268,11 @@ static std::string as_cpp(std::string text) {
     return "#include \"" HEADER "\"\n" + text + "\nextern \"C\" void cuda_run(void** a) { " + name + "(" + call + "); }\n";
 }
 
+static unsigned long long fnv(const std::string &text, unsigned long long hash) {
+    for (unsigned char c : text) hash = (hash ^ c) * 0x100000001b3;
+    return hash;
+}
+
 CUDA int nvrtcGetNumSupportedArchs(int *count) { *count = 1; return 0; }
 CUDA int nvrtcGetSupportedArchs(int *known) { known[0] = 90; return 0; }
 CUDA int nvrtcCreateProgram(void **program, const char *text, const char *, int, const char **, const char **) {
@@ -263,19 +286,30 @@ CUDA int nvrtcCompileProgram(void *program, int, const char **) {
         p->log = "assembly that is not known on the CPU";
         return 6;
     }
-    char name[] = "/tmp/cuda_on_cpu.XXXXXX";
-    if (!mkdtemp(name)) stop("no temporary folder");
-    const std::string folder = name;
-    std::ofstream(folder + "/kernel.cpp") << cpp;
-    const std::string command = "c++ -w -std=c++17 -O1 -fno-strict-aliasing -ffp-contract=off -fPIC -shared -o " + folder +
-                                "/kernel.so " + folder + "/kernel.cpp 2> " + folder + "/log";
-    if (system(command.c_str()) != 0) {
-        std::ifstream log(folder + "/log");
-        p->log.assign(std::istreambuf_iterator<char>(log), {});
-        return 6;
-    }
-    p->image = MAGIC + folder + "/kernel.so";
-    return 0;
+    Dl_info self;
+    if (!dladdr((void *)nvrtcCompileProgram, &self)) stop("the path of this library is not known");
+    const std::string own = self.dli_fname, folder = own.substr(0, own.rfind('/')) + "/kernels";
+    const std::string flags = "-w -std=c++17 -O1 -fno-strict-aliasing -ffp-contract=off -fPIC -shared";
+    std::ifstream header(HEADER);
+    const std::string definitions(std::istreambuf_iterator<char>(header), {});
+    char hash[33];
+    const std::string all = cpp + definitions + flags;
+    snprintf(hash, sizeof hash, "%016llx%016llx", fnv(all, 0xcbf29ce484222325), fnv(all, 0x84222325cbf29ce4));
+    const std::string library = folder + "/" + hash + ".so";
+    p->image = MAGIC + library;
+    if (access(library.c_str(), R_OK) == 0) return 0;
+    mkdir(folder.c_str(), 0777);
+    std::string unfinished = folder + "/XXXXXX";
+    if (!mkdtemp(unfinished.data())) stop("no folder " + folder);
+    std::ofstream(unfinished + "/kernel.cpp") << cpp;
+    const std::string command = "cd " + unfinished + " && c++ " + flags + " -o kernel.so kernel.cpp 2> log";
+    const bool compiled = system(command.c_str()) == 0;
+    std::ifstream log(unfinished + "/log");
+    p->log.assign(std::istreambuf_iterator<char>(log), {});
+    // Another process may have compiled the same text. Either file will do.
+    if (compiled && rename((unfinished + "/kernel.so").c_str(), library.c_str()) != 0) stop("no file " + library);
+    for (const char *file : {"/kernel.cpp", "/log", ""}) remove((unfinished + file).c_str());
+    return compiled ? 0 : 6;
 }
 CUDA int nvrtcGetProgramLogSize(void *program, size_t *size) { *size = ((Program *)program)->log.size() + 1; return 0; }
 CUDA int nvrtcGetProgramLog(void *program, char *log) { strcpy(log, ((Program *)program)->log.c_str()); return 0; }

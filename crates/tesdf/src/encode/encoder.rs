@@ -34,6 +34,7 @@ pub struct Encoder<'a> {
     options: EncodeOptions,
     band: Option<Length>,
     unit: Option<String>,
+    inside: Option<Inside>,
     domain: Domain<'a>,
     source: Source,
     repair: RepairMode,
@@ -68,6 +69,7 @@ impl<'a> Encoder<'a> {
             options: EncodeOptions::default(),
             band: None,
             unit: None,
+            inside: None,
             domain: Domain::Bisection,
             source: Source::default(),
             repair: RepairMode::Never,
@@ -107,10 +109,9 @@ impl<'a> Encoder<'a> {
 
     /// Sets what is inside of meshes that [`encode_file`](Self::encode_file) reads. A solid that is
     /// passed to [`encode`](Self::encode) brings its own rule. It replaces
-    /// [`EncodeOptions::inside`].
+    /// [`EncodeOptions::inside`], in the same way as `band`.
     pub fn inside(self, inside: impl Into<Inside>) -> Self {
-        let options = EncodeOptions { inside: inside.into(), ..self.options };
-        Self { options, ..self }
+        Self { inside: Some(inside.into()), ..self }
     }
 
     /// Sets the domain, from which the cells come. The default is [`Domain::Bisection`].
@@ -200,12 +201,13 @@ impl<'a> Encoder<'a> {
     }
 
     fn encode_path(&self, path: &Path) -> Result<TeSdf, EncodeFileError> {
+        let inside = self.resolved().inside;
         let (solid, source, report) = match self.repair {
             RepairMode::Never => {
-                let (solid, report) = SolidMesh::load(path, self.options.inside)?;
+                let (solid, report) = SolidMesh::load(path, inside)?;
                 (solid, Source::of_file(path, report.source_blake3.clone()), report)
             }
-            RepairMode::Auto => load_repaired(path, self.options.inside)?,
+            RepairMode::Auto => load_repaired(path, inside)?,
         };
         let unit = report.unit.as_deref();
         let at = |source| EncodeFileError::Encode { path: path.to_owned(), source };
@@ -233,6 +235,7 @@ impl<'a> Encoder<'a> {
         let mut options = self.options.clone();
         options.band = self.band.unwrap_or(options.band);
         options.unit = self.unit.clone().or(options.unit);
+        options.inside = self.inside.unwrap_or(options.inside);
         options
     }
 }

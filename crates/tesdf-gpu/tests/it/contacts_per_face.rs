@@ -1,0 +1,118 @@
+//! Contacts per face on the device: what holds on the processor holds here, within `f32`.
+
+use crate::compare::{ROUNDING, found};
+use crate::support::bodies::{Placed, RELATIONS, Relation, scene};
+use crate::support::per_face::{Detection, Kept};
+use crate::support::random::Random;
+use tesdf::collide::{CollideOptions, Contacts, ContactsPer, Mode, Placement, Pose, Scene};
+use tesdf_gpu::{Counting, DetectorOptions};
+
+fn on_device(scene: &Scene, options: &CollideOptions) -> Contacts {
+    found(scene, options, DetectorOptions::default()).0
+}
+
+/// Twice the rounding, and the finest tolerance of the exact mode on a device.
+const DEVICE: Detection = Detection {
+    detect: &on_device,
+    distance: 3.0 * ROUNDING,
+    point: ROUNDING,
+    level: 3.0 * ROUNDING * 0.1,
+    cosine: 1e-3,
+};
+
+#[test]
+fn each_face_keeps_its_least_distance() {
+    let mut random = Random(11);
+    let names = [["cube", "cube"], ["l_bracket", "cube"], ["torus_quads", "tetra"], ["beam", "l_bracket"]];
+    let mut all = Kept::default();
+    for names in names {
+        for relation in RELATIONS {
+            if relation == Relation::Same && names[0] != names[1] {
+                continue;
+            }
+            let bodies = relation.place(names, &mut random);
+            let kept = DEVICE.keeps_least_distances(&bodies, 1e-3 * bodies[0].diagonal());
+            all.faces += kept.faces;
+            all.unconverged += kept.unconverged;
+        }
+    }
+    assert!(all.faces > 2000 && all.unconverged * 200 < all.faces, "{all:?}");
+}
+
+#[test]
+fn each_face_of_bolt_and_nut_keeps_its_least_distance() {
+    let identity = Placement { pose: Pose::IDENTITY, scale: 1.0 };
+    let bodies = ["iso_m16_bolt_6k", "iso_m16_nut_c100"].map(|name| Placed::new(name, identity));
+    let kept = DEVICE.keeps_least_distances(&bodies, 2e-4);
+    assert!(kept.faces > 3000, "{kept:?}");
+}
+
+#[test]
+fn minima_are_followed_by_no_lower_point() {
+    let mut random = Random(23);
+    let names = [["l_bracket", "cube"], ["torus_quads", "tetra"], ["beam", "l_bracket"]];
+    let mut all = [0, 0];
+    for names in names {
+        for relation in RELATIONS.into_iter().filter(|&relation| relation != Relation::Same) {
+            let bodies = relation.place(names, &mut random);
+            let contact_distance = 1e-3 * bodies[0].diagonal();
+            for mode in [Mode::Exact, Mode::Face] {
+                let counts = DEVICE.minima_are_followed_by_no_lower_point(&bodies, contact_distance, mode);
+                all = [all[0] + counts[0], all[1] + counts[1]];
+            }
+        }
+    }
+    assert!(all[0] > 500 && all[1] > 500, "{all:?}");
+}
+
+#[test]
+fn a_border_ahead_of_a_peg_is_no_minimum() {
+    DEVICE.border_ahead_of_a_peg_is_no_minimum();
+}
+
+#[test]
+fn the_sides_of_a_bend_are_walls() {
+    DEVICE.sides_of_a_bend_are_walls();
+}
+
+#[test]
+fn a_box_stands_on_the_corners_of_the_patch() {
+    for per in [ContactsPer::Face, ContactsPer::Minimum] {
+        assert_eq!(DEVICE.box_stands_on_the_corners_of_the_patch(per), 0, "all searches converge");
+    }
+}
+
+#[test]
+fn a_box_stands_on_a_plane_and_on_four_pegs() {
+    for per in [ContactsPer::Face, ContactsPer::Minimum] {
+        DEVICE.box_stands_on_a_plane_and_on_four_pegs(per);
+    }
+}
+
+#[test]
+fn a_vertex_of_several_faces_has_one_contact() {
+    DEVICE.vertex_of_several_faces_has_one_contact(&[Mode::Exact, Mode::Face]);
+}
+
+/// A query of the mode `exact` looks at one point at least.
+#[test]
+fn work_is_counted_without_a_change_of_contacts() {
+    let bodies = Relation::Deep.place(["torus_quads", "l_bracket"], &mut Random(5));
+    let scene = scene(&bodies);
+    for contacts_per in [ContactsPer::Cell, ContactsPer::Face] {
+        let contact_distance = 1e-3 * bodies[0].diagonal();
+        let options =
+            CollideOptions { contact_distance, contacts_per, ..CollideOptions::with_mode(Mode::Exact) };
+        let (plain, detector) = found(&scene, &options, DetectorOptions::default());
+        let counts = detector.report().counts;
+        assert_eq!((counts.evaluations, counts.distances), (0, 0));
+        let counting = DetectorOptions { counting: Counting::Operations, ..DetectorOptions::default() };
+        let (counted, detector) = found(&scene, &options, counting);
+        let points =
+            |contacts: &Contacts| contacts.iter().map(|c| (c.point_a, c.distance)).collect::<Vec<_>>();
+        assert!(!plain.is_empty() && points(&plain) == points(&counted));
+        let counts = detector.report().counts;
+        assert!((counts.polygons..200 * counts.polygons).contains(&counts.evaluations), "{counts:?}");
+        assert!((2 * counts.evaluations..100 * counts.evaluations).contains(&counts.distances), "{counts:?}");
+    }
+}

@@ -1,0 +1,317 @@
+//! Contacts that stay on the device, and poses that come from arrays there.
+
+use crate::support::bodies::{Relation, body, rotation};
+use crate::support::random::Random;
+use tesdf::collide::{
+    CollideOptions, Contact, ContactsPer, Instance, InstanceId, Mode, Pose, Reduction, Scene, Shape, Velocity,
+};
+use tesdf::glam::{DQuat, DVec3, Vec3};
+use tesdf_gpu::{Detector, DetectorOptions, Device, DeviceArray, DeviceContacts, GivenPoses, GpuError};
+
+fn device() -> Device {
+    Device::choose(None).expect("a device")
+}
+
+fn detector(scene: &Scene) -> Detector {
+    Detector::new(&device(), scene, DetectorOptions::default()).expect("fits")
+}
+
+/// A bracket, a cube and a box in each world. The box meets the cube.
+fn worlds(count: u32, random: &mut Random) -> Scene {
+    let mut scene = Scene::new();
+    let meshes = ["l_bracket", "cube"]
+        .map(|name| scene.add_shape(Shape::Mesh(body(name).asset.clone())).expect("a shape"));
+    let slab = scene.add_shape(Shape::Box { half_extents: DVec3::new(0.5, 0.5, 0.1) }).expect("a shape");
+    for world in 0..count {
+        let [a, b] = Relation::Deep.place(["l_bracket", "cube"], random);
+        let slab_at = Pose { translation: b.at.pose.translation, rotation: rotation(random) };
+        let placed =
+            [(meshes[0], a.at.pose, a.at.scale), (meshes[1], b.at.pose, b.at.scale), (slab, slab_at, 0.5)];
+        for (shape, pose, scale) in placed {
+            let velocity = Velocity { linear: 0.01 * random.in_cube(), angular: 0.01 * random.in_cube() };
+            let instance = Instance { world, scale, velocity, ..Instance::new(shape, pose) };
+            scene.add(instance).expect("an instance");
+        }
+    }
+    scene
+}
+
+/// A contact: instances, both points, normal, distance.
+type Row = ((u32, u32), [DVec3; 3], f64);
+
+fn read(device: &Device, found: &DeviceContacts) -> Vec<Row> {
+    let vectors = |array: &DeviceArray<f32>| -> Vec<DVec3> {
+        let numbers = array.read(device).expect("numbers");
+        assert_eq!(numbers.len(), 3 * found.count);
+        numbers.chunks_exact(3).map(|v| Vec3::from_slice(v).as_dvec3()).collect()
+    };
+    let (a, b, n) = (vectors(&found.points_a), vectors(&found.points_b), vectors(&found.normals));
+    let distances = found.distances.read(device).expect("numbers");
+    let ids = found.instances.read(device).expect("numbers");
+    assert_eq!((distances.len(), ids.len()), (found.count, 2 * found.count));
+    (0..found.count)
+        .map(|k| ((ids[2 * k], ids[2 * k + 1]), [a[k], b[k], n[k]], f64::from(distances[k])))
+        .collect()
+}
+
+fn of_host(c: &Contact) -> Row {
+    ((c.instance_a.0, c.instance_b.0), [c.point_a, c.point_b, c.normal], c.distance)
+}
+
+/// Each contact has its partner, and pairs come in the same order. `size` bounds coordinates.
+fn are_equal(found: &[Row], expected: &[Contact], size: f64, bound: f64) {
+    assert_eq!(found.len(), expected.len());
+    let expected: Vec<Row> = expected.iter().map(of_host).collect();
+    let pairs = |rows: &[Row]| rows.iter().map(|row| row.0).collect::<Vec<_>>();
+    assert_eq!(pairs(found), pairs(&expected), "the order of pairs");
+    let mut taken = vec![false; found.len()];
+    for (pair, [a, b, n], distance) in &expected {
+        let is_partner = |(k, row): (usize, &Row)| {
+            !taken[k]
+                && row.0 == *pair
+                && row.1[0].distance(*a) <= bound * size
+                && row.1[1].distance(*b) <= bound * size
+                && row.1[2].distance(*n) <= 1e-4
+                && (row.2 - distance).abs() <= bound * size
+        };
+        let at = found.iter().enumerate().position(|(k, row)| is_partner((k, row)));
+        taken[at.unwrap_or_else(|| panic!("no contact of {pair:?} at {a} with {distance}"))] = true;
+    }
+}
+
+fn each_form() -> Vec<CollideOptions> {
+    let of = |mode, contacts_per, reduction| CollideOptions {
+        contact_distance: 0.01,
+        contacts_per,
+        reduction,
+        ..CollideOptions::with_mode(mode)
+    };
+    vec![
+        of(Mode::Node, ContactsPer::Face, Reduction::None),
+        of(Mode::Face, ContactsPer::Cell, Reduction::None),
+        of(Mode::Exact, ContactsPer::Cell, Reduction::None),
+        of(Mode::Exact, ContactsPer::Face, Reduction::PerPair(12)),
+        of(Mode::Node, ContactsPer::Face, Reduction::Spread(5)),
+    ]
+}
+
+#[test]
+fn contacts_on_the_device_are_those_of_a_detection() {
+    let scene = worlds(3, &mut Random(5));
+    let mut detector = detector(&scene);
+    let device = detector.device().clone();
+    for options in each_form() {
+        let expected = detector.detect(&scene, &options).expect("detects");
+        assert!(expected.len() > 30, "{} contacts", expected.len());
+        let found = detector.detect_on_device(&scene, None, &options).expect("detects");
+        // The same numbers, rounded in the world.
+        let rows = read(&device, &found);
+        are_equal(&rows, expected.as_slice(), 2.0, 1e-6);
+        let again = detector.detect_on_device(&scene, None, &options).expect("detects");
+        assert_eq!(read(&device, &again), rows, "two runs differ");
+    }
+}
+
+/// The order is that of the host also within a pair: shapes without a mesh have the order of their
+/// faces on both sides.
+#[test]
+fn contacts_have_the_order_of_a_detection() {
+    let mut random = Random(6);
+    let mut scene = Scene::new();
+    for world in 0..40 {
+        for k in 0..2 {
+            let half_extents = 0.3 * DVec3::ONE + 0.2 * random.in_cube();
+            let shape = scene.add_shape(Shape::Box { half_extents }).expect("a shape");
+            let pose =
+                Pose { translation: f64::from(k) * 0.2 * random.in_cube(), rotation: rotation(&mut random) };
+            // Ids do not have the order of worlds.
+            scene.add(Instance { world: 40 - world, ..Instance::new(shape, pose) }).expect("an instance");
+        }
+    }
+    let mut detector = detector(&scene);
+    let options =
+        CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(Mode::Exact) };
+    let expected = detector.detect(&scene, &options).expect("detects");
+    let found = detector.detect_on_device(&scene, None, &options).expect("detects");
+    let rows = read(detector.device(), &found);
+    assert!(rows.len() > 500 && !rows.len().is_power_of_two(), "{} contacts", rows.len());
+    assert_eq!(rows.len(), expected.len());
+    for (row, contact) in rows.iter().zip(&expected) {
+        let (pair, [a, ..], distance) = of_host(contact);
+        assert!(row.0 == pair && row.1[0].distance(a) < 1e-6 && (row.2 - distance).abs() < 1e-6);
+    }
+}
+
+/// Poses and velocities of a scene as arrays, in the order of ids.
+fn arrays(device: &Device, scene: &Scene) -> (DeviceArray<f32>, DeviceArray<f32>) {
+    let mut poses = Vec::new();
+    let mut velocities = Vec::new();
+    for (_, instance) in scene.instances() {
+        let Pose { translation, rotation } = instance.pose;
+        poses.extend(translation.as_vec3().to_array());
+        poses.extend(rotation.as_quat().to_array());
+        let Velocity { linear, angular } = instance.velocity;
+        velocities.extend([linear, angular].iter().flat_map(|v| v.as_vec3().to_array()));
+    }
+    let upload = |numbers: &[f32]| DeviceArray::upload(device, numbers).expect("fits");
+    (upload(&poses), upload(&velocities))
+}
+
+/// The scene with all bodies at the origin, and at rest.
+fn elsewhere(scene: &Scene) -> Scene {
+    let mut moved = scene.clone();
+    let updates: Vec<(InstanceId, Instance)> = scene
+        .instances()
+        .map(|(id, &i)| (id, Instance { pose: Pose::IDENTITY, velocity: Velocity::default(), ..i }))
+        .collect();
+    moved.update(&updates).expect("poses");
+    moved
+}
+
+#[test]
+fn poses_come_from_arrays() {
+    let mut random = Random(7);
+    let mut scene = worlds(2, &mut random);
+    // Ids that do not have the order of worlds, and one that is missing.
+    let plane = scene.add_shape(Shape::Plane).expect("a shape");
+    for world in [1, 0] {
+        let pose = Pose { translation: DVec3::new(0.0, 0.0, -0.1), rotation: rotation(&mut random) };
+        scene.add(Instance { world, ..Instance::new(plane, pose) }).expect("an instance");
+    }
+    scene.remove(&[InstanceId(0)]).expect("it is there");
+    let stale = elsewhere(&scene);
+    let mut detector = detector(&scene);
+    let device = detector.device().clone();
+    let (poses, velocities) = arrays(&device, &scene);
+    let given = GivenPoses { poses: &poses, velocities: Some(&velocities) };
+    let ahead = |speculative_time| CollideOptions {
+        contact_distance: 0.01,
+        speculative_time,
+        ..CollideOptions::with_mode(Mode::Node)
+    };
+    let mut counts = Vec::new();
+    for options in [ahead(0.0), ahead(2.0)] {
+        let expected = detector.detect(&scene, &options).expect("detects");
+        let found = detector.detect_on_device(&stale, Some(&given), &options).expect("detects");
+        let rows = read(&device, &found);
+        // Contacts at the contact distance itself may be on one side only.
+        let near = |rows: &[Row]| rows.iter().filter(|row| row.2 < 0.0099).count();
+        let expected_rows: Vec<Row> = expected.iter().map(of_host).collect();
+        assert_eq!(near(&rows), near(&expected_rows));
+        assert!(rows.len().abs_diff(expected.len()) <= 2, "{} and {} contacts", rows.len(), expected.len());
+        let deepest = |rows: &[Row]| rows.iter().map(|row| row.2).fold(0.0, f64::min);
+        assert!((deepest(&rows) - deepest(&expected_rows)).abs() < 4e-6);
+        counts.push(rows.len());
+    }
+    assert!(counts[0] > 100 && counts[1] > counts[0], "{counts:?}");
+    // Without velocities all are at rest.
+    let still = GivenPoses { velocities: None, ..given };
+    let found = detector.detect_on_device(&stale, Some(&still), &ahead(2.0)).expect("detects");
+    assert_eq!(found.count, counts[0]);
+}
+
+#[test]
+fn overlaps_without_a_contact_are_reported() {
+    let mut scene = Scene::new();
+    let bar = scene.add_shape(Shape::Box { half_extents: DVec3::new(1.0, 0.2, 0.2) }).expect("a shape");
+    scene.add(Instance::new(bar, Pose::IDENTITY)).expect("an instance");
+    let across = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
+    scene.add(Instance::new(bar, Pose { translation: DVec3::ZERO, rotation: across })).expect("an instance");
+    let mut detector = detector(&scene);
+    let options = CollideOptions::with_mode(Mode::Node);
+    let expected = detector.detect(&scene, &options).expect("detects");
+    let found = detector.detect_on_device(&scene, None, &options).expect("detects");
+    assert_eq!((found.count, &found.hidden), (0, &expected.hidden));
+    assert!(found.hidden.len() == 1 && found.hidden[0].depth > 0.1);
+    let exact = CollideOptions { contacts_per: ContactsPer::Cell, ..CollideOptions::with_mode(Mode::Exact) };
+    let found = detector.detect_on_device(&scene, None, &exact).expect("detects");
+    assert!(found.count > 0 && found.hidden.is_empty());
+}
+
+/// Only counters are read where no thread has found an overlap that contacts need not show.
+#[test]
+fn contacts_are_not_read() {
+    let mut scene = Scene::new();
+    let cube = scene.add_shape(Shape::Box { half_extents: DVec3::ONE }).expect("a shape");
+    scene.add(Instance::new(cube, Pose::IDENTITY)).expect("an instance");
+    scene.add(Instance::new(cube, Pose::at(DVec3::new(0.1, 0.2, 1.99)))).expect("an instance");
+    let mut detector = detector(&scene);
+    let options = CollideOptions::with_mode(Mode::Node);
+    let found = detector.detect_on_device(&scene, None, &options).expect("detects");
+    assert!(found.count >= 2 && detector.report().read < 100, "{} bytes", detector.report().read);
+    let read = read(detector.device(), &found);
+    assert!(read.iter().all(|row| (row.2 + 0.01).abs() < 1e-6), "{read:?}");
+    assert_eq!(detector.detect(&scene, &options).expect("detects").len(), found.count);
+    assert!(detector.report().read > 100);
+}
+
+#[test]
+fn what_is_no_pose_is_an_error() {
+    let mut scene = Scene::new();
+    let ball = scene.add_shape(Shape::Sphere { radius: 1.0 }).expect("a shape");
+    for x in [0.0, 1.5] {
+        scene.add(Instance::new(ball, Pose::at(DVec3::new(x, 0.0, 0.0)))).expect("an instance");
+    }
+    let mut detector = detector(&scene);
+    let device = detector.device().clone();
+    let options = CollideOptions::with_mode(Mode::Node);
+    let mut detect = |poses: &[f32], velocities: Option<&[f32]>| {
+        let poses = DeviceArray::upload(&device, poses).expect("fits");
+        let velocities = velocities.map(|numbers| DeviceArray::upload(&device, numbers).expect("fits"));
+        let given = GivenPoses { poses: &poses, velocities: velocities.as_ref() };
+        detector.detect_on_device(&scene, Some(&given), &options).map(|found| found.count)
+    };
+    let at = |x: f32, w: f32| [x, 0.0, 0.0, 0.0, 0.0, 0.0, w];
+    let both = |second: [f32; 7]| [at(0.0, 1.0), second].concat();
+    assert_eq!(detect(&both(at(1.5, 1.0)), None).expect("poses"), 2);
+    assert_eq!(detect(&both(at(1.5, -1.000_001)), Some(&[0.0; 12])).expect("poses"), 2);
+    for (second, text) in [
+        (at(1.5, 1.1), "1.1] with the velocity []; expected finite numbers, and a quaternion of length 1"),
+        (at(f32::NAN, 1.0), "NaN"),
+        (at(1.5, f32::INFINITY), "inf"),
+    ] {
+        let error = detect(&both(second), None).expect_err("no pose");
+        assert!(matches!(error, GpuError::Instance { instance: 1, .. }), "{error}");
+        assert!(error.to_string().contains(text), "{error}");
+    }
+    let mut fast = [0.0; 12];
+    fast[0] = f32::NAN;
+    let error = detect(&both(at(1.5, 1.0)), Some(&fast)).expect_err("no velocity");
+    assert!(matches!(error, GpuError::Instance { instance: 0, .. }), "{error}");
+    let error = detect(&[0.0; 7], None).expect_err("one row");
+    assert_eq!(error.to_string(), "array \"poses\" has 7 elements; expected 14: 7 for each of 2 instances");
+    let error = detect(&both(at(1.5, 1.0)), Some(&[0.0; 6])).expect_err("one row");
+    assert_eq!(
+        error.to_string(),
+        "array \"velocities\" has 6 elements; expected 12: 6 for each of 2 instances"
+    );
+}
+
+#[test]
+fn what_only_the_processor_does_is_an_error() {
+    let scene = worlds(1, &mut Random(8));
+    let mut detector = detector(&scene);
+    let of = |mode, contacts_per, reduction| CollideOptions {
+        contacts_per,
+        reduction,
+        ..CollideOptions::with_mode(mode)
+    };
+    for (options, text) in [
+        (
+            of(Mode::Exact, ContactsPer::Face, Reduction::None),
+            "leaving one contact of all faces at a vertex there",
+        ),
+        (of(Mode::Exact, ContactsPer::Minimum, Reduction::None), "leaving contacts per minimum there"),
+        (of(Mode::Node, ContactsPer::Face, Reduction::Deepest(4)), "leaving the deepest contacts there"),
+        (of(Mode::Edge, ContactsPer::Face, Reduction::None), "the mode `edge` is not available"),
+    ] {
+        let error =
+            detector.detect_on_device(&scene, None, &options).map(|found| found.count).expect_err("refused");
+        assert!(error.to_string().contains(text), "{error}");
+    }
+    let empty = Scene::new();
+    let found =
+        detector.detect_on_device(&empty, None, &CollideOptions::with_mode(Mode::Node)).expect("detects");
+    assert_eq!(found.count, 0);
+    assert!(read(detector.device(), &found).is_empty());
+}

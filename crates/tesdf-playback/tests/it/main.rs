@@ -1,0 +1,4 @@
+//! The tests of `tesdf-playback` over several of its modules, in one program.
+mod glb;
+mod page;
+mod support;

@@ -1,0 +1,19 @@
+//! The tests of `tesdf-sim` over several of its modules, in one program.
+mod assembly;
+mod chain;
+mod friction;
+mod gear_ratio;
+mod hoist;
+mod insertion;
+mod joints;
+mod journal;
+mod lift;
+mod mass_by_rule;
+mod newton;
+mod rest;
+mod scene_file;
+mod screw;
+mod scripts;
+mod separation;
+mod support;
+mod transmission;

@@ -1,0 +1,54 @@
+//! A frictionless nut turns down its bolt. Without contacts it does not, and the criterion fails.
+
+use std::sync::OnceLock;
+
+use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
+use tesdf_sim::{Summary, System};
+
+/// The bolt-nut scene of the repository, with the coarse bolt and a shorter duration.
+fn scene() -> (LoadedScene, System) {
+    static SCENE: OnceLock<(LoadedScene, System)> = OnceLock::new();
+    SCENE
+        .get_or_init(|| {
+            crate::support::scene("bolt-nut", |loaded| {
+                let bolt = loaded.scene.bodies[0].get_mut();
+                bolt.mesh = Some("../data/procedural/iso_m16_bolt_6k.obj".into());
+                loaded.scene.duration = 0.06;
+                // An ideal screw makes 0.0083 turns in 60 ms.
+                loaded.scene.criterion.screw.as_mut().unwrap().min_turns = 0.003;
+                loaded.scene.criterion.screw.as_mut().unwrap().min_acceleration = 0.0;
+            })
+        })
+        .clone()
+}
+
+fn run(change: impl FnOnce(&mut LoadedScene)) -> Summary {
+    let (mut loaded, system) = scene();
+    change(&mut loaded);
+    crate::support::run(&loaded, system).1
+}
+
+#[test]
+fn the_nut_turns_down_the_bolt() {
+    for (time_step, redetections) in [(1e-3, 0), (3e-3, 1), (5e-3, 2)] {
+        let summary = run(|loaded| {
+            loaded.scene.detector.mode = DetectorMode::Node;
+            loaded.scene.time_step = time_step;
+            loaded.scene.solver.redetections = redetections;
+        });
+        assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");
+        // This is a fifth of the clearance of 50 µm.
+        assert!(summary.deepest_penetration < 1e-5, "{summary:?}");
+        assert!(summary.mean_contacts > 100.0, "{summary:?}");
+    }
+}
+
+#[test]
+fn without_contacts_the_criterion_fails() {
+    let summary = run(|loaded| loaded.scene.detector.mode = DetectorMode::Off);
+    assert_eq!(summary.passed, Some(false));
+    let screw = summary.screw.unwrap();
+    assert!(screw.turns.abs() < 1e-9 && screw.travel > 0.01, "{screw:?}");
+    assert!(screw.failures.iter().any(|f| f.contains("turns; expected at least")), "{screw:?}");
+    assert!(screw.failures.iter().any(|f| f.contains("differ by")), "{screw:?}");
+}
