@@ -35,7 +35,7 @@ fn options(mode: Mode) -> CollideOptions {
 /// The overlaps of a scene that the device and the host report.
 fn both(scene: &Scene, mode: Mode) -> [Vec<HiddenOverlap>; 2] {
     let options = options(mode);
-    let mut detector = Detector::new(&device(), scene, DetectorOptions::default()).expect("fits");
+    let mut detector = Detector::new(&crate::compare::device(), scene, DetectorOptions::default()).expect("fits");
     let found = detector.detect(scene, &options).expect("detects");
     [found.hidden, detect(scene, &options).expect("a good scene").hidden]
 }
@@ -72,7 +72,7 @@ fn bodies_in_one_place_overlap_in_every_mode() {
         let [device, host] = both(&scene, mode);
         assert_eq!((device.len(), host.len()), (1, 1), "{mode:?}");
         assert!((device[0].depth - host[0].depth).abs() < 1e-5, "{device:?} instead of {host:?}");
-        let mut detector = Detector::new(&crate::device(), &scene, DetectorOptions::default()).expect("fits");
+        let mut detector = Detector::new(&crate::compare::device(), &scene, DetectorOptions::default()).expect("fits");
         let [searched, found] = [HiddenSearch::On, HiddenSearch::Off].map(|hidden| {
             detector.detect(&scene, &CollideOptions { hidden, ..options(mode) }).expect("detects")
         });
