@@ -1,4 +1,4 @@
-# Sourced by ./test: adds NVRTC, which compiles the kernels for CUDA, to LD_LIBRARY_PATH, or
+# Sourced by .ci/kernels.sh: adds NVRTC, which compiles the kernels for CUDA, to LD_LIBRARY_PATH, or
 # explains how to install it. Compiling needs no GPU.
 #
 # It tries in this order: the NVRTC of the system's loader, the one that an earlier call installed

@@ -16,15 +16,22 @@ if ! command -v cc >/dev/null; then
 fi
 
 # The features that are off by default and that tests need.
-features="--features tesdf-cli/gpu,tesdf-bench/peers"
+features="--features tesdf-cli/bench,tesdf-cli/gpu,tesdf-bench/peers"
 
-# Prints a command, then runs it. Adds its seconds to the file STEP_TIMES, where that is set.
+# Prints a command, then runs it. Where STEP_TIMES names a file, adds a line to it: the name of the
+# step, its seconds, and the seconds of all processors that it used.
 step() {
+    local name=$1
+    shift
     echo "+ $*"
-    local start=$SECONDS status=0
-    "$@" || status=$?
-    if [ -n "${STEP_TIMES:-}" ]; then
-        printf '%6d s  %s\n' $((SECONDS - start)) "$*" >>"$STEP_TIMES"
+    if [ -z "${STEP_TIMES:-}" ]; then
+        "$@"
+        return
     fi
+    local measured status=0 TIMEFORMAT='%R %U %S'
+    measured=$(mktemp)
+    { time "$@" 2>&3; } 3>&2 2>"$measured" || status=$?
+    awk -v name="$name" '{ printf "%s\t%.1f\t%.1f\n", name, $1, $2 + $3 }' "$measured" >>"$STEP_TIMES"
+    rm "$measured"
     return $status
 }

@@ -1,4 +1,4 @@
-# Sourced by ./test: finds or installs the software Vulkan driver. The GPU tests run on it, so they
+# Sourced where GPU code runs on it: finds or installs the software Vulkan driver.
 # have the same result on every machine. With TESDF_DEVICE they run on that device instead:
 # `TESDF_DEVICE=0 ./test`.
 

@@ -22,6 +22,7 @@ pub mod encode;
 pub mod encode_all;
 pub mod export;
 pub mod inspect;
+pub mod measure;
 mod open_run;
 pub mod part;
 pub mod query;
@@ -34,7 +35,6 @@ pub mod verify;
 pub mod view;
 pub mod why;
 
-use tesdf_bench::{detection, evaluate};
 use tesdf_terminal::report::{self, Failure, Outcome};
 
 /// Exact signed distances of triangle meshes.
@@ -79,7 +79,7 @@ pub enum Command {
     /// List the compute devices, with the numbers and names for --device
     Devices(devices::Args),
     /// Measure the cost of a detection on a device, stage by stage
-    Bench(detection::Args),
+    Bench(measure::BenchArgs),
     /// Draw the signed distance on a plane as a PNG picture
     Slice(slice::Args),
     /// Simulate the bodies of a scene and write the run
@@ -91,7 +91,7 @@ pub enum Command {
     /// Write a run as an animated GLB file, for Blender, three.js and others
     Export(export::Args),
     /// Measure Table I or IV of the paper, next to the paper's figures
-    Evaluate(evaluate::Args),
+    Evaluate(measure::EvaluateArgs),
     /// Print a completion script for a shell
     Completions(completions::Args),
 }
@@ -135,13 +135,13 @@ fn run(command: &Command) -> Result<Outcome, Failure> {
         Command::Clearance(args) => clearance::run(args),
         Command::Toi(args) => toi::run(args),
         Command::Devices(args) => devices::run(args),
-        Command::Bench(args) => detection::run(args),
+        Command::Bench(args) => measure::bench(args),
         Command::Slice(args) => slice::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Render(args) => render::run(args),
         Command::View(args) => view::run(args),
         Command::Export(args) => export::run(args),
-        Command::Evaluate(args) => evaluate::run(args),
+        Command::Evaluate(args) => measure::evaluate(args),
         Command::Completions(args) => completions::run(args),
     }
 }

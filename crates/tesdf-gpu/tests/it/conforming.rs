@@ -12,11 +12,11 @@ use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::SolidMesh;
 use tesdf_gpu::{Detector, DetectorOptions, DeviceArray, GpuError, GpuShapes};
 
-fn plain() -> EncodeOptions {
+pub fn plain() -> EncodeOptions {
     EncodeOptions { refinement: Refinement::None, ..EncodeOptions::preset(Preset::Fast) }
 }
 
-fn encoded(solid: &SolidMesh, domain: &ConformingMesh, options: &EncodeOptions) -> TeSdf {
+pub fn encoded(solid: &SolidMesh, domain: &ConformingMesh, options: &EncodeOptions) -> TeSdf {
     Encoder::new()
         .options(options.clone())
         .domain(Domain::Conforming(domain))
@@ -132,12 +132,12 @@ fn a_pass_takes_the_documented_number_of_launches() {
 }
 
 /// All vertices of a domain, as the device takes them.
-fn positions(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<f32> {
+pub fn positions(domain: &ConformingMesh, to: impl Fn(DVec3) -> DVec3) -> Vec<f32> {
     domain.vertices().iter().flat_map(|&p| to(p).as_vec3().to_array()).collect()
 }
 
 /// Rounds a position as the device does.
-fn rounded(p: DVec3) -> DVec3 {
+pub fn rounded(p: DVec3) -> DVec3 {
     bend(p).as_vec3().as_dvec3()
 }
 

@@ -117,7 +117,7 @@ fn lists_have_the_faces_of_the_processor_and_ties_within_rounding() {
     assert!(listed > 1000 && besides < listed, "{listed} entries, {besides} besides");
 }
 
-fn sampled(sampling: Sampling, refinement: Refinement) -> EncodeOptions {
+pub fn sampled(sampling: Sampling, refinement: Refinement) -> EncodeOptions {
     EncodeOptions {
         method: Method::Sampled(sampling),
         refinement,
@@ -127,14 +127,14 @@ fn sampled(sampling: Sampling, refinement: Refinement) -> EncodeOptions {
 }
 
 /// Cubes in the form of an L, in a grid with an outer layer.
-fn block() -> (SolidMesh, ConformingMesh) {
+pub fn block() -> (SolidMesh, ConformingMesh) {
     let l = |x, y, z| z == 1 && (1..3).contains(&x) && (y == 1 || (x < 2 && y == 2));
     let (solid, tetrahedra) = grid(4, 0.15, l);
     let conforming = ConformingMesh::new(&solid, &tetrahedra).expect("conforming by construction");
     (solid, conforming)
 }
 
-fn lists(asset: &TeSdf) -> Vec<Vec<u32>> {
+pub fn lists(asset: &TeSdf) -> Vec<Vec<u32>> {
     let mut lists = Vec::new();
     asset.visit_cells(|cell| lists.push(asset.list_of(cell.id)));
     lists

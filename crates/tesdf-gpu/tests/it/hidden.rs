@@ -2,7 +2,6 @@
 
 use std::sync::{Arc, LazyLock};
 
-use crate::compare::device;
 use crate::support::bodies::{Body, Placed, RELATIONS, rotation, scene};
 use crate::support::random::Random;
 use crate::support::shapes;
@@ -32,10 +31,16 @@ fn options(mode: Mode) -> CollideOptions {
     CollideOptions { contact_distance: 1e-3, ..CollideOptions::with_mode(mode) }
 }
 
+/// A cube, and another one that is shifted by a share of its side along x.
+pub fn two_cubes(shift: f64) -> Scene {
+    scene(&[moved(&cube(), DVec3::ZERO), moved(&cube(), shift * DVec3::X)])
+}
+
 /// The overlaps of a scene that the device and the host report.
-fn both(scene: &Scene, mode: Mode) -> [Vec<HiddenOverlap>; 2] {
+pub fn both(scene: &Scene, mode: Mode) -> [Vec<HiddenOverlap>; 2] {
     let options = options(mode);
-    let mut detector = Detector::new(&crate::compare::device(), scene, DetectorOptions::default()).expect("fits");
+    let mut detector =
+        Detector::new(&crate::compare::device(), scene, DetectorOptions::default()).expect("fits");
     let found = detector.detect(scene, &options).expect("detects");
     [found.hidden, detect(scene, &options).expect("a good scene").hidden]
 }
@@ -72,7 +77,8 @@ fn bodies_in_one_place_overlap_in_every_mode() {
         let [device, host] = both(&scene, mode);
         assert_eq!((device.len(), host.len()), (1, 1), "{mode:?}");
         assert!((device[0].depth - host[0].depth).abs() < 1e-5, "{device:?} instead of {host:?}");
-        let mut detector = Detector::new(&crate::compare::device(), &scene, DetectorOptions::default()).expect("fits");
+        let mut detector =
+            Detector::new(&crate::compare::device(), &scene, DetectorOptions::default()).expect("fits");
         let [searched, found] = [HiddenSearch::On, HiddenSearch::Off].map(|hidden| {
             detector.detect(&scene, &CollideOptions { hidden, ..options(mode) }).expect("detects")
         });

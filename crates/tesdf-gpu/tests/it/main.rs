@@ -10,8 +10,12 @@ mod degenerate;
 mod encode;
 mod hidden;
 mod inside_rules;
+#[cfg(feature = "cuda")]
+mod nvrtc;
 mod on_device;
+mod order;
 mod queries;
 mod reduction;
+mod smoke;
 #[path = "../../../tesdf/tests/it/support/mod.rs"]
 mod support;

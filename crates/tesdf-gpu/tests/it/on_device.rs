@@ -12,12 +12,12 @@ fn device() -> Device {
     Device::choose(None).expect("a device")
 }
 
-fn detector(scene: &Scene) -> Detector {
+pub fn detector(scene: &Scene) -> Detector {
     Detector::new(&device(), scene, DetectorOptions::default()).expect("fits")
 }
 
 /// A bracket, a cube and a box in each world. The box meets the cube.
-fn worlds(count: u32, random: &mut Random) -> Scene {
+pub fn worlds(count: u32, random: &mut Random) -> Scene {
     let mut scene = Scene::new();
     let meshes = ["l_bracket", "cube"]
         .map(|name| scene.add_shape(Shape::Mesh(body(name).asset.clone())).expect("a shape"));
@@ -37,9 +37,9 @@ fn worlds(count: u32, random: &mut Random) -> Scene {
 }
 
 /// A contact: instances, both points, normal, distance.
-type Row = ((u32, u32), [DVec3; 3], f64);
+pub type Row = ((u32, u32), [DVec3; 3], f64);
 
-fn read(device: &Device, found: &DeviceContacts) -> Vec<Row> {
+pub fn read(device: &Device, found: &DeviceContacts) -> Vec<Row> {
     let vectors = |array: &DeviceArray<f32>| -> Vec<DVec3> {
         let numbers = array.read(device).expect("numbers");
         assert_eq!(numbers.len(), 3 * found.count);
@@ -59,7 +59,7 @@ fn of_host(c: &Contact) -> Row {
 }
 
 /// Each contact has its partner, and pairs come in the same order. `size` bounds coordinates.
-fn are_equal(found: &[Row], expected: &[Contact], size: f64, bound: f64) {
+pub fn are_equal(found: &[Row], expected: &[Contact], size: f64, bound: f64) {
     assert_eq!(found.len(), expected.len());
     let expected: Vec<Row> = expected.iter().map(of_host).collect();
     let pairs = |rows: &[Row]| rows.iter().map(|row| row.0).collect::<Vec<_>>();
@@ -79,7 +79,7 @@ fn are_equal(found: &[Row], expected: &[Contact], size: f64, bound: f64) {
     }
 }
 
-fn each_form() -> Vec<CollideOptions> {
+pub fn each_form() -> Vec<CollideOptions> {
     let of = |mode, contacts_per, reduction| CollideOptions {
         contact_distance: 0.01,
         contacts_per,

@@ -43,7 +43,7 @@ fn by_pair(contacts: &[Contact]) -> BTreeMap<Pair, Vec<Contact>> {
 
 /// Checks all guarantees of a reduction for each number of contacts per pair. Returns the number of
 /// pairs that lost contacts.
-fn hold(scene: &Scene, options: &CollideOptions, numbers: &[u32]) -> usize {
+pub fn hold(scene: &Scene, options: &CollideOptions, numbers: &[u32]) -> usize {
     let mut pairs = 0;
     let (all, mut detector) = detected(scene, options, DetectorOptions::default());
     for &per_pair in numbers {

@@ -1,0 +1,22 @@
+#!/usr/bin/env bash
+# Compiles all kernels with NVRTC, CUDA's compiler, to machine code and to PTX. It needs no GPU. NVRTC
+# takes minutes, so it runs only where what decides the kernels' text has changed since it last compiled
+# them: `crates/tesdf-gpu/kernels.sha256` has the hash. It writes the new hash, for the commit of the
+# change. With `--always` it always runs.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+. .ci/toolchain.sh
+
+stamp=crates/tesdf-gpu/kernels.sha256
+hash=$(find crates/tesdf-gpu/src/kernels crates/tesdf-gpu/src/cuda Cargo.lock .ci/nvrtc.sh -type f -print0 | LC_ALL=C sort -z |
+    xargs -0 sha256sum | sha256sum | cut -d ' ' -f 1)
+if [ "${1:-}" != --always ] && [ "$hash" = "$(cat "$stamp" 2>/dev/null)" ]; then
+    echo "NVRTC has compiled these kernels: $stamp has their hash"
+    exit
+fi
+. .ci/nvrtc.sh
+step "NVRTC" cargo test --quiet --workspace $features --test it -- --ignored --nocapture nvrtc::
+if [ "$hash" != "$(cat "$stamp" 2>/dev/null)" ]; then
+    echo "$hash" >"$stamp"
+    echo "commit $stamp with the kernels"
+fi

@@ -1,0 +1,45 @@
+//! NVRTC compiles every kernel. It must be the real one, and needs no GPU: `.ci/kernels.sh`.
+use tesdf_gpu::cuda::{Resources, compile};
+
+use crate::cuda_source::SOURCES;
+
+/// Compiles to machine code for GPUs of compute centers, and prints the resources of each kernel.
+#[test]
+#[ignore = "needs NVRTC: .ci/kernels.sh runs it"]
+fn every_kernel_compiles_to_machine_code() {
+    println!("{:46} registers warps stack spilled shared", "kernel");
+    for source in SOURCES.iter() {
+        let compiled = compile(source, "sm_90a").unwrap_or_else(|e| panic!("{e}"));
+        assert!(compiled.image.starts_with(b"\x7fELF"), "{}", source.kernel);
+        let found = compiled.resources.expect("machine code has it");
+        let Resources { registers, stack_bytes, spilled_bytes: (stores, loads), .. } = found;
+        let warps = found.warps(source.threads.0);
+        let shared = source.shared_bytes + found.shared_bytes as usize;
+        println!(
+            "{:46} {registers:9} {warps:5} {stack_bytes:5} {:7} {shared:6}",
+            source.kernel,
+            stores + loads
+        );
+        assert!((1..=255).contains(&registers), "{}: {registers} registers", source.kernel);
+    }
+}
+
+/// Compiles to PTX for all GPUs from Turing on.
+#[test]
+#[ignore = "needs NVRTC: .ci/kernels.sh runs it"]
+fn every_kernel_compiles_to_ptx() {
+    for source in SOURCES.iter() {
+        let compiled = compile(source, "compute_75").unwrap_or_else(|e| panic!("{e}"));
+        let text = String::from_utf8_lossy(&compiled.image);
+        assert!(text.contains(&format!(".visible .entry {}(", source.entry)), "{}", source.kernel);
+    }
+}
+
+#[test]
+#[ignore = "needs NVRTC: .ci/kernels.sh runs it"]
+fn a_refused_kernel_says_why() {
+    let mut source = SOURCES[0].clone();
+    source.text.push_str("no such thing;");
+    let error = compile(&source, "sm_90a").expect_err("no kernel").to_string();
+    assert!(error.contains("error: identifier \"no\" is undefined"), "{error}");
+}
