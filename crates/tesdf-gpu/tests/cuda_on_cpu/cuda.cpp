@@ -260,10 +260,10 @@ static void replace_all(std::string &text, const std::string &from, const std::s
 static std::string as_cpp(std::string text) {
     replace_all(text, "extern __shared__ __align__(4) char ", "[];", "char* const ", " = cuda_shared;");
     replace_all(text, "extern __shared__ __align__(16) char ", "[];", "char* const ", " = cuda_shared;");
-    const std::string atom = "asm volatile(\"atom.relaxed.add.u32 %0, [%1], %2;\" : \"=r\"(result) : \"l\"(";
-    replace_all(text, atom, ") );", "result = __sync_fetch_and_add((uint32_t*)", ");");
-    const std::string greatest = "asm volatile(\"atom.relaxed.max.u32 %0, [%1], %2;\" : \"=r\"(result) : \"l\"(";
-    replace_all(text, greatest, ") );", "result = cuda_fetch_max((uint32_t*)", ");");
+    for (const char *name : {"add", "min", "max"}) {
+        const std::string atom = std::string("asm volatile(\"atom.relaxed.") + name + ".u32 %0, [%1], %2;\" : \"=r\"(result) : \"l\"(";
+        replace_all(text, atom, ") );", std::string("result = cuda_fetch_") + name + "((uint32_t*)", ");");
+    }
     for (size_t at; (at = text.find("), \"r\"(")) != std::string::npos;) text.replace(at, 7, ", ");
     if (text.find("asm ") != std::string::npos || text.find("__shared__") != std::string::npos) return {};
     size_t head = text.rfind("extern \"C\" __global__");

@@ -47,8 +47,24 @@ static inline float floor(float x) { return __builtin_floorf(x); }
 static inline float atan2(float y, float x) { return __builtin_atan2f(y, x); }
 static inline float fabs(float x) { return __builtin_fabsf(x); }
 
+// Blocks run one after the other, and threads one at a time.
+static inline unsigned cuda_fetch_add(unsigned *at, unsigned value) {
+    const unsigned old = *at;
+    *at = old + value;
+    return old;
+}
+static inline unsigned cuda_fetch_min(unsigned *at, unsigned value) {
+    const unsigned old = *at;
+    *at = min(old, value);
+    return old;
+}
 static inline unsigned cuda_fetch_max(unsigned *at, unsigned value) {
-    unsigned old = __atomic_load_n(at, __ATOMIC_RELAXED);
-    while (old < value && !__atomic_compare_exchange_n(at, &old, value, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {}
+    const unsigned old = *at;
+    *at = max(old, value);
+    return old;
+}
+static inline unsigned atomicExch(unsigned *at, unsigned value) {
+    const unsigned old = *at;
+    *at = value;
     return old;
 }

@@ -105,6 +105,12 @@ fn reach(scene: &Scene, options: &CollideOptions, &(a, b, part): &(InstanceId, I
     report.parts.iter().map(|part| part.contact_distance).fold(0.0, f64::max)
 }
 
+/// Whether a part may be missing on one side although it is not at the contact distance: the filter
+/// depends on a normal, and Frank–Wolfe may step another way. Such parts count as others.
+fn may_be_lost(options: &CollideOptions) -> bool {
+    options.cos_theta.is_some() || options.mode == Mode::Face
+}
+
 /// The number of touching parts, and of those with different results on device and host.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Compared {
@@ -161,12 +167,8 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
                 assert!((h - d).abs() < ROUNDING * size, "node {key:?}: {d} instead of {h}");
             }
             (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
-            // Without the filter, only a part at the contact distance may be missing on one side.
             _ => {
-                assert!(
-                    options.cos_theta.is_some() || is_close(),
-                    "{key:?}: {h:?} on the host, {d:?} on the device"
-                );
+                assert!(may_be_lost(options) || is_close(), "{key:?}: {h:?} on the host, {d:?} on the device");
                 others += 1;
             }
         }
@@ -197,10 +199,7 @@ fn faces_hold(scene: &Scene, options: &CollideOptions, size: f64, sides: [&Conta
         match (h, d) {
             (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
             _ => {
-                assert!(
-                    options.cos_theta.is_some() || is_close(),
-                    "{key:?}: {h:?} on the host, {d:?} on the device"
-                );
+                assert!(may_be_lost(options) || is_close(), "{key:?}: {h:?} on the host, {d:?} on the device");
                 others += 1;
             }
         }

@@ -55,7 +55,7 @@ FLAGS = """--no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --di
 def folder(tmp_path_factory):
     """a folder with a run, its page and its animation"""
     folder = tmp_path_factory.mktemp("playback")
-    cube = Path(__file__).resolve().parents[2] / "data" / "procedural" / "cube.obj"
+    cube = Path(__file__).resolve().parents[3] / "data" / "procedural" / "cube.obj"
     (folder / "cube.obj").write_bytes(cube.read_bytes())
     (folder / "scene.toml").write_text(SCENE)
     simulation = tesdf.Simulation(folder / "scene.toml")

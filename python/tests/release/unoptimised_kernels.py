@@ -1,6 +1,6 @@
 """Lets Warp compile its kernels without optimisation: in half the time, which is most of the time of these tests.
 
-python python/tests/unoptimised_kernels.py EXAMPLE.py
+python python/tests/release/unoptimised_kernels.py EXAMPLE.py
 
 runs an example with the kernels of the tests, so that they are compiled once.
 """

@@ -13,7 +13,7 @@ import pytest
 import tesdf
 from conftest import TETRAHEDRON
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "python" / "ray_encode.py"
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "python" / "ray_encode.py"
 COUNT = 1000
 
 
