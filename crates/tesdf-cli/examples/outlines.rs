@@ -1,5 +1,5 @@
 //! Writes the outlines of the built-in font, `assets/DejaVuSans-outlines.txt`. The test
-//! `tests/outlines.rs` compares the file with the font.
+//! `tests/it/outlines.rs` compares the file with the font.
 //!
 //! `cargo run -p tesdf-cli --example outlines > crates/tesdf-cli/assets/DejaVuSans-outlines.txt`
 use std::error::Error;

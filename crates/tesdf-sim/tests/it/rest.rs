@@ -219,6 +219,7 @@ fn the_stack_meets_its_criterion_only_with_contacts() {
 /// Bricks in running bond, each on two others, for a second. `tesdf simulate
 /// scenes/brick-wall.toml` runs ten.
 #[test]
+#[ignore = "a whole scene: .ci/release"]
 fn the_wall_meets_its_criterion_only_with_contacts() {
     let summary = scene("brick-wall.toml", |loaded| loaded.scene.duration = 1.0);
     assert_eq!((summary.passed, summary.unconverged_steps), (Some(true), 0), "{summary:?}");

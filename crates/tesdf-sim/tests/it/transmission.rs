@@ -75,12 +75,14 @@ fn failures(summary: &Summary) -> String {
 }
 
 #[test]
+#[ignore = "a whole scene: .ci/release"]
 fn two_gears_engage_and_drive() {
     let (_, summary) = run(|_| {});
     assert_eq!(summary.passed, Some(true), "{summary:?}");
 }
 
 #[test]
+#[ignore = "a whole scene: .ci/release"]
 fn a_gear_engages_with_faces() {
     let (_, summary) = run(|loaded| {
         shorten(loaded);
@@ -90,6 +92,7 @@ fn a_gear_engages_with_faces() {
 }
 
 #[test]
+#[ignore = "a whole scene: .ci/release"]
 fn a_gear_drives_the_same_on_any_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -308,7 +308,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #![proptest_config(ProptestConfig::with_cases(crate::testing::rotation::cases(4000)))]
         #[test]
         fn degenerate_faces_are_exact((corners, p) in degenerate::face_and_point()) {
             let triangle = Triangle::new(corners);
@@ -323,7 +323,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #![proptest_config(ProptestConfig::with_cases(crate::testing::rotation::cases(20_000)))]
         #[test]
         fn points_beyond_a_tip_are_exact((corners, p) in degenerate::beyond_a_tip()) {
             let found = Triangle::new(corners).closest(p);

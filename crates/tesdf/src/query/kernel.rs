@@ -360,7 +360,7 @@ mod tests {
 
     // Points are within a ball with a diameter of about 1, as bodies are.
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #![proptest_config(ProptestConfig::with_cases(crate::testing::rotation::cases(4000)))]
         #[test]
         fn degenerate_faces_are_exact((corners, p) in degenerate::face_and_point()) {
             assert_exact(corners.map(|c| 0.25 * c), 0.25 * p)?;
@@ -368,7 +368,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #![proptest_config(ProptestConfig::with_cases(crate::testing::rotation::cases(20_000)))]
         #[test]
         fn points_beyond_a_tip_are_exact((corners, p) in degenerate::beyond_a_tip()) {
             assert_exact(corners.map(|c| 0.5 * c), 0.5 * p)?;

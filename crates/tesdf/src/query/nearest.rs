@@ -382,7 +382,7 @@ mod tests {
     use crate::testing::degenerate;
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(20_000))]
+        #![proptest_config(ProptestConfig::with_cases(crate::testing::rotation::cases(20_000)))]
         // The mesh is within a ball of diameter 1; the polygon may be a hundred times as large.
         #[test]
         fn bounds_are_below_the_distance(

@@ -3,6 +3,7 @@
 
 use crate::support::cells::Cells;
 use crate::support::reference::{Reference, exceeds};
+use crate::support::rotation::cases;
 use crate::support::shapes::{FAMILIES, Family, Shape};
 use crate::support::well_formed::WellFormed;
 use proptest::prelude::*;
@@ -58,7 +59,7 @@ fn cells_of_each_mesh_family_are_right_with_each_preset() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(96), ..ProptestConfig::default() })]
 
     #[test]
     fn random_closed_meshes(

@@ -1,6 +1,6 @@
 //! Meshes of `data/` in all relative placements: no contact is lost, and each contact is sound.
 //!
-//! `TESDF_TEST_FACES=6600 cargo test --release -p tesdf --test contacts_none_lost` is the long run,
+//! `TESDF_TEST_FACES=6600 cargo test --release -p tesdf --test it contacts_none_lost` is the long run,
 //! with larger meshes.
 
 use std::collections::BTreeMap;

@@ -4,6 +4,7 @@
 use crate::support::bodies::{Placed, RELATIONS, Relation, scene};
 use crate::support::per_face::{Detection, block};
 use crate::support::random::Random;
+use crate::support::rotation::of_the_day;
 use tesdf::collide::{
     CollideOptions, Contact, Contacts, ContactsPer, Mode, Placement, Pose, Scene, coarse_contacts,
 };
@@ -54,7 +55,7 @@ fn minima_are_followed_by_no_lower_point() {
     let names = [["l_bracket", "cube"], ["torus_quads", "tetra"], ["lobed_peg", "lobed_hole_c100"]];
     let mut all = [0, 0];
     for names in names {
-        for relation in RELATIONS.into_iter().filter(|&relation| relation != Relation::Same) {
+        for relation in of_the_day(RELATIONS.into_iter().filter(|&relation| relation != Relation::Same)) {
             let bodies = relation.place(names, &mut random);
             let contact_distance = 1e-3 * bodies[0].diagonal();
             for mode in [Mode::Exact, Mode::Face] {
@@ -63,7 +64,7 @@ fn minima_are_followed_by_no_lower_point() {
             }
         }
     }
-    assert!(all[0] > 1000 && all[1] > 1000, "{all:?}");
+    assert!(all[0] > 100 && all[1] > 100, "{all:?}");
 }
 
 #[test]

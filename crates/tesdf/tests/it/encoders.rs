@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use crate::support::random::Random;
+use crate::support::rotation::of_the_day;
 use crate::support::shapes::Shape;
 use crate::support::tetrahedra::grid;
 use tesdf::asset::CellKind;
@@ -123,19 +124,16 @@ impl Sampler for OneFace {
 #[test]
 fn sampled_lists_are_never_certified() {
     let (solid, conforming) = block();
-    for most in [None, Some(3)] {
-        for domain in [Domain::Bisection, Domain::Conforming(&conforming)] {
-            let method = Method::Sampled(Sampling { resolution: 3, ..Sampling::SAFE });
-            let options = EncodeOptions { method, max_entries: most, ..fast() };
-            let asset = Encoder::new()
-                .options(options)
-                .domain(domain)
-                .sampler(&OneFace)
-                .encode(&solid)
-                .expect("encodes");
-            let certificate = asset.about().certificate();
-            assert_eq!((certificate.delta(), certificate.chains()), (None, None), "{certificate:?}");
-        }
+    let domains = [Domain::Bisection, Domain::Conforming(&conforming)];
+    for (most, domain) in
+        of_the_day([None, Some(3)].into_iter().flat_map(|most| domains.map(|domain| (most, domain))))
+    {
+        let method = Method::Sampled(Sampling { resolution: 3, ..Sampling::SAFE });
+        let options = EncodeOptions { method, max_entries: most, ..fast() };
+        let encoder = Encoder::new().options(options).domain(domain);
+        let asset = encoder.sampler(&OneFace).encode(&solid).expect("encodes");
+        let certificate = asset.about().certificate();
+        assert_eq!((certificate.delta(), certificate.chains()), (None, None), "{certificate:?}");
     }
 }
 

@@ -7,6 +7,7 @@ use crate::support::parts::Parts;
 use crate::support::parts::Turn::{Inward, Outward};
 use crate::support::parts::{bowl, soups};
 use crate::support::random::Random;
+use crate::support::rotation::of_the_day;
 use crate::support::ruled::{Body, Compared, assert_contacts, assert_faces, assert_nodes, random_pose};
 use tesdf::base::{Inside, InsideRule, Length};
 use tesdf::collide::{
@@ -292,12 +293,13 @@ fn meshes_as_they_come_touch_as_brute_force_says() {
     ];
     let mut random = Random(14);
     let mut compared = Compared::default();
-    for (i, j) in [(0, 1), (0, 3), (1, 3), (1, 2), (4, 3), (4, 0), (4, 2), (4, 4), (0, 0), (3, 1)] {
+    let pairs = [(0, 1), (0, 3), (1, 3), (1, 2), (4, 3), (4, 0), (4, 2), (4, 4), (0, 0), (3, 1)];
+    for (i, j) in of_the_day(pairs) {
         let poses = [random_pose(&mut random, 0.05), random_pose(&mut random, 0.3)];
         let share = |k: usize| bodies[k].asset.face_count().div_ceil(20);
         let [from, to] = [&poses[0], &poses[1]];
         assert_faces([&bodies[i], &bodies[j]], [from, to], 0.01, (4, share(i)), &mut compared);
         assert_faces([&bodies[j], &bodies[i]], [to, from], 0.01, (4, share(j)), &mut compared);
     }
-    assert!(compared.deep > 10 && compared.apart > 50, "{} {}", compared.deep, compared.apart);
+    assert!(compared.deep > 2 && compared.apart > 10, "{} {}", compared.deep, compared.apart);
 }

@@ -161,6 +161,7 @@ proptest! {
 
 /// 100,000 triangles at random, each a hole of its own. The work is bounded.
 #[test]
+#[ignore = "long: .ci/release"]
 fn a_soup_of_triangles_ends() {
     let mut state = 1u64;
     let mut random = || {

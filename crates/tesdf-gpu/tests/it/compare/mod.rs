@@ -168,7 +168,10 @@ pub fn hold_against(scene: &Scene, options: &CollideOptions, size: f64, device: 
             }
             (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
             _ => {
-                assert!(may_be_lost(options) || is_close(), "{key:?}: {h:?} on the host, {d:?} on the device");
+                assert!(
+                    may_be_lost(options) || is_close(),
+                    "{key:?}: {h:?} on the host, {d:?} on the device"
+                );
                 others += 1;
             }
         }
@@ -199,7 +202,10 @@ fn faces_hold(scene: &Scene, options: &CollideOptions, size: f64, sides: [&Conta
         match (h, d) {
             (Some(h), Some(d)) => others += usize::from((h - d).abs() > ANOTHER_WAY * size),
             _ => {
-                assert!(may_be_lost(options) || is_close(), "{key:?}: {h:?} on the host, {d:?} on the device");
+                assert!(
+                    may_be_lost(options) || is_close(),
+                    "{key:?}: {h:?} on the host, {d:?} on the device"
+                );
                 others += 1;
             }
         }

@@ -218,7 +218,7 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(4000))]
+        #![proptest_config(ProptestConfig::with_cases(crate::testing::rotation::cases(4000)))]
         #[test]
         fn bounds_hold_for_degenerate_faces((corners, p) in face_and_point(), thin in 0usize..3) {
             bounds_hold(corners, p, [0.0, 1e-15, 1e-9][thin])?;

@@ -13,6 +13,7 @@ pub mod per_face;
 pub mod points;
 pub mod random;
 pub mod reference;
+pub mod rotation;
 pub mod ruled;
 pub mod shapes;
 pub mod tetrahedra;
