@@ -173,7 +173,7 @@ fn bodies_that_are_apart_have_their_least_distance_at_nodes_and_edges() {
             }
         }
     }
-    assert!(apart > 20 && between > 300 && nodes > 300, "{apart} {between} {nodes}");
+    assert!(apart > 10 && between > 300 && nodes > 300, "{apart} {between} {nodes}");
 }
 
 /// Compares the contacts of each edge with samples of the edge: none is lower than the lowest
