@@ -11,5 +11,5 @@ if ! rustup target add "$target" >/dev/null 2>&1; then
     echo "warning: the target $target could not be installed; ARM is not tested" >&2
     exit 0
 fi
-RUSTFLAGS="-D warnings" step cargo check --quiet --lib -p tesdf --no-default-features --features collide,parallel \
+RUSTFLAGS="-D warnings" step "ARM" cargo check --quiet --lib -p tesdf --no-default-features --features collide,parallel \
     --target "$target" --target-dir target/arm

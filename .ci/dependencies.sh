@@ -12,15 +12,15 @@ deny=target/tools/bin/cargo-deny
 if [ "$("$deny" --version 2>/dev/null)" != "cargo-deny $version" ]; then
     # Not optimised, without data for debuggers: the program runs for seconds, and compiling it takes most
     # of the time.
-    CARGO_PROFILE_DEV_DEBUG=0 step cargo install --quiet --locked --debug --root target/tools "cargo-deny@$version"
+    CARGO_PROFILE_DEV_DEBUG=0 step "dependencies" cargo install --quiet --locked --debug --root target/tools "cargo-deny@$version"
 fi
 
 advisories=
-if step "$deny" fetch db; then
+if step "dependencies" "$deny" fetch db; then
     advisories=advisories
 else
     echo "warning: the list of known vulnerabilities could not be fetched; dependencies are checked for licences and sources alone" >&2
 fi
 for workspace in . python fuzz; do
-    step "$deny" --manifest-path "$workspace/Cargo.toml" --config deny.toml --locked check --hide-inclusion-graph $advisories bans licenses sources
+    step "dependencies" "$deny" --manifest-path "$workspace/Cargo.toml" --config deny.toml --locked check --hide-inclusion-graph $advisories bans licenses sources
 done

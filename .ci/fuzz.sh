@@ -15,7 +15,7 @@ out=$PWD/target/fuzz
 # build scripts are compiled without these flags.
 coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
 -Cllvm-args=-sanitizer-coverage-pc-table -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1"
-RUSTFLAGS=$coverage step cargo build --manifest-path fuzz/Cargo.toml --release --target "$target" --target-dir "$out" --bins
+RUSTFLAGS=$coverage step "fuzzing" cargo build --manifest-path fuzz/Cargo.toml --release --target "$target" --target-dir "$out" --bins
 
 mkdir -p fuzz/artifacts
 run_target() {
@@ -34,5 +34,5 @@ export -f run_target
 export out target seconds
 # A target uses one core.
 targets=$(basename -s .rs fuzz/fuzz_targets/*.rs)
-step xargs -P "$(nproc)" -I{} bash -c 'run_target {}' <<<"${only:-$targets}"
+step "fuzzing" xargs -P "$(nproc)" -I{} bash -c 'run_target {}' <<<"${only:-$targets}"
 (cd "$out/found" && grep "stat::number_of_executed_units" ./*.log)

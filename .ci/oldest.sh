@@ -10,5 +10,5 @@ fi
 
 # One compiler, set of flags and folder, so that the crates from elsewhere are compiled once.
 check() {
-    RUSTFLAGS="-D warnings" step cargo ${oldest:+"$oldest"} check --quiet --lib --target-dir target/features "$@"
+    RUSTFLAGS="-D warnings" step "feature sets" cargo ${oldest:+"$oldest"} check --quiet --lib --target-dir target/features "$@"
 }

@@ -14,7 +14,7 @@ check --bins --workspace --exclude tesdf-gpu
 mkdir -p target/packages
 folder=$(mktemp -d "$PWD/target/packages/XXXXXX")
 trap 'rm -rf "$folder"' EXIT
-step cargo package --quiet --allow-dirty --target-dir "$folder" --no-verify --workspace --exclude tesdf-python
+step "packages" cargo package --quiet --allow-dirty --target-dir "$folder" --no-verify --workspace --exclude tesdf-python
 
 # One workspace of the packaged files. Checked, not built as `cargo package` would: the compiled code
 # never runs.

@@ -21,7 +21,8 @@ export LD_LIBRARY_PATH="$cuda_on_cpu${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
 step "Python: package, MuJoCo" in_environment env -m pytest python/tests --ignore python/tests/release --ignore python/tests/test_device.py
 step "Python: devices" in_environment env -m pytest python/tests/test_device.py -k "not wgpu"
 # Compares the stubs with the module. The tests use the module as the stubs describe it.
-step "Python: stubs" in_environment env -m mypy.stubtest tesdf --allowlist python/tests/stubtest-allowlist.txt
+step "Python: stubs" in_environment env -m mypy.stubtest tesdf --allowlist python/tests/stubtest-allowlist.txt \
+    --mypy-config-file python/tests/mypy.ini
 # Each example checks what it shows.
 for example in furniture_leg grasp_check inspect_asset mujoco_nut_on_bolt mujoco_peg_in_hole rl_batch; do
     step "Python: examples" in_environment env "examples/python/$example.py"

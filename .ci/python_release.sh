@@ -37,6 +37,8 @@ in_newton() {
 in_release() {
     step "MJWarp, Ray, Chromium, rerun, USD" in_environment release -m pytest $tests --ignore $tests/test_newton.py \
         --ignore $tests/test_newton_device.py --ignore $tests/test_no_device.py --ignore $tests/test_mujoco_warp_device.py &&
+        # With MJWarp, rerun and USD, whose types `.ci/python.sh` does not see.
+        step "Python: stubs" in_environment release -m mypy.stubtest tesdf --allowlist $tests/stubtest-allowlist.txt &&
         step "MJWarp example" in_environment release $tests/unoptimised_kernels.py examples/python/mujoco_warp_nuts_on_bolts.py &&
         step "Ray example" in_environment release examples/python/ray_encode.py &&
         # CUDA's replacement is for these tests only: Warp would take it, too.
