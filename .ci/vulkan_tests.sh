@@ -9,9 +9,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export TESDF_DEVICE=wgpu:0
 
 if [ "${1:-}" = --all ]; then
-    step "all kernels on Vulkan" cargo test --quiet -p tesdf-gpu -- --skip in_all_modes
+    step "all kernels on Vulkan" cargo test --quiet --workspace $features --test gpu -- --skip in_all_modes
 else
-    # Other crates have no test of this name. Without them, the GPU crate would be compiled again, with
-    # other features.
-    step "Vulkan" cargo test --quiet --workspace $features --test it smoke::
+    step "Vulkan" cargo test --quiet --workspace $features --test gpu smoke::
 fi

@@ -21,7 +21,6 @@
 #include <fstream>
 #include <map>
 #include <numeric>
-#include <random>
 #include <setjmp.h>
 #include <string>
 #include <sys/mman.h>
@@ -161,12 +160,16 @@ static void **arguments;
 // The numbers below `count`, in another order in each call where CUDA_ON_CPU_ORDER is a seed.
 static const std::vector<unsigned> &order(unsigned count, std::vector<unsigned> &all) {
     static const char *seed = getenv("CUDA_ON_CPU_ORDER");
-    static std::mt19937 random(seed ? strtoul(seed, nullptr, 10) : 0);
+    static uint64_t random = seed ? strtoull(seed, nullptr, 10) * 2 + 1 : 0;
     if (all.size() != count) {
         all.resize(count);
         std::iota(all.begin(), all.end(), 0);
     }
-    if (seed) std::shuffle(all.begin(), all.end(), random);
+    for (unsigned left = seed ? count : 0; left > 1; left--) {
+        // Knuth's MMIX generator; its high bits are the better ones.
+        random = random * 6364136223846793005 + 1442695040888963407;
+        std::swap(all[left - 1], all[(random >> 32) * left >> 32]);
+    }
     return all;
 }
 
