@@ -1,4 +1,5 @@
-//! A module of the library uses only the modules before it, and no files use each other in a cycle.
+//! A module of the library uses only the modules before it, no files use each other in a cycle, and each
+//! file of tests belongs to a program.
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
@@ -157,4 +158,35 @@ fn no_files_use_each_other_in_a_cycle() {
         }
     }
     assert!(open.is_empty(), "in circles, or using files that are: {open:#?}");
+}
+
+/// A file that no test program names would not be compiled, and nothing would say so.
+#[test]
+fn every_test_file_belongs_to_a_program() {
+    let names = |folder: &Path| -> Vec<String> {
+        let entries =
+            fs::read_dir(folder).expect("a folder of tests").map(|entry| entry.expect("an entry").path());
+        let code = entries.filter(|path| path.is_dir() || path.extension().is_some_and(|end| end == "rs"));
+        code.map(|path| path.file_stem().expect("a name").to_string_lossy().into_owned()).collect()
+    };
+    let mut modules = 0;
+    for entry in fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("..")).expect("the crates") {
+        let krate = entry.expect("a crate").path();
+        let (tests, it) = (krate.join("tests"), krate.join("tests/it"));
+        if !tests.exists() {
+            continue;
+        }
+        let manifest = fs::read_to_string(krate.join("Cargo.toml")).expect("a manifest");
+        for name in names(&tests).iter().filter(|name| tests.join(format!("{name}.rs")).exists()) {
+            let path = format!("path = \"tests/{name}.rs\"");
+            assert!(manifest.contains(&path), "{}: {path} is not there", krate.display());
+        }
+        assert!(manifest.contains("path = \"tests/it/main.rs\""), "{}", krate.display());
+        let main = fs::read_to_string(it.join("main.rs")).expect("the program");
+        for name in names(&it).iter().filter(|name| *name != "main") {
+            assert!(main.contains(&format!("mod {name};\n")), "{}: no mod {name}", krate.display());
+            modules += 1;
+        }
+    }
+    assert!(modules > 120, "{modules} modules of tests");
 }
