@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Compiles all kernels with NVRTC, CUDA's compiler, to machine code and to PTX. It needs no GPU. NVRTC
-# takes minutes, so it runs only where what decides the kernels' text has changed since it last compiled
+# Checks the text of all kernels, and compiles it with NVRTC, CUDA's compiler, to machine code and to PTX.
+# It needs no GPU. It takes minutes, so it runs only where what decides the kernels' text has changed since it last compiled
 # them: `crates/tesdf-gpu/kernels.sha256` has the hash. It writes the new hash, for the commit of the
 # change. With `--always` it always runs.
 set -euo pipefail
@@ -15,7 +15,7 @@ if [ "${1:-}" != --always ] && [ "$hash" = "$(cat "$stamp" 2>/dev/null)" ]; then
     exit
 fi
 . .ci/nvrtc.sh
-step "NVRTC" cargo test --quiet --workspace $features --test gpu -- --ignored --nocapture nvrtc::
+step "NVRTC" cargo test --quiet --workspace $features --test gpu -- --ignored --nocapture cuda_source:: nvrtc::
 if [ "$hash" != "$(cat "$stamp" 2>/dev/null)" ]; then
     echo "$hash" >"$stamp"
     echo "commit $stamp with the kernels"
