@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Checks the text of all kernels, and compiles it with NVRTC, CUDA's compiler, to machine code and to PTX.
-# It needs no GPU. It takes minutes, so it runs only where what decides the kernels' text has changed since it last compiled
-# them: `crates/tesdf-gpu/kernels.sha256` has the hash. It writes the new hash, for the commit of the
-# change. With `--always` it always runs.
+# Checks the text of all kernels, and compiles it with NVRTC, CUDA's compiler, to machine code and to
+# PTX. It needs no GPU. It takes minutes, so it runs only where what decides the text has changed since
+# the last time: `crates/tesdf-gpu/kernels.sha256` has the hash. It writes the new hash, for the commit of
+# the change. With `--always` it always runs.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . .ci/toolchain.sh
