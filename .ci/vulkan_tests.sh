@@ -10,6 +10,7 @@ export TESDF_DEVICE=wgpu:0
 
 if [ "${1:-}" = --all ]; then
     step "all kernels on Vulkan" cargo test --quiet --workspace $features --test gpu -- --skip in_all_modes
+    step "the tool on Vulkan" cargo test --quiet --workspace $features --test it devices::
 else
     step "Vulkan" cargo test --quiet --workspace $features --test gpu smoke::
 fi

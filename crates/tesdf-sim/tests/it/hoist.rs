@@ -108,6 +108,7 @@ fn without_contacts_the_platform_falls() {
 }
 
 #[test]
+#[ignore = "a whole scene: .ci/release"]
 fn a_drum_that_is_too_thick_breaks_the_chains() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("spool.ply");

@@ -1,6 +1,4 @@
 //! A folder for each test, and the binary that runs in it.
-// Each test file is a separate crate and uses only some of these functions.
-#![allow(dead_code)]
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

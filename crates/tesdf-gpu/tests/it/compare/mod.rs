@@ -1,5 +1,4 @@
 //! Compares contacts of the device with those of the host.
-#![allow(dead_code, reason = "each test program uses its part")]
 use std::collections::{BTreeMap, BTreeSet};
 
 use tesdf::collide::{

@@ -1,6 +1,4 @@
 //! What every part must be, and measures of a mesh.
-// Each test file is a separate crate and uses only some of these functions.
-#![allow(dead_code)]
 use std::path::Path;
 use std::sync::Arc;
 

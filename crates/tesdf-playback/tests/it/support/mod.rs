@@ -1,5 +1,4 @@
 //! Runs for the tests.
-#![allow(dead_code, reason = "each test program uses its own part")]
 use tesdf::TeSdf;
 use tesdf::collide::{Instance, Pose, Shape};
 use tesdf::glam::{DQuat, DVec3};

@@ -1,6 +1,4 @@
 //! Meshes for the tests.
-// Each test file uses only some of these functions.
-#![allow(dead_code)]
 use std::path::Path;
 
 use tesdf::TeSdf;

@@ -1,6 +1,5 @@
 //! Shared parts of the tests: the scenes of the repository, runs of them, and scene files that are
 //! refused.
-#![allow(dead_code, reason = "each test program uses its own part")]
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
