@@ -10,7 +10,7 @@ use crate::support::cells::Cells;
 use crate::support::meshes::{self, Row};
 use crate::support::points::{self, KINDS, Kind};
 use crate::support::reference::{Reference, exceeds};
-use crate::support::rotation::of_the_day;
+use crate::support::rotation::{least, of_the_day};
 use crate::support::well_formed::WellFormed;
 use rayon::prelude::*;
 use tesdf::encode::{EncodeOptions, Encoder, Preset};
@@ -197,7 +197,7 @@ fn distances_equal_the_reference_files() {
     let files: usize = meshes::manifest().iter().map(|row| row.references.len()).sum();
     assert_eq!(files, 106, "reference files");
     let compared = *compared.lock().expect("no panic held it");
-    assert!(compared > files / 4, "{compared} reference files were compared");
+    assert!(compared > least(files - 1, files / 4), "{compared} reference files were compared");
 }
 
 #[test]

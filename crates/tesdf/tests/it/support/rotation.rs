@@ -28,3 +28,8 @@ pub fn of_the_day<T>(cases: impl IntoIterator<Item = T>) -> Vec<T> {
 pub fn cases(all: u32) -> u32 {
     if day().is_none() { all } else { all.div_ceil(DAYS as u32) }
 }
+
+/// What a test must find at least: in all cases, or in those of a day.
+pub fn least(of_all: usize, of_a_day: usize) -> usize {
+    if day().is_none() { of_all } else { of_a_day }
+}
