@@ -62,6 +62,7 @@ impl<'a> From<&'a PolygonReport> for Polygon<'a> {
             PolygonVerdict::Beyond => ("beyond", None),
             PolygonVerdict::Filtered { cosine } => ("filtered", Some(cosine)),
             PolygonVerdict::Descending => ("descending", None),
+            PolygonVerdict::OutOfCones => ("out_of_cones", None),
             PolygonVerdict::AtEnd => ("at_end", None),
         };
         let PolygonReport { cell, distance, point, face_b, .. } = *polygon;

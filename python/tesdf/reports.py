@@ -467,8 +467,8 @@ class WhyPolygon:
     face_b: int
     verdict: str
     """"contact"; or why it is none: "cell_beyond" and "beyond" the contact distance, "filtered" by
-    the cosine, "descending" where local minima are wanted, or "at_end" of an edge, which is
-    tested as a vertex"""
+    the cosine, "descending" or "out_of_cones" where local minima are wanted, or "at_end" of an
+    edge, which is tested as a vertex"""
     cosine: Optional[float]
     """of a filtered contact"""
 

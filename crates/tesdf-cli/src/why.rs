@@ -103,6 +103,7 @@ fn part_text(part: &PartReport, noun: &str, text: &mut String) {
             PolygonVerdict::Beyond => "dropped: beyond the contact distance".into(),
             PolygonVerdict::AtEnd => "dropped: an end of the edge, which is tested as a node".into(),
             PolygonVerdict::Descending => "dropped: the surface is lower beside it".into(),
+            PolygonVerdict::OutOfCones => "dropped: other places of the bodies meet first".into(),
             PolygonVerdict::Filtered { cosine } => format!("dropped by the cosine filter: {cosine:.4}"),
         };
         let cell = p.cell.map_or("no cell".into(), |cell| format!("cell {cell}"));

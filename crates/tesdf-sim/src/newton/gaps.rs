@@ -15,6 +15,9 @@ use crate::{Mass, State, System};
 /// above this: the contact crosses an edge of a curved surface. Sharper edges are two surfaces.
 const SAME_SURFACE: f64 = 0.97;
 
+/// Normals that differ by less, rad, are those of one face.
+const SAME_NORMAL: f64 = 1e-6;
+
 /// A contact that slides is lifted by at most this share of its way.
 const LIFT: f64 = 0.01;
 
@@ -77,7 +80,12 @@ impl<'a> Gaps<'a> {
 
     /// The contacts that were detected at `poses` and have a free body.
     pub fn find(&self, contacts: &[Contact], poses: &[Pose]) -> Vec<Found> {
-        let turned = contacts.iter().zip(normals(contacts)).map(|(c, normal)| Contact { normal, ..*c });
+        let normals = match self.mode {
+            Mode::Node | Mode::Edge => normals(contacts),
+            // Those of the detection are in the normal cones.
+            Mode::Face | Mode::Exact => contacts.iter().map(|c| c.normal).collect(),
+        };
+        let turned = contacts.iter().zip(normals).map(|(c, normal)| Contact { normal, ..*c });
         turned.filter_map(|contact| self.found(contact, poses)).collect()
     }
 
@@ -133,7 +141,10 @@ impl<'a> Gaps<'a> {
         let row = |found: Found| {
             let mut row = found.row.clone();
             if let Some(before) = before.of(&found.contact, self.point_of_a(&found.contact, poses)?) {
-                row.average(&before.row);
+                // Where a body slides along a face, the contact before may be that of another corner.
+                if before.contact.normal.distance(found.contact.normal) > SAME_NORMAL {
+                    row.average(&before.row);
+                }
             }
             let gap = row.gap - self.step.h * row.rate(velocities);
             // A face may have several contacts, and its deepest one is not at this place. The body

@@ -2,13 +2,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::parallel::*;
 
+use super::cones::{Cones, keep_different};
 use super::found::{AtVertex, Found, contacts, one_per_vertex, order};
 use super::ordered_pair::OrderedPair;
 use super::reduce::{Reduced, reduced};
 use super::surface::Candidates;
 use super::{
-    CollideError, CollideOptions, Contacts, InstancePair, InstancePairs, Reduction, Scene, Statistics,
-    deepest, few, hidden, spread,
+    CollideError, CollideOptions, Contact, Contacts, ContactsPer, InstanceId, InstancePair, InstancePairs,
+    Reduction, Scene, Statistics, deepest, few, hidden, spread,
 };
 
 /// Number of faces or nodes per task.
@@ -107,6 +108,26 @@ pub fn tasks<'p, 's>(
     pairs.iter().zip(candidates).flat_map(of_pair).collect()
 }
 
+/// The contacts without those that have a twin in their pair of instances. The two orders of a pair
+/// are adjacent.
+fn different(contacts: Vec<Contact>, pairs: &[OrderedPair]) -> Vec<Contact> {
+    let ids = |a: InstanceId, b: InstanceId| (a.min(b), a.max(b));
+    let of = |c: &Contact| ids(c.instance_a, c.instance_b);
+    let mut pairs = pairs.iter();
+    let mut runs = Vec::new();
+    for run in contacts.chunk_by(|x, y| of(x) == of(y)) {
+        // Contacts follow the order of the pairs.
+        let near = pairs.find(|pair| ids(pair.a, pair.b) == of(&run[0]));
+        runs.push((run, near.and_then(|pair| pair.cones.as_ref()).map(Cones::near)));
+    }
+    let kept = |(run, near): &(&[Contact], Option<f64>)| match near {
+        Some(near) => keep_different(run, *near),
+        None => vec![true; run.len()],
+    };
+    let kept: Vec<Vec<bool>> = runs.par_iter().map(kept).collect();
+    contacts.iter().zip(kept.iter().flatten()).filter_map(|(c, keep)| keep.then_some(*c)).collect()
+}
+
 /// The contacts of ordered pairs. Once `stop` is set, contacts are missing.
 fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) -> Contacts {
     let stopped = || stop.load(Ordering::Relaxed);
@@ -151,6 +172,12 @@ fn of_pairs(pairs: &[OrderedPair], options: &CollideOptions, stop: &AtomicBool) 
     contacts
         .chunk_by_mut(|x, y| (x.instance_a, x.instance_b) == (y.instance_a, y.instance_b))
         .for_each(|run| run.sort_by_key(order));
+    if options.contacts_per == ContactsPer::Minimum {
+        let found = contacts.len();
+        contacts = different(contacts, pairs);
+        statistics.filtered += found - contacts.len();
+        statistics.unconverged = contacts.iter().filter(|c| !c.converged).count();
+    }
     let all = contacts.len();
     let Reduced { contacts, reports, bytes } = reduced(contacts, options.reduction);
     statistics.reduced = all - contacts.len();

@@ -82,18 +82,17 @@ pub fn contacts(pair: &OrderedPair, candidates: &[u32]) -> Found {
         for ((part, face_a, feature), &candidate) in group.iter().zip(&mut next) {
             let mut found = |minimum: Minimum| {
                 let (minimum, cosine) = pair.faced(part, candidate, minimum);
-                match pair.dropped(part, candidate, &minimum, cosine) {
-                    None => {}
-                    Some(Dropped::AtEnd) => return,
-                    Some(Dropped::ByCosine(_) | Dropped::Descending) => {
-                        *filtered += 1;
+                let contact = match pair.contact(part, candidate, &minimum, cosine, [*face_a, *feature]) {
+                    Ok(contact) => contact,
+                    Err(dropped) => {
+                        *filtered += usize::from(!matches!(dropped, Dropped::AtEnd));
                         return;
                     }
-                }
+                };
                 if let Some(vertex) = pair.vertex(part, &minimum) {
                     at_vertices.push(AtVertex { index: contacts.len(), vertex, cosine });
                 }
-                contacts.push(pair.contact(part, &minimum, *face_a, *feature));
+                contacts.push(contact);
             };
             let mut polygon = |_: &_| *polygons += 1;
             let search = pair.search_of([part]);

@@ -30,6 +30,7 @@ mod branch;
 mod candidates;
 mod clearance;
 mod coarse;
+mod cones;
 mod contact;
 mod deepest;
 mod depth_bounds;

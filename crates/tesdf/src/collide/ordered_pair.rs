@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::ahead::Ahead;
+use super::cones::Cones;
 use super::descent::{OnFace, descends};
 use super::field::FieldBody;
 use super::instance_pairs::{InstancePair, instance_pairs};
@@ -19,9 +20,15 @@ pub enum Dropped {
     ByCosine(f64),
     /// The surface is lower beside the point.
     Descending,
+    /// No direction is in the normal cones of both bodies.
+    OutOfCones,
     /// The point is an end of an edge, which has a contact of its own.
     AtEnd,
 }
+
+/// Bodies that close by more than this part of the smaller diagonal within the speculative time may
+/// touch at other places than local minima.
+const FAST: f64 = 0.1;
 
 /// The surface of one body and the field of another.
 pub struct OrderedPair<'a> {
@@ -33,6 +40,11 @@ pub struct OrderedPair<'a> {
     pub reach: Reach,
     /// The search for minima, up to the greatest of these distances.
     pub search: Search,
+    /// The normal cones, where contacts are those of whole faces.
+    pub cones: Option<Cones<'a>>,
+    /// Whether the bodies close by so much within the speculative time that they may touch at other
+    /// places than local minima.
+    is_fast: bool,
     options: &'a CollideOptions,
     pub a: InstanceId,
     pub b: InstanceId,
@@ -90,7 +102,13 @@ impl<'a> OrderedPair<'a> {
         let [ahead_a, ahead_b] = Ahead::of_both(scene, [a, b], options.speculative_time)?;
         let least = options.contact_distance.min(contact_distance);
         let reach = Reach::new(&ahead_a.approach(&ahead_b), &field, contact_distance, least);
-        Ok(Self { surface, field, reach, search, options, a, b })
+        let is_of_faces = matches!(options.mode, Mode::Face | Mode::Exact);
+        let cones = (is_of_faces && options.contacts_per != ContactsPer::Cell).then(|| {
+            Cones::new([(shape_a, of_a.placement()), (shape_b, of_b.placement())], options.precision)
+        });
+        let smaller = diagonals.into_iter().fold(f64::INFINITY, f64::min);
+        let is_fast = contact_distance - options.contact_distance > FAST * smaller;
+        Ok(Self { surface, field, reach, search, cones, is_fast, options, a, b })
     }
 
     /// Broad phase.
@@ -160,26 +178,42 @@ impl<'a> OrderedPair<'a> {
         (Minimum { value, ..minimum }, value.gradient.dot(turned))
     }
 
-    /// Why a minimum of a candidate is no contact, if it is none: Eq. (10), which does not apply to
+    /// The contact of a minimum of a candidate, or why it is none: Eq. (10), which does not apply to
     /// rounded shapes and sheets, because they have normals in all directions; or a lower point
-    /// beside it.
+    /// beside it; or normal cones without a common direction.
     ///
-    /// `cosine` is that of [`faced`](Self::faced).
-    pub fn dropped(&self, part: &Part, candidate: u32, minimum: &Minimum, cosine: f64) -> Option<Dropped> {
+    /// `cosine` is that of [`faced`](Self::faced), `ids` are the face and the feature of
+    /// [`part`](Self::part).
+    pub fn contact(
+        &self,
+        part: &Part,
+        candidate: u32,
+        minimum: &Minimum,
+        cosine: f64,
+        ids: [u32; 2],
+    ) -> Result<Contact, Dropped> {
         match self.options.mode {
-            Mode::Node => return None,
-            Mode::Edge => {
-                let is_end = part.points().len() == 2 && minimum.corner.is_some();
-                return is_end.then_some(Dropped::AtEnd);
-            }
-            Mode::Face | Mode::Exact => {}
+            Mode::Node => {}
+            Mode::Edge if part.points().len() == 2 && minimum.corner.is_some() => return Err(Dropped::AtEnd),
+            Mode::Edge => {}
+            Mode::Face | Mode::Exact => self.check_face(part, candidate, minimum, cosine)?,
         }
+        let contact = self.touching(part, minimum, ids);
+        let Some(cones) = &self.cones else { return Ok(contact) };
+        match cones.of(contact, [candidate, minimum.value.position]) {
+            Some(turned) => Ok(turned),
+            None if self.options.contacts_per == ContactsPer::Minimum => Err(Dropped::OutOfCones),
+            None => Ok(contact),
+        }
+    }
+
+    fn check_face(&self, part: &Part, candidate: u32, minimum: &Minimum, cosine: f64) -> Result<(), Dropped> {
         let gradient = minimum.value.gradient;
         if part.points().len() == 3
             && !self.surface.is_sheet()
             && self.options.cos_theta.is_some_and(|cos| cosine > -cos)
         {
-            return Some(Dropped::ByCosine(cosine));
+            return Err(Dropped::ByCosine(cosine));
         }
         let Minimum { point, is_lowest, .. } = *minimum;
         let at = || {
@@ -189,21 +223,26 @@ impl<'a> OrderedPair<'a> {
             };
             OnFace { face: candidate, point, distance, gradient, is_lowest }
         };
-        let descends = self.options.contacts_per == ContactsPer::Minimum && self.descends(&at());
-        descends.then_some(Dropped::Descending)
+        match self.options.contacts_per == ContactsPer::Minimum && self.descends(&at()) {
+            true => Err(Dropped::Descending),
+            false => Ok(()),
+        }
     }
 
-    /// Whether the surface is lower beside a point of a face. So is then a contact there.
+    /// Whether the surface is lower beside a point of a face, which is then no local minimum. So is
+    /// then a contact there. Of bodies that close by much, all places count: they may pass the
+    /// lowest one by.
     pub fn descends(&self, at: &OnFace) -> bool {
-        descends(&self.surface, &self.field, at, |face| {
-            let around = self.surface.around();
-            let reach = self.reach.of(&face.corners, around) + around;
-            match self.options.mode {
-                // Frank–Wolfe need not find the lower point.
-                Mode::Face => self.search.within(reach).frank_wolfe(&self.field, face) < at.distance,
-                Mode::Node | Mode::Edge | Mode::Exact => at.distance <= reach,
-            }
-        })
+        !self.is_fast
+            && descends(&self.surface, &self.field, at, |face| {
+                let around = self.surface.around();
+                let reach = self.reach.of(&face.corners, around) + around;
+                match self.options.mode {
+                    // Frank–Wolfe need not find the lower point.
+                    Mode::Face => self.search.within(reach).frank_wolfe(&self.field, face) < at.distance,
+                    Mode::Node | Mode::Edge | Mode::Exact => at.distance <= reach,
+                }
+            })
     }
 
     /// The vertex at which a minimum is, by its bits; `None` in the modes node and edge, where
@@ -215,7 +254,7 @@ impl<'a> OrderedPair<'a> {
         Some(part.points()[usize::from(corner)].to_array().map(f64::to_bits))
     }
 
-    pub fn contact(&self, part: &Part, minimum: &Minimum, face_a: u32, feature: u32) -> Contact {
+    fn touching(&self, part: &Part, minimum: &Minimum, [face_a, feature]: [u32; 2]) -> Contact {
         let Minimum { point, value, cell, converged, .. } = *minimum;
         let (face_b, feature_b) = self.field.names(&value);
         let [point_a, point_b] = self.field.surface_points(point, part.radius, &value);

@@ -67,6 +67,9 @@ pub enum PolygonVerdict {
     },
     /// Dropped because the surface is lower beside it, where local minima are wanted.
     Descending,
+    /// Dropped because no direction is in the normal cones of both bodies there, where local minima
+    /// are wanted: other places of the bodies meet first.
+    OutOfCones,
     /// The least distance of an edge is at one of its ends, which are contacts as nodes.
     AtEnd,
 }
@@ -240,7 +243,7 @@ impl Stages<'_> {
 
     fn part(&self, candidate: u32, is_candidate: bool) -> PartReport {
         let OrderedPair { surface, field, reach, .. } = &self.pair;
-        let (part, _, id) = self.pair.part(candidate);
+        let (part, face, id) = self.pair.part(candidate);
         let search = self.pair.search_of([&part]);
         let contact_distance = search.reach * field.unit();
         let unit = field.unit();
@@ -270,11 +273,12 @@ impl Stages<'_> {
         let mut kept = Vec::new();
         search.minima(field, &part, None, &mut |polygon| seen.push(key(polygon)), &mut |polygon, minimum| {
             let (minimum, cosine) = self.pair.faced(&part, candidate, minimum);
-            let verdict = match self.pair.dropped(&part, candidate, &minimum, cosine) {
-                Some(Dropped::ByCosine(cosine)) => PolygonVerdict::Filtered { cosine },
-                Some(Dropped::Descending) => PolygonVerdict::Descending,
-                Some(Dropped::AtEnd) => PolygonVerdict::AtEnd,
-                None => PolygonVerdict::Contact,
+            let verdict = match self.pair.contact(&part, candidate, &minimum, cosine, [face, id]) {
+                Err(Dropped::ByCosine(cosine)) => PolygonVerdict::Filtered { cosine },
+                Err(Dropped::Descending) => PolygonVerdict::Descending,
+                Err(Dropped::OutOfCones) => PolygonVerdict::OutOfCones,
+                Err(Dropped::AtEnd) => PolygonVerdict::AtEnd,
+                Ok(_) => PolygonVerdict::Contact,
             };
             kept.push((key(polygon), describe(polygon, &minimum, verdict)));
         });

@@ -1,0 +1,403 @@
+//! Normals of contacts from the normal cones of the features that touch; proof in `docs/math.md`,
+//! section 17.
+//!
+//! The gradient of the signed distance says in which direction the distance of one point changes.
+//! Where a body lies on another one, this is the normal of any face of *b* that is as near, also
+//! where an edge of *b* lies on a face of *a*: as a plane, such a contact is a wall that is not
+//! there. And the point is only known to the tolerance of its distance, so just apart the gradient
+//! is off by √(2 tolerance / distance). A contact's normal must be in the cone of the outward
+//! normals at the place of *b*, and its opposite in that of *a*: a face has one, an edge the arc
+//! between its two faces, a vertex the cone of its faces.
+use arrayvec::ArrayVec;
+use glam::DVec3;
+
+use super::field::ROUNDING;
+use super::{Contact, Placement, Shape};
+use crate::TeSdf;
+use crate::geometry::Triangle;
+use crate::query::Precision;
+
+/// Sine of the angle by which a normal may be out of a cone: bodies that turn by less in a step can
+/// touch there.
+const SLOPE: f64 = 0.1;
+
+/// Faces that are turned against each other by more (rad) do not touch with their insides.
+const PARALLEL: f64 = 1e-3;
+
+/// Normals that differ by less (rad) are equal, so the edges between coplanar faces are none.
+const SAME: f64 = 1e-6;
+
+/// A ray is in a cone when it is nearer to it than this (rad).
+const NEAR: f64 = 1e-4;
+
+/// A place with more different normals is left as it is.
+const MOST: usize = 12;
+
+/// A place with more faces is left as it is.
+const MOST_FACES: usize = 64;
+
+/// A corner may be higher over the plane of a face beside it by this part of its distance, and the
+/// place is convex all the same.
+const CONVEX: f64 = 1e-5;
+
+/// A place belongs to a feature when it is nearer than this: parts of the diagonals of the smaller
+/// and of the larger body. The search knows a place to its tolerance.
+const OF_SMALLER: f64 = 1e-6;
+const OF_LARGER: f64 = 2e-7;
+
+/// Different outward normals at a place.
+type Normals = ArrayVec<DVec3, MOST>;
+
+/// The normal cones of two bodies, in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Cones<'a> {
+    a: Body<'a>,
+    b: Body<'a>,
+    near: f64,
+}
+
+/// A shape in the world.
+#[derive(Clone, Copy, Debug)]
+struct Body<'a> {
+    shape: &'a Shape,
+    placement: Placement,
+}
+
+/// A place on a body or in it, in the world.
+struct Place {
+    at: DVec3,
+    /// Faces up to this distance belong to it.
+    limit: f64,
+    /// One of them, by its index in the shape.
+    face: u32,
+}
+
+impl<'a> Cones<'a> {
+    /// Of the body that has the faces, and the body whose field is used. `precision` is that of the
+    /// contacts.
+    pub fn new([a, b]: [(&'a Shape, Placement); 2], precision: Precision) -> Self {
+        let [a, b] = [a, b].map(|(shape, placement)| Body { shape, placement });
+        let sizes = [a, b].map(|body| body.shape.diagonal() * body.placement.scale);
+        let finite = sizes.into_iter().filter(|size| size.is_finite());
+        let (least, most) = finite.fold((f64::INFINITY, 0.0f64), |(l, m), s| (l.min(s), m.max(s)));
+        let rounding = match precision {
+            Precision::F64 => OF_LARGER,
+            Precision::F32 => ROUNDING,
+        };
+        Self { a, b, near: (OF_SMALLER * least.min(f64::MAX)).max(rounding * most) }
+    }
+
+    /// The distance up to which two places are one, in the world's unit.
+    pub fn near(&self) -> f64 {
+        self.near
+    }
+
+    /// A contact of a face with the normal that the cones allow, and its distance along that
+    /// normal. `faces` are the indices of its faces in the shapes. `None` where they allow none: no
+    /// motion of the bodies brings these features together before others.
+    ///
+    /// Contacts of open meshes and sheets, at places that are not convex, and those that are deeper
+    /// than the features are known, stay as they are.
+    pub fn of(&self, contact: Contact, faces: [u32; 2]) -> Option<Contact> {
+        let keep = Some(contact);
+        let Contact { point_a, point_b, distance, normal, .. } = contact;
+        let Some(of_a) = self.a.normals(&Place { at: point_a, limit: self.near, face: faces[0] }) else {
+            return keep;
+        };
+        if let Some(radius) = self.b.radius() {
+            return of_round(contact, &of_a, radius);
+        }
+        let is_apart = distance > self.near;
+        // Inside of b, the faces of one place are equally near. Outside, they have the nearest point.
+        let place = match is_apart {
+            true => Place { at: point_b, limit: self.near, face: faces[1] },
+            false => Place { at: point_a, limit: distance.abs() + 2.0 * self.near, face: faces[1] },
+        };
+        let Some(of_b) = self.b.normals(&place) else { return keep };
+        let otherwise = if distance < -self.near { keep } else { None };
+        let turned = |normal: DVec3| Some(Contact { normal, ..contact });
+        // The common normal of two edges.
+        let across = match (of_a.as_slice(), of_b.as_slice()) {
+            ([a, b], [c, d]) => crossing([a, b], [c, d]),
+            _ => None,
+        };
+        match (of_a.as_slice(), of_b.as_slice(), across) {
+            // The corners of a patch are at edges or vertices of one of them.
+            ([m], [h], _) => {
+                if h.distance(-*m) <= PARALLEL {
+                    keep
+                } else {
+                    otherwise
+                }
+            }
+            ([m], ..) if is_apart => {
+                // The plane of the face: the way to it from the nearest point of b.
+                let cosine = -m.dot(normal);
+                (cosine > least_cosine()).then(|| Contact {
+                    normal: -*m,
+                    distance: distance * cosine,
+                    ..contact
+                })
+            }
+            ([m], ..) => {
+                if is_within(&of_b, -*m) {
+                    turned(-*m)
+                } else {
+                    otherwise
+                }
+            }
+            (_, [h], _) => {
+                if is_within(&opposite(&of_a), *h) {
+                    turned(*h)
+                } else {
+                    keep
+                }
+            }
+            (.., Some(across)) => {
+                // The distance along the common normal of two edges is the same between all points
+                // of their lines.
+                let n = if across.dot(normal) < 0.0 { -across } else { across };
+                if is_within(&of_a, -n) && is_within(&of_b, n) {
+                    let distance = if is_apart { n.dot(point_a - point_b) } else { distance };
+                    Some(Contact { normal: n, distance, ..contact })
+                } else if is_apart {
+                    keep
+                } else {
+                    otherwise
+                }
+            }
+            _ if is_apart => keep,
+            _ => {
+                // The mean is the same in both orders of a pair. The gradient, moved into the
+                // cones, is not: two such contacts would be a notch that locks.
+                let rays = common(&opposite(&of_a), &of_b);
+                match rays.iter().sum::<DVec3>().try_normalize() {
+                    Some(mean) => turned(mean),
+                    None if rays.is_empty() => otherwise,
+                    None => keep,
+                }
+            }
+        }
+    }
+}
+
+/// A contact of a ball or capsule of a radius, in the world, with faces of these normals. The
+/// gradient is exact there, because it begins at the core.
+fn of_round(contact: Contact, of_a: &[DVec3], radius: f64) -> Option<Contact> {
+    let &[m] = of_a else { return Some(contact) };
+    let normal = -m;
+    if normal.dot(contact.normal) <= least_cosine() {
+        // Deep inside, the nearest place of the surface can be on any side.
+        return (contact.distance < -radius).then_some(contact);
+    }
+    let core = contact.point_b - radius * contact.normal;
+    let point_b = core + radius * normal;
+    Some(Contact { normal, point_b, distance: normal.dot(contact.point_a - point_b), ..contact })
+}
+
+impl Body<'_> {
+    /// Radius of a rounded shape, in the world.
+    fn radius(&self) -> Option<f64> {
+        match *self.shape {
+            Shape::Sphere { radius } | Shape::Capsule { radius, .. } => Some(radius * self.placement.scale),
+            _ => None,
+        }
+    }
+
+    /// The different outward normals of the faces around a place, in the world. `None` where they
+    /// are no cone: at rounded shapes, borders, and where the surface is concave.
+    fn normals(&self, place: &Place) -> Option<Normals> {
+        let at = self.placement.to_shape(place.at);
+        let limit = place.limit / self.placement.scale;
+        let local = match self.shape {
+            Shape::Plane => [DVec3::Z].into_iter().collect(),
+            Shape::Box { half_extents } => {
+                let side = |axis: usize| {
+                    let sign = if at[axis] < 0.0 { -1.0 } else { 1.0 };
+                    (half_extents[axis] - at[axis].abs() <= limit).then(|| sign * DVec3::AXES[axis])
+                };
+                (0..3).filter_map(side).collect()
+            }
+            Shape::Mesh(asset) => around(asset, at, limit, place.face)?,
+            Shape::Sphere { .. } | Shape::Capsule { .. } => return None,
+        };
+        let rotation = self.placement.pose.rotation;
+        (!local.is_empty()).then(|| local.into_iter().map(|n| rotation * n).collect())
+    }
+}
+
+/// The different normals of the faces within `limit` of a place, from a face on, in the unit of the
+/// mesh.
+fn around(asset: &TeSdf, at: DVec3, limit: f64, face: u32) -> Option<Normals> {
+    if !(asset.faces_enclose_the_solid() && asset.faces_look_outward()) {
+        return None;
+    }
+    let triangle = |face: u32| {
+        let normal = asset.local_triangle(face as usize).normal;
+        Triangle::from_parts(asset.face_corners(face as usize), normal, false)
+    };
+    let first = triangle(face);
+    if is_on_inside(&first, at, limit) {
+        return Some([first.normal].into_iter().collect());
+    }
+    let (mut found, mut next, mut seen) = (vec![first], vec![face], vec![face]);
+    while let Some(face) = next.pop() {
+        for vertex in asset.face_vertices(face as usize) {
+            for &other in asset.faces_at(vertex) {
+                if seen.contains(&other) {
+                    continue;
+                }
+                seen.push(other);
+                let triangle = triangle(other);
+                if triangle.closest(at).distance <= limit {
+                    found.push(triangle);
+                    next.push(other);
+                }
+            }
+        }
+        if found.len() > MOST_FACES {
+            return None;
+        }
+    }
+    let mut normals = Normals::new();
+    for normal in found.iter().map(|triangle| triangle.normal).filter(|n| *n != DVec3::ZERO) {
+        if normals.iter().all(|n| n.distance(normal) > SAME) {
+            normals.try_push(normal).ok()?;
+        }
+    }
+    let is_convex = |&Triangle { corners: [first, ..], normal, .. }: &Triangle| {
+        let corners = found.iter().flat_map(|other| other.corners);
+        corners.map(|p| p - first).all(|way| way.dot(normal) <= CONVEX * way.length())
+    };
+    (normals.len() < 2 || found.iter().all(is_convex)).then_some(normals)
+}
+
+/// Whether a place is farther than `limit` from all sides of a face.
+fn is_on_inside(&Triangle { corners, normal, .. }: &Triangle, at: DVec3, limit: f64) -> bool {
+    (0..3).all(|k| {
+        let side = corners[(k + 1) % 3] - corners[k];
+        normal.cross(side).dot(at - corners[k]) > limit * side.length()
+    })
+}
+
+/// The greatest cosine of an angle out of a cone.
+fn least_cosine() -> f64 {
+    (1.0 - SLOPE * SLOPE).sqrt()
+}
+
+/// Whether a direction is in a cone, up to [`SLOPE`].
+fn is_within(cone: &[DVec3], direction: DVec3) -> bool {
+    nearest_in_cone(cone, direction).dot(direction) > least_cosine()
+}
+
+fn opposite(normals: &[DVec3]) -> Normals {
+    normals.iter().map(|n| -*n).collect()
+}
+
+/// The direction of a cone of unit vectors that is nearest to a direction.
+fn nearest_in_cone(rays: &[DVec3], v: DVec3) -> DVec3 {
+    let mut best: Option<DVec3> = None;
+    let mut offer = |p: DVec3| {
+        if let Some(p) = p.try_normalize()
+            && best.is_none_or(|best| p.dot(v) > best.dot(v))
+        {
+            best = Some(p);
+        }
+    };
+    for (i, &p) in rays.iter().enumerate() {
+        offer(p);
+        for (j, &q) in rays.iter().enumerate().skip(i + 1) {
+            // The foot of v on the plane of two rays, if it is between them.
+            let Some(normal) = p.cross(q).try_normalize() else { continue };
+            let foot = v.reject_from_normalized(normal);
+            if p.cross(foot).dot(normal) >= 0.0 && foot.cross(q).dot(normal) >= 0.0 {
+                offer(foot);
+            }
+            for &r in &rays[j + 1..] {
+                let det = p.cross(q).dot(r);
+                let inside = |x: DVec3, y: DVec3| x.cross(y).dot(v) * det.signum() >= 0.0;
+                if det.abs() > 1e-12 && inside(p, q) && inside(q, r) && inside(r, p) {
+                    offer(v);
+                }
+            }
+        }
+    }
+    best.unwrap_or_default()
+}
+
+/// The direction perpendicular to two edges, each between two faces with these normals; `None` where
+/// they are parallel.
+fn crossing([a, b]: [&DVec3; 2], [c, d]: [&DVec3; 2]) -> Option<DVec3> {
+    let [one, other] = [a.cross(*b).try_normalize()?, c.cross(*d).try_normalize()?];
+    let both = one.cross(other);
+    (both.length() > PARALLEL).then(|| both.normalize())
+}
+
+/// The extreme rays of what two cones have in common.
+fn common(one: &[DVec3], other: &[DVec3]) -> Vec<DVec3> {
+    let least = NEAR.cos();
+    let holds = |cone: &[DVec3], ray: DVec3| nearest_in_cone(cone, ray).dot(ray) >= least;
+    let mut rays: Vec<DVec3> = Vec::new();
+    let mut offer = |ray: DVec3| {
+        if rays.iter().all(|r| r.distance(ray) > 2.0 * NEAR) {
+            rays.push(ray);
+        }
+    };
+    one.iter().filter(|ray| holds(other, **ray)).for_each(|ray| offer(*ray));
+    other.iter().filter(|ray| holds(one, **ray)).for_each(|ray| offer(*ray));
+    let planes = |cone: &[DVec3]| -> Vec<DVec3> {
+        let of_ray =
+            |i: usize| (i + 1..cone.len()).filter_map(move |j| cone[i].cross(cone[j]).try_normalize());
+        (0..cone.len()).flat_map(of_ray).collect()
+    };
+    let planes_of_other = planes(other);
+    for plane in planes(one) {
+        for other_plane in &planes_of_other {
+            let line = plane.cross(*other_plane);
+            let Some(ray) = line.try_normalize().filter(|_| line.length() > NEAR) else { continue };
+            for ray in [ray, -ray] {
+                if holds(one, ray) && holds(other, ray) {
+                    offer(ray);
+                }
+            }
+        }
+    }
+    rays
+}
+
+/// Of contacts of one pair of instances that have the same place, normal and distance, in both
+/// orders, keeps the first: twins would carry twice the load of others. Returns the number of those
+/// left out. `contacts` are all of the pair, and `near` is [`Cones::near`].
+pub fn keep_different(contacts: &[Contact], near: f64) -> Vec<bool> {
+    let point = |k: usize| 0.5 * (contacts[k].point_a + contacts[k].point_b);
+    let normal = |k: usize| {
+        let Contact { instance_a, instance_b, normal, .. } = contacts[k];
+        if instance_a < instance_b { normal } else { -normal }
+    };
+    let mut order: Vec<usize> = (0..contacts.len()).collect();
+    order.sort_by(|&k, &l| point(k).x.total_cmp(&point(l).x).then(k.cmp(&l)));
+    let mut twins: Vec<(usize, usize)> = Vec::new();
+    for (i, &k) in order.iter().enumerate() {
+        let distance = contacts[k].distance;
+        // The two points of a contact are as far apart as its distance, in both orders along the
+        // same normal.
+        let reach = near + PARALLEL * distance.abs();
+        for &l in &order[i + 1..] {
+            if point(l).x - point(k).x > reach {
+                break;
+            }
+            if point(k).distance(point(l)) <= reach
+                && normal(k).distance(normal(l)) <= SAME
+                && (distance - contacts[l].distance).abs() <= near
+            {
+                twins.push((k.min(l), k.max(l)));
+            }
+        }
+    }
+    twins.sort_unstable();
+    let mut kept = vec![true; contacts.len()];
+    for (k, l) in twins {
+        kept[l] &= !kept[k];
+    }
+    kept
+}
