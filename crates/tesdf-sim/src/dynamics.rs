@@ -54,6 +54,8 @@ pub struct StepReport {
     pub deepest: Option<f64>,
     /// Number of times that contacts were detected.
     pub detections: u32,
+    /// Number of these detections that moved fast bodies to where they are hit.
+    pub advances: u32,
     /// Number of islands in the last solve: groups of bodies that are solved independently.
     pub islands: usize,
     /// Iterations of the slowest island, summed over all solves of the step.

@@ -115,7 +115,7 @@ impl Newton {
     }
 
     /// The states after moving for one step at `velocities`. Their velocities are `velocities`.
-    fn moved(&self, step: &Step, velocities: &[Vector6<f64>]) -> Vec<State> {
+    pub(super) fn moved(&self, step: &Step, velocities: &[Vector6<f64>]) -> Vec<State> {
         let mut states = self.system.states().to_vec();
         for (body, state) in self.system.bodies().iter().zip(&mut states) {
             if body.mass == Mass::Kinematic {
@@ -141,7 +141,7 @@ impl Newton {
         CollideOptions { contact_distance, speculative_time, ..self.collide }
     }
 
-    fn detect(
+    pub(super) fn detect(
         &mut self,
         step: &mut Step,
         states: &[State],
@@ -155,7 +155,7 @@ impl Newton {
         Ok(contacts)
     }
 
-    fn gaps<'a>(&'a self, step: &'a Step) -> Gaps<'a> {
+    pub(super) fn gaps<'a>(&'a self, step: &'a Step) -> Gaps<'a> {
         let Self { system, options, sizes, collide: CollideOptions { mode, .. }, .. } = self;
         Gaps { system, options, sizes, mode: *mode, step }
     }
@@ -350,10 +350,23 @@ impl Newton {
         if let Some(motion) = &stiffened {
             (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &start);
         }
+        // The contacts at which bodies are hit, found where they are hit.
+        let mut held: Vec<Row> = Vec::new();
         if rows.iter().any(|row| !stays(row)) {
             let beginning = self.gaps(step).beginning(contacts, &found);
-            for _ in 0..self.options.redetections {
-                let mut predicted = self.moved(step, &velocities);
+            let mut hit = match self.options.redetections {
+                0 => None,
+                _ => self.hit(step, &found, &velocities)?,
+            };
+            let mut round = 0;
+            while round < self.options.redetections {
+                // The first round, if any, is at the hits. The poses at the end of the step are
+                // predicted from its beginning all the same: a body may turn far after it was hit.
+                let hit = hit.take();
+                round += u32::from(hit.is_none());
+                let seen = hit.as_ref().map_or(&velocities, |hit| &hit.velocities).clone();
+                let is_hit = hit.as_ref().map_or(vec![false; seen.len()], |hit| hit.is_hit.clone());
+                let mut predicted = self.moved(step, &seen);
                 // The contacts of these bodies stay, so the detection need not look as far as they
                 // are pushed.
                 for (k, free) in step.free.iter().enumerate().filter(|(k, _)| deep[*k]) {
@@ -364,14 +377,21 @@ impl Newton {
                 let contacts = self.detect(step, &predicted, HiddenSearch::Off)?;
                 let poses: Vec<Pose> = predicted.iter().map(|state| state.pose).collect();
                 let mut next =
-                    self.gaps(step).predicted_rows(contacts.as_slice(), &poses, &velocities, &beginning);
+                    self.gaps(step).predicted_rows(contacts.as_slice(), &poses, &seen, &beginning, &is_hit);
                 next.retain(|row| !stays(row));
                 next.extend(contact_rows.iter().filter(|row| stays(row)).cloned());
+                next.extend_from_slice(&held);
                 next.extend_from_slice(&joints);
+                let of_joints = next.len() - joints.len()..;
+                predict(&mut next[of_joints], &self.gaps(step).bodies(), &poses, &seen, step.h);
+                if let Some(hit) = hit {
+                    let motion = stiffened.as_ref().unwrap_or(&plain);
+                    let (_, forces) = self.solve(step, motion, &next, Gap::Position, &velocities);
+                    held = hit.held(&next, &forces, stays);
+                    continue;
+                }
                 stiffened = plain.stiffened(&rows, &forces, &velocities, step.h);
                 rows = next;
-                let joints = rows.len() - joints.len()..;
-                predict(&mut rows[joints], &self.gaps(step).bodies(), &poses, &velocities, step.h);
                 let motion = stiffened.as_ref().unwrap_or(&plain);
                 let before = velocities;
                 (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &before);
@@ -380,7 +400,7 @@ impl Newton {
                 }
             }
         }
-        let carried = match rows.iter().any(|row| row.relaxed_gap > row.gap) {
+        let carried = match rows.iter().any(|row| row.relaxed_gap != row.gap) {
             true => {
                 let motion = stiffened.as_ref().unwrap_or(&plain);
                 self.solve(step, motion, &rows, Gap::Relaxed, &velocities).0

@@ -129,7 +129,26 @@ impl<'a> Gaps<'a> {
         row
     }
 
-    /// The rows of the contacts at the poses that `velocities` predict. Each gap is the predicted
+    /// For each free body: the share of the step after which it is hit, when it is where these
+    /// contacts were found and goes on with the velocities of `target`. Only contacts count that
+    /// close by more than `far` of the smaller body's size in the step. Infinite without any.
+    pub fn shares(&self, found: &[Found], target: &[Vector6<f64>], far: f64) -> Vec<f64> {
+        let mut shares = vec![f64::INFINITY; self.step.free.len()];
+        for Found { contact, row, .. } in found {
+            let bodies = [contact.instance_a, contact.instance_b].into_iter();
+            let sizes = bodies.filter_map(|id| Some(self.sizes[self.system.body_of(id)?]));
+            let way = -self.step.h * row.rate(target);
+            if way > far * sizes.fold(f64::INFINITY, f64::min) {
+                for (k, _) in row.sides.iter().flatten() {
+                    shares[*k] = shares[*k].min(row.gap.max(0.0) / way);
+                }
+            }
+        }
+        shares
+    }
+
+    /// The rows of the contacts at the poses that `velocities` predict. `is_hit` tells of free
+    /// bodies whether these are the poses at which they are hit. Each gap is the predicted
     /// distance, extrapolated back to the beginning of the step along its gradient.
     pub fn predicted_rows(
         &self,
@@ -137,12 +156,14 @@ impl<'a> Gaps<'a> {
         poses: &[Pose],
         velocities: &[Vector6<f64>],
         Beginning { depths, before }: &Beginning<'_>,
+        is_hit: &[bool],
     ) -> Vec<Row> {
         let row = |found: Found| {
             let mut row = found.row.clone();
             if let Some(before) = before.of(&found.contact, self.point_of_a(&found.contact, poses)?) {
                 // Where a body slides along a face, the contact before may be that of another corner.
-                if before.contact.normal.distance(found.contact.normal) > SAME_NORMAL {
+                let turns = before.contact.normal.distance(found.contact.normal) > SAME_NORMAL;
+                if turns && !row.sides.iter().flatten().any(|(k, _)| is_hit[*k]) {
                     row.average(&before.row);
                 }
             }

@@ -37,6 +37,7 @@ mod deep;
 mod engine;
 mod gaps;
 mod geometric;
+mod impacts;
 mod integrate;
 mod islands;
 mod joints;

@@ -54,6 +54,8 @@ pub struct Cones<'a> {
     a: Body<'a>,
     b: Body<'a>,
     near: f64,
+    /// Bound of the error of a distance.
+    tolerance: f64,
 }
 
 /// A shape in the world.
@@ -73,9 +75,9 @@ struct Place {
 }
 
 impl<'a> Cones<'a> {
-    /// Of the body that has the faces, and the body whose field is used. `precision` is that of the
-    /// contacts.
-    pub fn new([a, b]: [(&'a Shape, Placement); 2], precision: Precision) -> Self {
+    /// Of the body that has the faces, and the body whose field is used. `tolerance` is the bound of
+    /// the error of distances in the world's unit, and `precision` is that of the contacts.
+    pub fn new([a, b]: [(&'a Shape, Placement); 2], tolerance: f64, precision: Precision) -> Self {
         let [a, b] = [a, b].map(|(shape, placement)| Body { shape, placement });
         let sizes = [a, b].map(|body| body.shape.diagonal() * body.placement.scale);
         let finite = sizes.into_iter().filter(|size| size.is_finite());
@@ -84,7 +86,8 @@ impl<'a> Cones<'a> {
             Precision::F64 => OF_LARGER,
             Precision::F32 => ROUNDING,
         };
-        Self { a, b, near: (OF_SMALLER * least.min(f64::MAX)).max(rounding * most) }
+        let near = (OF_SMALLER * least.min(f64::MAX)).max(rounding * most);
+        Self { a, b, near, tolerance: tolerance.max(near) }
     }
 
     /// The distance up to which two places are one, in the world's unit.
@@ -105,7 +108,7 @@ impl<'a> Cones<'a> {
             return keep;
         };
         if let Some(radius) = self.b.radius() {
-            return of_round(contact, &of_a, radius);
+            return self.of_round(contact, &of_a, radius);
         }
         let is_apart = distance > self.near;
         // Inside of b, the faces of one place are equally near. Outside, they have the nearest point.
@@ -179,20 +182,24 @@ impl<'a> Cones<'a> {
             }
         }
     }
-}
 
-/// A contact of a ball or capsule of a radius, in the world, with faces of these normals. The
-/// gradient is exact there, because it begins at the core.
-fn of_round(contact: Contact, of_a: &[DVec3], radius: f64) -> Option<Contact> {
-    let &[m] = of_a else { return Some(contact) };
-    let normal = -m;
-    if normal.dot(contact.normal) <= least_cosine() {
-        // Deep inside, the nearest place of the surface can be on any side.
-        return (contact.distance < -radius).then_some(contact);
+    /// A contact of a ball or capsule of a radius, in the world, with faces of these normals. The
+    /// gradient is exact there, because it begins at the core.
+    fn of_round(&self, contact: Contact, of_a: &[DVec3], radius: f64) -> Option<Contact> {
+        let &[m] = of_a else { return Some(contact) };
+        let core = contact.point_b - radius * contact.normal;
+        let height = m.dot(core - contact.point_a);
+        let foot = core - height * m;
+        // The distance of a point beside the foot exceeds that of the foot by the square of the way
+        // over twice the height.
+        let place = self.near + (8.0 * self.tolerance * height.abs()).sqrt();
+        if height > 0.0 && foot.distance(contact.point_a) <= place {
+            let (normal, point_b) = (-m, core - radius * m);
+            return Some(Contact { point_a: foot, point_b, normal, distance: height - radius, ..contact });
+        }
+        // The core is over another face, or inside.
+        (height <= 0.0 || !contact.converged).then_some(contact)
     }
-    let core = contact.point_b - radius * contact.normal;
-    let point_b = core + radius * normal;
-    Some(Contact { normal, point_b, distance: normal.dot(contact.point_a - point_b), ..contact })
 }
 
 impl Body<'_> {

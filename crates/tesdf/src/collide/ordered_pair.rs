@@ -104,7 +104,9 @@ impl<'a> OrderedPair<'a> {
         let reach = Reach::new(&ahead_a.approach(&ahead_b), &field, contact_distance, least);
         let is_of_faces = matches!(options.mode, Mode::Face | Mode::Exact);
         let cones = (is_of_faces && options.contacts_per != ContactsPer::Cell).then(|| {
-            Cones::new([(shape_a, of_a.placement()), (shape_b, of_b.placement())], options.precision)
+            let tolerance = options.tolerance.resolve(diagonals[1]);
+            let shapes = [(shape_a, of_a.placement()), (shape_b, of_b.placement())];
+            Cones::new(shapes, tolerance, options.precision)
         });
         let smaller = diagonals.into_iter().fold(f64::INFINITY, f64::min);
         let is_fast = contact_distance - options.contact_distance > FAST * smaller;
