@@ -8,8 +8,10 @@
 //!
 //! Two shafts that cross within a radius of each other are past the middle: their deepest contacts
 //! push along the own normals. Such a pair gets one direction for all of its pushes: of the normals
-//! of its contacts the one along which the bodies overlap least, measured by their extents (the
-//! separating axis test). Contacts act that push along it.
+//! of its contacts and their opposites, the one along which the bodies overlap least, measured by
+//! their extents (the separating axis test). Contacts act that push along it. Where there is none,
+//! as of two boxes that are nearly at one place, one is added at the mean of the places, as deep as
+//! this overlap.
 use std::collections::BTreeMap;
 
 use glam::DVec3;
@@ -20,14 +22,22 @@ use tesdf::collide::{Contact, InstanceId, Mode, Pose, Scene, Shape, ShapeId};
 /// or face, or along the direction of the pair.
 const COS_THETA: f64 = 0.3;
 
-/// A pair is past the middle when a contact pushes along the own normal that is deeper than this
-/// fraction of the deepest one that pushes against it.
+/// A pair is past the middle when no contact pushes against the own normal, or one that pushes along
+/// it is deeper than this fraction of the deepest of these.
 const PAST_THE_MIDDLE: f64 = 0.5;
 
 /// Maximum number of normals that are tried as directions of a pair.
 const TRIALS: usize = 32;
 
-/// The normals of the vertices, edges or faces of the meshes of a scene, and their vertices, in the
+/// What a pair of bodies that overlap deeply is pushed along: the direction of its first instance, and
+/// the overlap, m.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    direction: DVec3,
+    overlap: f64,
+}
+
+/// The normals of the vertices, edges or faces of the meshes and boxes of a scene, and their vertices, in the
 /// frames of the meshes.
 #[derive(Clone, Debug)]
 pub struct Surfaces(BTreeMap<ShapeId, Surface>);
@@ -43,7 +53,11 @@ impl Surfaces {
     /// The surfaces of `scene`, with the normals of the features that have contacts in a mode.
     pub fn new(scene: &Scene, mode: Mode) -> Self {
         let of_shape = |(id, shape): (ShapeId, &Shape)| {
-            let Shape::Mesh(asset) = shape else { return None };
+            let asset = match shape {
+                Shape::Mesh(asset) => asset,
+                Shape::Box { .. } => return Some((id, of_box(shape, mode))),
+                _ => return None,
+            };
             let normals = match mode {
                 Mode::Node => normals_of_vertices(asset),
                 Mode::Edge => {
@@ -79,16 +93,32 @@ impl Surfaces {
                 pushes.push((on_first(contact), -contact.distance, self.cosine(scene, contact)));
             }
         }
-        let directions: BTreeMap<[InstanceId; 2], Option<DVec3>> =
-            deep.iter().map(|(pair, pushes)| (*pair, self.direction(scene, *pair, pushes))).collect();
-        let acts = |contact: &&Contact| match directions.get(&pair(contact)) {
-            Some(direction) if contact.distance < 0.0 => match direction {
-                Some(direction) => direction.dot(on_first(contact)) > COS_THETA,
+        let ways: BTreeMap<[InstanceId; 2], Option<Way>> =
+            deep.iter().map(|(pair, pushes)| (*pair, self.way(scene, *pair, pushes))).collect();
+        let acts = |contact: &&Contact| match ways.get(&pair(contact)) {
+            Some(way) if contact.distance < 0.0 => match way {
+                Some(way) => way.direction.dot(on_first(contact)) > COS_THETA,
                 None => self.cosine(scene, contact) <= -COS_THETA,
             },
             _ => true,
         };
-        contacts.iter().filter(acts).copied().collect()
+        let mut acting: Vec<Contact> = contacts.iter().filter(acts).copied().collect();
+        for (of_pair, way) in ways {
+            let Some(Way { direction, overlap }) = way else { continue };
+            let is_of_pair = |c: &&Contact| pair(c) == of_pair && c.distance < 0.0;
+            if acting.iter().any(|c| is_of_pair(&c)) {
+                continue;
+            }
+            let places: Vec<DVec3> = contacts.iter().filter(is_of_pair).map(|c| c.point_a).collect();
+            let first = contacts.iter().find(is_of_pair).copied();
+            acting.extend(first.map(|first| {
+                let place = places.iter().sum::<DVec3>() / places.len() as f64;
+                let [instance_a, instance_b] = of_pair;
+                let (point_a, point_b, normal, distance) = (place, place, direction, -overlap);
+                Contact { point_a, point_b, normal, distance, instance_a, instance_b, ..first }
+            }));
+        }
+        acting
     }
 
     fn of(&self, scene: &Scene, instance: InstanceId) -> Option<(&Surface, Pose, f64)> {
@@ -96,8 +126,8 @@ impl Surfaces {
         Some((self.0.get(&instance.shape)?, instance.pose, instance.scale))
     }
 
-    /// The cosine between the normal of a contact and that of its vertex or face. Vertices and
-    /// faces of simple shapes are always opposed.
+    /// The cosine between the normal of a contact and that of its vertex or face. Planes and
+    /// rounded shapes are always opposed, and so are the edges of boxes.
     fn cosine(&self, scene: &Scene, contact: &Contact) -> f64 {
         let own = || {
             let (surface, pose, _) = self.of(scene, contact.instance_a)?;
@@ -106,9 +136,9 @@ impl Surfaces {
         own().map_or(-1.0, |normal: DVec3| normal.dot(contact.normal))
     }
 
-    /// The direction in which a pair that is past the middle pushes its first instance. `pushes`
-    /// are the directions, depths and cosines of its penetrating contacts.
-    fn direction(&self, scene: &Scene, pair: [InstanceId; 2], pushes: &[(DVec3, f64, f64)]) -> Option<DVec3> {
+    /// How a pair that is past the middle is pushed. `pushes` are the directions, depths and cosines
+    /// of its penetrating contacts.
+    fn way(&self, scene: &Scene, pair: [InstanceId; 2], pushes: &[(DVec3, f64, f64)]) -> Option<Way> {
         let deepest = |along: bool| {
             let of_side = pushes.iter().filter(|(.., cosine)| match along {
                 true => *cosine > COS_THETA,
@@ -117,15 +147,31 @@ impl Surfaces {
             of_side.map(|(_, depth, _)| *depth).fold(0.0, f64::max)
         };
         let (along, against) = (deepest(true), deepest(false));
-        if along <= PAST_THE_MIDDLE * against || along == 0.0 {
+        if against > 0.0 && along <= PAST_THE_MIDDLE * against {
             return None;
         }
         let [first, second] = pair.map(|instance| self.of(scene, instance));
         let (first, second) = (first?, second?);
-        let overlap = |d: DVec3| extent(first, -d) + extent(second, d);
-        let tried = pushes.iter().step_by(pushes.len().div_ceil(TRIALS)).map(|(d, ..)| (*d, overlap(*d)));
-        tried.min_by(|(_, o), (_, p)| o.total_cmp(p)).map(|(direction, _)| direction)
+        let tried = pushes.iter().step_by(pushes.len().div_ceil(TRIALS)).flat_map(|(d, ..)| [*d, -*d]);
+        let ways = tried.map(|direction| {
+            let overlap = extent(first, -direction) + extent(second, direction);
+            Way { direction, overlap }
+        });
+        ways.min_by(|x, y| x.overlap.total_cmp(&y.overlap))
     }
+}
+
+/// The surface of a box, with the normals of its corners or of the parts of its sides.
+fn of_box(shape: &Shape, mode: Mode) -> Surface {
+    let vertices: Vec<DVec3> = shape.nodes().into_iter().map(|(corner, _)| corner).collect();
+    let normals = match mode {
+        Mode::Node | Mode::Edge => vertices.iter().map(|corner| corner.signum().normalize()).collect(),
+        Mode::Face | Mode::Exact => {
+            let normal = |part: &Vec<DVec3>| (part[1] - part[0]).cross(part[2] - part[0]).normalize_or_zero();
+            shape.parts().0.iter().map(normal).collect()
+        }
+    };
+    Surface { normals, vertices }
 }
 
 /// How far a body extends from the origin along a direction.

@@ -327,12 +327,13 @@ impl Newton {
 
     /// The velocities that move the poses, and the velocities that the next step starts from.
     fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
-        let contacts = &self.surfaces.acting(self.system.scene(), contacts, |c| self.is_deep(c));
+        let all = contacts;
+        let contacts = &self.surfaces.acting(self.system.scene(), all, |c| self.is_deep(c));
         let found = self.gaps(step).find(contacts, &step.poses);
         let mut contact_rows: Vec<Row> = found.iter().map(|found| self.gaps(step).first_row(found)).collect();
         let joints = joint_rows(&self.gaps(step).bodies(), step.h);
         let rows = [contact_rows.as_slice(), &joints].concat();
-        step.deep = self.deep(step, contacts, &rows);
+        step.deep = self.deep(step, all, &rows);
         let deep = step.deep.clone();
         // A deep body that is pushed into another one must not kick it, so what is detected again
         // says nothing about deep bodies.
