@@ -62,10 +62,25 @@ pub struct StepReport {
     pub iterations: u32,
     /// Whether every solve reached its tolerance.
     pub converged: bool,
+    /// Number of equal parts into which the step was divided, because a body turns far in it.
+    pub parts: u32,
     /// Wall time of the detection.
     pub detection: Duration,
     /// Wall time of everything else.
     pub solution: Duration,
+}
+
+impl StepReport {
+    /// Adds what a later part of the same step did.
+    pub(crate) fn add(&mut self, later: &Self) {
+        self.detections += later.detections;
+        self.advances += later.advances;
+        self.islands = self.islands.max(later.islands);
+        self.iterations += later.iterations;
+        self.converged &= later.converged;
+        self.detection += later.detection;
+        self.solution += later.solution;
+    }
 }
 
 /// Why a step or a state is refused.

@@ -4,7 +4,8 @@ use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Pose, Scene,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Pose, Scene, Shape,
+    instance_pairs,
 };
 
 use super::NewtonOptions;
@@ -58,6 +59,12 @@ type Velocities = [Vec<Vector6<f64>>; 2];
 
 /// Maximum number of further detections in a step when bodies close faster than was foreseen.
 const MORE_LOOKS: u32 = 8;
+
+/// A step is divided so that no body that may meet another one turns by more than this in a part, rad.
+const MOST_TURN: f64 = 1.0;
+
+/// Maximum number of parts of a step.
+const MOST_PARTS: f64 = 1000.0;
 
 /// The two gaps of a row.
 #[derive(Clone, Copy)]
@@ -325,6 +332,65 @@ impl Newton {
         step.free.iter().zip(from).zip(to).map(way).fold(0.0, f64::max)
     }
 
+    /// Into how many equal parts a step is divided, so that no body that may meet another one turns
+    /// by more than [`MOST_TURN`] in a part. Balls may turn as they like.
+    fn parts(&self, time_step: f64) -> Result<u32, DynamicsError> {
+        let scene = self.system.scene();
+        let turns = |body: usize| {
+            let shape = scene.instance(self.system.bodies()[body].instance).map(|i| scene.shape(i.shape));
+            let is_ball = matches!(shape, Ok(Ok(Shape::Sphere { .. })));
+            let turn = time_step * self.system.states()[body].angular.length();
+            if is_ball { 0.0 } else { turn }
+        };
+        let turns: Vec<f64> = (0..self.sizes.len()).map(turns).collect();
+        if turns.iter().all(|turn| *turn <= MOST_TURN) {
+            return Ok(1);
+        }
+        let time = self.options.speculation * time_step;
+        let distance = self.collide.contact_distance + time * time_step * self.system.gravity.length();
+        let pairs = instance_pairs(scene, distance, time)?;
+        let bodies = pairs.iter().flat_map(|pair| [pair.first, pair.second]);
+        let most = bodies.filter_map(|id| Some(turns[self.system.body_of(id)?])).fold(0.0, f64::max);
+        Ok((most / MOST_TURN).ceil().clamp(1.0, MOST_PARTS) as u32)
+    }
+
+    /// One part of a step.
+    fn part(&mut self, time_step: f64) -> Result<StepReport, DynamicsError> {
+        let begin = Instant::now();
+        let mut step = self.begin(time_step);
+        // The detection must reach as far as the step can close, so it uses the velocities that
+        // wrenches give; gravity is in the contact distance. Contacts, motors and joints change
+        // them.
+        let mut ahead = self.system.states().to_vec();
+        let falling = pack(time_step * self.system.gravity, DVec3::ZERO);
+        let target: Vec<_> = step.target.iter().map(|v| v - falling).collect();
+        set_velocities(&mut ahead, &step.free, &target);
+        let mut look = self.look(&mut step, &ahead)?;
+        let [mut velocities, mut carried] = self.velocities(&mut step, look.contacts.as_slice())?;
+        for _ in 0..MORE_LOOKS {
+            if !self.look_on(&step, &look, &mut ahead, &velocities)? {
+                break;
+            }
+            let more = self.look(&mut step, &ahead)?;
+            if !look.extend(more, self.system.scene()) {
+                break;
+            }
+            // What an earlier minimisation did not reach is of no account.
+            step.report.converged = true;
+            [velocities, carried] = self.velocities(&mut step, look.contacts.as_slice())?;
+        }
+        let mut states = self.moved(&step, &velocities);
+        set_velocities(&mut states, &step.free, &carried);
+        self.system.set_states(states)?;
+        let mut report = step.report;
+        let found = look.contacts;
+        report.contacts = found.len();
+        report.deepest = found.iter().map(|c| c.distance).reduce(f64::min);
+        report.solution = begin.elapsed().saturating_sub(report.detection);
+        self.found = found;
+        Ok(report)
+    }
+
     /// The velocities that move the poses, and the velocities that the next step starts from.
     fn velocities(&mut self, step: &mut Step, contacts: &[Contact]) -> Result<Velocities, DynamicsError> {
         let all = contacts;
@@ -437,42 +503,26 @@ impl Dynamics for Newton {
     }
 
     fn step(&mut self, time_step: f64) -> Result<StepReport, DynamicsError> {
-        let begin = Instant::now();
         if !(time_step > 0.0 && time_step.is_finite()) {
             let expected = "a finite number of seconds, greater than 0";
             return Err(DynamicsError::Option { option: "time step", found: time_step, expected });
         }
-        let mut step = self.begin(time_step);
-        // The detection must reach as far as the step can close, so it uses the velocities that
-        // wrenches give; gravity is in the contact distance. Contacts, motors and joints change
-        // them.
-        let mut ahead = self.system.states().to_vec();
-        let falling = pack(time_step * self.system.gravity, DVec3::ZERO);
-        let target: Vec<_> = step.target.iter().map(|v| v - falling).collect();
-        set_velocities(&mut ahead, &step.free, &target);
-        let mut look = self.look(&mut step, &ahead)?;
-        let [mut velocities, mut carried] = self.velocities(&mut step, look.contacts.as_slice())?;
-        for _ in 0..MORE_LOOKS {
-            if !self.look_on(&step, &look, &mut ahead, &velocities)? {
-                break;
+        let parts = self.parts(time_step)?;
+        let states = self.system.states().to_vec();
+        let part = time_step / f64::from(parts);
+        let mut report = self.part(part)?;
+        let beginning = std::mem::take(&mut self.found);
+        for _ in 1..parts {
+            match self.part(part) {
+                Ok(next) => report.add(&next),
+                Err(error) => {
+                    self.system.set_states(states)?;
+                    return Err(error);
+                }
             }
-            let more = self.look(&mut step, &ahead)?;
-            if !look.extend(more, self.system.scene()) {
-                break;
-            }
-            // What an earlier minimisation did not reach is of no account.
-            step.report.converged = true;
-            [velocities, carried] = self.velocities(&mut step, look.contacts.as_slice())?;
         }
-        let mut states = self.moved(&step, &velocities);
-        set_velocities(&mut states, &step.free, &carried);
-        self.system.set_states(states)?;
-        let mut report = step.report;
-        let found = look.contacts;
-        report.contacts = found.len();
-        report.deepest = found.iter().map(|c| c.distance).reduce(f64::min);
-        report.solution = begin.elapsed().saturating_sub(report.detection);
-        self.found = found;
+        self.found = beginning;
+        report.parts = parts;
         Ok(report)
     }
 
