@@ -195,6 +195,8 @@ impl Dynamics for RapierEngine {
             contacts: self.contacts.len(),
             deepest: self.contacts.iter().map(|c| c.distance).reduce(f64::min),
             detections: 1,
+            advances: 0,
+            parts: 1,
             islands: 1,
             iterations: self.options.substeps as u32,
             converged: true,

@@ -82,28 +82,30 @@ pub fn pair_reduction(instances: &Instances, touching: &Touching, report: &Repor
     }
 }
 
-/// Contacts in the world, sorted by world, pair of instances, ordered pair, face, feature and cell.
+/// Contacts in the world, sorted by world, pair of instances, ordered pair, face, feature and cell;
+/// and the indices of their faces in both shapes.
 pub fn contacts(
     shapes: &[&Shape],
     instances: &Instances,
     mode: Mode,
     words: &[Words],
     rows: &[Row],
-) -> Vec<Contact> {
-    let mut found: Vec<((u32, u32, bool), Contact)> = words
+) -> (Vec<Contact>, Vec<[u32; 2]>) {
+    let mut found: Vec<((u32, u32, bool), Contact, [u32; 2])> = words
         .par_iter()
         .zip(rows)
         .map(|(words, row)| {
             let (a, b) = (words.a, words.b);
-            ((a.min(b), a.max(b), a > b), contact(shapes, instances, mode, words, row))
+            let faces = [words.face_a, words.face_b];
+            ((a.min(b), a.max(b), a > b), contact(shapes, instances, mode, words, row), faces)
         })
         .collect();
     // Instances are sorted by world and id. Outside of the cube, a face may have several parts
     // without a cell.
-    found.par_sort_unstable_by_key(|(pair, c)| {
+    found.par_sort_unstable_by_key(|(pair, c, _)| {
         (*pair, c.face_a, c.feature.a, c.tet_b, c.point_a.to_array().map(f64::to_bits))
     });
-    found.into_iter().map(|(_, contact)| contact).collect()
+    found.into_iter().map(|(_, contact, faces)| (contact, faces)).unzip()
 }
 
 /// Removes contacts that are no local minima over the surface. Returns their number.

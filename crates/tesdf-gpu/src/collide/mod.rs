@@ -18,6 +18,7 @@ mod stages;
 use std::collections::BTreeMap;
 
 use tesdf::Length;
+use tesdf::collide::internal::in_cones;
 use tesdf::collide::{
     CollideError, CollideOptions, Contacts, ContactsPer, HiddenOverlap, Mode, Reduction, Scene, Shape,
     ShapeId, Statistics, reduce_pairs,
@@ -293,7 +294,12 @@ impl Detector {
             }
             one_per_vertex(&shapes, instances, &mut words, &mut rows);
         }
-        let contacts = contacts(&shapes, instances, options.mode, &words, &rows);
+        let (mut contacts, faces) = contacts(&shapes, instances, options.mode, &words, &rows);
+        if parts(options) == Parts::Faces {
+            let all = contacts.len();
+            contacts = in_cones(scene, options, &contacts, &faces)?;
+            filtered += all - contacts.len();
+        }
         let reductions = self.reductions(instances, options.reduction)?;
         let (found, unconverged) = match options.reduction {
             Reduction::PerPair(_) => (counts.contacts as usize, counts.unconverged as usize),

@@ -213,7 +213,7 @@ impl Detector {
         let shapes: Vec<&Shape> =
             self.shape_ids.iter().map(|&id| scene.shape(id)).collect::<Result<_, CollideError>>()?;
         let (words, rows) = self.read_contacts(options)?;
-        let shown = contacts(&shapes, &instances, options.mode, &words, &rows);
+        let (shown, _) = contacts(&shapes, &instances, options.mode, &words, &rows);
         Ok(DeviceContacts { hidden: HiddenOverlap::not_shown(hidden, &shown), ..found })
     }
 

@@ -12,7 +12,7 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::field::ROUNDING;
-use super::{Contact, Placement, Shape};
+use super::{CollideError, CollideOptions, Contact, ContactsPer, InstanceId, Placement, Scene, Shape};
 use crate::TeSdf;
 use crate::geometry::Triangle;
 use crate::query::Precision;
@@ -29,6 +29,9 @@ const SAME: f64 = 1e-6;
 
 /// A ray is in a cone when it is nearer to it than this (rad).
 const NEAR: f64 = 1e-4;
+
+/// Maximum number of times that a direction is moved into one cone and then into the other one.
+const ALTERNATIONS: usize = 16;
 
 /// A place with more different normals is left as it is.
 const MOST: usize = 12;
@@ -93,6 +96,12 @@ impl<'a> Cones<'a> {
     /// The distance up to which two places are one, in the world's unit.
     pub fn near(&self) -> f64 {
         self.near
+    }
+
+    /// The error of the place of a contact at a distance: the distance of a point beside the nearest
+    /// one exceeds it by the square of the way over twice the distance.
+    pub fn place(&self, distance: f64) -> f64 {
+        self.near + (8.0 * self.tolerance * distance.abs()).sqrt()
     }
 
     /// A contact of a face with the normal that the cones allow, and its distance along that
@@ -169,7 +178,17 @@ impl<'a> Cones<'a> {
                     otherwise
                 }
             }
-            _ if is_apart => keep,
+            _ if is_apart => {
+                // The gradient of the exact place is in both cones.
+                let within = clamped(&opposite(&of_a), &of_b, normal);
+                let cosine = within.map_or(0.0, |n| n.dot(normal));
+                match within {
+                    Some(normal) if cosine > least_cosine() => {
+                        Some(Contact { normal, distance: distance * cosine, ..contact })
+                    }
+                    _ => keep,
+                }
+            }
             _ => {
                 // The mean is the same in both orders of a pair. The gradient, moved into the
                 // cones, is not: two such contacts would be a notch that locks.
@@ -183,6 +202,18 @@ impl<'a> Cones<'a> {
         }
     }
 
+    /// A contact of a face that keeps its distance and its points: its normal is that of `turned`
+    /// where the way from one point to the other is along it, as far as the place is known.
+    pub fn beside(&self, contact: Contact, turned: Option<Contact>) -> Contact {
+        let Contact { point_a, point_b, distance, .. } = contact;
+        let is_along = |normal: &DVec3| {
+            let way = point_a - point_b;
+            way.distance(distance * *normal) <= self.place(distance)
+        };
+        let normal = turned.map(|turned| turned.normal).filter(is_along).unwrap_or(contact.normal);
+        Contact { normal, ..contact }
+    }
+
     /// A contact of a ball or capsule of a radius, in the world, with faces of these normals. The
     /// gradient is exact there, because it begins at the core.
     fn of_round(&self, contact: Contact, of_a: &[DVec3], radius: f64) -> Option<Contact> {
@@ -190,10 +221,7 @@ impl<'a> Cones<'a> {
         let core = contact.point_b - radius * contact.normal;
         let height = m.dot(core - contact.point_a);
         let foot = core - height * m;
-        // The distance of a point beside the foot exceeds that of the foot by the square of the way
-        // over twice the height.
-        let place = self.near + (8.0 * self.tolerance * height.abs()).sqrt();
-        if height > 0.0 && foot.distance(contact.point_a) <= place {
+        if height > 0.0 && foot.distance(contact.point_a) <= self.place(height) {
             let (normal, point_b) = (-m, core - radius * m);
             return Some(Contact { point_a: foot, point_b, normal, distance: height - radius, ..contact });
         }
@@ -332,6 +360,19 @@ fn nearest_in_cone(rays: &[DVec3], v: DVec3) -> DVec3 {
     best.unwrap_or_default()
 }
 
+/// A direction that is in both cones, near to `v`; `None` where none is found.
+fn clamped(one: &[DVec3], other: &[DVec3], v: DVec3) -> Option<DVec3> {
+    let mut at = v;
+    for _ in 0..ALTERNATIONS {
+        let of_one = nearest_in_cone(one, at);
+        at = nearest_in_cone(other, of_one);
+        if at.distance(of_one) <= SAME {
+            return Some(at);
+        }
+    }
+    None
+}
+
 /// The direction perpendicular to two edges, each between two faces with these normals; `None` where
 /// they are parallel.
 fn crossing([a, b]: [&DVec3; 2], [c, d]: [&DVec3; 2]) -> Option<DVec3> {
@@ -372,9 +413,48 @@ fn common(one: &[DVec3], other: &[DVec3]) -> Vec<DVec3> {
     rays
 }
 
+/// Contacts found elsewhere, with the normals of their cones; of those without one, nothing where
+/// local minima are wanted. `faces` are the indices of their faces in both shapes. The contacts are
+/// those of whole faces, in the order of a detection.
+///
+/// # Errors
+/// [`CollideError::NoInstance`] for an instance that the scene lacks.
+pub fn in_cones(
+    scene: &Scene,
+    options: &CollideOptions,
+    contacts: &[Contact],
+    faces: &[[u32; 2]],
+) -> Result<Vec<Contact>, CollideError> {
+    let body = |id: InstanceId| {
+        let instance = scene.instance(id)?;
+        Ok((scene.shape(instance.shape)?, instance.placement()))
+    };
+    let is_minimum = options.contacts_per == ContactsPer::Minimum;
+    let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
+    let mut found = Vec::with_capacity(contacts.len());
+    let mut faces = faces.iter();
+    for run in contacts.chunk_by(|x, y| ids(x) == ids(y)) {
+        let mut of_pair = Vec::with_capacity(run.len());
+        let mut near = 0.0;
+        for order in run.chunk_by(|x, y| x.instance_a == y.instance_a) {
+            let bodies: [(&Shape, Placement); 2] = [body(order[0].instance_a)?, body(order[0].instance_b)?];
+            let diagonal = bodies[1].0.diagonal().min(f64::MAX) * bodies[1].1.scale;
+            let cones = Cones::new(bodies, options.tolerance.resolve(diagonal), Precision::F32);
+            near = cones.near();
+            for (contact, faces) in order.iter().zip(&mut faces) {
+                let turned = cones.of(*contact, *faces);
+                of_pair.extend(if is_minimum { turned } else { Some(cones.beside(*contact, turned)) });
+            }
+        }
+        let kept = if is_minimum { keep_different(&of_pair, near) } else { vec![true; of_pair.len()] };
+        found.extend(of_pair.into_iter().zip(kept).filter_map(|(c, keep)| keep.then_some(c)));
+    }
+    Ok(found)
+}
+
 /// Of contacts of one pair of instances that have the same place, normal and distance, in both
-/// orders, keeps the first: twins would carry twice the load of others. Returns the number of those
-/// left out. `contacts` are all of the pair, and `near` is [`Cones::near`].
+/// orders, keeps the first: twins would carry twice the load of others. `contacts` are all of the
+/// pair, and `near` is [`Cones::near`].
 pub fn keep_different(contacts: &[Contact], near: f64) -> Vec<bool> {
     let point = |k: usize| 0.5 * (contacts[k].point_a + contacts[k].point_b);
     let normal = |k: usize| {

@@ -78,6 +78,7 @@ mod why;
 pub mod internal {
     pub use super::ahead::{Ahead, Approach};
     pub use super::candidates::{count_faces, count_polygons};
+    pub use super::cones::in_cones;
     pub use super::field::ROUNDING;
     pub use super::found::kept_at_vertices;
     pub use super::greatest_minimum::greatest_minimum;

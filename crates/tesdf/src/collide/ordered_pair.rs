@@ -202,10 +202,10 @@ impl<'a> OrderedPair<'a> {
         }
         let contact = self.touching(part, minimum, ids);
         let Some(cones) = &self.cones else { return Ok(contact) };
-        match cones.of(contact, [candidate, minimum.value.position]) {
-            Some(turned) => Ok(turned),
-            None if self.options.contacts_per == ContactsPer::Minimum => Err(Dropped::OutOfCones),
-            None => Ok(contact),
+        let turned = cones.of(contact, [candidate, minimum.value.position]);
+        match self.options.contacts_per {
+            ContactsPer::Minimum => turned.ok_or(Dropped::OutOfCones),
+            ContactsPer::Cell | ContactsPer::Face => Ok(cones.beside(contact, turned)),
         }
     }
 
