@@ -53,6 +53,7 @@ print(f"the best one has {room.max() * 1e3:.3f} mm: tips at {np.round(tips[best]
 axis = 0.01 * hand[best, :3, 0]
 for name, f, velocity in zip(("left", "right"), fingers, (axis, -axis)):
     impact = scene.time_of_impact(f[best], things[0][best], velocity_a=[*velocity, 0, 0, 0], end=2.0)
+    assert impact is not None and impact.verdict == "impact"
     print(f"  the {name} finger touches after {impact.time:.3f} s at {np.round(1e3 * np.array(impact.point_b), 2)} mm")
     assert impact.time > 0
 assert 10 < len(free) < 1000 and room.min() > ROOM / 2

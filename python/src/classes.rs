@@ -4,6 +4,7 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use serde::Serialize;
+use tesdf::collide::{Clearance, TimeOfImpact};
 use tesdf::mesh::CheckReport;
 
 /// `Answers` of `tesdf.results`.
@@ -58,6 +59,33 @@ pub fn dict<'py>(py: Python<'py>, found: &impl Serialize) -> PyResult<Bound<'py,
 fn json(found: &impl Serialize) -> PyResult<String> {
     serde_json::to_string(found)
         .map_err(|e| PyValueError::new_err(format!("the report cannot be handed to Python: {e}")))
+}
+
+/// Fields of `tesdf.Impact`.
+#[derive(Serialize)]
+pub struct Impact<'a> {
+    #[serde(flatten)]
+    clearance: &'a Clearance,
+    verdict: &'static str,
+    time: Option<f64>,
+    free_until: f64,
+    iterations: u32,
+    touches: bool,
+}
+
+impl<'a> Impact<'a> {
+    /// The fields, with the clearance at the impact, or at the time up to which bodies are known
+    /// to be apart.
+    pub fn of(found: &TimeOfImpact, clearance: &'a Clearance) -> Self {
+        Self {
+            clearance,
+            verdict: found.verdict(),
+            time: found.impact().map(|impact| impact.time),
+            free_until: found.free_until(),
+            iterations: found.iterations(),
+            touches: found.impact().is_some(),
+        }
+    }
 }
 
 /// Fields of `tesdf.CheckReport`.

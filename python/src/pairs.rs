@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use tesdf::base::unit::is_same_unit;
 use tesdf::collide::{
-    self, Clearance, ClearanceOptions, CollideError, Impact, Instance, InstanceId, Motion, Pose, Shape,
+    self, Clearance, ClearanceOptions, CollideError, Instance, InstanceId, Motion, Pose, Shape, TimeOfImpact,
     TimeOfImpactOptions, clearance, time_of_impact,
 };
 use tesdf::glam::DVec3;
@@ -123,13 +123,19 @@ pub fn impacts<'py>(
         time_of_impact(scene, a, b, motion_a, motion_b, options)
     };
     let found = measured(py, pairs, measure)?;
-    let of = || found.iter().map(Option::as_ref);
+    let time = |found: &TimeOfImpact| match found {
+        TimeOfImpact::Impact(impact) => impact.time,
+        TimeOfImpact::Free { .. } => f64::INFINITY,
+        TimeOfImpact::Undecided(_) => f64::NAN,
+    };
     let clearances: Vec<Clearance> =
-        of().map(|impact| impact.map_or(APART, |impact| impact.clearance)).collect();
+        found.iter().map(|found| found.clearance().copied().unwrap_or(APART)).collect();
     columns(py, pairs, &clearances)?
-        .add("time", of().map(|impact| impact.map_or(f64::INFINITY, |impact| impact.time)))?
-        .add("iterations", of().map(|impact| impact.map_or(0, |impact: &Impact| impact.iterations)))?
-        .add("touches", of().map(|impact| impact.is_some_and(|impact| impact.touches)))?
+        .add("time", found.iter().map(time))?
+        .add("free_until", found.iter().map(TimeOfImpact::free_until))?
+        .add("iterations", found.iter().map(TimeOfImpact::iterations))?
+        .add("touches", found.iter().map(|found| found.impact().is_some()))?
+        .add("decided", found.iter().map(|found| !matches!(found, TimeOfImpact::Undecided(_))))?
         .build("Impacts")
 }
 

@@ -391,7 +391,9 @@ impl Scene {
     }
 
     /// The first time at which two moving instances touch: an Impact, or None if they stay apart
-    /// until the end. It is never too late: nothing is sampled.
+    /// until the end. It is never too late: nothing is sampled. An Impact whose verdict is
+    /// "undecided" has no time; the bodies are apart up to free_until, and what comes then is not
+    /// known.
     ///
     /// - velocity_a, velocity_b: [6], vx vy vz wx wy wz: velocity of the body's origin, and angular
     ///   velocity about it in radians. The velocities of the instances are not used.
@@ -401,7 +403,8 @@ impl Scene {
     /// - end: the motion is followed from time 0 to this time.
     /// - tolerance: bodies touch when they are at most this far apart, in the world's unit. None is
     ///   1e-6 of the smaller diagonal.
-    /// - iterations: largest number of steps. If it is used up, touches is False.
+    /// - iterations: largest number of steps of a pair of parts of the surfaces. If it is used up,
+    ///   the verdict is "undecided".
     #[pyo3(signature = (
         a, b, *, velocity_a = None, velocity_b = None, screw_a = None, screw_b = None, end = 1.0, tolerance = None,
         iterations = 1000
@@ -427,11 +430,14 @@ impl Scene {
             let [motion_a, motion_b] = motions;
             time_of_impact(scene, InstanceId(a), InstanceId(b), motion_a, motion_b, &options)
         })?;
-        found.map(|impact| classes::report(py, "Impact", &impact)).transpose()
+        let clearance = found.clearance();
+        let report = |clearance| classes::report(py, "Impact", &classes::Impact::of(&found, clearance));
+        clearance.map(report).transpose()
     }
 
     /// The first impacts of pairs of moving instances [P, 2], on all threads: Impacts, arrays with
-    /// a row for each pair, whose time is inf where the bodies stay apart until the end.
+    /// a row for each pair, whose time is inf where the bodies stay apart until the end, and NaN
+    /// where it is not known.
     ///
     /// velocities_a and velocities_b have the shape [P, 6], screws_a and screws_b [P, 8]; bodies
     /// without either rest. Otherwise as time_of_impact; an error names the row. Ctrl-C ends it

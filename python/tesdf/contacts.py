@@ -144,15 +144,19 @@ class Clearances(_Rows):
 @dataclass(frozen=True, eq=False, repr=False)
 class Impacts(Clearances):
     """First impacts of pairs of moving bodies: the clearances at their times. Where the bodies stay
-    apart until the end, `time` is inf, the other numbers NaN, and the ids 2^32 - 1."""
+    apart until the end, `time` is inf, the numbers of the clearance NaN, and the ids 2^32 - 1."""
 
     time: _Float
-    """[P] before this time the bodies are apart"""
+    """[P] of the impact; NaN where it is undecided"""
     iterations: _Id
-    """[P] number of steps taken"""
+    """[P] the most steps that a pair of parts of the surfaces took"""
     touches: npt.NDArray[np.bool_]
-    """[P] whether the bodies touch at `time`. False where the steps were used up: the motion is then
-    known to be free up to `time`"""
+    """[P] whether the bodies touch at `time`"""
+    free_until: _Float
+    """[P] before this time the bodies are apart"""
+    decided: npt.NDArray[np.bool_]
+    """[P] False where the steps were used up, or rounding is not small relative to the tolerance: what
+    comes after `free_until` is not known, and the clearance is that at this time"""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

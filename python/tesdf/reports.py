@@ -441,15 +441,20 @@ class Clearance:
 
 @dataclass(frozen=True)
 class Impact(Clearance):
-    """First impact of two moving bodies: the clearance at its time."""
+    """First impact of two moving bodies: the clearance at its time. If it is undecided, the clearance
+    at the time up to which they are known to be apart."""
 
-    time: float
-    """before this time the bodies are apart"""
+    time: Optional[float]
+    """of the impact. None if it is undecided"""
     iterations: int
-    """number of steps taken"""
+    """the most steps that a pair of parts of the surfaces took"""
     touches: bool
-    """whether the bodies touch at `time`. False when the steps were used up: the motion is then
-    known to be free up to `time`"""
+    """whether the bodies touch at `time`"""
+    verdict: str
+    """"impact"; or "undecided" when the steps were used up, or rounding is not small relative to the
+    tolerance"""
+    free_until: float
+    """before this time the bodies are apart"""
 
 
 @dataclass(frozen=True)

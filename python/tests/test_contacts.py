@@ -94,10 +94,12 @@ def test_measures_are_those_of_the_command(asset, file):
     away = ["--pose-a", " ".join(map(str, far))]
     velocity = ["--velocity-a", " ".join(map(str, [-x for x in motion]))]
     expected = command("toi", file, *away, *velocity, "--end", "9")
+    assert expected.pop("end") == 9
     found = tesdf.time_of_impact(asset, asset, pose_a=far, pose_b=LINKED, velocity_a=-np.array(motion), end=9)
     assert found.touches and 0 < found.time < 9 and json.loads(json.dumps(vars(found))) == expected
     screw = [0, 0, 0, 1, 0, 0, 2, -6]
     expected = command("toi", file, *away, "--screw-a", " ".join(map(str, screw)))
+    assert expected.pop("end") == 1
     found = tesdf.time_of_impact(asset, asset, pose_a=far, pose_b=LINKED, screw_a=screw)
     assert found.touches and json.loads(json.dumps(vars(found))) == expected
     [expected, _] = command("collide", file, "--why")
@@ -246,7 +248,12 @@ def test_time_of_impact_of_simple_shapes():
     assert both.time == pytest.approx(1, abs=1e-6)
     screw = scene.time_of_impact(0, floor, screw_a=[0, 0, 0, 0, 0, 1, 2 * np.pi, -8], end=1)
     assert screw.time == pytest.approx(0.5, abs=1e-6)
-    assert not scene.time_of_impact(0, floor, velocity_a=[0, 0, -8, 0, 0, 0], iterations=0).touches
+    unknown = scene.time_of_impact(0, floor, velocity_a=[0, 0, -8, 0, 0, 0], iterations=0)
+    assert (unknown.verdict, unknown.time, unknown.touches) == ("undecided", None, False)
+    assert 0 <= unknown.free_until < 0.5 and found.verdict == "impact" and found.free_until == found.time
+    several = scene.times_of_impact([[0, floor]] * 2, velocities_a=[[0, 0, -8, 0, 0, 0], [1, 0, 0, 0, 0, 0]], iterations=0)
+    assert np.isnan(several.time[0]) and several.time[1] == np.inf
+    assert several.decided.tolist() == [False, True] and several.free_until.tolist() == [unknown.free_until, 1]
     for keywords, error, text in (
         (dict(velocity_a=[1, 2, 3]), ValueError, r"velocity_a: .*\(3,\); expected shape \(6,\), vx vy vz wx wy wz"),
         (dict(screw_b=[1, 2, 3]), ValueError, r"screw_b: .*\(3,\); expected shape \(8,\), px py pz"),

@@ -38,6 +38,7 @@ def test_times_of_impact_are_those_of_each_pair(asset):
         else:
             assert (found.time[row], found.distance[row], tuple(found.point_b[row])) == (alone.time, alone.distance, alone.point_b)
             assert (found.iterations[row], found.touches[row]) == (alone.iterations, alone.touches)
+            assert (found.free_until[row], found.decided[row]) == (alone.time, True)
     screws = np.tile([0, 0, 0, 1, 0, 0, 2 * np.pi, 3.0], (4, 1))
     found = scene.times_of_impact(pairs, screws_b=-screws, velocities_a=np.zeros((4, 6)))
     alone = scene.time_of_impact(0, 1, screw_b=-screws[0])

@@ -1,9 +1,9 @@
 //! `tesdf toi A.tesdf B.tesdf`: the time of impact of two moving bodies.
 use serde::Serialize;
 use tesdf::Length;
-use tesdf::collide::{Impact, Motion, TimeOfImpactOptions, time_of_impact};
+use tesdf::collide::{Clearance, Motion, TimeOfImpact, TimeOfImpactOptions, time_of_impact};
 
-use crate::clearance;
+use crate::clearance::rows as clearance_rows;
 use crate::collide::Bodies;
 use tesdf_terminal::parse;
 use tesdf_terminal::report::{self, Failure, Outcome};
@@ -34,20 +34,29 @@ pub struct Args {
     /// smaller body's diagonal]
     #[arg(long, value_name = "L", value_parser = parse::number, allow_hyphen_values = true)]
     pub tolerance: Option<f64>,
-    /// Maximum number of steps
+    /// Maximum number of steps of a pair of parts of the surfaces
     #[arg(long, value_name = "N", default_value_t = TimeOfImpactOptions::default().iterations)]
     pub iterations: u32,
-    /// Print the result as a JSON object; its `time` is null when the bodies do not touch
+    /// Print the result as a JSON object; its `verdict` is impact, free or undecided, and its `time`
+    /// is null when the bodies do not touch or it is not known
     #[arg(long)]
     pub json: bool,
 }
 
 /// The output of `--json`.
 #[derive(Serialize)]
-#[serde(untagged)]
-enum Json {
-    Impact(Impact),
-    None { time: Option<f64>, end: f64 },
+struct Json {
+    verdict: &'static str,
+    /// Of the impact.
+    time: Option<f64>,
+    /// Up to this time, the bodies are apart.
+    free_until: f64,
+    end: f64,
+    touches: bool,
+    iterations: u32,
+    /// At the impact, or where the verdict is undecided.
+    #[serde(flatten)]
+    clearance: Option<Clearance>,
 }
 
 /// Prints the time at which two bodies first touch.
@@ -63,23 +72,36 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     let motion_a = args.screw_a.or(args.velocity_a).unwrap_or_default();
     let motion_b = args.screw_b.or(args.velocity_b).unwrap_or_default();
     let (scene, [a, b]) = args.bodies.scene()?;
-    let impact = time_of_impact(&scene, a, b, motion_a, motion_b, &options).map_err(Failure::new)?;
+    let found = time_of_impact(&scene, a, b, motion_a, motion_b, &options).map_err(Failure::new)?;
     if args.json {
-        report::json(&impact.map_or(Json::None { time: None, end: args.end }, Json::Impact))?;
+        report::json(&Json {
+            verdict: found.verdict(),
+            time: found.impact().map(|impact| impact.time),
+            free_until: found.free_until(),
+            end: args.end,
+            touches: found.impact().is_some(),
+            iterations: found.iterations(),
+            clearance: found.clearance().copied(),
+        })?;
         return Ok(Outcome::Good);
     }
-    let Some(impact) = impact else {
-        report::text(&format!("no impact up to time {}\n", args.end))?;
-        return Ok(Outcome::Good);
+    let (time, clearance) = match &found {
+        TimeOfImpact::Free { end, .. } => {
+            report::text(&format!("no impact up to time {end}\n"))?;
+            return Ok(Outcome::Good);
+        }
+        TimeOfImpact::Impact(impact) => {
+            let what = if impact.time == 0.0 { "at the start" } else { "they touch" };
+            (("time", format!("{:e} ({what})", impact.time)), impact.clearance)
+        }
+        TimeOfImpact::Undecided(free) => {
+            let what = "what comes then is not known; try a larger --iterations or --tolerance";
+            (("free up to", format!("{:e} ({what})", free.time)), free.clearance)
+        }
     };
-    let what = match impact {
-        Impact { touches: false, .. } => "free up to this time; a larger --iterations continues",
-        Impact { time: 0.0, .. } => "at the start",
-        _ => "they touch",
-    };
-    let mut rows = vec![("time", format!("{:e} ({what})", impact.time))];
-    rows.extend(clearance::rows(&impact.clearance, [a, b]));
-    rows.push(("steps", impact.iterations.to_string()));
+    let mut rows = vec![time];
+    rows.extend(clearance_rows(&clearance, [a, b]));
+    rows.push(("steps", found.iterations().to_string()));
     report::table(&rows)?;
     Ok(Outcome::Good)
 }

@@ -55,14 +55,44 @@ fn time_of_impact_of_two_cubes() {
     assert!(time <= 1.0 && time > 1.0 - 1e-6, "{hit}");
     assert!(hit["distance"].as_f64().unwrap() >= 0.0 && hit["touches"] == true, "{hit}");
     assert_eq!(hit["normal"][2], 1.0);
+    assert_eq!(
+        (&hit["verdict"], &hit["free_until"], &hit["end"]),
+        (&"impact".into(), &hit["time"], &2.0.into())
+    );
     // The screw motion moves the body down by 4 per turn, and one turn takes a time of 2π.
     let screwed = toi(&["--screw-a", "1 1 0 0 0 -1 1 4", "--end", "9"]);
     let time = screwed["time"].as_f64().unwrap();
     assert!((time - 0.75 * std::f64::consts::TAU).abs() < 1e-5, "{screwed}");
     let miss = toi(&["--velocity-a", "0 0 -2 0 0 0"]);
-    assert_eq!(miss, serde_json::json!({"time": null, "end": 1.0}));
+    let expected = serde_json::json!({
+        "verdict": "free", "time": null, "free_until": 1.0, "end": 1.0, "touches": false, "iterations": 0,
+    });
+    assert_eq!(miss, expected);
+    // Past each other at a gap of 1e-4.
+    let past = ["--velocity-a", "20 0 0 0 0 0", "--velocity-b", "0 0 2.9999 0 0 0"];
+    let free = toi(&past);
+    assert_eq!((&free["verdict"], &free["time"]), (&"free".into(), &Value::Null), "{free}");
+    assert!(free["iterations"].as_u64().unwrap() < 20, "{free}");
+    let unknown = toi(&[
+        "--velocity-a",
+        "0 0 -2 0.3 0 0.2",
+        "--velocity-b",
+        "0 0 1 0 0 0",
+        "--end",
+        "2",
+        "--iterations",
+        "1",
+    ]);
+    assert_eq!((&unknown["verdict"], &unknown["time"]), (&"undecided".into(), &Value::Null), "{unknown}");
+    assert_eq!((&unknown["touches"], &unknown["iterations"]), (&false.into(), &1.into()));
+    let until = unknown["free_until"].as_f64().unwrap();
+    assert!(until > 0.0 && until < 1.0 && unknown["distance"].as_f64().unwrap() > 1e-6, "{unknown}");
     let text = folder.good(&["toi", "c.tesdf", "c.tesdf", "--pose-a", "0 0 5 0 0 0 1"]);
     assert_eq!(text, "no impact up to time 1\n");
+    let spin = ["toi", "c.tesdf", "c.tesdf", "--pose-a", "0 0 5 0 0 0 1", "--velocity-a", "0 0 -9 0 1 0"];
+    let text = folder.good(&[&spin[..], &["--iterations", "0"]].concat());
+    assert!(text.contains("free up to") && text.contains("not known; try a larger --iterations"), "{text}");
+    assert!(folder.good(&spin).contains("(they touch)"));
     let both = ["toi", "c.tesdf", "c.tesdf", "--velocity-a", "0 0 0 0 0 0", "--screw-a", "0 0 0 0 0 1 1 1"];
     assert_eq!(folder.tesdf(&both).0, Some(2));
 }

@@ -19,8 +19,8 @@
 //!   them beside the contacts.
 //! - [`coarse_contacts`]: faces that touch between their vertices, where the mode node can miss it.
 //! - [`clearance`](clearance()): the signed distance between two instances, with witness points.
-//! - [`time_of_impact`](time_of_impact()): the time at which two moving instances first touch;
-//!   never too late.
+//! - [`time_of_impact`](time_of_impact()): the time at which two moving instances first touch,
+//!   or that they stay apart; never too late.
 //! - [`why`](why()): why a contact is present or missing.
 //!
 //! In each contact, *a* is the body that has the face (or node), and *b* is the body whose signed
@@ -40,6 +40,7 @@ mod error;
 mod few;
 mod field;
 mod field_value;
+mod first_touch;
 mod found;
 mod greatest_minimum;
 mod hidden;
@@ -52,9 +53,11 @@ mod least;
 mod local_minima;
 mod middle;
 mod motion;
+mod moving;
 mod narrow;
 mod options;
 mod ordered_pair;
+mod parting;
 mod patches;
 mod piece;
 mod polygon;
@@ -110,5 +113,5 @@ pub use reduce::{reduce_pairs, wrench_error};
 pub use scene::{Groups, Instance, Scene, Velocity};
 pub use shape::Shape;
 pub use shape_ray::ShapeHit;
-pub use time_of_impact::{Impact, TimeOfImpactOptions, time_of_impact};
+pub use time_of_impact::{FreeUntil, Impact, TimeOfImpact, TimeOfImpactOptions, time_of_impact};
 pub use why::{BroadVerdict, PairVerdict, PartReport, PolygonReport, PolygonVerdict, WhyReport, why};

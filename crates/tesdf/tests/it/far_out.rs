@@ -219,14 +219,14 @@ fn poses_far_out_have_no_contacts_or_are_refused() {
                 let motion = Motion::Linear { velocity: towards };
                 let options = TimeOfImpactOptions { end: 10.0, ..TimeOfImpactOptions::default() };
                 match time_of_impact(&scene, ids[1], ids[0], motion, Motion::Rest, &options) {
-                    Ok(Some(impact)) => {
-                        assert!(
-                            impact.time.is_finite() && impact.clearance.distance.is_finite(),
-                            "{impact:?}"
-                        );
-                        assert!((impact.time * speed / r - 1.0).abs() < 1e-3, "{r} {speed}: {impact:?}");
+                    // Far out, rounding of the places is more than the tolerance.
+                    Ok(found) if found.impact().is_some() || r > 1e6 => {
+                        let distance = found.clearance().expect("they meet").distance;
+                        let time = found.free_until();
+                        assert!(time.is_finite() && distance.is_finite(), "{found:?}");
+                        assert!((time * speed / r - 1.0).abs() < 1e-3, "{r} {speed}: {found:?}");
                     }
-                    Ok(None) => panic!("{r} {speed}: they meet"),
+                    Ok(found) => panic!("{r} {speed}: {found:?}"),
                     Err(e) => {
                         assert!(speed > 1e100 && e.to_string().contains("up to 1e50"), "{r} {speed}: {e}")
                     }

@@ -118,8 +118,10 @@ fn a_sheet_and_a_box_have_the_clearance_and_impact_of_formulas() {
             let (still, down) =
                 (Motion::Linear { velocity: Velocity::default() }, Motion::Linear { velocity: down });
             let options = TimeOfImpactOptions { end: 1.0, ..TimeOfImpactOptions::default() };
-            let impact =
-                time_of_impact(&scene, a, b, still, down, &options).expect("an answer").expect("an impact");
+            let impact = *time_of_impact(&scene, a, b, still, down, &options)
+                .expect("an answer")
+                .impact()
+                .expect("an impact");
             assert!((impact.time - 0.275).abs() < 1e-4, "{impact:?}");
             let options = CollideOptions { contact_distance: 0.6, ..CollideOptions::default() };
             let contacts = detect(&scene, &options).expect("contacts");
@@ -251,7 +253,7 @@ fn a_box_in_a_void_has_contacts_clearance_and_impact_of_formulas() {
         let right = Motion::Linear { velocity: Velocity { linear: DVec3::X, angular: DVec3::ZERO } };
         let options = TimeOfImpactOptions::default();
         let impact = time_of_impact(&scene, moved, walls, right, Motion::Rest, &options);
-        let impact = impact.expect("an answer").expect("an impact");
+        let impact = *impact.expect("an answer").impact().expect("an impact");
         assert!((impact.time - 0.05).abs() < 1e-5, "{impact:?}");
         for mode in [Mode::Node, Mode::Edge, Mode::Face, Mode::Exact] {
             let contacts_per = ContactsPer::Face;
