@@ -1,11 +1,11 @@
 //! A moving body, and the parts of its surface at a time: nodes of its face tree and faces.
 use glam::{DMat3, DVec3, Vec3};
 
+use super::clearance::Body;
 use super::motion::{Motion, Twist};
 use super::simple::Simple;
 use super::{CollideError, Placement, Shape};
 use crate::asset::layout::TreeChild;
-use crate::collide::clearance::Body;
 use crate::geometry::Triangle;
 
 /// A part of a surface.
