@@ -119,7 +119,8 @@ class RepairReport:
     welded_vertices: tuple[tuple[int, int], ...]
     """merged vertices, each with the vertex that replaces it"""
     collapsed_faces: tuple[int, ...]
-    """faces that were removed because two of their corners are equal"""
+    """faces that were removed because two of their corners are equal, or because they have no area and
+    stand out of the surface"""
     duplicate_faces: tuple[tuple[int, int], ...]
     """faces that were removed because they repeat another face, with that face"""
     split_edges: tuple[SplitEdge, ...]

@@ -175,6 +175,36 @@ fn a_mesh_is_repaired_while_it_is_encoded() {
 }
 
 #[test]
+fn a_face_without_area_that_stands_out_is_no_surface_where_it_is_repaired() {
+    let folder = Folder::new();
+    // The last face runs from a corner to a point above the cube and back.
+    folder.write("hair.obj", format!("{VERTICES}v 1 1 50\n{FACES}f 7 9 7\n"));
+    folder.write("p.csv", "x,y,z\n1,1,50\n");
+    let distance = |more: &[&str]| {
+        let (code, _, err) =
+            folder.tesdf(&[&["encode", "hair.obj", "-o", "a.tesdf", "--preset", "fast"], more].concat());
+        assert_eq!(code, Some(0), "{err}");
+        let out = folder.good(&["query", "a.tesdf", "--points", "p.csv"]);
+        let answer = out.lines().nth(1).expect("an answer");
+        (answer.split(',').nth(3).expect("a distance").parse::<f64>().expect("a number"), err)
+    };
+    let (as_it_is, err) = distance(&[]);
+    assert!(as_it_is.abs() < 1e-6, "{as_it_is}");
+    assert!(err.contains("stands out of the surface, and distances refer to it, too"), "{err}");
+    let (boundary, err) = distance(&["--surface", "boundary"]);
+    assert!((boundary - 48.0).abs() < 1e-4 && err.contains("and is left out of it"), "{boundary} {err}");
+    let (repaired, err) = distance(&["--repair", "auto"]);
+    assert!((repaired - 48.0).abs() < 1e-4 && !err.contains("stands out"), "{repaired} {err}");
+    assert!(err.contains("note: repaired as by `tesdf repair`; 1 face dropped"), "{err}");
+    // The command for repairs does the same.
+    folder.good(&["repair", "hair.obj", "--auto", "-o", "r.ply"]);
+    let (_, out, _) = folder.tesdf(&["check", "r.ply"]);
+    assert!(out.ends_with("ok: the inside is well defined\n"), "{out}");
+    let (_, out, _) = folder.tesdf(&["check", "hair.obj"]);
+    assert!(out.contains("face 12 has two equal corners (6, 8, 6); it stands out of the surface"), "{out}");
+}
+
+#[test]
 fn many_meshes_are_repaired_while_they_are_encoded() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path("meshes")).unwrap();

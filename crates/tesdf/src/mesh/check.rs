@@ -5,6 +5,7 @@ use serde::Serialize;
 use crate::base::InsideRule;
 
 use super::count::count;
+use super::hairs::{COUNTS, hairs, tell_of_hairs};
 use super::{Defect, DefectKind, Severity, Topology, TriangleMesh};
 
 mod edges;
@@ -16,7 +17,7 @@ mod regions;
 mod t_junctions;
 mod winding;
 
-pub(crate) use faces::face_flaws;
+pub(crate) use faces::{face_flaws, has_no_area};
 pub(crate) use intersections::self_intersections;
 pub(crate) use range::{coordinate_in_range, out_of_range};
 pub(crate) use t_junctions::{TJunctions, t_junctions};
@@ -110,7 +111,9 @@ pub fn check(mesh: &TriangleMesh) -> CheckReport {
 /// [`Generalized`](InsideRule::Generalized) and [`Sheet`](InsideRule::Sheet) take any mesh whose
 /// coordinates are in the accepted range. All other defects are warnings then.
 pub fn check_for(mesh: &TriangleMesh, rule: InsideRule) -> CheckReport {
-    check_and_survey(mesh, rule).0
+    let mut report = check_and_survey(mesh, rule).0;
+    tell_of_hairs(&mut report.defects, &hairs(mesh.vertices(), mesh.faces()), COUNTS);
+    report
 }
 
 /// As [`check_for`], with the winding numbers on the sides of all faces, where they were found.

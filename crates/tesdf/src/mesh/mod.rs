@@ -2,6 +2,7 @@
 mod check;
 mod count;
 mod defect;
+mod hairs;
 mod other_rules;
 mod polygon;
 mod presented;

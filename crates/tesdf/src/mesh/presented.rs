@@ -57,12 +57,13 @@ enum Faces {
 
 impl Presentation {
     /// `winding` is the range of winding numbers, and `survey` those of all sides of faces, where
-    /// they are known.
+    /// they are known. `hairs`: the faces without area that stand out.
     pub fn new(
         mesh: &TriangleMesh,
         inside: Inside,
         winding: Option<[i32; 2]>,
         survey: Option<Survey>,
+        hairs: &[u32],
     ) -> Self {
         let Inside { rule, surface } = inside;
         let all = |telling| Self { telling, faces: Faces::All, is_simple: true, partly: Vec::new() };
@@ -88,7 +89,7 @@ impl Presentation {
         let classes = survey.classes(rule);
         let kept: Vec<(u32, bool)> = match surface {
             SurfaceFaces::All => (0..).zip(&classes).map(|(f, c)| (f, is_inward(*c))).collect(),
-            SurfaceFaces::Boundary => boundary(mesh, &classes),
+            SurfaceFaces::Boundary => boundary(mesh, &classes, hairs),
         };
         // A face without area is not known, and changes no winding number.
         let is_whole = |&(f, _): &(u32, bool)| {
@@ -172,6 +173,14 @@ impl Presentation {
         Ok(Presented { mesh, ids, telling: *telling, sign_faces, is_simple })
     }
 
+    /// Whether a face of the mesh is a face of the surface.
+    pub fn has_face(&self, face: u32) -> bool {
+        match &self.faces {
+            Faces::All => true,
+            Faces::Some(some) => some.iter().any(|(f, _)| *f == face),
+        }
+    }
+
     /// A warning where faces lie only partly between inside and outside.
     pub fn partly_buried(&self, mesh: &TriangleMesh) -> Option<Defect> {
         let first = *self.partly.first()?;
@@ -194,8 +203,8 @@ fn is_inward(class: FaceClass) -> bool {
 }
 
 /// The faces that are not buried, and whether each looks inward. A face of which nothing is known
-/// stays when it has a vertex of another face that stays.
-fn boundary(mesh: &TriangleMesh, classes: &[FaceClass]) -> Vec<(u32, bool)> {
+/// stays when it has a vertex of another face that stays, unless it stands out of the surface.
+fn boundary(mesh: &TriangleMesh, classes: &[FaceClass], hairs: &[u32]) -> Vec<(u32, bool)> {
     let mut used = vec![false; mesh.vertices().len()];
     let known = |c: FaceClass| !matches!(c, FaceClass::Buried | FaceClass::Unknown);
     for (corners, _) in mesh.faces().iter().zip(classes).filter(|(_, c)| known(**c)) {
@@ -203,7 +212,10 @@ fn boundary(mesh: &TriangleMesh, classes: &[FaceClass]) -> Vec<(u32, bool)> {
     }
     let stays = |&(face, class): &(u32, &FaceClass)| match class {
         FaceClass::Buried => false,
-        FaceClass::Unknown => mesh.faces()[face as usize].iter().any(|&v| used[v as usize]),
+        FaceClass::Unknown => {
+            hairs.binary_search(&face).is_err()
+                && mesh.faces()[face as usize].iter().any(|&v| used[v as usize])
+        }
         _ => true,
     };
     (0..).zip(classes).filter(stays).map(|(f, c)| (f, is_inward(*c))).collect()

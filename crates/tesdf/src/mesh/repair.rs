@@ -1,8 +1,11 @@
+use std::collections::HashSet;
+
 use glam::DVec3;
 
 use super::{
     MeshError, Severity, TriangleMesh, check,
     check::out_of_range,
+    hairs::hairs,
     topology::{Topology, has_repeated_corner},
     weld::weld_within,
 };
@@ -50,10 +53,11 @@ pub enum RepairError {
     OutOfRange(String),
     /// No face is left.
     #[error(
-        "no face is left: {collapsed} of {faces} faces have two equal corners; use a smaller weld tolerance, if any"
+        "no face is left: {collapsed} of {faces} faces have two equal corners or stand out without area; use a smaller weld tolerance, if any"
     )]
     NoFaceLeft {
-        /// Faces dropped because two of their corners are equal.
+        /// Faces dropped because two of their corners are equal, or because they have no area and
+        /// stand out.
         collapsed: usize,
         /// Faces of the input mesh.
         faces: usize,
@@ -78,7 +82,7 @@ struct Draft {
 ///
 /// The steps, in this order:
 /// - Merge vertices within the weld tolerance, if one is given.
-/// - Drop faces with two equal corners.
+/// - Drop faces with two equal corners, and other faces without area that stand out of the surface.
 /// - Drop faces that repeat another face with the same orientation. Duplicates stay when the mesh
 ///   is closed only with them, for example where a face is there twice and once reversed.
 /// - Split faces at vertices that lie on their open edges. A collinear face vanishes when nothing
@@ -154,8 +158,10 @@ fn join(mesh: &TriangleMesh, options: &RepairOptions) -> Result<(Draft, RepairRe
     if let Some(tolerance) = options.weld_tolerance {
         report.welded_vertices = draft.weld(tolerance);
     }
-    let collapsed = draft.retain(|_, corners| !has_repeated_corner(corners));
-    report.collapsed_faces = collapsed;
+    let of_hairs = hairs(&draft.vertices, &draft.faces).into_iter();
+    let of_hairs: HashSet<u32> = of_hairs.map(|face| draft.origin[face as usize]).collect();
+    report.collapsed_faces =
+        draft.retain(|origin, corners| !has_repeated_corner(corners) && !of_hairs.contains(&origin));
     if draft.faces.is_empty() {
         let (collapsed, faces) = (report.collapsed_faces.len(), mesh.faces().len());
         return Err(RepairError::NoFaceLeft { collapsed, faces });

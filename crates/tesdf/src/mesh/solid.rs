@@ -5,8 +5,11 @@ use std::path::{Path, PathBuf};
 use super::count::count;
 use super::{
     AutoRepaired, CheckReport, Defect, DefectKind, LoadReport, LoadedMesh, MeshError, ReadError,
-    RepairOptions, Severity, Survey, TriangleMesh, check_and_survey, other_rules, presented::Presentation,
-    presented::Presented, read, repair_auto,
+    RepairOptions, Severity, Survey, TriangleMesh, check_and_survey,
+    hairs::{COUNTS, LEFT_OUT, hairs, tell_of_hairs},
+    other_rules,
+    presented::{Presentation, Presented},
+    read, repair_auto,
 };
 use crate::base::{Inside, InsideRule};
 
@@ -134,7 +137,11 @@ impl SolidMesh {
     fn checked(mesh: TriangleMesh, inside: Inside, report: CheckReport, survey: Option<Survey>) -> Self {
         let simple = report.is_simple();
         let (mut warnings, winding) = (report.defects, report.winding);
-        let presentation = Presentation::new(&mesh, inside, winding, survey);
+        let hairs = hairs(mesh.vertices(), mesh.faces());
+        let presentation = Presentation::new(&mesh, inside, winding, survey, &hairs);
+        // The presentation has all of them or none.
+        let are_left_out = hairs.first().is_some_and(|&face| !presentation.has_face(face));
+        tell_of_hairs(&mut warnings, &hairs, if are_left_out { LEFT_OUT } else { COUNTS });
         warnings.extend(presentation.partly_buried(&mesh));
         Self { mesh, warnings, simple, inside, presentation }
     }
@@ -149,8 +156,8 @@ impl SolidMesh {
         self.presentation.of(&self.mesh, self.simple)
     }
 
-    /// As [`with_inside`](Self::with_inside). A mesh that is refused is repaired first, by
-    /// [`repair_auto`](super::repair_auto()). Returns what was changed as well, or `None` when the
+    /// As [`with_inside`](Self::with_inside). A mesh that is refused, or has faces without area that
+    /// stand out of the surface, is repaired first, by [`repair_auto`](super::repair_auto()). Returns what was changed as well, or `None` when the
     /// mesh is a solid as it is.
     ///
     /// # Errors
@@ -175,16 +182,19 @@ impl SolidMesh {
     /// ```
     pub fn repaired(mesh: TriangleMesh, inside: Inside) -> Result<(Self, Option<AutoRepaired>), NotSolid> {
         let (report, survey) = check_and_survey(&mesh, inside.rule);
-        if report.encodable {
+        let is_clean = !inside.rule.needs_closed() || hairs(mesh.vertices(), mesh.faces()).is_empty();
+        if report.encodable && is_clean {
             return Ok((Self::checked(mesh, inside, report, survey), None));
         }
         match repair_auto(&mesh) {
-            Ok(Some(found)) => {
+            Ok(Some(found)) if found.options.is_some() || !report.encodable => {
                 let solid = Self::with_inside(found.repaired.mesh.clone(), inside)?;
                 let is_changed = found.options.is_some();
                 Ok((solid, is_changed.then_some(found)))
             }
-            Ok(None) | Err(_) => Err(NotSolid::new(&mesh, report, None)),
+            // Faces without area that no repair takes away.
+            _ if report.encodable => Ok((Self::checked(mesh, inside, report, survey), None)),
+            _ => Err(NotSolid::new(&mesh, report, None)),
         }
     }
 

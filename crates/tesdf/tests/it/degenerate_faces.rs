@@ -9,13 +9,14 @@ use crate::support::reference::Reference;
 use crate::support::shapes::{FAMILIES, Family, Shape};
 use proptest::prelude::*;
 use tesdf::TeSdf;
+use tesdf::base::{Inside, InsideRule, SurfaceFaces};
 use tesdf::collide::{
     ClearanceOptions, CollideOptions, Instance, InstanceId, Mode, Pose, Scene, Shape as Body, clearance,
     detect,
 };
 use tesdf::encode::{EncodeOptions, Encoder, Preset};
 use tesdf::glam::DVec3;
-use tesdf::mesh::{SolidMesh, TriangleMesh};
+use tesdf::mesh::{Defect, Severity, SolidMesh, TriangleMesh, check, repair_auto};
 use tesdf::query::Precision;
 use tesdf::verify::{VerifyOptions, verify};
 
@@ -288,4 +289,64 @@ proptest! {
         let shift = 0.4 * solid.mesh().diagonal() * Random(seed).in_cube();
         check_contacts(&Arc::new(asset), &solid, shift)?;
     }
+}
+
+/// Faces without area that stand out of a cube, with the vertices they add.
+fn hairs() -> Vec<(Vec<DVec3>, Vec<[u32; 3]>)> {
+    let far = DVec3::new(0.0, 0.0, 3.0);
+    vec![
+        // From a corner to a point far from the cube.
+        (vec![far], vec![[7, 8, 7]]),
+        // A point on its own.
+        (vec![far], vec![[8, 8, 8]]),
+        // Three corners on a line, there and back.
+        (vec![far, far + DVec3::X, far + 2.0 * DVec3::X], vec![[8, 9, 10], [10, 9, 8]]),
+        (vec![far, DVec3::new(0.5, 0.5, 2.0)], vec![[7, 9, 8], [8, 9, 7]]),
+    ]
+}
+
+fn with_hair((more, faces): (Vec<DVec3>, Vec<[u32; 3]>)) -> TriangleMesh {
+    let (vertices, cube) = cube();
+    TriangleMesh::new([vertices, more].concat(), [cube, faces].concat()).expect("valid ids")
+}
+
+#[test]
+fn faces_without_area_that_stand_out_are_left_out_where_they_are_no_surface() {
+    let at = DVec3::new(0.0, 0.0, 3.0);
+    let distance = |solid: &SolidMesh| {
+        Encoder::new().preset(Preset::Fast).encode(solid).expect("it encodes").signed_distance(at)
+    };
+    let tells = |warnings: &[Defect], what: &str| {
+        let has = |d: &Defect| d.severity == Severity::Warning && d.message.ends_with(what);
+        assert!(warnings.iter().any(has), "{what}: {warnings:?}");
+    };
+    let (left_out, counts) =
+        ("stands out of the surface, and is left out of it", "and distances refer to it, too");
+    for (k, hair) in hairs().into_iter().enumerate() {
+        let mesh = with_hair(hair);
+        // As it is, the faces count, and a warning says so.
+        tells(&check(&mesh).defects, counts);
+        let solid = SolidMesh::new(mesh.clone()).expect("a solid");
+        tells(solid.warnings(), counts);
+        assert!(distance(&solid) < 1e-6, "{k}");
+        for rule in [InsideRule::Winding, InsideRule::Nonzero, InsideRule::Odd] {
+            let inside = Inside { rule, surface: SurfaceFaces::Boundary };
+            let solid = SolidMesh::with_inside(mesh.clone(), inside).expect("a solid");
+            assert!((distance(&solid) - 2.0).abs() < 1e-6, "{k} {rule:?}: {}", distance(&solid));
+            tells(solid.warnings(), left_out);
+        }
+        let (solid, changes) = SolidMesh::repaired(mesh.clone(), Inside::default()).expect("a solid");
+        assert!((distance(&solid) - 2.0).abs() < 1e-6, "{k}: {}", distance(&solid));
+        assert!(solid.is_simple() && solid.mesh().faces().len() == 12, "{k}: {:?}", solid.warnings());
+        let changes = changes.expect("changes");
+        let dropped: Vec<u32> = (12..mesh.faces().len() as u32).collect();
+        assert_eq!(changes.repaired.report.collapsed_faces, dropped);
+        assert_eq!(repair_auto(&mesh).expect("an answer"), Some(changes));
+    }
+    // Along an edge of the cube such a face changes no distance, and nothing is repaired.
+    let mesh = with_hair((Vec::new(), vec![[6, 7, 6]]));
+    let solid = SolidMesh::new(mesh.clone()).expect("a solid");
+    assert!((distance(&solid) - 2.0).abs() < 1e-6);
+    assert!(solid.warnings().iter().all(|d| !d.message.contains("stands out")), "{:?}", solid.warnings());
+    assert!(SolidMesh::repaired(mesh, Inside::default()).expect("a solid").1.is_none());
 }

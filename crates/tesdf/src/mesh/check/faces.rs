@@ -44,19 +44,29 @@ pub(crate) fn face_flaws(mesh: &TriangleMesh) -> FaceFlaws {
             let list = if same { &mut flaws.duplicates } else { &mut flaws.reversed_duplicates };
             list.push([face, first]);
         }
-        let [a, b, c] = mesh.triangle(f);
-        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
-        // Above the limit, rounding cannot hide a zero. Below it the exact test decides.
-        let ratio = (b - a).cross(c - a).length() / longest;
-        if ratio.is_nan() || ratio < NEEDLE {
-            if normal_signs(a, b, c) == [0; 3] {
-                flaws.zero_area.push(face);
-            } else {
-                flaws.needles.push((face, ratio));
-            }
+        let corners = mesh.triangle(f);
+        let ratio = height_ratio(corners);
+        if has_no_area(corners) {
+            flaws.zero_area.push(face);
+        } else if ratio.is_nan() || ratio < NEEDLE {
+            flaws.needles.push((face, ratio));
         }
     }
     flaws
+}
+
+/// The height of a face divided by its longest edge.
+fn height_ratio([a, b, c]: [DVec3; 3]) -> f64 {
+    let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+    (b - a).cross(c - a).length() / longest
+}
+
+/// Whether the corners of a face lie exactly on one line.
+pub(crate) fn has_no_area(corners: [DVec3; 3]) -> bool {
+    let [a, b, c] = corners;
+    let ratio = height_ratio(corners);
+    // Above the limit, rounding cannot hide a zero. Below it the exact test decides.
+    (ratio.is_nan() || ratio < NEEDLE) && normal_signs(a, b, c) == [0; 3]
 }
 
 /// Whether the cyclic order of the corners is that of their ids in ascending order.

@@ -6,7 +6,7 @@ use super::{
     Draft, RepairError, RepairOptions, RepairReport, Repaired, ShellOrientation, close, closing_tolerance,
     fill::area,
 };
-use crate::mesh::TriangleMesh;
+use crate::mesh::{TriangleMesh, hairs::hairs};
 
 /// Holes are filled only if the fillings are smaller than this share of the given surface. A
 /// surface with larger ones is rather a sheet than a solid with holes: the lid of a half sphere is
@@ -54,7 +54,7 @@ pub struct AutoRepaired {
 /// Makes a mesh encodable with the least effort that works. `None` when no repair works.
 ///
 /// The attempts, in this order, end with the first that makes the mesh encodable:
-/// - no repair;
+/// - no repair, unless faces without area stand out of the surface;
 /// - [`RepairOptions::DEFAULT`]: duplicates, T-junctions, and the orientation of faces and shells;
 /// - the orientation of shells that meet others ([`ShellOrientation::All`]);
 /// - welding with the [`closing_tolerance`];
@@ -71,7 +71,14 @@ pub fn repair_auto(mesh: &TriangleMesh) -> Result<Option<AutoRepaired>, RepairEr
     if untouched.is_closed() {
         let repaired = untouched.check(RepairReport::default())?;
         if repaired.report.encodable {
-            return Ok(Some(AutoRepaired { options: None, repaired }));
+            let as_it_is = AutoRepaired { options: None, repaired };
+            if hairs(mesh.vertices(), mesh.faces()).is_empty() {
+                return Ok(Some(as_it_is));
+            }
+            return Ok(Some(match attempt(mesh, &RepairOptions::DEFAULT) {
+                Ok(Attempt::Works(found)) => *found,
+                Ok(_) | Err(_) => as_it_is,
+            }));
         }
     }
     match attempt(mesh, &RepairOptions::DEFAULT) {

@@ -13,7 +13,8 @@ pub struct RepairReport {
     pub weld_tolerance: Option<f64>,
     /// Merged vertices: [merged vertex, vertex that replaces it].
     pub welded_vertices: Vec<[u32; 2]>,
-    /// Faces dropped because two of their corners are equal.
+    /// Faces dropped because two of their corners are equal, or because they have no area and stand
+    /// out of the surface.
     pub collapsed_faces: Vec<u32>,
     /// Faces dropped because they repeat an earlier face with the same orientation: [dropped face,
     /// earlier face].
@@ -182,8 +183,8 @@ impl fmt::Display for RepairReport {
         list(
             f,
             [
-                "face with two equal corners dropped (0-based)",
-                "faces with two equal corners dropped (0-based)",
+                "face with two equal corners, or without area off the surface, dropped (0-based)",
+                "faces with two equal corners, or without area off the surface, dropped (0-based)",
             ],
             &mut self.collapsed_faces.iter().map(u32::to_string),
         )?;
