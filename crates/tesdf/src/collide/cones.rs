@@ -1,5 +1,5 @@
 //! Normals of contacts from the normal cones of the features that touch; proof in `docs/math.md`,
-//! section 17.
+//! section 18.
 //!
 //! The gradient of the signed distance says in which direction the distance of one point changes.
 //! Where a body lies on another one, this is the normal of any face of *b* that is as near, also
@@ -31,7 +31,7 @@ const SAME: f64 = 1e-6;
 const NEAR: f64 = 1e-4;
 
 /// Maximum number of times that a direction is moved into one cone and then into the other one.
-const ALTERNATIONS: usize = 16;
+const ALTERNATIONS: usize = 4;
 
 /// A place with more different normals is left as it is.
 const MOST: usize = 12;
@@ -127,7 +127,7 @@ impl<'a> Cones<'a> {
         };
         let Some(of_b) = self.b.normals(&place) else { return keep };
         let otherwise = if distance < -self.near { keep } else { None };
-        let turned = |normal: DVec3| Some(Contact { normal, ..contact });
+        let along = |normal: DVec3| Some(Contact { normal, ..contact });
         // The common normal of two edges.
         let across = match (of_a.as_slice(), of_b.as_slice()) {
             ([a, b], [c, d]) => crossing([a, b], [c, d]),
@@ -142,25 +142,18 @@ impl<'a> Cones<'a> {
                     otherwise
                 }
             }
-            ([m], ..) if is_apart => {
-                // The plane of the face: the way to it from the nearest point of b.
-                let cosine = -m.dot(normal);
-                (cosine > least_cosine()).then(|| Contact {
-                    normal: -*m,
-                    distance: distance * cosine,
-                    ..contact
-                })
-            }
+            // The plane of the face: the way to it from the nearest point of b.
+            ([m], ..) if is_apart => self.turned(contact, -*m),
             ([m], ..) => {
                 if is_within(&of_b, -*m) {
-                    turned(-*m)
+                    along(-*m)
                 } else {
                     otherwise
                 }
             }
             (_, [h], _) => {
                 if is_within(&opposite(&of_a), *h) {
-                    turned(*h)
+                    along(*h)
                 } else {
                     keep
                 }
@@ -181,25 +174,30 @@ impl<'a> Cones<'a> {
             _ if is_apart => {
                 // The gradient of the exact place is in both cones.
                 let within = clamped(&opposite(&of_a), &of_b, normal);
-                let cosine = within.map_or(0.0, |n| n.dot(normal));
-                match within {
-                    Some(normal) if cosine > least_cosine() => {
-                        Some(Contact { normal, distance: distance * cosine, ..contact })
-                    }
-                    _ => keep,
-                }
+                within.and_then(|normal| self.turned(contact, normal)).or(keep)
             }
             _ => {
                 // The mean is the same in both orders of a pair. The gradient, moved into the
                 // cones, is not: two such contacts would be a notch that locks.
                 let rays = common(&opposite(&of_a), &of_b);
                 match rays.iter().sum::<DVec3>().try_normalize() {
-                    Some(mean) => turned(mean),
+                    Some(mean) => along(mean),
                     None if rays.is_empty() => otherwise,
                     None => keep,
                 }
             }
         }
+    }
+
+    /// A contact of bodies that are apart with another normal, and its distance along it. `None` where
+    /// this is not the direction from one point to the other, as far as the places are known and
+    /// the bodies may turn.
+    fn turned(&self, contact: Contact, normal: DVec3) -> Option<Contact> {
+        let Contact { point_a, point_b, distance, .. } = contact;
+        let way = point_a - point_b;
+        let is_right = normal.dot(contact.normal) > least_cosine()
+            || way.distance(distance * normal) <= self.place(distance);
+        is_right.then(|| Contact { normal, distance: normal.dot(way), ..contact })
     }
 
     /// A contact of a face that keeps its distance and its points: its normal is that of `turned`
