@@ -145,14 +145,14 @@ impl<'a> Cones<'a> {
             // The plane of the face: the way to it from the nearest point of b.
             ([m], ..) if is_apart => self.turned(contact, -*m),
             ([m], ..) => {
-                if is_within(&of_b, -*m) {
+                if Cone::new(of_b).is_near(-*m) {
                     along(-*m)
                 } else {
                     otherwise
                 }
             }
             (_, [h], _) => {
-                if is_within(&opposite(&of_a), *h) {
+                if Cone::opposite(&of_a).is_near(*h) {
                     along(*h)
                 } else {
                     keep
@@ -162,7 +162,7 @@ impl<'a> Cones<'a> {
                 // The distance along the common normal of two edges is the same between all points
                 // of their lines.
                 let n = if across.dot(normal) < 0.0 { -across } else { across };
-                if is_within(&of_a, -n) && is_within(&of_b, n) {
+                if Cone::opposite(&of_a).is_near(n) && Cone::new(of_b).is_near(n) {
                     let distance = if is_apart { n.dot(point_a - point_b) } else { distance };
                     Some(Contact { normal: n, distance, ..contact })
                 } else if is_apart {
@@ -173,13 +173,13 @@ impl<'a> Cones<'a> {
             }
             _ if is_apart => {
                 // The gradient of the exact place is in both cones.
-                let within = clamped(&opposite(&of_a), &of_b, normal);
+                let within = clamped(&Cone::opposite(&of_a), &Cone::new(of_b), normal);
                 within.and_then(|normal| self.turned(contact, normal)).or(keep)
             }
             _ => {
                 // The mean is the same in both orders of a pair. The gradient, moved into the
                 // cones, is not: two such contacts would be a notch that locks.
-                let rays = common(&opposite(&of_a), &of_b);
+                let rays = common(&Cone::opposite(&of_a), &Cone::new(of_b));
                 match rays.iter().sum::<DVec3>().try_normalize() {
                     Some(mean) => along(mean),
                     None if rays.is_empty() => otherwise,
@@ -318,52 +318,93 @@ fn least_cosine() -> f64 {
     (1.0 - SLOPE * SLOPE).sqrt()
 }
 
-/// Whether a direction is in a cone, up to [`SLOPE`].
-fn is_within(cone: &[DVec3], direction: DVec3) -> bool {
-    nearest_in_cone(cone, direction).dot(direction) > least_cosine()
+/// A cone of unit vectors: all sums of its rays with weights of at least 0.
+struct Cone {
+    rays: Normals,
+    /// The cross products of each two rays, in the order of the first one.
+    crosses: ArrayVec<DVec3, { MOST * (MOST - 1) / 2 }>,
 }
 
-fn opposite(normals: &[DVec3]) -> Normals {
-    normals.iter().map(|n| -*n).collect()
-}
-
-/// The direction of a cone of unit vectors that is nearest to a direction.
-fn nearest_in_cone(rays: &[DVec3], v: DVec3) -> DVec3 {
-    let mut best: Option<DVec3> = None;
-    let mut offer = |p: DVec3| {
-        if let Some(p) = p.try_normalize()
-            && best.is_none_or(|best| p.dot(v) > best.dot(v))
-        {
-            best = Some(p);
+impl Cone {
+    fn new(rays: Normals) -> Self {
+        let mut crosses = ArrayVec::new();
+        for (i, p) in rays.iter().enumerate() {
+            crosses.extend(rays[i + 1..].iter().map(|q| p.cross(*q)));
         }
-    };
-    for (i, &p) in rays.iter().enumerate() {
-        offer(p);
-        for (j, &q) in rays.iter().enumerate().skip(i + 1) {
-            // The foot of v on the plane of two rays, if it is between them.
-            let Some(normal) = p.cross(q).try_normalize() else { continue };
-            let foot = v.reject_from_normalized(normal);
-            if p.cross(foot).dot(normal) >= 0.0 && foot.cross(q).dot(normal) >= 0.0 {
-                offer(foot);
+        Self { rays, crosses }
+    }
+
+    /// The cone of the opposite directions.
+    fn opposite(normals: &[DVec3]) -> Self {
+        Self::new(normals.iter().map(|n| -*n).collect())
+    }
+
+    /// The cross product of the rays `i` and `j`, where `i` is less than `j`.
+    fn cross(&self, i: usize, j: usize) -> DVec3 {
+        self.crosses[i * (2 * self.rays.len() - i - 1) / 2 + j - i - 1]
+    }
+
+    /// Whether a direction is a sum of three rays that are not in a plane.
+    fn is_inside(&self, v: DVec3) -> bool {
+        let count = self.rays.len();
+        (0..count).any(|i| {
+            (i + 1..count).any(|j| {
+                let over = self.cross(i, j).dot(v);
+                (j + 1..count).any(|k| {
+                    let (det, next) = (self.cross(i, j).dot(self.rays[k]), self.cross(j, k).dot(v));
+                    let last = -self.cross(i, k).dot(v);
+                    let side = det.signum();
+                    det.abs() > 1e-12 && over * side >= 0.0 && next * side >= 0.0 && last * side >= 0.0
+                })
+            })
+        })
+    }
+
+    /// The direction of the cone that is nearest to a direction.
+    fn nearest(&self, v: DVec3) -> DVec3 {
+        if self.is_inside(v) {
+            return v;
+        }
+        let mut best = (f64::NEG_INFINITY, DVec3::ZERO);
+        let mut offer = |p: DVec3| {
+            let cosine = p.dot(v);
+            if cosine > best.0 {
+                best = (cosine, p);
             }
-            for &r in &rays[j + 1..] {
-                let det = p.cross(q).dot(r);
-                let inside = |x: DVec3, y: DVec3| x.cross(y).dot(v) * det.signum() >= 0.0;
-                if det.abs() > 1e-12 && inside(p, q) && inside(q, r) && inside(r, p) {
-                    offer(v);
+        };
+        for (i, &p) in self.rays.iter().enumerate() {
+            offer(p);
+            for (j, &q) in self.rays.iter().enumerate().skip(i + 1) {
+                // The foot of v on the plane of two rays, if it is between them.
+                let across = self.cross(i, j);
+                let square = across.length_squared();
+                if square <= f64::MIN_POSITIVE {
+                    continue;
+                }
+                let foot = v - v.dot(across) / square * across;
+                if p.cross(foot).dot(across) >= 0.0
+                    && foot.cross(q).dot(across) >= 0.0
+                    && let Some(foot) = foot.try_normalize()
+                {
+                    offer(foot);
                 }
             }
         }
+        best.1
     }
-    best.unwrap_or_default()
+
+    /// Whether a direction is in the cone, up to [`SLOPE`].
+    fn is_near(&self, direction: DVec3) -> bool {
+        self.nearest(direction).dot(direction) > least_cosine()
+    }
 }
 
 /// A direction that is in both cones, near to `v`; `None` where none is found.
-fn clamped(one: &[DVec3], other: &[DVec3], v: DVec3) -> Option<DVec3> {
+fn clamped(one: &Cone, other: &Cone, v: DVec3) -> Option<DVec3> {
     let mut at = v;
     for _ in 0..ALTERNATIONS {
-        let of_one = nearest_in_cone(one, at);
-        at = nearest_in_cone(other, of_one);
+        let of_one = one.nearest(at);
+        at = other.nearest(of_one);
         if at.distance(of_one) <= SAME {
             return Some(at);
         }
@@ -380,26 +421,22 @@ fn crossing([a, b]: [&DVec3; 2], [c, d]: [&DVec3; 2]) -> Option<DVec3> {
 }
 
 /// The extreme rays of what two cones have in common.
-fn common(one: &[DVec3], other: &[DVec3]) -> Vec<DVec3> {
+fn common(one: &Cone, other: &Cone) -> Vec<DVec3> {
     let least = NEAR.cos();
-    let holds = |cone: &[DVec3], ray: DVec3| nearest_in_cone(cone, ray).dot(ray) >= least;
+    let holds = |cone: &Cone, ray: DVec3| cone.nearest(ray).dot(ray) >= least;
     let mut rays: Vec<DVec3> = Vec::new();
     let mut offer = |ray: DVec3| {
         if rays.iter().all(|r| r.distance(ray) > 2.0 * NEAR) {
             rays.push(ray);
         }
     };
-    one.iter().filter(|ray| holds(other, **ray)).for_each(|ray| offer(*ray));
-    other.iter().filter(|ray| holds(one, **ray)).for_each(|ray| offer(*ray));
-    let planes = |cone: &[DVec3]| -> Vec<DVec3> {
-        let of_ray =
-            |i: usize| (i + 1..cone.len()).filter_map(move |j| cone[i].cross(cone[j]).try_normalize());
-        (0..cone.len()).flat_map(of_ray).collect()
-    };
-    let planes_of_other = planes(other);
-    for plane in planes(one) {
-        for other_plane in &planes_of_other {
-            let line = plane.cross(*other_plane);
+    one.rays.iter().filter(|ray| holds(other, **ray)).for_each(|ray| offer(*ray));
+    other.rays.iter().filter(|ray| holds(one, **ray)).for_each(|ray| offer(*ray));
+    // The lines in which a side of one crosses a side of the other.
+    let unit = |cone: &Cone| cone.crosses.iter().filter_map(|n| n.try_normalize()).collect::<Vec<_>>();
+    let (sides, others) = (unit(one), unit(other));
+    for side in sides {
+        for line in others.iter().map(|other| side.cross(*other)) {
             let Some(ray) = line.try_normalize().filter(|_| line.length() > NEAR) else { continue };
             for ray in [ray, -ray] {
                 if holds(one, ray) && holds(other, ray) {

@@ -15,9 +15,14 @@ pub struct Contact {
     pub point_a: DVec3,
     /// The point of b's surface that is closest to `point_a`.
     pub point_b: DVec3,
-    /// ∇φ_b at `point_a`: a unit vector from b to a.
+    /// A unit vector from b to a: ∇φ_b at `point_a`. Contacts of whole faces
+    /// ([`ContactsPer::Face`](super::ContactsPer::Face),
+    /// [`ContactsPer::Minimum`](super::ContactsPer::Minimum)) have a direction that both bodies
+    /// allow instead, where one is near: the normal of the face that meets an edge or a vertex, the
+    /// common normal of edges that cross (`docs/math.md`, section 18).
     pub normal: DVec3,
-    /// φ_b at `point_a`; negative where the bodies penetrate.
+    /// φ_b at `point_a`; negative where the bodies penetrate. With
+    /// [`ContactsPer::Minimum`](super::ContactsPer::Minimum), the distance along the normal.
     pub distance: f64,
     /// The face of a, 0-based in the encoded mesh. For a node or edge, the lowest face that has it.
     pub face_a: u32,

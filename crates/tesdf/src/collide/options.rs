@@ -42,7 +42,12 @@ pub enum ContactsPer {
     /// [`Face`](Self::Face), without those beside which the surface is lower, where the distance
     /// falls by more than 0.1 per unit of length. As planes, these would stop bodies that have
     /// room; those that are walls all the same, as the sides of a groove, stay. Each that is left
-    /// out is followed by a lower one, so the deepest contact remains.
+    /// out is followed by a lower one, so the deepest contact remains. Of instances that close by
+    /// more than 0.1 of the smaller diagonal within the speculative time, all contacts stay.
+    ///
+    /// Distances are along the normals, which are in the normal cones of both bodies; where these
+    /// have no common direction, there is no contact. Of contacts at one place with one normal, in
+    /// both orders of a pair, one stays. This is what a simulation needs.
     Minimum,
 }
 

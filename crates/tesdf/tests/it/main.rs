@@ -45,6 +45,7 @@ mod mesh_repair_auto;
 mod mesh_split;
 mod mesh_write;
 mod negative_winding;
+mod normal_cones;
 mod prove;
 mod query_by_tree;
 mod reduction;

@@ -1,0 +1,207 @@
+//! Normals of contacts are in the normal cones of the features that touch.
+use std::sync::Arc;
+
+use tesdf::collide::{
+    CollideOptions, Contact, ContactsPer, Instance, InstanceId, Mode, Pose, Scene, Shape, detect,
+};
+use tesdf::encode::{Encoder, Preset};
+use tesdf::glam::{DQuat, DVec3};
+
+use crate::support::bodies::rotation;
+use crate::support::random::Random;
+use crate::support::shapes;
+
+/// Sine of the angle by which a normal may be out of a cone (`docs/math.md`, section 18).
+const SLOPE: f64 = 0.1;
+
+/// A point is on a side of a box of size 1 when it is nearer.
+const ON_SIDE: f64 = 5e-6;
+
+/// A box, as a mesh or a shape.
+#[derive(Clone, Copy, Debug)]
+enum Kind {
+    Mesh,
+    Formula,
+}
+
+/// A box in the world.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    kind: Kind,
+    half: DVec3,
+    pose: Pose,
+}
+
+impl Block {
+    fn shape(&self) -> Shape {
+        match self.kind {
+            Kind::Formula => Shape::Box { half_extents: self.half },
+            Kind::Mesh => {
+                let solid = shapes::Shape::default().add_box(-self.half, self.half, 1).solid();
+                Shape::Mesh(Arc::new(Encoder::new().preset(Preset::Fast).encode(&solid).expect("a box")))
+            }
+        }
+    }
+
+    /// How far a direction is out of the cone of the normals of the sides within `near` of a point:
+    /// the length of what must be taken from it. The normals are the axes, so each component of the
+    /// direction, in the frame of the box, must be 0 off the sides, and of their sign at them.
+    fn out_of_cone(&self, point: DVec3, direction: DVec3, near: f64) -> f64 {
+        let (p, d) = (self.pose.to_body(point), self.pose.rotation.inverse() * direction);
+        let excess = |axis: usize| {
+            let at_side = self.half[axis] - p[axis].abs() <= near;
+            if at_side { (-d[axis] * p[axis].signum()).max(0.0) } else { d[axis].abs() }
+        };
+        DVec3::from_array([0, 1, 2].map(excess)).length()
+    }
+}
+
+fn contacts(blocks: &[Block; 2], mode: Mode) -> Vec<Contact> {
+    let mut scene = Scene::new();
+    for block in blocks {
+        let shape = scene.add_shape(block.shape()).expect("a good shape");
+        scene.add(Instance::new(shape, block.pose)).expect("a good pose");
+    }
+    let options = CollideOptions {
+        contacts_per: ContactsPer::Minimum,
+        contact_distance: 2e-3,
+        ..CollideOptions::with_mode(mode)
+    };
+    detect(&scene, &options).expect("contacts").into_vec()
+}
+
+/// Two boxes of size 1 that nearly touch at random features: `gap` is the distance along the
+/// direction that turns a feature of the second to the first.
+fn touching(random: &mut Random, gap: f64) -> [Block; 2] {
+    let mut block = |turned: bool| {
+        let kind = if random.unit() < 0.5 { Kind::Mesh } else { Kind::Formula };
+        let half = DVec3::new(random.between(0.2, 0.4), random.between(0.2, 0.4), random.between(0.2, 0.4));
+        let rotation = if turned { rotation(random) } else { DQuat::IDENTITY };
+        Block { kind, half, pose: Pose { translation: DVec3::ZERO, rotation } }
+    };
+    let flush = block(false);
+    let [first, mut second] = [block(true), block(true)];
+    let mut first = if random.unit() < 0.3 { Block { pose: flush.pose, ..first } } else { first };
+    if random.unit() < 0.3 {
+        // Flush faces and parallel edges.
+        second.pose.rotation = first.pose.rotation;
+    }
+    // The second is moved along a direction until the supports in it are `gap` apart.
+    let side = |block: &Block, axis: usize| block.pose.rotation * DVec3::AXES[axis];
+    let direction = match random.index(3) {
+        0 => side(&first, random.index(3)),
+        1 => side(&first, random.index(3)).cross(side(&second, random.index(3))),
+        _ => random.direction(),
+    };
+    let direction = direction.try_normalize().unwrap_or(DVec3::Z);
+    let support = |block: &Block, d: DVec3| (block.pose.rotation.inverse() * d).abs().dot(block.half);
+    let way = support(&first, direction) + support(&second, direction) + gap;
+    let aside = 0.2 * random.in_cube().reject_from_normalized(direction);
+    first.pose.translation = 0.1 * random.in_cube();
+    second.pose.translation = first.pose.translation + way * direction + aside;
+    [first, second]
+}
+
+#[test]
+fn normals_are_in_the_cones_of_both_bodies() {
+    let mut random = Random(0x5eed_c0de);
+    let (mut seen, mut worst) = (0, 0.0f64);
+    for round in 0..160 {
+        let gap = [0.0, 1e-12, 1e-9, 1e-7, 1e-5, 1e-3, -1e-12, -1e-9][round % 8];
+        let blocks = touching(&mut random, gap);
+        for mode in [Mode::Exact, Mode::Face] {
+            for c in contacts(&blocks, mode) {
+                let [a, b] = if c.instance_a == InstanceId(0) { blocks } else { [blocks[1], blocks[0]] };
+                let near = ON_SIDE + 2.0 * c.distance.abs();
+                let out =
+                    a.out_of_cone(c.point_a, -c.normal, near).max(b.out_of_cone(c.point_b, c.normal, near));
+                assert!((c.normal.length() - 1.0).abs() < 1e-12, "{c:?}");
+                assert!(out <= 1.01 * SLOPE, "{out} out of a cone, gap {gap}, {mode:?}: {blocks:?} {c:?}");
+                (seen, worst) = (seen + 1, worst.max(out));
+            }
+        }
+    }
+    assert!(seen > 1000, "{seen} contacts, at most {worst} out of a cone");
+}
+
+/// A contact of a face with an edge or a vertex has the normal of the face, whichever body has it,
+/// and at any gap.
+#[test]
+fn a_box_on_its_edge_or_corner_is_pushed_along_the_normal_of_the_face() {
+    let mut random = Random(7);
+    for kind in [Kind::Mesh, Kind::Formula] {
+        for gap in [-1e-9, 0.0, 1e-12, 1e-9, 1e-7, 3e-7, 1e-6, 1e-5, 1e-4] {
+            for tilt in 0..6 {
+                let half = DVec3::new(0.3, 0.25, 0.2);
+                let turn = match tilt {
+                    0..3 => DQuat::from_axis_angle(DVec3::AXES[tilt % 2], random.between(0.2, 1.3)),
+                    _ => rotation(&mut random),
+                };
+                let height = (turn.inverse() * DVec3::Z).abs().dot(half);
+                let floor = Block {
+                    kind,
+                    half: DVec3::new(1.0, 1.0, 0.5),
+                    pose: Pose::at(DVec3::new(0.0, 0.0, -0.5)),
+                };
+                let pose = Pose { translation: DVec3::new(0.1, -0.05, height + gap), rotation: turn };
+                let found = contacts(&[floor, Block { kind, half, pose }], Mode::Exact);
+                assert!(!found.is_empty(), "{kind:?}, gap {gap}, tilt {tilt}");
+                for c in found {
+                    let up = if c.instance_a == InstanceId(0) { -c.normal } else { c.normal };
+                    assert!(up.distance(DVec3::Z) < 1e-9, "{kind:?}, gap {gap}, tilt {tilt}: {c:?}");
+                    // Some are a corner's that is higher.
+                    assert!(c.distance >= gap - 1e-7, "{kind:?}, gap {gap}, tilt {tilt}: {c:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Each pair of features has one contact.
+#[test]
+fn no_two_contacts_are_at_one_place_with_one_normal() {
+    let mut random = Random(11);
+    for round in 0..60 {
+        let blocks = touching(&mut random, [0.0, 1e-9, 1e-5][round % 3]);
+        let found = contacts(&blocks, Mode::Exact);
+        for (k, c) in found.iter().enumerate() {
+            for d in &found[k + 1..] {
+                let sign = if c.instance_a == d.instance_a { 1.0 } else { -1.0 };
+                let apart = (c.point_a + c.point_b).distance(d.point_a + d.point_b);
+                let turned = c.normal.distance(sign * d.normal);
+                assert!(apart > 1e-7 || turned > 1e-7, "{blocks:?} {c:?} {d:?}");
+            }
+        }
+    }
+}
+
+/// Over the flat edges between tiles, a ball has one contact, as over a plane.
+#[test]
+fn a_ball_over_tiles_has_the_normal_of_their_plane() {
+    let solid =
+        shapes::Shape::default().add_box(DVec3::new(-1.0, -1.0, -0.2), DVec3::new(1.0, 1.0, 0.0), 10).solid();
+    let tiles = Arc::new(Encoder::new().preset(Preset::Fast).encode(&solid).expect("tiles"));
+    let mut random = Random(3);
+    for gap in [-1e-4, 0.0, 1e-6, 1e-3] {
+        for _ in 0..20 {
+            let mut scene = Scene::new();
+            let floor = scene.add_shape(Shape::Mesh(tiles.clone())).expect("tiles");
+            let ball = scene.add_shape(Shape::Sphere { radius: 0.05 }).expect("a ball");
+            scene.add(Instance::new(floor, Pose::IDENTITY)).expect("a pose");
+            let at = DVec3::new(random.between(-0.9, 0.9), random.between(-0.9, 0.9), 0.05 + gap);
+            scene.add(Instance::new(ball, Pose::at(at))).expect("a pose");
+            let options = CollideOptions {
+                contacts_per: ContactsPer::Minimum,
+                contact_distance: 0.01,
+                ..CollideOptions::default()
+            };
+            let found = detect(&scene, &options).expect("contacts");
+            assert!(!found.is_empty());
+            for c in found {
+                let up = if c.instance_a == InstanceId(0) { -c.normal } else { c.normal };
+                assert!(up.distance(DVec3::Z) < 1e-9 && (c.distance - gap).abs() < 1e-7, "{at} {c:?}");
+                assert!(c.point_a.with_z(at.z).distance(at) < 1e-9, "{at} {c:?}");
+            }
+        }
+    }
+}
