@@ -1,4 +1,5 @@
 //! The tests of `tesdf-sim` over several of its modules, in one program.
+mod analytic;
 mod assembly;
 mod chain;
 mod friction;

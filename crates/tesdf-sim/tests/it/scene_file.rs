@@ -9,6 +9,8 @@ use tesdf_sim::record::{RecordError, RunRecord};
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, MAX_BODIES, SceneError};
 use tesdf_sim::{Dynamics, Mass, SimulateError, simulate};
 
+use crate::support::meshes::cuboid;
+
 const DROP: &str = r#"
 time_step = 1e-3
 duration = 0.05
@@ -285,22 +287,7 @@ fn the_size_of_a_scene_is_bounded() {
 /// A scene whose bodies use one mesh, and assets of that mesh with different units.
 fn cubes(bodies: &str) -> (tempfile::TempDir, LoadedScene) {
     let folder = tempfile::tempdir().unwrap();
-    let corner = |k: usize| DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2) as f64);
-    let faces = [
-        [0, 2, 1],
-        [1, 2, 3],
-        [4, 5, 6],
-        [5, 7, 6],
-        [0, 1, 4],
-        [1, 5, 4],
-        [2, 6, 3],
-        [3, 6, 7],
-        [0, 4, 2],
-        [2, 4, 6],
-        [1, 3, 5],
-        [3, 7, 5],
-    ];
-    let mesh = TriangleMesh::new((0..8).map(corner).collect(), faces.to_vec()).unwrap();
+    let mesh = cuboid(DVec3::ZERO, DVec3::ONE);
     let solid = SolidMesh::new(mesh.clone()).unwrap();
     write(folder.path().join("cube.ply"), &mesh).unwrap();
     for (name, unit) in [("mm", "mm"), ("inch", "inches"), ("furlong", "furlong")] {

@@ -1,5 +1,8 @@
-//! Shared parts of the tests: the scenes of the repository, runs of them, and scene files that are
-//! refused.
+//! Shared parts of the tests: the scenes of the repository, runs of them, scene files that tests write or
+//! that are refused, and meshes.
+pub mod bench;
+pub mod meshes;
+
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
