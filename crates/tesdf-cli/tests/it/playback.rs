@@ -72,7 +72,7 @@ fn what_cannot_be_exported_is_refused() {
 fn a_run_becomes_a_page() {
     let folder = simulated();
     let text = folder.good(&["view", "run", "-o", "page.html"]);
-    assert!(text.contains("21 of 21 states") && text.contains("at most 6 in a frame"), "{text}");
+    assert!(text.contains("21 of 21 states") && text.contains("at most 2 in a frame"), "{text}");
     let page = std::fs::read_to_string(folder.path("page.html")).unwrap();
     assert!(page.contains("<title>run</title>") && page.contains(r#""name":"\u003c/script> & ball""#));
     assert_eq!(page.matches("</script>").count(), 3, "the name of a body ends no script");

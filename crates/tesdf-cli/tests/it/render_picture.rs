@@ -226,7 +226,7 @@ fn contacts_of_a_run_are_drawn_where_they_are() {
     folder.write("rest.toml", rest);
     folder.good(&["simulate", "rest.toml", "-o", "run"]);
     let common =
-        ["render", "--run", "run", "-o", "p.png", "--size", "300x300", "--view", "-90 0", "--time", "0.2"];
+        ["render", "--run", "run", "-o", "p.png", "--size", "300x300", "--view", "-90 -30", "--time", "0.2"];
     let redness = |args: &[&str]| {
         folder.good(&[&common[..], args].concat());
         let map = Pixmap::load_png(folder.path("p.png")).unwrap();

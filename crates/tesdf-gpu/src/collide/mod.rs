@@ -295,7 +295,7 @@ impl Detector {
             one_per_vertex(&shapes, instances, &mut words, &mut rows);
         }
         let (mut contacts, faces) = contacts(&shapes, instances, options.mode, &words, &rows);
-        if parts(options) == Parts::Faces {
+        if parts(options) == Parts::Faces && wants_minima(options) {
             let all = contacts.len();
             contacts = in_cones(scene, options, &contacts, &faces)?;
             filtered += all - contacts.len();

@@ -12,7 +12,7 @@ use arrayvec::ArrayVec;
 use glam::DVec3;
 
 use super::field::ROUNDING;
-use super::{CollideError, CollideOptions, Contact, ContactsPer, InstanceId, Placement, Scene, Shape};
+use super::{CollideError, CollideOptions, Contact, InstanceId, Placement, Scene, Shape};
 use crate::TeSdf;
 use crate::geometry::Triangle;
 use crate::query::Precision;
@@ -143,14 +143,11 @@ impl<'a> Cones<'a> {
                 }
             }
             // The plane of the face: the way to it from the nearest point of b.
-            ([m], ..) if is_apart => self.turned(contact, -*m),
-            ([m], ..) => {
-                if Cone::new(of_b).is_near(-*m) {
-                    along(-*m)
-                } else {
-                    otherwise
-                }
-            }
+            ([m], ..) => match (Cone::new(of_b).is_near(-*m), is_apart) {
+                (false, _) => otherwise,
+                (true, true) => self.turned(contact, -*m),
+                (true, false) => along(-*m),
+            },
             (_, [h], _) => {
                 if Cone::opposite(&of_a).is_near(*h) {
                     along(*h)
@@ -448,9 +445,9 @@ fn common(one: &Cone, other: &Cone) -> Vec<DVec3> {
     rays
 }
 
-/// Contacts found elsewhere, with the normals of their cones; of those without one, nothing where
-/// local minima are wanted. `faces` are the indices of their faces in both shapes. The contacts are
-/// those of whole faces, in the order of a detection.
+/// Contacts per local minimum, found elsewhere with the precision `f32`, with the normals of their
+/// cones, without those that have none and without twins. `faces` are the indices of their faces in
+/// both shapes. The contacts are those of whole faces, in the order of a detection.
 ///
 /// # Errors
 /// [`CollideError::NoInstance`] for an instance that the scene lacks.
@@ -464,7 +461,6 @@ pub fn in_cones(
         let instance = scene.instance(id)?;
         Ok((scene.shape(instance.shape)?, instance.placement()))
     };
-    let is_minimum = options.contacts_per == ContactsPer::Minimum;
     let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
     let mut found = Vec::with_capacity(contacts.len());
     let mut faces = faces.iter();
@@ -476,12 +472,9 @@ pub fn in_cones(
             let diagonal = bodies[1].0.diagonal().min(f64::MAX) * bodies[1].1.scale;
             let cones = Cones::new(bodies, options.tolerance.resolve(diagonal), Precision::F32);
             near = cones.near();
-            for (contact, faces) in order.iter().zip(&mut faces) {
-                let turned = cones.of(*contact, *faces);
-                of_pair.extend(if is_minimum { turned } else { Some(cones.beside(*contact, turned)) });
-            }
+            of_pair.extend(order.iter().zip(&mut faces).filter_map(|(c, faces)| cones.of(*c, *faces)));
         }
-        let kept = if is_minimum { keep_different(&of_pair, near) } else { vec![true; of_pair.len()] };
+        let kept = keep_different(&of_pair, near);
         found.extend(of_pair.into_iter().zip(kept).filter_map(|(c, keep)| keep.then_some(c)));
     }
     Ok(found)

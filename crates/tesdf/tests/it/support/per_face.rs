@@ -106,10 +106,14 @@ impl Detection<'_> {
                 others.iter().any(|other| other.point_a.distance(c.point_a) <= self.point * size)
             };
             let places: Vec<_> = of(all.as_slice()).copied().collect();
-            let kept: Vec<_> = of(minima.as_slice()).copied().collect();
+            let mut kept: Vec<_> = of(minima.as_slice()).copied().collect();
             assert!(kept.iter().all(|c| is_among(&places, c)), "a contact that no face has");
-            let least = |contacts| of(contacts).map(|c| c.distance).fold(f64::INFINITY, f64::min);
-            let [deepest, of_minima] = [least(all.as_slice()), least(minima.as_slice())];
+            // One contact stands for two of both orders at one place with one normal.
+            let other = of_direction(minima.as_slice(), b as u32, a as u32);
+            kept.extend(other.map(|c| Contact { point_a: c.point_b, point_b: c.point_a, ..*c }));
+            let least =
+                |contacts: &[Contact]| contacts.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
+            let [deepest, of_minima] = [least(&places), least(&kept)];
             let is_kept = of_minima == deepest || of_minima <= deepest + self.distance * size;
             assert!(is_kept, "{mode:?}: {of_minima} instead of {deepest}");
             let near = (1e-3 * size).max(self.point * size);
