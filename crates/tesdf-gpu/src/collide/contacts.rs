@@ -91,15 +91,12 @@ pub fn contacts(
     words: &[Words],
     rows: &[Row],
 ) -> (Vec<Contact>, Vec<[u32; 2]>) {
-    let mut found: Vec<((u32, u32, bool), Contact, [u32; 2])> = words
-        .par_iter()
-        .zip(rows)
-        .map(|(words, row)| {
-            let (a, b) = (words.a, words.b);
-            let faces = [words.face_a, words.face_b];
-            ((a.min(b), a.max(b), a > b), contact(shapes, instances, mode, words, row), faces)
-        })
-        .collect();
+    let of_words = |(words, row): (&Words, &Row)| {
+        let (a, b) = (words.a, words.b);
+        let faces = [words.face_a, words.face_b];
+        ((a.min(b), a.max(b), a > b), contact(shapes, instances, mode, words, row), faces)
+    };
+    let mut found: Vec<_> = words.par_iter().zip(rows).map(of_words).collect();
     // Instances are sorted by world and id. Outside of the cube, a face may have several parts
     // without a cell.
     found.par_sort_unstable_by_key(|(pair, c, _)| {
