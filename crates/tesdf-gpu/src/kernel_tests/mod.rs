@@ -16,7 +16,7 @@ use crate::kernels::GROUP;
 
 /// The device of the tests.
 fn device() -> Device {
-    Device::choose(None).expect("a device: `.ci/vulkan.sh` installs the software one")
+    Device::choose(None).expect("a device: `./test` makes the replacement of CUDA's driver")
 }
 
 /// Uploads an array. An empty array takes one element, because a buffer cannot be empty.

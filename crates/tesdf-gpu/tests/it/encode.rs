@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use crate::compare::device;
 use crate::support::meshes;
 use crate::support::tetrahedra::grid;
 use tesdf::domain::{Cell, ConformingMesh, DomainCube};
@@ -14,11 +15,7 @@ use tesdf::geometry::{Aabb, AabbTree, LocalFrame};
 use tesdf::mesh::{SolidMesh, TriangleMesh};
 use tesdf::verify::{VerifyOptions, verify};
 use tesdf::{Progress, TeSdf};
-use tesdf_gpu::{Device, DeviceSampler, ROUNDING, SamplerLimits};
-
-fn device() -> Device {
-    Device::choose(None).expect("a device")
-}
+use tesdf_gpu::{DeviceSampler, ROUNDING, SamplerLimits};
 
 fn solid(name: &str) -> SolidMesh {
     let row = meshes::manifest().into_iter().find(|r| r.name == name).expect("a row of the manifest");

@@ -1,5 +1,6 @@
 //! Contacts that stay on the device, and poses that come from arrays there.
 
+use crate::compare::device;
 use crate::support::bodies::{Relation, body, rotation};
 use crate::support::random::Random;
 use tesdf::collide::{
@@ -7,10 +8,6 @@ use tesdf::collide::{
 };
 use tesdf::glam::{DQuat, DVec3, Vec3};
 use tesdf_gpu::{Detector, DetectorOptions, Device, DeviceArray, DeviceContacts, GivenPoses, GpuError};
-
-fn device() -> Device {
-    Device::choose(None).expect("a device")
-}
 
 pub fn detector(scene: &Scene) -> Detector {
     Detector::new(&device(), scene, DetectorOptions::default()).expect("fits")

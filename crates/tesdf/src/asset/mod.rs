@@ -21,6 +21,8 @@ mod cell_bounds;
 mod cells;
 mod conforming;
 mod container;
+#[cfg(feature = "collide")]
+pub(crate) mod corner_cones;
 mod entries;
 mod error;
 mod face_record;

@@ -79,6 +79,8 @@ pub struct TeSdf {
     faces_at: OnceLock<FacesAt>,
     #[cfg(feature = "collide")]
     pub(super) sharp_sides: OnceLock<Vec<u8>>,
+    #[cfg(feature = "collide")]
+    pub(super) corner_cones: OnceLock<Vec<f32>>,
     pub(crate) inner_ball: OnceLock<InnerBall>,
     pub(crate) corner_reaches: OnceLock<Vec<f32>>,
     face_normals: OnceLock<Vec<(DVec3, bool)>>,
@@ -172,6 +174,8 @@ impl TeSdf {
             faces_at: OnceLock::new(),
             #[cfg(feature = "collide")]
             sharp_sides: OnceLock::new(),
+            #[cfg(feature = "collide")]
+            corner_cones: OnceLock::new(),
             inner_ball: OnceLock::new(),
             corner_reaches: OnceLock::new(),
             face_normals: OnceLock::new(),
@@ -260,6 +264,7 @@ impl TeSdf {
         #[cfg(feature = "collide")]
         {
             self.sharp_sides = OnceLock::new();
+            self.corner_cones = OnceLock::new();
         }
         self.forget_normals();
     }
