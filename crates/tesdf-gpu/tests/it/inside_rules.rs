@@ -79,6 +79,7 @@ fn nodes_in_a_hole_have_the_depth_of_formulas() {
 }
 
 #[test]
+#[ignore = "most of a minute, as the test above in its other modes: .ci/release"]
 fn boxes_in_a_hole_have_the_depth_of_formulas_in_all_modes() {
     boxes_in_the_hole(&each_mode(0.0)[2..]);
 }
