@@ -37,8 +37,8 @@ struct Way {
     overlap: f64,
 }
 
-/// The normals of the vertices, edges or faces of the meshes and boxes of a scene, and their vertices, in the
-/// frames of the meshes.
+/// The normals of the vertices, edges or faces of the meshes and boxes of a scene, and their
+/// vertices, in the frames of the shapes.
 #[derive(Clone, Debug)]
 pub struct Surfaces(BTreeMap<ShapeId, Surface>);
 

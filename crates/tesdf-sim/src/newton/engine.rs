@@ -141,9 +141,9 @@ impl Newton {
 
     /// The options of a detection. Within a step, gravity acts on one body of a pair while contacts
     /// hold the other, so it counts for all pairs.
-    fn options_of(&self, step: &Step) -> CollideOptions {
-        let speculative_time = self.options.speculation * step.h;
-        let fall = speculative_time * step.h * self.system.gravity.length();
+    fn options_of(&self, time_step: f64) -> CollideOptions {
+        let speculative_time = self.options.speculation * time_step;
+        let fall = speculative_time * time_step * self.system.gravity.length();
         let contact_distance = self.collide.contact_distance + fall;
         CollideOptions { contact_distance, speculative_time, ..self.collide }
     }
@@ -155,7 +155,7 @@ impl Newton {
         hidden: HiddenSearch,
     ) -> Result<Contacts, DynamicsError> {
         let start = Instant::now();
-        let options = CollideOptions { hidden, ..self.options_of(step) };
+        let options = CollideOptions { hidden, ..self.options_of(step.h) };
         let contacts = self.detector.detect(self.system.scene_at(states)?, &options)?;
         step.report.detections += 1;
         step.report.detection += start.elapsed();
@@ -247,7 +247,7 @@ impl Newton {
     /// Detects as far ahead as the velocities of `ahead` move the bodies.
     fn look(&mut self, step: &mut Step, ahead: &[State]) -> Result<Look, DynamicsError> {
         let contacts = self.detect(step, ahead, HiddenSearch::On)?;
-        let options = self.options_of(step);
+        let options = self.options_of(step.h);
         Ok(Look::new(contacts, self.system.scene_at(ahead)?, &options)?)
     }
 
@@ -346,9 +346,8 @@ impl Newton {
         if turns.iter().all(|turn| *turn <= MOST_TURN) {
             return Ok(1);
         }
-        let time = self.options.speculation * time_step;
-        let distance = self.collide.contact_distance + time * time_step * self.system.gravity.length();
-        let pairs = instance_pairs(scene, distance, time)?;
+        let CollideOptions { contact_distance, speculative_time, .. } = self.options_of(time_step);
+        let pairs = instance_pairs(scene, contact_distance, speculative_time)?;
         let bodies = pairs.iter().flat_map(|pair| [pair.first, pair.second]);
         let most = bodies.filter_map(|id| Some(turns[self.system.body_of(id)?])).fold(0.0, f64::max);
         Ok((most / MOST_TURN).ceil().clamp(1.0, MOST_PARTS) as u32)

@@ -157,8 +157,8 @@ impl SolidMesh {
     }
 
     /// As [`with_inside`](Self::with_inside). A mesh that is refused, or has faces without area that
-    /// stand out of the surface, is repaired first, by [`repair_auto`](super::repair_auto()). Returns what was changed as well, or `None` when the
-    /// mesh is a solid as it is.
+    /// stand out of the surface, is repaired first, by [`repair_auto`](super::repair_auto()). Returns
+    /// what was changed as well, or `None` when the mesh is a solid as it is.
     ///
     /// # Errors
     /// [`NotSolid`] when no repair makes the mesh a solid.
