@@ -6,6 +6,7 @@ use tesdf::collide::{CollideOptions, Reduction, detect};
 
 use super::arguments::Args;
 use super::frames::Frames;
+use super::hashes::Hashes;
 use super::report::{Counts, PHASES, Report, Spread, ms, text};
 use tesdf_terminal::report::{self as output, Failure, Outcome};
 
@@ -52,6 +53,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         phases_ms: PHASES.map(|phase| (phase, 0.0)),
         phases_unpruned_ms: None,
         counts: Counts::default(),
+        contacts_hash: String::new(),
         bytes: None,
         wall_ms: Spread::default(),
         cpu_wall_ms: None,
@@ -63,12 +65,15 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         Some(device) => {
             super::on_device::fill(&mut report, args, &device.0, &mut frames, &options)?;
             if args.against_cpu {
-                let (cpu, _) = on_processor(&mut frames, &options, report.repeat)?;
+                let (cpu, ..) = on_processor(&mut frames, &options, report.repeat)?;
                 report.cpu_over_device = Some(cpu.mean / report.wall_ms.mean);
                 report.cpu_wall_ms = Some(cpu);
             }
         }
-        None => (report.wall_ms, report.counts) = on_processor(&mut frames, &options, report.repeat)?,
+        None => {
+            (report.wall_ms, report.counts, report.contacts_hash) =
+                on_processor(&mut frames, &options, report.repeat)?;
+        }
     }
     if args.json {
         output::json(&report)?;
@@ -82,14 +87,15 @@ fn on_processor(
     frames: &mut Frames,
     options: &CollideOptions,
     repeat: u32,
-) -> Result<(Spread, Counts), Failure> {
-    let (mut times, mut found) = (Vec::new(), Vec::new());
+) -> Result<(Spread, Counts, String), Failure> {
+    let (mut times, mut found, mut hashes) = (Vec::new(), Vec::new(), Hashes::default());
     for frame in 0..frames.poses.len() {
         frames.show(frame)?;
         for _ in 0..repeat {
             let start = Instant::now();
             let contacts = detect(&frames.scene, options).map_err(Failure::new)?;
             times.push(ms(start.elapsed()));
+            hashes.add(frame, contacts.as_slice())?;
             found.push(contacts.statistics);
         }
     }
@@ -105,5 +111,5 @@ fn on_processor(
         kept: (options.reduction != Reduction::None).then(|| spread(|s| s.touching - s.filtered - s.reduced)),
         ..Counts::default()
     };
-    Ok((Spread::of(times), counts))
+    Ok((Spread::of(times), counts, hashes.all()))
 }

@@ -3,7 +3,10 @@ mod arguments;
 mod clearance;
 mod collide;
 pub(crate) mod frames;
+mod hashes;
 mod heap;
+#[cfg(feature = "gpu")]
+mod kernels;
 #[cfg(feature = "gpu")]
 pub(crate) mod on_device;
 mod poses;
@@ -28,6 +31,10 @@ enum Benchmark {
     Clearance(clearance::Args),
     /// Measure the search for pairs in a heap of many bodies, anew in each step and kept
     Heap(heap::Args),
+    /// Compile all kernels for a CUDA device, which need not be there, and keep them for later
+    /// calls; print registers, stack, spilled bytes and seconds of each
+    #[cfg(feature = "gpu")]
+    Kernels(kernels::Args),
     /// Write a file of poses with overlapping bodies, from a seed
     Poses(poses::Args),
     /// Keep some poses of a run in a small file, for measurements on other machines
@@ -46,6 +53,8 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
         Benchmark::Collide(args) => collide::run(args),
         Benchmark::Clearance(args) => clearance::run(args),
         Benchmark::Heap(args) => heap::run(args),
+        #[cfg(feature = "gpu")]
+        Benchmark::Kernels(args) => kernels::run(args),
         Benchmark::Poses(args) => poses::run(args),
         Benchmark::Record(args) => record::run(args),
         Benchmark::Worlds(args) => worlds::run(args),

@@ -7,6 +7,7 @@ use tesdf_terminal::report::Failure;
 
 use super::arguments::{Args, LanesName, ModeName};
 use super::frames::Frames;
+use super::hashes::Hashes;
 use super::report::{Bytes, Counts, PHASES, Report, Spread, Stage, ms};
 
 /// The phase of a stage. A stage that only prepares a launch belongs to the phase of that launch.
@@ -56,6 +57,7 @@ pub fn fill(
     let all = measure(frames, &mut detector, options, 1)?;
     report.phases_unpruned_ms = Some(all.phases());
     report.counts = measured.counts;
+    report.contacts_hash = measured.contacts_hash;
     report.counts.queries_unpruned = Some(all.counts.queries);
     let searches = args.mode != ModeName::Node;
     report.counts.evaluations = operations.counts.evaluations.filter(|_| searches);
@@ -104,6 +106,7 @@ struct Measured {
     counts: Counts,
     bytes: Bytes,
     wall_ms: Spread,
+    contacts_hash: String,
 }
 
 impl Measured {
@@ -120,16 +123,18 @@ fn measure(
     options: &CollideOptions,
     repeat: u32,
 ) -> Result<Measured, Failure> {
-    let (mut walls, mut reports) = (Vec::new(), Vec::new());
+    let (mut walls, mut reports, mut hashes) = (Vec::new(), Vec::new(), Hashes::default());
     for frame in 0..frames.poses.len() {
         frames.show(frame)?;
         // The first detection grows the buffers and compiles the kernels.
         detector.detect(&frames.scene, options).map_err(Failure::new)?;
         for _ in 0..repeat {
             let start = Instant::now();
-            detector.detect(&frames.scene, options).map_err(Failure::new)?;
+            let contacts = detector.detect(&frames.scene, options).map_err(Failure::new)?;
             walls.push(ms(start.elapsed()));
-            detector.detect_timed(&frames.scene, options).map_err(Failure::new)?;
+            hashes.add(frame, contacts.as_slice())?;
+            let contacts = detector.detect_timed(&frames.scene, options).map_err(Failure::new)?;
+            hashes.add(frame, contacts.as_slice())?;
             reports.push(detector.report().clone());
         }
     }
@@ -173,5 +178,6 @@ fn measure(
             products_by_buffer: held.pipeline,
         },
         wall_ms: Spread::of(walls),
+        contacts_hash: hashes.all(),
     })
 }

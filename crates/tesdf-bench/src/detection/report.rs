@@ -94,6 +94,8 @@ pub struct Report {
     pub phases_ms: [(&'static str, f64); 3],
     pub phases_unpruned_ms: Option<[(&'static str, f64); 3]>,
     pub counts: Counts,
+    /// Hash of all contacts of all frames.
+    pub contacts_hash: String,
     pub bytes: Option<Bytes>,
     /// Time from the poses to the contacts in host memory.
     pub wall_ms: Spread,

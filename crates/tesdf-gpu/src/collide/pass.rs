@@ -12,8 +12,12 @@ use crate::GpuError;
 use crate::device::Buffer;
 use crate::kernels::broad::pairs::INSTANCE_ROWS;
 use crate::kernels::counters::{self, COUNTERS, CountersLaunch};
+use crate::kernels::middle::clip;
 
 pub use crate::kernels::GROUP;
+
+/// Up to this number of bodies, several groups share the large faces of a meshlet.
+const FEW_INSTANCES: usize = 512;
 
 /// The parts of a surface that the narrow phase takes.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -81,7 +85,9 @@ impl Detector {
             pass.place(given)?;
         }
         pass.broad()?;
-        let per_meshlet = pass.groups_for(pass.detector.buffers.room.meshlets, 1, counters::MESHLETS)?;
+        let slabs = pass.slabs();
+        let per_meshlet =
+            pass.groups_in_slabs(pass.detector.buffers.room.meshlets, 1, slabs, counters::MESHLETS)?;
         pass.middle(&per_meshlet)?;
         pass.narrow()?;
         pass.reduce()?;
@@ -128,6 +134,18 @@ impl Pass<'_> {
     /// from the elements that `counter` has counted, but at most `room`, the capacity of the
     /// buffer: see [`groups_for`](counters::groups_for).
     pub fn groups_for(&mut self, room: u32, per: u32, counter: u32) -> Result<CubeCount, GpuError> {
+        self.groups_in_slabs(room, per, 1, counter)
+    }
+
+    /// The same groups `slabs` times in z. A stage that takes its element from the position among all
+    /// groups finds elements in the first slab alone.
+    fn groups_in_slabs(
+        &mut self,
+        room: u32,
+        per: u32,
+        slabs: u32,
+        counter: u32,
+    ) -> Result<CubeCount, GpuError> {
         let groups = self.detector.buffers.groups.clone();
         let counters = self.counters();
         let one = CubeCount::Static(1, 1, 1);
@@ -136,9 +154,15 @@ impl Pass<'_> {
             "groups",
             one,
             1,
-            counters::groups_for(counters, groups.words(), room, per, counter)
+            counters::groups_for(counters, groups.words(), room, per, slabs, counter)
         )?;
         Ok(groups.count())
+    }
+
+    /// Groups of threads per meshlet. With many bodies there are enough meshlets to occupy the device.
+    fn slabs(&self) -> u32 {
+        let few = self.instances.ids.len() <= FEW_INSTANCES;
+        if few && parts(self.options) == Parts::Polygons { clip::GROUPS_PER_MESHLET } else { 1 }
     }
 
     /// 1 when least signed distances rule out meshlets, faces and cells, and otherwise 0.

@@ -55,6 +55,8 @@
 #[cfg(feature = "cuda")]
 mod driver;
 #[cfg(feature = "cuda")]
+mod kernel_cache;
+#[cfg(feature = "cuda")]
 mod memory;
 #[cfg(feature = "cuda")]
 mod nvrtc;
@@ -62,6 +64,8 @@ mod nvrtc;
 pub(crate) mod server;
 mod source;
 
+#[cfg(feature = "cuda")]
+pub use kernel_cache::compile_ahead;
 #[cfg(feature = "cuda")]
 pub use nvrtc::{Compiled, Resources, compile};
 pub use source::{Count, CudaSource, sources};

@@ -8,6 +8,9 @@ use cudarc::nvrtc::{result, sys};
 use super::CudaSource;
 use crate::GpuError;
 
+/// Options of the compiler for every kernel. Products are not fused into sums.
+pub(super) const OPTIONS: [&str; 2] = ["--fmad=false", "--std=c++17"];
+
 /// A compiled kernel.
 #[derive(Clone, Debug)]
 pub struct Compiled {
@@ -66,8 +69,8 @@ pub fn compile(source: &CudaSource, architecture: &str) -> Result<Compiled, GpuE
     let text = CString::new(source.text.as_str()).map_err(|e| refused(e.to_string()))?;
     let mut program = Program::new(&text).map_err(|e| refused(e.to_string()))?;
     let is_machine_code = architecture.starts_with("sm_");
-    let mut options =
-        vec![format!("--gpu-architecture={architecture}"), "--fmad=false".into(), "--std=c++17".into()];
+    let mut options = vec![format!("--gpu-architecture={architecture}")];
+    options.extend(OPTIONS.map(String::from));
     if is_machine_code {
         options.push("--ptxas-options=-v".into());
     }
@@ -102,6 +105,17 @@ fn is_present() -> bool {
     // the driver.
     static PRESENT: LazyLock<bool> = LazyLock::new(|| unsafe { sys::is_culib_present() });
     *PRESENT
+}
+
+/// Version of the compiler: major and minor number.
+pub(super) fn version() -> Result<(i32, i32), GpuError> {
+    if !is_present() {
+        return Err(GpuError::NoNvrtc);
+    }
+    let (mut major, mut minor) = (0, 0);
+    // SAFETY: the call writes two numbers, and fails only without a place for them.
+    let _ = unsafe { sys::nvrtcVersion(&mut major, &mut minor) };
+    Ok((major, minor))
 }
 
 fn supported() -> Vec<i32> {

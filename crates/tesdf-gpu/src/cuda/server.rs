@@ -28,8 +28,9 @@ use cubecl_runtime::storage::ManagedResource;
 use cubecl_server::allocator::ContiguousMemoryLayoutPolicy;
 
 use super::driver::{self, Event, Facts, Function, Gpu};
+use super::kernel_cache;
 use super::memory::{ALIGNMENT, Memory, Storage};
-use super::nvrtc::{architecture, compile};
+use super::nvrtc::architecture;
 use super::source::{Count, least_hardware, properties, source};
 use crate::GpuError;
 use crate::device::STREAM;
@@ -162,7 +163,7 @@ impl CudaServer {
         })
     }
 
-    /// Returns a kernel, and compiles it at the first call.
+    /// Returns a kernel, and at the first call loads it from the cache or compiles it.
     fn load(&mut self, kernel: &dyn CubeKernel, count: Count) -> Result<Arc<Loaded>, ServerError> {
         let key = (kernel.id(), count);
         if let Some(loaded) = self.kernels.get(&key) {
@@ -173,8 +174,8 @@ impl CudaServer {
         if count == Count::Indirect {
             source = source.counted_by_device().map_err(refused)?;
         }
-        let compiled = compile(&source, &self.architecture).map_err(refused)?;
-        let function = self.gpu.load(&compiled.image, &source.entry, source.threads, source.shared_bytes)?;
+        let image = kernel_cache::image(&source, &self.architecture).map_err(refused)?;
+        let function = self.gpu.load(&image, &source.entry, source.threads, source.shared_bytes)?;
         let loaded = Arc::new(Loaded { function, io: source.io });
         self.kernels.insert(key, loaded.clone());
         Ok(loaded)

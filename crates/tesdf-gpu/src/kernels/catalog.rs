@@ -106,7 +106,7 @@ fn add_broad(all: &mut Vec<Named>, device: &Device, target: &Target) {
         [counters::BLOCKS, counters::MESHLETS, counters::POLYGONS, counters::CONTACTS, counters::TOUCHING]
     {
         kernels!(all, device, target;
-            Direct counters::groups_for, 1, (counters(), words(), 1, 1, counter); counter;;
+            Direct counters::groups_for, 1, (counters(), words(), 1, 1, 1, counter); counter;;
         );
     }
 }

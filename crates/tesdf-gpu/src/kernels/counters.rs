@@ -87,14 +87,21 @@ impl Counters {
 pub const MAX_GROUPS: u32 = 32_768;
 
 /// Computes the number of groups of a stage in x, y and z: `per` elements per group, from a buffer
-/// with capacity `room`.
+/// with capacity `room`, in x and y, and all of them `slabs` times in z.
 #[cube(launch, create_dummy_kernel)]
-pub fn groups_for(counters: &Counters, groups: &mut [u32], room: u32, per: u32, #[comptime] counter: u32) {
+pub fn groups_for(
+    counters: &Counters,
+    groups: &mut [u32],
+    room: u32,
+    per: u32,
+    slabs: u32,
+    #[comptime] counter: u32,
+) {
     if ABSOLUTE_POS == 0usize {
         let needed = (counters.within(counter, room) + per - 1u32) / per;
         let wide = needed.min(MAX_GROUPS).max(1u32);
         groups[0] = wide;
         groups[1] = ((needed + wide - 1u32) / wide).max(1u32);
-        groups[2] = 1u32;
+        groups[2] = slabs;
     }
 }

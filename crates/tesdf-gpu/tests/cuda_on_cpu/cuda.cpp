@@ -291,6 +291,7 @@ static unsigned long long fnv(const std::string &text, unsigned long long hash) 
     return hash;
 }
 
+CUDA int nvrtcVersion(int *major, int *minor) { *major = 0, *minor = 0; return 0; }
 CUDA int nvrtcGetNumSupportedArchs(int *count) { *count = 1; return 0; }
 CUDA int nvrtcGetSupportedArchs(int *known) { known[0] = 90; return 0; }
 CUDA int nvrtcCreateProgram(void **program, const char *text, const char *, int, const char **, const char **) {

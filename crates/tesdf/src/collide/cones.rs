@@ -10,6 +10,7 @@
 //! between its two faces, a vertex the cone of its faces.
 use arrayvec::ArrayVec;
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::field::ROUNDING;
 use super::{CollideError, CollideOptions, Contact, InstanceId, Placement, Scene, Shape};
@@ -529,7 +530,7 @@ pub fn in_cones(
     };
     let ids = |c: &Contact| (c.instance_a.min(c.instance_b), c.instance_a.max(c.instance_b));
     let mut found = Vec::with_capacity(contacts.len());
-    let mut faces = faces.iter();
+    let mut faces = faces;
     for run in contacts.chunk_by(|x, y| ids(x) == ids(y)) {
         let mut of_pair = Vec::with_capacity(run.len());
         let mut near = 0.0;
@@ -538,7 +539,9 @@ pub fn in_cones(
             let diagonal = bodies[1].0.diagonal().min(f64::MAX) * bodies[1].1.scale;
             let cones = Cones::new(bodies, options.tolerance.resolve(diagonal), Precision::F32);
             near = cones.near();
-            of_pair.extend(order.iter().zip(&mut faces).filter_map(|(c, faces)| cones.of(*c, *faces)));
+            let (of_order, others) = faces.split_at(order.len().min(faces.len()));
+            faces = others;
+            of_pair.par_extend(order.par_iter().zip(of_order).filter_map(|(c, faces)| cones.of(*c, *faces)));
         }
         let kept = keep_different(&of_pair, near);
         found.extend(of_pair.into_iter().zip(kept).filter_map(|(c, keep)| keep.then_some(c)));

@@ -5,7 +5,7 @@ use cubecl::prelude::*;
 /// of the roots.
 pub const LEVELS: usize = tesdf::domain::MAX_DEPTH as usize + 1;
 /// Words for the bits.
-const WORDS: usize = LEVELS.div_ceil(32);
+pub const WORDS: usize = LEVELS.div_ceil(32);
 
 /// One bit for each level.
 #[derive(CubeType)]
@@ -35,6 +35,24 @@ impl Bits {
         let at = (level / 32u32) as usize;
         let cleared = self.words[at] & !mask;
         self.words[at] = select(value, cleared | mask, cleared);
+    }
+
+    pub fn word(&self, #[comptime] at: usize) -> u32 {
+        self.words[at]
+    }
+
+    pub fn set_word(&mut self, #[comptime] at: usize, word: u32) {
+        self.words[at] = word;
+    }
+
+    /// One more than the lowest level whose bit is set; 0 when no bit is set.
+    pub fn first(&self) -> u32 {
+        let (low, middle, high) = (self.words[0], self.words[1], self.words[2]);
+        let of_low = 32u32 - (low & (!low + 1u32)).leading_zeros();
+        let of_middle = 64u32 - (middle & (!middle + 1u32)).leading_zeros();
+        let of_high = 96u32 - (high & (!high + 1u32)).leading_zeros();
+        let of_rest = select(high > 0u32, of_high, 0u32);
+        select(low > 0u32, of_low, select(middle > 0u32, of_middle, of_rest))
     }
 
     /// One more than the highest level whose bit is set; 0 when no bit is set.

@@ -3,7 +3,8 @@
 //! A thread walks the bisection forest with the barycentric coordinates of the face's three
 //! corners. It starts from the roots of the cube, or from the tetrahedra of a conforming domain. It
 //! descends into one child and returns later for the other. For this it stores its path, one bit
-//! per level, and the node words of the first children. A polygon is stored as weights of the
+//! per level, and the node words of the first children. Faces meet from one to thousands of cells, so
+//! every [`ROUND`] steps threads without work take branches of the others' walks. A polygon is stored as weights of the
 //! face's corners, because the coordinates in each cell are linear in these weights.
 use cubecl::prelude::*;
 
@@ -11,17 +12,25 @@ use super::super::broad::meshlets::{Blocks, meshlet_work};
 use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, CANDIDATES, Counters};
 use super::super::field::locate::{Cell, is_split};
-use super::super::field::shapes::{BAND, Field, NONE, Shapes, TREE_NODES};
+use super::super::field::shapes::{BAND, Field, HIGH, LOW, NONE, Shapes, TREE_NODES};
 use super::super::field::tetrahedra::{Around, around_of};
 use super::super::math::vector::v3;
 use super::super::narrow::exchange::LANES;
 use super::bits::{Bits, LEVELS, no_bits};
+use super::branches::no_branches;
 use super::corners::{Corners, corners_in};
 use super::cut::{Cut, no_polygon, whole};
 use super::items::{Polygons, Subject};
 
+/// Steps of a walk between two exchanges of branches. An exchange takes about as long as a step.
+const ROUND: u32 = 16;
+/// Groups of threads that share the large faces of a meshlet.
+pub const GROUPS_PER_MESHLET: u32 = 8;
+/// A face is large when its radius is more than this share of the domain's extent.
+const LARGE: f32 = 0.25;
+
 /// The share of a thread in a face that several threads work on.
-#[derive(CubeType, Clone, Copy)]
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
 pub struct Share {
     /// Number of this thread.
@@ -30,8 +39,8 @@ pub struct Share {
     pub threads: u32,
 }
 
-/// Number of threads that share a face. It is more than one in a meshlet with few faces, because
-/// these may be large.
+/// Number of threads of a group that share a face. It is more than one in a meshlet with few faces,
+/// because these may be large.
 #[cube]
 fn threads_per_face(faces: u32) -> u32 {
     let mut threads = 1u32;
@@ -41,8 +50,8 @@ fn threads_per_face(faces: u32) -> u32 {
     threads
 }
 
-/// Clips faces. A group takes a meshlet. A face has one thread, or several where the meshlet has
-/// few faces.
+/// Clips faces. The groups of a slab in z take a meshlet each. A face has one thread, or several where
+/// the meshlet has few faces. Large faces have threads in every slab, and the others in the first.
 #[cube(launch, create_dummy_kernel)]
 pub fn clip_polygons(
     shapes: &Shapes,
@@ -52,36 +61,98 @@ pub fn clip_polygons(
     polygons: &mut Polygons,
     prune: u32,
 ) {
-    let item = CUBE_POS as u32;
+    let mut branches = no_branches();
+    let item = CUBE_POS_X + CUBE_POS_Y * CUBE_COUNT_X;
     let count = counters.within(counters::MESHLETS, meshlets.room);
     if item < count {
         let work = meshlet_work(shapes, pairs, meshlets, item);
-        let pair = work.pair;
+        let (pair, field) = (work.pair, work.field);
         let faces = work.faces();
         let threads = threads_per_face(faces);
-        let share = Share { mine: UNIT_POS % threads, threads };
+        let mut walk = Walk { face: 0u32, root: 0u32, cell: 0u32, depth: 0u32, open: false };
+        let mut start = Start { number: 0u32, end: 0u32, levels: 0u32, turn: 0u32 };
+        let mut share = Share { mine: 0u32, threads: 1u32 };
+        let mut path = no_bits();
+        let mut waiting = no_bits();
+        waiting.clear();
+        // The first child at each level of the path.
+        let mut children = Array::<u32>::new(LEVELS);
+        let mut polygon = no_polygon();
         if UNIT_POS / threads < faces {
             let face = work.face(UNIT_POS / threads);
             let part = shapes.part(pair, face);
             let subject = Subject { pair, face, part, reach: pairs.reach_of(pair, part) };
             let center = subject.part.center();
-            let field = work.field;
             let radius = subject.part.radius_around(center);
-            if !field.is_beyond(center, radius, subject.reach, prune) {
+            let extent = (field.vector(HIGH) - field.vector(LOW)).greatest();
+            let slabs = select(field.is_mesh() && radius > LARGE * extent, CUBE_COUNT_Z, 1u32);
+            share = Share { mine: UNIT_POS % threads * slabs + CUBE_POS_Z, threads: threads * slabs };
+            if CUBE_POS_Z < slabs && !field.is_beyond(center, radius, subject.reach, prune) {
                 if share.mine == 0u32 {
                     counters.append(CANDIDATES);
                 }
-                let mut polygon = no_polygon();
                 if field.is_mesh() {
-                    clip(field, subject, share, counters, polygons, &mut polygon, prune);
+                    if share.mine == 0u32 && !field.is_conforming() && reaches_out(field, subject) {
+                        outside_cube(field, subject, counters, polygons, &mut polygon);
+                    }
+                    walk.face = face;
+                    start = start_of(field, share);
                 } else if share.mine == 0u32 {
                     polygon.start(whole(), subject.part.count);
                     polygon.write(polygons, counters, subject, NONE);
                 }
             }
         }
+        let mut going = true;
+        while going {
+            if walk.open || start.number < start.end {
+                let part = shapes.part(pair, walk.face);
+                let subject = Subject { pair, face: walk.face, part, reach: pairs.reach_of(pair, part) };
+                let search = Search { subject, beyond: reaches_out(field, subject), prune };
+                let around = around_of(part.a, part.b, part.c);
+                while !walk.open && start.number < start.end {
+                    start.next(field, around, share, &mut walk, &mut path);
+                }
+                if walk.open {
+                    go_on(
+                        field,
+                        search,
+                        &mut walk,
+                        &mut path,
+                        &mut waiting,
+                        &mut children,
+                        counters,
+                        polygons,
+                        &mut polygon,
+                    );
+                }
+            }
+            let is_free = !walk.open && start.number >= start.end;
+            going = branches.exchange(is_free, &mut walk, &mut path, &mut waiting, &children);
+        }
         counters.tell_if_broken_off(count);
     }
+}
+
+/// Whether points of a face outside of the cells can be contacts. Around a conforming domain,
+/// `outside::outside_polygons` finds them.
+#[cube]
+fn reaches_out(field: Field<'_>, subject: Subject) -> bool {
+    let conforming = field.is_conforming();
+    (conforming && subject.reach > 0.0f32)
+        || (!conforming && (subject.reach >= field.number(BAND) || field.is_open()))
+}
+
+/// A walk through the cells that a face meets, between two steps.
+#[derive(CubeType, CubeTypeMut, Clone, Copy)]
+#[expand(derive(Clone, Copy))]
+pub struct Walk {
+    pub face: u32,
+    pub root: u32,
+    pub cell: u32,
+    pub depth: u32,
+    /// Whether the cell still has to be visited.
+    pub open: bool,
 }
 
 /// A face, and the cells in which it may have polygons.
@@ -95,39 +166,8 @@ struct Search {
     prune: u32,
 }
 
-/// Clips a face by this thread's share of all cells that it meets.
-#[cube]
-fn clip(
-    field: Field<'_>,
-    subject: Subject,
-    share: Share,
-    counters: &Counters,
-    polygons: &mut Polygons,
-    polygon: &mut Cut,
-    prune: u32,
-) {
-    let reach = subject.reach;
-    let conforming = field.is_conforming();
-    // Around a conforming domain, `outside::outside_polygons` finds the parts of the face.
-    let beyond =
-        (conforming && reach > 0.0f32) || (!conforming && (reach >= field.number(BAND) || field.is_open()));
-    if beyond && !conforming && share.mine == 0u32 {
-        outside_cube(field, subject, counters, polygons, polygon);
-    }
-    let search = Search { subject, beyond, prune };
-    let around = around_of(subject.part.a, subject.part.b, subject.part.c);
-    let mut start = start_of(field, share);
-    let mut path = no_bits();
-    while start.number < start.end {
-        let begin = start.next(field, around, share, &mut path);
-        if begin.open {
-            walk(field, search, begin, &mut path, counters, polygons, polygon);
-        }
-    }
-}
-
 /// The starting cell of a thread's next walk. In the bisection domain it is one of the six roots.
-/// When several threads share a face, it is a cell three levels below. In a conforming domain, the
+/// When several threads share a face, it is a cell some levels below. In a conforming domain, the
 /// threads take the tetrahedra in turns, and `number` is a node of the tree over tetrahedra.
 #[derive(CubeType, CubeTypeMut, Clone, Copy)]
 #[expand(derive(Clone, Copy))]
@@ -140,21 +180,11 @@ struct Start {
     turn: u32,
 }
 
-/// A cell at which a walk starts.
-#[derive(CubeType, Clone, Copy)]
-#[expand(derive(Clone, Copy))]
-struct Begin {
-    root: u32,
-    cell: u32,
-    depth: u32,
-    /// Whether this thread has to walk the cell.
-    open: bool,
-}
-
 #[cube]
 fn start_of(field: Field<'_>, share: Share) -> Start {
     let conforming = field.is_conforming();
-    let levels = select(share.threads > 1u32 && !conforming, 3u32, 0u32);
+    let few = select(share.threads > 1u32, 3u32, 0u32);
+    let levels = select(conforming, 0u32, select(share.threads > 8u32, 6u32, few));
     Start {
         number: select(conforming, 0u32, share.mine),
         end: select(conforming, field.entry(TREE_NODES), 6u32 << levels),
@@ -165,8 +195,8 @@ fn start_of(field: Field<'_>, share: Share) -> Start {
 
 #[cube]
 impl Start {
-    /// The next starting cell. Its path is written to `path`.
-    fn next(&mut self, field: Field<'_>, around: Around, share: Share, path: &mut Bits) -> Begin {
+    /// Begins the walk at the next starting cell, and writes its path, unless another thread does.
+    fn next(&mut self, field: Field<'_>, around: Around, share: Share, walk: &mut Walk, path: &mut Bits) {
         let number = self.number;
         let mut root = number >> self.levels;
         let mut elsewhere = false;
@@ -198,32 +228,36 @@ impl Start {
         let below = (1u32 << (self.levels - depth)) - 1u32;
         let repeated = depth < self.levels && (number & below) != 0u32;
         self.number = next;
-        Begin { root, cell, depth, open: !elsewhere && !repeated }
+        walk.root = root;
+        walk.cell = cell;
+        walk.depth = depth;
+        walk.open = !elsewhere && !repeated;
     }
 }
 
-/// Walks the descendants of a cell, and writes the polygons of a face in them.
+/// Goes on with a walk, by [`ROUND`] steps at most, and writes the polygons of the face in its cells.
 #[cube]
-fn walk(
+#[allow(clippy::too_many_arguments)]
+fn go_on(
     field: Field<'_>,
     search: Search,
-    begin: Begin,
+    walk: &mut Walk,
     path: &mut Bits,
+    waiting: &mut Bits,
+    children: &mut Array<u32>,
     counters: &Counters,
     polygons: &mut Polygons,
     polygon: &mut Cut,
 ) {
     let part = search.subject.part;
-    let root = corners_in(field.tetrahedron(begin.root), part);
-    let mut held = path.follow(root, begin.depth);
-    // The first child at each level, and whether its sibling still has to be visited.
-    let mut children = Array::<u32>::new(LEVELS);
-    let mut waiting = no_bits();
-    waiting.clear();
-    let mut cell = begin.cell;
-    let mut depth = begin.depth;
+    let root = corners_in(field.tetrahedron(walk.root), part);
+    let mut held = path.follow(root, walk.depth);
+    let mut cell = walk.cell;
+    let mut depth = walk.depth;
     let mut open = true;
-    while open {
+    let mut steps = 0u32;
+    while open && steps < ROUND {
+        steps += 1u32;
         let word = field.cell_word(cell);
         let k = 3u32 - depth % 3u32;
         let mut down = false;
@@ -266,6 +300,9 @@ fn walk(
         let again = path.follow(root, select(down || !open, 0u32, depth));
         held = Corners::pick(down, next, again);
     }
+    walk.cell = cell;
+    walk.depth = depth;
+    walk.open = open;
 }
 
 /// Writes the parts of a face outside of the cube, at most six.

@@ -1,5 +1,6 @@
 //! Middle phase: finds the cells of nodes, the polygons of faces, and hidden overlaps.
 pub mod bits;
+pub mod branches;
 pub mod clip;
 pub mod corners;
 pub mod cut;

@@ -403,6 +403,10 @@ pub fn minimize(
                     found = lowest_of(found, search, next.vertex, list, exchange);
                 }
             }
+            if comptime!(lanes > 1) {
+                // Another thread may have written the last one.
+                sync_cube();
+            }
             if found.distance < search.distance && lane == found.lane {
                 best.put(held, here);
             }
