@@ -77,6 +77,7 @@ impl Branches {
             walk.cell = self.words[at + 2usize];
             walk.depth = self.words[at + 3usize];
             walk.open = true;
+            walk.is_new = true;
             #[unroll]
             for word in 0..WORDS {
                 path.set_word(word, self.words[at + 4usize + word]);

@@ -3,7 +3,7 @@
 //! A thread walks the bisection forest with the barycentric coordinates of the face's three
 //! corners. It starts from the roots of the cube, or from the tetrahedra of a conforming domain. It
 //! descends into one child and returns later for the other. For this it stores its path, one bit
-//! per level, and the node words of the first children. Faces meet from one to thousands of cells, so
+//! per level, the node words of the first children, and the coordinates at each third level. Faces meet from one to thousands of cells, so
 //! every [`ROUND`] steps threads without work take branches of the others' walks. A polygon is stored as weights of the
 //! face's corners, because the coordinates in each cell are linear in these weights.
 use cubecl::prelude::*;
@@ -11,7 +11,7 @@ use cubecl::prelude::*;
 use super::super::broad::meshlets::{Blocks, meshlet_work};
 use super::super::broad::ordered_pair::OrderedPairs;
 use super::super::counters::{self, CANDIDATES, Counters};
-use super::super::field::locate::{Cell, is_split};
+use super::super::field::locate::{Cell, Lambda, is_split};
 use super::super::field::shapes::{BAND, Field, HIGH, LOW, NONE, Shapes, TREE_NODES};
 use super::super::field::tetrahedra::{Around, around_of};
 use super::super::math::vector::v3;
@@ -69,14 +69,13 @@ pub fn clip_polygons(
         let (pair, field) = (work.pair, work.field);
         let faces = work.faces();
         let threads = threads_per_face(faces);
-        let mut walk = Walk { face: 0u32, root: 0u32, cell: 0u32, depth: 0u32, open: false };
+        let mut walk = Walk { face: 0u32, root: 0u32, cell: 0u32, depth: 0u32, open: false, is_new: false };
         let mut start = Start { number: 0u32, end: 0u32, levels: 0u32, turn: 0u32 };
         let mut share = Share { mine: 0u32, threads: 1u32 };
         let mut path = no_bits();
         let mut waiting = no_bits();
         waiting.clear();
-        // The first child at each level of the path.
-        let mut children = Array::<u32>::new(LEVELS);
+        let mut trail = no_trail();
         let mut polygon = no_polygon();
         if UNIT_POS / threads < faces {
             let face = work.face(UNIT_POS / threads);
@@ -120,7 +119,7 @@ pub fn clip_polygons(
                         &mut walk,
                         &mut path,
                         &mut waiting,
-                        &mut children,
+                        &mut trail,
                         counters,
                         polygons,
                         &mut polygon,
@@ -128,7 +127,7 @@ pub fn clip_polygons(
                 }
             }
             let is_free = !walk.open && start.number >= start.end;
-            going = branches.exchange(is_free, &mut walk, &mut path, &mut waiting, &children);
+            going = branches.exchange(is_free, &mut walk, &mut path, &mut waiting, &trail.children);
         }
         counters.tell_if_broken_off(count);
     }
@@ -153,6 +152,8 @@ pub struct Walk {
     pub depth: u32,
     /// Whether the cell still has to be visited.
     pub open: bool,
+    /// Whether no step of this walk has been made by this thread.
+    pub is_new: bool,
 }
 
 /// A face, and the cells in which it may have polygons.
@@ -232,6 +233,65 @@ impl Start {
         walk.cell = cell;
         walk.depth = depth;
         walk.open = !elsewhere && !repeated;
+        walk.is_new = true;
+    }
+}
+
+/// What a walk needs to return to the cells of its path.
+#[derive(CubeType)]
+struct Trail {
+    /// The first child at each level.
+    children: Array<u32>,
+    /// The face's corners at each third level, 12 numbers each.
+    corners: Array<f32>,
+}
+
+#[cube]
+fn no_trail() -> Trail {
+    Trail {
+        children: Array::<u32>::new(LEVELS),
+        corners: Array::<f32>::new(comptime!(12 * LEVELS.div_ceil(3))),
+    }
+}
+
+/// The third level at or above a level.
+#[cube]
+fn third(depth: u32) -> u32 {
+    depth / 3u32 * 3u32
+}
+
+#[cube]
+impl Trail {
+    /// Keeps the corners in the cell at level `depth`, at each third level.
+    fn keep(&mut self, depth: u32, corners: Corners) {
+        if depth % 3u32 == 0u32 {
+            let at = (4u32 * depth) as usize;
+            self.put(at, corners.a);
+            self.put(at + 4usize, corners.b);
+            self.put(at + 8usize, corners.c);
+        }
+    }
+
+    /// The corners in the cell at level `depth`, a multiple of 3.
+    fn at(&self, depth: u32) -> Corners {
+        let at = (4u32 * depth) as usize;
+        Corners { a: self.get(at), b: self.get(at + 4usize), c: self.get(at + 8usize) }
+    }
+
+    fn put(&mut self, at: usize, l: Lambda) {
+        self.corners[at] = l.l0;
+        self.corners[at + 1usize] = l.l1;
+        self.corners[at + 2usize] = l.l2;
+        self.corners[at + 3usize] = l.l3;
+    }
+
+    fn get(&self, at: usize) -> Lambda {
+        Lambda {
+            l0: self.corners[at],
+            l1: self.corners[at + 1usize],
+            l2: self.corners[at + 2usize],
+            l3: self.corners[at + 3usize],
+        }
     }
 }
 
@@ -244,16 +304,21 @@ fn go_on(
     walk: &mut Walk,
     path: &mut Bits,
     waiting: &mut Bits,
-    children: &mut Array<u32>,
+    trail: &mut Trail,
     counters: &Counters,
     polygons: &mut Polygons,
     polygon: &mut Cut,
 ) {
     let part = search.subject.part;
-    let root = corners_in(field.tetrahedron(walk.root), part);
-    let mut held = path.follow(root, walk.depth);
     let mut cell = walk.cell;
     let mut depth = walk.depth;
+    let mut base = third(depth);
+    if walk.is_new {
+        let root = corners_in(field.tetrahedron(walk.root), part);
+        trail.keep(base, path.follow(root, base));
+        walk.is_new = false;
+    }
+    let mut held = path.follow_from(trail.at(base), base, depth);
     let mut open = true;
     let mut steps = 0u32;
     while open && steps < ROUND {
@@ -269,7 +334,7 @@ fn go_on(
                 let below = over.least() < 0.0f32;
                 down = true;
                 side = below && !above;
-                children[depth as usize] = word;
+                trail.children[depth as usize] = word;
                 waiting.set(depth, above && below);
                 path.set(depth, side);
             } else {
@@ -283,10 +348,11 @@ fn go_on(
                 }
             }
         }
-        let next = held.in_child(k, side);
         if down {
             cell = word + select(side, 1u32, 0u32);
             depth += 1u32;
+            held = held.in_child(k, side);
+            trail.keep(depth, held);
         } else {
             // Return to the last level with a sibling to visit.
             depth = waiting.last();
@@ -294,11 +360,13 @@ fn go_on(
             if open {
                 waiting.set(depth - 1u32, false);
                 path.set(depth - 1u32, true);
-                cell = children[(depth - 1u32) as usize] + 1u32;
+                cell = trail.children[(depth - 1u32) as usize] + 1u32;
+                // The sibling's corners were kept at its own level.
+                base = third(depth - 1u32);
+                held = path.follow_from(trail.at(base), base, depth);
+                trail.keep(depth, held);
             }
         }
-        let again = path.follow(root, select(down || !open, 0u32, depth));
-        held = Corners::pick(down, next, again);
     }
     walk.cell = cell;
     walk.depth = depth;

@@ -84,15 +84,6 @@ impl Corners {
         polygon.cut(v3(self.a.l2, self.b.l2, self.c.l2), 1.0f32);
         polygon.cut(v3(self.a.l3, self.b.l3, self.c.l3), 1.0f32);
     }
-
-    /// Picks one of two values without a branch.
-    pub fn pick(condition: bool, first: Corners, second: Corners) -> Corners {
-        Corners {
-            a: pick_lambda(select(condition, 1u32, 2u32), first.a, second.a, second.a),
-            b: pick_lambda(select(condition, 1u32, 2u32), first.b, second.b, second.b),
-            c: pick_lambda(select(condition, 1u32, 2u32), first.c, second.c, second.c),
-        }
-    }
 }
 
 #[cube]
@@ -105,9 +96,14 @@ impl Bits {
     /// Coordinates in a cell, from those in its root. The first `depth` bits of the path lead to
     /// the cell.
     pub fn follow(&self, root: Corners, depth: u32) -> Corners {
-        let mut held = root;
+        self.follow_from(root, 0u32, depth)
+    }
+
+    /// Coordinates in a cell, from those in the cell at level `from` of its path, a multiple of 3.
+    pub fn follow_from(&self, kept: Corners, from: u32, depth: u32) -> Corners {
+        let mut held = kept;
         // Each turn descends three levels, each with its own refinement edge.
-        let mut level = 0u32;
+        let mut level = from;
         while level < depth {
             let one = held.in_child(3u32, self.get(level));
             let two = one.in_child(2u32, self.get(level + 1u32));
