@@ -70,8 +70,9 @@ pub enum GpuError {
     },
     /// The library NVRTC, which compiles kernels for CUDA, is missing.
     #[error(
-        "NVRTC, which compiles kernels for CUDA, was not found; expected libnvrtc.so.12 or nvrtc64_12.dll. Install the CUDA toolkit 12, \
-         or `pip install nvidia-cuda-nvrtc-cu12` and put its folder nvidia/cuda_nvrtc/lib into LD_LIBRARY_PATH"
+        "NVRTC, which compiles kernels for CUDA, was not found; expected libnvrtc.so, libnvrtc.so.13 or libnvrtc.so.12 (Windows: \
+         nvrtc64_130_0.dll or nvrtc64_120_0.dll). Install the CUDA toolkit 12 or 13, or `pip install nvidia-cuda-nvrtc` and put its folder \
+         nvidia/cu13/lib into LD_LIBRARY_PATH"
     )]
     NoNvrtc,
     /// The kernels cannot read a shape, or cannot move its vertices.

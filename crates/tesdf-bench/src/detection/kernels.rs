@@ -46,7 +46,7 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     }
     let mut text = format!(
         "{:64} threads registers warps stack spilled shared seconds\n",
-        format_args!("kernel ({})", args.architecture)
+        format!("kernel ({})", args.architecture)
     );
     for r in &rows {
         let Row { kernel, threads, registers, warps, stack_bytes, spilled_bytes, shared_bytes, .. } = r;

@@ -149,6 +149,7 @@ pub fn text(r: &Report) -> String {
     if let Some(kept) = &r.counts.kept {
         line("  kept", spread(kept));
     }
+    line("  hash of all", r.contacts_hash.clone());
     if r.launches > 0 {
         line("launches", r.launches.to_string());
     }

@@ -1,7 +1,7 @@
 //! The kernels as CUDA C++, for NVIDIA GPUs with CUDA, also where no graphics driver is installed.
 //!
-//! Tests compile each kernel with NVRTC, and run the generated code on the processor. No kernel has
-//! been run on a CUDA device yet.
+//! Tests compile each kernel with NVRTC, and run the generated code on the processor. An NVIDIA H100
+//! gave the same bytes.
 //!
 //! # One way to launch
 //!
@@ -16,6 +16,8 @@
 //! kernel ──source──▶ CUDA C++ ──nvrtc──▶ machine code ──driver──▶ launch
 //!           cubecl-cpp           library of CUDA           driver of the GPU
 //! ```
+//!
+//! Machine code is kept on disk ([`compile_ahead`]).
 //!
 //! Generating the text needs neither a GPU nor CUDA, and compiling it needs no GPU. [`sources`]
 //! returns the text of every kernel in `kernels::catalog`, and tests compile each of them.

@@ -1,9 +1,10 @@
 //! NVRTC, the compiler of CUDA C++. The library is loaded at the first use.
-use std::ffi::{CStr, CString, c_char};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::fmt;
+use std::ptr;
 use std::sync::LazyLock;
 
-use cudarc::nvrtc::{result, sys};
+use libloading::Library;
 
 use super::CudaSource;
 use crate::GpuError;
@@ -62,32 +63,28 @@ impl fmt::Display for Resources {
 /// [`GpuError::NoNvrtc`] when NVRTC is not installed; [`GpuError::Kernel`] with the compiler's
 /// messages when NVRTC rejects the text.
 pub fn compile(source: &CudaSource, architecture: &str) -> Result<Compiled, GpuError> {
-    if !is_present() {
-        return Err(GpuError::NoNvrtc);
-    }
+    let nvrtc = nvrtc()?;
     let refused = |reason: String| GpuError::Kernel { kernel: source.kernel.clone(), reason };
     let text = CString::new(source.text.as_str()).map_err(|e| refused(e.to_string()))?;
-    let mut program = Program::new(&text).map_err(|e| refused(e.to_string()))?;
+    let mut program = Program::new(nvrtc, &text).map_err(&refused)?;
     let is_machine_code = architecture.starts_with("sm_");
-    let mut options = vec![format!("--gpu-architecture={architecture}")];
-    options.extend(OPTIONS.map(String::from));
+    let target = format!("--gpu-architecture={architecture}");
+    let mut options = vec![target.as_str()];
+    options.extend(OPTIONS);
     if is_machine_code {
-        options.push("--ptxas-options=-v".into());
+        options.push("--ptxas-options=-v");
     }
     let compiled = program.compile(&options);
     let log = program.log();
     compiled.map_err(|e| refused(format!("{e} for {architecture}\n{log}")))?;
-    let image = program.image(is_machine_code).map_err(|e| refused(e.to_string()))?;
+    let image = program.image(is_machine_code).map_err(refused)?;
     Ok(Compiled { image, resources: is_machine_code.then(|| resources(&log)) })
 }
 
 /// The architecture to compile for, on a GPU with compute capability `capability`, such as 90:
 /// machine code for this GPU, or PTX for the next lower capability that NVRTC knows.
 pub(super) fn architecture(capability: i32) -> Result<String, GpuError> {
-    if !is_present() {
-        return Err(GpuError::NoNvrtc);
-    }
-    let known = supported();
+    let known = nvrtc()?.supported();
     if known.contains(&capability) {
         return Ok(format!("sm_{capability}"));
     }
@@ -100,83 +97,163 @@ pub(super) fn architecture(capability: i32) -> Result<String, GpuError> {
     }
 }
 
-fn is_present() -> bool {
-    // SAFETY: the call opens libraries by NVIDIA's names. Their initialisers are trusted, as for
-    // the driver.
-    static PRESENT: LazyLock<bool> = LazyLock::new(|| unsafe { sys::is_culib_present() });
-    *PRESENT
-}
-
 /// Version of the compiler: major and minor number.
 pub(super) fn version() -> Result<(i32, i32), GpuError> {
-    if !is_present() {
-        return Err(GpuError::NoNvrtc);
-    }
     let (mut major, mut minor) = (0, 0);
-    // SAFETY: the call writes two numbers, and fails only without a place for them.
-    let _ = unsafe { sys::nvrtcVersion(&mut major, &mut minor) };
+    // SAFETY: the call writes two numbers. It fails only without a place for them.
+    let _ = unsafe { (nvrtc()?.version)(&mut major, &mut minor) };
     Ok((major, minor))
 }
 
-fn supported() -> Vec<i32> {
-    let mut count = 0;
-    // SAFETY: the first call writes one number. The second call writes as many numbers as the first
-    // returned.
-    unsafe {
-        if sys::nvrtcGetNumSupportedArchs(&mut count).result().is_err() {
-            return Vec::new();
+/// Names of the library, newest first. Toolkits also install the first one, which stands for their
+/// own version; packages of Python install the others alone.
+const NAMES: [&str; 5] =
+    ["libnvrtc.so", "libnvrtc.so.13", "libnvrtc.so.12", "nvrtc64_130_0.dll", "nvrtc64_120_0.dll"];
+
+/// Result of a call; 0 is success.
+type Status = c_int;
+type Handle = *mut c_void;
+type SizeOf = unsafe extern "C" fn(Handle, *mut usize) -> Status;
+type Copy = unsafe extern "C" fn(Handle, *mut c_char) -> Status;
+
+/// The functions of the library that are used here, as `nvrtc.h` of CUDA 12 and 13 declares them.
+struct Nvrtc {
+    version: unsafe extern "C" fn(*mut c_int, *mut c_int) -> Status,
+    count_of_architectures: unsafe extern "C" fn(*mut c_int) -> Status,
+    architectures: unsafe extern "C" fn(*mut c_int) -> Status,
+    create: unsafe extern "C" fn(
+        *mut Handle,
+        *const c_char,
+        *const c_char,
+        c_int,
+        *const *const c_char,
+        *const *const c_char,
+    ) -> Status,
+    compile: unsafe extern "C" fn(Handle, c_int, *const *const c_char) -> Status,
+    destroy: unsafe extern "C" fn(*mut Handle) -> Status,
+    log_size: SizeOf,
+    log: Copy,
+    cubin_size: SizeOf,
+    cubin: Copy,
+    ptx_size: SizeOf,
+    ptx: Copy,
+    error: unsafe extern "C" fn(Status) -> *const c_char,
+    /// Last, so that the functions are gone before the library.
+    _library: Library,
+}
+
+/// The library, which is opened once.
+fn nvrtc() -> Result<&'static Nvrtc, GpuError> {
+    // SAFETY: the call opens libraries by NVIDIA's names. Their initialisers are trusted, as for
+    // the driver.
+    static NVRTC: LazyLock<Option<Nvrtc>> = LazyLock::new(|| {
+        NAMES.iter().find_map(|&name| unsafe { Library::new(name) }.ok().and_then(|l| Nvrtc::of(l).ok()))
+    });
+    NVRTC.as_ref().ok_or(GpuError::NoNvrtc)
+}
+
+impl Nvrtc {
+    fn of(library: Library) -> Result<Self, libloading::Error> {
+        // SAFETY: the functions have the types that `nvrtc.h` declares.
+        unsafe {
+            Ok(Self {
+                version: *library.get(b"nvrtcVersion")?,
+                count_of_architectures: *library.get(b"nvrtcGetNumSupportedArchs")?,
+                architectures: *library.get(b"nvrtcGetSupportedArchs")?,
+                create: *library.get(b"nvrtcCreateProgram")?,
+                compile: *library.get(b"nvrtcCompileProgram")?,
+                destroy: *library.get(b"nvrtcDestroyProgram")?,
+                log_size: *library.get(b"nvrtcGetProgramLogSize")?,
+                log: *library.get(b"nvrtcGetProgramLog")?,
+                cubin_size: *library.get(b"nvrtcGetCUBINSize")?,
+                cubin: *library.get(b"nvrtcGetCUBIN")?,
+                ptx_size: *library.get(b"nvrtcGetPTXSize")?,
+                ptx: *library.get(b"nvrtcGetPTX")?,
+                error: *library.get(b"nvrtcGetErrorString")?,
+                _library: library,
+            })
         }
-        let mut known = vec![0; count.max(0) as usize];
-        if sys::nvrtcGetSupportedArchs(known.as_mut_ptr()).result().is_err() {
-            return Vec::new();
+    }
+
+    /// Architectures that the compiler knows, such as 90.
+    fn supported(&self) -> Vec<i32> {
+        let mut count = 0;
+        // SAFETY: the first call writes one number. The second call writes as many numbers as the
+        // first returned.
+        unsafe {
+            if (self.count_of_architectures)(&mut count) != 0 {
+                return Vec::new();
+            }
+            let mut known = vec![0; count.max(0) as usize];
+            if (self.architectures)(known.as_mut_ptr()) != 0 {
+                return Vec::new();
+            }
+            known
         }
-        known
+    }
+
+    /// The message of a status that is not 0.
+    fn checked(&self, status: Status) -> Result<(), String> {
+        if status == 0 {
+            return Ok(());
+        }
+        // SAFETY: the message is a constant of the library.
+        let message = unsafe { CStr::from_ptr((self.error)(status)) };
+        Err(message.to_string_lossy().into_owned())
     }
 }
 
 /// A program of NVRTC. Dropping it destroys it.
 struct Program<'a> {
-    program: sys::nvrtcProgram,
+    nvrtc: &'static Nvrtc,
+    program: Handle,
     /// NVRTC may keep a pointer to the text.
     _text: &'a CStr,
 }
 
 impl<'a> Program<'a> {
-    fn new(text: &'a CStr) -> Result<Self, result::NvrtcError> {
-        Ok(Self { program: result::create_program(text, None)?, _text: text })
+    fn new(nvrtc: &'static Nvrtc, text: &'a CStr) -> Result<Self, String> {
+        let mut program = ptr::null_mut();
+        // SAFETY: the text ends with a zero byte; there are no headers.
+        let status =
+            unsafe { (nvrtc.create)(&mut program, text.as_ptr(), ptr::null(), 0, ptr::null(), ptr::null()) };
+        nvrtc.checked(status)?;
+        Ok(Self { nvrtc, program, _text: text })
     }
 
-    fn compile(&mut self, options: &[String]) -> Result<(), result::NvrtcError> {
-        // SAFETY: the program is alive until it is dropped. The options contain no zero bytes.
-        unsafe {
-            result::compile_program(self.program, &options.iter().map(String::as_str).collect::<Vec<_>>())
-        }
+    fn compile(&mut self, options: &[&str]) -> Result<(), String> {
+        let options: Vec<CString> =
+            options.iter().map(|&o| CString::new(o)).collect::<Result<_, _>>().map_err(|e| e.to_string())?;
+        let pointers: Vec<*const c_char> = options.iter().map(|o| o.as_ptr()).collect();
+        // SAFETY: the program is alive until it is dropped, and so are the options.
+        let status =
+            unsafe { (self.nvrtc.compile)(self.program, pointers.len() as c_int, pointers.as_ptr()) };
+        self.nvrtc.checked(status)
     }
 
     fn log(&self) -> String {
-        // SAFETY: the program is alive, and the log ends with a zero byte.
-        let log = unsafe { result::get_program_log(self.program) }.unwrap_or_default();
-        let bytes: Vec<u8> = log.iter().map(|&c| c as u8).take_while(|&c| c != 0).collect();
-        String::from_utf8_lossy(&bytes).into_owned()
+        let log = self.bytes(self.nvrtc.log_size, self.nvrtc.log).unwrap_or_default();
+        let log: Vec<u8> = log.into_iter().take_while(|&c| c != 0).collect();
+        String::from_utf8_lossy(&log).into_owned()
     }
 
-    fn image(&self, is_machine_code: bool) -> Result<Vec<u8>, result::NvrtcError> {
+    fn image(&self, is_machine_code: bool) -> Result<Vec<u8>, String> {
+        let nvrtc = self.nvrtc;
+        if is_machine_code {
+            self.bytes(nvrtc.cubin_size, nvrtc.cubin)
+        } else {
+            self.bytes(nvrtc.ptx_size, nvrtc.ptx)
+        }
+    }
+
+    fn bytes(&self, size_of: SizeOf, copy: Copy) -> Result<Vec<u8>, String> {
         let mut size = 0;
         // SAFETY: the program is alive, and the buffer has the size that NVRTC returned.
         unsafe {
-            if is_machine_code {
-                sys::nvrtcGetCUBINSize(self.program, &mut size).result()?;
-            } else {
-                sys::nvrtcGetPTXSize(self.program, &mut size).result()?;
-            }
-            let mut image = vec![0u8; size];
-            let to = image.as_mut_ptr().cast::<c_char>();
-            if is_machine_code {
-                sys::nvrtcGetCUBIN(self.program, to).result()?;
-            } else {
-                sys::nvrtcGetPTX(self.program, to).result()?;
-            }
-            Ok(image)
+            self.nvrtc.checked(size_of(self.program, &mut size))?;
+            let mut bytes = vec![0u8; size];
+            self.nvrtc.checked(copy(self.program, bytes.as_mut_ptr().cast::<c_char>()))?;
+            Ok(bytes)
         }
     }
 }
@@ -185,7 +262,7 @@ impl Drop for Program<'_> {
     fn drop(&mut self) {
         // SAFETY: `new` created the program, and it is destroyed once. After a failure nothing is
         // left to do.
-        let _ = unsafe { result::destroy_program(self.program) };
+        let _ = unsafe { (self.nvrtc.destroy)(&mut self.program) };
     }
 }
 

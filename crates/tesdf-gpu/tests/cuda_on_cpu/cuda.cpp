@@ -334,5 +334,7 @@ CUDA int nvrtcGetProgramLogSize(void *program, size_t *size) { *size = ((Program
 CUDA int nvrtcGetProgramLog(void *program, char *log) { strcpy(log, ((Program *)program)->log.c_str()); return 0; }
 CUDA int nvrtcGetCUBINSize(void *program, size_t *size) { *size = ((Program *)program)->image.size() + 1; return 0; }
 CUDA int nvrtcGetCUBIN(void *program, char *image) { strcpy(image, ((Program *)program)->image.c_str()); return 0; }
+CUDA int nvrtcGetPTXSize(void *program, size_t *size) { return nvrtcGetCUBINSize(program, size); }
+CUDA int nvrtcGetPTX(void *program, char *image) { return nvrtcGetCUBIN(program, image); }
 CUDA int nvrtcDestroyProgram(void **program) { delete (Program *)*program; return 0; }
 CUDA const char *nvrtcGetErrorString(int) { return "see nvrtc.h"; }
