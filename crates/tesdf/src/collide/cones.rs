@@ -10,13 +10,13 @@
 //! between its two faces, a vertex the cone of its faces.
 use arrayvec::ArrayVec;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::field::ROUNDING;
 use super::{CollideError, CollideOptions, Contact, InstanceId, Placement, Scene, Shape};
 use crate::TeSdf;
 use crate::asset::corner_cones::CONVEX;
 use crate::geometry::Triangle;
+use crate::parallel::*;
 use crate::query::Precision;
 
 /// Sine of the angle by which a normal may be out of a cone: bodies that turn by less in a step can
@@ -541,7 +541,8 @@ pub fn in_cones(
             near = cones.near();
             let (of_order, others) = faces.split_at(order.len().min(faces.len()));
             faces = others;
-            of_pair.par_extend(order.par_iter().zip(of_order).filter_map(|(c, faces)| cones.of(*c, *faces)));
+            let of_order = order.par_iter().zip(of_order).filter_map(|(c, faces)| cones.of(*c, *faces));
+            of_pair.extend(of_order.collect::<Vec<_>>());
         }
         let kept = keep_different(&of_pair, near);
         found.extend(of_pair.into_iter().zip(kept).filter_map(|(c, keep)| keep.then_some(c)));
