@@ -45,7 +45,6 @@ mod linear;
 mod look;
 mod normals;
 mod options;
-mod passing;
 mod problem;
 mod rows;
 mod spring;

@@ -11,7 +11,6 @@ mod journal;
 mod lift;
 mod mass_by_rule;
 mod newton;
-mod passing;
 mod rest;
 mod scene_file;
 mod screw;
