@@ -15,6 +15,13 @@ pub enum Motion {
         /// Velocity per unit of time; the angular part in radians, about the body's origin.
         velocity: Velocity,
     },
+    /// Constant velocity of a point of the body, and rotation about this point at a constant rate.
+    About {
+        /// The point at time 0, in the world; for example the centre of mass.
+        point: DVec3,
+        /// Velocity per unit of time; the angular part in radians, about the point.
+        velocity: Velocity,
+    },
     /// Rotation about a line and translation along it.
     Screw {
         /// A point of the line.
@@ -65,6 +72,8 @@ impl Motion {
     pub(super) fn validate(&self) -> Result<(), String> {
         match *self {
             Self::Linear { velocity } => velocity.validate(),
+            Self::About { point, .. } if !in_range(point) => Err(format!("motion about {point}; {EXPECTED}")),
+            Self::About { velocity, .. } => velocity.validate(),
             Self::Screw { point, angular_speed, pitch, .. }
                 if !(in_range(point) && in_range(DVec3::new(angular_speed, pitch, 0.0))) =>
             {
@@ -87,6 +96,13 @@ impl Motion {
                 translation: start.translation + t * velocity.linear,
                 rotation: rotated(DQuat::from_scaled_axis(t * velocity.angular), start.rotation),
             },
+            Self::About { point, velocity } => {
+                let rotation = DQuat::from_scaled_axis(t * velocity.angular);
+                Pose {
+                    translation: point + t * velocity.linear + rotation * (start.translation - point),
+                    rotation: rotated(rotation, start.rotation),
+                }
+            }
             Self::Screw { point, axis, angular_speed, pitch } => {
                 let (axis, angle) = (axis.normalize_or_zero(), t * angular_speed);
                 let rotation = DQuat::from_axis_angle(axis, angle);
@@ -106,6 +122,9 @@ impl Motion {
             Self::Rest => Twist { drift: DVec3::ZERO, spin: DVec3::ZERO, center: start.translation },
             Self::Linear { velocity } => {
                 Twist { drift: velocity.linear, spin: velocity.angular, center: start.translation }
+            }
+            Self::About { point, velocity } => {
+                Twist { drift: velocity.linear, spin: velocity.angular, center: point }
             }
             Self::Screw { point, axis, angular_speed, pitch } => {
                 let axis = axis.normalize_or_zero();
@@ -130,6 +149,18 @@ impl Twist {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_motion_about_the_origin_of_the_body_is_linear() {
+        let start = Pose::new(DVec3::new(3.0, -1.0, 2.0), DQuat::from_rotation_x(0.3)).expect("a pose");
+        let velocity = Velocity { linear: DVec3::new(0.5, 0.0, -2.0), angular: DVec3::new(1.0, 2.0, 3.0) };
+        let about = |point| Motion::About { point, velocity }.pose_at(start, 0.7);
+        assert_eq!(about(start.translation), Motion::Linear { velocity }.pose_at(start, 0.7));
+        // Any other point of the body stays at its place in it.
+        let point = DVec3::new(1.0, 1.0, 0.0);
+        let moved = about(point).to_world(start.to_body(point));
+        assert!(moved.distance(point + 0.7 * velocity.linear) < 1e-14, "{moved}");
+    }
 
     #[test]
     fn a_screw_advances_one_pitch_per_turn() {

@@ -130,7 +130,7 @@ mod tests {
     use crate::collide::{InstanceId, Motion, Placement, Pose, Shape, Velocity};
     use glam::DQuat;
 
-    fn motions() -> [Motion; 4] {
+    fn motions() -> [Motion; 5] {
         [
             Motion::Rest,
             Motion::Linear {
@@ -140,6 +140,13 @@ mod tests {
                 velocity: Velocity {
                     linear: DVec3::new(-0.4, 0.2, 0.5),
                     angular: DVec3::new(0.2, 0.7, -0.4),
+                },
+            },
+            Motion::About {
+                point: DVec3::new(1.0, 0.5, -0.3),
+                velocity: Velocity {
+                    linear: DVec3::new(0.3, -0.6, 0.1),
+                    angular: DVec3::new(-0.5, 0.4, 0.6),
                 },
             },
             Motion::Screw {
