@@ -75,7 +75,7 @@ pub enum Command {
     /// 0; `overlap` in the JSON result, and the text, tell whether they share volume.
     Clearance(clearance::Args),
     /// Find the time at which two moving bodies first touch
-    Toi(toi::Args),
+    Toi(Box<toi::Args>),
     /// List the compute devices, with the numbers and names for --device
     Devices(devices::Args),
     /// Measure the cost of a detection on a device, stage by stage

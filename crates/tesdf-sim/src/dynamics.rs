@@ -62,8 +62,17 @@ pub struct StepReport {
     pub iterations: u32,
     /// Whether every solve reached its tolerance.
     pub converged: bool,
-    /// Number of equal parts into which the step was divided, because a body turns far in it.
+    /// Number of parts into which the step was divided, because a body turns far in it, or where a
+    /// fast pair would have passed.
     pub parts: u32,
+    /// Number of motions of fast pairs, in parts of the step, that were followed by their time of
+    /// impact.
+    pub followed: u32,
+    /// Number of parts that were divided because of what this has shown.
+    pub divided: u32,
+    /// Number of these motions that were neither shown to be free nor to end at a small depth, when
+    /// the part could not be divided any more: bodies may have passed into each other.
+    pub unbounded: u32,
     /// Wall time of the detection.
     pub detection: Duration,
     /// Wall time of everything else.
@@ -75,6 +84,9 @@ impl StepReport {
     pub(crate) fn add(&mut self, later: &Self) {
         self.detections += later.detections;
         self.advances += later.advances;
+        self.followed += later.followed;
+        self.divided += later.divided;
+        self.unbounded += later.unbounded;
         self.islands = self.islands.max(later.islands);
         self.iterations += later.iterations;
         self.converged &= later.converged;

@@ -16,6 +16,7 @@ use super::integrate::{Outside, free_velocity, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
 use super::look::Look;
+use super::passing::Passing;
 use super::problem::{Minimum, Problem};
 use super::rows::{FreeBody, Resistance, Row};
 use super::step::Step;
@@ -42,12 +43,12 @@ where
 
 /// The built-in engine: Newton's method on a regularised convex problem of all contacts.
 pub struct Newton {
-    system: System,
+    pub(super) system: System,
     detector: Box<dyn Detect>,
     collide: CollideOptions,
-    options: NewtonOptions,
+    pub(super) options: NewtonOptions,
     /// Diagonal of each body's bounding box, m.
-    sizes: Vec<f64>,
+    pub(super) sizes: Vec<f64>,
     /// For bodies that overlap deeply.
     surfaces: Surfaces,
     /// What the last step found at its beginning.
@@ -61,10 +62,28 @@ type Velocities = [Vec<Vector6<f64>>; 2];
 const MORE_LOOKS: u32 = 8;
 
 /// A step is divided so that no body that may meet another one turns by more than this in a part, rad.
-const MOST_TURN: f64 = 1.0;
+pub const MOST_TURN: f64 = 1.0;
 
-/// Maximum number of parts of a step.
+/// A step has at most as many parts because bodies turn far.
 const MOST_PARTS: f64 = 1000.0;
+
+/// Of the times of parts.
+const ROUNDING: f64 = 1e-9;
+
+/// Maximum number of times that a part of a step is divided because a fast pair would pass.
+const MOST_DIVISIONS: u32 = 32;
+
+/// The solution of a part of a step.
+struct Part {
+    /// The states at its end.
+    states: Vec<State>,
+    /// The contacts at its beginning.
+    found: Contacts,
+    /// Whether pairs pass in it.
+    passing: Option<Passing>,
+    /// What is reported of it.
+    report: StepReport,
+}
 
 /// The two gaps of a row.
 #[derive(Clone, Copy)]
@@ -102,7 +121,7 @@ impl Newton {
         Ok(Self { system, detector, collide, options, sizes, surfaces, found })
     }
 
-    fn begin(&self, h: f64) -> Step {
+    fn begin(&self, h: f64, whole: f64) -> Step {
         let states = self.system.states();
         let mut free_of = vec![None; states.len()];
         let (mut free, mut target) = (Vec::new(), Vec::new());
@@ -118,7 +137,7 @@ impl Newton {
         let poses = states.iter().map(|state| state.pose).collect();
         let report = StepReport { converged: true, ..StepReport::default() };
         let deep = vec![false; free.len()];
-        Step { h, poses, free, free_of, target, deep, report }
+        Step { h, whole, poses, free, free_of, target, deep, report }
     }
 
     /// The states after moving for one step at `velocities`. Their velocities are `velocities`.
@@ -332,31 +351,38 @@ impl Newton {
         step.free.iter().zip(from).zip(to).map(way).fold(0.0, f64::max)
     }
 
-    /// Into how many equal parts a step is divided, so that no body that may meet another one turns
-    /// by more than [`MOST_TURN`] in a part. Balls may turn as they like.
-    fn parts(&self, time_step: f64) -> Result<u32, DynamicsError> {
+    /// Whether a body has no directions.
+    pub(super) fn is_ball(&self, body: usize) -> bool {
         let scene = self.system.scene();
-        let turns = |body: usize| {
-            let shape = scene.instance(self.system.bodies()[body].instance).map(|i| scene.shape(i.shape));
-            let is_ball = matches!(shape, Ok(Ok(Shape::Sphere { .. })));
-            let turn = time_step * self.system.states()[body].angular.length();
-            if is_ball { 0.0 } else { turn }
-        };
-        let turns: Vec<f64> = (0..self.sizes.len()).map(turns).collect();
-        if turns.iter().all(|turn| *turn <= MOST_TURN) {
-            return Ok(1);
-        }
-        let CollideOptions { contact_distance, speculative_time, .. } = self.options_of(time_step);
-        let pairs = instance_pairs(scene, contact_distance, speculative_time)?;
-        let bodies = pairs.iter().flat_map(|pair| [pair.first, pair.second]);
-        let most = bodies.filter_map(|id| Some(turns[self.system.body_of(id)?])).fold(0.0, f64::max);
-        Ok((most / MOST_TURN).ceil().clamp(1.0, MOST_PARTS) as u32)
+        let shape = scene.instance(self.system.bodies()[body].instance).map(|i| scene.shape(i.shape));
+        matches!(shape, Ok(Ok(Shape::Sphere { .. })))
     }
 
-    /// One part of a step.
-    fn part(&mut self, time_step: f64) -> Result<StepReport, DynamicsError> {
+    /// How long the next part may be when `left` seconds of a step, `whole`, are left: so that no body
+    /// that may meet another one turns by more than [`MOST_TURN`]. Balls may turn as they like.
+    fn part_of(&mut self, left: f64, whole: f64) -> Result<f64, DynamicsError> {
+        let states = self.system.states().to_vec();
+        let turn = |(body, state): (usize, &State)| match self.is_ball(body) {
+            true => 0.0,
+            false => left * state.angular.length(),
+        };
+        let turns: Vec<f64> = states.iter().enumerate().map(turn).collect();
+        if turns.iter().all(|turn| *turn <= MOST_TURN) {
+            return Ok(left);
+        }
+        let CollideOptions { contact_distance, speculative_time, .. } = self.options_of(left);
+        let pairs = instance_pairs(self.system.scene_at(&states)?, contact_distance, speculative_time)?;
+        let bodies = pairs.iter().flat_map(|pair| [pair.first, pair.second]);
+        let most = bodies.filter_map(|id| Some(turns[self.system.body_of(id)?])).fold(0.0, f64::max);
+        // Equal parts stay so, whatever rounding does.
+        let parts = ((1.0 - ROUNDING) * most / MOST_TURN).ceil().max(1.0);
+        Ok((left / parts).max(whole / MOST_PARTS).min(left))
+    }
+
+    /// Solves a part of a step, `whole`, that takes `time_step` seconds. Nothing moves yet.
+    fn part(&mut self, time_step: f64, whole: f64) -> Result<Part, DynamicsError> {
         let begin = Instant::now();
-        let mut step = self.begin(time_step);
+        let mut step = self.begin(time_step, whole);
         // The detection must reach as far as the step can close, so it uses the velocities that
         // wrenches give; gravity is in the contact distance. Contacts, motors and joints change
         // them.
@@ -379,14 +405,48 @@ impl Newton {
             [velocities, carried] = self.velocities(&mut step, look.contacts.as_slice())?;
         }
         let mut states = self.moved(&step, &velocities);
+        let passing = self.passing(&mut step, &states)?;
         set_velocities(&mut states, &step.free, &carried);
-        self.system.set_states(states)?;
         let mut report = step.report;
         let found = look.contacts;
         report.contacts = found.len();
         report.deepest = found.iter().map(|c| c.distance).reduce(f64::min);
         report.solution = begin.elapsed().saturating_sub(report.detection);
-        self.found = found;
+        Ok(Part { states, found, passing, report })
+    }
+
+    /// Moves by a step, in as many parts as bodies that turn far and fast pairs need.
+    fn in_parts(&mut self, whole: f64) -> Result<StepReport, DynamicsError> {
+        let mut report = StepReport { converged: true, ..StepReport::default() };
+        let mut first: Option<Contacts> = None;
+        let (mut left, mut longest) = (whole, whole);
+        let mut time = self.part_of(left, whole)?;
+        while left > 0.0 {
+            let Part { states, found, passing, report: of_part } = self.part(time, whole)?;
+            let may_divide = report.divided < MOST_DIVISIONS;
+            let divides = passing.filter(|_| may_divide);
+            // A part that is divided is solved again.
+            report.add(&StepReport { converged: of_part.converged || divides.is_some(), ..of_part });
+            first.get_or_insert_with(|| {
+                (report.contacts, report.deepest) = (of_part.contacts, of_part.deepest);
+                found
+            });
+            if let Some(Passing { hit, .. }) = divides {
+                report.divided += 1;
+                time = hit.unwrap_or(0.5 * time);
+                if hit.is_none() {
+                    longest = time;
+                }
+                continue;
+            }
+            report.parts += 1;
+            report.unbounded += passing.map_or(0, |passing| passing.pairs);
+            self.system.set_states(states)?;
+            left -= time;
+            longest *= 2.0;
+            time = self.part_of(left, whole)?.min(longest);
+        }
+        self.found = first.unwrap_or_default();
         Ok(report)
     }
 
@@ -478,7 +538,7 @@ impl Newton {
 }
 
 /// Gives the free bodies these velocities.
-fn set_velocities(states: &mut [State], free: &[FreeBody], velocities: &[Vector6<f64>]) {
+pub fn set_velocities(states: &mut [State], free: &[FreeBody], velocities: &[Vector6<f64>]) {
     for (free, v) in free.iter().zip(velocities) {
         (states[free.body].linear, states[free.body].angular) = unpack(v);
     }
@@ -506,23 +566,11 @@ impl Dynamics for Newton {
             let expected = "a finite number of seconds, greater than 0";
             return Err(DynamicsError::Option { option: "time step", found: time_step, expected });
         }
-        let parts = self.parts(time_step)?;
         let states = self.system.states().to_vec();
-        let part = time_step / f64::from(parts);
-        let mut report = self.part(part)?;
-        let beginning = std::mem::take(&mut self.found);
-        for _ in 1..parts {
-            match self.part(part) {
-                Ok(next) => report.add(&next),
-                Err(error) => {
-                    self.system.set_states(states)?;
-                    return Err(error);
-                }
-            }
-        }
-        self.found = beginning;
-        report.parts = parts;
-        Ok(report)
+        self.in_parts(time_step).or_else(|error| {
+            self.system.set_states(states)?;
+            Err(error)
+        })
     }
 
     fn contacts(&self) -> &[Contact] {

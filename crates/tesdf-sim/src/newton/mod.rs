@@ -45,6 +45,7 @@ mod linear;
 mod look;
 mod normals;
 mod options;
+mod passing;
 mod problem;
 mod rows;
 mod spring;

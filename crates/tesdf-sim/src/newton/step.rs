@@ -9,6 +9,8 @@ use crate::StepReport;
 pub struct Step {
     /// Its duration, s.
     pub h: f64,
+    /// The duration of the whole step that this is a part of, s.
+    pub whole: f64,
     /// Poses at the beginning of the step.
     pub poses: Vec<Pose>,
     /// The free bodies.

@@ -11,6 +11,7 @@ mod journal;
 mod lift;
 mod mass_by_rule;
 mod newton;
+mod passing;
 mod rest;
 mod scene_file;
 mod screw;

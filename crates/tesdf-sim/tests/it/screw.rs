@@ -1,9 +1,10 @@
 //! A frictionless nut turns down its bolt. Without contacts it does not, and the criterion fails.
 
+use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene};
-use tesdf_sim::{Summary, System};
+use tesdf_sim::{Moment, StepReport, Summary, System, simulate};
 
 /// The bolt-nut scene of the repository, with the coarse bolt and a shorter duration.
 fn scene() -> (LoadedScene, System) {
@@ -41,6 +42,20 @@ fn the_nut_turns_down_the_bolt() {
         assert!(summary.deepest_penetration < 1e-5, "{summary:?}");
         assert!(summary.mean_contacts > 100.0, "{summary:?}");
     }
+}
+
+/// Threads do not pay for fast pairs.
+#[test]
+fn the_nut_is_not_followed() {
+    let (mut loaded, system) = scene();
+    loaded.scene.duration = 2.0 * loaded.scene.time_step;
+    let mut engine = loaded.newton(system).unwrap();
+    let see = |moment: &Moment<'_>| {
+        let StepReport { parts, followed, .. } = moment.report;
+        assert_eq!((parts, followed), (1, 0));
+        ControlFlow::Continue(())
+    };
+    simulate(&loaded.scene, &mut engine, see).unwrap();
 }
 
 #[test]

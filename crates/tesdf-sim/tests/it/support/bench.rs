@@ -7,7 +7,7 @@ use tesdf::collide::{Pose, Velocity};
 use tesdf::glam::DVec3;
 use tesdf::mesh::{TriangleMesh, write};
 use tesdf_sim::scene_file::LoadedScene;
-use tesdf_sim::{State, simulate};
+use tesdf_sim::{Moment, State, StepReport, simulate};
 
 use super::meshes;
 
@@ -84,6 +84,16 @@ impl Bench {
     /// The states of the bodies, at the start and after each step, of a run of `duration` seconds.
     /// `settings` are top keys of the scene file, which says of the engine nothing else.
     pub fn run(&self, settings: &str, bodies: &[Body], duration: f64) -> Vec<Vec<State>> {
+        self.watch(settings, bodies, duration).0
+    }
+
+    /// The same with what each step reports.
+    pub fn watch(
+        &self,
+        settings: &str,
+        bodies: &[Body],
+        duration: f64,
+    ) -> (Vec<Vec<State>>, Vec<StepReport>) {
         let mut text = format!("time_step = {STEP:?}\nduration = {duration:?}\n{settings}\n");
         for (k, body) in bodies.iter().enumerate() {
             let Body { geometry, mass, friction, pose, velocity } = body;
@@ -101,7 +111,12 @@ impl Bench {
         }
         let loaded = LoadedScene::parse(text, self.0.path().join("scene.toml")).unwrap();
         let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
-        let (record, _) = simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap();
-        (0..=record.steps() as usize).map(|step| record.states(step).unwrap()).collect()
+        let mut reports = Vec::new();
+        let see = |moment: &Moment<'_>| {
+            reports.push(moment.report);
+            ControlFlow::Continue(())
+        };
+        let (record, _) = simulate(&loaded.scene, &mut engine, see).unwrap();
+        ((0..=record.steps() as usize).map(|step| record.states(step).unwrap()).collect(), reports)
     }
 }

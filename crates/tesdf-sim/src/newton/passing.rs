@@ -1,0 +1,219 @@
+//! Whether fast pairs pass into each other in the solved motion of a part of a step.
+//!
+//! A contact is a plane, and holds a point as far as the motion is straight and the surface flat. Of
+//! slow pairs what is beyond that is small. The motion of a fast pair is followed by its time of impact,
+//! so it is free to its end, ends at a small depth, or is solved again in shorter parts.
+//! `docs/math.md`, section 19.
+use std::collections::BTreeSet;
+
+use glam::DVec3;
+use tesdf::Length;
+use tesdf::collide::{
+    ClearanceOptions, InstanceId, InstancePair, Motion, TimeOfImpactOptions, Velocity, clearance,
+    instance_pairs, time_of_impact,
+};
+
+use super::Newton;
+use super::engine::{MOST_TURN, set_velocities};
+use super::impacts::FAR;
+use super::integrate::unpack;
+use super::step::Step;
+use crate::{Body, DynamicsError, Mass, State};
+
+/// A fast pair ends a part at most this deep, as part of the smaller diagonal, unless it was deeper at
+/// the beginning.
+const DEPTH: f64 = 5e-4;
+
+/// Error of a depth, as part of the small depth.
+const EXACT: f64 = 0.1;
+
+/// Pairs that touch before this share of a part touch at its beginning: to divide there would be no
+/// use.
+const AT_ONCE: f64 = 0.02;
+
+/// Bodies that touch at the beginning may turn a little more than those that a step begins with.
+const TURNS: f64 = 1.5 * MOST_TURN;
+
+/// What passes in a part.
+#[derive(Clone, Copy, Debug)]
+pub struct Passing {
+    /// When a pair is hit, s, up to which the part is to be solved; `None` if a half of it is.
+    pub hit: Option<f64>,
+    /// Number of pairs that pass.
+    pub pairs: u32,
+}
+
+/// A pair of bodies that closes fast.
+struct Fast {
+    ids: [InstanceId; 2],
+    bodies: [usize; 2],
+    /// The diagonal of the smaller one, m.
+    size: f64,
+    /// Bound of the way by which it closes in the part, m.
+    way: f64,
+}
+
+/// What a fast pair does in a part.
+enum Course {
+    /// It is free, or goes on by less than the small depth after it touches.
+    Free,
+    /// It touches at the beginning, at this depth, m.
+    Touching(f64),
+    /// It touches later, and the part is to be divided at this time, s.
+    Hit(f64),
+}
+
+impl Newton {
+    /// The fast pairs that pass when the bodies move from their states to `moved`, whose velocities are
+    /// those of this motion.
+    pub(super) fn passing(
+        &mut self,
+        step: &mut Step,
+        moved: &[State],
+    ) -> Result<Option<Passing>, DynamicsError> {
+        let pairs = self.fast_pairs(step, moved)?;
+        step.report.followed += pairs.len() as u32;
+        let mut touching: Vec<(Fast, f64)> = Vec::new();
+        let mut hits: Vec<f64> = Vec::new();
+        for pair in pairs {
+            match self.course(step, &pair, moved) {
+                Course::Free => {}
+                Course::Touching(depth) => touching.push((pair, depth)),
+                Course::Hit(time) => hits.push(time),
+            }
+        }
+        if !touching.is_empty() {
+            self.system.scene_at(moved)?;
+        }
+        let is_lost = |(pair, before): &&(Fast, f64)| {
+            let small = DEPTH * pair.size;
+            self.turns(step, pair, moved) || self.depth(pair) > small.max(before + EXACT * small)
+        };
+        let lost = touching.iter().filter(is_lost).count();
+        // Half of the part has still to be solved where that is less.
+        let half = if lost > 0 { 0.5 * step.h } else { step.h };
+        let hit = hits.iter().copied().reduce(f64::min).filter(|hit| *hit < half);
+        let pairs = (lost + hits.len()) as u32;
+        Ok((pairs > 0).then_some(Passing { hit, pairs }))
+    }
+
+    /// The pairs that may meet in the part, and of which the way in the whole step would be more than
+    /// [`FAR`] of the smaller size, with or without contacts. Pairs that overlap deeply are pushed apart
+    /// otherwise.
+    fn fast_pairs(&mut self, step: &Step, moved: &[State]) -> Result<Vec<Fast>, DynamicsError> {
+        let at_begin = |velocities: &[State]| -> Vec<State> {
+            let begin = self.system.states().iter().zip(velocities);
+            begin.map(|(begin, moved)| State { pose: begin.pose, ..*moved }).collect()
+        };
+        let solved = at_begin(moved);
+        let mut free = solved.clone();
+        set_velocities(&mut free, &step.free, &step.target);
+        let fastest =
+            free.iter().chain(&solved).enumerate().map(|(k, state)| self.speed(k % free.len(), state));
+        let smallest = self.sizes.iter().copied().fold(f64::INFINITY, f64::min);
+        if 2.0 * step.whole * fastest.fold(0.0, f64::max) <= FAR * smallest {
+            return Ok(Vec::new());
+        }
+        let without = self.pairs_that_meet(step, &free)?;
+        let is_fast = |pair: &Fast| step.whole * pair.way > step.h * FAR * pair.size;
+        let are_fast: BTreeSet<_> =
+            without.iter().filter(|pair| is_fast(pair)).map(|pair| pair.ids).collect();
+        let mut pairs = self.pairs_that_meet(step, &solved)?;
+        pairs.retain(|pair| is_fast(pair) || are_fast.contains(&pair.ids));
+        Ok(pairs)
+    }
+
+    /// Bound of the speed of the points of a body, m/s.
+    fn speed(&self, body: usize, state: &State) -> f64 {
+        if self.system.bodies()[body].mass == Mass::Fixed {
+            return 0.0;
+        }
+        // Planes are infinite.
+        let turning =
+            if state.angular == DVec3::ZERO { 0.0 } else { self.sizes[body] * state.angular.length() };
+        state.linear.length() + turning
+    }
+
+    /// The pairs that these states let meet in the part, but those that overlap deeply.
+    fn pairs_that_meet(&mut self, step: &Step, states: &[State]) -> Result<Vec<Fast>, DynamicsError> {
+        // Instances look ahead with straight ways of their origins, but centres of mass move straight.
+        let bend = |(body, state): (&Body, &State)| match body.mass {
+            Mass::Free(mass) => (step.h * state.angular.length()).powi(2) * mass.center.length(),
+            Mass::Fixed | Mass::Kinematic => 0.0,
+        };
+        let bend = self.system.bodies().iter().zip(states).map(bend).fold(0.0, f64::max);
+        let pairs = instance_pairs(self.system.scene_at(states)?, bend, step.h)?;
+        let of_pair = |InstancePair { first, second, contact_distance: way }| {
+            let bodies = [self.system.body_of(first)?, self.system.body_of(second)?];
+            let size = bodies.map(|body| self.sizes[body]).into_iter().fold(f64::INFINITY, f64::min);
+            let is_deep = |body: usize| step.free_of[body].is_some_and(|k| step.deep[k]);
+            (!bodies.into_iter().any(is_deep)).then_some(Fast { ids: [first, second], bodies, size, way })
+        };
+        Ok(pairs.into_iter().filter_map(of_pair).collect())
+    }
+
+    /// What a pair does in a part. The scene is at its beginning.
+    fn course(&self, step: &Step, pair: &Fast, moved: &[State]) -> Course {
+        let solved = pair.bodies.map(|body| self.motion(body, &moved[body]));
+        // Contacts end at the skin.
+        let skin = self.options.skin * pair.size;
+        let Some((touches, clearance)) = self.touch(pair, solved, 0.5 * skin, step.h) else {
+            return Course::Free;
+        };
+        // The speed at its end is at most twice that bound.
+        if 2.0 * pair.way * (1.0 - touches / step.h) <= DEPTH * pair.size {
+            return Course::Free;
+        }
+        if touches == 0.0 {
+            return Course::Touching((-clearance).max(0.0));
+        }
+        // Contacts that are not closed yet have pushed it, so it is hit where it would be without them.
+        let free = pair.bodies.map(|body| {
+            let velocity = step.free_of[body].map(|k| unpack(&step.target[k]));
+            let (linear, angular) = velocity.unwrap_or((moved[body].linear, moved[body].angular));
+            self.motion(body, &State { linear, angular, ..moved[body] })
+        });
+        let hit = self.touch(pair, free, 2.0 * skin, step.h).map_or(touches, |(time, _)| time);
+        if hit < AT_ONCE * step.h { Course::Touching(0.0) } else { Course::Hit(hit) }
+    }
+
+    /// The time at which a pair touches or is no longer known to be free, and the clearance then;
+    /// `None` if it is free to the end.
+    fn touch(&self, pair: &Fast, motions: [Motion; 2], tolerance: f64, end: f64) -> Option<(f64, f64)> {
+        let ([a, b], [of_a, of_b]) = (pair.ids, motions);
+        let tolerance = if tolerance > 0.0 { Length::Absolute(tolerance) } else { Length::OfDiagonal(1e-6) };
+        let options = TimeOfImpactOptions { tolerance, end, ..TimeOfImpactOptions::default() };
+        match time_of_impact(self.system.scene(), a, b, of_a, of_b, &options) {
+            Ok(found) => Some((found.free_until(), found.clearance()?.distance)),
+            // Of a plane that turns nothing is known.
+            Err(_) => Some((0.0, 0.0)),
+        }
+    }
+
+    /// The motion of a body in a part of a step, at the velocities of `state`.
+    fn motion(&self, body: usize, state: &State) -> Motion {
+        let pose = self.system.states()[body].pose;
+        let point = match self.system.bodies()[body].mass {
+            Mass::Fixed => return Motion::Rest,
+            Mass::Kinematic => pose.translation,
+            Mass::Free(mass) => pose.to_world(mass.center),
+        };
+        let velocity = Velocity { linear: state.linear, angular: state.angular };
+        Motion::About { point, velocity }
+    }
+
+    /// Whether a body of a pair turns so far that what holds it at the beginning says little of the end.
+    fn turns(&self, step: &Step, pair: &Fast, moved: &[State]) -> bool {
+        pair.bodies.iter().any(|&body| {
+            let is_fixed = self.system.bodies()[body].mass == Mass::Fixed;
+            !is_fixed && !self.is_ball(body) && step.h * moved[body].angular.length() > TURNS
+        })
+    }
+
+    /// How deep a pair is, m, where the scene is. As deep as can be if that is not known.
+    fn depth(&self, pair: &Fast) -> f64 {
+        let options = ClearanceOptions { tolerance: Length::Absolute(EXACT * DEPTH * pair.size) };
+        let [a, b] = pair.ids;
+        clearance(self.system.scene(), a, b, &options).map_or(f64::INFINITY, |found| -found.lower_bound)
+    }
+}
