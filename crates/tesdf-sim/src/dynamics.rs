@@ -60,7 +60,7 @@ pub struct StepReport {
     pub islands: usize,
     /// Iterations of the slowest island, summed over all solves of the step.
     pub iterations: u32,
-    /// Whether every solve reached its tolerance.
+    /// Whether every solve reached its tolerance, and no pair is [`unbounded`](Self::unbounded).
     pub converged: bool,
     /// Number of parts into which the step was divided, because a body turns far in it, or where a
     /// fast pair would have passed.

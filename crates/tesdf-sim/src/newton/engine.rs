@@ -441,6 +441,7 @@ impl Newton {
             }
             report.parts += 1;
             report.unbounded += passing.map_or(0, |passing| passing.pairs);
+            report.converged &= passing.is_none();
             self.system.set_states(states)?;
             left -= time;
             longest *= 2.0;
