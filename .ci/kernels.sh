@@ -15,7 +15,7 @@ if [ "${1:-}" != --always ] && [ "$hash" = "$(cat "$stamp" 2>/dev/null)" ]; then
     exit
 fi
 . .ci/nvrtc.sh
-step "NVRTC" cargo test --quiet --workspace $features --test gpu -- --ignored --nocapture cuda_source:: nvrtc::
+step "NVRTC" cargo test --quiet --workspace $features --test gpu -- --ignored cuda_source:: nvrtc::
 if [ "$hash" != "$(cat "$stamp" 2>/dev/null)" ]; then
     echo "$hash" >"$stamp"
     echo "commit $stamp with the kernels"

@@ -42,6 +42,19 @@ collide() {
     shift 3
     step "$name" "$limit" "$W/tesdf" bench collide "data/recordings/$scene.json" --device "$D" --json "$@"
 }
+sanitize() { # NAME SECONDS TOOL OPTIONS…: compute-sanitizer on the peg
+    local name=$1 limit=$2 tool=$3
+    shift 3
+    step "$name" "$limit" compute-sanitizer --tool "$tool" --error-exitcode 9 "$W/tesdf" bench collide \
+        data/recordings/peg-in-hole.json --frames 1 --repeat 1 --device "$D" --json "$@"
+}
+profile() { # NAME KERNELS LAUNCHES OPTIONS…: counters of kernels on the bolt
+    local name=$1 kernels=$2 launches=$3
+    shift 3
+    step "$name" 45 ncu --clock-control none --set basic --section WarpStateStats --section MemoryWorkloadAnalysis \
+        --kernel-name "regex:$kernels" --launch-count "$launches" "$W/tesdf" bench collide \
+        data/recordings/bolt-nut.json --frames 1 --repeat 1 --device "$D" "$@"
+}
 
 xz -dkc .card/tesdf.xz >"$W/tesdf"
 xz -dkc .card/gpu_tests.xz >"$W/gpu_tests"
@@ -71,8 +84,7 @@ step devices 20 "$W/tesdf" devices --json
 # Smoke: nodes, then one frame of bolt and nut, compared with the processor's time.
 if ! collide smoke_node 30 peg-in-hole --mode node --frames 1 --repeat 1 ||
     ! collide smoke 40 bolt-nut --e-max 32 --preset gpu --frames 1 --repeat 1 --against-cpu; then
-    step memcheck 120 compute-sanitizer --tool memcheck --error-exitcode 9 "$W/tesdf" bench collide \
-        data/recordings/peg-in-hole.json --mode node --frames 1 --repeat 1 --device "$D"
+    sanitize memcheck 120 memcheck --mode node
     exit 1
 fi
 # The machine's own NVRTC, into another cache: the registers of each kernel.
@@ -88,13 +100,9 @@ step algorithm1 60 "$W/tesdf" encode data/procedural/iso_m16_nut_c50.obj -o "$W/
 step simulate 45 "$W/tesdf" simulate scenes/bolt-nut.toml --duration 0.2 -o "$W/run.tesrun" --device "$D" --json --force
 step simulate_cpu 45 "$W/tesdf" simulate scenes/bolt-nut.toml --duration 0.2 -o "$W/run_cpu.tesrun" --json --force
 
-# What limits the narrow phase, and races.
-step ncu 45 ncu --clock-control none --set basic --section WarpStateStats --section MemoryWorkloadAnalysis \
-    --kernel-name 'regex:clip_polygons.*|narrow_faces.*' --launch-count 2 "$W/tesdf" bench collide \
-    data/recordings/bolt-nut.json --preset gpu --e-max 32 --frames 1 --repeat 1 --device "$D"
-step ncu_exact 45 ncu --clock-control none --set basic --section WarpStateStats --section MemoryWorkloadAnalysis \
-    --kernel-name 'regex:narrow_exact_faces.*' --launch-count 1 "$W/tesdf" bench collide \
-    data/recordings/bolt-nut.json --mode exact --contacts-per face --frames 1 --repeat 1 --device "$D"
+# What limits the middle and the narrow phase.
+profile ncu 'clip_polygons.*|narrow_faces.*' 2 --preset gpu --e-max 32
+profile ncu_exact 'narrow_exact_faces.*' 1 --mode exact --contacts-per face
 
 # The same card through Vulkan, where sums and products may be fused.
 D=wgpu:0
@@ -104,7 +112,7 @@ D=cuda:0
 
 # The paper's tables: Table II on the recorded poses, Fig. 4, Fig. 9.
 step table2 90 "$W/tesdf" evaluate table2 --device "$D" --preset gpu --frames "$FRAMES" --repeat 5 --format json
-step table2_compact 60 "$W/tesdf" evaluate table2 --device "$D" --frames 4 --repeat 5 --format json
+step table2_compact 60 "$W/tesdf" evaluate table2 --device "$D" --frames "$FRAMES" --repeat 5 --format json
 collide lanes_group 20 peg-in-hole --e-max 32 --preset gpu --frames 4
 collide lanes_single 20 peg-in-hole --e-max 32 --preset gpu --frames 4 --lanes single
 step fig9 45 "$W/tesdf" evaluate fig9 --quick --device "$D" --repeat 9 --format json
@@ -120,10 +128,8 @@ collide worlds_exact_64 30 bolt-nut --mode exact --contacts-per minimum --frames
 step tests 200 sh -c 'cd crates/tesdf-gpu && exec "$W/gpu_tests" --test-threads 12'
 
 # Races, and accesses out of bounds.
-step racecheck 60 compute-sanitizer --tool racecheck --error-exitcode 9 "$W/tesdf" bench collide \
-    data/recordings/peg-in-hole.json --mode face --frames 1 --repeat 1 --device "$D" --json
-step memcheck 60 compute-sanitizer --tool memcheck --error-exitcode 9 "$W/tesdf" bench collide \
-    data/recordings/peg-in-hole.json --mode exact --frames 1 --repeat 1 --device "$D" --json
+sanitize racecheck 60 racecheck --mode face
+sanitize memcheck 60 memcheck --mode exact
 
 step clocks 5 nvidia-smi --query-gpu=clocks.sm,clocks_event_reasons.active,temperature.gpu,ecc.errors.uncorrected.volatile.total --format=csv
 exit 0

@@ -3,23 +3,14 @@ use tesdf_gpu::cuda::{Resources, compile};
 
 use crate::cuda_source::SOURCES;
 
-/// Compiles to machine code for GPUs of compute centers, and prints the resources of each kernel.
+/// Compiles to machine code for GPUs of compute centers. `tesdf bench kernels` prints its resources.
 #[test]
 #[ignore = "needs NVRTC: .ci/kernels.sh runs it"]
 fn every_kernel_compiles_to_machine_code() {
-    println!("{:46} registers warps stack spilled shared", "kernel");
     for source in SOURCES.iter() {
         let compiled = compile(source, "sm_90a").unwrap_or_else(|e| panic!("{e}"));
         assert!(compiled.image.starts_with(b"\x7fELF"), "{}", source.kernel);
-        let found = compiled.resources.expect("machine code has it");
-        let Resources { registers, stack_bytes, spilled_bytes: (stores, loads), .. } = found;
-        let warps = found.warps(source.threads.0);
-        let shared = source.shared_bytes + found.shared_bytes as usize;
-        println!(
-            "{:46} {registers:9} {warps:5} {stack_bytes:5} {:7} {shared:6}",
-            source.kernel,
-            stores + loads
-        );
+        let Resources { registers, .. } = compiled.resources.expect("machine code has it");
         assert!((1..=255).contains(&registers), "{}: {registers} registers", source.kernel);
     }
 }

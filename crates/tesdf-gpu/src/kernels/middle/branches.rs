@@ -2,7 +2,7 @@
 use cubecl::prelude::*;
 
 use super::super::narrow::exchange::LANES;
-use super::bits::{Bits, WORDS};
+use super::bits::WORDS;
 use super::clip::Walk;
 
 /// Words of a branch: face, root, cell, depth and path.
@@ -33,15 +33,8 @@ impl Branches {
     /// Each thread that is free takes a branch of a thread whose walk has one waiting: the topmost,
     /// which is likely to be the largest. Returns whether a thread of the group has work. All threads
     /// of the group call it together.
-    pub fn exchange(
-        &mut self,
-        is_free: bool,
-        walk: &mut Walk,
-        path: &mut Bits,
-        waiting: &mut Bits,
-        children: &Array<u32>,
-    ) -> bool {
-        let top = waiting.first();
+    pub fn exchange(&mut self, is_free: bool, walk: &mut Walk) -> bool {
+        let top = walk.waiting.first();
         let gives = walk.open && top > 0u32;
         // Wait until all threads have read the last states.
         sync_cube();
@@ -60,14 +53,14 @@ impl Branches {
         let moves = before < free.min(givers);
         let at = (before * BRANCH) as usize;
         if gives && moves {
-            waiting.set(top - 1u32, false);
+            walk.waiting.set(top - 1u32, false);
             self.words[at] = walk.face;
             self.words[at + 1usize] = walk.root;
-            self.words[at + 2usize] = children[(top - 1u32) as usize] + 1u32;
+            self.words[at + 2usize] = walk.children[(top - 1u32) as usize] + 1u32;
             self.words[at + 3usize] = top;
             #[unroll]
             for word in 0..WORDS {
-                self.words[at + 4usize + word] = path.word(word);
+                self.words[at + 4usize + word] = walk.path.word(word);
             }
         }
         sync_cube();
@@ -80,9 +73,10 @@ impl Branches {
             walk.is_new = true;
             #[unroll]
             for word in 0..WORDS {
-                path.set_word(word, self.words[at + 4usize + word]);
+                walk.path.set_word(word, self.words[at + 4usize + word]);
             }
-            path.set(walk.depth - 1u32, true);
+            let level = walk.depth - 1u32;
+            walk.path.set(level, true);
         }
         free < LANES
     }

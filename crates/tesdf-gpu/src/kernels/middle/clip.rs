@@ -3,9 +3,12 @@
 //! A thread walks the bisection forest with the barycentric coordinates of the face's three
 //! corners. It starts from the roots of the cube, or from the tetrahedra of a conforming domain. It
 //! descends into one child and returns later for the other. For this it stores its path, one bit
-//! per level, the node words of the first children, and the coordinates at each third level. Faces meet from one to thousands of cells, so
-//! every [`ROUND`] steps threads without work take branches of the others' walks. A polygon is stored as weights of the
-//! face's corners, because the coordinates in each cell are linear in these weights.
+//! per level, the node words of the first children, and the coordinates at each third level. A
+//! polygon is stored as weights of the face's corners, because the coordinates in each cell are
+//! linear in these weights.
+//!
+//! Faces meet from one to thousands of cells. So every [`ROUND`] steps threads without work take
+//! branches of the others' walks.
 use cubecl::prelude::*;
 
 use super::super::broad::meshlets::{Blocks, meshlet_work};
@@ -20,7 +23,7 @@ use super::bits::{Bits, LEVELS, no_bits};
 use super::branches::no_branches;
 use super::corners::{Corners, corners_in};
 use super::cut::{Cut, no_polygon, whole};
-use super::items::{Polygons, Subject};
+use super::items::{Polygons, Subject, subject_of};
 
 /// Steps of a walk between two exchanges of branches. An exchange takes about as long as a step.
 const ROUND: u32 = 16;
@@ -69,18 +72,12 @@ pub fn clip_polygons(
         let (pair, field) = (work.pair, work.field);
         let faces = work.faces();
         let threads = threads_per_face(faces);
-        let mut walk = Walk { face: 0u32, root: 0u32, cell: 0u32, depth: 0u32, open: false, is_new: false };
+        let mut walk = no_walk();
         let mut start = Start { number: 0u32, end: 0u32, levels: 0u32, turn: 0u32 };
         let mut share = Share { mine: 0u32, threads: 1u32 };
-        let mut path = no_bits();
-        let mut waiting = no_bits();
-        waiting.clear();
-        let mut trail = no_trail();
         let mut polygon = no_polygon();
         if UNIT_POS / threads < faces {
-            let face = work.face(UNIT_POS / threads);
-            let part = shapes.part(pair, face);
-            let subject = Subject { pair, face, part, reach: pairs.reach_of(pair, part) };
+            let subject = subject_of(shapes, pairs, pair, work.face(UNIT_POS / threads));
             let center = subject.part.center();
             let radius = subject.part.radius_around(center);
             let extent = (field.vector(HIGH) - field.vector(LOW)).greatest();
@@ -94,7 +91,7 @@ pub fn clip_polygons(
                     if share.mine == 0u32 && !field.is_conforming() && reaches_out(field, subject) {
                         outside_cube(field, subject, counters, polygons, &mut polygon);
                     }
-                    walk.face = face;
+                    walk.face = subject.face;
                     start = start_of(field, share);
                 } else if share.mine == 0u32 {
                     polygon.start(whole(), subject.part.count);
@@ -105,29 +102,19 @@ pub fn clip_polygons(
         let mut going = true;
         while going {
             if walk.open || start.number < start.end {
-                let part = shapes.part(pair, walk.face);
-                let subject = Subject { pair, face: walk.face, part, reach: pairs.reach_of(pair, part) };
+                let subject = subject_of(shapes, pairs, pair, walk.face);
+                let part = subject.part;
                 let search = Search { subject, beyond: reaches_out(field, subject), prune };
                 let around = around_of(part.a, part.b, part.c);
                 while !walk.open && start.number < start.end {
-                    start.next(field, around, share, &mut walk, &mut path);
+                    start.next(field, around, share, &mut walk);
                 }
                 if walk.open {
-                    go_on(
-                        field,
-                        search,
-                        &mut walk,
-                        &mut path,
-                        &mut waiting,
-                        &mut trail,
-                        counters,
-                        polygons,
-                        &mut polygon,
-                    );
+                    go_on(field, search, &mut walk, counters, polygons, &mut polygon);
                 }
             }
             let is_free = !walk.open && start.number >= start.end;
-            going = branches.exchange(is_free, &mut walk, &mut path, &mut waiting, &trail.children);
+            going = branches.exchange(is_free, &mut walk);
         }
         counters.tell_if_broken_off(count);
     }
@@ -143,8 +130,7 @@ fn reaches_out(field: Field<'_>, subject: Subject) -> bool {
 }
 
 /// A walk through the cells that a face meets, between two steps.
-#[derive(CubeType, CubeTypeMut, Clone, Copy)]
-#[expand(derive(Clone, Copy))]
+#[derive(CubeType)]
 pub struct Walk {
     pub face: u32,
     pub root: u32,
@@ -154,6 +140,31 @@ pub struct Walk {
     pub open: bool,
     /// Whether no step of this walk has been made by this thread.
     pub is_new: bool,
+    pub path: Bits,
+    /// The levels with a sibling to visit.
+    pub waiting: Bits,
+    /// The first child at each level.
+    pub children: Array<u32>,
+    /// The face's corners at each third level, 12 numbers each.
+    corners: Array<f32>,
+}
+
+#[cube]
+fn no_walk() -> Walk {
+    let mut waiting = no_bits();
+    waiting.clear();
+    Walk {
+        face: 0u32,
+        root: 0u32,
+        cell: 0u32,
+        depth: 0u32,
+        open: false,
+        is_new: false,
+        path: no_bits(),
+        waiting,
+        children: Array::<u32>::new(LEVELS),
+        corners: Array::<f32>::new(comptime!(12 * LEVELS.div_ceil(3))),
+    }
 }
 
 /// A face, and the cells in which it may have polygons.
@@ -197,7 +208,7 @@ fn start_of(field: Field<'_>, share: Share) -> Start {
 #[cube]
 impl Start {
     /// Begins the walk at the next starting cell, and writes its path, unless another thread does.
-    fn next(&mut self, field: Field<'_>, around: Around, share: Share, walk: &mut Walk, path: &mut Bits) {
+    fn next(&mut self, field: Field<'_>, around: Around, share: Share, walk: &mut Walk) {
         let number = self.number;
         let mut root = number >> self.levels;
         let mut elsewhere = false;
@@ -219,7 +230,7 @@ impl Start {
             split = is_split(word);
             if split {
                 let side = (number >> (self.levels - 1u32 - depth)) & 1u32;
-                path.set(depth, side == 1u32);
+                walk.path.set(depth, side == 1u32);
                 cell = word + side;
                 depth += 1u32;
             }
@@ -237,23 +248,6 @@ impl Start {
     }
 }
 
-/// What a walk needs to return to the cells of its path.
-#[derive(CubeType)]
-struct Trail {
-    /// The first child at each level.
-    children: Array<u32>,
-    /// The face's corners at each third level, 12 numbers each.
-    corners: Array<f32>,
-}
-
-#[cube]
-fn no_trail() -> Trail {
-    Trail {
-        children: Array::<u32>::new(LEVELS),
-        corners: Array::<f32>::new(comptime!(12 * LEVELS.div_ceil(3))),
-    }
-}
-
 /// The third level at or above a level.
 #[cube]
 fn third(depth: u32) -> u32 {
@@ -261,7 +255,7 @@ fn third(depth: u32) -> u32 {
 }
 
 #[cube]
-impl Trail {
+impl Walk {
     /// Keeps the corners in the cell at level `depth`, at each third level.
     fn keep(&mut self, depth: u32, corners: Corners) {
         if depth % 3u32 == 0u32 {
@@ -272,10 +266,11 @@ impl Trail {
         }
     }
 
-    /// The corners in the cell at level `depth`, a multiple of 3.
-    fn at(&self, depth: u32) -> Corners {
-        let at = (4u32 * depth) as usize;
-        Corners { a: self.get(at), b: self.get(at + 4usize), c: self.get(at + 8usize) }
+    /// The corners in the cell at level `depth` of the path, from those kept at level `base`.
+    fn corners(&self, base: u32, depth: u32) -> Corners {
+        let at = (4u32 * base) as usize;
+        let kept = Corners { a: self.get(at), b: self.get(at + 4usize), c: self.get(at + 8usize) };
+        self.path.follow_from(kept, base, depth)
     }
 
     fn put(&mut self, at: usize, l: Lambda) {
@@ -297,14 +292,10 @@ impl Trail {
 
 /// Goes on with a walk, by [`ROUND`] steps at most, and writes the polygons of the face in its cells.
 #[cube]
-#[allow(clippy::too_many_arguments)]
 fn go_on(
     field: Field<'_>,
     search: Search,
     walk: &mut Walk,
-    path: &mut Bits,
-    waiting: &mut Bits,
-    trail: &mut Trail,
     counters: &Counters,
     polygons: &mut Polygons,
     polygon: &mut Cut,
@@ -312,13 +303,14 @@ fn go_on(
     let part = search.subject.part;
     let mut cell = walk.cell;
     let mut depth = walk.depth;
-    let mut base = third(depth);
+    let base = third(depth);
     if walk.is_new {
         let root = corners_in(field.tetrahedron(walk.root), part);
-        trail.keep(base, path.follow(root, base));
+        let corners = walk.path.follow(root, base);
+        walk.keep(base, corners);
         walk.is_new = false;
     }
-    let mut held = path.follow_from(trail.at(base), base, depth);
+    let mut held = walk.corners(base, depth);
     let mut open = true;
     let mut steps = 0u32;
     while open && steps < ROUND {
@@ -334,9 +326,9 @@ fn go_on(
                 let below = over.least() < 0.0f32;
                 down = true;
                 side = below && !above;
-                trail.children[depth as usize] = word;
-                waiting.set(depth, above && below);
-                path.set(depth, side);
+                walk.children[depth as usize] = word;
+                walk.waiting.set(depth, above && below);
+                walk.path.set(depth, side);
             } else {
                 let here = Cell { word, number: cell };
                 if !here.is_out() || search.beyond {
@@ -352,19 +344,18 @@ fn go_on(
             cell = word + select(side, 1u32, 0u32);
             depth += 1u32;
             held = held.in_child(k, side);
-            trail.keep(depth, held);
+            walk.keep(depth, held);
         } else {
             // Return to the last level with a sibling to visit.
-            depth = waiting.last();
+            depth = walk.waiting.last();
             open = depth > 0u32;
             if open {
-                waiting.set(depth - 1u32, false);
-                path.set(depth - 1u32, true);
-                cell = trail.children[(depth - 1u32) as usize] + 1u32;
+                walk.waiting.set(depth - 1u32, false);
+                walk.path.set(depth - 1u32, true);
+                cell = walk.children[(depth - 1u32) as usize] + 1u32;
                 // The sibling's corners were kept at its own level.
-                base = third(depth - 1u32);
-                held = path.follow_from(trail.at(base), base, depth);
-                trail.keep(depth, held);
+                held = walk.corners(third(depth - 1u32), depth);
+                walk.keep(depth, held);
             }
         }
     }

@@ -1,8 +1,9 @@
 //! The output of the middle phase for the narrow phase: nodes with their cells, and polygons.
 use cubecl::prelude::*;
 
-use super::super::broad::ordered_pair::{OrderedPair, Part};
+use super::super::broad::ordered_pair::{OrderedPair, OrderedPairs, Part};
 use super::super::counters::{Counters, POLYGONS};
+use super::super::field::shapes::Shapes;
 use super::super::math::vector::{Row, row};
 use super::cut::{Cut, CutExpand};
 
@@ -59,6 +60,13 @@ pub struct Subject {
     pub part: Part,
     /// Contact distance for the part: smaller distances are contacts.
     pub reach: f32,
+}
+
+/// A face of the first shape of a pair, in the frame of the field.
+#[cube]
+pub fn subject_of(shapes: &Shapes, pairs: &OrderedPairs, pair: OrderedPair, face: u32) -> Subject {
+    let part = shapes.part(pair, face);
+    Subject { pair, face, part, reach: pairs.reach_of(pair, part) }
 }
 
 /// A point of a face: the weights of its second and third corner.

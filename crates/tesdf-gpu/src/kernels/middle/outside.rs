@@ -16,7 +16,7 @@ use super::super::math::vector::{V3, zero};
 use super::super::narrow::exchange::LANES;
 use super::corners::corners_in;
 use super::cut::{Cut, CutExpand, Quarter, no_polygon, quarter_at};
-use super::items::{MAX_VERTICES, Polygons, Subject};
+use super::items::{MAX_VERTICES, Polygons, Subject, subject_of};
 
 /// Largest number of tetrahedra that a piece is cut by.
 const MAX_NEAR: usize = 48;
@@ -160,9 +160,7 @@ pub fn outside_polygons(
             }
             let mut waits = 0u32;
             if active {
-                let face = work.face(number);
-                let part = shapes.part(pair, face);
-                let subject = Subject { pair, face, part, reach: pairs.reach_of(pair, part) };
+                let subject = subject_of(shapes, pairs, pair, work.face(number));
                 let center = subject.part.center();
                 let radius = subject.part.radius_around(center);
                 if !field.is_beyond(center, radius, subject.reach, prune) {
