@@ -28,4 +28,8 @@ impl Detect for Shared {
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError> {
         self.0.detect(scene, options)
     }
+
+    fn holds_all(&self, options: &CollideOptions) -> bool {
+        self.0.holds_all(options)
+    }
 }

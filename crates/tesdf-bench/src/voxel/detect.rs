@@ -80,6 +80,11 @@ impl Detect for VoxelDetector {
         statistics.bytes = size_of_val(contacts.as_slice());
         Ok(Contacts::new(contacts, statistics, Vec::new(), hidden))
     }
+
+    /// The distances of a grid are not exact.
+    fn holds_all(&self, _: &CollideOptions) -> bool {
+        false
+    }
 }
 
 /// The name of a mode that needs exact minima.

@@ -4,7 +4,7 @@ use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Pose, Scene, Shape,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Mode, Pose, Scene, Shape,
     instance_pairs,
 };
 
@@ -30,6 +30,13 @@ pub trait Detect: Send + Sync {
     /// # Errors
     /// The errors of the detection, as [`CollideError`].
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError>;
+
+    /// Whether contacts hold every part of a surface that comes within those distances. Where this is
+    /// so, [`Newton`] follows fast pairs by the exact distance and divides the step where one passes.
+    /// Where it is not, no number of parts would hold them.
+    fn holds_all(&self, options: &CollideOptions) -> bool {
+        options.mode != Mode::Node
+    }
 }
 
 impl<F> Detect for F
@@ -44,8 +51,8 @@ where
 /// The built-in engine: Newton's method on a regularised convex problem of all contacts.
 pub struct Newton {
     pub(super) system: System,
-    detector: Box<dyn Detect>,
-    collide: CollideOptions,
+    pub(super) detector: Box<dyn Detect>,
+    pub(super) collide: CollideOptions,
     pub(super) options: NewtonOptions,
     /// Diagonal of each body's bounding box, m.
     pub(super) sizes: Vec<f64>,

@@ -71,6 +71,9 @@ impl Newton {
         step: &mut Step,
         moved: &[State],
     ) -> Result<Option<Passing>, DynamicsError> {
+        if !self.detector.holds_all(&self.collide) {
+            return Ok(None);
+        }
         let pairs = self.fast_pairs(step, moved)?;
         step.report.followed += pairs.len() as u32;
         let mut touching: Vec<(Fast, f64)> = Vec::new();

@@ -96,7 +96,7 @@ impl LoadedScene {
         })?;
         let solver = self.scene.solver;
         match self.scene.detector.mode {
-            DetectorMode::Off => Newton::new(system, nothing, collide, solver),
+            DetectorMode::Off => Newton::new(system, Nothing, collide, solver),
             _ => Newton::new(system, detector, collide, solver),
         }
         .map_err(|e| match e {
@@ -143,8 +143,17 @@ impl LoadedScene {
     }
 }
 
-fn nothing(_: &Scene, _: &CollideOptions) -> Result<Contacts, CollideError> {
-    Ok(Contacts::default())
+/// The detector of the mode `off`.
+struct Nothing;
+
+impl Detect for Nothing {
+    fn detect(&self, _: &Scene, _: &CollideOptions) -> Result<Contacts, CollideError> {
+        Ok(Contacts::default())
+    }
+
+    fn holds_all(&self, _: &CollideOptions) -> bool {
+        false
+    }
 }
 
 /// The detection options of a scene.
