@@ -4,7 +4,7 @@
 //! other, contacts on both sides of one then push it both ways, and nothing moves: 128 shafts in a
 //! pile stay 11.6 mm deep. Of the penetrating contacts of such a pair only those act that push a
 //! vertex or face against its own normal, into the body that it belongs to (Eq. (10) of the paper,
-//! for vertices, too).
+//! for vertices, too). So it is at shallow overlaps beside the rim of flush sides ([`has_rear`]).
 //!
 //! Two shafts that cross within a radius of each other are past the middle: their deepest contacts
 //! push along the own normals. Such a pair gets one direction for all of its pushes: of the normals
@@ -12,7 +12,7 @@
 //! their extents (the separating axis test). Contacts act that push along it. Where there is none,
 //! as of two boxes that are nearly at one place, one is added at the mean of the places, as deep as
 //! this overlap.
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec3;
 use tesdf::TeSdf;
@@ -35,6 +35,16 @@ const TRIALS: usize = 32;
 struct Way {
     direction: DVec3,
     overlap: f64,
+}
+
+/// A contact that penetrates.
+#[derive(Clone, Copy, Debug)]
+struct Push {
+    /// Of the pair's first instance.
+    direction: DVec3,
+    depth: f64,
+    /// Between the normal and that of the vertex or face.
+    cosine: f64,
 }
 
 /// The normals of the vertices, edges or faces of the meshes and boxes of a scene, and their
@@ -81,20 +91,24 @@ impl Surfaces {
         contacts: &[Contact],
         is_deep: impl Fn(&Contact) -> bool,
     ) -> Vec<Contact> {
-        let mut deep: BTreeMap<[InstanceId; 2], Vec<(DVec3, f64, f64)>> = BTreeMap::new();
-        for contact in contacts.iter().filter(|c| is_deep(c)) {
-            deep.entry(pair(contact)).or_default();
-        }
-        if deep.is_empty() {
-            return contacts.to_vec();
-        }
+        let mut pushes: BTreeMap<[InstanceId; 2], Vec<Push>> = BTreeMap::new();
+        let mut deep: BTreeSet<[InstanceId; 2]> = BTreeSet::new();
         for contact in contacts.iter().filter(|c| c.distance < 0.0) {
-            if let Some(pushes) = deep.get_mut(&pair(contact)) {
-                pushes.push((on_first(contact), -contact.distance, self.cosine(scene, contact)));
+            let cosine = self.cosine(scene, contact);
+            let push = Push { direction: on_first(contact), depth: -contact.distance, cosine };
+            pushes.entry(pair(contact)).or_default().push(push);
+            if is_deep(contact) {
+                deep.insert(pair(contact));
             }
         }
-        let ways: BTreeMap<[InstanceId; 2], Option<Way>> =
-            deep.iter().map(|(pair, pushes)| (*pair, self.way(scene, *pair, pushes))).collect();
+        pushes.retain(|pair, pushes| deep.contains(pair) || has_rear(pushes));
+        if pushes.is_empty() {
+            return contacts.to_vec();
+        }
+        let way = |(pair, pushes): (&[InstanceId; 2], &Vec<Push>)| {
+            (*pair, if deep.contains(pair) { self.way(scene, *pair, pushes) } else { None })
+        };
+        let ways: BTreeMap<[InstanceId; 2], Option<Way>> = pushes.iter().map(way).collect();
         let acts = |contact: &&Contact| match ways.get(&pair(contact)) {
             Some(way) if contact.distance < 0.0 => match way {
                 Some(way) => way.direction.dot(on_first(contact)) > COS_THETA,
@@ -136,29 +150,39 @@ impl Surfaces {
         own().map_or(-1.0, |normal: DVec3| normal.dot(contact.normal))
     }
 
-    /// How a pair that is past the middle is pushed. `pushes` are the directions, depths and cosines
-    /// of its penetrating contacts.
-    fn way(&self, scene: &Scene, pair: [InstanceId; 2], pushes: &[(DVec3, f64, f64)]) -> Option<Way> {
-        let deepest = |along: bool| {
-            let of_side = pushes.iter().filter(|(.., cosine)| match along {
-                true => *cosine > COS_THETA,
-                false => *cosine <= -COS_THETA,
-            });
-            of_side.map(|(_, depth, _)| *depth).fold(0.0, f64::max)
-        };
-        let (along, against) = (deepest(true), deepest(false));
+    /// How a pair that is past the middle is pushed. `pushes` are its penetrating contacts.
+    fn way(&self, scene: &Scene, pair: [InstanceId; 2], pushes: &[Push]) -> Option<Way> {
+        let (along, against) = deepest(pushes);
         if against > 0.0 && along <= PAST_THE_MIDDLE * against {
             return None;
         }
         let [first, second] = pair.map(|instance| self.of(scene, instance));
         let (first, second) = (first?, second?);
-        let tried = pushes.iter().step_by(pushes.len().div_ceil(TRIALS)).flat_map(|(d, ..)| [*d, -*d]);
+        let tried = pushes.iter().step_by(pushes.len().div_ceil(TRIALS)).flat_map(|push| [push.direction, -push.direction]);
         let ways = tried.map(|direction| {
             let overlap = extent(first, -direction) + extent(second, direction);
             Way { direction, overlap }
         });
         ways.min_by(|x, y| x.overlap.total_cmp(&y.overlap))
     }
+}
+
+/// The greatest depths of the contacts that push along the own normal, and against it.
+fn deepest(pushes: &[Push]) -> (f64, f64) {
+    let of = |acts: fn(f64) -> bool| {
+        let depths = pushes.iter().filter(|push| acts(push.cosine)).map(|push| push.depth);
+        depths.fold(0.0, f64::max)
+    };
+    (of(|cosine| cosine > COS_THETA), of(|cosine| cosine <= -COS_THETA))
+}
+
+/// Whether contacts of a pair push a body at its rear: along the own normal, and much less deep than
+/// those that push at its front. Beside the rim of two sides that lie flush in each other, the side
+/// that the rim belongs to is nearer; two such pushes against each other at nearly one height turned
+/// a box by 0.5° to find room for 0.2 µm.
+fn has_rear(pushes: &[Push]) -> bool {
+    let (along, against) = deepest(pushes);
+    along > 0.0 && along <= PAST_THE_MIDDLE * against
 }
 
 /// The surface of a box, with the normals of its corners or of the parts of its sides.
@@ -182,7 +206,7 @@ fn extent((surface, pose, scale): (&Surface, Pose, f64), direction: DVec3) -> f6
 }
 
 /// The instances of a contact, the lower one first.
-fn pair(contact: &Contact) -> [InstanceId; 2] {
+pub fn pair(contact: &Contact) -> [InstanceId; 2] {
     let (a, b) = (contact.instance_a, contact.instance_b);
     [a.min(b), a.max(b)]
 }

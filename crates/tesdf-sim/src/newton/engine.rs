@@ -1,15 +1,16 @@
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use glam::DVec3;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 use tesdf::collide::{
-    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, Mode, Pose, Scene, Shape,
+    CollideError, CollideOptions, Contact, Contacts, HiddenOverlap, HiddenSearch, InstanceId, Mode, Pose, Scene, Shape,
     instance_pairs,
 };
 
 use super::NewtonOptions;
-use super::deep::Surfaces;
+use super::deep::{Surfaces, pair};
 use super::gaps::Gaps;
 use super::geometric::Motion;
 use super::integrate::{Outside, free_velocity, moved, pack, unpack, velocity};
@@ -200,6 +201,17 @@ impl Newton {
         -contact.distance > self.options.deep * size
     }
 
+    /// The pairs that overlap deeply and that no joint holds.
+    fn apart(&self, contacts: &[Contact]) -> BTreeSet<[InstanceId; 2]> {
+        let joints = self.system.joints();
+        let is_held = |id: &InstanceId| {
+            let body = self.system.body_of(*id);
+            joints.iter().any(|joint| body == Some(joint.child) || body == joint.parent)
+        };
+        let deep = contacts.iter().filter(|c| self.is_deep(c)).map(pair);
+        deep.filter(|pair| !pair.iter().any(is_held)).collect()
+    }
+
     /// The bodies of islands that overlap deeply, as [`Step::deep`].
     fn deep(&self, step: &Step, contacts: &[Contact], rows: &[Row]) -> Vec<bool> {
         let mut deep = vec![false; step.free.len()];
@@ -259,7 +271,12 @@ impl Newton {
                 *body = island.bodies.partition_point(|b| b < body);
             }
             let gap = match gap {
-                Gap::Position => row.gap,
+                Gap::Position => {
+                    if row.resistance == Resistance::Parting {
+                        row = row.parting();
+                    }
+                    row.gap
+                }
                 Gap::Relaxed => row.relaxed_gap,
             };
             (row, gap)
@@ -472,8 +489,10 @@ impl Newton {
         // says nothing about deep bodies.
         let stays = |row: &Row| row.sides.iter().flatten().any(|(k, _)| deep[*k]);
         // Where bodies overlap deeply, rigid contacts would contradict each other.
-        for row in contact_rows.iter_mut().filter(|row| stays(row)) {
-            row.resistance = Resistance::Spring;
+        let apart = self.apart(all);
+        for (row, found) in contact_rows.iter_mut().zip(&found).filter(|(row, _)| stays(row)) {
+            let parts = apart.contains(&pair(&found.contact));
+            row.resistance = if parts { Resistance::Parting } else { Resistance::Spring };
         }
         let mut rows = [contact_rows.as_slice(), &joints].concat();
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();

@@ -43,7 +43,7 @@ pub struct Gaps<'a> {
 /// A contact and what its gap depends on.
 pub struct Found {
     /// With the normal of [`normals`].
-    contact: Contact,
+    pub contact: Contact,
     /// The gap is the distance above the skin.
     row: Row,
     /// The way by which kinematic bodies open the gap in the step, m.

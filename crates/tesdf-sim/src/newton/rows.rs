@@ -80,6 +80,8 @@ pub struct Friction {
 pub enum Resistance {
     /// As a spring, which gives way under load.
     Spring,
+    /// As `Spring`: a contact of bodies that overlap deeply. What parts them is [`Row::parting`].
+    Parting,
     /// With the force under which it does not give way.
     Rigid,
     /// As `Rigid`: a motor that drives a velocity with a finite force. It may begin stalled, with
@@ -88,6 +90,14 @@ pub enum Resistance {
 }
 
 impl Row {
+    /// The row that parts two bodies: it pushes at their centres of mass, without friction. So their
+    /// overlap along a direction falls as fast as they move, because they do not turn, and what pushes
+    /// on both sides of a body does not wedge it: with μ = 0.5 a torus in a nut stayed 140 µm deep.
+    pub fn parting(&self) -> Self {
+        let push = |(free, j): (usize, Vector6<f64>)| (free, Vector6::new(j[0], j[1], j[2], 0.0, 0.0, 0.0));
+        Self { sides: self.sides.map(|side| side.map(push)), friction: None, ..self.clone() }
+    }
+
     /// Rate of change of the gap at `velocity`, m/s or rad/s.
     #[inline]
     pub fn rate(&self, velocity: &[Vector6<f64>]) -> f64 {

@@ -112,7 +112,7 @@ impl Spring {
     }
 
     fn is_rigid(&self) -> bool {
-        self.resistance != Resistance::Spring
+        matches!(self.resistance, Resistance::Rigid | Resistance::Motor)
     }
 
     fn stiffening(&self, stiffening: f64) -> f64 {
