@@ -261,6 +261,15 @@ impl Simulation {
         classes::dict(py, &summary)
     }
 
+    /// What the steps so far did not do as the scene asks, in lines for users: bodies that overlap,
+    /// joints that came apart, energy from nowhere, steps that did not converge. summary()["warnings"]
+    /// has them with names and values.
+    #[getter]
+    fn warnings(&self, py: Python<'_>) -> Vec<String> {
+        let summary = self.read(py, |r| r.run.summary(r.engine.system()));
+        summary.warnings.into_iter().map(|warning| warning.message).collect()
+    }
+
     /// Writes the run file of the steps so far, with the bytes of that of the command.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let saved = self.read(py, |r| r.run.clone().into_record().save(&path));

@@ -10,7 +10,7 @@ use serde::Serialize;
 use tesdf::Progress;
 use tesdf_sim::record::RecordError;
 use tesdf_sim::scene_file::{DetectorMode, LoadedScene, SceneError};
-use tesdf_sim::{HiddenPair, InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
+use tesdf_sim::{InterruptedRun, Moment, PartialRun, RunOrigin, Summary, System, simulate_from};
 
 use crate::collide::warn_of_coarse;
 use tesdf_terminal::device::{self, Choice, Device};
@@ -58,6 +58,10 @@ pub struct Args {
     /// Where contacts are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("contacts are found"))]
     pub device: Choice,
+    /// Exit with code 1 when the run has warnings: bodies that overlap, joints that come apart, energy
+    /// from nowhere, steps that did not converge
+    #[arg(long)]
+    pub strict: bool,
     /// Print the result as JSON
     #[arg(long)]
     pub json: bool,
@@ -155,9 +159,10 @@ pub fn run(args: &Args) -> Result<Outcome, Failure> {
     drop(bar);
     let (record, summary) = ended.map_err(|e| recorder.failure(e, args.source()))?;
     recorder.finish(&record)?;
-    warn_of(&summary.hidden, loaded.scene.detector.mode);
+    warn_of(&summary, loaded.scene.detector.mode);
     print(args, &summary)?;
-    Ok(if summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
+    let is_refused = args.strict && !summary.warnings.is_empty();
+    Ok(if is_refused || summary.passed == Some(false) { Outcome::NotGood } else { Outcome::Good })
 }
 
 fn open_interrupted(run: &Path) -> Result<InterruptedRun, Failure> {
@@ -286,10 +291,10 @@ impl Drop for LiveProgress<'_> {
     }
 }
 
-/// Warns of bodies that overlapped without a contact, and prints a hint.
-fn warn_of(hidden: &[HiddenPair], mode: DetectorMode) {
-    hidden.iter().for_each(|pair| report::warning(&pair.message()));
-    if !hidden.is_empty() && mode == DetectorMode::Node {
+/// Prints the warnings, and a hint where vertices do not show an overlap.
+fn warn_of(summary: &Summary, mode: DetectorMode) {
+    summary.warnings.iter().for_each(|warning| report::warning(&warning.message));
+    if !summary.hidden.is_empty() && mode == DetectorMode::Node {
         report::hint(
             "the mode `node` only tests vertices: use --mode face or --mode exact, or mesh the bodies more finely",
         );

@@ -35,6 +35,7 @@ pub mod scene_file;
 pub mod script;
 mod simulate;
 mod system;
+mod warning;
 
 pub use dynamics::{Dynamics, DynamicsError, StepReport};
 pub use joint::{Drive, Joint, JointKind, Motor};
@@ -42,3 +43,4 @@ pub use mass::{MassError, MassProperties};
 pub use record::{HiddenPair, InterruptedRun, RunJournal, RunOrigin, RunRecord};
 pub use simulate::{Moment, PartialRun, Run, SimulateError, Summary, simulate, simulate_from};
 pub use system::{Body, Mass, State, System, Wrench};
+pub use warning::{Warning, WarningKind};

@@ -10,6 +10,7 @@ use crate::criterion::{
 };
 use crate::scene_file::{LimitError, SceneFile};
 use crate::script::Scripts;
+use crate::warning::{Warning, Watch, energies};
 use crate::{Dynamics, DynamicsError, HiddenPair, RunRecord, StepReport, System};
 
 /// The state of a run after a step.
@@ -64,6 +65,8 @@ pub struct Summary {
     /// Pairs of bodies that overlapped without a contact that shows it, so that nothing kept them
     /// apart; sorted by the numbers of the bodies. A run with such pairs meets no criterion.
     pub hidden: Vec<HiddenPair>,
+    /// What the run did not do as the scene asks.
+    pub warnings: Vec<Warning>,
     /// Result of the screw criterion, if the scene has one.
     pub screw: Option<ScrewReport>,
     /// Result of the rest criterion, if the scene has one.
@@ -187,6 +190,7 @@ pub struct Run {
     totals: Totals,
     /// The trackers after the steps so far.
     trackers: Trackers,
+    watch: Watch,
     scripts: Scripts,
     /// Energy at time 0, J.
     energy: f64,
@@ -215,9 +219,12 @@ impl Run {
         let energy = system.kinetic_energy() + system.potential_energy();
         let scripts = Scripts::new(&scene.scripts, &system).map_err(SimulateError::Script)?;
         let mut trackers = Trackers::new(&scene.criterion, &system).map_err(SimulateError::Criterion)?;
+        let mut watch = Watch::new(scene, &system);
         for step in 1..=record.steps() {
+            let before = energies(&system);
             show(&mut system, step)?;
             trackers.observe(&system, scene.time_step);
+            watch.observe(&system, before, step as f64 * scene.time_step);
         }
         record.reserve(steps).map_err(|_| LimitError::memory(steps, record.bodies.len()))?;
         record.plan(Some(steps));
@@ -226,6 +233,7 @@ impl Run {
             record,
             totals,
             trackers,
+            watch,
             scripts,
             energy,
             time_step: scene.time_step,
@@ -242,6 +250,7 @@ impl Run {
         let (step, h) = (self.record.steps(), self.time_step);
         let failed = |source| SimulateError::Step { step, source };
         self.scripts.drive(engine, step as f64 * h, h).map_err(failed)?;
+        let before = energies(engine.system());
         let report = engine.step(h).map_err(failed)?;
         let (system, time) = (engine.system(), (step + 1) as f64 * h);
         self.record.push(time, system);
@@ -249,6 +258,7 @@ impl Run {
             self.record.push_contacts(step, engine.contacts(), system);
         }
         self.trackers.observe(system, h);
+        self.watch.observe(system, before, time);
         self.totals.add(&report);
         self.record.push_hidden(step, engine.hidden(), system);
         Ok(Moment { step: step + 1, steps: self.steps, time, report, system, record: &self.record })
@@ -305,6 +315,7 @@ impl Run {
             hoist,
             transmission,
             assembly,
+            warnings: self.watch.warnings(system, &self.totals, &hidden, self.time_step),
             deepest_penetration: depths.fold(sums.deepest_penetration, f64::max),
             hidden,
             ..sums
@@ -315,18 +326,23 @@ impl Run {
 /// Sums over the steps of a run.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Totals {
-    steps: u64,
+    pub(crate) steps: u64,
     contacts: usize,
     most: usize,
     deepest: f64,
     iterations: u64,
-    unconverged: u64,
+    pub(crate) unconverged: u64,
+    /// The first step that did not converge.
+    pub(crate) first_unconverged: Option<u64>,
     detection: Duration,
     solution: Duration,
 }
 
 impl Totals {
     pub(crate) fn add(&mut self, report: &StepReport) {
+        if !report.converged {
+            self.first_unconverged.get_or_insert(self.steps);
+        }
         self.steps += 1;
         self.contacts += report.contacts;
         self.most = self.most.max(report.contacts);

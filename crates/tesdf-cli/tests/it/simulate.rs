@@ -50,6 +50,21 @@ fn a_run_is_written_and_summarised() {
 }
 
 #[test]
+fn warnings_are_told_and_with_strict_exit_with_1() {
+    let folder = Folder::new();
+    folder.write("drop.toml", DROP.to_string() + "[solver]\nmax_iterations = 1\n");
+    let arguments = ["simulate", "drop.toml", "-o", "run", "--json", "--duration", "0.1"];
+    let (code, out, err) = folder.tesdf(&arguments);
+    let json: serde_json::Value = serde_json::from_str(&out).unwrap();
+    let warning = &json["warnings"][0];
+    assert_eq!((code, &warning["kind"]), (Some(0), &"not-converged".into()), "{json}");
+    assert_eq!(warning["count"], json["unconverged_steps"]);
+    assert!(err.contains(warning["message"].as_str().unwrap()), "{err}");
+    let (code, ..) = folder.tesdf(&[&arguments[..], &["--strict"]].concat());
+    assert_eq!(code, Some(1));
+}
+
+#[test]
 fn an_unmet_criterion_exits_with_1() {
     let folder = Folder::new();
     folder.write("drop.toml", DROP.to_string() + SCREW);

@@ -158,7 +158,10 @@ impl Surfaces {
         }
         let [first, second] = pair.map(|instance| self.of(scene, instance));
         let (first, second) = (first?, second?);
-        let tried = pushes.iter().step_by(pushes.len().div_ceil(TRIALS)).flat_map(|push| [push.direction, -push.direction]);
+        let tried = pushes
+            .iter()
+            .step_by(pushes.len().div_ceil(TRIALS))
+            .flat_map(|push| [push.direction, -push.direction]);
         let ways = tried.map(|direction| {
             let overlap = extent(first, -direction) + extent(second, direction);
             Way { direction, overlap }

@@ -90,6 +90,11 @@ pub enum Resistance {
 }
 
 impl Row {
+    /// Whether the row is a contact: it pushes only.
+    pub fn is_contact(&self) -> bool {
+        self.bounds == [0.0, f64::INFINITY]
+    }
+
     /// The row that parts two bodies: it pushes at their centres of mass, without friction. So their
     /// overlap along a direction falls as fast as they move, because they do not turn, and what pushes
     /// on both sides of a body does not wedge it: with μ = 0.5 a torus in a nut stayed 140 µm deep.

@@ -247,6 +247,7 @@ fn boxes_deep_in_each_other_come_apart() {
         let mut scene = Scene::new();
         let shape = scene.add_shape(Shape::Box { half_extents: half }).unwrap();
         let ends = &run[run.len() - 1];
+        assert!(ends.iter().all(|state| state.pose.rotation.w > 1.0 - 1e-6), "they turned: {ends:?}");
         let [a, b] = [0, 1].map(|body: usize| scene.add(Instance::new(shape, ends[body].pose)).unwrap());
         let gap = clearance(&scene, a, b, &ClearanceOptions::default()).unwrap().distance;
         assert!(gap > -OVERLAP, "{offset}: {gap} m, {ends:?}");

@@ -2,6 +2,7 @@
 mod analytic;
 mod assembly;
 mod chain;
+mod deep;
 mod friction;
 mod gear_ratio;
 mod hoist;
@@ -19,3 +20,4 @@ mod scripts;
 mod separation;
 mod support;
 mod transmission;
+mod warnings;

@@ -1,6 +1,7 @@
 //! Scene files that tests write: all that they do not say has the default of scene files.
 use std::fmt::Write;
 use std::ops::ControlFlow;
+use std::path::Path;
 
 use tempfile::TempDir;
 use tesdf::collide::{Pose, Velocity};
@@ -64,6 +65,10 @@ pub struct Bench(TempDir);
 impl Bench {
     pub fn new() -> Self {
         Self(tempfile::tempdir().unwrap())
+    }
+
+    pub fn folder(&self) -> &Path {
+        self.0.path()
     }
 
     /// The geometry of a mesh.

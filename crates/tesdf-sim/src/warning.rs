@@ -1,0 +1,279 @@
+//! What a run did not do as its scene asks: warnings for users.
+use serde::Serialize;
+use tesdf::Length;
+use tesdf::collide::{ClearanceOptions, CollideError, InstancePair, clearance, instance_pairs};
+
+use crate::scene_file::{DetectorMode, SceneFile};
+use crate::simulate::Totals;
+use crate::{HiddenPair, Joint, Mass, System};
+
+/// Joints that come farther apart than this fraction of the diagonal of their child are told.
+const APART: f64 = 1e-3;
+
+/// Joints that turn farther apart than this are told, rad.
+const TWISTED: f64 = 1e-2;
+
+/// A gain of energy is told from this fraction of the greatest kinetic energy on.
+const GAIN: f64 = 0.05;
+
+/// A gain is visible if it lets all bodies move by more than this fraction of the smallest one in a
+/// step.
+const VISIBLE: f64 = 1e-3;
+
+/// Error of the measured overlaps, as a fraction of the depth that is told.
+const TOLERANCE: f64 = 0.1;
+
+/// What a [`Warning`] is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WarningKind {
+    /// Bodies overlapped, and no contact showed it. The value is a lower bound of the depth, m.
+    Hidden,
+    /// Bodies overlap deeply at the end. The value is the depth by the exact clearance, m.
+    Overlap,
+    /// A joint came apart. The value is the distance, m.
+    Joint,
+    /// Energy grew while nothing drove the bodies. The value is the gain, J.
+    Energy,
+    /// Steps did not converge. The value is their part of all steps.
+    NotConverged,
+}
+
+/// What a run did not do as its scene asks. There is one of each kind but
+/// [`Hidden`](WarningKind::Hidden), of which there is one for each pair.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Warning {
+    /// What it is about.
+    pub kind: WarningKind,
+    /// The bodies, or the joint, with the greatest value.
+    pub names: Vec<String>,
+    /// How much, as the kind says.
+    pub value: f64,
+    /// Number of pairs of bodies, of joints, or of steps.
+    pub count: u64,
+    /// A line for users: what, where, how much, and what to do.
+    pub message: String,
+}
+
+/// Watches the steps of a run.
+#[derive(Clone, Debug)]
+pub(crate) struct Watch {
+    /// `None` where detection is off: a depth from which an overlap is told, as a fraction of the
+    /// diagonal of the smaller body.
+    deep: Option<f64>,
+    /// For each joint: how far it came apart, m and rad, and when it was farthest, s.
+    joints: Vec<Apart>,
+    energy: Energy,
+    /// Diagonals of the bodies, m.
+    sizes: Vec<f64>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Apart {
+    distance: f64,
+    angle: f64,
+    time: f64,
+}
+
+/// Energy that bodies gained while nothing drove them, J.
+#[derive(Clone, Copy, Debug, Default)]
+struct Energy {
+    /// What was gained less what was lost, and the least that this has been.
+    change: f64,
+    least: f64,
+    gain: f64,
+    /// When the gain was greatest, s.
+    time: f64,
+    /// The greatest kinetic energy.
+    kinetic: f64,
+}
+
+/// Kinetic and potential energy, J.
+pub(crate) fn energies(system: &System) -> [f64; 2] {
+    [system.kinetic_energy(), system.potential_energy()]
+}
+
+impl Watch {
+    pub(crate) fn new(scene: &SceneFile, system: &System) -> Self {
+        let size = |body: &crate::Body| {
+            let instance = system.scene().instance(body.instance).ok()?;
+            Some(instance.scale * system.scene().shape(instance.shape).ok()?.diagonal())
+        };
+        Self {
+            deep: (scene.detector.mode != DetectorMode::Off).then_some(scene.solver.deep),
+            joints: vec![Apart::default(); system.joints().len()],
+            energy: Energy::default(),
+            sizes: system.bodies().iter().map(|body| size(body).unwrap_or(0.0)).collect(),
+        }
+    }
+
+    /// Records the state after a step that ends at `time`, s. `before` are the energies at its
+    /// beginning.
+    pub(crate) fn observe(&mut self, system: &System, before: [f64; 2], time: f64) {
+        for (apart, joint) in self.joints.iter_mut().zip(system.joints()) {
+            let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
+            if distance > apart.distance {
+                (apart.distance, apart.time) = (distance, time);
+            }
+            apart.angle = apart.angle.max(angle);
+        }
+        self.energy.observe(system, before, time);
+    }
+
+    /// The warnings of a run with these steps of `time_step` seconds, and `system` at its end.
+    pub(crate) fn warnings(
+        &self,
+        system: &System,
+        totals: &Totals,
+        hidden: &[HiddenPair],
+        time_step: f64,
+    ) -> Vec<Warning> {
+        let mut warnings: Vec<Warning> = hidden.iter().map(of_hidden).collect();
+        warnings.extend(self.overlap(system));
+        warnings.extend(self.joint(system));
+        warnings.extend(self.energy(system, time_step));
+        warnings.extend(not_converged(totals, time_step));
+        warnings
+    }
+
+    /// Of bodies that overlap. Of pairs that cannot be measured nothing is said.
+    fn overlap(&self, system: &System) -> Option<Warning> {
+        let deep = self.overlaps(system, self.deep?).unwrap_or_default();
+        let worst = deep.iter().max_by(|x, y| x.1.total_cmp(&y.1))?;
+        let names = worst.0.map(|body| system.bodies()[body].name.clone());
+        let [a, b] = &names;
+        let message = format!(
+            "bodies {a} and {b} overlap by {:.3e} m at the end{}: start them apart, or press them less",
+            worst.1,
+            among(deep.len(), "pairs that overlap deeply")
+        );
+        Some(Warning {
+            kind: WarningKind::Overlap,
+            names: names.into(),
+            value: worst.1,
+            count: deep.len() as u64,
+            message,
+        })
+    }
+
+    /// The pairs of bodies, of which one is free at least, that overlap deeper than this fraction of
+    /// the smaller one, and how deep, m.
+    fn overlaps(&self, system: &System, deep: f64) -> Result<Vec<([usize; 2], f64)>, CollideError> {
+        // The instances of the system have the poses of the last detection.
+        let mut system = system.clone();
+        let states = system.states().to_vec();
+        let scene = system.scene_at(&states)?.clone();
+        let mut found = Vec::new();
+        for InstancePair { first, second, .. } in instance_pairs(&scene, 0.0, 0.0)? {
+            let (Some(a), Some(b)) = (system.body_of(first), system.body_of(second)) else { continue };
+            let is_free = |body: usize| matches!(system.bodies()[body].mass, Mass::Free(_));
+            let bound = deep * self.sizes[a].min(self.sizes[b]);
+            if bound <= 0.0 || !(is_free(a) || is_free(b)) {
+                continue;
+            }
+            let options = ClearanceOptions { tolerance: Length::Absolute(TOLERANCE * bound) };
+            let depth = -clearance(&scene, first, second, &options)?.distance;
+            if depth > bound {
+                found.push(([a, b], depth));
+            }
+        }
+        Ok(found)
+    }
+
+    fn joint(&self, system: &System) -> Option<Warning> {
+        let share = |(apart, joint): (&Apart, &Joint)| {
+            let size = self.sizes.get(joint.child).copied().unwrap_or(0.0);
+            (apart.distance / (APART * size)).max(apart.angle / TWISTED)
+        };
+        let shares: Vec<f64> = self.joints.iter().zip(system.joints()).map(share).collect();
+        let count = shares.iter().filter(|share| **share > 1.0).count() as u64;
+        let worst = (0..shares.len()).max_by(|&x, &y| shares[x].total_cmp(&shares[y]))?;
+        let (joint, apart) = (&system.joints()[worst], self.joints[worst]);
+        let Apart { distance, angle, time } = apart;
+        let message = format!(
+            "joint {} came apart by {distance:.3e} m and {angle:.3e} rad, farthest at {time:.4} s{}: shorten the time \
+             step, or see whether joints, limits and contacts contradict each other",
+            joint.name,
+            among(count as usize, "joints that came apart")
+        );
+        (count > 0).then(|| Warning {
+            kind: WarningKind::Joint,
+            names: vec![joint.name.clone()],
+            value: distance,
+            count,
+            message,
+        })
+    }
+
+    fn energy(&self, system: &System, time_step: f64) -> Option<Warning> {
+        let Energy { gain, time, kinetic, .. } = self.energy;
+        let masses = system.bodies().iter().zip(&self.sizes).filter_map(|(body, size)| match body.mass {
+            Mass::Free(mass) => Some((mass.mass, *size)),
+            Mass::Fixed | Mass::Kinematic => None,
+        });
+        let (mass, size) =
+            masses.fold((0.0, f64::INFINITY), |(m, least), (mass, size)| (m + mass, size.min(least)));
+        let visible = 0.5 * mass * (VISIBLE * size / time_step).powi(2);
+        (gain > visible && gain > GAIN * kinetic).then(|| Warning {
+            kind: WarningKind::Energy,
+            names: Vec::new(),
+            value: gain,
+            count: 1,
+            message: format!(
+                "energy grew by {gain:.3e} J up to {time:.4} s, {:.0} % of the greatest kinetic energy, and nothing drives \
+                 the bodies: shorten the time step",
+                1e2 * gain / kinetic
+            ),
+        })
+    }
+}
+
+impl Energy {
+    /// A push-out raises bodies without a velocity, so only what becomes kinetic energy counts.
+    fn observe(&mut self, system: &System, before: [f64; 2], time: f64) {
+        let [kinetic, potential] = energies(system);
+        self.kinetic = self.kinetic.max(kinetic).max(before[0]);
+        if is_driven(system) {
+            (self.change, self.least) = (0.0, 0.0);
+            return;
+        }
+        let (of_all, of_kinetic) = (kinetic + potential - before[0] - before[1], kinetic - before[0]);
+        self.change += if of_all > 0.0 { of_all.min(of_kinetic).max(0.0) } else { of_all };
+        self.least = self.least.min(self.change);
+        if self.change - self.least > self.gain {
+            (self.gain, self.time) = (self.change - self.least, time);
+        }
+    }
+}
+
+/// Whether a motor, a wrench or a kinematic body may do work.
+fn is_driven(system: &System) -> bool {
+    system.joints().iter().any(|joint| joint.motor.is_some())
+        || system.bodies().iter().any(|body| matches!(body.mass, Mass::Kinematic))
+        || system.wrenches().iter().any(|wrench| wrench.force.length() > 0.0 || wrench.torque.length() > 0.0)
+}
+
+fn of_hidden(pair: &HiddenPair) -> Warning {
+    Warning {
+        kind: WarningKind::Hidden,
+        names: pair.bodies.to_vec(),
+        value: pair.depth,
+        count: pair.steps,
+        message: pair.message(),
+    }
+}
+
+fn not_converged(totals: &Totals, time_step: f64) -> Option<Warning> {
+    let Totals { steps, unconverged, first_unconverged, .. } = *totals;
+    let first = first_unconverged? as f64 * time_step;
+    let message = format!(
+        "{unconverged} of {steps} steps did not converge, the first at {first:.4} s: forces there are not exact; shorten the \
+         time step, or raise max_iterations under [solver]"
+    );
+    let value = unconverged as f64 / steps as f64;
+    Some(Warning { kind: WarningKind::NotConverged, names: Vec::new(), value, count: unconverged, message })
+}
+
+fn among(count: usize, what: &str) -> String {
+    if count == 1 { String::new() } else { format!(", the most of {count} {what}") }
+}
