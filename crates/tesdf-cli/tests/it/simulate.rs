@@ -52,7 +52,9 @@ fn a_run_is_written_and_summarised() {
 #[test]
 fn warnings_are_told_and_with_strict_exit_with_1() {
     let folder = Folder::new();
-    folder.write("drop.toml", DROP.to_string() + "[solver]\nmax_iterations = 1\n");
+    let box_of_1_cm =
+        DROP.replace("sphere = { radius = 0.01 }", "box = { half_extents = [0.01, 0.01, 0.01] }");
+    folder.write("drop.toml", box_of_1_cm + "[solver]\nmax_iterations = 1\n");
     let arguments = ["simulate", "drop.toml", "-o", "run", "--json", "--duration", "0.1"];
     let (code, out, err) = folder.tesdf(&arguments);
     let json: serde_json::Value = serde_json::from_str(&out).unwrap();
