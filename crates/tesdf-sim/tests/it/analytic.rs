@@ -359,16 +359,27 @@ fn a_fast_bar_on_a_hinge_is_stopped_by_a_post() {
 
 /// A floor without friction pushes a body up alone: it may turn, but its centre only falls.
 #[test]
-fn bodies_that_fall_on_a_plane_do_not_move_to_the_side() {
+fn bodies_that_fall_on_a_floor_do_not_move_to_the_side() {
     /// Of the lowest corner at the start, m.
     const HEIGHT: f64 = 1e-3;
     let bench = Bench::new();
     let random = &mut fastrand::Rng::with_seed(7);
     let sine = |random: &mut fastrand::Rng| 2.0 * random.f64() - 1.0;
+    let wide = DVec3::new(2.0, 2.0, 0.05);
+    let below =
+        |geometry: String| Body { pose: Pose::at(DVec3::new(1.25, 0.0, -wide.z)), ..Body::fixed(geometry) };
+    let floors = [
+        Body::plane(0.0),
+        below(bench.cuboid(Kind::Shape, wide)),
+        below(bench.cuboid(Kind::Mesh, wide)),
+        Body::fixed(bench.mesh("tiles", &tiles(24, 6.0, 0.2))),
+    ];
     for half in [DVec3::splat(0.05), CARD, DVec3::new(0.1, 0.005, 0.005)] {
-        for kind in [Kind::Mesh, Kind::Shape] {
+        for (kind, floor) in
+            [Kind::Mesh, Kind::Shape].into_iter().flat_map(|kind| floors.iter().map(move |f| (kind, f)))
+        {
             let geometry = bench.cuboid(kind, half);
-            let mut bodies = vec![Body::plane(0.0)];
+            let mut bodies = vec![floor.clone()];
             // Too far from each other to touch.
             for k in 0..6 {
                 let rotation =
@@ -378,12 +389,13 @@ fn bodies_that_fall_on_a_plane_do_not_move_to_the_side() {
             }
             let run = bench.run("", &bodies, 0.15);
             for body in 1..bodies.len() {
+                let name = format!("{kind:?} {half} on {}, body {body}", floor.geometry);
                 let start = run[0][body].pose.translation.truncate();
                 let sideways = most(&run, body, |state| state.pose.translation.truncate().distance(start));
                 let turned = most(&run, body, |state| state.angular.length());
                 // Else it has not met the floor.
-                assert!(turned > 0.1, "{kind:?} {half}, body {body}");
-                assert!(sideways < SIDEWAYS, "{kind:?} {half}, body {body}: {sideways} m");
+                assert!(turned > 0.1, "{name}");
+                assert!(sideways < SIDEWAYS, "{name}: {sideways} m");
             }
         }
     }

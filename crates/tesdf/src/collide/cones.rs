@@ -60,6 +60,8 @@ type Normals = ArrayVec<DVec3, MOST>;
 pub struct Cones<'a> {
     a: Body<'a>,
     b: Body<'a>,
+    /// The diagonals, in the world.
+    sizes: [f64; 2],
     near: f64,
     /// Bound of the error of a distance.
     tolerance: f64,
@@ -94,7 +96,7 @@ impl<'a> Cones<'a> {
             Precision::F32 => ROUNDING,
         };
         let near = (OF_SMALLER * least.min(f64::MAX)).max(rounding * most);
-        Self { a, b, near, tolerance: tolerance.max(near) }
+        Self { a, b, sizes, near, tolerance: tolerance.max(near) }
     }
 
     /// The distance up to which two places are one, in the world's unit.
@@ -143,7 +145,7 @@ impl<'a> Cones<'a> {
             // The corners of a patch are at edges or vertices of one of them.
             ([m], [h], _) => {
                 if h.distance(-*m) <= PARALLEL {
-                    keep
+                    along(self.flush(-*m, *h))
                 } else {
                     otherwise
                 }
@@ -189,6 +191,20 @@ impl<'a> Cones<'a> {
                     None => keep,
                 }
             }
+        }
+    }
+
+    /// The normal of two faces that lie flush on each other, as far as bodies turn in a step. That of
+    /// the larger body: a small one that comes to lie on it gets no push to the side. Of bodies of
+    /// one size it is the mean. Both are the same in both orders.
+    fn flush(&self, of_a: DVec3, of_b: DVec3) -> DVec3 {
+        let [a, b] = self.sizes;
+        if a > (1.0 + SAME) * b {
+            of_a
+        } else if b > (1.0 + SAME) * a {
+            of_b
+        } else {
+            (of_a + of_b).normalize()
         }
     }
 
