@@ -13,12 +13,13 @@ use super::NewtonOptions;
 use super::deep::{Surfaces, pair};
 use super::gaps::Gaps;
 use super::geometric::Motion;
-use super::integrate::{Outside, free_velocity, moved, pack, unpack, velocity};
+use super::integrate::{Outside, free_linear, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
 use super::look::Look;
 use super::passing::Passing;
 use super::problem::{Minimum, Problem};
+use super::rotation::Rotation;
 use super::rows::{FreeBody, Resistance, Row};
 use super::step::Step;
 use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
@@ -135,20 +136,24 @@ impl Newton {
     fn begin(&self, h: f64, whole: f64) -> Step {
         let states = self.system.states();
         let mut free_of = vec![None; states.len()];
-        let (mut free, mut target) = (Vec::new(), Vec::new());
+        let (mut free, mut target, mut rotations) = (Vec::new(), Vec::new(), Vec::new());
         for (k, (body, state)) in self.system.bodies().iter().zip(states).enumerate() {
             if let Mass::Free(mass) = body.mass {
                 free_of[k] = Some(free.len());
-                free.push(FreeBody::new(k, &mass, state));
                 let (gravity, wrench) = (self.system.gravity, self.system.wrenches()[k]);
                 let outside = Outside { gravity, wrench, angular_damping: body.angular_damping };
-                target.push(free_velocity(&mass, state, &outside, h));
+                let rotation = Rotation::new(&mass, state, &outside, h);
+                let mean = rotation.mean(rotation.momentum);
+                // Rows act in the middle of the rotation.
+                free.push(FreeBody::new(k, &mass, rotation.middle(mean)));
+                target.push(pack(free_linear(&mass, state, &outside, h), mean));
+                rotations.push(rotation);
             }
         }
         let poses = states.iter().map(|state| state.pose).collect();
         let report = StepReport { converged: true, ..StepReport::default() };
         let deep = vec![false; free.len()];
-        Step { h, whole, poses, free, free_of, target, deep, report }
+        Step { h, whole, poses, free, free_of, target, rotations, deep, report }
     }
 
     /// The states after moving for one step at `velocities`. Their velocities are `velocities`.
@@ -536,7 +541,7 @@ impl Newton {
         }
         let mut rows = [contact_rows.as_slice(), &joints].concat();
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
-        let plain = Motion::new(&step.free, &step.target);
+        let mut plain = Motion::new(&step.free, &step.target);
         let (mut velocities, mut forces) = self.solve(step, &plain, &rows, Gap::Position, &start);
         let at_start = vec![Vector6::zeros(); step.free.len()];
         let mut stiffened = plain.stiffened(&rows, &forces, &at_start, step.h);
@@ -583,6 +588,7 @@ impl Newton {
                     held = hit.held(&next, &forces, stays);
                     continue;
                 }
+                step.turn(&mut plain, &velocities);
                 stiffened = plain.stiffened(&rows, &forces, &velocities, step.h);
                 rows = next;
                 let motion = stiffened.as_ref().unwrap_or(&plain);
@@ -600,6 +606,7 @@ impl Newton {
             }
             false => velocities.clone(),
         };
+        let carried = step.ended(&plain, &velocities, &carried);
         Ok([velocities, carried])
     }
 }

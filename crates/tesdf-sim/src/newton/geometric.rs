@@ -73,11 +73,10 @@ impl Motion {
 
 #[cfg(test)]
 mod tests {
-    use glam::DMat3;
-    use tesdf::collide::Pose;
+    use glam::{DMat3, DQuat};
 
     use super::*;
-    use crate::{MassProperties, State};
+    use crate::MassProperties;
 
     fn pull(arm: DVec3, resistance: Resistance) -> Row {
         let side = Some((0, Vector6::new(0.0, 0.0, 1.0, arm.y, -arm.x, 0.0)));
@@ -98,7 +97,7 @@ mod tests {
     fn a_pull_turns_a_body_back() {
         let inertia = DMat3::from_diagonal(DVec3::new(2e-3, 3e-3, 4e-3));
         let mass = MassProperties { mass: 2.0, center: DVec3::ZERO, inertia };
-        let free = [FreeBody::new(0, &mass, &State::at_rest(Pose::IDENTITY))];
+        let free = [FreeBody::new(0, &mass, DQuat::IDENTITY)];
         let plain = Motion::new(&free, &[Vector6::new(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]);
         let (h, at_start) = (5e-3, [Vector6::zeros()]);
         let arm = DVec3::new(0.0, 0.0, 0.1);

@@ -47,6 +47,7 @@ mod normals;
 mod options;
 mod passing;
 mod problem;
+mod rotation;
 mod rows;
 mod spring;
 mod step;

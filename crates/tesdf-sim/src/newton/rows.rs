@@ -1,12 +1,12 @@
 //! Converts contacts to rows of the convex problem.
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use nalgebra::{Matrix6, Vector6};
 use tesdf::collide::{Contact, Pose};
 
 use super::integrate::pack;
-use crate::{Mass, MassProperties, State, System};
+use crate::{Mass, MassProperties, System};
 
-/// A free body and its inertia, in the pose at the beginning of a step.
+/// A free body and its inertia, in the middle of its free rotation in a step.
 #[derive(Clone, Debug)]
 pub struct FreeBody {
     /// Index of the body in the system.
@@ -18,9 +18,9 @@ pub struct FreeBody {
 }
 
 impl FreeBody {
-    /// The free body of index `body` in `state`.
-    pub fn new(body: usize, mass: &MassProperties, state: &State) -> Self {
-        let world = mass.inertia_in_world(state.pose);
+    /// The free body of index `body` in the orientation `rotation`.
+    pub fn new(body: usize, mass: &MassProperties, rotation: DQuat) -> Self {
+        let world = mass.inertia_in_world(Pose { translation: DVec3::ZERO, rotation });
         let blocks = |linear: f64, angular: glam::DMat3| {
             let mut m = Matrix6::zeros();
             for k in 0..3 {

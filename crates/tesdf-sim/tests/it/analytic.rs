@@ -26,6 +26,12 @@ fn extent(half: DVec3, rotation: DQuat) -> DVec3 {
     axes.into_iter().map(DVec3::abs).sum()
 }
 
+/// Moments of inertia of a box of 1 kg, kg m².
+fn inertia(half: DVec3) -> DVec3 {
+    let square = half * half;
+    (DVec3::splat(square.element_sum()) - square) / 3.0
+}
+
 /// The way that the centre of a body sinks, m.
 fn sinks(run: &[Vec<State>], body: usize) -> f64 {
     run[0][body].pose.translation.z - run[run.len() - 1][body].pose.translation.z
@@ -399,4 +405,66 @@ fn bodies_that_fall_on_a_floor_do_not_move_to_the_side() {
             }
         }
     }
+}
+
+/// A free body keeps its energy and its angular momentum, also where it turns over and over about its
+/// middle axis.
+#[test]
+fn a_box_that_turns_over_keeps_energy_and_angular_momentum() {
+    /// Parts of them.
+    const ENERGY: f64 = 1e-4;
+    const MOMENTUM: f64 = 1e-10;
+    let bench = Bench::new();
+    let half = DVec3::new(0.05, 0.03, 0.01);
+    let inertia = inertia(half);
+    for speed in [5.0, 20.0, 100.0] {
+        let velocity = Velocity { linear: DVec3::ZERO, angular: speed * DVec3::new(0.01, 1.0, 0.0) };
+        let body = Body { velocity, ..Body::free(bench.cuboid(Kind::Shape, half), 1.0, Pose::IDENTITY) };
+        let run = bench.run("gravity = [0, 0, 0]", &[body], 5.0);
+        let momentum = |state: &State| {
+            let rotation = state.pose.rotation;
+            rotation * (inertia * (rotation.inverse() * state.angular))
+        };
+        let energy = |state: &State| 0.5 * momentum(state).dot(state.angular);
+        let start = &run[0][0];
+        let lost = most(&run, 0, |state| (energy(state) / energy(start) - 1.0).abs());
+        let turned = most(&run, 0, |state| momentum(state).distance(momentum(start)));
+        let over = most(&run, 0, |state| -(state.pose.rotation.inverse() * state.angular).y);
+        assert!(over > 0.9 * speed, "{speed} rad/s: it has not turned over: {over}");
+        assert!(lost < ENERGY, "{speed} rad/s: {lost} of the energy");
+        let part = turned / momentum(start).length();
+        assert!(part < MOMENTUM, "{speed} rad/s: {part} of the angular momentum");
+    }
+}
+
+/// A heavy top on a ball joint whose tilt θ stays precesses at the rate Ω with
+/// (I₁ − I₃) cos θ Ω² − I₃ ω₃ Ω + m g l = 0, where I₁ is about its tip.
+#[test]
+fn a_top_precesses_at_its_tilt() {
+    /// rad.
+    const TILT: f64 = 2e-3;
+    /// Part of the rate. The top turns by half a radian in a step.
+    const RATE: f64 = 0.01;
+    let bench = Bench::new();
+    let (half, arm, tilt, spin, seconds) = (DVec3::new(0.1, 0.1, 0.01), 0.05, 0.3f64, 100.0, 2.0);
+    let DVec3 { x, z: i3, .. } = inertia(half);
+    let i1 = x + arm * arm;
+    let c = (i1 - i3) * tilt.cos();
+    let rate = 2.0 * G * arm / (i3 * spin + ((i3 * spin).powi(2) - 4.0 * c * G * arm).sqrt());
+    let rotation = leaning(tilt);
+    let up = rotation * DVec3::Z;
+    let angular = (spin - rate * tilt.cos()) * up + rate * DVec3::Z;
+    let velocity = Velocity { linear: angular.cross(arm * up), angular };
+    let top = Body::free(bench.cuboid(Kind::Shape, half), 1.0, Pose { translation: arm * up, rotation });
+    let settings = "detector = { mode = \"off\" }\n\
+                    joints = [{ name = \"tip\", kind = \"ball\", child = \"0\", anchor = [0, 0, 0] }]";
+    let run = bench.run(settings, &[Body { velocity, ..top }], seconds);
+    let axes = states(&run, 0).map(|state| state.pose.rotation * DVec3::Z);
+    let (mut way, mut before) = (0.0, up);
+    for axis in axes {
+        assert!((axis.z.acos() - tilt).abs() < TILT, "tilt {}", axis.z.acos());
+        way += before.truncate().angle_to(axis.truncate());
+        before = axis;
+    }
+    assert!((way / seconds / rate - 1.0).abs() < RATE, "{} instead of {rate} rad/s", way / seconds);
 }
