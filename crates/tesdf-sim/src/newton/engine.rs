@@ -10,9 +10,10 @@ use tesdf::collide::{
 };
 
 use super::NewtonOptions;
+use super::chains::Iterate;
 use super::deep::{Surfaces, pair};
 use super::gaps::Gaps;
-use super::geometric::Motion;
+use super::geometric::{Loads, Motion, Start};
 use super::integrate::{Outside, free_linear, moved, pack, unpack, velocity};
 use super::islands::{Island, islands};
 use super::joints::{joint_rows, predict};
@@ -93,13 +94,15 @@ struct Part {
     found: Contacts,
     /// Whether pairs pass in it.
     passing: Option<Passing>,
+    /// Whether joints do not hold in it, but may in shorter parts.
+    is_loose: bool,
     /// What is reported of it.
     report: StepReport,
 }
 
 /// The two gaps of a row.
 #[derive(Clone, Copy)]
-enum Gap {
+pub enum Gap {
     /// Includes the correction that pushes penetrating bodies apart.
     Position,
     /// Without that correction.
@@ -237,7 +240,7 @@ impl Newton {
 
     /// Minimises the problem of every island from `start`. A body without rows keeps its target
     /// velocity.
-    fn solve(
+    pub(super) fn solve(
         &self,
         step: &mut Step,
         motion: &Motion,
@@ -428,8 +431,10 @@ impl Newton {
     }
 
     /// How long the next part may be when `left` seconds of a step, `whole`, are left: so that no body
-    /// that may meet another one turns by more than [`MOST_TURN`]. Balls may turn as they like.
+    /// that may meet another one turns by more than [`MOST_TURN`], and no arm of a joint too far. Balls
+    /// may turn as they like.
     fn part_of(&mut self, left: f64, whole: f64) -> Result<f64, DynamicsError> {
+        let left = self.part_of_arms(left, whole);
         let states = self.system.states().to_vec();
         let turn = |(body, state): (usize, &State)| match self.is_ball(body) {
             true => 0.0,
@@ -475,25 +480,27 @@ impl Newton {
         }
         let mut states = self.moved(&step, &velocities);
         let passing = self.passing(&mut step, &states)?;
+        let is_loose = self.is_loose(&states, time_step, whole);
         set_velocities(&mut states, &step.free, &carried);
         let mut report = step.report;
         let found = look.contacts;
         report.contacts = found.len();
         report.deepest = found.iter().map(|c| c.distance).reduce(f64::min);
         report.solution = begin.elapsed().saturating_sub(report.detection);
-        Ok(Part { states, found, passing, report })
+        Ok(Part { states, found, passing, is_loose, report })
     }
 
-    /// Moves by a step, in as many parts as bodies that turn far and fast pairs need.
+    /// Moves by a step, in as many parts as bodies that turn far, fast pairs and joints need.
     fn in_parts(&mut self, whole: f64) -> Result<StepReport, DynamicsError> {
         let mut report = StepReport { converged: true, ..StepReport::default() };
         let mut first: Option<Contacts> = None;
         let (mut left, mut longest) = (whole, whole);
         let mut time = self.part_of(left, whole)?;
         while left > 0.0 {
-            let Part { states, found, passing, report: of_part } = self.part(time, whole)?;
+            let Part { states, found, passing, is_loose, report: of_part } = self.part(time, whole)?;
             let may_divide = report.divided < MOST_DIVISIONS;
-            let divides = passing.filter(|_| may_divide);
+            let half = is_loose.then_some(Passing { hit: None, pairs: 0 });
+            let divides = passing.filter(|_| may_divide).or(half);
             // A part that is divided is solved again.
             report.add(&StepReport { converged: of_part.converged || divides.is_some(), ..of_part });
             first.get_or_insert_with(|| {
@@ -543,8 +550,11 @@ impl Newton {
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut plain = Motion::new(&step.free, &step.target);
         let (mut velocities, mut forces) = self.solve(step, &plain, &rows, Gap::Position, &start);
-        let at_start = vec![Vector6::zeros(); step.free.len()];
-        let mut stiffened = plain.stiffened(&rows, &forces, &at_start, step.h);
+        let count = step.free.len();
+        let loads = |rows: &[Row], forces: &[f64]| Loads::new(count, rows, forces, rows.len() - joints.len());
+        let from = Start { velocities: &start, h: step.h, whole: step.whole };
+        let mut found_at = vec![Vector6::zeros(); count];
+        let mut stiffened = plain.stiffened(&loads(&rows, &forces), &found_at, &from);
         if let Some(motion) = &stiffened {
             (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &start);
         }
@@ -589,7 +599,8 @@ impl Newton {
                     continue;
                 }
                 step.turn(&mut plain, &velocities);
-                stiffened = plain.stiffened(&rows, &forces, &velocities, step.h);
+                found_at.clone_from(&velocities);
+                stiffened = plain.stiffened(&loads(&rows, &forces), &found_at, &from);
                 rows = next;
                 let motion = stiffened.as_ref().unwrap_or(&plain);
                 let before = velocities;
@@ -599,13 +610,15 @@ impl Newton {
                 }
             }
         }
+        let of_joints = rows.len() - joints.len();
+        let mut solved = Iterate { rows, velocities, forces, found_at, plain, stiffened };
+        self.close_joints(step, &mut solved, of_joints, &from);
+        let Iterate { rows, velocities, .. } = &solved;
         let carried = match rows.iter().any(|row| row.relaxed_gap != row.gap) {
-            true => {
-                let motion = stiffened.as_ref().unwrap_or(&plain);
-                self.solve(step, motion, &rows, Gap::Relaxed, &velocities).0
-            }
+            true => self.solve(step, solved.motion(), rows, Gap::Relaxed, velocities).0,
             false => velocities.clone(),
         };
+        let Iterate { velocities, plain, .. } = solved;
         let carried = step.ended(&plain, &velocities, &carried);
         Ok([velocities, carried])
     }

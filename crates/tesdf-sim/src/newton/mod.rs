@@ -33,6 +33,7 @@
 //! With re-detection, the gaps and rows come from the predicted pose. The step is then an iteration
 //! of sequential quadratic programming on the exact distance.
 
+mod chains;
 mod deep;
 mod engine;
 mod gaps;
