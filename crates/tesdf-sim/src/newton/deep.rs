@@ -50,7 +50,10 @@ struct Push {
 /// The normals of the vertices, edges or faces of the meshes and boxes of a scene, and their
 /// vertices, in the frames of the shapes.
 #[derive(Clone, Debug)]
-pub struct Surfaces(BTreeMap<ShapeId, Surface>);
+pub struct Surfaces {
+    of_shapes: BTreeMap<ShapeId, Surface>,
+    mode: Mode,
+}
 
 #[derive(Clone, Debug)]
 struct Surface {
@@ -80,7 +83,7 @@ impl Surfaces {
             };
             Some((id, Surface { normals, vertices: vertices(asset) }))
         };
-        Self(scene.shapes().filter_map(of_shape).collect())
+        Self { of_shapes: scene.shapes().filter_map(of_shape).collect(), mode }
     }
 
     /// The contacts that act. `is_deep` tells whether a contact is that of a deep pair. The
@@ -101,7 +104,8 @@ impl Surfaces {
                 deep.insert(pair(contact));
             }
         }
-        pushes.retain(|pair, pushes| deep.contains(pair) || has_rear(pushes));
+        let of_faces = matches!(self.mode, Mode::Face | Mode::Exact);
+        pushes.retain(|pair, pushes| deep.contains(pair) || of_faces && has_rear(pushes));
         if pushes.is_empty() {
             return contacts.to_vec();
         }
@@ -137,7 +141,7 @@ impl Surfaces {
 
     fn of(&self, scene: &Scene, instance: InstanceId) -> Option<(&Surface, Pose, f64)> {
         let instance = scene.instance(instance).ok()?;
-        Some((self.0.get(&instance.shape)?, instance.pose, instance.scale))
+        Some((self.of_shapes.get(&instance.shape)?, instance.pose, instance.scale))
     }
 
     /// The cosine between the normal of a contact and that of its vertex or face. Planes and

@@ -212,8 +212,12 @@ impl Newton {
         -contact.distance > self.options.deep * size
     }
 
-    /// The pairs that overlap deeply and that no joint holds.
+    /// The pairs that overlap deeply and that no joint holds. None where contacts do not show all of an
+    /// overlap: bodies that do not turn would stay in each other where no vertex is.
     fn apart(&self, contacts: &[Contact]) -> BTreeSet<[InstanceId; 2]> {
+        if !self.detector.holds_all(&self.collide) {
+            return BTreeSet::new();
+        }
         let joints = self.system.joints();
         let is_held = |id: &InstanceId| {
             let body = self.system.body_of(*id);
