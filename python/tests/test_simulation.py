@@ -80,6 +80,17 @@ def test_a_box_falls_and_lands(scene):
     assert simulation.steps == 130 and repr(simulation) == "<tesdf.Simulation: 2 bodies, step 130 of 120>"
 
 
+def test_what_a_run_does_not_do_is_told(scene, tmp_path):
+    simulation = tesdf.Simulation(scene)
+    assert simulation.run()["warnings"] == [] and simulation.warnings == []
+    hasty = tmp_path / "hasty.toml"
+    hasty.write_text(SCENE + "[solver]\nmax_iterations = 1\n")
+    simulation = tesdf.Simulation(hasty)
+    (told,) = simulation.run()["warnings"]
+    assert (told["kind"], told["count"]) == ("not-converged", simulation.summary()["unconverged_steps"])
+    assert simulation.warnings == [told["message"]] and "did not converge" in told["message"]
+
+
 def test_options(scene):
     simulation = tesdf.Simulation(scene, mode="off", time_step=2e-3, duration=0.01)
     assert simulation.planned_steps == 5 and not simulation.run()["passed"] is None

@@ -347,7 +347,7 @@ mod tests {
             scene.add(Instance::new(shape, Pose::at(DVec3::Z * height))).unwrap();
         }
         let surface = Surface { normals: vec![DVec3::Z], vertices: vec![DVec3::NEG_Z, DVec3::Z] };
-        let surfaces = Surfaces(BTreeMap::from([(shape, surface)]));
+        let surfaces = Surfaces { of_shapes: BTreeMap::from([(shape, surface)]), mode: Mode::Exact };
         let (up, down, aside) = (DVec3::Z, DVec3::NEG_Z, DVec3::X);
         let found = [
             // Deep; the deepest contact pushes against the normal.
