@@ -35,8 +35,8 @@ pub trait Detect: Send + Sync {
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError>;
 
     /// Whether contacts hold every part of a surface that comes within those distances. Where this is
-    /// so, [`Newton`] follows fast pairs by the exact distance and divides the step where one passes.
-    /// Where it is not, no number of parts would hold them.
+    /// so, [`Newton`] follows fast pairs by the exact distance and divides the step where one passes;
+    /// where it is not, no number of parts would hold them. And it parts deep bodies without turning them.
     fn holds_all(&self, options: &CollideOptions) -> bool {
         options.mode != Mode::Node
     }
@@ -299,11 +299,11 @@ impl Newton {
         let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
         let inertia: Vec<_> = island.bodies.iter().map(|&k| motion.inertia[k]).collect();
         let rows: Vec<_> = island.rows.iter().map(|&k| local(rows[k].clone())).collect();
-        let minimise = |rows: Vec<(Row, f64)>| {
-            let problem = Problem::new(inertia.clone(), of(&motion.target), rows.into_iter(), step.h);
-            problem.minimise(of(start), &self.options)
+        let minimise = |rows: &[(Row, f64)]| {
+            let rows = rows.iter().map(|(row, gap)| (row, *gap));
+            Problem::new(inertia.clone(), of(&motion.target), rows, step.h).minimise(of(start), &self.options)
         };
-        let minimum = minimise(rows.clone());
+        let minimum = minimise(&rows);
         let asked = rows.iter().map(|(_, gap)| gap.abs() / step.h).fold(0.0, f64::max);
         if !self.is_wild(step, island, asked, [&of(&motion.target), &of(start)], &minimum.velocity) {
             return minimum;
@@ -312,7 +312,8 @@ impl Newton {
             let resistance = if row.is_contact() { Resistance::Spring } else { row.resistance };
             (Row { resistance, ..row }, gap)
         };
-        Minimum { converged: false, ..minimise(rows.into_iter().map(as_spring).collect()) }
+        let springs: Vec<_> = rows.into_iter().map(as_spring).collect();
+        Minimum { converged: false, ..minimise(&springs) }
     }
 
     /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows

@@ -5,6 +5,8 @@
 //! method of multipliers (Hestenes, *Multiplier and gradient methods*, 1969; Powell, *A method for
 //! nonlinear constraints in minimization problems*, 1969), until no contact gives way: each spring
 //! gets a compression that it keeps without giving way, the compression of the minimum before.
+use std::borrow::Borrow;
+
 use nalgebra::{Matrix6, Vector6};
 
 use super::NewtonOptions;
@@ -96,10 +98,10 @@ impl Problem {
     pub fn new(
         inertia: Vec<Matrix6<f64>>,
         target: Vec<Vector6<f64>>,
-        rows: impl Iterator<Item = (Row, f64)>,
+        rows: impl Iterator<Item = (impl Borrow<Row>, f64)>,
         time_step: f64,
     ) -> Self {
-        let mut springs: Vec<Spring> = rows.map(|(row, gap)| Spring::new(&row, gap)).collect();
+        let mut springs: Vec<Spring> = rows.map(|(row, gap)| Spring::new(row.borrow(), gap)).collect();
         let pair = |spring: &Spring| match spring.sides {
             [Some((a, _)), Some((b, _))] => Some((a.min(b), a.max(b))),
             _ => None,
