@@ -37,9 +37,10 @@ impl Step {
     /// to the rotations of rigid bodies.
     ///
     /// Rows change the angular momentum L, and `plain` has the mean velocity ω as linear in it. An
-    /// iteration of Newton's method on ω = Φ(L), with Φ of [`Rotation::mean`].
+    /// iteration of Newton's method on ω = Φ(L), with Φ of [`Rotation::mean`]. Velocities that part deep
+    /// bodies are no motion, and must not become one: the pile of shafts was kicked to three times its energy.
     pub fn turn(&self, plain: &mut Motion, velocities: &[Vector6<f64>]) {
-        for (k, v) in velocities.iter().enumerate() {
+        for (k, v) in velocities.iter().enumerate().filter(|(k, _)| !self.deep[*k]) {
             let added = added(plain, k, v);
             let mean = self.rotations[k].mean(self.rotations[k].momentum + added);
             let of_rows = unpack(&(self.free[k].inverse * pack(DVec3::ZERO, added))).1;
@@ -57,6 +58,9 @@ impl Step {
         carried: &[Vector6<f64>],
     ) -> Vec<Vector6<f64>> {
         let end = |(k, v): (usize, &Vector6<f64>)| {
+            if self.deep[k] {
+                return *v;
+            }
             let momentum = self.rotations[k].momentum + added(plain, k, v);
             pack(unpack(v).0, self.rotations[k].end(unpack(&velocities[k]).1, momentum))
         };
