@@ -262,8 +262,8 @@ impl Simulation {
     }
 
     /// What the steps so far did not do as the scene asks, in lines for users: bodies that overlap,
-    /// joints that came apart, energy from nowhere, steps that did not converge. summary()["warnings"]
-    /// has them with names and values.
+    /// joints that came apart, energy from nowhere, steps that did not converge.
+    /// summary()["warnings"] has them with names and values.
     #[getter]
     fn warnings(&self, py: Python<'_>) -> Vec<String> {
         let summary = self.read(py, |r| r.run.summary(r.engine.system()));

@@ -58,8 +58,8 @@ pub struct Args {
     /// Where contacts are found
     #[arg(long, value_name = "DEVICE", value_parser = Choice::parse, default_value_t = Choice::Processor, help = device::help("contacts are found"))]
     pub device: Choice,
-    /// Exit with code 1 when the run has warnings: bodies that overlap, joints that come apart, energy
-    /// from nowhere, steps that did not converge
+    /// Exit with code 1 when the run has warnings: bodies that overlap, joints that come apart,
+    /// energy from nowhere, steps that did not converge
     #[arg(long)]
     pub strict: bool,
     /// Print the result as JSON

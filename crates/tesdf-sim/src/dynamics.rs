@@ -62,14 +62,14 @@ pub struct StepReport {
     pub iterations: u32,
     /// Whether every solve reached its tolerance, and no pair is [`unbounded`](Self::unbounded).
     pub converged: bool,
-    /// Number of parts into which the step was divided, because a body turns far in it, joints would not
-    /// hold, or where a fast pair would have passed.
+    /// Number of parts into which the step was divided, because a body turns far in it, joints
+    /// would not hold, or where a fast pair would have passed.
     pub parts: u32,
     /// Number of motions of fast pairs, in parts of the step, that were followed by their time of
     /// impact.
     pub followed: u32,
-    /// Number of parts that were solved and then divided because of what this has shown, or because joints
-    /// did not hold.
+    /// Number of parts that were solved and then divided because of what this has shown, or because
+    /// joints did not hold.
     pub divided: u32,
     /// Number of these motions that were neither shown to be free nor to end at a small depth, when
     /// the part could not be divided any more: bodies may have passed into each other.

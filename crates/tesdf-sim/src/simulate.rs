@@ -301,7 +301,7 @@ impl Run {
         Summary {
             momentum: momentum.to_array(),
             angular_momentum: angular_momentum.to_array(),
-            joint_drift: self.trackers.drift(system),
+            joint_drift: self.watch.drift(),
             seconds: self.record.steps() as f64 * self.time_step,
             kinetic_energy: system.kinetic_energy(),
             released_energy: self.energy - system.potential_energy(),

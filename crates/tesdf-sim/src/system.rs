@@ -275,6 +275,15 @@ impl System {
         self.bodies.get(body).ok_or(DynamicsError::NoBody { body, bodies: self.bodies.len() })
     }
 
+    /// Diagonal of the bounding box of a body, m.
+    ///
+    /// # Errors
+    /// The scene lacks its instance or shape.
+    pub(crate) fn diagonal(&self, body: &Body) -> Result<f64, CollideError> {
+        let instance = self.scene.instance(body.instance)?;
+        Ok(self.scene.shape(instance.shape)?.diagonal() * instance.scale)
+    }
+
     /// The number of the body of an instance.
     pub fn body_of(&self, instance: InstanceId) -> Option<usize> {
         // Instances are numbered in the order in which they are added, so the bodies are sorted by

@@ -3,6 +3,7 @@ use serde::Serialize;
 use tesdf::Length;
 use tesdf::collide::{ClearanceOptions, CollideError, InstancePair, clearance, instance_pairs};
 
+use crate::criterion::JointDrift;
 use crate::scene_file::{DetectorMode, SceneFile};
 use crate::simulate::Totals;
 use crate::{HiddenPair, Joint, Mass, System};
@@ -95,15 +96,11 @@ pub(crate) fn energies(system: &System) -> [f64; 2] {
 
 impl Watch {
     pub(crate) fn new(scene: &SceneFile, system: &System) -> Self {
-        let size = |body: &crate::Body| {
-            let instance = system.scene().instance(body.instance).ok()?;
-            Some(instance.scale * system.scene().shape(instance.shape).ok()?.diagonal())
-        };
         Self {
             deep: (scene.detector.mode != DetectorMode::Off).then_some(scene.solver.deep),
             joints: vec![Apart::default(); system.joints().len()],
             energy: Energy::default(),
-            sizes: system.bodies().iter().map(|body| size(body).unwrap_or(0.0)).collect(),
+            sizes: system.bodies().iter().map(|body| system.diagonal(body).unwrap_or(0.0)).collect(),
         }
     }
 
@@ -118,6 +115,15 @@ impl Watch {
             apart.angle = apart.angle.max(angle);
         }
         self.energy.observe(system, before, time);
+    }
+
+    /// How far the joints came apart; `None` when there are none.
+    pub(crate) fn drift(&self) -> Option<JointDrift> {
+        let drifts = self.joints.iter().map(|&Apart { distance, angle, .. }| JointDrift { distance, angle });
+        drifts.reduce(|one, other| JointDrift {
+            distance: one.distance.max(other.distance),
+            angle: one.angle.max(other.angle),
+        })
     }
 
     /// The warnings of a run with these steps of `time_step` seconds, and `system` at its end.
@@ -156,15 +162,16 @@ impl Watch {
         })
     }
 
-    /// The pairs of bodies, of which one is free at least, that overlap deeper than this fraction of
-    /// the smaller one, and how deep, m.
+    /// The pairs of bodies, of which one is free at least, that overlap deeper than this fraction
+    /// of the smaller one, and how deep, m.
     fn overlaps(&self, system: &System, deep: f64) -> Result<Vec<([usize; 2], f64)>, CollideError> {
         // The instances of the system have the poses of the last detection.
         let mut system = system.clone();
         let states = system.states().to_vec();
-        let scene = system.scene_at(&states)?.clone();
+        system.scene_at(&states)?;
+        let scene = system.scene();
         let mut found = Vec::new();
-        for InstancePair { first, second, .. } in instance_pairs(&scene, 0.0, 0.0)? {
+        for InstancePair { first, second, .. } in instance_pairs(scene, 0.0, 0.0)? {
             let (Some(a), Some(b)) = (system.body_of(first), system.body_of(second)) else { continue };
             let is_free = |body: usize| matches!(system.bodies()[body].mass, Mass::Free(_));
             let bound = deep * self.sizes[a].min(self.sizes[b]);
@@ -172,7 +179,7 @@ impl Watch {
                 continue;
             }
             let options = ClearanceOptions { tolerance: Length::Absolute(TOLERANCE * bound) };
-            let depth = -clearance(&scene, first, second, &options)?.distance;
+            let depth = -clearance(scene, first, second, &options)?.distance;
             if depth > bound {
                 found.push(([a, b], depth));
             }

@@ -3,7 +3,8 @@ use tesdf_gpu::cuda::{Resources, compile};
 
 use crate::cuda_source::SOURCES;
 
-/// Compiles to machine code for GPUs of compute centers. `tesdf bench kernels` prints its resources.
+/// Compiles to machine code for GPUs of compute centers. `tesdf bench kernels` prints its
+/// resources.
 #[test]
 #[ignore = "needs NVRTC: .ci/kernels.sh runs it"]
 fn every_kernel_compiles_to_machine_code() {

@@ -1,6 +1,6 @@
 //! Fingers lift a body and hold it.
 use serde::{Deserialize, Serialize};
-use tesdf::collide::{CollideError, InstanceId, Pose};
+use tesdf::collide::{InstanceId, Pose};
 use tesdf::glam::DVec3;
 
 use super::shared::{Checks, Penetration, body, free_body, positive, unit};
@@ -164,11 +164,7 @@ impl LiftTracker {
         criterion.validate(system)?;
         let (body, mass, fingers) = criterion.find(system)?;
         let instance = system.bodies()[body].instance;
-        let size = || {
-            let placed = system.scene().instance(instance)?;
-            Ok(system.scene().shape(placed.shape)?.diagonal() * placed.scale)
-        };
-        let size = size().map_err(|e: CollideError| e.to_string())?;
+        let size = system.diagonal(&system.bodies()[body]).map_err(|e| e.to_string())?;
         Ok(Self {
             axis: unit(criterion.axis)?,
             body,

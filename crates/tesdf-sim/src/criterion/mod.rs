@@ -49,7 +49,6 @@ pub(crate) struct Trackers {
     hoist: Option<HoistTracker>,
     transmission: Option<TransmissionTracker>,
     assembly: Option<AssemblyTracker>,
-    drift: JointDrift,
 }
 
 impl Trackers {
@@ -82,7 +81,6 @@ impl Trackers {
                 .map(|gears| TransmissionTracker::new(gears, system))
                 .transpose()?,
             assembly: assembly.as_ref().map(|parts| AssemblyTracker::new(parts, system)).transpose()?,
-            drift: JointDrift::default(),
         })
     }
 
@@ -115,16 +113,6 @@ impl Trackers {
         if let Some(assembly) = &mut self.assembly {
             assembly.observe(system, time_step);
         }
-        for joint in system.joints() {
-            let (distance, angle) = joint.error(System::poses_of(joint, system.states()));
-            self.drift.distance = self.drift.distance.max(distance);
-            self.drift.angle = self.drift.angle.max(angle);
-        }
-    }
-
-    /// How far the joints came apart; `None` when there are none.
-    pub(crate) fn drift(&self, system: &System) -> Option<JointDrift> {
-        (!system.joints().is_empty()).then_some(self.drift)
     }
 
     /// Compares the run so far with the criteria. `failures` are added to those of each criterion.

@@ -2,7 +2,7 @@
 use serde::{Deserialize, Serialize};
 use tesdf::collide::{CollideError, Pose};
 
-use crate::{Body, Mass, System};
+use crate::{Mass, System};
 
 /// Every free body stays where it is, and the bodies gain no energy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,11 +71,8 @@ impl RestTracker {
     /// The same errors as [`RestCriterion::validate`].
     pub fn new(criterion: &RestCriterion, system: &System) -> Result<Self, String> {
         criterion.validate()?;
-        let size = |body: &Body| {
-            let instance = system.scene().instance(body.instance)?;
-            Ok(system.scene().shape(instance.shape)?.diagonal() * instance.scale)
-        };
-        let sizes = system.bodies().iter().map(size).collect::<Result<_, CollideError>>();
+        let diagonals = system.bodies().iter().map(|body| system.diagonal(body));
+        let sizes = diagonals.collect::<Result<_, CollideError>>();
         let sizes = sizes.map_err(|e| e.to_string())?;
         let (criterion, body) = (criterion.clone(), String::new());
         let mut tracker = Self {

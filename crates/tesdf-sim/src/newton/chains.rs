@@ -1,4 +1,5 @@
-//! Chains of joints: further rounds in which joints come to hold, and the parts of a step that they need.
+//! Chains of joints: further rounds in which joints come to hold, and the parts of a step that they
+//! need.
 //!
 //! A round solves the joints with their errors at the predicted poses and their directions at the
 //! beginning of the step (SHAKE, Ryckaert, Ciccotti and Berendsen 1977). A joint that is left open
@@ -15,18 +16,19 @@ use super::rows::Row;
 use super::step::Step;
 use crate::{Joint, Mass, State, System};
 
-/// Maximum number of rounds for the joints alone. An error falls by three to ten in a round. A chain
-/// with an end of 20,000 times the mass of a link needs six; with four it flew apart.
+/// Maximum number of rounds for the joints alone. An error falls by three to ten in a round. A
+/// chain with an end of 20,000 times the mass of a link needs six; with four it flew apart.
 const ROUNDS: u32 = 8;
 
-/// Joints hold when they are apart by less than this part of the child's diagonal, and this angle, rad.
+/// Joints hold when they are apart by less than this part of the child's diagonal, and this angle,
+/// rad.
 const HOLDS: f64 = 2e-6;
 
 /// A step has at most as many parts because of its joints.
 const PARTS: f64 = 64.0;
 
-/// Joints that are off by this much more than at the beginning of a part do not hold in it. Joints that
-/// contradict each other would not hold in shorter parts, either.
+/// Joints that are off by this much more than at the beginning of a part do not hold in it. Joints
+/// that contradict each other would not hold in shorter parts, either.
 const WORSE: f64 = 2.0;
 
 /// A joint on the axis of a body has an arm below this part of its diagonal.
@@ -72,8 +74,8 @@ impl Newton {
             }
             let poses: Vec<Pose> = states.iter().map(|state| state.pose).collect();
             step.turn(&mut iterate.plain, &iterate.velocities);
-            // Forces that close a gap are no loads: with a stiffness that follows them in each round,
-            // the rounds converge more slowly.
+            // Forces that close a gap are no loads: with a stiffness that follows them in each
+            // round, the rounds converge more slowly.
             let Iterate { rows, forces, found_at, .. } = &*iterate;
             let loads = loads.get_or_insert_with(|| Loads::new(step.free.len(), rows, forces, of_joints));
             iterate.stiffened = iterate.plain.stiffened(loads, found_at, start);
@@ -93,14 +95,15 @@ impl Newton {
         far && time > 1.5 * whole / PARTS
     }
 
-    /// How long the next part may be, when `left` seconds of the step `whole` are left, so that no arm
-    /// of a joint turns by more than [`ARM_TURN`].
+    /// How long the next part may be, when `left` seconds of the step `whole` are left, so that no
+    /// arm of a joint turns by more than [`ARM_TURN`].
     pub(super) fn part_of_arms(&self, left: f64, whole: f64) -> f64 {
         let parts = (left * self.arm_rate(self.system.states()) / ARM_TURN).ceil().max(1.0);
         (left / parts).max(whole / PARTS).min(left)
     }
 
-    /// The greatest error of a joint: its distance as part of the child's diagonal, or its angle, rad.
+    /// The greatest error of a joint: its distance as part of the child's diagonal, or its angle,
+    /// rad.
     fn joint_error(&self, states: &[State]) -> f64 {
         let of_joint = |joint: &Joint| {
             let (distance, angle) = joint.error(System::poses_of(joint, states));

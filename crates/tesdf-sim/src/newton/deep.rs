@@ -183,10 +183,10 @@ fn deepest(pushes: &[Push]) -> (f64, f64) {
     (of(|cosine| cosine > COS_THETA), of(|cosine| cosine <= -COS_THETA))
 }
 
-/// Whether contacts of a pair push a body at its rear: along the own normal, and much less deep than
-/// those that push at its front. Beside the rim of two sides that lie flush in each other, the side
-/// that the rim belongs to is nearer; two such pushes against each other at nearly one height turned
-/// a box by 0.5° to find room for 0.2 µm.
+/// Whether contacts of a pair push a body at its rear: along the own normal, and much less deep
+/// than those that push at its front. Beside the rim of two sides that lie flush in each other, the
+/// side that the rim belongs to is nearer; two such pushes against each other at nearly one height
+/// turned a box by 0.5° to find room for 0.2 µm.
 fn has_rear(pushes: &[Push]) -> bool {
     let (along, against) = deepest(pushes);
     along > 0.0 && along <= PAST_THE_MIDDLE * against

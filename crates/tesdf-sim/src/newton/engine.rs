@@ -34,9 +34,10 @@ pub trait Detect: Send + Sync {
     /// The errors of the detection, as [`CollideError`].
     fn detect(&self, scene: &Scene, options: &CollideOptions) -> Result<Contacts, CollideError>;
 
-    /// Whether contacts hold every part of a surface that comes within those distances. Where this is
-    /// so, [`Newton`] follows fast pairs by the exact distance and divides the step where one passes;
-    /// where it is not, no number of parts would hold them. And it parts deep bodies without turning them.
+    /// Whether contacts hold every part of a surface that comes within those distances. Where this
+    /// is so, [`Newton`] follows fast pairs by the exact distance and divides the step where one
+    /// passes; where it is not, no number of parts would hold them. And it parts deep bodies
+    /// without turning them.
     fn holds_all(&self, options: &CollideOptions) -> bool {
         options.mode != Mode::Node
     }
@@ -126,11 +127,8 @@ impl Newton {
     ) -> Result<Self, DynamicsError> {
         options.validate()?;
         collide.validate()?;
-        let size = |body: &crate::Body| {
-            let instance = system.scene().instance(body.instance)?;
-            Ok(system.scene().shape(instance.shape)?.diagonal() * instance.scale)
-        };
-        let sizes = system.bodies().iter().map(size).collect::<Result<_, CollideError>>()?;
+        let diagonals = system.bodies().iter().map(|body| system.diagonal(body));
+        let sizes = diagonals.collect::<Result<_, CollideError>>()?;
         let (detector, found) = (Box::new(detector), Contacts::default());
         let surfaces = Surfaces::new(system.scene(), collide.mode);
         Ok(Self { system, detector, collide, options, sizes, surfaces, found })
@@ -212,8 +210,8 @@ impl Newton {
         -contact.distance > self.options.deep * size
     }
 
-    /// The pairs that overlap deeply and that no joint holds. None where contacts do not show all of an
-    /// overlap: bodies that do not turn would stay in each other where no vertex is.
+    /// The pairs that overlap deeply and that no joint holds. None where contacts do not show all
+    /// of an overlap: bodies that do not turn would stay in each other where no vertex is.
     fn apart(&self, contacts: &[Contact]) -> BTreeSet<[InstanceId; 2]> {
         if !self.detector.holds_all(&self.collide) {
             return BTreeSet::new();
@@ -317,9 +315,9 @@ impl Newton {
     }
 
     /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows
-    /// ask for, m/s or rad/s. Then rigid contacts contradict each other: a box between a plane and a
-    /// press that were 0.16 mm too near for it left sideways at 2 km/s, because its two sides were
-    /// touched along directions that differed by 70 µrad.
+    /// ask for, m/s or rad/s. Then rigid contacts contradict each other: a box between a plane and
+    /// a press that were 0.16 mm too near for it left sideways at 2 km/s, because its two sides
+    /// were touched along directions that differed by 70 µrad.
     fn is_wild(
         &self,
         step: &Step,
@@ -435,9 +433,9 @@ impl Newton {
         matches!(shape, Ok(Ok(Shape::Sphere { .. })))
     }
 
-    /// How long the next part may be when `left` seconds of a step, `whole`, are left: so that no body
-    /// that may meet another one turns by more than [`MOST_TURN`], and no arm of a joint too far. Balls
-    /// may turn as they like.
+    /// How long the next part may be when `left` seconds of a step, `whole`, are left: so that no
+    /// body that may meet another one turns by more than [`MOST_TURN`], and no arm of a joint too
+    /// far. Balls may turn as they like.
     fn part_of(&mut self, left: f64, whole: f64) -> Result<f64, DynamicsError> {
         let left = self.part_of_arms(left, whole);
         let states = self.system.states().to_vec();

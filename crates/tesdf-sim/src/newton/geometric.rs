@@ -4,25 +4,27 @@
 //! A force keeps its direction while the body on which it acts turns. So its torque changes: for a
 //! force `f` at an arm `r` and a small rotation `θ` across the force by `−(f · r) θ`. The rows of a
 //! step know the torque at one pose only. Then a light link that is pulled from both sides turns
-//! too far, and back in the next step, from h² ω² = 4 on for the frequency ω of its oscillation. That of
-//! a link of 50 g and 5 cm under 600 N is 24 at 5 ms.
+//! too far, and back in the next step, from h² ω² = 4 on for the frequency ω of its oscillation.
+//! That of a link of 50 g and 5 cm under 600 N is 24 at 5 ms.
 //!
-//! So a step gets the energy `½ J |ω − ω₀|²` for each body, where `J` is a time squared times `K`, the sum
-//! of `f · r` over its rows.
+//! So a step gets the energy `½ J |ω − ω₀|²` for each body, where `J` is a time squared times `K`,
+//! the sum of `f · r` over its rows.
 //!
 //! *Contacts*: J = h² K, and h ω₀ leads to the pose that the contacts were found at.
 //!
-//! *Joints*: J = β s² K, and ω₀ is the velocity at the start. Where `s` is the time step, this is the method
-//! of Newmark (*A method of computation for structural dynamics*, 1959) for that oscillation, linearly
-//! implicit: θ₁ − 2 θ₀ + θ₋₁ = −h² ω² (θ₀ + β (θ₁ − 2 θ₀ + θ₋₁)). With β ≥ ¼ it is stable for every pull, and
-//! takes no energy. J works as an inertia that resists changes of the angular velocity only.
+//! *Joints*: J = β s² K, and ω₀ is the velocity at the start. Where `s` is the time step, this is
+//! the method of Newmark (*A method of computation for structural dynamics*, 1959) for that
+//! oscillation, linearly implicit: θ₁ − 2 θ₀ + θ₋₁ = −h² ω² (θ₀ + β (θ₁ − 2 θ₀ + θ₋₁)). With β ≥ ¼
+//! it is stable for every pull, and takes no energy. J works as an inertia that resists changes of
+//! the angular velocity only.
 //!
-//! The time `s` is the whole step, also for its parts. With the duration of each part, that inertia would
-//! come and go with the parts, and bring the energy of its motion: a swinging chain with an end of 400 times
-//! the mass of a link gained 3 %, and with 20,000 times it flew apart. But a link that turns far in a step,
-//! as the last one of a whip, would feel an inertia that is none: such a chain gained 12 %. So `s` is the
-//! time in which a body turns by 0.1 rad, where this is shorter; parts are as short as that. It then loses a
-//! third of its energy when it cracks, and none with the duration of each part.
+//! The time `s` is the whole step, also for its parts. With the duration of each part, that inertia
+//! would come and go with the parts, and bring the energy of its motion: a swinging chain with an
+//! end of 400 times the mass of a link gained 3 %, and with 20,000 times it flew apart. But a link
+//! that turns far in a step, as the last one of a whip, would feel an inertia that is none: such a
+//! chain gained 12 %. So `s` is the time in which a body turns by 0.1 rad, where this is shorter;
+//! parts are as short as that. It then loses a third of its energy when it cracks, and none with
+//! the duration of each part.
 //!
 //! A rotation about the force has no such torque at a point, but links touch in several. Without a
 //! stiffness for this rotation, a chain whose end weighs a hundred times as much as its links
@@ -34,12 +36,12 @@ use nalgebra::{Matrix3, Matrix6, Vector6};
 
 use super::rows::{FreeBody, Resistance, Row};
 
-/// A stiffness of contacts below this share of a body's moment of inertia is left out: a minimisation
-/// without it predicts such a body well enough, and needs no repetition.
+/// A stiffness of contacts below this share of a body's moment of inertia is left out: a
+/// minimisation without it predicts such a body well enough, and needs no repetition.
 const OF_CONTACTS: f64 = 0.1;
 
-/// The same for joints. With 0.1 a chain with an end of 20,000 times the mass of a link flew apart in steps
-/// of 2.5 ms.
+/// The same for joints. With 0.1 a chain with an end of 20,000 times the mass of a link flew apart
+/// in steps of 2.5 ms.
 const OF_JOINTS: f64 = 0.01;
 
 /// β of Newmark's method.
@@ -76,8 +78,8 @@ pub struct Loads {
 }
 
 impl Loads {
-    /// Of `count` free bodies under `forces` along `rows`, N or N m. The last rows, from `of_joints` on, are
-    /// those of joints.
+    /// Of `count` free bodies under `forces` along `rows`, N or N m. The last rows, from
+    /// `of_joints` on, are those of joints.
     pub fn new(count: usize, rows: &[Row], forces: &[f64], of_joints: usize) -> Self {
         let of = |range: Range<usize>| stiffness(count, &rows[range.clone()], &forces[range]);
         Self { contacts: of(0..of_joints), joints: of(of_joints..rows.len()) }
@@ -86,7 +88,8 @@ impl Loads {
 
 fn stiffness(count: usize, rows: &[Row], forces: &[f64]) -> Vec<f64> {
     let mut stiffness = vec![0.0; count];
-    // Springs are motors, and the contacts of bodies that overlap deeply: their forces are no loads.
+    // Springs are motors, and the contacts of bodies that overlap deeply: their forces are no
+    // loads.
     for (row, force) in rows.iter().zip(forces).filter(|(row, _)| row.resistance == Resistance::Rigid) {
         for (side, arm) in row.sides.iter().zip(row.arms) {
             if let Some((body, j)) = side {
@@ -113,8 +116,9 @@ impl Motion {
         Self { inertia: free.iter().map(|body| body.inertia).collect(), target: target.to_vec() }
     }
 
-    /// The same motion with the geometric stiffness of `loads`. The contacts were found at the poses that
-    /// the velocities of `found_at` lead to. Returns `None` where the stiffness of no body matters.
+    /// The same motion with the geometric stiffness of `loads`. The contacts were found at the
+    /// poses that the velocities of `found_at` lead to. Returns `None` where the stiffness of no
+    /// body matters.
     pub fn stiffened(&self, loads: &Loads, found_at: &[Vector6<f64>], start: &Start<'_>) -> Option<Self> {
         let (mut motion, mut is_stiffer) = (self.clone(), false);
         for (k, found_at) in found_at.iter().enumerate() {
@@ -131,8 +135,8 @@ impl Motion {
         is_stiffer.then_some(motion)
     }
 
-    /// Adds `½ added |ω − around|²` of body `k`. Two squares around different velocities are, up to a
-    /// constant, one square around their mean.
+    /// Adds `½ added |ω − around|²` of body `k`. Two squares around different velocities are, up to
+    /// a constant, one square around their mean.
     fn hold(&mut self, k: usize, added: f64, around: &Vector6<f64>) -> bool {
         let inertia = self.inertia[k].fixed_view::<3, 3>(3, 3).into_owned();
         let angular = |v: &Vector6<f64>| v.fixed_rows::<3>(3).into_owned();
@@ -214,7 +218,8 @@ mod tests {
         }
     }
 
-    /// The inertia of a joint's pull is that of the whole step, and less where a body turns far in it.
+    /// The inertia of a joint's pull is that of the whole step, and less where a body turns far in
+    /// it.
     #[test]
     fn parts_of_a_step_have_the_inertia_of_the_step() {
         let plain = plain();

@@ -77,7 +77,7 @@ impl Hit {
     pub fn held(&self, rows: &[Row], forces: &[f64], stays: impl Fn(&Row) -> bool) -> Vec<Row> {
         let is_of_hit = |row: &Row| {
             let meets = row.sides.iter().flatten().any(|(k, _)| self.is_hit[*k]);
-            meets && row.bounds == [0.0, f64::INFINITY] && !stays(row)
+            meets && row.is_contact() && !stays(row)
         };
         let acting = rows.iter().zip(forces).filter(|(row, force)| **force > 0.0 && is_of_hit(row));
         acting.map(|(row, _)| Row { relaxed_gap: row.relaxed_gap.min(0.0), ..row.clone() }).collect()

@@ -8,7 +8,7 @@ use nalgebra::Vector6;
 use tesdf::collide::Pose;
 
 use super::integrate::pack;
-use super::rows::{Bodies, Resistance, Row};
+use super::rows::{Bodies, PUSHES, Resistance, Row};
 use crate::joint::{axes, rotation_between, swing, wrapped};
 use crate::{Drive, Joint, JointKind, Mass, System};
 
@@ -104,7 +104,7 @@ fn measures(joint: &Joint, poses: [Pose; 2], h: f64) -> Vec<Measure> {
     if let Some([low, high]) = joint.limits {
         let push = |error, bounds| Measure { bounds, ..rigid(axis, error) };
         if joint.kind != JointKind::Ball {
-            found.push(push(coordinate - low, [0.0, f64::INFINITY]));
+            found.push(push(coordinate - low, PUSHES));
         }
         found.push(push(coordinate - high, [f64::NEG_INFINITY, 0.0]));
     }

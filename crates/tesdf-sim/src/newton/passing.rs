@@ -20,8 +20,8 @@ use super::integrate::unpack;
 use super::step::Step;
 use crate::{Body, DynamicsError, Mass, State};
 
-/// A fast pair ends a part at most this deep, as part of the smaller diagonal, unless it was deeper at
-/// the beginning.
+/// A fast pair ends a part at most this deep, as part of the smaller diagonal, unless it was deeper
+/// at the beginning.
 const DEPTH: f64 = 5e-4;
 
 /// Error of a depth, as part of the small depth.
@@ -64,8 +64,8 @@ enum Course {
 }
 
 impl Newton {
-    /// The fast pairs that pass when the bodies move from their states to `moved`, whose velocities are
-    /// those of this motion.
+    /// The fast pairs that pass when the bodies move from their states to `moved`, whose velocities
+    /// are those of this motion.
     pub(super) fn passing(
         &mut self,
         step: &mut Step,
@@ -100,9 +100,9 @@ impl Newton {
         Ok((pairs > 0).then_some(Passing { hit, pairs }))
     }
 
-    /// The pairs that may meet in the part, and of which the way in the whole step would be more than
-    /// [`FAR`] of the smaller size, with or without contacts. Pairs that overlap deeply are pushed apart
-    /// otherwise.
+    /// The pairs that may meet in the part, and of which the way in the whole step would be more
+    /// than [`FAR`] of the smaller size, with or without contacts. Pairs that overlap deeply are
+    /// pushed apart otherwise.
     fn fast_pairs(&mut self, step: &Step, moved: &[State]) -> Result<Vec<Fast>, DynamicsError> {
         let at_begin = |velocities: &[State]| -> Vec<State> {
             let begin = self.system.states().iter().zip(velocities);
@@ -139,7 +139,8 @@ impl Newton {
 
     /// The pairs that these states let meet in the part, but those that overlap deeply.
     fn pairs_that_meet(&mut self, step: &Step, states: &[State]) -> Result<Vec<Fast>, DynamicsError> {
-        // Instances look ahead with straight ways of their origins, but centres of mass move straight.
+        // Instances look ahead with straight ways of their origins, but centres of mass move
+        // straight.
         let bend = |(body, state): (&Body, &State)| match body.mass {
             Mass::Free(mass) => (step.h * state.angular.length()).powi(2) * mass.center.length(),
             Mass::Fixed | Mass::Kinematic => 0.0,
@@ -170,7 +171,8 @@ impl Newton {
         if touches == 0.0 {
             return Course::Touching((-clearance).max(0.0));
         }
-        // Contacts that are not closed yet have pushed it, so it is hit where it would be without them.
+        // Contacts that are not closed yet have pushed it, so it is hit where it would be without
+        // them.
         let free = pair.bodies.map(|body| {
             let velocity = step.free_of[body].map(|k| unpack(&step.target[k]));
             let (linear, angular) = velocity.unwrap_or((moved[body].linear, moved[body].angular));
@@ -205,7 +207,8 @@ impl Newton {
         Motion::About { point, velocity }
     }
 
-    /// Whether a body of a pair turns so far that what holds it at the beginning says little of the end.
+    /// Whether a body of a pair turns so far that what holds it at the beginning says little of the
+    /// end.
     fn turns(&self, step: &Step, pair: &Fast, moved: &[State]) -> bool {
         pair.bodies.iter().any(|&body| {
             let is_fixed = self.system.bodies()[body].mass == Mass::Fixed;

@@ -1,11 +1,11 @@
 //! The rotation of a body in a step: its angular momentum is constant.
 //!
 //! Contacts, joints and what acts from outside change the angular momentum at the start of a step.
-//! From then on the body turns freely, and has that momentum at the end, too. So it keeps the momentum
-//! exactly, as the scheme of Simo and Wong (*Unconditionally stable algorithms for rigid body dynamics
-//! that exactly preserve energy and momentum*, 1991), and its energy nearly: a box that turned over and
-//! over about its middle axis for 60 s lost a third of the energy with an implicit gyroscopic term, and
-//! changes it by 7e-6 now.
+//! From then on the body turns freely, and has that momentum at the end, too. So it keeps the
+//! momentum exactly, as the scheme of Simo and Wong (*Unconditionally stable algorithms for rigid
+//! body dynamics that exactly preserve energy and momentum*, 1991), and its energy nearly: a box
+//! that turned over and over about its middle axis for 60 s lost a third of the energy with an
+//! implicit gyroscopic term, and changes it by 7e-6 now.
 use std::f64::consts::TAU;
 
 use glam::{DMat3, DQuat, DVec3};
@@ -48,8 +48,8 @@ impl Rotation {
         Self { start: state.pose.rotation, momentum, inertia, inverse, h }
     }
 
-    /// The constant angular velocity in the world that leads to the orientation at the end of the step
-    /// when the angular momentum is `momentum`.
+    /// The constant angular velocity in the world that leads to the orientation at the end of the
+    /// step when the angular momentum is `momentum`.
     pub fn mean(&self, momentum: DVec3) -> DVec3 {
         let mut rate = self.rate(self.start, momentum);
         let substeps = (self.h * rate.length() / FINE).ceil().clamp(1.0, SUBSTEPS);
@@ -85,8 +85,9 @@ impl Rotation {
         self.inverse * (rotation.inverse() * momentum)
     }
 
-    /// The angular velocity ω in the body's frame of the implicit midpoint rule: `I ω = exp(−h ω / 2) m`
-    /// for the momentum `m` in the body's frame at the beginning. Newton's method from `rate`.
+    /// The angular velocity ω in the body's frame of the implicit midpoint rule: `I ω = exp(−h ω /
+    /// 2) m` for the momentum `m` in the body's frame at the beginning. Newton's method from
+    /// `rate`.
     fn midpoint(&self, momentum: DVec3, mut rate: DVec3, h: f64) -> DVec3 {
         for _ in 0..ITERATIONS {
             let middle = DQuat::from_scaled_axis(-0.5 * h * rate) * momentum;

@@ -35,6 +35,9 @@ impl FreeBody {
     }
 }
 
+/// The bounds of the force of a contact, and of the lower limit of a joint: it pushes only.
+pub const PUSHES: [f64; 2] = [0.0, f64::INFINITY];
+
 /// A condition on the velocities of two bodies: a force acts between them, along `sides`, so that
 /// `gap + h Σ jacobian · v` becomes zero, as far as the force stays within its bounds.
 #[derive(Clone, Debug)]
@@ -90,14 +93,15 @@ pub enum Resistance {
 }
 
 impl Row {
-    /// Whether the row is a contact: it pushes only.
+    /// Whether the row is a contact, or a lower limit: it pushes only.
     pub fn is_contact(&self) -> bool {
-        self.bounds == [0.0, f64::INFINITY]
+        self.bounds == PUSHES
     }
 
-    /// The row that parts two bodies: it pushes at their centres of mass, without friction. So their
-    /// overlap along a direction falls as fast as they move, because they do not turn, and what pushes
-    /// on both sides of a body does not wedge it: with μ = 0.5 a torus in a nut stayed 140 µm deep.
+    /// The row that parts two bodies: it pushes at their centres of mass, without friction. So
+    /// their overlap along a direction falls as fast as they move, because they do not turn, and
+    /// what pushes on both sides of a body does not wedge it: with μ = 0.5 a torus in a nut stayed
+    /// 140 µm deep.
     pub fn parting(&self) -> Self {
         let push = |(free, j): (usize, Vector6<f64>)| (free, Vector6::new(j[0], j[1], j[2], 0.0, 0.0, 0.0));
         Self { sides: self.sides.map(|side| side.map(push)), friction: None, ..self.clone() }
@@ -164,7 +168,7 @@ impl Row {
             gap: contact.distance,
             relaxed_gap: contact.distance,
             stiffness: 1.0 / (weight * softness),
-            bounds: [0.0, f64::INFINITY],
+            bounds: PUSHES,
             resistance: Resistance::Rigid,
             friction: (coefficient > 0.0).then(friction),
         })

@@ -4,7 +4,7 @@ use nalgebra::Vector6;
 
 use super::integrate::{pack, unpack};
 use super::linear::BlockMatrix;
-use super::rows::{Friction, Resistance, Row};
+use super::rows::{Friction, PUSHES, Resistance, Row};
 
 /// A motor that exceeds its target by this share does not stall at first.
 const FASTER: f64 = 0.1;
@@ -108,7 +108,7 @@ impl Spring {
 
     /// Whether the spring is a contact: it pushes only.
     pub fn is_contact(&self) -> bool {
-        self.bounds == [0.0, f64::INFINITY]
+        self.bounds == PUSHES
     }
 
     fn is_rigid(&self) -> bool {

@@ -33,12 +33,13 @@ pub struct Step {
 }
 
 impl Step {
-    /// Sets the targets so that the angular momenta that `velocities` have in the motion `plain` lead
-    /// to the rotations of rigid bodies.
+    /// Sets the targets so that the angular momenta that `velocities` have in the motion `plain`
+    /// lead to the rotations of rigid bodies.
     ///
     /// Rows change the angular momentum L, and `plain` has the mean velocity ω as linear in it. An
-    /// iteration of Newton's method on ω = Φ(L), with Φ of [`Rotation::mean`]. Velocities that part deep
-    /// bodies are no motion, and must not become one: the pile of shafts was kicked to three times its energy.
+    /// iteration of Newton's method on ω = Φ(L), with Φ of [`Rotation::mean`]. Velocities that part
+    /// deep bodies are no motion, and must not become one: the pile of shafts was kicked to three
+    /// times its energy.
     pub fn turn(&self, plain: &mut Motion, velocities: &[Vector6<f64>]) {
         for (k, v) in velocities.iter().enumerate().filter(|(k, _)| !self.deep[*k]) {
             let added = added(plain, k, v);
@@ -49,8 +50,9 @@ impl Step {
         }
     }
 
-    /// The velocities that the next step starts from: `carried` in the motion `plain`, with the angular
-    /// velocities at the end of the step of these angular momenta. The poses move at `velocities`.
+    /// The velocities that the next step starts from: `carried` in the motion `plain`, with the
+    /// angular velocities at the end of the step of these angular momenta. The poses move at
+    /// `velocities`.
     pub fn ended(
         &self,
         plain: &Motion,

@@ -179,12 +179,8 @@ fn collide_options(section: &DetectorSection, system: &System) -> CollideOptions
 
 /// Diagonal of the smallest free body, m; 0 when there is none.
 fn smallest_free_body(system: &System) -> f64 {
-    let size = |body: &crate::Body| {
-        let instance = system.scene().instance(body.instance).ok()?;
-        Some(system.scene().shape(instance.shape).ok()?.diagonal() * instance.scale)
-    };
     let free = system.bodies().iter().filter(|body| body.mass != Mass::Fixed);
-    free.filter_map(size).reduce(f64::min).unwrap_or(0.0)
+    free.filter_map(|body| system.diagonal(body).ok()).reduce(f64::min).unwrap_or(0.0)
 }
 
 enum ShapeFailure {

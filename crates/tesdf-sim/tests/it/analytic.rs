@@ -407,8 +407,8 @@ fn bodies_that_fall_on_a_floor_do_not_move_to_the_side() {
     }
 }
 
-/// A free body keeps its energy and its angular momentum, also where it turns over and over about its
-/// middle axis.
+/// A free body keeps its energy and its angular momentum, also where it turns over and over about
+/// its middle axis.
 #[test]
 fn a_box_that_turns_over_keeps_energy_and_angular_momentum() {
     /// Parts of them.
@@ -469,12 +469,12 @@ fn a_top_precesses_at_its_tilt() {
     assert!((way / seconds / rate - 1.0).abs() < RATE, "{} instead of {rate} rad/s", way / seconds);
 }
 
-/// A chain of links on joints with a load at its end, that swings down from the horizontal, keeps its
-/// energy, and its joints hold: also where the load is 20,000 times as heavy as a link.
+/// A chain of links on joints with a load at its end, that swings down from the horizontal, keeps
+/// its energy, and its joints hold: also where the load is 20,000 times as heavy as a link.
 #[test]
 fn a_chain_with_a_load_swings_and_keeps_its_energy() {
-    /// Maximum gain, and maximum loss, as parts of the fall of the chain to the vertical. The velocities are
-    /// those of half a step before: m g v h / 2 of the load is 0.7 % of that.
+    /// Maximum gain, and maximum loss, as parts of the fall of the chain to the vertical. The
+    /// velocities are those of half a step before: m g v h / 2 of the load is 0.7 % of that.
     const ENERGY: [f64; 2] = [0.02, 0.05];
     /// m.
     const APART: f64 = 1e-6;

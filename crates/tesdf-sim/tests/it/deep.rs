@@ -1,15 +1,13 @@
 //! Bodies that begin deep in each other come apart.
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use tesdf::collide::{ClearanceOptions, Pose, clearance};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf::mesh::read;
-use tesdf_sim::scene_file::LoadedScene;
-use tesdf_sim::{Dynamics, State, simulate};
 
 use crate::support::bench::{Bench, Body, Kind};
 use crate::support::meshes::bowl;
+use crate::support::run;
 
 /// Maximum depth of bodies that touch, m.
 const OVERLAP: f64 = 1e-6;
@@ -21,29 +19,22 @@ fn of_data(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../data/procedural").join(name).canonicalize().unwrap()
 }
 
-/// Runs two free bodies without gravity. Returns their exact clearance, m, at the start and at the end.
-fn clearances(bodies: &[Body; 2], folder: &Path) -> [f64; 2] {
-    let mut text = format!("time_step = 0.005\nduration = {DURATION:?}\ngravity = [0, 0, 0]\n");
-    for (name, Body { geometry, friction, pose, .. }) in ["a", "b"].iter().zip(bodies) {
-        let Pose { translation, rotation } = pose;
-        let (translation, rotation) = (translation.to_array(), rotation.to_array());
-        text += &format!(
-            "[[bodies]]\nname = \"{name}\"\n{geometry}\nmass = 1.0\nfriction = {friction:?}\ntranslation = {translation:?}\n\
-             rotation = {rotation:?}\n"
-        );
-    }
-    let loaded = LoadedScene::parse(text, folder.join("scene.toml")).unwrap();
-    let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
-    let start = engine.system().states().to_vec();
-    simulate(&loaded.scene, &mut engine, |_| ControlFlow::Continue(())).unwrap();
-    let mut system = engine.system().clone();
+/// A mesh of the data as geometry.
+fn mesh(name: &str) -> String {
+    format!("mesh = {:?}", of_data(name).display().to_string())
+}
+
+/// Runs two free bodies without gravity. Returns their exact clearance, m, at the start and at the
+/// end.
+fn clearances(bench: &Bench, bodies: &[Body; 2]) -> [f64; 2] {
+    let loaded = bench.load("gravity = [0, 0, 0]", bodies, DURATION);
+    let mut system = loaded.system().unwrap();
+    let (record, _) = run(&loaded, system.clone());
     let [a, b] = [0, 1].map(|body: usize| system.bodies()[body].instance);
-    let end = system.states().to_vec();
-    let mut at = |states: &[State]| {
-        let scene = system.scene_at(states).unwrap();
+    [0, record.steps() as usize].map(|step| {
+        let scene = system.scene_at(&record.states(step).unwrap()).unwrap();
         clearance(scene, a, b, &ClearanceOptions::default()).unwrap().distance
-    };
-    [at(&start), at(&end)]
+    })
 }
 
 /// A box in the wall of a bowl, and across its mouth.
@@ -58,13 +49,14 @@ fn a_box_deep_in_a_bowl_comes_out() {
         (DVec3::new(0.0, 0.0, -0.01), DVec3::new(0.04, 0.004, 0.006)),
     ] {
         let boxed = Body::free(bench.cuboid(Kind::Mesh, half), 1.0, Pose::at(place));
-        let [before, after] = clearances(&[around(), boxed], bench.folder());
+        let [before, after] = clearances(&bench, &[around(), boxed]);
         assert!(before < -1e-3 && after > -OVERLAP, "{place}: {before} m, then {after} m");
     }
 }
 
 /// Checks that `count` random pairs of these meshes of the data come apart.
 fn check_pairs(names: &[&str], count: usize, seed: u64) {
+    let bench = Bench::new();
     let random = &mut fastrand::Rng::with_seed(seed);
     let mut deep = 0;
     for pair in 0..count {
@@ -77,11 +69,8 @@ fn check_pairs(names: &[&str], count: usize, seed: u64) {
         let offset = 0.3 * size.min(other_size) * DVec3::new(sine(), sine(), sine());
         let pose = Pose { translation: center + offset - rotation * other, rotation };
         let friction = if pair % 2 == 0 { 0.0 } else { 0.5 };
-        let at = |name: &str, pose| {
-            let geometry = format!("mesh = {:?}", of_data(name).display().to_string());
-            Body { friction, ..Body::free(geometry, 1.0, pose) }
-        };
-        let [before, after] = clearances(&[at(a, Pose::IDENTITY), at(b, pose)], Path::new("."));
+        let at = |name: &str, pose| Body { friction, ..Body::free(mesh(name), 1.0, pose) };
+        let [before, after] = clearances(&bench, &[at(a, Pose::IDENTITY), at(b, pose)]);
         deep += usize::from(before < -1e-4);
         assert!(
             after > before.min(0.0) - OVERLAP && after > -OVERLAP,
@@ -117,15 +106,13 @@ fn all_meshes_deep_in_each_other_come_apart() {
     check_pairs(&names, 30, 2);
 }
 
-/// Half a pitch from its place, the crests of a nut are in those of its bolt. It goes to the next thread.
+/// Half a pitch from its place, the crests of a nut are in those of its bolt. It goes to the next
+/// thread.
 #[test]
 #[ignore = "a whole scene: .ci/release"]
 fn a_nut_half_a_pitch_off_finds_a_thread() {
-    let at = |name: &str, z| {
-        let geometry = format!("mesh = {:?}", of_data(name).display().to_string());
-        Body::free(geometry, 1.0, Pose::at(DVec3::new(0.0, 0.0, z)))
-    };
+    let at = |name: &str, z| Body::free(mesh(name), 1.0, Pose::at(DVec3::new(0.0, 0.0, z)));
     let bodies = [at("iso_m16_bolt_6k.obj", 0.0), at("iso_m16_nut_c50.obj", 0.005)];
-    let [before, after] = clearances(&bodies, Path::new("."));
+    let [before, after] = clearances(&Bench::new(), &bodies);
     assert!(before < -5e-4 && after > -OVERLAP, "{before} m, then {after} m");
 }

@@ -49,8 +49,8 @@ fn free_fall_is_symplectic_euler() {
     assert_eq!((pose.rotation, angular), (DQuat::IDENTITY, DVec3::ZERO));
 }
 
-/// Without torque, a body keeps its angular momentum exactly and its energy to second order in the time
-/// step: half the step gives a quarter of the drift.
+/// Without torque, a body keeps its angular momentum exactly and its energy to second order in the
+/// time step: half the step gives a quarter of the drift.
 #[test]
 fn torque_free_rotation_keeps_momentum_and_energy() {
     let drift = |h: f64| {

@@ -1,5 +1,5 @@
-//! Fast bodies do not pass into others: at the end of each step they are at most a little deep, and no
-//! report says that it could not be shown.
+//! Fast bodies do not pass into others: at the end of each step they are at most a little deep, and
+//! no report says that it could not be shown.
 use tesdf::collide::{ClearanceOptions, Instance, Pose, Scene, Shape, Velocity, clearance};
 use tesdf::glam::{DQuat, DVec3};
 use tesdf_sim::{State, StepReport};
@@ -55,8 +55,8 @@ fn check_depth(name: &str, (run, reports): &(Vec<Vec<State>>, Vec<StepReport>), 
     reports.iter().map(|report| report.divided).sum()
 }
 
-/// Boxes in any orientation are shot at a thin plate. Their corners do not dip into it, and no step that
-/// is divided adds energy.
+/// Boxes in any orientation are shot at a thin plate. Their corners do not dip into it, and no step
+/// that is divided adds energy.
 #[test]
 fn corners_of_a_fast_box_stay_out_of_a_thin_plate() {
     let bench = Bench::new();

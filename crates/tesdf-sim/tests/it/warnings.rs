@@ -9,19 +9,17 @@ use tesdf_sim::{
     simulate,
 };
 
+use crate::support;
+
 const BOX: &str = "shape = { box = { half_extents = [0.05, 0.05, 0.05] } }";
 
 fn load(text: &str) -> LoadedScene {
     LoadedScene::parse(text.into(), "scene.toml").unwrap()
 }
 
-fn run(loaded: &LoadedScene, engine: &mut dyn Dynamics) -> Summary {
-    simulate(&loaded.scene, engine, |_| ControlFlow::Continue(())).unwrap().1
-}
-
 fn summary(text: &str) -> Summary {
     let loaded = load(text);
-    run(&loaded, &mut loaded.newton(loaded.system().unwrap()).unwrap())
+    support::run(&loaded, loaded.system().unwrap()).1
 }
 
 fn of(kind: WarningKind, summary: &Summary) -> &Warning {
@@ -166,7 +164,7 @@ fn energy_from_nowhere_is_told() {
     let loaded = load(&on_a_plane(10.0, 0.5, ""));
     let told = |factor: f64| {
         let engine = loaded.newton(loaded.system().unwrap()).unwrap();
-        run(&loaded, &mut Pushed(engine, factor))
+        simulate(&loaded.scene, &mut Pushed(engine, factor), |_| ControlFlow::Continue(())).unwrap().1
     };
     assert_eq!(told(1.0).warnings, []);
     let summary = told(1.01);

@@ -194,9 +194,9 @@ impl<'a> Cones<'a> {
         }
     }
 
-    /// The normal of two faces that lie flush on each other, as far as bodies turn in a step. That of
-    /// the larger body: a small one that comes to lie on it gets no push to the side. Of bodies of
-    /// one size it is the mean. Both are the same in both orders.
+    /// The normal of two faces that lie flush on each other, as far as bodies turn in a step. That
+    /// of the larger body: a small one that comes to lie on it gets no push to the side. Of bodies
+    /// of one size it is the mean. Both are the same in both orders.
     fn flush(&self, of_a: DVec3, of_b: DVec3) -> DVec3 {
         let [a, b] = self.sizes;
         if a > (1.0 + SAME) * b {

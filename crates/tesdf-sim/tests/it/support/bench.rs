@@ -1,7 +1,6 @@
 //! Scene files that tests write: all that they do not say has the default of scene files.
 use std::fmt::Write;
 use std::ops::ControlFlow;
-use std::path::Path;
 
 use tempfile::TempDir;
 use tesdf::collide::{Pose, Velocity};
@@ -67,10 +66,6 @@ impl Bench {
         Self(tempfile::tempdir().unwrap())
     }
 
-    pub fn folder(&self) -> &Path {
-        self.0.path()
-    }
-
     /// The geometry of a mesh.
     pub fn mesh(&self, name: &str, mesh: &TriangleMesh) -> String {
         let file = format!("{name}.ply");
@@ -99,6 +94,19 @@ impl Bench {
         bodies: &[Body],
         duration: f64,
     ) -> (Vec<Vec<State>>, Vec<StepReport>) {
+        let loaded = self.load(settings, bodies, duration);
+        let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
+        let mut reports = Vec::new();
+        let see = |moment: &Moment<'_>| {
+            reports.push(moment.report);
+            ControlFlow::Continue(())
+        };
+        let (record, _) = simulate(&loaded.scene, &mut engine, see).unwrap();
+        ((0..=record.steps() as usize).map(|step| record.states(step).unwrap()).collect(), reports)
+    }
+
+    /// The scene of these bodies, whose names are their numbers.
+    pub fn load(&self, settings: &str, bodies: &[Body], duration: f64) -> LoadedScene {
         let mut text = format!("time_step = {STEP:?}\nduration = {duration:?}\n{settings}\n");
         for (k, body) in bodies.iter().enumerate() {
             let Body { geometry, mass, friction, pose, velocity } = body;
@@ -114,14 +122,6 @@ impl Bench {
             }
             writeln!(text, "rotation = {:?}", pose.rotation.to_array()).unwrap();
         }
-        let loaded = LoadedScene::parse(text, self.0.path().join("scene.toml")).unwrap();
-        let mut engine = loaded.newton(loaded.system().unwrap()).unwrap();
-        let mut reports = Vec::new();
-        let see = |moment: &Moment<'_>| {
-            reports.push(moment.report);
-            ControlFlow::Continue(())
-        };
-        let (record, _) = simulate(&loaded.scene, &mut engine, see).unwrap();
-        ((0..=record.steps() as usize).map(|step| record.states(step).unwrap()).collect(), reports)
+        LoadedScene::parse(text, self.0.path().join("scene.toml")).unwrap()
     }
 }
