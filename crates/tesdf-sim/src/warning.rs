@@ -275,7 +275,7 @@ fn not_converged(totals: &Totals, time_step: f64) -> Option<Warning> {
     let first = first_unconverged? as f64 * time_step;
     let message = format!(
         "{unconverged} of {steps} steps did not converge, the first at {first:.4} s: forces there are not exact; shorten the \
-         time step, or raise max_iterations under [solver]"
+         time step"
     );
     let value = unconverged as f64 / steps as f64;
     Some(Warning { kind: WarningKind::NotConverged, names: Vec::new(), value, count: unconverged, message })

@@ -9,10 +9,10 @@ use nalgebra::Vector6;
 use tesdf::collide::Pose;
 
 use super::Newton;
-use super::engine::Gap;
+use super::engine::{Gap, from_last};
 use super::geometric::{ARM_TURN, Loads, Motion, Start};
 use super::joints::predict;
-use super::rows::Row;
+use super::rows::{Row, RowForce};
 use super::step::Step;
 use crate::{Joint, Mass, State, System};
 
@@ -41,7 +41,7 @@ pub struct Iterate {
     /// Velocities of the free bodies.
     pub velocities: Vec<Vector6<f64>>,
     /// The forces of the rows.
-    pub forces: Vec<f64>,
+    pub forces: Vec<RowForce>,
     /// The velocities that lead to the poses at which the contacts were found.
     pub found_at: Vec<Vector6<f64>>,
     /// The motion without geometric stiffness.
@@ -82,7 +82,13 @@ impl Newton {
             let rows = &mut iterate.rows[of_joints..];
             predict(rows, &self.gaps(step).bodies(), &poses, &iterate.velocities, step.h);
             let (rows, velocities) = (&iterate.rows, &iterate.velocities);
-            let solved = self.solve(step, iterate.motion(), rows, Gap::Position, velocities);
+            let solved = self.solve(
+                step,
+                iterate.motion(),
+                rows,
+                Gap::Position,
+                from_last(velocities, &iterate.forces),
+            );
             (iterate.velocities, iterate.forces) = solved;
         }
     }

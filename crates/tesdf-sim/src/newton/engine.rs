@@ -21,7 +21,7 @@ use super::look::Look;
 use super::passing::Passing;
 use super::problem::{Minimum, Problem};
 use super::rotation::Rotation;
-use super::rows::{FreeBody, Resistance, Row};
+use super::rows::{FreeBody, Resistance, Row, RowForce, carry};
 use super::step::Step;
 use crate::{Dynamics, DynamicsError, Mass, Motor, State, StepReport, System, Wrench};
 
@@ -99,6 +99,15 @@ struct Part {
     is_loose: bool,
     /// What is reported of it.
     report: StepReport,
+}
+
+/// What a minimisation starts from.
+#[derive(Clone, Copy)]
+pub struct Guess<'a> {
+    /// Of all free bodies.
+    pub velocities: &'a [Vector6<f64>],
+    /// What each row does; `None` where nothing is known.
+    pub forces: Option<&'a [RowForce]>,
 }
 
 /// The two gaps of a row.
@@ -240,7 +249,7 @@ impl Newton {
         deep
     }
 
-    /// Minimises the problem of every island from `start`. A body without rows keeps its target
+    /// Minimises the problem of every island from `guess`. A body without rows keeps its target
     /// velocity.
     pub(super) fn solve(
         &self,
@@ -248,14 +257,14 @@ impl Newton {
         motion: &Motion,
         rows: &[Row],
         gap: Gap,
-        start: &[Vector6<f64>],
-    ) -> (Vec<Vector6<f64>>, Vec<f64>) {
+        guess: Guess<'_>,
+    ) -> (Vec<Vector6<f64>>, Vec<RowForce>) {
         let islands = islands(step.free.len(), rows);
-        let minimum = |island: &Island| self.solve_island(step, motion, island, rows, gap, start);
+        let minimum = |island: &Island| self.solve_island(step, motion, island, rows, gap, guess);
         // One thread computes each minimum, and they are collected in order: the bits do not depend
         // on the number of threads.
         let minima: Vec<Minimum> = islands.par_iter().map(minimum).collect();
-        let (mut velocities, mut forces) = (motion.target.clone(), vec![0.0; rows.len()]);
+        let (mut velocities, mut forces) = (motion.target.clone(), vec![RowForce::default(); rows.len()]);
         let report = &mut step.report;
         report.islands = islands.len();
         let mut slowest = 0;
@@ -276,7 +285,7 @@ impl Newton {
         island: &Island,
         rows: &[Row],
         gap: Gap,
-        start: &[Vector6<f64>],
+        guess: Guess<'_>,
     ) -> Minimum {
         let local = |mut row: Row| {
             for (body, _) in row.sides.iter_mut().flatten() {
@@ -297,21 +306,15 @@ impl Newton {
         let of = |values: &[Vector6<f64>]| island.bodies.iter().map(|&k| values[k]).collect::<Vec<_>>();
         let inertia: Vec<_> = island.bodies.iter().map(|&k| motion.inertia[k]).collect();
         let rows: Vec<_> = island.rows.iter().map(|&k| local(rows[k].clone())).collect();
-        let minimise = |rows: &[(Row, f64)]| {
-            let rows = rows.iter().map(|(row, gap)| (row, *gap));
-            Problem::new(inertia.clone(), of(&motion.target), rows, step.h).minimise(of(start), &self.options)
-        };
-        let minimum = minimise(&rows);
+        let of_rows = |forces: &[RowForce]| island.rows.iter().map(|&k| forces[k]).collect::<Vec<_>>();
+        let (start, forces) = (of(guess.velocities), guess.forces.map(of_rows));
         let asked = rows.iter().map(|(_, gap)| gap.abs() / step.h).fold(0.0, f64::max);
-        if !self.is_wild(step, island, asked, [&of(&motion.target), &of(start)], &minimum.velocity) {
-            return minimum;
+        let problem = Problem::new(inertia, of(&motion.target), rows, step.h);
+        let minimum = problem.minimise(start.clone(), forces.as_deref());
+        match self.is_wild(step, island, asked, [&of(&motion.target), &start], &minimum.velocity) {
+            true => Minimum { converged: false, ..problem.softened().minimise(start, None) },
+            false => minimum,
         }
-        let as_spring = |(row, gap): (Row, f64)| {
-            let resistance = if row.is_contact() { Resistance::Spring } else { row.resistance };
-            (Row { resistance, ..row }, gap)
-        };
-        let springs: Vec<_> = rows.into_iter().map(as_spring).collect();
-        Minimum { converged: false, ..minimise(&springs) }
     }
 
     /// Whether bodies are much faster than anything asks them to be: what moves them, or what rows
@@ -552,14 +555,17 @@ impl Newton {
         let mut rows = [contact_rows.as_slice(), &joints].concat();
         let start: Vec<_> = step.free.iter().map(|free| velocity(&self.system.states()[free.body])).collect();
         let mut plain = Motion::new(&step.free, &step.target);
-        let (mut velocities, mut forces) = self.solve(step, &plain, &rows, Gap::Position, &start);
+        let (mut velocities, mut forces) =
+            self.solve(step, &plain, &rows, Gap::Position, Guess { velocities: &start, forces: None });
         let count = step.free.len();
-        let loads = |rows: &[Row], forces: &[f64]| Loads::new(count, rows, forces, rows.len() - joints.len());
+        let loads =
+            |rows: &[Row], forces: &[RowForce]| Loads::new(count, rows, forces, rows.len() - joints.len());
         let from = Start { velocities: &start, h: step.h, whole: step.whole };
         let mut found_at = vec![Vector6::zeros(); count];
         let mut stiffened = plain.stiffened(&loads(&rows, &forces), &found_at, &from);
         if let Some(motion) = &stiffened {
-            (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &start);
+            (velocities, forces) =
+                self.solve(step, motion, &rows, Gap::Position, from_last(&velocities, &forces));
         }
         // The contacts at which bodies are hit, found where they are hit.
         let mut held: Vec<Row> = Vec::new();
@@ -597,17 +603,21 @@ impl Newton {
                 predict(&mut next[of_joints], &self.gaps(step).bodies(), &poses, &seen, step.h);
                 if let Some(hit) = hit {
                     let motion = stiffened.as_ref().unwrap_or(&plain);
-                    let (_, forces) = self.solve(step, motion, &next, Gap::Position, &velocities);
+                    let guess = carry(&rows, &forces, &next);
+                    let (_, forces) =
+                        self.solve(step, motion, &next, Gap::Position, from_last(&velocities, &guess));
                     held = hit.held(&next, &forces, stays);
                     continue;
                 }
                 step.turn(&mut plain, &velocities);
                 found_at.clone_from(&velocities);
                 stiffened = plain.stiffened(&loads(&rows, &forces), &found_at, &from);
+                let guess = carry(&rows, &forces, &next);
                 rows = next;
                 let motion = stiffened.as_ref().unwrap_or(&plain);
                 let before = velocities;
-                (velocities, forces) = self.solve(step, motion, &rows, Gap::Position, &before);
+                (velocities, forces) =
+                    self.solve(step, motion, &rows, Gap::Position, from_last(&before, &guess));
                 if self.farthest(step, &before, &velocities) < self.options.settled {
                     break;
                 }
@@ -616,15 +626,20 @@ impl Newton {
         let of_joints = rows.len() - joints.len();
         let mut solved = Iterate { rows, velocities, forces, found_at, plain, stiffened };
         self.close_joints(step, &mut solved, of_joints, &from);
-        let Iterate { rows, velocities, .. } = &solved;
+        let Iterate { rows, velocities, forces, .. } = &solved;
         let carried = match rows.iter().any(|row| row.relaxed_gap != row.gap) {
-            true => self.solve(step, solved.motion(), rows, Gap::Relaxed, velocities).0,
+            true => self.solve(step, solved.motion(), rows, Gap::Relaxed, from_last(velocities, forces)).0,
             false => velocities.clone(),
         };
         let Iterate { velocities, plain, .. } = solved;
         let carried = step.ended(&plain, &velocities, &carried);
         Ok([velocities, carried])
     }
+}
+
+/// A minimisation that starts from the last one.
+pub fn from_last<'a>(velocities: &'a [Vector6<f64>], forces: &'a [RowForce]) -> Guess<'a> {
+    Guess { velocities, forces: Some(forces) }
 }
 
 /// Gives the free bodies these velocities.

@@ -34,7 +34,7 @@ use std::ops::Range;
 use glam::DVec3;
 use nalgebra::{Matrix3, Matrix6, Vector6};
 
-use super::rows::{FreeBody, Resistance, Row};
+use super::rows::{FreeBody, Resistance, Row, RowForce};
 
 /// A stiffness of contacts below this share of a body's moment of inertia is left out: a
 /// minimisation without it predicts such a body well enough, and needs no repetition.
@@ -80,20 +80,20 @@ pub struct Loads {
 impl Loads {
     /// Of `count` free bodies under `forces` along `rows`, N or N m. The last rows, from
     /// `of_joints` on, are those of joints.
-    pub fn new(count: usize, rows: &[Row], forces: &[f64], of_joints: usize) -> Self {
+    pub fn new(count: usize, rows: &[Row], forces: &[RowForce], of_joints: usize) -> Self {
         let of = |range: Range<usize>| stiffness(count, &rows[range.clone()], &forces[range]);
         Self { contacts: of(0..of_joints), joints: of(of_joints..rows.len()) }
     }
 }
 
-fn stiffness(count: usize, rows: &[Row], forces: &[f64]) -> Vec<f64> {
+fn stiffness(count: usize, rows: &[Row], forces: &[RowForce]) -> Vec<f64> {
     let mut stiffness = vec![0.0; count];
     // Springs are motors, and the contacts of bodies that overlap deeply: their forces are no
     // loads.
     for (row, force) in rows.iter().zip(forces).filter(|(row, _)| row.resistance == Resistance::Rigid) {
         for (side, arm) in row.sides.iter().zip(row.arms) {
             if let Some((body, j)) = side {
-                stiffness[*body] += force * DVec3::new(j[0], j[1], j[2]).dot(arm);
+                stiffness[*body] += force.along * DVec3::new(j[0], j[1], j[2]).dot(arm);
             }
         }
     }
@@ -155,10 +155,12 @@ mod tests {
 
     use super::*;
     use crate::MassProperties;
+    use crate::newton::rows::RowId;
 
     fn pull(arm: DVec3, resistance: Resistance) -> Row {
         let side = Some((0, Vector6::new(0.0, 0.0, 1.0, arm.y, -arm.x, 0.0)));
         Row {
+            id: RowId::Joint(0),
             sides: [side, None],
             arms: [arm, DVec3::ZERO],
             gap: 0.0,
@@ -186,7 +188,7 @@ mod tests {
 
     /// The body under 1 kN, which matters, or another force along a row.
     fn stiffened(row: Row, force: f64, of_joints: usize, around: &Vector6<f64>) -> Option<Motion> {
-        let loads = Loads::new(1, &[row], &[force], of_joints);
+        let loads = Loads::new(1, &[row], &[RowForce { along: force, ..RowForce::default() }], of_joints);
         let (around, other) = ([*around], [Vector6::repeat(7.0)]);
         let [found_at, velocities] = if of_joints == 0 { [&other, &around] } else { [&around, &other] };
         plain().stiffened(&loads, found_at, &Start { velocities, h: H, whole: H })

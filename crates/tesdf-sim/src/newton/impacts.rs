@@ -10,7 +10,7 @@ use tesdf::collide::{HiddenSearch, Pose};
 
 use super::Newton;
 use super::gaps::Found;
-use super::rows::Row;
+use super::rows::{Row, RowForce};
 use super::step::Step;
 use crate::DynamicsError;
 
@@ -74,12 +74,12 @@ impl Newton {
 impl Hit {
     /// Of rows at the places of the hits, those with a force, for the rest of the step: nothing
     /// comes closer there after it was hit.
-    pub fn held(&self, rows: &[Row], forces: &[f64], stays: impl Fn(&Row) -> bool) -> Vec<Row> {
+    pub fn held(&self, rows: &[Row], forces: &[RowForce], stays: impl Fn(&Row) -> bool) -> Vec<Row> {
         let is_of_hit = |row: &Row| {
             let meets = row.sides.iter().flatten().any(|(k, _)| self.is_hit[*k]);
             meets && row.is_contact() && !stays(row)
         };
-        let acting = rows.iter().zip(forces).filter(|(row, force)| **force > 0.0 && is_of_hit(row));
+        let acting = rows.iter().zip(forces).filter(|(row, force)| force.along > 0.0 && is_of_hit(row));
         acting.map(|(row, _)| Row { relaxed_gap: row.relaxed_gap.min(0.0), ..row.clone() }).collect()
     }
 }

@@ -59,11 +59,12 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::newton::rows::Resistance;
+    use crate::newton::rows::{Resistance, RowId};
 
     fn row(a: Option<usize>, b: Option<usize>) -> Row {
         let side = |k: Option<usize>| k.map(|k| (k, Vector6::zeros()));
         Row {
+            id: RowId::Joint(0),
             arms: [DVec3::ZERO; 2],
             sides: [side(a), side(b)],
             gap: 0.0,

@@ -8,13 +8,9 @@ use nalgebra::Vector6;
 use tesdf::collide::Pose;
 
 use super::integrate::pack;
-use super::rows::{Bodies, PUSHES, Resistance, Row};
+use super::rows::{Bodies, PUSHES, Resistance, Row, RowId};
 use crate::joint::{axes, rotation_between, swing, wrapped};
 use crate::{Drive, Joint, JointKind, Mass, System};
-
-/// Stiffness of joints, relative to that of contacts. Joints that carry a load then come to the
-/// tolerance in one or two rounds less.
-const STIFFER: f64 = 100.0;
 
 /// A direction in which a joint measures an error: of the translation at a point, or of the
 /// rotation.
@@ -53,7 +49,8 @@ pub fn joint_rows(bodies: &Bodies<'_>, h: f64) -> Vec<Row> {
         let row = |measure: Measure| row(joint, measure, point, bodies, h);
         measures(joint, poses, h).into_iter().map(row).collect::<Vec<_>>()
     };
-    bodies.system.joints().iter().flat_map(of_joint).collect()
+    let rows = bodies.system.joints().iter().flat_map(of_joint);
+    rows.enumerate().map(|(k, row)| Row { id: RowId::Joint(k), ..row }).collect()
 }
 
 /// Sets the gaps of `rows`, which are those of all joints, to the errors at the poses that
@@ -115,9 +112,6 @@ fn measures(joint: &Joint, poses: [Pose; 2], h: f64) -> Vec<Measure> {
             _ => coordinate - target,
         };
         let (error, bounds, stiffness, resistance) = match motor.drive {
-            Drive::Velocity(rate) if motor.limit.is_finite() => {
-                (Error::Rate(rate), limit, None, Resistance::Motor)
-            }
             Drive::Velocity(rate) => (Error::Rate(rate), limit, None, Resistance::Rigid),
             Drive::Position(target) => (Error::Position(from(target)), limit, None, Resistance::Rigid),
             Drive::Force(force) => {
@@ -136,7 +130,7 @@ fn measures(joint: &Joint, poses: [Pose; 2], h: f64) -> Vec<Measure> {
 }
 
 fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f64) -> Row {
-    let Bodies { system, free, free_of, softness } = *bodies;
+    let Bodies { system, free_of, .. } = *bodies;
     let jacobian = |center: DVec3| match measure.direction {
         Direction::Along(d) => pack(d, (point - center).cross(d)),
         Direction::About(d) => pack(DVec3::ZERO, d),
@@ -160,17 +154,17 @@ fn row(joint: &Joint, measure: Measure, point: DVec3, bodies: &Bodies<'_>, h: f6
             }
         }
     });
-    let weight = Row::weight(&sides, free);
     let gap = match measure.error {
         Error::Position(error) => error + h * rate,
         Error::Rate(target) => h * (rate - target),
     };
     Row {
+        id: RowId::Joint(0),
         sides,
         arms,
         gap,
         relaxed_gap: gap,
-        stiffness: measure.stiffness.unwrap_or(STIFFER / (weight * softness)),
+        stiffness: measure.stiffness.unwrap_or(0.0),
         bounds: measure.bounds,
         resistance: measure.resistance,
         friction: None,

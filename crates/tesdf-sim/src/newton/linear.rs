@@ -1,13 +1,11 @@
-//! Symmetric positive definite matrices of 6 × 6 blocks, with one block row per body, and their
-//! sparse Cholesky factorisation.
+//! Matrices of 6 × 6 blocks, with one block row per body, and their sparse factorisation.
 //!
 //! Crates for sparse matrices (faer, nalgebra-sparse) know single numbers only, and would have to
 //! find the blocks again. With blocks the order and the fill are those of a graph of bodies, and
 //! the arithmetic is that of nalgebra's 6 × 6 matrices.
 use std::collections::BTreeSet;
 
-use glam::{DMat3, DVec3};
-use nalgebra::{Cholesky, Matrix3, Matrix6, Vector6};
+use nalgebra::{Cholesky, LU, Matrix6, U6, Vector6};
 
 /// Which off-diagonal blocks may be nonzero, and the order in which bodies are eliminated.
 #[derive(Clone, Debug)]
@@ -90,107 +88,226 @@ impl Pattern {
     }
 }
 
-/// A symmetric block matrix. Of each pair of mirrored blocks it stores the upper one.
+/// The derivatives of up to `N` quantities by the velocity of a body, for each of two bodies.
+pub type Sides<const N: usize> = [Option<(usize, [Vector6<f64>; N])>; 2];
+
+/// A block matrix. Of a symmetric one it stores one of each pair of mirrored blocks.
 #[derive(Clone, Debug)]
 pub struct BlockMatrix<'a> {
     pattern: &'a Pattern,
     diagonal: Vec<Matrix6<f64>>,
+    /// The rows are of the lower body of the pair, the columns of the higher one.
     upper: Vec<Matrix6<f64>>,
+    /// The blocks below the diagonal; `None` where the matrix is symmetric.
+    lower: Option<Vec<Matrix6<f64>>>,
 }
 
+/// The factors of a matrix.
+pub struct Factor<'a> {
+    pattern: &'a Pattern,
+    blocks: Blocks,
+}
+
+enum Blocks {
+    /// `L` of `L Lᵀ`: its diagonal blocks by body, and the others in the order of the pattern.
+    Cholesky { diagonal: Vec<Matrix6<f64>>, below: Vec<Matrix6<f64>> },
+    /// The block `L` has ones on its diagonal; `beside` is `D⁻¹ U` right of it. Rows are exchanged
+    /// within the blocks of the diagonal only.
+    Lu { diagonal: Vec<Lu6>, below: Vec<Matrix6<f64>>, beside: Vec<Matrix6<f64>> },
+}
+
+type Lu6 = LU<f64, U6, U6>;
+
 impl<'a> BlockMatrix<'a> {
-    /// A block-diagonal matrix; the blocks of `pattern` are zero.
-    pub fn new(pattern: &'a Pattern, diagonal: Vec<Matrix6<f64>>) -> Self {
-        Self { pattern, diagonal, upper: vec![Matrix6::zeros(); pattern.pairs.len()] }
+    /// A symmetric block-diagonal matrix; the blocks of `pattern` are zero.
+    pub fn symmetric(pattern: &'a Pattern, diagonal: Vec<Matrix6<f64>>) -> Self {
+        Self { pattern, diagonal, upper: vec![Matrix6::zeros(); pattern.pairs.len()], lower: None }
     }
 
-    /// Adds `k j jᵀ`, where `j` is zero except at the bodies of `sides`. `pair` is the index of
+    /// The same for a matrix that need not stay symmetric.
+    pub fn general(pattern: &'a Pattern, diagonal: Vec<Matrix6<f64>>) -> Self {
+        Self {
+            lower: Some(vec![Matrix6::zeros(); pattern.pairs.len()]),
+            ..Self::symmetric(pattern, diagonal)
+        }
+    }
+
+    /// Adds `Jᵀ B J`, where `J` is zero except at the bodies of `sides`. `pair` is the index of
     /// these two bodies in the pattern.
     #[inline]
-    pub fn add(&mut self, sides: &[Option<(usize, Vector6<f64>)>; 2], pair: Option<usize>, k: f64) {
-        for (body, j) in sides.iter().flatten() {
-            self.diagonal[*body].ger(k, j, j, 1.0);
-        }
-        if let ([Some((a, ja)), Some((b, jb))], Some(pair)) = (sides, pair) {
-            let (low, high) = if a < b { (ja, jb) } else { (jb, ja) };
-            self.upper[pair].ger(k, low, high, 1.0);
-        }
-    }
-
-    /// Adds `Jᵀ S J`, where `J` gives the velocity of the first body at its arm relative to that of
-    /// the second one at its own, and `S` is symmetric. A side is a body and its arm, the vector
-    /// from the centre of mass, m.
-    pub fn add_point(&mut self, sides: [Option<(usize, DVec3)>; 2], pair: Option<usize>, s: DMat3) {
-        let s = Matrix3::from(s.to_cols_array_2d());
-        let products = sides.map(|side| side.map(|(body, arm)| (body, cross(arm), s * cross(arm))));
-        for (body, r, sr) in products.iter().flatten() {
-            add_blocks(&mut self.diagonal[*body], 1.0, [s, -sr, sr.transpose() * -1.0, -(r * sr)]);
-        }
-        if let ([Some((a, ra, sra)), Some((b, rb, srb))], Some(pair)) = (products, pair) {
-            let (rl, srl, srh) = if a < b { (ra, sra, srb) } else { (rb, srb, sra) };
-            add_blocks(&mut self.upper[pair], -1.0, [s, -srh, srl.transpose() * -1.0, -(rl * srh)]);
-        }
-    }
-
-    /// Solves by Cholesky factorisation. Returns `None` when rounding made the matrix indefinite.
-    pub fn solve(&self, rhs: &[Vector6<f64>]) -> Option<Vec<Vector6<f64>>> {
-        let mut diagonal = self.diagonal.clone();
-        let mut below = vec![Matrix6::zeros(); self.pattern.blocks];
-        for (place, upper) in self.pattern.of_pair.iter().zip(&self.upper) {
-            below[place.block] = if place.is_lower_row { *upper } else { upper.transpose() };
-        }
-        let mut x = rhs.to_vec();
-        for Column { body, rows, first, products } in &self.pattern.columns {
-            let factor = Cholesky::new(diagonal[*body])?.unpack();
-            let blocks = *first..first + rows.len();
-            for block in &mut below[blocks.clone()] {
-                *block = factor.solve_lower_triangular_unchecked(&block.transpose()).transpose();
+    pub fn add<const N: usize>(&mut self, sides: &Sides<N>, pair: Option<usize>, b: &[[f64; N]; N]) {
+        let [first, second] = sides;
+        let products = [first, second].map(|side| match side {
+            Some((body, j)) => {
+                let product = product(b, j);
+                add_products(&mut self.diagonal[*body], j, &product);
+                product
             }
-            let eliminated = factor.solve_lower_triangular_unchecked(&x[*body]);
-            x[*body] = eliminated;
-            diagonal[*body] = factor;
-            let mut products = products.iter();
-            for (j, (&row, block)) in rows.iter().zip(blocks.clone()).enumerate() {
-                let of_row = below[block];
-                diagonal[row] -= of_row * of_row.transpose();
-                x[row] -= of_row * eliminated;
-                for (i, place) in (0..j).zip(&mut products) {
-                    // `rows` is sorted, so `i` is the lower body.
-                    let lower = below[first + i];
-                    below[place.block] -= match place.is_lower_row {
-                        true => lower * of_row.transpose(),
-                        false => of_row * lower.transpose(),
-                    };
+            None => [Vector6::zeros(); N],
+        });
+        if let (Some((a, ja)), Some((b, jb)), Some(pair)) = (first, second, pair) {
+            let ([pa, pb], is_low) = (&products, a < b);
+            let (low, high) = if is_low { ((ja, pa), (jb, pb)) } else { ((jb, pb), (ja, pa)) };
+            add_products(&mut self.upper[pair], low.0, high.1);
+            if let Some(lower) = &mut self.lower {
+                add_products(&mut lower[pair], high.0, low.1);
+            }
+        }
+    }
+
+    /// Factors the matrix: by Cholesky where it is symmetric, else by elimination without pivoting
+    /// between bodies. Returns `None` when rounding made it indefinite or singular.
+    pub fn factor(self) -> Option<Factor<'a>> {
+        let pattern = self.pattern;
+        let blocks = match self.lower {
+            None => cholesky(pattern, self.diagonal, &self.upper)?,
+            Some(lower) => lu(pattern, self.diagonal, &self.upper, &lower)?,
+        };
+        Some(Factor { pattern, blocks })
+    }
+}
+
+/// `B J`
+#[inline]
+fn product<const N: usize>(b: &[[f64; N]; N], j: &[Vector6<f64>; N]) -> [Vector6<f64>; N] {
+    let mut product = [Vector6::zeros(); N];
+    for (to, b) in product.iter_mut().zip(b) {
+        for (b, j) in b.iter().zip(j) {
+            let (to, j) = (&mut to.data.0[0], &j.data.0[0]);
+            for (to, j) in to.iter_mut().zip(j) {
+                *to += b * j;
+            }
+        }
+    }
+    product
+}
+
+/// Adds `Σ jᵣ pᵣᵀ`. With plain loops, because nalgebra's `ger` takes three times as long.
+#[inline]
+fn add_products<const N: usize>(to: &mut Matrix6<f64>, j: &[Vector6<f64>; N], p: &[Vector6<f64>; N]) {
+    for (c, column) in to.data.0.iter_mut().enumerate() {
+        for (j, p) in j.iter().zip(p) {
+            let p = p.data.0[0][c];
+            for (to, j) in column.iter_mut().zip(&j.data.0[0]) {
+                *to += j * p;
+            }
+        }
+    }
+}
+
+/// The scalar product.
+#[inline]
+pub fn dot(a: &Vector6<f64>, b: &Vector6<f64>) -> f64 {
+    let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (a.data.0[0], b.data.0[0]);
+    (a * u + b * v + c * w) + (d * x + e * y + f * z)
+}
+
+fn cholesky(pattern: &Pattern, mut diagonal: Vec<Matrix6<f64>>, upper: &[Matrix6<f64>]) -> Option<Blocks> {
+    let mut below = vec![Matrix6::zeros(); pattern.blocks];
+    for (place, upper) in pattern.of_pair.iter().zip(upper) {
+        below[place.block] = if place.is_lower_row { *upper } else { upper.transpose() };
+    }
+    for Column { body, rows, first, products } in &pattern.columns {
+        let factor = Cholesky::new(diagonal[*body])?.unpack();
+        let blocks = *first..first + rows.len();
+        for block in &mut below[blocks.clone()] {
+            *block = factor.solve_lower_triangular_unchecked(&block.transpose()).transpose();
+        }
+        diagonal[*body] = factor;
+        let mut products = products.iter();
+        for (j, (&row, block)) in rows.iter().zip(blocks.clone()).enumerate() {
+            let of_row = below[block];
+            diagonal[row] -= of_row * of_row.transpose();
+            for (i, place) in (0..j).zip(&mut products) {
+                // `rows` is sorted, so `i` is the lower body.
+                let lower = below[first + i];
+                below[place.block] -= match place.is_lower_row {
+                    true => lower * of_row.transpose(),
+                    false => of_row * lower.transpose(),
+                };
+            }
+        }
+    }
+    Some(Blocks::Cholesky { diagonal, below })
+}
+
+fn lu(
+    pattern: &Pattern,
+    mut full: Vec<Matrix6<f64>>,
+    upper: &[Matrix6<f64>],
+    lower: &[Matrix6<f64>],
+) -> Option<Blocks> {
+    let mut below = vec![Matrix6::zeros(); pattern.blocks];
+    let mut beside = below.clone();
+    for (place, (upper, lower)) in pattern.of_pair.iter().zip(upper.iter().zip(lower)) {
+        let (row, column) = if place.is_lower_row { (upper, lower) } else { (lower, upper) };
+        below[place.block] = *row;
+        beside[place.block] = *column;
+    }
+    let mut diagonal: Vec<Option<Lu6>> = vec![None; full.len()];
+    for Column { body, rows, first, products } in &pattern.columns {
+        let factor = LU::new(full[*body]);
+        for block in &mut beside[*first..first + rows.len()] {
+            if !factor.solve_mut(block) {
+                return None;
+            }
+        }
+        let mut products = products.iter();
+        for (j, &row) in rows.iter().enumerate() {
+            let (of_row, of_column) = (below[first + j], beside[first + j]);
+            full[row] -= of_row * of_column;
+            for (i, place) in (0..j).zip(&mut products) {
+                // Between `rows[i]`, the lower body, and `rows[j]`.
+                let upper = below[first + i] * of_column;
+                let lower = of_row * beside[first + i];
+                let (row, column) = if place.is_lower_row { (upper, lower) } else { (lower, upper) };
+                below[place.block] -= row;
+                beside[place.block] -= column;
+            }
+        }
+        if !factor.is_invertible() {
+            return None;
+        }
+        diagonal[*body] = Some(factor);
+    }
+    let diagonal = diagonal.into_iter().collect::<Option<_>>()?;
+    Some(Blocks::Lu { diagonal, below, beside })
+}
+
+impl Factor<'_> {
+    /// Solves for one right-hand side.
+    pub fn solve(&self, rhs: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
+        let mut x = rhs.to_vec();
+        let columns = &self.pattern.columns;
+        match &self.blocks {
+            Blocks::Cholesky { diagonal, below } => {
+                for Column { body, rows, first, .. } in columns {
+                    let eliminated = diagonal[*body].solve_lower_triangular_unchecked(&x[*body]);
+                    x[*body] = eliminated;
+                    rows.iter().zip(&below[*first..]).for_each(|(&row, block)| x[row] -= block * eliminated);
+                }
+                for Column { body, rows, first, .. } in columns.iter().rev() {
+                    let mut left = x[*body];
+                    rows.iter().zip(&below[*first..]).for_each(|(&row, block)| left -= block.tr_mul(&x[row]));
+                    x[*body] = diagonal[*body].tr_solve_lower_triangular_unchecked(&left);
+                }
+            }
+            Blocks::Lu { diagonal, below, beside } => {
+                for Column { body, rows, first, .. } in columns {
+                    // The matrix is known to be invertible.
+                    diagonal[*body].solve_mut(&mut x[*body]);
+                    let eliminated = x[*body];
+                    rows.iter().zip(&below[*first..]).for_each(|(&row, block)| x[row] -= block * eliminated);
+                }
+                for Column { body, rows, first, .. } in columns.iter().rev() {
+                    let mut left = x[*body];
+                    rows.iter().zip(&beside[*first..]).for_each(|(&row, block)| left -= block * x[row]);
+                    x[*body] = left;
                 }
             }
         }
-        for Column { body, rows, first, .. } in self.pattern.columns.iter().rev() {
-            let mut left = x[*body];
-            for (row, block) in rows.iter().zip(&below[*first..]) {
-                left -= block.tr_mul(&x[*row]);
-            }
-            x[*body] = diagonal[*body].tr_solve_lower_triangular_unchecked(&left);
-        }
-        Some(x)
+        x
     }
-}
-
-/// The matrix whose product with a vector is the cross product of `a` with it.
-fn cross(a: DVec3) -> Matrix3<f64> {
-    Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
-}
-
-/// Adds `k` times the 3 × 3 blocks, row by row.
-fn add_blocks(to: &mut Matrix6<f64>, k: f64, [a, b, c, d]: [Matrix3<f64>; 4]) {
-    for (block, (row, column)) in [(a, (0, 0)), (b, (0, 3)), (c, (3, 0)), (d, (3, 3))] {
-        let mut view = to.fixed_view_mut::<3, 3>(row, column);
-        view += block * k;
-    }
-}
-
-/// Scalar product of two block vectors.
-pub fn dot(a: &[Vector6<f64>], b: &[Vector6<f64>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
 #[cfg(test)]
@@ -205,28 +322,36 @@ mod tests {
         for (k, block) in matrix.diagonal.iter().enumerate() {
             dense.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(block);
         }
-        for (&(a, b), block) in matrix.pattern.pairs.iter().zip(&matrix.upper) {
-            dense.fixed_view_mut::<6, 6>(6 * a, 6 * b).copy_from(block);
-            dense.fixed_view_mut::<6, 6>(6 * b, 6 * a).copy_from(&block.transpose());
+        for (k, &(a, b)) in matrix.pattern.pairs.iter().enumerate() {
+            let upper = matrix.upper[k];
+            let lower = matrix.lower.as_ref().map_or_else(|| upper.transpose(), |lower| lower[k]);
+            dense.fixed_view_mut::<6, 6>(6 * a, 6 * b).copy_from(&upper);
+            dense.fixed_view_mut::<6, 6>(6 * b, 6 * a).copy_from(&lower);
         }
         dense
     }
 
-    /// A matrix of `bodies` bodies with random rows between those of `pairs`.
-    fn random_matrix(pattern: &Pattern, bodies: usize, seed: u64) -> BlockMatrix<'_> {
+    fn vector(random: &mut fastrand::Rng) -> Vector6<f64> {
+        Vector6::from_fn(|_, _| random.f64() - 0.5)
+    }
+
+    /// Adds random rows between the pairs of a pattern, and friction that follows their push where
+    /// the matrix is general.
+    fn fill(mut matrix: BlockMatrix<'_>, seed: u64) -> BlockMatrix<'_> {
         let random = &mut fastrand::Rng::with_seed(seed);
-        let mut vector = || Vector6::from_fn(|_, _| random.f64() - 0.5);
-        let mut matrix = BlockMatrix::new(pattern, vec![Matrix6::identity() * 0.01; bodies]);
-        for (k, &(a, b)) in pattern.pairs.iter().enumerate() {
+        let follows = if matrix.lower.is_some() { -1.5 } else { 0.0 };
+        let b = [[3.0, 0.0, 0.0], [follows, 2.0, -0.3], [0.2 * follows, -0.3, 1.0]];
+        for (k, &(low, high)) in matrix.pattern.pairs.clone().iter().enumerate() {
             for _ in 0..20 {
-                matrix.add(&[Some((b, vector())), Some((a, vector()))], Some(k), 3.0);
+                let mut side = |body| Some((body, [(); 3].map(|()| vector(random))));
+                matrix.add(&[side(high), side(low)], Some(k), &b);
             }
-            matrix.add(&[Some((a, vector())), None], None, 5.0);
+            matrix.add(&[Some((low, [vector(random)])), None], None, &[[5.0]]);
         }
         matrix
     }
 
-    /// A ring, a chain, a grid, a clique, a star and bodies without any pair.
+    /// A ring, a chain, a grid, a clique, a star and bodies without any pair; symmetric and not.
     #[test]
     fn the_sparse_solution_is_the_dense_one() {
         let chain = |n: usize| (1..n).map(|k| (k - 1, k)).collect::<Vec<_>>();
@@ -238,15 +363,18 @@ mod tests {
             [(1, vec![]), (4, vec![]), (7, ring), (30, chain(30)), (20, grid), (6, clique), (9, star)];
         for (seed, (bodies, pairs)) in cases.into_iter().enumerate() {
             let pattern = Pattern::new(bodies, pairs);
-            let matrix = random_matrix(&pattern, bodies, seed as u64);
+            let diagonal = vec![Matrix6::identity() * 0.01; bodies];
             let random = &mut fastrand::Rng::with_seed(99);
-            let rhs: Vec<_> = (0..bodies).map(|_| Vector6::from_fn(|_, _| random.f64() - 0.5)).collect();
-            let found = matrix.solve(&rhs).unwrap();
+            let rhs: Vec<_> = (0..bodies).map(|_| vector(random)).collect();
             let flat = DVector::from_iterator(6 * bodies, rhs.iter().flat_map(|v| v.iter().copied()));
-            let expected = dense(&matrix).cholesky().unwrap().solve(&flat);
-            let worst =
-                (0..6 * bodies).map(|k| (found[k / 6][k % 6] - expected[k]).abs()).fold(0.0, f64::max);
-            assert!(worst < 1e-12 * expected.amax(), "case {seed}: {worst:e} of {:e}", expected.amax());
+            for empty in [BlockMatrix::symmetric, BlockMatrix::general] {
+                let matrix = fill(empty(&pattern, diagonal.clone()), seed as u64);
+                let expected = dense(&matrix).lu().solve(&flat).unwrap();
+                let found = matrix.factor().unwrap().solve(&rhs);
+                let worst =
+                    (0..6 * bodies).map(|k| (found[k / 6][k % 6] - expected[k]).abs()).fold(0.0, f64::max);
+                assert!(worst < 1e-11 * expected.amax(), "case {seed}: {worst:e} of {:e}", expected.amax());
+            }
         }
     }
 
@@ -257,51 +385,37 @@ mod tests {
     }
 
     #[test]
-    fn an_indefinite_matrix_has_no_solution() {
+    fn an_indefinite_matrix_has_no_factor() {
         let pattern = Pattern::new(2, vec![(0, 1)]);
-        let mut matrix = BlockMatrix::new(&pattern, vec![Matrix6::identity(); 2]);
-        matrix.add(&[Some((0, Vector6::repeat(1.0))), Some((1, Vector6::repeat(1.0)))], Some(0), -1.0);
-        assert_eq!(matrix.solve(&[Vector6::zeros(); 2]), None);
+        let mut matrix = BlockMatrix::symmetric(&pattern, vec![Matrix6::identity(); 2]);
+        let side = |body, x| Some((body, [Vector6::repeat(x)]));
+        matrix.add(&[side(0, 1.0), side(1, 1.0)], Some(0), &[[-1.0]]);
+        assert!(matrix.factor().is_none());
+        assert!(BlockMatrix::general(&pattern, vec![Matrix6::zeros(); 2]).factor().is_none());
     }
 
-    /// Three rows, one for each axis of the world, have the same effect as a point.
+    /// The blocks of `Jᵀ B J`, with bodies in either order and alone.
     #[test]
-    fn a_point_is_three_rows() {
+    fn blocks_are_the_products_of_the_sides() {
         let pattern = Pattern::new(2, vec![(0, 1)]);
-        let arms = [DVec3::new(0.3, -0.2, 0.9), DVec3::new(-1.3, 0.4, 0.1)];
-        let s = DMat3::from_cols(
-            DVec3::new(3.0, 0.5, 0.2),
-            DVec3::new(0.5, 2.0, -0.3),
-            DVec3::new(0.2, -0.3, 1.0),
-        );
-        for sides in [
-            [Some((0, arms[0])), Some((1, arms[1]))],
-            [Some((1, arms[0])), Some((0, arms[1]))],
-            [None, Some((1, arms[1]))],
-        ] {
-            let mut points = BlockMatrix::new(&pattern, vec![Matrix6::zeros(); 2]);
-            points.add_point(sides, Some(0), s);
-            // J has a row for each axis; S mixes them.
-            let row = |axis: DVec3| {
-                let side = |k: usize, sign: f64| {
-                    sides[k].map(|(body, arm)| {
-                        (body, sign * super::super::integrate::pack(axis, arm.cross(axis)))
-                    })
-                };
-                [side(0, 1.0), side(1, -1.0)]
-            };
+        let random = &mut fastrand::Rng::with_seed(7);
+        let b = [[3.0, 0.5, 0.2], [-1.0, 2.0, -0.3], [0.4, -0.3, 1.0]];
+        let mut side = |body| Some((body, [(); 3].map(|()| vector(random))));
+        for sides in [[side(0), side(1)], [side(1), side(0)], [None, side(1)]] {
+            let mut matrix = BlockMatrix::general(&pattern, vec![Matrix6::zeros(); 2]);
+            matrix.add(&sides, Some(0), &b);
             let mut expected = DMatrix::zeros(12, 12);
-            for (i, p) in DVec3::AXES.into_iter().enumerate() {
-                for (j, q) in DVec3::AXES.into_iter().enumerate() {
-                    for (a, ja) in row(p).into_iter().flatten() {
-                        for (b, jb) in row(q).into_iter().flatten() {
-                            let mut view = expected.fixed_view_mut::<6, 6>(6 * a, 6 * b);
-                            view += ja * jb.transpose() * s.col(j)[i];
+            for (p, jp) in sides.iter().flatten() {
+                for (q, jq) in sides.iter().flatten() {
+                    for (r, jp) in jp.iter().enumerate() {
+                        for (c, jq) in jq.iter().enumerate() {
+                            let mut view = expected.fixed_view_mut::<6, 6>(6 * p, 6 * q);
+                            view += jp * jq.transpose() * b[r][c];
                         }
                     }
                 }
             }
-            assert!((dense(&points) - &expected).amax() < 1e-14, "{sides:?}");
+            assert!((dense(&matrix) - &expected).amax() < 1e-14, "{sides:?}");
         }
     }
 }

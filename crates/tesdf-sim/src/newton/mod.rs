@@ -1,27 +1,18 @@
 //! The built-in engine: it solves all contacts of an island together, as one convex problem.
 //!
-//! A contact is a spring that acts at the end of the step, so a step minimises a convex function of
-//! the velocities. This is the formulation of Todorov, *Convex and analytically-invertible dynamics
-//! with contacts and constraints* (ICRA 2014), and of Castro, Permenter and Han, *An unconstrained
-//! convex formulation of compliant contact* (IEEE T-RO 2022):
+//! The velocities `v` at the end of a step are those of rigid contacts:
 //!
 //! ```text
-//! minimise over v   ½ |v − v*|²_M + Σ ½ Kᵢ min(0, gᵢ + h Jᵢ v)² + Σ friction + Σ joints + Σ motors
-//! with              Kᵢ = κ / (wᵢ h²),   wᵢ = Jᵢ M⁻¹ Jᵢᵀ
+//! minimise over v   ½ |v − v*|²_M      with   gᵢ + h Jᵢ v ≥ 0,   joints, motors and friction
 //! ```
 //!
-//! Springs give way. So the problem is solved again, with each spring compressed by its force,
-//! until no contact gives way (the method of multipliers, in `problem.rs`). Its solution is that of
-//! rigid contacts: the minimum of the first term with `gᵢ + h Jᵢ v ≥ 0`. Islands that overlap
-//! deeply keep their springs. Gaps are counted from a skin ([`NewtonOptions::skin`]), and normals
-//! at edges that are flush are those of the faces (`normals.rs`).
-//!
-//! *Friction* is a spring against the slip `h t`, where `t` is the tangential velocity, whose force
-//! ends at the limit `b = μ` × push of the contact. The push is that of the minimisation before, so
-//! that each minimisation is convex (lagged friction: Kaufman et al., *Staggered projections for
-//! frictional contact in multibody systems*, SIGGRAPH Asia 2008). It cannot act across a gap, as
-//! the convex cone of Castro et al. can. The limits stay once they change by less than 0.3 %. Below
-//! the limit the force is raised, too, so a body that sticks does not creep.
+//! This is the formulation of Todorov, *Convex and analytically-invertible dynamics with contacts
+//! and constraints* (ICRA 2014), and of Castro, Permenter and Han, *An unconstrained convex
+//! formulation of compliant contact* (IEEE T-RO 2022), without their springs. An interior point
+//! method solves it (`interior.rs`), with Coulomb's friction. Contacts of islands that overlap deeply
+//! are springs of the stiffness `Kᵢ = κ / (wᵢ h²)`, with `wᵢ = Jᵢ M⁻¹ Jᵢᵀ`. Gaps are counted from a
+//! skin ([`NewtonOptions::skin`]), and normals at edges that are flush are those of the faces
+//! (`normals.rs`).
 //!
 //! *Joints* (`joints.rs`) are rows `eᵢ + h Jᵢ v = 0`, and *motors* rows whose force stays within
 //! their limit.
@@ -40,8 +31,10 @@ mod gaps;
 mod geometric;
 mod impacts;
 mod integrate;
+mod interior;
 mod islands;
 mod joints;
+mod line;
 mod linear;
 mod look;
 mod normals;
@@ -50,7 +43,6 @@ mod passing;
 mod problem;
 mod rotation;
 mod rows;
-mod spring;
 mod step;
 
 pub use engine::{Detect, Newton};

@@ -1,428 +1,366 @@
-//! The convex problem of one island, and Newton's method that minimises it.
-//!
-//! A spring gives way under load. Where the corners of a face have different numbers of springs, it
-//! gives way unevenly, and a body at rest tilts and slides off. So the forces are raised by the
-//! method of multipliers (Hestenes, *Multiplier and gradient methods*, 1969; Powell, *A method for
-//! nonlinear constraints in minimization problems*, 1969), until no contact gives way: each spring
-//! gets a compression that it keeps without giving way, the compression of the minimum before.
-use std::borrow::Borrow;
-
+//! The problem of one island: rows that may act, and those that a solution calls.
+use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
-use super::NewtonOptions;
-use super::linear::{BlockMatrix, Pattern, dot};
-use super::rows::Row;
-use super::spring::{Change, Deflection, Grips, Spring};
+use super::interior::Interior;
+use super::line::{Force, Line, Masses};
+use super::linear::Pattern;
+use super::rows::{Resistance, Row, RowForce};
 
-/// The function `½ |v − target|²_M + Σ energy of the springs` of the velocities `v`.
+/// Bodies, the rows between them, and the velocities without rows.
 #[derive(Debug)]
 pub struct Problem {
     inertia: Vec<Matrix6<f64>>,
+    inverse: Vec<Matrix6<f64>>,
     target: Vec<Vector6<f64>>,
-    springs: Vec<Spring>,
+    levers: Vec<f64>,
+    /// With their gaps.
+    rows: Vec<(Row, f64)>,
     pattern: Pattern,
     time_step: f64,
 }
 
-/// Result of a minimisation.
+/// The solution of a problem.
 #[derive(Clone, Debug)]
 pub struct Minimum {
     /// Velocities of the bodies of the island.
     pub velocity: Vec<Vector6<f64>>,
-    /// The force of each row along its sides, N or N m.
-    pub forces: Vec<f64>,
+    /// What each row does.
+    pub forces: Vec<RowForce>,
     /// Number of Newton iterations.
     pub iterations: u32,
-    /// Whether every minimisation reached the tolerance, and the limits of friction have settled.
+    /// Whether the method came to its end.
     pub converged: bool,
 }
 
-/// The state of a minimisation.
-#[derive(Clone, Debug)]
-struct Iterate {
-    velocity: Vec<Vector6<f64>>,
-    /// One for each spring.
-    deflections: Vec<Deflection>,
-    /// Multiplies the stiffness of rigid rows.
-    stiffening: f64,
-    /// Whether the limits of friction follow the pushes of the contacts. Once they have settled
-    /// they stay: rounding moves the pushes of contacts that share a load, the more the stiffer
-    /// they are.
-    grips: Grips,
-}
+/// A contact may act when its gap is at most this share of the way by which it differs between the
+/// velocities of the start and those without contacts, ...
+const NEAR: f64 = 0.01;
 
-/// Every time that the forces are raised, the springs become stiffer by this factor. An error then
-/// falls by the stiffness κ of that minimisation, and not always by the first κ. Stiff springs also
-/// let go of contacts that are nearly as near as their neighbours: a contact gives up force by its
-/// gap in each minimisation.
-const STIFFENING: f64 = 10.0;
+/// ... or this share of the greatest such way in the island: bricks that stand side by side.
+const NEAR_OF_ALL: f64 = 1e-3;
 
-/// Maximum number of times that forces are raised. At rest 4 to 5 suffice. Contacts that contradict
-/// each other never come to an end: a peg in a hole that is too narrow, or, by rounding, two equal
-/// faces on each other.
-const ROUNDS: u32 = 8;
+/// A contact is closed when its gap is below this, m.
+const CLOSED: f64 = 1e-10;
 
-/// Maximum number of further times where contacts have friction, until its limits have settled.
-const ROUNDS_OF_FRICTION: u32 = 16;
+/// The forces are a guess for more rows when these are closed by less than this, m.
+const NEARLY_OPEN: f64 = 1e-3;
 
-/// Springs do not become stiffer than this factor. More would leave no digits to the masses.
-const STIFFEST: f64 = 1e8;
-
-/// The same while the limits of friction follow: the stiffer the springs, the more the pushes of
-/// contacts that share a load differ from one minimisation to the next. At 1e4 the limits of a
-/// gripper that closes around a brick went on changing by 2 %.
-const STIFFEST_UNSETTLED: f64 = 1e3;
-
-/// The limits of friction have settled when their changes are less than this share of them.
-const LAG: f64 = 3e-3;
-
-/// Limits of friction below this share of the forces that would stop the bodies do not matter.
-const NO_LIMIT: f64 = 1e-6;
-
-/// A stalled motor may exceed its target by this multiple of the greatest way by which other rows
-/// give way: in the first minimisations, all bodies between two fingers give way under their
-/// pushes.
-const EXCESS: f64 = 100.0;
-
-/// A contact is nearly closed when its gap is at most this share of the way by which it differs
-/// between the velocities of the start and those without contacts.
-const NEAR: f64 = 0.1;
-
-/// Maximum number of evaluations of a line search. The derivative is piecewise linear without
-/// friction, so its root is usually found after a few.
-const LINE_SEARCH: usize = 60;
+/// A body's points are within about this multiple of its radius of gyration.
+const LEVER: f64 = 2.0;
 
 impl Problem {
     /// `target` has one velocity per body, in the order of `bodies`. Each row comes with its gap,
     /// and refers to bodies by their index in `bodies`.
     pub fn new(
         inertia: Vec<Matrix6<f64>>,
-        target: Vec<Vector6<f64>>,
-        rows: impl Iterator<Item = (impl Borrow<Row>, f64)>,
+        mut target: Vec<Vector6<f64>>,
+        rows: Vec<(Row, f64)>,
         time_step: f64,
     ) -> Self {
-        let mut springs: Vec<Spring> = rows.map(|(row, gap)| Spring::new(row.borrow(), gap)).collect();
-        let pair = |spring: &Spring| match spring.sides {
-            [Some((a, _)), Some((b, _))] => Some((a.min(b), a.max(b))),
-            _ => None,
-        };
-        let pattern = Pattern::new(inertia.len(), springs.iter().filter_map(pair).collect());
-        for spring in &mut springs {
-            spring.pair = pair(spring).and_then(|(a, b)| pattern.pair(a, b));
+        // Inertias are positive definite.
+        let invert = |m: &Matrix6<f64>| m.cholesky().map_or_else(Matrix6::zeros, |m| m.inverse());
+        let inverse: Vec<_> = inertia.iter().map(invert).collect();
+        for (row, _) in rows.iter().filter(|(row, _)| is_given(row)) {
+            for (body, j) in row.sides.iter().flatten() {
+                target[*body] += inverse[*body] * j * (time_step * row.bounds[0]);
+            }
         }
-        Self { inertia, target, springs, pattern, time_step }
+        let pattern = Pattern::new(inertia.len(), rows.iter().filter_map(|(row, _)| pair(row)).collect());
+        let lever = |m: &Matrix6<f64>| LEVER * (m.fixed_view::<3, 3>(3, 3).trace() / m[(0, 0)]).sqrt();
+        let levers = inertia.iter().map(lever).collect();
+        Self { inertia, inverse, target, levers, rows, pattern, time_step }
     }
 
-    /// Minimises from `start`. Where rows are rigid or have friction, raises their forces and
-    /// minimises again, until no rigid row gives way and the limits of friction have settled.
+    /// The problem whose contacts are springs.
+    pub fn softened(mut self) -> Self {
+        for (row, _) in self.rows.iter_mut().filter(|(row, _)| row.is_contact()) {
+            row.resistance = Resistance::Spring;
+        }
+        self
+    }
+
+    /// Solves from `start`, where rows had the forces `guess`, if any.
     ///
-    /// Most contacts stay open, so the minimisation begins with those that are nearly closed. It is
-    /// repeated with the others that its solution closes, until there are none. Contacts may give
-    /// way by the tolerance, so others that are closed by less do not need a repetition: in a wall
-    /// of bricks, where hundreds are open by rounding alone, each repetition closed a few more.
-    pub fn minimise(&self, start: Vec<Vector6<f64>>, options: &NewtonOptions) -> Minimum {
-        let h = self.time_step;
-        let gap = |spring: &Spring, v: &[Vector6<f64>]| spring.gap + h * spring.rate(v);
-        let is_near = |spring: &Spring| {
-            let [now, free] = [gap(spring, &start), gap(spring, &self.target)];
-            !spring.is_contact() || now <= NEAR * (now - free).abs()
+    /// Most contacts stay open, so it begins with those that are nearly closed. It is repeated with
+    /// the others that its solution closes, until there are none.
+    pub fn minimise(&self, start: Vec<Vector6<f64>>, guess: Option<&[RowForce]>) -> Minimum {
+        let gap = |(row, gap): &(Row, f64), v: &[Vector6<f64>]| gap + self.time_step * row.rate(v);
+        let change = |row: &(Row, f64)| (gap(row, &start) - gap(row, &self.target)).abs();
+        let of_all = NEAR_OF_ALL * self.rows.iter().map(change).fold(0.0, f64::max);
+        let is_near = |row: &(Row, f64)| {
+            !row.0.is_contact() || gap(row, &start) <= f64::max(NEAR * change(row), of_all)
         };
-        let mut near: Vec<bool> = self.springs.iter().map(is_near).collect();
-        let (mut velocity, mut iterations) = (start, 0);
+        let masses = Masses { inverse: &self.inverse, time_step: self.time_step };
+        let line = |(row, gap): &(Row, f64)| {
+            let pair = pair(row).and_then(|(a, b)| self.pattern.pair(a, b));
+            Line { pair, ..Line::new(row, *gap, &masses) }
+        };
+        let near = |(k, row): (usize, &(Row, f64))| {
+            let has_force = guess.is_some_and(|guess| guess[k].along != 0.0);
+            (!is_given(&row.0) && (has_force || is_near(row))).then(|| line(row))
+        };
+        // Of the rows that may act.
+        let mut lines: Vec<Option<Line>> = self.rows.iter().enumerate().map(near).collect();
+        let mut forces = vec![Force::default(); self.rows.len()];
+        if let Some(guess) = guess {
+            for (k, line) in lines.iter().enumerate().filter_map(|(k, line)| Some((k, line.as_ref()?))) {
+                forces[k] = line.of_force(&guess[k]);
+            }
+        }
+        let mut guess = guess.map(|_| start.clone());
+        let mut iterations = 0;
         loop {
-            let springs = self.springs.iter().zip(&near).filter_map(|(spring, near)| near.then_some(spring));
-            let part = Part { problem: self, springs: springs.collect() };
-            // The forces are found anew, so that they do not depend on the contacts before.
-            let mut at = part.start(velocity);
-            let (more, converged, slack) = part.raise_forces(&mut at, options);
-            iterations += more;
-            velocity = std::mem::take(&mut at.velocity);
-            let mut is_complete = true;
-            for (near, spring) in near.iter_mut().zip(&self.springs).filter(|(near, _)| !**near) {
-                let gap = gap(spring, &velocity);
-                *near = gap < slack;
-                is_complete &= gap >= -slack;
-            }
-            if is_complete {
-                let mut acting = part.forces(&at).into_iter();
-                let forces = near.iter().map(|near| if *near { acting.next().unwrap_or(0.0) } else { 0.0 });
-                return Minimum { velocity, forces: forces.collect(), iterations, converged };
-            }
-        }
-    }
-}
-
-/// The problem with some of its springs.
-struct Part<'a> {
-    problem: &'a Problem,
-    springs: Vec<&'a Spring>,
-}
-
-impl Part<'_> {
-    fn start(&self, velocity: Vec<Vector6<f64>>) -> Iterate {
-        let deflections = self.springs.iter().map(|s| s.start(&velocity, self.problem.time_step)).collect();
-        let has_friction = self.springs.iter().any(|s| s.friction.is_some());
-        let grips = if has_friction { Grips::Follow } else { Grips::Stay };
-        Iterate { velocity, deflections, stiffening: 1.0, grips }
-    }
-
-    /// The force of each row along its sides, N or N m.
-    fn forces(&self, at: &Iterate) -> Vec<f64> {
-        self.springs.iter().zip(&at.deflections).map(|(s, d)| s.force(d, at.stiffening).0).collect()
-    }
-
-    /// Returns the number of Newton iterations, whether it converged, and the distance by which
-    /// rigid rows may give way, m.
-    fn raise_forces(&self, at: &mut Iterate, options: &NewtonOptions) -> (u32, bool, f64) {
-        let (mut iterations, mut converged) = self.descend(at, options);
-        let [_, most] = self.error(at);
-        let slack = options.tolerance * most;
-        let rounds = match at.grips {
-            Grips::Follow => ROUNDS_OF_FRICTION + ROUNDS,
-            Grips::Stay => ROUNDS,
-        };
-        for _ in 0..rounds {
-            if self.lag(at) <= LAG {
-                at.grips = Grips::Stay;
-            }
-            let settled = at.grips == Grips::Stay;
-            if !converged || settled && self.error(at)[0] <= slack {
-                break;
-            }
-            self.raise(at);
-            let (more, good) = self.descend(at, options);
-            (iterations, converged) = (iterations + more, good);
-        }
-        (iterations, converged && (at.grips == Grips::Stay || self.lag(at) <= LAG), slack)
-    }
-
-    /// Newton's method with an exact line search. Returns the number of iterations, and whether it
-    /// reached the tolerance.
-    fn descend(&self, at: &mut Iterate, options: &NewtonOptions) -> (u32, bool) {
-        let goal = options.tolerance * options.tolerance * self.energy();
-        for iteration in 1..=options.max_iterations {
-            let force = self.force(at);
-            let Some(direction) = self.direction(at, &force) else { return (iteration, false) };
-            let changes: Vec<_> =
-                self.springs.iter().map(|s| s.change(&direction, self.problem.time_step)).collect();
-            // This is twice the decrease that a quadratic function would have.
-            let small = dot(&force, &direction) <= goal;
-            let step = if small { 1.0 } else { self.line_search(at, &direction, &changes) };
-            at.velocity.iter_mut().zip(&direction).for_each(|(v, d)| *v += step * d);
-            let mut is_quadratic = step == 1.0;
-            for ((spring, deflection), change) in self.springs.iter().zip(&mut at.deflections).zip(&changes) {
-                let after = deflection.after(change, step);
-                is_quadratic = is_quadratic && spring.is_linear_between(deflection, &after, at.stiffening);
-                *deflection = after;
-            }
-            // If all springs kept their state, the function is quadratic along the step and this is
-            // its minimum.
-            if small || is_quadratic {
-                return (iteration, true);
-            }
-        }
-        (options.max_iterations, false)
-    }
-
-    /// The greatest distance by which a rigid row gives way, or keeps a force that it should not,
-    /// and the greatest one that corresponds to a force. The two are m or rad.
-    fn error(&self, at: &Iterate) -> [f64; 2] {
-        let errors = self.springs.iter().zip(&at.deflections).map(|(s, d)| s.error(d, at.stiffening));
-        errors.fold([0.0; 2], |[a, b], [c, d]| [a.max(c), b.max(d)])
-    }
-
-    /// The changes of the limits of friction that are due, as a share of these limits. Limits far
-    /// below the forces that would stop the bodies in this step are of no account: where two bodies
-    /// just come together, rounding makes the push.
-    fn lag(&self, at: &Iterate) -> f64 {
-        let grips = self.springs.iter().zip(&at.deflections).filter_map(|(s, d)| s.grips(d, at.stiffening));
-        let [change, all] = grips.fold([0.0; 2], |[a, b], [next, now]| [a + (next - now).abs(), b + next]);
-        let stop = self
-            .problem
-            .inertia
-            .iter()
-            .zip(&self.problem.target)
-            .map(|(inertia, v)| (inertia * v).fixed_rows::<3>(0).norm());
-        let least = NO_LIMIT * stop.sum::<f64>() / self.problem.time_step;
-        if change > 0.0 { change / all.max(least) } else { 0.0 }
-    }
-
-    /// Gives each rigid row its present force as the force at zero deflection, and stiffens it. A
-    /// stalled motor that exceeds its target becomes a row again.
-    fn raise(&self, at: &mut Iterate) {
-        let stiffest = match at.grips {
-            Grips::Follow => STIFFEST_UNSETTLED,
-            Grips::Stay => STIFFEST,
-        };
-        let factor = STIFFENING.min(stiffest / at.stiffening);
-        let others = self.springs.iter().zip(&at.deflections).filter(|(_, d)| !d.is_stalled());
-        let worst = others.map(|(s, d)| s.error(d, at.stiffening)[0]).fold(0.0, f64::max);
-        for (spring, deflection) in self.springs.iter().zip(&mut at.deflections) {
-            let exceeds = spring.excess(deflection) > EXCESS * worst;
-            spring.keep(deflection, at.stiffening, factor, at.grips);
-            if exceeds {
-                deflection.release();
-            }
-        }
-        at.stiffening *= factor;
-    }
-
-    /// The energy that the tolerance is relative to: twice the kinetic energy of the motion without
-    /// contacts, plus twice the energy of the springs that this motion would compress.
-    fn energy(&self) -> f64 {
-        let energy = |spring: &&Spring| {
-            let deflection = spring.deflection(&self.problem.target, self.problem.time_step);
-            spring.force(&deflection, 1.0).0 * -deflection.gap
-        };
-        let motion =
-            self.problem.inertia.iter().zip(&self.problem.target).map(|(inertia, v)| v.dot(&(inertia * v)));
-        motion.sum::<f64>() + self.springs.iter().map(energy).sum::<f64>()
-    }
-
-    /// The negative gradient.
-    fn force(&self, at: &Iterate) -> Vec<Vector6<f64>> {
-        let of_body =
-            |((inertia, v), target): ((&Matrix6<f64>, &Vector6<f64>), &Vector6<f64>)| inertia * (target - v);
-        let mut force: Vec<_> =
-            self.problem.inertia.iter().zip(&at.velocity).zip(&self.problem.target).map(of_body).collect();
-        for (spring, deflection) in self.springs.iter().zip(&at.deflections) {
-            spring.push(deflection, at.stiffening, self.problem.time_step, &mut force);
-        }
-        force
-    }
-
-    fn direction(&self, at: &Iterate, force: &[Vector6<f64>]) -> Option<Vec<Vector6<f64>>> {
-        let mut hessian = BlockMatrix::new(&self.problem.pattern, self.problem.inertia.clone());
-        let h2 = self.problem.time_step * self.problem.time_step;
-        for (spring, deflection) in self.springs.iter().zip(&at.deflections) {
-            spring.stiffen(deflection, at.stiffening, h2, &mut hessian);
-        }
-        hessian.solve(force)
-    }
-
-    /// The step length along `direction` at which the derivative is zero. The derivative increases.
-    fn line_search(&self, at: &Iterate, direction: &[Vector6<f64>], changes: &[Change]) -> f64 {
-        let (mut constant, mut linear) = (0.0, 0.0);
-        for (((inertia, v), target), d) in
-            self.problem.inertia.iter().zip(&at.velocity).zip(&self.problem.target).zip(direction)
-        {
-            let momentum = inertia * d;
-            constant += momentum.dot(&(v - target));
-            linear += momentum.dot(d);
-        }
-        let derivative = |step: f64| {
-            let (mut value, mut slope) = (constant + step * linear, linear);
-            for ((spring, deflection), change) in self.springs.iter().zip(&at.deflections).zip(changes) {
-                let resistance = spring.resist(&deflection.after(change, step), change, at.stiffening);
-                value += resistance.0;
-                slope += resistance.1;
-            }
-            (value, slope)
-        };
-        let start = derivative(0.0).0;
-        let (mut low, mut high) = (0.0, f64::INFINITY);
-        let mut step = 1.0;
-        for _ in 0..LINE_SEARCH {
-            let (value, slope) = derivative(step);
-            if value.abs() <= 1e-10 * start.abs() {
-                break;
-            }
-            if value < 0.0 {
-                low = step
-            } else {
-                high = step
-            }
-            let next = step - value / slope;
-            step = match next > low && next < high {
-                true => next,
-                false if high.is_finite() => 0.5 * (low + high),
-                false => 2.0 * step,
+            let acting: Vec<usize> = (0..lines.len()).filter(|&k| lines[k].is_some()).collect();
+            let interior = Interior {
+                inertia: &self.inertia,
+                inverse: &self.inverse,
+                target: &self.target,
+                pattern: &self.pattern,
+                time_step: self.time_step,
+                levers: &self.levers,
+                lines: lines.iter().flatten().collect(),
             };
+            let guessed = guess.map(|velocity| (velocity, acting.iter().map(|&k| forces[k]).collect()));
+            let found = interior.solve(guessed);
+            iterations += found.iterations;
+            acting.iter().zip(&found.forces).for_each(|(&k, force)| forces[k] = *force);
+            let mut closed = 0.0;
+            for (to, row) in
+                lines.iter_mut().zip(&self.rows).filter(|(to, (row, _))| to.is_none() && !is_given(row))
+            {
+                let [now, free] = [&found.velocity, &self.target].map(|v| gap(row, v));
+                if now < f64::max(NEAR * (now - free).abs(), CLOSED) {
+                    *to = Some(line(row));
+                }
+                closed = f64::max(closed, -now);
+            }
+            if closed <= CLOSED || !found.velocity.iter().all(|v| v.norm().is_finite()) {
+                let force = |(k, (row, _)): (usize, &(Row, f64))| match &lines[k] {
+                    Some(line) => line.to_force(&forces[k]),
+                    None if is_given(row) => RowForce { along: row.bounds[0], friction: DVec3::ZERO },
+                    None => RowForce::default(),
+                };
+                return Minimum {
+                    velocity: found.velocity,
+                    forces: self.rows.iter().enumerate().map(force).collect(),
+                    iterations,
+                    converged: found.converged,
+                };
+            }
+            guess = (closed < NEARLY_OPEN && found.converged).then_some(found.velocity);
         }
-        step
+    }
+}
+
+/// Whether the force of a row is given.
+fn is_given(row: &Row) -> bool {
+    row.bounds[0] == row.bounds[1]
+}
+
+/// The two bodies of a row, the lower one first.
+fn pair(row: &Row) -> Option<(usize, usize)> {
+    match row.sides {
+        [Some((a, _)), Some((b, _))] => Some((a.min(b), a.max(b))),
+        _ => None,
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use glam::{DMat3, DQuat, DVec3};
+    use glam::{DMat3, DQuat};
 
     use super::*;
     use crate::MassProperties;
-    use crate::newton::rows::{FreeBody, Resistance};
+    use crate::newton::integrate::{pack, unpack};
+    use crate::newton::interior::LAG;
+    use crate::newton::rows::{FreeBody, Friction, PUSHES, RowId};
 
-    /// A chain of bodies with random rows; some rows connect a body to a fixed body.
-    fn random_problem(free: &[FreeBody], h: f64, seed: u64) -> Problem {
-        let random = &mut fastrand::Rng::with_seed(seed);
-        let mut number = || random.f64() - 0.5;
-        let mut vector = || Vector6::from_fn(|_, _| number());
-        let target = free.iter().map(|_| vector()).collect();
-        let mut rows = Vec::new();
-        for k in 0..60 * free.len() {
-            let (a, b) = (k % free.len(), (k + 1) % free.len());
-            let other = (k % 3 > 0 && a != b).then(|| (b, vector()));
-            let gap = 0.1 * h * vector()[0];
-            let sides = [Some((a, vector())), other];
-            let (stiffness, resistance) = (30.0 / (h * h), Resistance::Spring);
-            let bounds = [0.0, f64::INFINITY];
-            let arms = [DVec3::ZERO; 2];
-            let row =
-                Row { sides, arms, gap, relaxed_gap: gap, stiffness, bounds, resistance, friction: None };
-            rows.push((row, gap));
-        }
-        Problem::new(free.iter().map(|body| body.inertia).collect(), target, rows.into_iter(), h)
-    }
+    const H: f64 = 1e-3;
 
-    fn whole<'a>(problem: &'a Problem) -> Part<'a> {
-        Part { problem, springs: problem.springs.iter().collect() }
-    }
-
-    #[test]
-    fn the_gradient_vanishes_at_the_minimum() {
-        let mass = MassProperties {
-            mass: 2.0,
-            center: DVec3::ZERO,
-            inertia: DMat3::from_diagonal(DVec3::new(0.1, 0.2, 0.3)),
+    /// Five bodies whose masses differ by up to a factor of `ratio`.
+    fn bodies(ratio: f64, random: &mut fastrand::Rng) -> Vec<FreeBody> {
+        let mut body = |k| {
+            let mass = 2.0 * ratio.powf(random.f64() - 0.5);
+            let inertia = DMat3::from_diagonal(mass * DVec3::new(0.05, 0.1, 0.15));
+            FreeBody::new(k, &MassProperties { mass, center: DVec3::ZERO, inertia }, DQuat::IDENTITY)
         };
-        let free: Vec<_> = (0..5).map(|k| FreeBody::new(k, &mass, DQuat::IDENTITY)).collect();
-        for seed in 0..20 {
-            let problem = random_problem(&free, 1e-3, seed);
-            let options = NewtonOptions::default();
-            let found = problem.minimise(problem.target.clone(), &options);
-            assert!(found.converged, "seed {seed}: {found:?}");
-            let all = whole(&problem);
-            let force = all.force(&all.start(found.velocity));
-            let size: f64 = all.energy().sqrt();
-            let left = dot(&force, &force).sqrt();
-            assert!(left < 1e-5 * size, "seed {seed}: {left:e} of {size:e}");
-        }
+        (0..5).map(&mut body).collect()
     }
 
-    /// The conditions of Karush, Kuhn and Tucker: forces and momenta are in balance, no gap is
-    /// negative, and there is no force across a gap.
-    #[test]
-    fn rigid_contacts_do_not_give_way() {
-        let mass =
-            MassProperties { mass: 2.0, center: DVec3::ZERO, inertia: DMat3::from_diagonal(DVec3::ONE) };
-        let free: Vec<_> = (0..5).map(|k| FreeBody::new(k, &mass, DQuat::IDENTITY)).collect();
-        for seed in 0..20 {
-            let mut problem = random_problem(&free, 1e-3, seed);
-            // Without motion no gap is negative, so the rows do not contradict each other.
-            problem.springs.iter_mut().for_each(|spring| spring.gap = spring.gap.abs());
-            problem.springs.iter_mut().for_each(|spring| spring.resistance = Resistance::Rigid);
-            let all = whole(&problem);
-            let mut at = all.start(problem.target.clone());
-            let (_, converged, _) = all.raise_forces(&mut at, &NewtonOptions::default());
-            assert!(converged, "seed {seed}");
-            let force = all.force(&at);
-            assert!(dot(&force, &force).sqrt() < 1e-6 * all.energy().sqrt(), "seed {seed}: {force:?}");
-            let pushing = at.deflections.iter().filter(|d| d.gap < 0.0).count();
-            assert!(pushing > 5, "seed {seed}: {pushing} contacts");
-            for (spring, d) in problem.springs.iter().zip(&at.deflections) {
-                let end = spring.gap + 1e-3 * spring.rate(&at.velocity);
-                assert!((end - d.gap - d.compression()).abs() < 1e-15, "seed {seed}: {end:e}");
-                assert!(end > -1e-12 && (end < 1e-12 || d.gap >= 0.0), "seed {seed}: {end:e}, {d:?}");
+    /// Contacts at random points with random normals, most of them open when nothing moves.
+    fn contacts(count: usize, coefficient: f64, random: &mut fastrand::Rng) -> Vec<Row> {
+        let mut vector = || DVec3::new(random.f64() - 0.5, random.f64() - 0.5, random.f64() - 0.5);
+        let mut contact = |k: usize| {
+            let (a, b, normal, arms) = (k % 5, (k + 1) % 5, vector().normalize(), [vector(), vector()]);
+            let side = |body, arm: DVec3, n: DVec3| Some((body, pack(n, arm.cross(n))));
+            let gap = 0.1 * H * vector().x.abs();
+            Row {
+                id: RowId::Joint(k),
+                sides: [side(a, arms[0], normal), side(b, arms[1], -normal).filter(|_| !k.is_multiple_of(3))],
+                arms,
+                gap,
+                relaxed_gap: gap,
+                stiffness: 30.0 / (H * H),
+                bounds: PUSHES,
+                resistance: Resistance::Rigid,
+                friction: (coefficient > 0.0).then_some(Friction {
+                    normal,
+                    coefficient,
+                    way: (0.01 * H * vector()).reject_from_normalized(normal),
+                }),
+            }
+        };
+        (0..count).map(&mut contact).collect()
+    }
+
+    fn problem(free: &[FreeBody], target: &[Vector6<f64>], rows: &[Row]) -> Problem {
+        let inertia = free.iter().map(|body| body.inertia).collect();
+        Problem::new(inertia, target.to_vec(), rows.iter().map(|row| (row.clone(), row.gap)).collect(), H)
+    }
+
+    fn velocities(random: &mut fastrand::Rng) -> Vec<Vector6<f64>> {
+        (0..5).map(|_| Vector6::from_fn(|_, _| random.f64() - 0.5)).collect()
+    }
+
+    /// Says what of the laws a solution does not keep: momentum, the law of each row, and that of
+    /// friction.
+    fn check(
+        free: &[FreeBody],
+        target: &[Vector6<f64>],
+        rows: &[Row],
+        found: &Minimum,
+    ) -> Result<(), String> {
+        let mut lack: Vec<_> = free
+            .iter()
+            .zip(target)
+            .zip(&found.velocity)
+            .map(|((body, to), v)| body.inertia * (to - v))
+            .collect();
+        for (k, (row, force)) in rows.iter().zip(&found.forces).enumerate() {
+            for (side, (arm, sign)) in row.sides.iter().zip([(row.arms[0], H), (row.arms[1], -H)]) {
+                let Some((body, j)) = side else { continue };
+                let friction = sign * force.friction;
+                lack[*body] += j * (H * force.along) + pack(friction, arm.cross(friction));
+            }
+            let gap = row.gap + H * row.rate(&found.velocity);
+            // A force that a spring with this kept force has again.
+            let per_gap = 1.0 / (H * H * Row::weight(&row.sides, free));
+            let again = match row.resistance {
+                Resistance::Rigid => force.along - per_gap * gap,
+                Resistance::Spring | Resistance::Parting => -row.stiffness * gap,
+            };
+            let off = (again.clamp(row.bounds[0], row.bounds[1]) - force.along) / per_gap;
+            if off.abs() > 1e-9 {
+                return Err(format!("row {k}: {force:?} at a gap of {gap:e} m"));
+            }
+            let Some(friction) = row.friction else { continue };
+            let at = |side: usize| {
+                row.sides[side].map_or(DVec3::ZERO, |(body, _)| {
+                    let (linear, angular) = unpack(&found.velocity[body]);
+                    linear + angular.cross(row.arms[side])
+                })
+            };
+            let slip = friction.way + (H * (at(0) - at(1))).reject_from_normalized(friction.normal);
+            let limit = friction.coefficient * force.along;
+            let again = (force.friction - per_gap * slip).clamp_length_max(limit);
+            // Limits that lag may be off by this share.
+            if again.distance(force.friction) > 1e-9 * per_gap + LAG * limit {
+                return Err(format!("row {k}: {force:?} at a slip of {slip} m"));
             }
         }
+        let off = lack.iter().zip(free).map(|(p, body)| H * (body.inverse * p).norm()).fold(0.0, f64::max);
+        if off > 1e-8 { Err(format!("momentum is off by {off:e} m")) } else { Ok(()) }
+    }
+
+    /// The conditions of Karush, Kuhn and Tucker, with masses up to a thousand times each other.
+    #[test]
+    fn solutions_keep_the_laws_of_contact_and_friction() {
+        for seed in 0..60 {
+            let random = &mut fastrand::Rng::with_seed(seed);
+            let coefficient = [0.0, 0.1, 0.2][seed as usize % 3];
+            let free = bodies([1.0, 10.0, 1e3][seed as usize / 3 % 3], random);
+            let (target, rows) = (velocities(random), contacts(100, coefficient, random));
+            let found = problem(&free, &target, &rows).minimise(target.clone(), None);
+            assert!(found.converged, "seed {seed}");
+            check(&free, &target, &rows, &found).unwrap_or_else(|off| panic!("seed {seed}: {off}"));
+            assert!(found.forces.iter().filter(|force| force.along > 0.0).count() > 5, "seed {seed}");
+        }
+    }
+
+    /// Joints, motors of a limited force, springs and given forces beside contacts.
+    #[test]
+    fn rows_of_all_kinds_keep_their_laws() {
+        for seed in 0..40 {
+            let random = &mut fastrand::Rng::with_seed(seed);
+            let (free, target) = (bodies(10.0, random), velocities(random));
+            let mut rows = contacts(60, 0.1, random);
+            for (k, row) in rows.iter_mut().enumerate().take(16) {
+                row.friction = None;
+                (row.bounds, row.resistance) = match k % 4 {
+                    0 => ([f64::NEG_INFINITY, f64::INFINITY], Resistance::Rigid),
+                    1 => ([-50.0, 50.0], Resistance::Rigid),
+                    2 => (PUSHES, Resistance::Spring),
+                    _ => ([f64::NEG_INFINITY, 0.0], Resistance::Rigid),
+                };
+            }
+            rows[15].bounds = [20.0; 2];
+            let found = problem(&free, &target, &rows).minimise(target.clone(), None);
+            assert!(found.converged, "seed {seed}");
+            assert_eq!(found.forces[15].along, 20.0);
+            check(&free, &target, &rows, &found).unwrap_or_else(|off| panic!("seed {seed}: {off}"));
+        }
+    }
+
+    /// A solution is found again from itself, and from one of other gaps.
+    #[test]
+    fn forces_that_are_kept_lead_to_the_same_motion() {
+        for seed in 0..20 {
+            let random = &mut fastrand::Rng::with_seed(seed);
+            let (free, target) = (bodies(10.0, random), velocities(random));
+            // With friction and scattered normals there may be several motions.
+            let (coefficient, noises) =
+                [(0.0, [0.0, 1e-9, 1e-6, 1.0]), (0.2, [0.0, 1e-9, 1e-8, 1e-7])][seed as usize % 2];
+            let mut rows = contacts(100, coefficient, random);
+            let first = problem(&free, &target, &rows).minimise(target.clone(), None);
+            for noise in noises {
+                rows.iter_mut().for_each(|row| row.gap += noise * H * (random.f64() - 0.5));
+                let problem = problem(&free, &target, &rows);
+                let again = problem.minimise(first.velocity.clone(), Some(&first.forces));
+                let cold = problem.minimise(target.clone(), None);
+                let off = again.velocity.iter().zip(&cold.velocity).map(|(a, b)| H * (a - b).norm());
+                let off = off.fold(0.0, f64::max);
+                assert!(again.converged && cold.converged && off < 1e-8, "seed {seed}, {noise}: {off:e} m");
+                assert!(noise > 1e-9 || again.iterations < 10, "seed {seed}: {}", again.iterations);
+            }
+        }
+    }
+
+    /// Two walls that are too near for a body push it to the middle.
+    #[test]
+    fn rows_that_contradict_each_other_have_a_solution() {
+        let random = &mut fastrand::Rng::with_seed(1);
+        let (free, target) = (bodies(1.0, random), vec![Vector6::zeros(); 5]);
+        let mut rows = contacts(2, 0.0, random);
+        for (row, sign) in rows.iter_mut().zip([1.0, -1.0]) {
+            row.sides = [Some((0, sign * Vector6::x())), None];
+            row.gap = -1e-3;
+        }
+        let found = problem(&free, &target, &rows).minimise(target.clone(), None);
+        assert!(found.converged);
+        assert!(H * found.velocity[0].norm() < 1e-9, "{}", found.velocity[0]);
+        assert!((found.forces[0].along / found.forces[1].along - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn rows_that_nothing_closes_have_no_force() {
+        let random = &mut fastrand::Rng::with_seed(1);
+        let (free, target) = (bodies(1.0, random), vec![Vector6::zeros(); 5]);
+        let rows = contacts(20, 0.3, random);
+        let found = problem(&free, &target, &rows).minimise(target.clone(), None);
+        assert_eq!(found.velocity, target);
+        assert_eq!(found.forces, [RowForce::default(); 20]);
+        let none = problem(&free, &target, &[]).minimise(target.clone(), None);
+        assert!(none.converged && none.velocity == target);
     }
 }

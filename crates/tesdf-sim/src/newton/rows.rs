@@ -1,7 +1,7 @@
 //! Converts contacts to rows of the convex problem.
 use glam::{DQuat, DVec3};
 use nalgebra::{Matrix6, Vector6};
-use tesdf::collide::{Contact, Pose};
+use tesdf::collide::{Contact, InstanceId, Pose};
 
 use super::integrate::pack;
 use crate::{Mass, MassProperties, System};
@@ -38,10 +38,30 @@ impl FreeBody {
 /// The bounds of the force of a contact, and of the lower limit of a joint: it pushes only.
 pub const PUSHES: [f64; 2] = [0.0, f64::INFINITY];
 
+/// What a row is about. Rows of the same id in two minimisations have nearly the same force.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum RowId {
+    /// The instances of a contact, and the face, edge or vertex of the first one.
+    Contact([InstanceId; 2], u32),
+    /// The number of a row among those of all joints.
+    Joint(usize),
+}
+
+/// What a row does to its first side.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowForce {
+    /// Along the row, N or N m.
+    pub along: f64,
+    /// N
+    pub friction: DVec3,
+}
+
 /// A condition on the velocities of two bodies: a force acts between them, along `sides`, so that
 /// `gap + h Σ jacobian · v` becomes zero, as far as the force stays within its bounds.
 #[derive(Clone, Debug)]
 pub struct Row {
+    /// What it is about.
+    pub id: RowId,
     /// Up to two free bodies: the index of each in the list of free bodies, and the derivative of
     /// the gap by its velocity.
     pub sides: [Option<(usize, Vector6<f64>)>; 2],
@@ -52,7 +72,7 @@ pub struct Row {
     pub gap: f64,
     /// The gap without the correction that pushes penetrating bodies apart.
     pub relaxed_gap: f64,
-    /// Stiffness K, N/m or N m/rad.
+    /// Stiffness K of a spring, N/m or N m/rad.
     pub stiffness: f64,
     /// The least and the greatest force, N or N m; positive forces open the gap. A contact pushes
     /// only: 0 to infinity.
@@ -71,8 +91,6 @@ pub struct Friction {
     pub normal: DVec3,
     /// Coefficient of friction.
     pub coefficient: f64,
-    /// Stiffness of sticking, N/m.
-    pub stiffness: f64,
     /// The way in the step that kinematic bodies add to that of the free ones, in the tangent
     /// plane, m.
     pub way: DVec3,
@@ -85,11 +103,8 @@ pub enum Resistance {
     Spring,
     /// As `Spring`: a contact of bodies that overlap deeply. What parts them is [`Row::parting`].
     Parting,
-    /// With the force under which it does not give way.
+    /// It does not give way.
     Rigid,
-    /// As `Rigid`: a motor that drives a velocity with a finite force. It may begin stalled, with
-    /// its greatest force.
-    Motor,
 }
 
 impl Row {
@@ -152,17 +167,9 @@ impl Row {
         };
         let sides = [side(0, contact.normal), side(1, -contact.normal)];
         let weight = Self::weight(&sides, free);
-        let friction = || {
-            let tangents = contact.normal.any_orthonormal_pair();
-            let weight = |t: DVec3| Self::weight(&[side(0, t), side(1, -t)], free);
-            Friction {
-                normal: contact.normal,
-                coefficient,
-                stiffness: 2.0 / ((weight(tangents.0) + weight(tangents.1)) * softness),
-                way: DVec3::ZERO,
-            }
-        };
+        let friction = Friction { normal: contact.normal, coefficient, way: DVec3::ZERO };
         (weight > 0.0).then(|| Self {
+            id: RowId::Contact([contact.instance_a, contact.instance_b], contact.feature.a),
             sides,
             arms: points.map(|point| point.map_or(DVec3::ZERO, |(_, arm)| arm)),
             gap: contact.distance,
@@ -170,7 +177,7 @@ impl Row {
             stiffness: 1.0 / (weight * softness),
             bounds: PUSHES,
             resistance: Resistance::Rigid,
-            friction: (coefficient > 0.0).then(friction),
+            friction: (coefficient > 0.0).then_some(friction),
         })
     }
 }
@@ -186,4 +193,23 @@ pub struct Bodies<'a> {
     pub free_of: &'a [Option<usize>],
     /// h² / κ, s².
     pub softness: f64,
+}
+
+/// The forces of the rows `before` for rows of the same ids, in the order in which these come.
+pub fn carry(before: &[Row], forces: &[RowForce], rows: &[Row]) -> Vec<RowForce> {
+    let ordered = |rows: &[Row]| {
+        let mut order: Vec<(RowId, usize)> = rows.iter().map(|row| row.id).zip(0..).collect();
+        order.sort_unstable();
+        order
+    };
+    let mut carried = vec![RowForce::default(); rows.len()];
+    let before = ordered(before);
+    let mut from = before.iter().peekable();
+    for (id, k) in ordered(rows) {
+        while from.next_if(|(other, _)| *other < id).is_some() {}
+        if let Some((_, other)) = from.next_if(|(other, _)| *other == id) {
+            carried[k] = forces[*other];
+        }
+    }
+    carried
 }

@@ -207,9 +207,10 @@ fn deep_overlap_is_removed_without_a_kick() {
         let report = engine.step(1e-3).unwrap();
         assert!(engine.system().states()[body].linear.length() < 1e-6);
         let now = 0.03 - engine.system().states()[body].pose.translation.z;
-        assert!(now <= depth + 1e-12, "{depth} {now}");
+        // A solution is off by less than 0.1 nm.
+        assert!(now <= depth + 1e-10, "{depth} {now}");
         // A step removes at most half of the depth, and at most 0.5 m/s.
-        assert!(depth - now <= (0.5 * depth).min(0.5e-3) + 1e-12, "{depth} {now}, {report:?}");
+        assert!(depth - now <= (0.5 * depth.max(0.0)).min(0.5e-3) + 1e-10, "{depth} {now}, {report:?}");
         depth = now;
     }
     assert!(depth < 1e-6, "{depth}");

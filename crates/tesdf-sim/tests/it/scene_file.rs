@@ -265,8 +265,8 @@ fn the_size_of_a_scene_is_bounded() {
             "line 3: duration: 90000000 steps of 2 bodies make a run of 18720000208 bytes; expected at most 17179869184",
         ),
         (
-            change("[record]", "[solver]\nmax_iterations = 1000000000\n[record]"),
-            "line 6: solver.max_iterations: 1000000000; expected 1 to 10000",
+            change("[record]", "[solver]\nredetections = 1000000000\n[record]"),
+            "line 6: solver.redetections: 1000000000; expected 0 to 8",
         ),
         (
             change("[record]", "[detector]\nmode = \"face\"\niterations = 1000000000\n[record]"),
