@@ -82,7 +82,7 @@ const COLD: Effort = Effort { iterations: 30, short_steps: 3, width: 0 };
 /// The same without friction: convex, so short steps pass.
 const CONVEX: Effort = Effort { iterations: 100, short_steps: u32::MAX, width: 0 };
 /// With lagged limits.
-const LAGGED: Effort = Effort { iterations: 50, short_steps: 3, width: 0 };
+const LAGGED: Effort = Effort { iterations: 50, short_steps: u32::MAX, width: 0 };
 
 /// Most corrections of fixed limits of friction.
 const CORRECTIONS: u32 = 4;
@@ -170,8 +170,8 @@ struct Slipping {
     share: [f64; 2],
     /// The decrease of the friction with the slip: xx, xy, yy.
     stiffness: [f64; 3],
-    /// Whether a is the least one.
-    is_least: bool,
+    /// The least a.
+    least: f64,
 }
 
 /// A change of all unknowns.
@@ -194,8 +194,6 @@ struct Aim<'a> {
     products: &'a [[f64; 2]],
     /// ν of friction.
     centre: f64,
-    /// The least a, m.
-    width: f64,
 }
 
 impl Interior<'_> {
@@ -461,7 +459,9 @@ impl<'a> Run<'a> {
                 Limits::Fixed(limits) => limits[k].max(f64::EPSILON * f64::EPSILON),
                 Limits::Coulomb | Limits::Lagged => slip.coefficient * row.force,
             };
-            let (least, path) = (width * slip.scale, self.centre / limit);
+            // A spring sticks as softly as it pushes.
+            let least = (width * slip.scale).max(0.5 * limit * line.compliance);
+            let path = self.centre / limit;
             let width = path.max(least);
             let length = (width * width + u[0] * u[0] + u[1] * u[1]).sqrt();
             let along = u.map(|u| u / length);
@@ -473,7 +473,7 @@ impl<'a> Run<'a> {
                 -0.5 * k * (share[0] * along[1] + share[1] * along[0]),
                 k * (1.0 - share[1] * along[1]),
             ];
-            Slipping { slip: u, limit, width, length, along, share, stiffness, is_least: path <= least }
+            Slipping { slip: u, limit, width, least, length, along, share, stiffness }
         });
         Local { residual, stiffness: 1.0 / softness, slip }
     }
@@ -517,10 +517,7 @@ impl<'a> Run<'a> {
                 local.stiffness * (products[0] / row.room[0] - products[1] / row.room[1] - local.residual);
             let friction = line.slip.as_ref().map_or([0.0; 2], |slip| {
                 let at = &local.slip;
-                let wider = match at.is_least {
-                    true => 0.0,
-                    false => (aim.centre / at.limit).max(aim.width * slip.scale) - at.width,
-                };
+                let wider = (aim.centre / at.limit).max(at.least) - at.width;
                 let follows = if is_coulomb { slip.coefficient * push } else { 0.0 };
                 let [k, wider] = [at.limit / (at.width + at.length), at.limit * wider / at.length];
                 [0, 1].map(|i| wider * at.share[i] - k * at.slip[i] - follows * at.along[i])
@@ -569,11 +566,10 @@ impl<'a> Run<'a> {
         factor: &Factor<'_>,
         momentum: &[Vector6<f64>],
         locals: &[Local],
-        width: f64,
         is_coulomb: bool,
     ) -> (Direction, f64, f64) {
         let direction = |products: &[[f64; 2]], centre: f64| {
-            self.direction(factor, momentum, locals, &Aim { products, centre, width }, is_coulomb)
+            self.direction(factor, momentum, locals, &Aim { products, centre }, is_coulomb)
         };
         let products: Vec<[f64; 2]> =
             self.rows.iter().zip(&self.of.lines).map(|(row, line)| row.products(line)).collect();
@@ -667,7 +663,7 @@ impl<'a> Run<'a> {
             let momentum = self.momentum();
             let Some(factor) = self.matrix(&locals, is_coulomb).factor() else { break };
             self.iterations += 1;
-            let (direction, step, centre) = self.next(&factor, &momentum, &locals, WIDTHS[width], is_coulomb);
+            let (direction, step, centre) = self.next(&factor, &momentum, &locals, is_coulomb);
             self.advance(&direction, step, &locals, &limits);
             self.centre = (self.centre + step * (centre - self.centre)).max(self.least);
             let way = self.of.way(&direction.velocity);
