@@ -83,12 +83,15 @@ def test_a_box_falls_and_lands(scene):
 def test_what_a_run_does_not_do_is_told(scene, tmp_path):
     simulation = tesdf.Simulation(scene)
     assert simulation.run()["warnings"] == [] and simulation.warnings == []
-    hasty = tmp_path / "hasty.toml"
-    hasty.write_text(SCENE + "[solver]\nmax_iterations = 1\n")
-    simulation = tesdf.Simulation(hasty)
-    (told,) = simulation.run()["warnings"]
-    assert (told["kind"], told["count"]) == ("not-converged", simulation.summary()["unconverged_steps"])
-    assert simulation.warnings == [told["message"]] and "did not converge" in told["message"]
+    # The lower side of the ceiling is 50 mm above the floor, too low for the box.
+    low = tmp_path / "low.toml"
+    ceiling = "shape = { box = { half_extents = [0.1, 0.1, 0.02] } }\nfixed = true\ntranslation = [0, 0, 0.07]\n"
+    low.write_text(SCENE + "[[bodies]]\nname = 'ceiling'\n" + ceiling)
+    simulation = tesdf.Simulation(low)
+    told = simulation.run()["warnings"]
+    overlap = told[0]
+    assert overlap["kind"] == "overlap" and overlap["value"] > 4e-3 and "box" in overlap["names"]
+    assert simulation.warnings == [warning["message"] for warning in told] and "at the end" in overlap["message"]
 
 
 def test_options(scene):

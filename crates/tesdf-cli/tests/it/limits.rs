@@ -46,8 +46,8 @@ fn scenes_over_a_limit_are_refused_with_key_and_line() {
         ),
         (
             "\n[[bodies]]\nname = \"floor\"",
-            "[solver]\nmax_iterations = 1000000000\n[[bodies]]\nname = \"floor\"",
-            "s.toml, line 5: solver.max_iterations: 1000000000; expected 1 to 10000",
+            "[solver]\nredetections = 1000000000\n[[bodies]]\nname = \"floor\"",
+            "s.toml, line 5: solver.redetections: 1000000000; expected 0 to 8",
         ),
     ] {
         assert!(DROP.contains(from));

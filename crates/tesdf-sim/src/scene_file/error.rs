@@ -27,7 +27,7 @@ pub enum SceneError {
         path: PathBuf,
         /// Line of the field, from 1; `None` when the file does not have the field.
         line: Option<usize>,
-        /// Name of the field, such as `solver.tolerance`.
+        /// Name of the field, such as `solver.skin`.
         key: String,
         /// What was found and what was expected.
         reason: String,
