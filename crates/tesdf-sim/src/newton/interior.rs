@@ -21,23 +21,18 @@
 //! an iteration that does not come to an end is done again with limits of friction that follow the
 //! iterates and then stay, a convex problem, and those are corrected a few times (lagged friction:
 //! Kaufman et al., *Staggered projections for frictional contact in multibody systems*, 2008).
-use nalgebra::{Matrix6, Vector6};
+mod iteration;
 
-use super::line::{Force, Line};
-use super::linear::{BlockMatrix, Factor, Pattern};
+use iteration::Run;
+use nalgebra::Vector6;
+
+use super::line::{Bodies, Force, Line, Slip};
+use super::linear::Pattern;
 
 /// Bodies and the rows between them.
 pub struct Interior<'a> {
-    pub inertia: &'a [Matrix6<f64>],
-    /// The inverses of `inertia`.
-    pub inverse: &'a [Matrix6<f64>],
-    /// Velocities without rows.
-    pub target: &'a [Vector6<f64>],
+    pub bodies: &'a Bodies,
     pub pattern: &'a Pattern,
-    /// s
-    pub time_step: f64,
-    /// The length at which a body's rotation counts as a way, m.
-    pub levers: &'a [f64],
     pub lines: Vec<&'a Line>,
 }
 
@@ -62,6 +57,16 @@ enum Limits {
     Lagged,
     /// These, in the units of the slips.
     Fixed(Vec<f64>),
+}
+
+impl Limits {
+    /// That of row `k` with this push.
+    fn of(&self, k: usize, slip: &Slip, push: f64) -> f64 {
+        match self {
+            Self::Fixed(limits) => limits[k].max(f64::EPSILON * f64::EPSILON),
+            Self::Coulomb | Self::Lagged => slip.coefficient * push,
+        }
+    }
 }
 
 /// How long a run tries.
@@ -91,23 +96,9 @@ const CORRECTIONS: u32 = 4;
 pub const LAG: f64 = 3e-3;
 /// m
 const STILL: f64 = 1e-8;
-/// Lagged limits stay once the root of ν is below this gap, m.
-const FREEZE: f64 = 1e-5;
 /// The corrections begin with this gap as the root of ν, m.
 const CORRECTED_FROM: f64 = 1e-6;
 
-/// An iterate is the solution when the last iteration moved no body by more than this, and leaves no
-/// more of a gap, m.
-const SETTLED: f64 = 1e-10;
-/// With friction, the forces are off by less than this way, and this share of the way without rows.
-const BALANCED: [f64; 2] = [1e-8, 1e-6];
-/// ν ends at the square of this gap, m, ...
-const LEAST_GAP: f64 = 1e-11;
-/// ... or below this multiple of it, 0.1 nm squared. A box at rest is 1e-16 m above its rigid place
-/// then, and nothing pushes it across a gap of nanometres.
-const FEW: f64 = 1e2;
-/// ν begins with the square of this multiple of the greatest gap that is to be closed.
-const FIRST: f64 = 3.0;
 /// From forces that are nearly right, ν begins with this multiple of what they are off.
 const FIRST_WARM: f64 = 10.0;
 /// The least gap as which they may be off, m.
@@ -118,89 +109,12 @@ const NEARLY: f64 = 1e-3;
 /// The least `a`, m: that with which the method converges, and that of the solution. The way by
 /// which a contact creeps in a step before it sticks.
 const WIDTHS: [f64; 2] = [1e-10, 1e-12];
-/// Most iterations with the second one.
-const FINE: u32 = 4;
-
-/// The least share of ν that an iteration aims at.
-const LEAST_CENTRING: f64 = 1e-6;
-/// A step that goes all the way to a bound is shortened by this share, and less where the predictor
-/// is nearly free of bounds.
-const SHORTER: f64 = 0.01;
-/// Steps below are short, and above long.
-const SHORT: f64 = 0.3;
-const LONG: f64 = 0.7;
-/// Gondzio's correction is taken where it lengthens the step by this factor.
-const LENGTHENS: f64 = 1.05;
-
-/// The state of a row.
-#[derive(Clone, Copy, Debug)]
-struct State {
-    force: f64,
-    /// How far the force is within each bound. Beside a bound, the difference would have no digits.
-    room: [f64; 2],
-    /// What a gap is beyond zero where the force is at the bound.
-    slack: [f64; 2],
-    friction: [f64; 2],
-}
-
-/// What an iteration knows of a row.
-#[derive(Clone, Copy, Debug, Default)]
-struct Local {
-    /// Gap and force that do not fit.
-    residual: f64,
-    /// The decrease of the force with the gap.
-    stiffness: f64,
-    slip: Slipping,
-}
-
-/// What an iteration knows of a friction.
-#[derive(Clone, Copy, Debug, Default)]
-struct Slipping {
-    /// u
-    slip: [f64; 2],
-    /// b
-    limit: f64,
-    /// a
-    width: f64,
-    /// r
-    length: f64,
-    /// u / r
-    along: [f64; 2],
-    /// −λ / b, at most 1.
-    share: [f64; 2],
-    /// The decrease of the friction with the slip: xx, xy, yy.
-    stiffness: [f64; 3],
-    /// The least a.
-    least: f64,
-}
-
-/// A change of all unknowns.
-struct Direction {
-    velocity: Vec<Vector6<f64>>,
-    rows: Vec<RowDirection>,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-struct RowDirection {
-    force: f64,
-    slack: [f64; 2],
-    /// The friction after a whole step, not its change.
-    friction: [f64; 2],
-}
-
-/// What a direction aims at.
-struct Aim<'a> {
-    /// For each bound of each row: the change of room × slack.
-    products: &'a [[f64; 2]],
-    /// ν of friction.
-    centre: f64,
-}
 
 impl Interior<'_> {
     /// The solution, from velocities and forces that may be nearly right.
     pub fn solve(&self, guess: Option<(Vec<Vector6<f64>>, Vec<Force>)>) -> Solution {
-        if self.lines.iter().all(|line| line.violation(self.target) == 0.0) {
-            let (velocity, forces) = (self.target.to_vec(), vec![Force::default(); self.lines.len()]);
+        if self.lines.iter().all(|line| line.violation(&self.bodies.target) == 0.0) {
+            let (velocity, forces) = (self.bodies.target.to_vec(), vec![Force::default(); self.lines.len()]);
             return Solution { velocity, forces, iterations: 0, converged: true, limits: Vec::new() };
         }
         let mut iterations = 0;
@@ -249,18 +163,25 @@ impl Interior<'_> {
         let way = |(v, lever): (&Vector6<f64>, &f64)| {
             v.fixed_rows::<3>(0).norm() + lever * v.fixed_rows::<3>(3).norm()
         };
-        self.time_step * velocity.iter().zip(self.levers).map(way).fold(0.0, greater)
+        self.bodies.time_step * velocity.iter().zip(&self.bodies.levers).map(way).fold(0.0, greater)
     }
 
     /// The way that this momentum gives, m.
     fn way_of_momentum(&self, momentum: &[Vector6<f64>]) -> f64 {
-        let rates: Vec<_> = self.inverse.iter().zip(momentum).map(|(inverse, p)| inverse * p).collect();
+        let rates: Vec<_> =
+            self.bodies.inverse.iter().zip(momentum).map(|(inverse, p)| inverse * p).collect();
         self.way(&rates)
     }
 
     /// The momentum that the motion without rows has more than `velocity`.
     fn lack(&self, velocity: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
-        self.inertia.iter().zip(self.target).zip(velocity).map(|((m, to), v)| m * (to - v)).collect()
+        self.bodies
+            .inertia
+            .iter()
+            .zip(&self.bodies.target)
+            .zip(velocity)
+            .map(|((m, to), v)| m * (to - v))
+            .collect()
     }
 
     /// The limits of friction that follow from the pushes.
@@ -289,11 +210,12 @@ impl Interior<'_> {
 
     /// The mean square of a gap of `gap` metres over all bounds, in the units of the rows.
     fn mean_square(&self, gap: f64) -> f64 {
-        let count = |line: &&Line| line.bounds.iter().filter(|bound| bound.is_finite()).count() as f64;
-        let (squares, bounds) = self.lines.iter().fold((0.0, 0.0), |(squares, bounds), line| {
-            (squares + count(line) * (gap * line.scale).powi(2), bounds + count(line))
-        });
-        if bounds > 0.0 { squares / bounds } else { 0.0 }
+        let square = |line: &&Line| line.count_bounds() as f64 * (gap * line.scale).powi(2);
+        self.lines.iter().map(square).sum::<f64>() / self.count_bounds().max(1) as f64
+    }
+
+    fn count_bounds(&self) -> usize {
+        self.lines.iter().map(|line| line.count_bounds()).sum()
     }
 
     /// How far velocities and forces are from a solution without friction's law, m.
@@ -311,7 +233,7 @@ impl Interior<'_> {
 
     /// ν for velocities and forces that are nearly right.
     fn centre_of(&self, velocity: &[Vector6<f64>], forces: &[Force]) -> f64 {
-        let bounded = self.lines.iter().zip(forces).filter(|(line, _)| line.is_bounded());
+        let bounded = self.lines.iter().zip(forces).filter(|(line, _)| line.count_bounds() > 0);
         let (products, count) = bounded.fold((0.0, 0.0), |(sum, count), (line, force)| {
             (sum + (line.at(velocity) * force.push).abs(), count + 1.0)
         });
@@ -322,377 +244,4 @@ impl Interior<'_> {
 /// The greater one, or NaN where one is.
 fn greater(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
-}
-
-/// Positive slack and room whose difference is `gap` and whose product is `centre`.
-fn on_path(gap: f64, centre: f64) -> [f64; 2] {
-    let root = (gap * gap + 4.0 * centre).sqrt();
-    let slack = if gap > 0.0 { 0.5 * (gap + root) } else { 2.0 * centre / (root - gap) };
-    [slack, centre / slack]
-}
-
-impl State {
-    /// The state at the gap `gap` with this ν. A row without bounds keeps the force `kept`.
-    fn new(line: &Line, gap: f64, centre: f64, kept: Force) -> Self {
-        let [low, high] = line.bounds;
-        let (force, room, slack) = match (low.is_finite(), high.is_finite()) {
-            (true, false) => {
-                let [slack, room] = on_path(gap, centre);
-                (low + room, [room, f64::INFINITY], [slack, 0.0])
-            }
-            (false, true) => {
-                let [slack, room] = on_path(-gap, centre);
-                (high - room, [f64::INFINITY, room], [0.0, slack])
-            }
-            (true, true) => {
-                // ν / (half + x) − ν / (half − x) = gap
-                let half = 0.5 * (high - low);
-                let root = centre + (centre * centre + (gap * half).powi(2)).sqrt();
-                let x = -gap * half * half / root;
-                // (half − |x|) (half + |x|) = 2 ν |x| / |gap|
-                let near = 2.0 * centre * half * half / root / (half + x.abs());
-                let room = if x < 0.0 { [near, half - x] } else { [half + x, near] };
-                (0.5 * (low + high) + x, room, room.map(|room| centre / room))
-            }
-            (false, false) => (kept.push, [f64::INFINITY; 2], [0.0; 2]),
-        };
-        Self { force, room, slack, friction: kept.friction }
-    }
-
-    /// Room × slack of each bound.
-    #[inline]
-    fn products(&self, line: &Line) -> [f64; 2] {
-        let of = |k: usize| if line.bounds[k].is_finite() { self.room[k] * self.slack[k] } else { 0.0 };
-        [of(0), of(1)]
-    }
-
-    /// The force that is reported. An open contact has none.
-    fn force(&self, line: &Line) -> Force {
-        let is_at = |k: usize| line.bounds[k].is_finite() && self.room[k] < self.slack[k];
-        match [is_at(0), is_at(1)] {
-            [true, _] => Force { push: line.bounds[0], friction: [0.0; 2] },
-            [_, true] => Force { push: line.bounds[1], friction: [0.0; 2] },
-            _ => Force { push: self.force, friction: self.friction },
-        }
-    }
-}
-
-/// An iterate.
-struct Run<'a> {
-    of: &'a Interior<'a>,
-    velocity: Vec<Vector6<f64>>,
-    rows: Vec<State>,
-    /// ν of friction.
-    centre: f64,
-    /// Number of factorisations so far.
-    iterations: u32,
-    /// Number of bounds.
-    bounds: f64,
-    /// ν at the end.
-    least: f64,
-}
-
-impl<'a> Run<'a> {
-    /// From velocities and forces that are nearly right.
-    fn from(of: &'a Interior<'a>, velocity: Vec<Vector6<f64>>, forces: &[Force], centre: f64) -> Self {
-        let state = |(line, force): (&&Line, &Force)| {
-            // Where only one bound is near, so that the force comes out again.
-            let kept = if line.bounds.iter().all(|bound| bound.is_finite()) { 0.0 } else { force.push };
-            State::new(line, line.at(&velocity) - kept, centre, *force)
-        };
-        let rows = of.lines.iter().zip(forces).map(state).collect();
-        let finite = of.lines.iter().flat_map(|line| line.bounds).filter(|bound| bound.is_finite());
-        let (bounds, least) = (finite.count() as f64, of.mean_square(LEAST_GAP));
-        Self { of, velocity, rows, centre, iterations: 0, bounds, least }
-    }
-
-    /// From the velocities that the springs of all rows would lead to.
-    fn cold(of: &'a Interior<'a>) -> Self {
-        let violations = of.lines.iter().map(|line| line.violation(of.target));
-        let greatest = violations.fold(0.0, f64::max);
-        let centre = f64::max((FIRST * greatest).powi(2), of.mean_square(LEAST_GAP));
-        let none = vec![Force::default(); of.lines.len()];
-        let mut matrix = BlockMatrix::symmetric(of.pattern, of.inertia.to_vec());
-        let mut momentum: Vec<_> = of.inertia.iter().zip(of.target).map(|(m, v)| m * v).collect();
-        for line in &of.lines {
-            let k = if line.is_bounded() { 1.0 } else { 1.0 / line.compliance };
-            let way = line.slip.as_ref().map_or([0.0; 2], |slip| slip.way);
-            line.act(-k * line.gap, way.map(|way| -way), &mut momentum);
-            match &line.slip {
-                Some(slip) => {
-                    matrix.add(&slip.sides, line.pair, &[[k, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-                }
-                None => matrix.add(&line.sides, line.pair, &[[k]]),
-            }
-        }
-        // The matrix is that of springs no stiffer than the masses, so it is definite.
-        let velocity = matrix.factor().map_or_else(|| of.target.to_vec(), |factor| factor.solve(&momentum));
-        Self { iterations: 1, ..Self::from(of, velocity, &none, centre) }
-    }
-
-    /// The mean of room × slack.
-    fn product(&self) -> f64 {
-        let products = self.rows.iter().zip(&self.of.lines).map(|(row, line)| row.products(line));
-        let sum = products.fold(0.0, |sum, [a, b]| sum + a + b);
-        if self.bounds > 0.0 { sum / self.bounds } else { 0.0 }
-    }
-
-    /// The momentum that velocities and forces leave.
-    fn momentum(&self) -> Vec<Vector6<f64>> {
-        let mut momentum = self.of.lack(&self.velocity);
-        for (line, row) in self.of.lines.iter().zip(&self.rows) {
-            line.act(row.force, row.friction, &mut momentum);
-        }
-        momentum
-    }
-
-    fn local(&self, k: usize, limits: &Limits, width: f64) -> Local {
-        let (line, row) = (self.of.lines[k], &self.rows[k]);
-        let gap = line.at(&self.velocity);
-        // Where a bound is infinite, the slack is zero.
-        let softness = line.compliance + row.slack[0] / row.room[0] + row.slack[1] / row.room[1];
-        let residual = gap + line.compliance * row.force - row.slack[0] + row.slack[1];
-        let slip = line.slip.as_ref().map_or(Slipping::default(), |slip| {
-            let [x, y] = slip.change(&self.velocity);
-            let u = [slip.way[0] + x, slip.way[1] + y];
-            let limit = match limits {
-                Limits::Fixed(limits) => limits[k].max(f64::EPSILON * f64::EPSILON),
-                Limits::Coulomb | Limits::Lagged => slip.coefficient * row.force,
-            };
-            // A spring sticks as softly as it pushes.
-            let least = (width * slip.scale).max(0.5 * limit * line.compliance);
-            let path = self.centre / limit;
-            let width = path.max(least);
-            let length = (width * width + u[0] * u[0] + u[1] * u[1]).sqrt();
-            let along = u.map(|u| u / length);
-            let size = row.friction[0].hypot(row.friction[1]).max(limit);
-            let share = row.friction.map(|friction| -friction / size);
-            let k = limit / (width + length);
-            let stiffness = [
-                k * (1.0 - share[0] * along[0]),
-                -0.5 * k * (share[0] * along[1] + share[1] * along[0]),
-                k * (1.0 - share[1] * along[1]),
-            ];
-            Slipping { slip: u, limit, width, least, length, along, share, stiffness }
-        });
-        Local { residual, stiffness: 1.0 / softness, slip }
-    }
-
-    fn matrix(&self, locals: &[Local], is_coulomb: bool) -> BlockMatrix<'a> {
-        let inertia = self.of.inertia.to_vec();
-        let mut matrix = match is_coulomb {
-            true => BlockMatrix::general(self.of.pattern, inertia),
-            false => BlockMatrix::symmetric(self.of.pattern, inertia),
-        };
-        for (line, Local { stiffness: d, slip: at, .. }) in self.of.lines.iter().zip(locals) {
-            match &line.slip {
-                Some(slip) => {
-                    let [xx, xy, yy] = at.stiffness;
-                    let follows = if is_coulomb { -slip.coefficient * d } else { 0.0 };
-                    let b =
-                        [[*d, 0.0, 0.0], [follows * at.along[0], xx, xy], [follows * at.along[1], xy, yy]];
-                    matrix.add(&slip.sides, line.pair, &b);
-                }
-                None => matrix.add(&line.sides, line.pair, &[[*d]]),
-            }
-        }
-        matrix
-    }
-
-    /// The change of all unknowns to an aim, for the present `momentum`.
-    fn direction(
-        &self,
-        factor: &Factor<'_>,
-        momentum: &[Vector6<f64>],
-        locals: &[Local],
-        aim: &Aim<'_>,
-        is_coulomb: bool,
-    ) -> Direction {
-        let mut momentum = momentum.to_vec();
-        // The changes of push and friction when the velocities stay.
-        let mut standing = Vec::with_capacity(self.rows.len());
-        for (k, (line, row)) in self.of.lines.iter().zip(&self.rows).enumerate() {
-            let (local, products) = (&locals[k], aim.products[k]);
-            let push =
-                local.stiffness * (products[0] / row.room[0] - products[1] / row.room[1] - local.residual);
-            let friction = line.slip.as_ref().map_or([0.0; 2], |slip| {
-                let at = &local.slip;
-                let wider = (aim.centre / at.limit).max(at.least) - at.width;
-                let follows = if is_coulomb { slip.coefficient * push } else { 0.0 };
-                let [k, wider] = [at.limit / (at.width + at.length), at.limit * wider / at.length];
-                [0, 1].map(|i| wider * at.share[i] - k * at.slip[i] - follows * at.along[i])
-            });
-            line.act(push, [friction[0] - row.friction[0], friction[1] - row.friction[1]], &mut momentum);
-            standing.push((push, friction));
-        }
-        let velocity = factor.solve(&momentum);
-        let of_row = |k: usize| {
-            let (line, local, row, (push, friction)) =
-                (self.of.lines[k], &locals[k], &self.rows[k], standing[k]);
-            let yields = local.stiffness * line.change(&velocity);
-            let force = push - yields;
-            let products = aim.products[k];
-            let slack = [
-                (products[0] - row.slack[0] * force) / row.room[0],
-                (products[1] + row.slack[1] * force) / row.room[1],
-            ];
-            let friction = line.slip.as_ref().map_or([0.0; 2], |slip| {
-                let ([x, y], [xx, xy, yy]) = (slip.change(&velocity), local.slip.stiffness);
-                let follows = if is_coulomb { slip.coefficient * yields } else { 0.0 };
-                let [u, v] = local.slip.along;
-                [friction[0] - xx * x - xy * y + follows * u, friction[1] - xy * x - yy * y + follows * v]
-            });
-            RowDirection { force, slack, friction }
-        };
-        Direction { rows: (0..self.rows.len()).map(of_row).collect(), velocity }
-    }
-
-    /// The greatest step at which all rooms and slacks are positive.
-    fn longest(&self, direction: &Direction) -> f64 {
-        let to_zero = |value: f64, change: f64| if change < 0.0 { -value / change } else { f64::INFINITY };
-        let of_row = |((row, change), line): ((&State, &RowDirection), &&Line)| {
-            let of_bound = |k: usize, force: f64| match line.bounds[k].is_finite() {
-                true => to_zero(row.slack[k], change.slack[k]).min(to_zero(row.room[k], force)),
-                false => f64::INFINITY,
-            };
-            of_bound(0, change.force).min(of_bound(1, -change.force))
-        };
-        self.rows.iter().zip(&direction.rows).zip(&self.of.lines).map(of_row).fold(f64::INFINITY, f64::min)
-    }
-
-    /// The direction of an iteration, how far to go along it, and ν of friction at its end.
-    fn next(
-        &self,
-        factor: &Factor<'_>,
-        momentum: &[Vector6<f64>],
-        locals: &[Local],
-        is_coulomb: bool,
-    ) -> (Direction, f64, f64) {
-        let direction = |products: &[[f64; 2]], centre: f64| {
-            self.direction(factor, momentum, locals, &Aim { products, centre }, is_coulomb)
-        };
-        let products: Vec<[f64; 2]> =
-            self.rows.iter().zip(&self.of.lines).map(|(row, line)| row.products(line)).collect();
-        let away: Vec<[f64; 2]> = products.iter().map(|now| now.map(|product| -product)).collect();
-        let predictor = direction(&away, self.least);
-        if self.bounds == 0.0 {
-            return (predictor, 1.0, self.centre);
-        }
-        let affine = self.longest(&predictor).min(1.0);
-        let product = self.product();
-        let centring = (1.0 - affine).powi(3).max(LEAST_CENTRING);
-        let centre = (centring * product).max(self.least).min(product.max(self.least));
-        let mut aims: Vec<[f64; 2]> = Vec::with_capacity(products.len());
-        for ((now, change), line) in products.iter().zip(&predictor.rows).zip(&self.of.lines) {
-            let aim = |k: usize, sign: f64| match line.bounds[k].is_finite() {
-                true => centre - now[k] - sign * change.slack[k] * change.force,
-                false => 0.0,
-            };
-            aims.push([aim(0, 1.0), aim(1, -1.0)]);
-        }
-        let mut corrected = direction(&aims, centre);
-        let mut longest = self.longest(&corrected);
-        if longest < 1.0 / LENGTHENS {
-            let farther = (1.5 * longest + 0.1).min(1.0);
-            for (((aims, row), change), line) in
-                aims.iter_mut().zip(&self.rows).zip(&corrected.rows).zip(&self.of.lines)
-            {
-                for (k, sign) in
-                    [(0, 1.0), (1, -1.0)].into_iter().filter(|&(k, _)| line.bounds[k].is_finite())
-                {
-                    let room = row.room[k] + farther * sign * change.force;
-                    let product = room * (row.slack[k] + farther * change.slack[k]);
-                    aims[k] += (product.clamp(0.1 * centre, 10.0 * centre) - product).max(-10.0 * centre);
-                }
-            }
-            let again = direction(&aims, centre);
-            let reach = self.longest(&again);
-            if reach.min(1.0) >= LENGTHENS * longest {
-                (corrected, longest) = (again, reach);
-            }
-        }
-        let shorter = SHORTER * (100.0 * (1.0 - affine)).clamp(1e-4, 1.0);
-        (corrected, ((1.0 - shorter) * longest).min(1.0), centre)
-    }
-
-    /// Goes along a direction.
-    fn advance(&mut self, direction: &Direction, step: f64, locals: &[Local], limits: &Limits) {
-        self.velocity.iter_mut().zip(&direction.velocity).for_each(|(v, change)| *v += step * change);
-        for (((row, change), line), local) in
-            self.rows.iter_mut().zip(&direction.rows).zip(&self.of.lines).zip(locals)
-        {
-            row.force += step * change.force;
-            row.room[0] += step * change.force;
-            row.room[1] -= step * change.force;
-            row.slack[0] += step * change.slack[0];
-            row.slack[1] += step * change.slack[1];
-            let Some(slip) = &line.slip else { continue };
-            let limit = match limits {
-                Limits::Fixed(_) => local.slip.limit,
-                Limits::Coulomb | Limits::Lagged => slip.coefficient * row.force,
-            };
-            row.friction = [0, 1].map(|k| row.friction[k] + step * (change.friction[k] - row.friction[k]));
-            let size = row.friction[0].hypot(row.friction[1]);
-            if size > limit {
-                row.friction = row.friction.map(|friction| friction * limit / size);
-            }
-        }
-    }
-
-    /// Iterates to the end.
-    fn descend(mut self, mut limits: Limits, effort: Effort) -> Solution {
-        let has_friction = self.of.has_friction();
-        let [freeze, few] = [self.of.mean_square(FREEZE), FEW * self.least];
-        let balanced = BALANCED[0] + BALANCED[1] * self.of.way(self.of.target);
-        let (mut width, mut short_steps, mut left) = (effort.width, 0, effort.iterations);
-        // The solution with the first width.
-        let mut coarse = None;
-        while left > 0 && short_steps < effort.short_steps {
-            left -= 1;
-            if matches!(limits, Limits::Lagged) && self.product() < freeze {
-                let forces: Vec<Force> =
-                    self.rows.iter().zip(&self.of.lines).map(|(row, line)| row.force(line)).collect();
-                limits = Limits::Fixed(self.of.limits(&forces));
-            }
-            let is_coulomb = has_friction && matches!(limits, Limits::Coulomb);
-            let locals: Vec<Local> =
-                (0..self.rows.len()).map(|k| self.local(k, &limits, WIDTHS[width])).collect();
-            for (row, local) in self.rows.iter_mut().zip(&locals) {
-                row.friction = local.slip.share.map(|share| -local.slip.limit * share);
-            }
-            let momentum = self.momentum();
-            let Some(factor) = self.matrix(&locals, is_coulomb).factor() else { break };
-            self.iterations += 1;
-            let (direction, step, centre) = self.next(&factor, &momentum, &locals, is_coulomb);
-            self.advance(&direction, step, &locals, &limits);
-            self.centre = (self.centre + step * (centre - self.centre)).max(self.least);
-            let way = self.of.way(&direction.velocity);
-            if !way.is_finite() {
-                break;
-            }
-            short_steps = if step < SHORT { short_steps + 1 } else { 0 };
-            let open = || {
-                let gaps = locals.iter().zip(&self.of.lines).map(|(l, line)| l.residual.abs() / line.scale);
-                gaps.fold(0.0, f64::max) * (1.0 - step)
-            };
-            let is_balanced = || !is_coulomb || self.of.way_of_momentum(&momentum) < balanced;
-            if step > LONG && way < SETTLED && open() < SETTLED && is_balanced() && self.product() <= few {
-                if !has_friction || width + 1 == WIDTHS.len() {
-                    return self.solution(&limits, true);
-                }
-                coarse = Some(self.solution(&limits, true));
-                (width, short_steps, left) = (width + 1, 0, FINE);
-            }
-        }
-        match coarse {
-            Some(coarse) => Solution { iterations: self.iterations, ..coarse },
-            None => self.solution(&limits, false),
-        }
-    }
-
-    fn solution(&self, limits: &Limits, converged: bool) -> Solution {
-        let limits = if let Limits::Fixed(limits) = limits { limits.clone() } else { Vec::new() };
-        let forces = self.rows.iter().zip(&self.of.lines).map(|(row, line)| row.force(line)).collect();
-        Solution { velocity: self.velocity.clone(), forces, iterations: self.iterations, converged, limits }
-    }
 }

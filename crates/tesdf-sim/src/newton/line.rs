@@ -58,19 +58,25 @@ pub struct Force {
     pub friction: [f64; 2],
 }
 
-/// The bodies of an island, and the step.
-#[derive(Clone, Copy, Debug)]
-pub struct Masses<'a> {
-    /// The inverses of their inertias.
-    pub inverse: &'a [Matrix6<f64>],
+/// The bodies of an island, in a step.
+#[derive(Clone, Debug)]
+pub struct Bodies {
+    /// Mass and inertia in the world frame, as [`FreeBody::inertia`](super::rows::FreeBody).
+    pub inertia: Vec<Matrix6<f64>>,
+    /// The inverses of `inertia`.
+    pub inverse: Vec<Matrix6<f64>>,
+    /// Velocities without rows.
+    pub target: Vec<Vector6<f64>>,
+    /// The length at which a body's rotation counts as a way, m.
+    pub levers: Vec<f64>,
     /// The duration of the step, s.
     pub time_step: f64,
 }
 
-impl Masses<'_> {
+impl Bodies {
     /// `1 / (h √w)`
-    fn scale(&self, weights: f64) -> f64 {
-        1.0 / (self.time_step * weights.sqrt())
+    fn scale(&self, weight: f64) -> f64 {
+        1.0 / (self.time_step * weight.sqrt())
     }
 
     /// `w`
@@ -80,10 +86,10 @@ impl Masses<'_> {
 }
 
 impl Line {
-    /// The line of `row` with this gap; the pattern is not known yet.
-    pub fn new(row: &Row, gap: f64, masses: &Masses<'_>) -> Self {
-        let scale = masses.scale(masses.weight(&row.sides));
-        let scaled = |j: Vector6<f64>, scale: f64| j * (masses.time_step * scale);
+    /// The line of `row` with this gap, whose two bodies are this pair of the pattern.
+    pub fn new(row: &Row, gap: f64, pair: Option<usize>, bodies: &Bodies) -> Self {
+        let scale = bodies.scale(bodies.weight(&row.sides));
+        let scaled = |j: Vector6<f64>, scale: f64| j * (bodies.time_step * scale);
         let slip = row.friction.map(|friction| {
             let tangents: [DVec3; 2] = friction.normal.any_orthonormal_pair().into();
             let side = |k: usize, t: DVec3| {
@@ -91,7 +97,7 @@ impl Line {
                 row.sides[k].map(|(body, _)| (body, sign * pack(t, row.arms[k].cross(t))))
             };
             let along = tangents.map(|t| [side(0, t), side(1, t)]);
-            let of_slip = masses.scale(along.iter().map(|sides| masses.weight(sides)).sum::<f64>() / 2.0);
+            let of_slip = bodies.scale(along.iter().map(|sides| bodies.weight(sides)).sum::<f64>() / 2.0);
             let sides = array::from_fn(|k| {
                 let ((body, normal), (_, x), (_, y)) = (row.sides[k]?, along[0][k]?, along[1][k]?);
                 Some((body, [scaled(normal, scale), scaled(x, of_slip), scaled(y, of_slip)]))
@@ -110,7 +116,7 @@ impl Line {
         };
         Self {
             sides: row.sides.map(|side| side.map(|(body, j)| (body, [scaled(j, scale)]))),
-            pair: None,
+            pair,
             gap: scale * gap,
             compliance,
             bounds: row.bounds.map(|force| force / scale),
@@ -119,9 +125,9 @@ impl Line {
         }
     }
 
-    /// Whether its force has a bound.
-    pub fn is_bounded(&self) -> bool {
-        self.bounds.iter().any(|bound| bound.is_finite())
+    /// Number of bounds of its force.
+    pub fn count_bounds(&self) -> usize {
+        self.bounds.iter().filter(|bound| bound.is_finite()).count()
     }
 
     /// The gap at the end of the step at these velocities.

@@ -3,21 +3,17 @@ use glam::DVec3;
 use nalgebra::{Matrix6, Vector6};
 
 use super::interior::Interior;
-use super::line::{Force, Line, Masses};
+use super::line::{Bodies, Force, Line};
 use super::linear::Pattern;
 use super::rows::{Resistance, Row, RowForce};
 
 /// Bodies, the rows between them, and the velocities without rows.
 #[derive(Debug)]
 pub struct Problem {
-    inertia: Vec<Matrix6<f64>>,
-    inverse: Vec<Matrix6<f64>>,
-    target: Vec<Vector6<f64>>,
-    levers: Vec<f64>,
+    bodies: Bodies,
     /// With their gaps.
     rows: Vec<(Row, f64)>,
     pattern: Pattern,
-    time_step: f64,
 }
 
 /// The solution of a problem.
@@ -69,7 +65,7 @@ impl Problem {
         let pattern = Pattern::new(inertia.len(), rows.iter().filter_map(|(row, _)| pair(row)).collect());
         let lever = |m: &Matrix6<f64>| LEVER * (m.fixed_view::<3, 3>(3, 3).trace() / m[(0, 0)]).sqrt();
         let levers = inertia.iter().map(lever).collect();
-        Self { inertia, inverse, target, levers, rows, pattern, time_step }
+        Self { bodies: Bodies { inertia, inverse, target, levers, time_step }, rows, pattern }
     }
 
     /// The problem whose contacts are springs.
@@ -85,16 +81,16 @@ impl Problem {
     /// Most contacts stay open, so it begins with those that are nearly closed. It is repeated with
     /// the others that its solution closes, until there are none.
     pub fn minimise(&self, start: Vec<Vector6<f64>>, guess: Option<&[RowForce]>) -> Minimum {
-        let gap = |(row, gap): &(Row, f64), v: &[Vector6<f64>]| gap + self.time_step * row.rate(v);
-        let change = |row: &(Row, f64)| (gap(row, &start) - gap(row, &self.target)).abs();
+        let Bodies { target, time_step, .. } = &self.bodies;
+        let gap = |(row, gap): &(Row, f64), v: &[Vector6<f64>]| gap + time_step * row.rate(v);
+        let change = |row: &(Row, f64)| (gap(row, &start) - gap(row, target)).abs();
         let of_all = NEAR_OF_ALL * self.rows.iter().map(change).fold(0.0, f64::max);
         let is_near = |row: &(Row, f64)| {
             !row.0.is_contact() || gap(row, &start) <= f64::max(NEAR * change(row), of_all)
         };
-        let masses = Masses { inverse: &self.inverse, time_step: self.time_step };
         let line = |(row, gap): &(Row, f64)| {
             let pair = pair(row).and_then(|(a, b)| self.pattern.pair(a, b));
-            Line { pair, ..Line::new(row, *gap, &masses) }
+            Line::new(row, *gap, pair, &self.bodies)
         };
         let near = |(k, row): (usize, &(Row, f64))| {
             let has_force = guess.is_some_and(|guess| guess[k].along != 0.0);
@@ -112,15 +108,8 @@ impl Problem {
         let mut iterations = 0;
         loop {
             let acting: Vec<usize> = (0..lines.len()).filter(|&k| lines[k].is_some()).collect();
-            let interior = Interior {
-                inertia: &self.inertia,
-                inverse: &self.inverse,
-                target: &self.target,
-                pattern: &self.pattern,
-                time_step: self.time_step,
-                levers: &self.levers,
-                lines: lines.iter().flatten().collect(),
-            };
+            let all = lines.iter().flatten().collect();
+            let interior = Interior { bodies: &self.bodies, pattern: &self.pattern, lines: all };
             let guessed = guess.map(|velocity| (velocity, acting.iter().map(|&k| forces[k]).collect()));
             let found = interior.solve(guessed);
             iterations += found.iterations;
@@ -129,7 +118,7 @@ impl Problem {
             for (to, row) in
                 lines.iter_mut().zip(&self.rows).filter(|(to, (row, _))| to.is_none() && !is_given(row))
             {
-                let [now, free] = [&found.velocity, &self.target].map(|v| gap(row, v));
+                let [now, free] = [&found.velocity, target].map(|v| gap(row, v));
                 if now < f64::max(NEAR * (now - free).abs(), CLOSED) {
                     *to = Some(line(row));
                 }
